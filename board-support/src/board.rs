@@ -1,0 +1,152 @@
+//! The board as one struct of named devices.
+
+use stm32f1xx_hal::{
+    gpio::{GpioExt, PinState},
+    pac,
+    rcc::{Enable, Rcc},
+};
+
+use crate::{
+    ClockSource, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
+    design::DIP_SETTLE_CYCLES, dip, rs485, uart::LineSettings,
+};
+
+/// The board's devices.
+pub struct Board {
+    /// What the core runs on.
+    pub clock: ClockSource,
+    /// Why the chip started: bit 0 low-power, 1 window watchdog, 2 independent watchdog, 3 software,
+    /// 4 power-on, 5 reset pin. A power-on sets the pin's bit as well (RM0008 7.3.10).
+    pub reset_cause: u8,
+    /// SW01 as a number 0 to 255.
+    pub dip: u8,
+    /// The lines of the slot.
+    pub slot: Slot,
+    /// The status LEDs, all off.
+    pub leds: Leds,
+    /// The scan's beat, not started.
+    pub scan_timer: ScanTimer,
+    /// The watchdog, not started.
+    pub watchdog: Watchdog,
+    /// The RS-485 line, off, with its driver disabled.
+    pub line: LineOff,
+}
+
+/// The RS-485 line before it is set up.
+pub struct LineOff {
+    usart: pac::USART1,
+    pins: rs485::Pins,
+    timer: pac::TIM2,
+    start_bit: pac::TIM1,
+    rcc: Rcc,
+}
+
+impl LineOff {
+    /// Sets the line up, with silences of `t15_ns` and `t35_ns` nanoseconds between frames, and
+    /// listens. `None` when the rate or the silences cannot be had from the clock: the line then
+    /// stays off.
+    #[must_use]
+    pub fn start(
+        mut self,
+        settings: LineSettings,
+        t15_ns: u32,
+        t35_ns: u32,
+    ) -> Option<(Rs485, GapTimer)> {
+        let rcc = &mut self.rcc;
+        let gap = GapTimer::new(self.timer, self.start_bit, settings, t15_ns, t35_ns, rcc)?;
+        let line = Rs485::new(self.usart, self.pins, settings, rcc)?;
+        Some((line, gap))
+    }
+}
+
+/// Brings the board up. Outputs of the slot are still floating, as after the reset.
+#[must_use]
+pub fn setup(device: pac::Peripherals) -> Board {
+    let reset_cause = take_reset_cause(&device.RCC);
+    let (mut rcc, clock) = clock::start(device.RCC, device.FLASH);
+
+    let mut a = device.GPIOA.split(&mut rcc);
+    let mut b = device.GPIOB.split(&mut rcc);
+    let mut c = device.GPIOC.split(&mut rcc);
+
+    // First of all the driver's pin, so that nothing gets on the bus.
+    let driver = a
+        .pa8
+        .into_push_pull_output_with_state(&mut a.crh, PinState::Low);
+    let rx = a.pa10.into_pull_up_input(&mut a.crh);
+
+    let mut sw = (
+        a.pa4.into_pull_up_input(&mut a.crl),
+        a.pa5.into_pull_up_input(&mut a.crl),
+        a.pa6.into_pull_up_input(&mut a.crl),
+        a.pa7.into_pull_up_input(&mut a.crl),
+        b.pb12.into_pull_up_input(&mut b.crh),
+        b.pb13.into_pull_up_input(&mut b.crh),
+        b.pb14.into_pull_up_input(&mut b.crh),
+        b.pb15.into_pull_up_input(&mut b.crh),
+    );
+    cortex_m::asm::delay(DIP_SETTLE_CYCLES);
+    let dip = dip::read([
+        &mut sw.0, &mut sw.1, &mut sw.2, &mut sw.3, &mut sw.4, &mut sw.5, &mut sw.6, &mut sw.7,
+    ]);
+
+    let leds = Leds::new(
+        b.pb8
+            .into_push_pull_output_with_state(&mut b.crh, PinState::Low),
+        b.pb9
+            .into_push_pull_output_with_state(&mut b.crh, PinState::Low),
+        c.pc13
+            .into_push_pull_output_with_state(&mut c.crh, PinState::High),
+    );
+
+    // A probe can read the log while the core sleeps.
+    device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
+    // TIM1 looks at PA10 through the alternate-function block, in its reset mapping.
+    pac::AFIO::enable(&mut rcc);
+
+    Board {
+        clock,
+        reset_cause,
+        dip,
+        slot: Slot {
+            line1: a.pa0,
+            line2: a.pa1,
+            line3: a.pa2,
+            line4: a.pa3,
+            cr: a.crl,
+        },
+        leds,
+        scan_timer: ScanTimer::new(device.TIM4, &mut rcc),
+        watchdog: Watchdog::new(device.IWDG, &device.DBGMCU),
+        line: LineOff {
+            usart: device.USART1,
+            pins: rs485::Pins {
+                driver,
+                tx: a.pa9,
+                rx,
+                cr: a.crh,
+            },
+            timer: device.TIM2,
+            start_bit: device.TIM1,
+            rcc,
+        },
+    }
+}
+
+/// Reads the reset flags and takes them back, so that the next start sees only its own.
+fn take_reset_cause(rcc: &pac::RCC) -> u8 {
+    let csr = rcc.csr().read();
+    let flags = [
+        csr.lpwrrstf().bit_is_set(),
+        csr.wwdgrstf().bit_is_set(),
+        csr.iwdgrstf().bit_is_set(),
+        csr.sftrstf().bit_is_set(),
+        csr.porrstf().bit_is_set(),
+        csr.pinrstf().bit_is_set(),
+    ];
+    rcc.csr().modify(|_, w| w.rmvf().set_bit());
+    flags
+        .into_iter()
+        .enumerate()
+        .fold(0, |cause, (bit, set)| cause | u8::from(set) << bit)
+}

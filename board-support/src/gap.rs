@@ -1,0 +1,100 @@
+//! From a line's silences to the settings of the frame-gap timer.
+//!
+//! The timer starts when the receiver raises its flag, which is some time before the character has
+//! left the line, and must run out no sooner than the silence asked for after its end.
+
+use crate::uart::LineSettings;
+
+/// Settings of a 16-bit up-counting timer in one-pulse mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GapTicks {
+    /// Prescaler register: the clock is divided by one more.
+    pub prescaler: u16,
+    /// Compare value: t1.5 after the character's end.
+    pub t15: u16,
+    /// Reload value: t3.5 after the character's end.
+    pub t35: u16,
+}
+
+impl GapTicks {
+    /// Settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock
+    /// in Hz. The coarsest tick is used that 16 bits need, and every time is rounded up.
+    ///
+    /// `None` when the silence is longer than any prescaler reaches (some minutes).
+    #[must_use]
+    pub const fn new(clock_hz: u32, line: LineSettings, t15_ns: u32, t35_ns: u32) -> Option<Self> {
+        let clock = clock_hz as u64;
+        if line.baud == 0 || clock == 0 {
+            return None;
+        }
+        let rest =
+            (clock * line.format.sixteenths_after_flag() as u64).div_ceil(16 * line.baud as u64);
+        let cycles = [
+            rest + (clock * t15_ns as u64).div_ceil(1_000_000_000),
+            rest + (clock * t35_ns as u64).div_ceil(1_000_000_000),
+        ];
+        let divider = cycles[1].div_ceil(0xFFFF);
+        if divider > 0x1_0000 {
+            return None;
+        }
+        let divider = if divider == 0 { 1 } else { divider };
+        Some(Self {
+            prescaler: (divider - 1) as u16,
+            t15: cycles[0].div_ceil(divider) as u16,
+            t35: cycles[1].div_ceil(divider) as u16,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::uart::Format;
+
+    /// The instant of a count after the character's end, in nanoseconds.
+    fn after_end(ticks: GapTicks, count: u16, line: LineSettings) -> i64 {
+        let divider = u64::from(ticks.prescaler) + 1;
+        let flag_to_end = u64::from(line.format.sixteenths_after_flag()) * 1_000_000_000
+            / (16 * u64::from(line.baud));
+        (u64::from(count) * divider * 1_000_000_000 / 72_000_000) as i64 - flag_to_end as i64
+    }
+
+    #[test]
+    fn the_silences_are_never_short_and_at_most_two_ticks_long() {
+        for (baud, t15, t35) in [
+            (1200, 13_750_000, 32_083_334),
+            (9600, 1_718_750, 4_010_417),
+            (115_200, 750_000, 1_750_000),
+            (921_600, 750_000, 1_750_000),
+            (9600, 1_718_750, 100_000_000),
+        ] {
+            for format in [Format::N2, Format::E1, Format::O1, Format::N1] {
+                let line = LineSettings { baud, format };
+                let ticks = GapTicks::new(72_000_000, line, t15, t35).unwrap();
+                let tick_ns = (i64::from(ticks.prescaler) + 1) * 1_000_000_000 / 72_000_000 + 1;
+                for (count, wanted) in [(ticks.t15, t15), (ticks.t35, t35)] {
+                    let over = after_end(ticks, count, line) - i64::from(wanted);
+                    assert!(
+                        (-1..=2 * tick_ns).contains(&over),
+                        "{line:?} {wanted}: {over} ns over"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let line = LineSettings {
+            baud: 0,
+            format: Format::N2,
+        };
+        assert_eq!(GapTicks::new(72_000_000, line, 1, 2), None);
+        let line = LineSettings::FACTORY;
+        assert_eq!(GapTicks::new(0, line, 1, 2), None);
+        assert!(
+            GapTicks::new(72_000_000, line, u32::MAX, u32::MAX).is_some(),
+            "4.3 s is fine"
+        );
+    }
+}

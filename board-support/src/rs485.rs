@@ -1,0 +1,182 @@
+//! The RS-485 line: USART1 with its transceiver's driver enable.
+//!
+//! Half duplex: while the unit sends, its receiver is off, so that it cannot take its own bytes for a
+//! request even where the transceiver's receiver stays on. The methods are what one interrupt needs,
+//! each a few instructions: [`Rs485::status`] is read once and says what the interrupt is about.
+
+use stm32f1xx_hal::{
+    gpio::{Input, Output, PA8, PA10, PinState, PullUp, PushPull},
+    pac,
+    rcc::{Enable, Rcc, Reset},
+};
+
+use crate::uart::{Format, LineSettings, divider};
+
+/// What the UART wants, as it was when [`Rs485::status`] read it.
+#[derive(Clone, Copy)]
+pub struct Status {
+    flags: u16,
+    /// CR1, whose interrupt enables stand at the places of their flags (RM0008 27.6.1, 27.6.4).
+    enables: u16,
+}
+
+/// A character from the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Character {
+    /// Its eight data bits.
+    pub byte: u8,
+    /// What was wrong with it: bit 0 parity, bit 1 framing (the stop bit was low), bit 2 noise (the
+    /// samples of a bit disagreed), bit 3 overrun (a character after it was lost).
+    pub faults: u8,
+}
+
+/// PE, FE, NE and ORE: as [`Character::faults`] has them.
+const FAULTS: u16 = 0b1111;
+const ORE: u16 = 1 << 3;
+const RXNE: u16 = 1 << 5;
+const TC: u16 = 1 << 6;
+const TXE: u16 = 1 << 7;
+
+impl Status {
+    /// A character is waiting to be [`read`](Rs485::read), or was lost.
+    #[must_use]
+    pub const fn received(self) -> bool {
+        self.flags & (RXNE | ORE) != 0
+    }
+
+    /// The next byte can be [sent](Rs485::send), and one is wanted.
+    #[must_use]
+    pub const fn wants_byte(self) -> bool {
+        self.flags & self.enables & TXE != 0
+    }
+
+    /// The last stop bit has left the unit.
+    #[must_use]
+    pub const fn sent(self) -> bool {
+        self.flags & self.enables & TC != 0
+    }
+}
+
+/// The pins of the line, before it is set up.
+pub(crate) struct Pins {
+    pub(crate) driver: PA8<Output<PushPull>>,
+    pub(crate) tx: stm32f1xx_hal::gpio::PA9,
+    pub(crate) rx: PA10<Input<PullUp>>,
+    pub(crate) cr: stm32f1xx_hal::gpio::Cr<'A', true>,
+}
+
+/// The line in use.
+pub struct Rs485 {
+    usart: pac::USART1,
+    driver: PA8<Output<PushPull>>,
+}
+
+impl Rs485 {
+    /// Sets the line up and turns the receiver on. `None` when the rate cannot be had from this
+    /// clock; the line then stays off.
+    pub(crate) fn new(
+        usart: pac::USART1,
+        mut pins: Pins,
+        settings: LineSettings,
+        rcc: &mut Rcc,
+    ) -> Option<Self> {
+        let divider = divider(rcc.clocks.pclk2().raw(), settings.baud)?;
+        pac::USART1::enable(rcc);
+        pac::USART1::reset(rcc);
+        usart.brr().write(|w| {
+            w.div_mantissa().set(divider >> 4);
+            w.div_fraction().set((divider & 0xF) as u8)
+        });
+        usart.cr2().write(|w| match settings.format {
+            Format::N2 => w.stop().stop2(),
+            Format::E1 | Format::O1 | Format::N1 => w.stop().stop1(),
+        });
+        usart.cr1().write(|w| {
+            // A parity bit is a ninth bit of the word (RM0008 27.3.7).
+            match settings.format {
+                Format::N2 | Format::N1 => w.m().m8().pce().disabled(),
+                Format::E1 => w.m().m9().pce().enabled().ps().even(),
+                Format::O1 => w.m().m9().pce().enabled().ps().odd(),
+            };
+            w.ue()
+                .enabled()
+                .te()
+                .enabled()
+                .re()
+                .enabled()
+                .rxneie()
+                .enabled()
+        });
+        // The transmitter is on and idles high before the pin becomes its output.
+        let _tx = pins.tx.into_alternate_push_pull(&mut pins.cr);
+        let _rx = pins.rx;
+        Some(Self {
+            usart,
+            driver: pins.driver,
+        })
+    }
+
+    /// What the UART wants.
+    #[inline]
+    #[must_use]
+    pub fn status(&self) -> Status {
+        Status {
+            flags: self.usart.sr().read().bits(),
+            enables: self.usart.cr1().read().bits(),
+        }
+    }
+
+    /// Takes the character that [`Status::received`] told of.
+    #[inline]
+    pub fn read(&mut self, status: Status) -> Character {
+        Character {
+            // The data register's ninth bit is the parity bit.
+            byte: self.usart.dr().read().bits() as u8,
+            faults: (status.flags & FAULTS) as u8,
+        }
+    }
+
+    /// Turns the driver on and sends the first byte of a response, with the receiver off.
+    pub fn start_sending(&mut self, first: u8) {
+        self.driver.set_state(PinState::High);
+        // Reading SR and then writing DR takes TC back (RM0008 27.6.1).
+        let _ = self.usart.sr().read();
+        self.usart.dr().write(|w| w.dr().set(u16::from(first)));
+        self.usart
+            .cr1()
+            .modify(|_, w| w.re().disabled().rxneie().disabled().txeie().enabled());
+    }
+
+    /// Sends the next byte.
+    #[inline]
+    pub fn send(&mut self, byte: u8) {
+        self.usart.dr().write(|w| w.dr().set(u16::from(byte)));
+    }
+
+    /// No byte is ready yet: asks no more until [`resume_sending`](Self::resume_sending).
+    pub fn pause_sending(&mut self) {
+        self.usart.cr1().modify(|_, w| w.txeie().disabled());
+    }
+
+    /// Bytes are ready again.
+    pub fn resume_sending(&mut self) {
+        self.usart.cr1().modify(|_, w| w.txeie().enabled());
+    }
+
+    /// The last byte was given to the UART: [`Status::sent`] will tell when it has left.
+    #[inline]
+    pub fn finish_sending(&mut self) {
+        self.usart
+            .cr1()
+            .modify(|_, w| w.txeie().disabled().tcie().enabled());
+    }
+
+    /// Turns the driver off and the receiver on, at once when [`Status::sent`] tells.
+    #[inline]
+    pub fn stop_sending(&mut self) {
+        self.driver.set_state(PinState::Low);
+        self.usart
+            .cr1()
+            .modify(|_, w| w.tcie().disabled().re().enabled().rxneie().enabled());
+    }
+}

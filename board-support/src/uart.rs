@@ -1,0 +1,116 @@
+//! What the line's UART has to be set to: character format and baud rate divider.
+
+use crate::design::BAUD_ERROR_PPM;
+
+/// How a character stands on the line. Every one has eight data bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Format {
+    /// No parity, two stop bits.
+    #[default]
+    N2,
+    /// Even parity, one stop bit.
+    E1,
+    /// Odd parity, one stop bit.
+    O1,
+    /// No parity, one stop bit.
+    N1,
+}
+
+impl Format {
+    /// Bits of a character on the line, start, parity and stop bits among them: 10 or 11.
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        match self {
+            Self::N2 | Self::E1 | Self::O1 => 11,
+            Self::N1 => 10,
+        }
+    }
+
+    /// Sixteenths of a bit from the receiver's interrupt to the end of the character.
+    ///
+    /// A stop bit is sampled in its middle, at the 10th sixteenth of it; the flag of a second stop
+    /// bit comes at the end of the first (RM0008 27.3.3).
+    #[must_use]
+    pub const fn sixteenths_after_flag(self) -> u32 {
+        match self {
+            Self::N2 => 16,
+            Self::E1 | Self::O1 | Self::N1 => 6,
+        }
+    }
+}
+
+/// Rate and format of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineSettings {
+    /// Bits per second.
+    pub baud: u32,
+    /// The character format.
+    pub format: Format,
+}
+
+impl LineSettings {
+    /// The factory setting, 9600 8N2, which is also the loader mode's.
+    pub const FACTORY: Self = Self {
+        baud: 9600,
+        format: Format::N2,
+    };
+}
+
+/// The baud rate register for a rate, at the UART's clock in Hz: the clock over the rate, in
+/// sixteenths of the oversampling (RM0008 27.3.4), rounded to the nearest.
+///
+/// `None` for a rate that cannot be had within [`BAUD_ERROR_PPM`].
+#[must_use]
+pub const fn divider(clock_hz: u32, baud: u32) -> Option<u16> {
+    if baud == 0 {
+        return None;
+    }
+    let divider = (clock_hz + baud / 2) / baud;
+    // Below 16 the integer part of the divider would be zero.
+    if divider < 16 || divider > u16::MAX as u32 {
+        return None;
+    }
+    let had = divider as u64 * baud as u64;
+    let error = had.abs_diff(clock_hz as u64) * 1_000_000 / clock_hz as u64;
+    if error <= BAUD_ERROR_PPM as u64 {
+        Some(divider as u16)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::{SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ};
+
+    #[test]
+    fn dividers_are_those_of_the_reference_manual() {
+        // RM0008 table 192, fPCLK = 72 MHz: 9.6 kbit/s 468.75, 115.2 kbit/s 39.0625.
+        assert_eq!(divider(72_000_000, 9600), Some(7500));
+        assert_eq!(divider(72_000_000, 115_200), Some(0x271));
+    }
+
+    #[test]
+    fn every_rate_of_the_map_can_be_had_on_both_clocks() {
+        for baud in [
+            1200, 2400, 4800, 9600, 19200, 38400, 57600, 115_200, 230_400, 460_800, 921_600,
+        ] {
+            for clock in [SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ] {
+                assert!(divider(clock, baud).is_some(), "{baud} at {clock}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rate_that_would_be_wrong_is_refused() {
+        assert_eq!(divider(72_000_000, 0), None);
+        assert_eq!(divider(72_000_000, 300), None, "the divider has 16 bits");
+        assert_eq!(
+            divider(72_000_000, 5_000_000),
+            None,
+            "no sixteen samples a bit"
+        );
+        assert_eq!(divider(8_000_000, 460_800), None, "2.1 % off");
+    }
+}

@@ -1,0 +1,103 @@
+//! ModIO-DO: four open-collector outputs for 5 to 30 V, 200 mA. A line driven high makes its
+//! transistor conduct.
+
+use embedded_hal::digital::{OutputPin, PinState};
+
+use crate::{CHANNELS, Channels, IoModule, Kind, ModuleError};
+
+/// Four digital outputs.
+#[derive(Debug)]
+pub struct Do4<P> {
+    lines: [P; CHANNELS],
+}
+
+impl<P: OutputPin> Do4<P> {
+    /// Takes over the four slot lines. The caller has made them outputs that drive low, so that no
+    /// output conducts before the first scan.
+    pub const fn new(lines: [P; CHANNELS]) -> Self {
+        Self { lines }
+    }
+}
+
+impl<P: OutputPin> IoModule for Do4<P> {
+    fn kinds(&self) -> [Kind; CHANNELS] {
+        [Kind::BitOutput; CHANNELS]
+    }
+
+    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
+        Ok(())
+    }
+
+    /// Drives every line every time, changed or not, so that no output stays wrong for longer than
+    /// a scan.
+    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+        let mut result = Ok(());
+        for (channel, line) in self.lines.iter_mut().enumerate() {
+            if line
+                .set_state(PinState::from(channels.bit(channel)))
+                .is_err()
+            {
+                result = Err(ModuleError::Line { channel });
+            }
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use embedded_hal_mock::eh1::MockError;
+    use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
+
+    use super::*;
+
+    fn line(levels: &[State]) -> Mock {
+        Mock::new(
+            &levels
+                .iter()
+                .map(|&l| Transaction::set(l))
+                .collect::<Vec<_>>(),
+        )
+    }
+
+    #[test]
+    fn every_line_follows_its_bit_at_every_scan() {
+        use State::{High, Low};
+        let mut module = Do4::new([
+            line(&[High, High, Low]),
+            line(&[Low, Low, High]),
+            line(&[Low, Low, Low]),
+            line(&[High, High, High]),
+        ]);
+        assert_eq!(module.kinds(), [Kind::BitOutput; 4]);
+        let mut channels = Channels::new();
+        channels.set_bit(0, true);
+        channels.set_bit(3, true);
+        module.drive_outputs(&channels).unwrap();
+        module.drive_outputs(&channels).unwrap();
+        channels.set_bit(0, false);
+        channels.set_bit(1, true);
+        module.drive_outputs(&channels).unwrap();
+        assert!(
+            channels.bit(1) && channels.bit(3),
+            "outputs are not changed by a scan"
+        );
+        module.lines.iter_mut().for_each(Mock::done);
+    }
+
+    #[test]
+    fn a_line_that_cannot_be_driven_is_named_and_the_others_are_driven() {
+        let failing = Mock::new(&[Transaction::set(State::Low)
+            .with_error(MockError::Io(std::io::ErrorKind::NotConnected))]);
+        let low = || line(&[State::Low]);
+        let mut module = Do4::new([failing, low(), low(), low()]);
+        assert_eq!(
+            module.drive_outputs(&Channels::new()),
+            Err(ModuleError::Line { channel: 0 })
+        );
+        module.lines.iter_mut().for_each(Mock::done);
+    }
+}
