@@ -1,0 +1,197 @@
+//! Decoding of request PDUs: quantities, byte counts, lengths and value forms, all of them
+//! exception 03, then the wrap at 16 bits (02). What the addresses mean is the model's business.
+
+use crate::{Bits, Exception, Function, Span, Words};
+
+/// The most bits one read may ask for (V1.1b3 6.1).
+const MAX_READ_BITS: u16 = 2000;
+/// The most words one read may ask for (V1.1b3 6.3).
+const MAX_READ_WORDS: u16 = 125;
+/// The most bits one write may hold (V1.1b3 6.11).
+const MAX_WRITE_BITS: u16 = 1968;
+/// The most words one write may hold (V1.1b3 6.12).
+const MAX_WRITE_WORDS: u16 = 123;
+
+/// Where the value of a single write lies, counted from the unit address.
+pub(crate) const SINGLE_FROM: u8 = 4;
+/// Where the values of a multiple write lie, counted from the unit address.
+pub(crate) const MULTIPLE_FROM: u8 = 7;
+
+/// A request whose form is right.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Request<'a> {
+    ReadBits(Span),
+    ReadWords(Span),
+    WriteBits {
+        span: Span,
+        bits: Bits<'a>,
+        from: u8,
+    },
+    WriteWords {
+        span: Span,
+        words: Words<'a>,
+        from: u8,
+    },
+}
+
+impl<'a> Request<'a> {
+    /// Decodes a request by its function code and the bytes after it.
+    ///
+    /// # Errors
+    /// The exception to answer with.
+    pub(crate) fn decode(function: u8, fields: &'a [u8]) -> Result<Self, Exception> {
+        match Function::from_code(function).ok_or(Exception::IllegalFunction)? {
+            Function::ReadCoils | Function::ReadDiscreteInputs => {
+                read(fields, MAX_READ_BITS).map(Self::ReadBits)
+            }
+            Function::ReadHoldingRegisters | Function::ReadInputRegisters => {
+                read(fields, MAX_READ_WORDS).map(Self::ReadWords)
+            }
+            Function::WriteSingleCoil => write_single_bit(fields),
+            Function::WriteSingleRegister => write_single_word(fields),
+            Function::WriteMultipleCoils => write_bits(fields),
+            Function::WriteMultipleRegisters => write_words(fields),
+        }
+    }
+}
+
+/// Address and quantity.
+fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
+    let &[address_hi, address_lo, quantity_hi, quantity_lo] = fields else {
+        return Err(Exception::IllegalDataValue);
+    };
+    span(
+        u16::from_be_bytes([address_hi, address_lo]),
+        u16::from_be_bytes([quantity_hi, quantity_lo]),
+        most,
+    )
+}
+
+/// Address and FF00 (on) or 0000 (off). The first value byte taken as packed bits is just that bit.
+fn write_single_bit(fields: &[u8]) -> Result<Request<'_>, Exception> {
+    let (&[hi, lo], value @ ([0x00, 0x00] | [0xFF, 0x00])) = single(fields)? else {
+        return Err(Exception::IllegalDataValue);
+    };
+    let span = Span::single(u16::from_be_bytes([hi, lo]));
+    Ok(Request::WriteBits {
+        span,
+        bits: Bits::new(value, 1),
+        from: SINGLE_FROM,
+    })
+}
+
+/// Address and value.
+fn write_single_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
+    let (&address, value) = single(fields)?;
+    let span = Span::single(u16::from_be_bytes(address));
+    Ok(Request::WriteWords {
+        span,
+        words: Words::new(value),
+        from: SINGLE_FROM,
+    })
+}
+
+/// The address and the value of a single write.
+fn single(fields: &[u8]) -> Result<(&[u8; 2], &[u8; 2]), Exception> {
+    let (address, value) = fields
+        .split_first_chunk()
+        .ok_or(Exception::IllegalDataValue)?;
+    let value = value.try_into().map_err(|_| Exception::IllegalDataValue)?;
+    Ok((address, value))
+}
+
+/// Address, quantity, byte count, packed bits.
+fn write_bits(fields: &[u8]) -> Result<Request<'_>, Exception> {
+    let (start, quantity, data) = multiple(fields)?;
+    if data.len() != usize::from(quantity.div_ceil(8)) {
+        return Err(Exception::IllegalDataValue);
+    }
+    let span = span(start, quantity, MAX_WRITE_BITS)?;
+    Ok(Request::WriteBits {
+        span,
+        bits: Bits::new(data, quantity),
+        from: MULTIPLE_FROM,
+    })
+}
+
+/// Address, quantity, byte count, words.
+fn write_words(fields: &[u8]) -> Result<Request<'_>, Exception> {
+    let (start, quantity, data) = multiple(fields)?;
+    if data.len() != usize::from(quantity) * 2 {
+        return Err(Exception::IllegalDataValue);
+    }
+    let span = span(start, quantity, MAX_WRITE_WORDS)?;
+    Ok(Request::WriteWords {
+        span,
+        words: Words::new(data),
+        from: MULTIPLE_FROM,
+    })
+}
+
+/// Address, quantity and data of a multiple write whose byte count is true.
+fn multiple(fields: &[u8]) -> Result<(u16, u16, &[u8]), Exception> {
+    let &[
+        address_hi,
+        address_lo,
+        quantity_hi,
+        quantity_lo,
+        byte_count,
+        ref data @ ..,
+    ] = fields
+    else {
+        return Err(Exception::IllegalDataValue);
+    };
+    if data.len() != usize::from(byte_count) {
+        return Err(Exception::IllegalDataValue);
+    }
+    Ok((
+        u16::from_be_bytes([address_hi, address_lo]),
+        u16::from_be_bytes([quantity_hi, quantity_lo]),
+        data,
+    ))
+}
+
+/// The span, after the checks of its quantity and then of its end.
+fn span(start: u16, quantity: u16, most: u16) -> Result<Span, Exception> {
+    if quantity == 0 || quantity > most {
+        return Err(Exception::IllegalDataValue);
+    }
+    Span::new(start, quantity).ok_or(Exception::IllegalDataAddress)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_hold_for_requests_too_long_for_a_frame() {
+        // 124 words with a true byte count: 259 bytes on an RTU line, but other lines may come.
+        let fields = |count: u8| {
+            let mut fields = [0; 5 + 248];
+            fields[3] = count;
+            fields[4] = count * 2;
+            fields
+        };
+        let decode = |fields: &[u8]| Request::decode(0x10, fields).map(|_| ());
+        assert_eq!(decode(&fields(124)), Err(Exception::IllegalDataValue));
+        assert_eq!(decode(&fields(123)[..5 + 246]), Ok(()));
+    }
+
+    #[test]
+    fn values_are_where_the_request_has_them() {
+        // Without the unit address and the function code.
+        let [single, multiple] = [SINGLE_FROM, MULTIPLE_FROM].map(|from| usize::from(from) - 2);
+        let fields = [0, 9, 0xFF, 0x00];
+        let Ok(Request::WriteWords { span, words, from }) = Request::decode(0x06, &fields) else {
+            panic!("function 06");
+        };
+        assert_eq!((span, usize::from(from) - 2), (Span::single(9), single));
+        assert!(words.iter().eq(Words::new(&fields[single..]).iter()));
+        let fields = [0, 9, 0, 2, 1, 0b10];
+        let Ok(Request::WriteBits { bits, from, .. }) = Request::decode(0x0F, &fields) else {
+            panic!("function 0F");
+        };
+        assert_eq!(usize::from(from) - 2, multiple);
+        assert!(bits.iter().eq([false, true]));
+    }
+}

@@ -1,0 +1,60 @@
+//! What a UART may report about one character.
+
+use core::ops::BitOr;
+
+/// The faults of one character, as a set. The bits are those in which the USARTs of the STM32
+/// report them (RM0008 27.6.1), so that a driver there can pass its status register through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Faults(u8);
+
+impl Faults {
+    /// A good character.
+    pub const NONE: Self = Self(0);
+    /// The parity bit is wrong.
+    pub const PARITY: Self = Self(1);
+    /// The stop bit is low.
+    pub const FRAMING: Self = Self(1 << 1);
+    /// The samples of a bit disagreed.
+    pub const NOISE: Self = Self(1 << 2);
+    /// A character before this one was lost, because it was not fetched in time.
+    pub const OVERRUN: Self = Self(1 << 3);
+
+    /// Bit 0 parity, 1 framing, 2 noise, 3 overrun; other bits are ignored.
+    #[inline]
+    pub const fn from_bits(bits: u8) -> Self {
+        Self(bits & 0x0F)
+    }
+
+    /// The bits as [`from_bits`](Self::from_bits) takes them.
+    #[inline]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// Whether all of `other` are among these.
+    #[inline]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+impl BitOr for Faults {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_four_bits_are_faults() {
+        assert_eq!(Faults::from_bits(0xF0), Faults::NONE);
+        assert_eq!(Faults::from_bits(0xFF).bits(), 0x0F);
+        let both = Faults::PARITY | Faults::OVERRUN;
+        assert_eq!(both, Faults::from_bits(0b1001));
+        assert!(both.contains(Faults::OVERRUN) && !both.contains(Faults::NOISE));
+    }
+}

@@ -1,0 +1,105 @@
+//! The silent times between characters and frames.
+
+/// Silent times in nanoseconds, measured from the end of a character's last stop bit.
+///
+/// A UART alone sees the end of a character, not the start of the next. Without help (a pin
+/// interrupt on the start bit) a gap above t1.5 is certain only when no character has ended for
+/// `t15 + character`, and a frame that is just going on at the limit can be told from one that has
+/// ended only at `t35 + character`.
+///
+/// ```text
+///   ___________            ___________
+///   character n|...gap....|     n + 1 |
+///              ^ end                  ^ end: gap = time between ends - character
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gaps {
+    /// t1.5: the longest silence allowed within a frame.
+    pub t15: u32,
+    /// t3.5: the shortest silence between frames.
+    pub t35: u32,
+    /// One character, start and stop bits included.
+    pub character: u32,
+}
+
+impl Gaps {
+    /// Above this rate the silent times no longer shrink, in bit/s (V1.02 2.5.1.1).
+    const FIXED_ABOVE: u32 = 19_200;
+    /// t1.5 above 19200 bit/s, in ns.
+    const FIXED_T15: u32 = 750_000;
+    /// t3.5 above 19200 bit/s, in ns.
+    const FIXED_T35: u32 = 1_750_000;
+
+    /// The times of the standard in nanoseconds, for `baud` in bit/s and characters of `bits` bits
+    /// in all (11, or 10 for 8N1). The length of a bit is rounded up, so that no silence is too
+    /// short.
+    ///
+    /// Made for 1200 bit/s and above; below 10 bit/s the times would not fit and stop at the
+    /// largest `u32`.
+    pub const fn standard(baud: u32, bits: u8) -> Self {
+        let bit = ns_per_bit(baud);
+        let half_character = bit.saturating_mul(bits as u32).div_ceil(2);
+        let (t15, t35) = if baud > Self::FIXED_ABOVE {
+            (Self::FIXED_T15, Self::FIXED_T35)
+        } else {
+            (
+                half_character.saturating_mul(3),
+                half_character.saturating_mul(7),
+            )
+        };
+        Self {
+            t15,
+            t35,
+            character: bit.saturating_mul(bits as u32),
+        }
+    }
+}
+
+/// The length of a bit in nanoseconds, rounded up.
+const fn ns_per_bit(baud: u32) -> u32 {
+    const SECOND: u32 = 1_000_000_000;
+    if baud == 0 {
+        u32::MAX
+    } else {
+        SECOND.div_ceil(baud)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn up_to_19200_they_follow_the_character() {
+        for (baud, bits) in [(1200, 11), (2400, 11), (9600, 11), (9600, 10), (19_200, 11)] {
+            let gaps = Gaps::standard(baud, bits);
+            let character = f64::from(bits) * 1e9 / f64::from(baud);
+            let about = |gap: u32, characters: f64| {
+                let excess = f64::from(gap) - characters * character;
+                (0.0..50.0).contains(&excess)
+            };
+            assert!(about(gaps.t15, 1.5), "{baud} {gaps:?}");
+            assert!(about(gaps.t35, 3.5), "{baud} {gaps:?}");
+            assert!(about(gaps.character, 1.0), "{baud} {gaps:?}");
+        }
+    }
+
+    #[test]
+    fn above_19200_they_are_fixed() {
+        for baud in [19_201, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600] {
+            let gaps = Gaps::standard(baud, 11);
+            assert_eq!((gaps.t15, gaps.t35), (750_000, 1_750_000));
+        }
+        assert_eq!(Gaps::standard(1_000_000, 10).character, 10_000);
+    }
+
+    #[test]
+    fn no_rate_makes_them_overflow() {
+        for baud in [0, 1, 9, u32::MAX] {
+            for bits in [0, 1, 255] {
+                let gaps = Gaps::standard(baud, bits);
+                assert!(gaps.t15 <= gaps.t35);
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Registers as a PDU holds them: 16 bits, high byte first (V1.1b3 4.2).
+
+use core::slice;
+
+/// The registers of a write request, in the order of their addresses.
+#[derive(Clone, Copy, Debug)]
+pub struct Words<'a> {
+    words: &'a [[u8; 2]],
+}
+
+impl<'a> Words<'a> {
+    /// The registers in `bytes`; an odd last byte is left out.
+    #[inline]
+    pub const fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            words: bytes.as_chunks().0,
+        }
+    }
+
+    /// How many registers.
+    #[inline]
+    pub const fn count(self) -> usize {
+        self.words.len()
+    }
+
+    /// The register `index` places after the first; `None` beyond the last.
+    #[inline]
+    pub fn get(self, index: u16) -> Option<u16> {
+        self.words
+            .get(usize::from(index))
+            .copied()
+            .map(u16::from_be_bytes)
+    }
+
+    /// The registers in order.
+    #[inline]
+    pub fn iter(self) -> impl ExactSizeIterator<Item = u16> + 'a {
+        self.words.iter().copied().map(u16::from_be_bytes)
+    }
+}
+
+/// Takes the registers of a read reply, in the order of their addresses.
+#[derive(Debug)]
+pub struct WordsOut<'a> {
+    slots: slice::IterMut<'a, [u8; 2]>,
+}
+
+impl<'a> WordsOut<'a> {
+    /// Room for as many registers as fit `bytes`.
+    #[inline]
+    pub fn new(bytes: &'a mut [u8]) -> Self {
+        Self {
+            slots: bytes.as_chunks_mut().0.iter_mut(),
+        }
+    }
+
+    /// Appends a register; more than there is room for are ignored.
+    #[inline]
+    pub fn push(&mut self, word: u16) {
+        if let Some(slot) = self.slots.next() {
+            *slot = word.to_be_bytes();
+        }
+    }
+
+    /// Sets what has not been pushed to 0, so that nothing old leaves the device.
+    pub(crate) fn finish(self) {
+        for slot in self.slots {
+            *slot = [0; 2];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_high_byte_comes_first_and_an_odd_byte_is_left_out() {
+        let words = Words::new(&[0x12, 0x34, 0x56, 0x78, 0x9A]);
+        assert!(words.iter().eq([0x1234, 0x5678]));
+        assert_eq!(
+            (words.count(), words.get(1), words.get(2)),
+            (2, Some(0x5678), None)
+        );
+    }
+
+    #[test]
+    fn what_is_pushed_too_much_or_too_little_does_no_harm() {
+        let mut bytes = [0xFF; 5];
+        let mut out = WordsOut::new(&mut bytes);
+        (0..3).for_each(|_| out.push(0x0102));
+        out.finish();
+        assert_eq!(bytes, [1, 2, 1, 2, 0xFF]);
+        let mut out = WordsOut::new(&mut bytes);
+        out.push(0x0304);
+        out.finish();
+        assert_eq!(bytes, [3, 4, 0, 0, 0xFF]);
+    }
+}

@@ -1,0 +1,206 @@
+//! The diagnostic counters (V1.02 appendix A), and the life of the buffers.
+
+mod common;
+
+use common::{Points, UNIT, Unit, frame, pdu};
+use modbus_server::rtu::{Faults, Receiver};
+use modbus_server::{Adu, Counters, Exception};
+
+fn unit() -> Unit {
+    Unit::new(Points::new(4, 4))
+}
+
+#[test]
+fn each_request_moves_the_counters_it_should() {
+    let mut unit = unit();
+    let mut expected = Counters::default();
+    let good = pdu(0x03, &[0, 1]);
+    let beyond = pdu(0x03, &[4, 1]);
+
+    unit.raw(&frame(UNIT, &good));
+    expected.bus_messages += 1;
+    expected.unit_messages += 1;
+    assert_eq!(unit.counters(), expected, "a good request");
+
+    unit.raw(&frame(UNIT, &beyond));
+    expected.bus_messages += 1;
+    expected.unit_messages += 1;
+    expected.exceptions += 1;
+    assert_eq!(unit.counters(), expected, "a refused one");
+
+    unit.raw(&frame(0, &pdu(0x06, &[0, 1])));
+    expected.bus_messages += 1;
+    expected.unit_messages += 1;
+    expected.no_response += 1;
+    assert_eq!(unit.counters(), expected, "a broadcast");
+
+    unit.raw(&frame(0, &beyond));
+    expected.bus_messages += 1;
+    expected.unit_messages += 1;
+    expected.no_response += 1;
+    expected.exceptions += 1;
+    assert_eq!(unit.counters(), expected, "a bad broadcast");
+
+    unit.raw(&frame(UNIT + 1, &good));
+    expected.bus_messages += 1;
+    assert_eq!(unit.counters(), expected, "another unit's");
+
+    unit.raw(&frame(UNIT, &good)[..7]);
+    expected.communication_errors += 1;
+    assert_eq!(unit.counters(), expected, "a truncated one");
+
+    for (state, nak, busy) in [
+        (Exception::ServerDeviceFailure, 0, 0),
+        (Exception::NegativeAcknowledge, 1, 0),
+        (Exception::ServerDeviceBusy, 0, 1),
+    ] {
+        unit.points.state = Some(state);
+        unit.raw(&frame(UNIT, &good));
+        expected.bus_messages += 1;
+        expected.unit_messages += 1;
+        expected.exceptions += 1;
+        expected.nak += nak;
+        expected.busy += busy;
+        assert_eq!(unit.counters(), expected, "{state:?}");
+    }
+
+    // On a broadcast neither was returned.
+    unit.points.state = Some(Exception::ServerDeviceBusy);
+    unit.raw(&frame(0, &pdu(0x06, &[0, 1])));
+    expected.bus_messages += 1;
+    expected.unit_messages += 1;
+    expected.no_response += 1;
+    expected.exceptions += 1;
+    assert_eq!(unit.counters(), expected, "a busy broadcast");
+}
+
+#[test]
+fn counters_wrap() {
+    let mut unit = unit();
+    for _ in 0..0x1_0002 {
+        unit.receiver.character(0, Faults::OVERRUN);
+        unit.receiver.t15();
+        unit.receiver.character(0, Faults::NONE);
+        assert_eq!(unit.silence(), None);
+        unit.must_answer();
+    }
+    let counters = unit.counters();
+    assert_eq!(counters.as_words(), [2, 2, 0, 2, 0, 0, 0, 2, 2]);
+}
+
+/// A receiver that has heard its first silence, and has no buffer.
+fn receiver() -> Receiver<'static> {
+    let mut receiver = Receiver::new(UNIT, false);
+    receiver.t35();
+    receiver
+}
+
+fn hear(receiver: &mut Receiver<'_>, bytes: &[u8]) {
+    bytes
+        .iter()
+        .for_each(|byte| receiver.character(*byte, Faults::NONE));
+}
+
+fn buffer() -> &'static mut Adu {
+    Box::leak(Box::default())
+}
+
+#[test]
+fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
+    let mut receiver = receiver();
+    let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
+    receiver.give_back(buffer());
+    hear(&mut receiver, &ours);
+    let first = receiver.t35().expect("it had a buffer").adu;
+
+    hear(&mut receiver, &ours);
+    assert!(receiver.t15().is_none());
+    assert!(receiver.t35().is_none());
+    assert_eq!(receiver.counters().dropped, 1);
+    // What would not have been served anyway is not counted as dropped.
+    hear(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
+    assert!(receiver.t35().is_none());
+    hear(&mut receiver, &ours[..7]);
+    assert!(receiver.t35().is_none());
+    hear(&mut receiver, &frame(UNIT, &[]));
+    assert!(receiver.t35().is_none());
+    hear(&mut receiver, &frame(UNIT, &[0x63; 300]));
+    assert!(receiver.t35().is_none());
+    receiver.character(UNIT, Faults::PARITY);
+    assert!(receiver.t35().is_none());
+    let line = *receiver.counters();
+    assert_eq!(
+        (line.dropped, line.bus_messages, line.communication_errors),
+        (1, 3, 4)
+    );
+
+    receiver.give_back(first);
+    hear(&mut receiver, &ours);
+    assert_eq!(
+        receiver.t35().expect("a buffer again").adu.as_slice(),
+        &ours[..6]
+    );
+
+    let counters = modbus_server::Server::new(UNIT).counters(&line);
+    assert_eq!((counters.busy, counters.no_response), (1, 1));
+}
+
+#[test]
+fn buffers_that_come_back_in_the_middle_of_a_frame_wait_for_the_next() {
+    let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
+    for at in 1..ours.len() {
+        let mut receiver = receiver();
+        hear(&mut receiver, &ours[..at]);
+        receiver.give_back(buffer());
+        receiver.give_back(buffer());
+        hear(&mut receiver, &ours[at..]);
+        assert!(receiver.t15().is_none());
+        assert!(receiver.t35().is_none());
+        assert_eq!(receiver.counters().dropped, 1);
+        for _ in 0..2 {
+            hear(&mut receiver, &ours);
+            assert_eq!(receiver.t35().expect("a buffer").adu.as_slice(), &ours[..6]);
+        }
+    }
+}
+
+#[test]
+fn two_requests_can_be_held_at_once() {
+    let mut receiver = receiver();
+    receiver.give_back(buffer());
+    receiver.give_back(buffer());
+    let [one, two] = [1, 2].map(|count| frame(UNIT, &pdu(0x03, &[0, count])));
+    hear(&mut receiver, &one);
+    let first = receiver.t35().expect("the first");
+    hear(&mut receiver, &two);
+    let second = receiver.t35().expect("the second");
+    assert_eq!(first.adu.as_slice(), &one[..6]);
+    assert_eq!(second.adu.as_slice(), &two[..6]);
+}
+
+#[test]
+fn frames_for_others_cost_no_buffer() {
+    let mut receiver = receiver();
+    receiver.give_back(buffer());
+    for _ in 0..5 {
+        hear(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
+        assert!(receiver.t35().is_none());
+    }
+    hear(&mut receiver, &frame(UNIT, &pdu(0x03, &[0, 1])));
+    assert!(receiver.t35().is_some());
+}
+
+#[test]
+fn a_third_buffer_does_not_disturb_a_frame() {
+    let mut receiver = receiver();
+    receiver.give_back(buffer());
+    receiver.give_back(buffer());
+    let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
+    hear(&mut receiver, &ours);
+    let first = receiver.t35().expect("the first").adu;
+    hear(&mut receiver, &ours[..3]);
+    receiver.give_back(first);
+    receiver.give_back(buffer());
+    hear(&mut receiver, &ours[3..]);
+    assert_eq!(receiver.t35().expect("whole").adu.as_slice(), &ours[..6]);
+}

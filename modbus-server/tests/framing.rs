@@ -1,0 +1,291 @@
+//! What makes a frame, and what spoils one (V1.02 2.4.2, 2.5.1). After everything that can go
+//! wrong, silence and then a good request must be answered.
+
+mod common;
+
+use common::{Points, UNIT, Unit, crc, frame, pdu};
+use modbus_server::rtu::{Faults, Receiver};
+
+fn unit() -> Unit {
+    Unit::new(Points::new(64, 64))
+}
+
+/// A read of one word.
+fn request() -> Vec<u8> {
+    frame(UNIT, &pdu(0x03, &[0, 1]))
+}
+
+/// Sends nothing but a frame that must be ignored and counted as an error.
+fn is_an_error(unit: &mut Unit, bytes: &[u8]) {
+    let before = unit.counters().communication_errors;
+    assert_eq!(unit.raw(bytes), None, "{bytes:02X?}");
+    assert_eq!(unit.counters().communication_errors, before + 1);
+    unit.must_answer();
+}
+
+#[test]
+fn every_single_bit_error_is_caught() {
+    let mut unit = unit();
+    let good = request();
+    for bit in 0..good.len() * 8 {
+        let mut bad = good.clone();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        is_an_error(&mut unit, &bad);
+    }
+    assert_eq!(unit.raw(&good).unwrap().len(), 7);
+}
+
+#[test]
+fn a_swapped_crc_is_bad() {
+    let mut swapped = request();
+    let len = swapped.len();
+    swapped.swap(len - 1, len - 2);
+    assert_ne!(swapped, request());
+    is_an_error(&mut unit(), &swapped);
+}
+
+#[test]
+fn an_unknown_function_with_a_bad_crc_is_not_answered() {
+    let mut bad = frame(UNIT, &[0x63, 0, 0]);
+    bad[2] ^= 1;
+    is_an_error(&mut unit(), &bad);
+}
+
+#[test]
+fn one_to_three_bytes_are_noise_even_with_a_good_crc() {
+    let mut unit = unit();
+    for noise in [&[0x00][..], &[0xFF], &[UNIT, 0x03], &[0x00, 0x00, 0x00]] {
+        is_an_error(&mut unit, noise);
+    }
+    let [low, high] = crc(&[UNIT]);
+    is_an_error(&mut unit, &[UNIT, low, high]);
+    // Two bytes that are a good CRC of nothing.
+    is_an_error(&mut unit, &[0xFF, 0xFF]);
+}
+
+#[test]
+fn four_bytes_are_a_frame() {
+    assert_eq!(unit().request(&[0x07]).unwrap(), [0x87, 0x01]);
+}
+
+#[test]
+fn a_frame_of_256_bytes_is_processed() {
+    let mut unit = unit();
+    let longest = [&[0x63][..], &[0x55; 252]].concat();
+    assert_eq!(frame(UNIT, &longest).len(), 256);
+    assert_eq!(unit.request(&longest).unwrap(), [0xE3, 0x01]);
+}
+
+#[test]
+fn longer_frames_are_dropped_up_to_the_next_silence() {
+    for len in [257, 258, 300, 512, 513, 1000, 70_000] {
+        let mut unit = unit();
+        let body = [&[UNIT, 0x63][..], &vec![0x55; len - 4]].concat();
+        let too_long = [&body[..], &crc(&body)].concat();
+        assert_eq!(too_long.len(), len);
+        is_an_error(&mut unit, &too_long);
+
+        // Even if a good request is the end of it.
+        let joined = [&vec![0x55; len][..], &request()].concat();
+        is_an_error(&mut unit, &joined);
+    }
+}
+
+#[test]
+fn requests_without_silence_between_them_are_both_lost() {
+    let joined = [request(), request()].concat();
+    is_an_error(&mut unit(), &joined);
+    let joined = [frame(UNIT + 1, &[0x03, 0, 0, 0, 1]), request()].concat();
+    is_an_error(&mut unit(), &joined);
+}
+
+#[test]
+fn a_stray_byte_costs_no_more_than_the_frame_it_joins() {
+    let joined = [&[0x00][..], &request()].concat();
+    is_an_error(&mut unit(), &joined);
+}
+
+#[test]
+fn a_truncated_frame_is_forgotten() {
+    let mut unit = unit();
+    for len in 1..request().len() {
+        is_an_error(&mut unit, &request()[..len]);
+    }
+}
+
+#[test]
+fn a_faulty_character_anywhere_spoils_its_frame() {
+    for faults in [
+        Faults::PARITY,
+        Faults::FRAMING,
+        Faults::NOISE,
+        Faults::OVERRUN,
+        Faults::PARITY | Faults::FRAMING,
+    ] {
+        for at in 0..request().len() {
+            let mut unit = unit();
+            for (index, byte) in request().into_iter().enumerate() {
+                let faults = if index == at { faults } else { Faults::NONE };
+                unit.receiver.character(byte, faults);
+            }
+            assert_eq!(unit.silence(), None);
+            let counters = unit.counters();
+            assert_eq!(
+                (counters.communication_errors, counters.bus_messages),
+                (1, 0)
+            );
+            assert_eq!(counters.overruns, u16::from(faults == Faults::OVERRUN));
+            unit.must_answer();
+        }
+    }
+}
+
+#[test]
+fn power_up_in_the_middle_of_traffic_waits_for_silence() {
+    let mut receiver = Receiver::new(UNIT, false);
+    receiver.give_back(Box::leak(Box::default()));
+    let mut hear = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .for_each(|b| receiver.character(*b, Faults::NONE))
+    };
+    hear(&request());
+    hear(&[0x00; 300]);
+    hear(&request());
+    assert!(receiver.t15().is_none());
+    receiver.character(0, Faults::FRAMING);
+    assert!(receiver.t35().is_none(), "this silence is the first");
+    assert_eq!(
+        *receiver.counters(),
+        Default::default(),
+        "nothing was heard"
+    );
+    request()
+        .iter()
+        .for_each(|byte| receiver.character(*byte, Faults::NONE));
+    assert!(receiver.t35().is_some());
+}
+
+#[test]
+fn silence_without_a_frame_is_nothing() {
+    let mut unit = unit();
+    for _ in 0..3 {
+        assert!(unit.receiver.t15().is_none());
+        assert!(unit.receiver.t35().is_none());
+    }
+    assert_eq!(*unit.receiver.counters(), Default::default());
+    unit.must_answer();
+}
+
+#[test]
+fn a_gap_above_t15_is_counted_and_tolerated() {
+    let mut unit = unit();
+    for (index, byte) in request().into_iter().enumerate() {
+        if index > 0 {
+            assert!(unit.receiver.t15().is_none());
+        }
+        unit.receiver.character(byte, Faults::NONE);
+    }
+    assert!(unit.silence().is_some());
+    assert_eq!(unit.counters().gaps, 7);
+    assert_eq!(unit.counters().bus_messages, 1);
+}
+
+#[test]
+fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
+    for at in 1..request().len() {
+        let mut unit = Unit::with(UNIT, true, Points::new(64, 64));
+        unit.characters(&request()[..at]);
+        assert!(unit.receiver.t15().is_none());
+        unit.characters(&request()[at..]);
+        assert_eq!(unit.silence(), None);
+        let counters = unit.counters();
+        assert_eq!((counters.gaps, counters.unit_messages), (1, 0));
+        // Its CRC was good.
+        assert_eq!(
+            (counters.bus_messages, counters.communication_errors),
+            (1, 0)
+        );
+        unit.must_answer();
+    }
+}
+
+#[test]
+fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
+    // A good write, and then more characters that make it a good frame of another kind.
+    let mut unit = unit();
+    let first = frame(UNIT, &pdu(0x06, &[1, 0x0BAD]));
+    unit.characters(&first);
+    let ahead = unit.receiver.t15().expect("complete as it stands");
+    assert_eq!(
+        ahead.as_slice(),
+        &first[..first.len() - 2],
+        "without its CRC"
+    );
+    assert_eq!(
+        unit.receiver.t15().expect("still").as_slice(),
+        &first[..first.len() - 2]
+    );
+    let whole = [&first[..], &[0x99]].concat();
+    let end = crc(&whole);
+    unit.characters(&[0x99]);
+    assert!(unit.receiver.t15().is_none());
+    unit.characters(&end);
+    let reply = unit.silence().expect("a good CRC");
+    assert_eq!(
+        reply[1..3],
+        [0x86, 0x03],
+        "the PDU is longer than function 06 has it"
+    );
+    assert_eq!(unit.points.words[1], 0, "what was seen at t1.5 is void");
+    assert_eq!(unit.counters().gaps, 2);
+}
+
+#[test]
+fn a_frame_of_256_bytes_can_be_seen_at_t15_and_go_on() {
+    let mut unit = unit();
+    unit.characters(&frame(UNIT, &[&[0x63][..], &[0x55; 252]].concat()));
+    assert_eq!(unit.receiver.t15().unwrap().len(), 254);
+    unit.characters(&[0]);
+    assert_eq!(unit.silence(), None);
+    assert_eq!(unit.counters().communication_errors, 1);
+    unit.must_answer();
+}
+
+#[test]
+fn t35_alone_closes_a_frame() {
+    let mut unit = unit();
+    unit.characters(&request());
+    let closed = unit.receiver.t35().expect("closed");
+    assert_eq!(closed.adu.as_slice(), &request()[..6]);
+    assert_eq!(closed.line.bus_messages, 1);
+}
+
+#[test]
+fn after_its_own_reply_the_unit_listens_at_once() {
+    let mut unit = unit();
+    unit.characters(&[0x55, 0x55]); // the echo of what it sent itself, if the receiver was late
+    unit.receiver.resume();
+    unit.must_answer();
+    assert_eq!(unit.counters().communication_errors, 0);
+}
+
+#[test]
+fn nothing_is_lent_at_t15_that_would_not_be_served_at_t35() {
+    let mut strict = Unit::with(UNIT, true, Points::new(64, 64));
+    strict.characters(&request()[..4]);
+    strict.receiver.t15();
+    strict.characters(&request()[4..]);
+    assert!(strict.receiver.t15().is_none(), "torn");
+    assert!(strict.receiver.t35().is_none());
+
+    let mut unit = unit();
+    unit.receiver.character(UNIT, Faults::PARITY);
+    unit.characters(&request()[1..]);
+    assert!(unit.receiver.t15().is_none(), "spoiled");
+    assert!(unit.receiver.t35().is_none());
+
+    unit.characters(&frame(UNIT + 1, &pdu(0x03, &[0, 1])));
+    assert!(unit.receiver.t15().is_none(), "another unit's");
+    assert!(unit.receiver.t35().is_none());
+}
