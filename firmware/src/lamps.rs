@@ -1,0 +1,157 @@
+//! What the status LEDs show, from what the device knows, every 10 ms.
+//!
+//! | LED | shows |
+//! |---|---|
+//! | running | blinks once a second |
+//! | activity | lights for 50 ms after a request for this unit |
+//! | fault | blinks five times in two seconds: SW01 is no unit address; steady: the slot's module fails or is none this firmware can drive; a short flash every two seconds: no crystal |
+
+use crate::start_up::Address;
+
+/// How often [`Lamps::tick`] is to be called, in milliseconds.
+pub const TICK_MS: u16 = 10;
+
+const PERIOD: u16 = 2000 / TICK_MS;
+const BLINK: u16 = 200 / TICK_MS;
+const RUN: u16 = 500 / TICK_MS;
+const FLASH: u16 = 100 / TICK_MS;
+const ACTIVITY: u8 = (50 / TICK_MS) as u8;
+
+/// The worst thing wrong, worst first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// SW01 shows no unit address: the line is not served.
+    NoAddress,
+    /// The slot's module fails, or is none this firmware can drive.
+    Module,
+    /// The crystal did not start: the clock is 1 % off at worst.
+    NoCrystal,
+    /// Nothing.
+    None,
+}
+
+impl Trouble {
+    /// What is known to be wrong from the start.
+    #[must_use]
+    pub const fn at_start(address: Address, module_drivable: bool, crystal: bool) -> Self {
+        match address {
+            Address::Invalid => Self::NoAddress,
+            _ if !module_drivable => Self::Module,
+            _ if !crystal => Self::NoCrystal,
+            _ => Self::None,
+        }
+    }
+
+    /// The worse of this and a failing module.
+    #[must_use]
+    pub const fn or_module(self, failing: bool) -> Self {
+        match self {
+            Self::NoCrystal | Self::None if failing => Self::Module,
+            _ => self,
+        }
+    }
+}
+
+/// Which LEDs are lit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lit {
+    /// The activity LED.
+    pub activity: bool,
+    /// The fault LED.
+    pub fault: bool,
+    /// The running LED.
+    pub run: bool,
+}
+
+/// The state of the LEDs' patterns.
+#[derive(Debug, Default)]
+pub struct Lamps {
+    tick: u16,
+    activity: u8,
+}
+
+impl Lamps {
+    /// Starts the patterns.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            tick: 0,
+            activity: 0,
+        }
+    }
+
+    /// What is lit for the next [`TICK_MS`]; `request` says that one has come since the last tick.
+    pub fn tick(&mut self, request: bool, trouble: Trouble) -> Lit {
+        self.activity = if request {
+            ACTIVITY
+        } else {
+            self.activity.saturating_sub(1)
+        };
+        let tick = self.tick;
+        self.tick = if tick + 1 < PERIOD { tick + 1 } else { 0 };
+        Lit {
+            activity: self.activity > 0,
+            fault: match trouble {
+                Trouble::NoAddress => tick / BLINK % 2 == 0,
+                Trouble::Module => true,
+                Trouble::NoCrystal => tick < FLASH,
+                Trouble::None => false,
+            },
+            run: tick / RUN % 2 == 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// Milliseconds lit and times switched on in two seconds.
+    fn measure(trouble: Trouble, led: fn(Lit) -> bool) -> (u16, usize) {
+        let mut lamps = Lamps::new();
+        let lit: Vec<bool> = (0..PERIOD)
+            .map(|_| led(lamps.tick(false, trouble)))
+            .collect();
+        let rises = (0..lit.len()).filter(|&i| lit[i] && !lit[(i + lit.len() - 1) % lit.len()]);
+        let count = lit.iter().filter(|&&on| on).count() as u16;
+        (count * TICK_MS, rises.count())
+    }
+
+    #[test]
+    fn each_trouble_has_its_own_pattern() {
+        assert_eq!(measure(Trouble::None, |l| l.fault), (0, 0));
+        assert_eq!(measure(Trouble::NoAddress, |l| l.fault), (1000, 5));
+        assert_eq!(measure(Trouble::Module, |l| l.fault), (2000, 0));
+        assert_eq!(measure(Trouble::NoCrystal, |l| l.fault), (100, 1));
+        assert_eq!(measure(Trouble::None, |l| l.run), (1000, 2));
+    }
+
+    #[test]
+    fn the_worst_trouble_is_shown() {
+        let unit = Address::Unit(1);
+        assert_eq!(Trouble::at_start(unit, true, true), Trouble::None);
+        assert_eq!(Trouble::at_start(unit, true, false), Trouble::NoCrystal);
+        assert_eq!(Trouble::at_start(unit, false, false), Trouble::Module);
+        assert_eq!(
+            Trouble::at_start(Address::Invalid, false, false),
+            Trouble::NoAddress
+        );
+        assert_eq!(Trouble::None.or_module(true), Trouble::Module);
+        assert_eq!(Trouble::NoCrystal.or_module(false), Trouble::NoCrystal);
+        assert_eq!(Trouble::NoAddress.or_module(true), Trouble::NoAddress);
+    }
+
+    #[test]
+    fn a_request_lights_the_activity_led_for_fifty_milliseconds() {
+        let mut lamps = Lamps::new();
+        assert!(!lamps.tick(false, Trouble::None).activity);
+        assert!(lamps.tick(true, Trouble::None).activity);
+        for _ in 0..4 {
+            assert!(lamps.tick(false, Trouble::None).activity);
+        }
+        assert!(!lamps.tick(false, Trouble::None).activity);
+    }
+}

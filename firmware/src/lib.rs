@@ -1,0 +1,10 @@
+//! The device's logic without its hardware: what the tasks of the application do, in a form that runs
+//! and is tested on the host.
+
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod alive;
+pub mod image;
+pub mod lamps;
+pub mod start_up;
