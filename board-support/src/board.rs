@@ -3,12 +3,12 @@
 use stm32f1xx_hal::{
     gpio::{GpioExt, PinState},
     pac,
-    rcc::{Enable, Rcc},
+    rcc::Enable,
 };
 
 use crate::{
-    ClockSource, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
-    design::DIP_SETTLE_CYCLES, dip, rs485, uart::LineSettings,
+    ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
+    design::DIP_SETTLE_CYCLES, dip, i2c::BusPins, rs485, uart::LineSettings, unique_id,
 };
 
 /// The board's devices.
@@ -20,8 +20,14 @@ pub struct Board {
     pub reset_cause: u8,
     /// SW01 as a number 0 to 255.
     pub dip: u8,
+    /// The chip's unique number, in the order of its addresses (RM0008 30.2).
+    pub unique_id: [u8; 12],
     /// The lines of the slot.
     pub slot: Slot,
+    /// The bus to the DAC of the analog-output modules, its pins floating until it is used.
+    pub dac: DacBus,
+    /// The pages that survive a power cycle.
+    pub flash: Flash,
     /// The status LEDs, all off.
     pub leds: Leds,
     /// The scan's beat, not started.
@@ -38,7 +44,8 @@ pub struct LineOff {
     pins: rs485::Pins,
     timer: pac::TIM2,
     start_bit: pac::TIM1,
-    rcc: Rcc,
+    clock: ClockSource,
+    rcc: pac::RCC,
 }
 
 impl LineOff {
@@ -52,9 +59,10 @@ impl LineOff {
         t15_ns: u32,
         t35_ns: u32,
     ) -> Option<(Rs485, GapTimer)> {
-        let rcc = &mut self.rcc;
-        let gap = GapTimer::new(self.timer, self.start_bit, settings, t15_ns, t35_ns, rcc)?;
-        let line = Rs485::new(self.usart, self.pins, settings, rcc)?;
+        let (clock, rcc) = (self.clock, &mut self.rcc);
+        let (timer, start_bit) = (self.timer, self.start_bit);
+        let gap = GapTimer::new(timer, start_bit, settings, t15_ns, t35_ns, clock, rcc)?;
+        let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
         Some((line, gap))
     }
 }
@@ -62,8 +70,9 @@ impl LineOff {
 /// Brings the board up. Outputs of the slot are still floating, as after the reset.
 #[must_use]
 pub fn setup(device: pac::Peripherals) -> Board {
-    let reset_cause = take_reset_cause(&device.RCC);
-    let (mut rcc, clock) = clock::start(device.RCC, device.FLASH);
+    let mut rcc = device.RCC;
+    let reset_cause = take_reset_cause(&rcc);
+    let clock = clock::start(&rcc, &device.FLASH);
 
     let mut a = device.GPIOA.split(&mut rcc);
     let mut b = device.GPIOB.split(&mut rcc);
@@ -103,20 +112,26 @@ pub fn setup(device: pac::Peripherals) -> Board {
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
     // TIM1 looks at PA10 through the alternate-function block, in its reset mapping.
     pac::AFIO::enable(&mut rcc);
+    pac::ADC1::enable(&mut rcc);
+    pac::I2C1::enable(&mut rcc);
 
     Board {
         clock,
         reset_cause,
         dip,
+        unique_id: unique_id::read(),
         slot: Slot {
             line1: a.pa0,
             line2: a.pa1,
             line3: a.pa2,
             line4: a.pa3,
             cr: a.crl,
+            adc: device.ADC1,
         },
+        dac: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
+        flash: Flash::new(device.FLASH),
         leds,
-        scan_timer: ScanTimer::new(device.TIM4, &mut rcc),
+        scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog: Watchdog::new(device.IWDG, &device.DBGMCU),
         line: LineOff {
             usart: device.USART1,
@@ -128,6 +143,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
             },
             timer: device.TIM2,
             start_bit: device.TIM1,
+            clock,
             rcc,
         },
     }

@@ -1,16 +1,11 @@
 //! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal
-//! does not start. The HAL would wait for a dead crystal for ever, so it is tried here first.
+//! does not start. The HAL would wait for a dead crystal, or a PLL that does not lock, for ever, and
+//! panics over frequencies it does not like; here every wait has an end and the frequencies are
+//! constants. While it runs on the crystal, the clock security system watches it (RM0008 7.2.7).
 
-use stm32f1xx_hal::{
-    flash::FlashExt,
-    pac,
-    rcc::{Config, Rcc, RccExt},
-    time::Hertz,
-};
+use stm32f1xx_hal::pac;
 
-use crate::design::{
-    ADCCLK_ON_HSE_HZ, HSE_HZ, HSE_READY_LOOKS, SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ,
-};
+use crate::design::{HSE_HZ, HSE_READY_LOOKS, PLL_READY_LOOKS, SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ};
 
 /// What the core runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,31 +22,98 @@ impl ClockSource {
     pub const fn is_crystal(self) -> bool {
         matches!(self, Self::Crystal)
     }
+
+    /// The core's clock in Hz, which is that of APB2 and of all timers as well.
+    #[must_use]
+    pub const fn core_hz(self) -> u32 {
+        match self {
+            Self::Crystal => SYSCLK_ON_HSE_HZ,
+            Self::Internal => SYSCLK_ON_HSI_HZ,
+        }
+    }
+
+    /// The clock of APB1 in Hz: half the core's.
+    #[must_use]
+    pub const fn apb1_hz(self) -> u32 {
+        self.core_hz() / 2
+    }
 }
 
-/// Brings the clocks up.
-pub(crate) fn start(rcc: pac::RCC, flash: pac::FLASH) -> (Rcc, ClockSource) {
-    let mut acr = flash.constrain().acr;
-    if crystal_starts(&rcc) {
-        let config = Config::hse(Hertz::from_raw(HSE_HZ))
-            .sysclk(Hertz::from_raw(SYSCLK_ON_HSE_HZ))
-            .pclk1(Hertz::from_raw(SYSCLK_ON_HSE_HZ / 2))
-            .adcclk(Hertz::from_raw(ADCCLK_ON_HSE_HZ));
-        (rcc.freeze(config, &mut acr), ClockSource::Crystal)
-    } else {
-        let config = Config::hsi()
-            .sysclk(Hertz::from_raw(SYSCLK_ON_HSI_HZ))
-            .pclk1(Hertz::from_raw(SYSCLK_ON_HSI_HZ / 2))
-            .adcclk(Hertz::from_raw(SYSCLK_ON_HSI_HZ / 6));
-        (rcc.freeze(config, &mut acr), ClockSource::Internal)
+/// PLLMUL for a multiple of the PLL's source: 0 for twice (RM0008 7.3.2).
+const fn multiplier(source_hz: u32, hz: u32) -> u8 {
+    assert!(hz.is_multiple_of(source_hz) && hz / source_hz >= 2 && hz / source_hz <= 16);
+    (hz / source_hz - 2) as u8
+}
+
+const ON_CRYSTAL: u8 = multiplier(HSE_HZ, SYSCLK_ON_HSE_HZ);
+/// The internal oscillator feeds the PLL at half its 8 MHz.
+const ON_INTERNAL: u8 = multiplier(4_000_000, SYSCLK_ON_HSI_HZ);
+
+/// Brings the clocks up, from wherever they are.
+pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH) -> ClockSource {
+    // Two wait states, for more than 48 MHz (RM0008 3.3.3), and the prefetch that makes up for them.
+    // SAFETY: two is a defined number of wait states.
+    flash
+        .acr()
+        .modify(|_, w| unsafe { w.latency().bits(2).prftbe().set_bit() });
+    to_internal_without_pll(rcc);
+    if crystal_starts(rcc) {
+        if pll_runs(rcc, ClockSource::Crystal) {
+            // From here on a crystal that fails raises the NMI.
+            rcc.cr().modify(|_, w| w.csson().set_bit());
+            return ClockSource::Crystal;
+        }
+        to_internal_without_pll(rcc);
+        rcc.cr().modify(|_, w| w.hseon().clear_bit());
     }
+    if !pll_runs(rcc, ClockSource::Internal) {
+        // Nothing outside the chip could cause this. Nothing else can be done about it either.
+        crate::restart();
+    }
+    ClockSource::Internal
+}
+
+/// As after a reset. A debugger or a boot loader may have left it otherwise, and the PLL takes its
+/// settings only while it is off.
+fn to_internal_without_pll(rcc: &pac::RCC) {
+    rcc.cr().modify(|_, w| w.hsion().set_bit());
+    looked(PLL_READY_LOOKS, || rcc.cr().read().hsirdy().bit_is_set());
+    rcc.cfgr().modify(|_, w| w.sw().hsi());
+    looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_hsi());
+    rcc.cr().modify(|_, w| w.pllon().clear_bit());
 }
 
 fn crystal_starts(rcc: &pac::RCC) -> bool {
     rcc.cr().modify(|_, w| w.hseon().set_bit());
-    let ready = (0..HSE_READY_LOOKS).any(|_| rcc.cr().read().hserdy().bit_is_set());
+    let ready = looked(HSE_READY_LOOKS, || rcc.cr().read().hserdy().bit_is_set());
     if !ready {
         rcc.cr().modify(|_, w| w.hseon().clear_bit());
     }
     ready
+}
+
+/// Sets the PLL and the dividers up for a source and goes over to it.
+fn pll_runs(rcc: &pac::RCC, source: ClockSource) -> bool {
+    rcc.cfgr().write(|w| {
+        match source {
+            // SAFETY: both multipliers are of four bits, by `multiplier`.
+            ClockSource::Crystal => unsafe {
+                w.pllsrc().hse_div_prediv().pllmul().bits(ON_CRYSTAL)
+            },
+            // SAFETY: as above.
+            ClockSource::Internal => unsafe { w.pllsrc().hsi_div2().pllmul().bits(ON_INTERNAL) },
+        };
+        w.ppre1().div2().adcpre().div6()
+    });
+    rcc.cr().modify(|_, w| w.pllon().set_bit());
+    if !looked(PLL_READY_LOOKS, || rcc.cr().read().pllrdy().bit_is_set()) {
+        return false;
+    }
+    rcc.cfgr().modify(|_, w| w.sw().pll());
+    looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_pll())
+}
+
+/// Looks up to `looks` times whether something is so.
+fn looked(looks: u32, mut is_so: impl FnMut() -> bool) -> bool {
+    (0..looks).any(|_| is_so())
 }

@@ -10,13 +10,55 @@ pub const SYSCLK_ON_HSE_HZ: u32 = 72_000_000;
 /// could be: they miss 921600 bit/s by 0.6 %, these miss it by 0.2 % as the crystal's 72 MHz do.
 pub const SYSCLK_ON_HSI_HZ: u32 = 60_000_000;
 
-/// ADC clock, in Hz: SYSCLK / 6, under the 14 MHz of DS5319 table 46.
+/// ADC clock, in Hz: SYSCLK / 6, under the 14 MHz of DS5319 table 46; 10 MHz without a crystal.
 pub const ADCCLK_ON_HSE_HZ: u32 = SYSCLK_ON_HSE_HZ / 6;
+
+/// Sampling time of an analog line, in half cycles of ADCCLK: 55.5, which with the 12.5 of the
+/// conversion itself makes 5.7 us at 12 MHz. Good for a source of 50 kOhm (DS5319 table 47); the
+/// module's weakest, the NTC under its 10 kOhm, has less than 10, so it settles within a quarter of a
+/// step even straight after another line at the other end of the range.
+pub const ADC_SAMPLE_HALF_CYCLES: u32 = 111;
+
+/// Wait for the ADC to settle after power-up, in us: 1 at most (DS5319 table 46), doubled.
+pub const ADC_SETTLING_US: u32 = 2;
+
+/// The longest wait for the ADC's calibration, in us: 83 cycles take 8 at 10 MHz (DS5319 table 46).
+pub const ADC_CALIBRATION_US: u32 = 100;
+
+/// SCL of the DAC's bus, in Hz. Standard mode, because nobody knows the pull-ups and the wires of the
+/// module in the slot, and a transfer of 13 bytes takes 1.5 ms in a task that has nothing better to
+/// do. Below 88 kHz, because above it the F103's repeated start comes too early (errata sheet of
+/// the medium-density parts, I2C, set-up time of a repeated start).
+pub const I2C_HZ: u32 = 80_000;
+
+/// The longest wait for one step on the DAC's bus, a byte or a condition, in us: twice the nine bits
+/// of a byte. Whoever stretches the clock for longer is taken to be stuck.
+pub const I2C_STEP_US: u32 = 2 * 9 * 1_000_000 / I2C_HZ;
+
+/// Half a period of SCL when the bus is clocked by hand, in us.
+pub const I2C_HALF_PERIOD_US: u32 = 6;
+
+/// The pages of the flash that keep what survives a power cycle: the last two of the smallest part,
+/// the 64 KiB one (DS5319 table 2). The linker keeps the program out of them.
+pub const STORE_PAGES: [u32; 2] = [0x0800_F800, 0x0800_FC00];
+
+/// A page of flash, in bytes (medium density, PM0075 2.1).
+pub const PAGE_BYTES: u32 = 1024;
+
+/// The longest wait for a half-word to be programmed, in us: 70 at most (DS5319 table 29).
+pub const FLASH_PROGRAM_US: u32 = 500;
+
+/// The longest wait for a page to be erased, in us: 40 ms at most (DS5319 table 29).
+pub const FLASH_ERASE_US: u32 = 100_000;
 
 /// How often a crystal's ready flag is looked at before it is given up. One look takes some ten
 /// cycles of the 8 MHz the chip starts on, so this is about 100 ms; a good crystal needs 2 ms
 /// (DS5319 table 22).
 pub const HSE_READY_LOOKS: u32 = 80_000;
+
+/// How often the PLL's ready flag, or a change of the system clock, is looked at: some 10 ms; the PLL
+/// locks within 200 us (DS5319 table 27).
+pub const PLL_READY_LOOKS: u32 = 8_000;
 
 /// Cycles from switching the pull-ups on to reading the DIP switch: 100 us for 40 kOhm against any
 /// stray capacitance.
@@ -29,6 +71,17 @@ pub const SCAN_HZ: u32 = 1_000;
 /// (DS5319 table 25), so it bites between 333 and 667 ms.
 pub const WATCHDOG_MS: u32 = 500;
 
+/// What the watchdog's clock, the LSI, is divided by before it counts (RM0008 19.4.2): steps of
+/// 0.2 ms.
+pub const WATCHDOG_DIVIDER: u32 = 8;
+
+/// The watchdog's reload value (RM0008 19.4.3).
+pub const WATCHDOG_RELOAD: u16 = (WATCHDOG_MS * 40 / WATCHDOG_DIVIDER - 1) as u16;
+
+/// The longest wait for the watchdog to take its settings over, in us: five cycles of the slowest LSI
+/// are 170 (RM0008 19.4.4), and it has to start first, 85 (DS5319 table 25).
+pub const WATCHDOG_SETTINGS_US: u32 = 1_000;
+
 /// The largest error of a baud rate the divider may leave, in parts per million. A character of 11
 /// bits is sampled right up to 4.5 % of difference; both ends and their crystals share it.
 pub const BAUD_ERROR_PPM: u32 = 5_000;
@@ -36,5 +89,17 @@ pub const BAUD_ERROR_PPM: u32 = 5_000;
 const _: () = {
     assert!(SYSCLK_ON_HSE_HZ.is_multiple_of(HSE_HZ));
     assert!(ADCCLK_ON_HSE_HZ <= 14_000_000);
-    assert!(SYSCLK_ON_HSE_HZ.is_multiple_of(SCAN_HZ) && SYSCLK_ON_HSI_HZ.is_multiple_of(SCAN_HZ));
+    assert!(ADCCLK_ON_HSE_HZ > SYSCLK_ON_HSI_HZ / 6);
+    // The scan timer divides by two and counts the rest with 16 bits.
+    assert!(
+        SYSCLK_ON_HSE_HZ.is_multiple_of(2 * SCAN_HZ) && SYSCLK_ON_HSE_HZ / 2 / SCAN_HZ <= 65_536
+    );
+    assert!(SYSCLK_ON_HSI_HZ.is_multiple_of(2 * SCAN_HZ));
+    assert!(
+        WATCHDOG_MS * 40 / WATCHDOG_DIVIDER <= 4096,
+        "the watchdog counts with 12 bits"
+    );
+    assert!(I2C_HZ <= 88_000);
+    assert!(STORE_PAGES[0] + PAGE_BYTES == STORE_PAGES[1]);
+    assert!(STORE_PAGES[1] + PAGE_BYTES == 0x0801_0000);
 };

@@ -1,8 +1,48 @@
-//! Reading the flash the program runs from.
+//! The flash: what the program is in, and the two pages at its end that keep what survives a power
+//! cycle (RM0008 3.3, PM0075 2.3).
+//!
+//! An operation stalls every fetch from flash, and with it every handler there: 40 to 70 us for a
+//! half-word, 20 to 40 ms for a page. Every one unlocks the controller, checks, and locks it again,
+//! whatever comes of it.
+
+use core::ptr;
+
+use cortex_m::asm;
+use stm32f1xx_hal::pac;
+
+use crate::{
+    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PAGE_BYTES, STORE_PAGES},
+    wait::within_us,
+};
 
 /// Where the flash of the smallest part ends: 64 KiB (DS5319 table 2).
 const END: u32 = 0x0801_0000;
 const START: u32 = 0x0800_0000;
+/// What unlocks the controller (PM0075 2.3.1).
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+
+const ERASED: u16 = 0xFFFF;
+
+/// A page's bytes.
+pub type Page = [u8; PAGE_BYTES as usize];
+
+/// Why an operation was refused or failed. The address is the one that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlashError {
+    /// Not on the [store's pages](STORE_PAGES), or not at the start of a half-word or page. A mistake
+    /// of the caller's.
+    Address(u32),
+    /// The half-word is not erased, and only 0 can be programmed over what it holds. Erase first.
+    NotErased(u32),
+    /// The page is write-protected by the option bytes. Only a programmer can change that.
+    Protected(u32),
+    /// The controller cannot be unlocked before the next reset.
+    Locked,
+    /// The operation did not end in time; it may have been done or not.
+    Timeout(u32),
+    /// What was programmed or erased does not read back: the page is worn out.
+    Worn(u32),
+}
 
 /// `N` bytes at an address, or `None` when they are not all in the first 64 KiB.
 #[must_use]
@@ -13,5 +53,141 @@ pub fn read<const N: usize>(address: u32) -> Option<[u8; N]> {
     }
     // SAFETY: the range was just checked to be flash, which is always readable and never written
     // while this runs. Volatile, because a programmer may have changed what the linker placed here.
-    Some(unsafe { core::ptr::read_volatile(address as *const [u8; N]) })
+    Some(unsafe { ptr::read_volatile(address as *const [u8; N]) })
+}
+
+/// The store's pages, and the controller that changes them.
+pub struct Flash {
+    flash: pac::FLASH,
+}
+
+/// What the controller is to do.
+#[derive(Clone, Copy)]
+enum Mode {
+    Program,
+    Erase,
+}
+
+impl Flash {
+    pub(crate) fn new(flash: pac::FLASH) -> Self {
+        Self { flash }
+    }
+
+    /// The bytes of one of the [store's pages](STORE_PAGES); `None` for any other address.
+    #[must_use]
+    pub fn page(&self, address: u32) -> Option<&Page> {
+        // SAFETY: a page of flash is readable at any time, of bytes, and changed by nothing but this
+        // value's `&mut` methods, which the borrow keeps from being called. Those end in a barrier
+        // that the compiler takes as a change of any memory.
+        STORE_PAGES
+            .contains(&address)
+            .then(|| unsafe { &*(address as *const Page) })
+    }
+
+    /// Programs an erased half-word, or any with 0.
+    ///
+    /// # Errors
+    ///
+    /// All of [`FlashError`].
+    pub fn program_half_word(&mut self, address: u32, half: u16) -> Result<(), FlashError> {
+        let [first, last] = STORE_PAGES;
+        if !(first..last + PAGE_BYTES).contains(&address) || !address.is_multiple_of(2) {
+            return Err(FlashError::Address(address));
+        }
+        let place = address as *mut u16;
+        // SAFETY: the address was just checked to be that of a half-word of flash.
+        let read = || unsafe { ptr::read_volatile(place) };
+        if read() != ERASED && half != 0 {
+            return Err(FlashError::NotErased(address));
+        }
+        self.operate(Mode::Program, address, FLASH_PROGRAM_US, |_| {
+            // SAFETY: a half-word of the store, of which no reference is alive (`&mut self`); with PG
+            // set a store of 16 bits is how flash is programmed (PM0075 2.3.3).
+            unsafe { ptr::write_volatile(place, half) };
+        })?;
+        if read() == half {
+            Ok(())
+        } else {
+            Err(FlashError::Worn(address))
+        }
+    }
+
+    /// Erases a page.
+    ///
+    /// # Errors
+    ///
+    /// All of [`FlashError`] but `NotErased`.
+    pub fn erase_page(&mut self, address: u32) -> Result<(), FlashError> {
+        if !STORE_PAGES.contains(&address) {
+            return Err(FlashError::Address(address));
+        }
+        self.operate(Mode::Erase, address, FLASH_ERASE_US, |flash| {
+            // SAFETY: the address is that of one of the store's pages, which no code is on.
+            flash.ar().write(|w| unsafe { w.far().bits(address) });
+            flash.cr().modify(|_, w| w.strt().set_bit());
+        })?;
+        let erased = (address..address + PAGE_BYTES)
+            .step_by(4)
+            // SAFETY: words of the page, which is readable and aligned.
+            .all(|word| unsafe { ptr::read_volatile(word as *const u32) } == u32::MAX);
+        if erased {
+            Ok(())
+        } else {
+            Err(FlashError::Worn(address))
+        }
+    }
+
+    /// Does an operation with the controller unlocked and set up for it, within a bounded time, and
+    /// locks it again.
+    fn operate(
+        &mut self,
+        mode: Mode,
+        address: u32,
+        bound_us: u32,
+        act: impl FnOnce(&pac::FLASH),
+    ) -> Result<(), FlashError> {
+        let flash = &self.flash;
+        self.unlock()?;
+        // What an earlier operation left: these are taken back by writing 1.
+        flash.sr().write(|w| {
+            w.eop().set_bit();
+            w.pgerr().set_bit().wrprterr().set_bit()
+        });
+        flash.cr().modify(|_, w| match mode {
+            Mode::Program => w.pg().set_bit(),
+            Mode::Erase => w.per().set_bit(),
+        });
+        act(flash);
+        let done = within_us(bound_us, || flash.sr().read().bsy().bit_is_clear());
+        let status = flash.sr().read();
+        // Every mode bit off, and locked.
+        flash.cr().write(|w| w.lock().set_bit());
+        // The bytes behind references taken from now on may be others.
+        asm::dsb();
+        if status.wrprterr().bit_is_set() {
+            Err(FlashError::Protected(address))
+        } else if !done {
+            Err(FlashError::Timeout(address))
+        } else if status.pgerr().bit_is_set() {
+            Err(FlashError::NotErased(address))
+        } else {
+            Ok(())
+        }
+    }
+
+    fn unlock(&self) -> Result<(), FlashError> {
+        let locked = || self.flash.cr().read().lock().bit_is_set();
+        // The keys of an open controller would jam it.
+        if locked() {
+            for key in KEYS {
+                // SAFETY: the two keys in their order are what the register takes.
+                self.flash.keyr().write(|w| unsafe { w.key().bits(key) });
+            }
+        }
+        if locked() {
+            Err(FlashError::Locked)
+        } else {
+            Ok(())
+        }
+    }
 }

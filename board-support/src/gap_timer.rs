@@ -8,10 +8,10 @@
 
 use stm32f1xx_hal::{
     pac,
-    rcc::{BusTimerClock, Enable, Rcc, Reset},
+    rcc::{Enable, Reset},
 };
 
-use crate::{gap::GapTicks, uart::LineSettings};
+use crate::{ClockSource, gap::GapTicks, uart::LineSettings};
 
 /// What the timer's interrupt is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,10 +39,10 @@ impl GapTimer {
         line: LineSettings,
         t15_ns: u32,
         t35_ns: u32,
-        rcc: &mut Rcc,
+        clock: ClockSource,
+        rcc: &mut pac::RCC,
     ) -> Option<Self> {
-        let clock = pac::TIM2::timer_clock(&rcc.clocks).raw();
-        let ticks = GapTicks::new(clock, line, t15_ns, t35_ns)?;
+        let ticks = GapTicks::new(clock.core_hz(), line, t15_ns, t35_ns)?;
         pac::TIM2::enable(rcc);
         pac::TIM2::reset(rcc);
         timer.psc().write(|w| w.psc().set(ticks.prescaler));

@@ -3,14 +3,20 @@
 //! [`setup`](board::setup) brings the clocks up, reads the DIP switch and returns one
 //! [`Board`](board::Board) whose fields are the devices. This is the only crate that names the HAL; a
 //! port to another board is a new module beside [`board`]. What needs no hardware ([`design`],
-//! [`uart`], [`gap`]) is built and tested on the host.
+//! [`uart`], [`gap`], the logic of [`fault`] and of freeing an I2C bus) is built and tested on the
+//! host.
 
 #![no_std]
 
 pub mod design;
+pub mod fault;
 pub mod gap;
+#[cfg(any(target_os = "none", test))]
+mod i2c;
 pub mod uart;
 
+#[cfg(target_os = "none")]
+mod adc;
 #[cfg(target_os = "none")]
 pub mod board;
 #[cfg(target_os = "none")]
@@ -26,20 +32,38 @@ mod leds;
 #[cfg(target_os = "none")]
 mod rs485;
 #[cfg(target_os = "none")]
+mod safe;
+#[cfg(target_os = "none")]
 mod scan_timer;
 #[cfg(target_os = "none")]
 mod slot;
+#[cfg(target_os = "none")]
+pub mod stack;
+#[cfg(target_os = "none")]
+mod unique_id;
+#[cfg(target_os = "none")]
+mod wait;
 #[cfg(target_os = "none")]
 mod watchdog;
 
 #[cfg(target_os = "none")]
 pub use {
+    adc::{AdcError, AnalogInputs},
     clock::ClockSource,
+    flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},
+    i2c::{DacBus, DacBusError, Held},
     leds::Leds,
     rs485::{Character, Rs485, Status},
+    safe::outputs_off,
     scan_timer::ScanTimer,
-    slot::{Slot, SlotInput, SlotOutput},
+    slot::{AnalogLines, Slot, SlotInput, SlotOutput},
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };
+
+/// Starts the device over: a reset by software, which makes every pin a floating input at once.
+#[cfg(target_os = "none")]
+pub fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}

@@ -7,10 +7,13 @@
 use stm32f1xx_hal::{
     gpio::{Input, Output, PA8, PA10, PinState, PullUp, PushPull},
     pac,
-    rcc::{Enable, Rcc, Reset},
+    rcc::{Enable, Reset},
 };
 
-use crate::uart::{Format, LineSettings, divider};
+use crate::{
+    ClockSource,
+    uart::{Format, LineSettings, divider},
+};
 
 /// What the UART wants, as it was when [`Rs485::status`] read it.
 #[derive(Clone, Copy)]
@@ -78,9 +81,10 @@ impl Rs485 {
         usart: pac::USART1,
         mut pins: Pins,
         settings: LineSettings,
-        rcc: &mut Rcc,
+        clock: ClockSource,
+        rcc: &mut pac::RCC,
     ) -> Option<Self> {
-        let divider = divider(rcc.clocks.pclk2().raw(), settings.baud)?;
+        let divider = divider(clock.core_hz(), settings.baud)?;
         pac::USART1::enable(rcc);
         pac::USART1::reset(rcc);
         usart.brr().write(|w| {

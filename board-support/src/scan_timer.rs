@@ -2,35 +2,42 @@
 
 use stm32f1xx_hal::{
     pac,
-    rcc::Rcc,
-    timer::{CounterHz, Event, Timer},
+    rcc::{Enable, Reset},
 };
 
-use crate::design::SCAN_HZ;
+use crate::{ClockSource, design::SCAN_HZ};
 
 /// The scan's timer.
 pub struct ScanTimer {
-    counter: CounterHz<pac::TIM4>,
+    timer: pac::TIM4,
 }
 
 impl ScanTimer {
-    pub(crate) fn new(timer: pac::TIM4, rcc: &mut Rcc) -> Self {
-        Self {
-            counter: Timer::new(timer, rcc).counter_hz(),
-        }
+    pub(crate) fn new(timer: pac::TIM4, clock: ClockSource, rcc: &mut pac::RCC) -> Self {
+        pac::TIM4::enable(rcc);
+        pac::TIM4::reset(rcc);
+        // Half the clock fits 16 bits; the design constants see to that and to whole numbers.
+        timer.psc().write(|w| w.psc().set(1));
+        let ticks = clock.core_hz() / 2 / SCAN_HZ;
+        timer.arr().write(|w| w.arr().set((ticks - 1) as u16));
+        Self { timer }
     }
 
     /// Starts the beat: an interrupt every millisecond.
     pub fn start(&mut self) {
-        // Cannot fail: the design constants give a prescaler and a reload of 16 bits on both clocks.
-        let _ = self
-            .counter
-            .start(stm32f1xx_hal::time::Hertz::from_raw(SCAN_HZ));
-        self.counter.listen(Event::Update);
+        // The update by software loads the prescaler; its flag is no beat.
+        self.timer.egr().write(|w| w.ug().update());
+        self.timer.sr().write(|w| w.uif().clear_bit());
+        self.timer.dier().write(|w| w.uie().enabled());
+        self.timer.cr1().write(|w| w.cen().enabled());
     }
 
     /// Whether a beat has come since the last call.
     pub fn take_beat(&mut self) -> bool {
-        self.counter.wait().is_ok()
+        let beat = self.timer.sr().read().uif().bit_is_set();
+        if beat {
+            self.timer.sr().write(|w| w.uif().clear_bit());
+        }
+        beat
     }
 }

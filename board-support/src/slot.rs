@@ -8,13 +8,26 @@ use stm32f1xx_hal::{
     pac,
 };
 
-/// The four lines, floating as after a reset until one of the methods is called.
+use crate::AnalogInputs;
+
+/// The four lines, floating as after a reset until one of the methods is called. A module that needs
+/// none of them, or one that is not there, leaves them so.
 pub struct Slot {
     pub(crate) line1: PA0<Input<Floating>>,
     pub(crate) line2: PA1<Input<Floating>>,
     pub(crate) line3: PA2<Input<Floating>>,
     pub(crate) line4: PA3<Input<Floating>>,
     pub(crate) cr: Cr<'A', false>,
+    pub(crate) adc: pac::ADC1,
+}
+
+/// How many of the slot's lines are analog inputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnalogLines {
+    /// Lines 1 and 2.
+    Two,
+    /// All four.
+    Four,
 }
 
 /// A slot line as an input with pull-up. The HAL's own type of one type for all four looks its pin up
@@ -50,6 +63,36 @@ impl Slot {
         self.line3.into_push_pull_output_with_state(cr, low);
         self.line4.into_push_pull_output_with_state(cr, low);
         LINES.map(SlotOutput)
+    }
+
+    /// Lines 1 and 2 as inputs with pull-ups, lines 3 and 4 as outputs that drive low from their first
+    /// instant.
+    #[must_use]
+    pub fn into_relay(mut self) -> ([SlotInput; 2], [SlotOutput; 2]) {
+        let (cr, low) = (&mut self.cr, PinState::Low);
+        self.line1.into_pull_up_input(cr);
+        self.line2.into_pull_up_input(cr);
+        self.line3.into_push_pull_output_with_state(cr, low);
+        self.line4.into_push_pull_output_with_state(cr, low);
+        let [line1, line2, line3, line4] = LINES;
+        (
+            [SlotInput(line1), SlotInput(line2)],
+            [SlotOutput(line3), SlotOutput(line4)],
+        )
+    }
+
+    /// The first lines as analog inputs, the others left floating. Sets the ADC up, which takes some
+    /// 15 us; should that fail, every reading will say so.
+    #[must_use]
+    pub fn into_analog(mut self, lines: AnalogLines) -> AnalogInputs {
+        let cr = &mut self.cr;
+        self.line1.into_analog(cr);
+        self.line2.into_analog(cr);
+        if lines == AnalogLines::Four {
+            self.line3.into_analog(cr);
+            self.line4.into_analog(cr);
+        }
+        AnalogInputs::new(self.adc, lines)
     }
 }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | running | blinks once a second |
 //! | activity | lights for 50 ms after a request for this unit |
-//! | fault | blinks five times in two seconds: SW01 is no unit address; steady: the slot's module fails or is none this firmware can drive; a short flash every two seconds: no crystal |
+//! | fault | blinks five times in two seconds: SW01 is no unit address; steady: the slot's module does not answer; a short flash every two seconds: no crystal |
 
 use crate::start_up::Address;
 
@@ -22,7 +22,7 @@ const ACTIVITY: u8 = (50 / TICK_MS) as u8;
 pub enum Trouble {
     /// SW01 shows no unit address: the line is not served.
     NoAddress,
-    /// The slot's module fails, or is none this firmware can drive.
+    /// The slot's module does not answer.
     Module,
     /// The crystal did not start: the clock is 1 % off at worst.
     NoCrystal,
@@ -33,10 +33,9 @@ pub enum Trouble {
 impl Trouble {
     /// What is known to be wrong from the start.
     #[must_use]
-    pub const fn at_start(address: Address, module_drivable: bool, crystal: bool) -> Self {
+    pub const fn at_start(address: Address, crystal: bool) -> Self {
         match address {
             Address::Invalid => Self::NoAddress,
-            _ if !module_drivable => Self::Module,
             _ if !crystal => Self::NoCrystal,
             _ => Self::None,
         }
@@ -132,11 +131,10 @@ mod tests {
     #[test]
     fn the_worst_trouble_is_shown() {
         let unit = Address::Unit(1);
-        assert_eq!(Trouble::at_start(unit, true, true), Trouble::None);
-        assert_eq!(Trouble::at_start(unit, true, false), Trouble::NoCrystal);
-        assert_eq!(Trouble::at_start(unit, false, false), Trouble::Module);
+        assert_eq!(Trouble::at_start(unit, true), Trouble::None);
+        assert_eq!(Trouble::at_start(unit, false), Trouble::NoCrystal);
         assert_eq!(
-            Trouble::at_start(Address::Invalid, false, false),
+            Trouble::at_start(Address::Invalid, false),
             Trouble::NoAddress
         );
         assert_eq!(Trouble::None.or_module(true), Trouble::Module);

@@ -5,6 +5,8 @@
 #![forbid(unsafe_code)]
 
 pub mod alive;
-pub mod image;
+pub mod config;
+pub mod device;
 pub mod lamps;
 pub mod start_up;
+pub mod store;

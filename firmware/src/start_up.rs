@@ -1,6 +1,6 @@
 //! What the device decides once, when it starts.
 
-use register_map::{Module, preset};
+use crate::config::Line;
 
 /// What the DIP switch SW01 asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,14 +39,14 @@ impl Address {
     }
 }
 
-/// The slot's module: as preset in flash, else as chosen at build, else a 4DI. A stop-gap until the
-/// configuration store's MODULE register.
+/// What the line is set to: as configured, or as the factory set it in the loader mode and while
+/// there is no address.
 #[must_use]
-pub fn module(preset: Option<[u8; preset::LEN]>, chosen_at_build: Option<&str>) -> Module {
-    preset
-        .and_then(preset::decode)
-        .or_else(|| chosen_at_build?.parse().ok())
-        .unwrap_or(Module::Di4)
+pub const fn line(address: Address, configured: Line) -> Line {
+    match address {
+        Address::Unit(_) => configured,
+        Address::Loader | Address::Invalid => Line::FACTORY,
+    }
 }
 
 #[cfg(test)]
@@ -67,11 +67,12 @@ mod tests {
     }
 
     #[test]
-    fn a_preset_module_comes_before_the_one_chosen_at_build() {
-        let preset = Some(preset::encode(Module::Do4));
-        assert_eq!(module(preset, Some("4ai")), Module::Do4);
-        assert_eq!(module(Some([0xFF; 4]), Some("4ai")), Module::Ai4);
-        assert_eq!(module(None, Some("nonsense")), Module::Di4);
-        assert_eq!(module(None, None), Module::Di4);
+    fn the_loader_mode_has_the_factorys_line_whatever_is_configured() {
+        let configured = Line {
+            baud: register_map::codes::Baud::B115200,
+            ..Line::FACTORY
+        };
+        assert_eq!(line(Address::Unit(1), configured), configured);
+        assert_eq!(line(Address::Loader, configured), Line::FACTORY);
     }
 }

@@ -32,6 +32,17 @@ impl<'a> Words<'a> {
             .map(u16::from_be_bytes)
     }
 
+    /// `count` registers from the one `start` places after the first; fewer where they end.
+    #[inline]
+    pub fn slice(self, start: u16, count: u16) -> Self {
+        let (_, words) = self
+            .words
+            .split_at_checked(start.into())
+            .unwrap_or_default();
+        let words = words.get(..usize::from(count)).unwrap_or(words);
+        Self { words }
+    }
+
     /// The registers in order.
     #[inline]
     pub fn iter(self) -> impl ExactSizeIterator<Item = u16> + 'a {
@@ -81,6 +92,18 @@ mod tests {
         assert_eq!(
             (words.count(), words.get(1), words.get(2)),
             (2, Some(0x5678), None)
+        );
+    }
+
+    #[test]
+    fn a_slice_ends_where_the_registers_end() {
+        let words = Words::new(&[0, 1, 0, 2, 0, 3]);
+        assert!(words.slice(1, 2).iter().eq([2, 3]));
+        assert!(words.slice(0, 1).iter().eq([1]));
+        assert!(words.slice(2, 9).iter().eq([3]));
+        assert_eq!(
+            (words.slice(3, 1).count(), words.slice(4, 1).count()),
+            (0, 0)
         );
     }
 

@@ -12,6 +12,35 @@ pub enum Kind {
     BitInput,
     /// A digital output.
     BitOutput,
+    /// An analog input.
+    WordInput,
+    /// An analog output.
+    WordOutput,
+}
+
+/// How far an analog input's word is to be trusted; always good for any other channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ChannelStatus {
+    /// The word is what is measured.
+    #[default]
+    Good = 0,
+    /// Below what the signal can be.
+    UnderRange = 1,
+    /// Above what can be measured.
+    OverRange = 2,
+    /// Nothing is connected, or a wire is broken.
+    OpenCircuit = 3,
+    /// The sensor's wires touch.
+    ShortCircuit = 4,
+}
+
+impl ChannelStatus {
+    /// The code of this status, 0 to 4.
+    #[must_use]
+    pub const fn code(self) -> u16 {
+        self as u16
+    }
 }
 
 /// What stands in a module's channels: inputs as last scanned, outputs as commanded.
@@ -19,13 +48,19 @@ pub enum Kind {
 pub struct Channels {
     /// Digital channels, channel 1 in bit 0.
     bits: u8,
+    words: [u16; CHANNELS],
+    status: [ChannelStatus; CHANNELS],
 }
 
 impl Channels {
-    /// Everything off.
+    /// Everything off, at 0 and good.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bits: 0 }
+        Self {
+            bits: 0,
+            words: [0; CHANNELS],
+            status: [ChannelStatus::Good; CHANNELS],
+        }
     }
 
     /// A digital channel, 0 to 3; `false` for a channel that does not exist.
@@ -45,6 +80,41 @@ impl Channels {
             };
         }
     }
+
+    /// An analog channel, 0 to 3, as its [`Scale`](crate::Scale) says; 0 for a channel that does not
+    /// exist.
+    #[must_use]
+    pub const fn word(&self, channel: usize) -> u16 {
+        if channel < CHANNELS {
+            self.words[channel]
+        } else {
+            0
+        }
+    }
+
+    /// Sets an analog channel, 0 to 3; one that does not exist is left alone.
+    pub const fn set_word(&mut self, channel: usize, value: u16) {
+        if channel < CHANNELS {
+            self.words[channel] = value;
+        }
+    }
+
+    /// The status of a channel, 0 to 3; good for a channel that does not exist.
+    #[must_use]
+    pub const fn status(&self, channel: usize) -> ChannelStatus {
+        if channel < CHANNELS {
+            self.status[channel]
+        } else {
+            ChannelStatus::Good
+        }
+    }
+
+    /// Sets the status of a channel, 0 to 3; one that does not exist is left alone.
+    pub const fn set_status(&mut self, channel: usize, status: ChannelStatus) {
+        if channel < CHANNELS {
+            self.status[channel] = status;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -61,5 +131,30 @@ mod tests {
         assert_eq!(read(&channels), [true, false, false, true, false]);
         channels.set_bit(0, false);
         assert_eq!(read(&channels), [false, false, false, true, false]);
+    }
+
+    #[test]
+    fn words_and_status_are_kept_apart_and_a_fifth_channel_is_nothing() {
+        let mut channels = Channels::new();
+        for channel in 0..5 {
+            channels.set_word(channel, 100 + channel as u16);
+        }
+        channels.set_status(1, ChannelStatus::OpenCircuit);
+        channels.set_status(4, ChannelStatus::OverRange);
+        assert_eq!(
+            [0, 1, 2, 3, 4].map(|c| channels.word(c)),
+            [100, 101, 102, 103, 0]
+        );
+        assert_eq!(
+            [0, 1, 2, 3, 4].map(|c| channels.status(c).code()),
+            [0, 3, 0, 0, 0]
+        );
+    }
+
+    #[test]
+    fn status_codes_are_those_of_the_register_map() {
+        use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
+        let all = [Good, UnderRange, OverRange, OpenCircuit, ShortCircuit];
+        assert_eq!(all.map(ChannelStatus::code), [0, 1, 2, 3, 4]);
     }
 }

@@ -2,13 +2,8 @@
 
 use embedded_hal::digital::InputPin;
 
-use crate::{CHANNELS, Channels, IoModule, Kind, ModuleError};
-
-/// Debounce of every input until told otherwise, in milliseconds.
-pub const DEBOUNCE_DEFAULT_MS: u16 = 5;
-
-/// The longest debounce, in milliseconds.
-pub const DEBOUNCE_MAX_MS: u16 = 1000;
+use crate::debounce::{DEBOUNCE_DEFAULT_MS, Debounce};
+use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
 
 /// Four debounced digital inputs.
 ///
@@ -30,23 +25,18 @@ impl<P: InputPin> Di4<P> {
             filters: [Debounce::new(DEBOUNCE_DEFAULT_MS); CHANNELS],
         }
     }
-
-    /// Sets the debounce of a channel, 0 to 3, in milliseconds, and returns what it is now: at most
-    /// [`DEBOUNCE_MAX_MS`], and 0 for a channel that does not exist.
-    pub fn set_debounce(&mut self, channel: usize, milliseconds: u16) -> u16 {
-        match self.filters.get_mut(channel) {
-            Some(filter) => {
-                filter.needed = milliseconds.min(DEBOUNCE_MAX_MS);
-                filter.needed
-            }
-            None => 0,
-        }
-    }
 }
 
 impl<P: InputPin> IoModule for Di4<P> {
     fn kinds(&self) -> [Kind; CHANNELS] {
         [Kind::BitInput; CHANNELS]
+    }
+
+    /// Takes the debounce from [`ChannelSettings::filter`].
+    fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
+        for (filter, settings) in self.filters.iter_mut().zip(settings) {
+            filter.set_needed(settings.filter);
+        }
     }
 
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
@@ -66,39 +56,6 @@ impl<P: InputPin> IoModule for Di4<P> {
     }
 }
 
-/// The filter of one input.
-#[derive(Clone, Copy, Debug)]
-struct Debounce {
-    /// Scans a new level must stand before it counts.
-    needed: u16,
-    /// Scans the new level has stood so far.
-    seen: u16,
-    /// The level that counts, none before the first sample.
-    level: Option<bool>,
-}
-
-impl Debounce {
-    const fn new(needed: u16) -> Self {
-        Self {
-            needed,
-            seen: 0,
-            level: None,
-        }
-    }
-
-    fn sample(&mut self, now: bool) -> bool {
-        let level = self.level.unwrap_or(now);
-        self.seen = if now == level { 0 } else { self.seen + 1 };
-        let changed = self.seen > 0 && self.seen >= self.needed;
-        if changed {
-            self.seen = 0;
-        }
-        let level = level != changed;
-        self.level = Some(level);
-        level
-    }
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -115,6 +72,13 @@ mod tests {
             .iter()
             .map(|&on| Transaction::get(if on { State::Low } else { State::High }));
         Mock::new(&states.collect::<Vec<_>>())
+    }
+
+    fn settings(debounce: u16) -> ChannelSettings {
+        ChannelSettings {
+            filter: debounce,
+            ..ChannelSettings::default_for(Kind::BitInput)
+        }
     }
 
     fn finish(mut module: Di4<Mock>) {
@@ -142,9 +106,7 @@ mod tests {
             levels.resize(scans, true);
             levels.resize(2 * scans - 1, false);
             let mut module = Di4::new([(); 4].map(|()| line(&levels)));
-            for channel in 0..CHANNELS {
-                assert_eq!(module.set_debounce(channel, debounce), debounce);
-            }
+            module.configure(&[settings(debounce); CHANNELS]);
             let mut channels = Channels::new();
             let seen: Vec<bool> = levels
                 .iter()
@@ -194,10 +156,26 @@ mod tests {
     }
 
     #[test]
-    fn a_debounce_too_long_or_of_no_channel_is_not_taken() {
-        let mut module = Di4::new([(); 4].map(|()| line(&[])));
-        assert_eq!(module.set_debounce(0, 5000), DEBOUNCE_MAX_MS);
-        assert_eq!(module.set_debounce(4, 10), 0);
+    fn each_channel_has_its_own_debounce_and_the_same_again_disturbs_none() {
+        let levels = [false, true, true, true, true, true];
+        let mut module = Di4::new([(); 4].map(|()| line(&levels)));
+        let mut channels = Channels::new();
+        let seen = levels.map(|_| {
+            module.configure(&[0, 2, 4, 5].map(settings));
+            module.read_inputs(&mut channels).unwrap();
+            [0, 1, 2, 3].map(|c| u8::from(channels.bit(c)))
+        });
+        assert_eq!(
+            seen,
+            [
+                [0, 0, 0, 0],
+                [1, 0, 0, 0],
+                [1, 1, 0, 0],
+                [1, 1, 0, 0],
+                [1, 1, 1, 0],
+                [1, 1, 1, 1],
+            ]
+        );
         finish(module);
     }
 }

@@ -3,7 +3,7 @@
 
 use embedded_hal::digital::{OutputPin, PinState};
 
-use crate::{CHANNELS, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
 
 /// Four digital outputs.
 #[derive(Debug)]
@@ -23,6 +23,8 @@ impl<P: OutputPin> IoModule for Do4<P> {
     fn kinds(&self) -> [Kind; CHANNELS] {
         [Kind::BitOutput; CHANNELS]
     }
+
+    fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
     fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
         Ok(())

@@ -2,12 +2,51 @@
 //! both mean the same thing by an address.
 //!
 //! Addresses are PDU addresses, counted from zero as they stand in the frame.
+//!
+//! Each block of registers is a module with a constant for every address, `RULES`, the numbers that
+//! hold for them ([`Rule`]), and `BLOCK`, the same with the words for people ([`Block`], [`Text`]). The
+//! firmware uses the numbers alone, so the words are not in its image. [`codes`] has an enum for each
+//! register that holds codes, [`record`] the form in which a configuration is stored in flash, and
+//! [`docs`] writes `docs/register-map.md`.
+//!
+//! ```
+//! use register_map::{BLOCKS, InForce, Values, configuration, rule_at};
+//!
+//! let (rule, _) = rule_at(configuration::RULES, configuration::FRAME_GAP).unwrap();
+//! assert_eq!(rule.values, Values::range(5, 1000).or(0));
+//! assert_eq!(rule.in_force, InForce::Restart);
+//!
+//! let mut registers = BLOCKS.iter().flat_map(|block| block.registers());
+//! let (rule, text) = registers.find(|(_, text)| text.name == "BETA").unwrap();
+//! assert_eq!((rule.first, rule.default, text.unit), (0x0160, 3950, "K"));
+//! ```
 
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod block;
+pub mod codes;
+pub mod configuration;
+pub mod counters;
+pub mod docs;
+pub mod fault;
 mod module;
 pub mod points;
-pub mod preset;
+pub mod record;
+mod rule;
+pub mod state;
+mod values;
 
+pub use block::{Block, Text};
 pub use module::{Module, UnknownModule};
+pub use rule::{Access, InForce, Narrower, Rule, Run, Runs, rule_at, runs};
+pub use values::Values;
+
+/// Every block, in ascending order of the addresses.
+pub static BLOCKS: [&Block; 5] = [
+    &points::BLOCK,
+    &configuration::BLOCK,
+    &state::BLOCK,
+    &fault::BLOCK,
+    &counters::BLOCK,
+];

@@ -3,6 +3,8 @@
 use core::fmt;
 use core::str::FromStr;
 
+use crate::points::PointKind;
+
 /// What is plugged into a slot: the value of a MODULE register, and a `--module` name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
@@ -34,6 +36,33 @@ impl Module {
         Self::Ao4,
         Self::Ai2Ao2,
     ];
+
+    /// Every code with the module's name.
+    pub const NAMES: [(u16, &'static str); 7] = {
+        let mut names = [(0, ""); 7];
+        let mut i = 0;
+        while i < names.len() {
+            names[i] = (Self::ALL[i].code(), Self::ALL[i].name());
+            i += 1;
+        }
+        names
+    };
+
+    /// What this module makes of the four points of its port.
+    #[inline]
+    #[must_use]
+    pub const fn points(self) -> [PointKind; 4] {
+        use PointKind::{BitInput, BitOutput, None, WordInput, WordOutput};
+        match self {
+            Self::None => [None; 4],
+            Self::Di4 => [BitInput; 4],
+            Self::Do4 => [BitOutput; 4],
+            Self::Relay2 => [BitInput, BitInput, BitOutput, BitOutput],
+            Self::Ai4 => [WordInput; 4],
+            Self::Ao4 => [WordOutput; 4],
+            Self::Ai2Ao2 => [WordInput, WordInput, WordOutput, WordOutput],
+        }
+    }
 
     /// The code of this module in the MODULE registers, 0 to 6.
     #[must_use]

@@ -2,7 +2,7 @@
 
 use board_support::{GapTimer, Rs485};
 use modbus_server::{
-    Adu, Head,
+    Adu, Head, LineCounters,
     rtu::{Closed, Faults, Next, Receiver, Transmitter},
 };
 
@@ -13,12 +13,30 @@ pub struct Line {
     receiver: Receiver<'static>,
     transmitter: Transmitter<'static>,
     request: Option<Closed<'static>>,
+    reply: Reply,
+}
+
+/// How far the reply is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reply {
+    /// There is none.
+    None,
+    /// It waits for the response delay to pass.
+    Delayed { ms: u16 },
+    /// It is being sent.
+    Sending,
 }
 
 impl Line {
     /// Listens as `unit`. The first frame is taken after the first t3.5 of silence.
-    pub fn new(uart: Rs485, mut gap: GapTimer, unit: u8, adus: &'static mut [Adu; 2]) -> Self {
-        let mut receiver = Receiver::new(unit, false);
+    pub fn new(
+        uart: Rs485,
+        mut gap: GapTimer,
+        unit: u8,
+        strict_t15: bool,
+        adus: &'static mut [Adu; 2],
+    ) -> Self {
+        let mut receiver = Receiver::new(unit, strict_t15);
         adus.iter_mut().for_each(|adu| receiver.give_back(adu));
         gap.restart();
         Self {
@@ -27,20 +45,21 @@ impl Line {
             receiver,
             transmitter: Transmitter::idle(),
             request: None,
+            reply: Reply::None,
         }
     }
 
-    /// The UART's interrupt.
+    /// The UART's interrupt. True when a reply has just left.
     #[inline]
-    pub fn on_uart(&mut self) {
+    pub fn on_uart(&mut self) -> bool {
         let status = self.uart.status();
         // First, for the bus is another's within a bit of the last stop bit.
-        if status.sent() {
+        let sent = status.sent();
+        if sent {
             self.uart.stop_sending();
+            self.reply = Reply::None;
             self.receiver.resume();
-            if let Some(adu) = self.transmitter.take_buffer() {
-                self.receiver.give_back(adu);
-            }
+            self.take_back();
         }
         if status.received() {
             let character = self.uart.read(status);
@@ -55,6 +74,7 @@ impl Line {
                 Next::Done => self.uart.finish_sending(),
             }
         }
+        sent
     }
 
     /// t1.5 of silence.
@@ -72,15 +92,46 @@ impl Line {
         Some(())
     }
 
-    /// The request that waits, if any. Its buffer comes back by [`finish_reply`](Self::finish_reply).
-    pub fn take_request(&mut self) -> Option<&'static mut Adu> {
-        self.request.take().map(|closed| closed.adu)
+    /// A millisecond has passed: the response delay runs.
+    pub fn on_millisecond(&mut self) {
+        match self.reply {
+            Reply::Delayed { ms: 0 } => self.send(),
+            Reply::Delayed { ms } => self.reply = Reply::Delayed { ms: ms - 1 },
+            Reply::None | Reply::Sending => {}
+        }
     }
 
-    /// Takes the bus and sends the first byte of a reply.
-    pub fn start_reply(&mut self, head: Head) {
-        self.gap.stop();
+    /// Whether a reply is on its way, or waits for its delay.
+    pub fn is_replying(&self) -> bool {
+        self.reply != Reply::None
+    }
+
+    /// The request that waits, if any, and what the line has counted. Its buffer comes back by
+    /// [`finish_reply`](Self::finish_reply). A reply that still waits for its delay is given up: the
+    /// master has.
+    pub fn take_request(&mut self) -> Option<(&'static mut Adu, LineCounters)> {
+        let closed = self.request.take()?;
+        if matches!(self.reply, Reply::Delayed { .. }) {
+            self.reply = Reply::None;
+            self.take_back();
+        }
+        Some((closed.adu, closed.line))
+    }
+
+    /// A reply that begins with `head`: its first byte leaves now, or after a delay in milliseconds.
+    pub fn start_reply(&mut self, head: Head, delay_ms: u16) {
         self.transmitter = Transmitter::new(head);
+        if delay_ms == 0 {
+            self.send();
+        } else {
+            self.reply = Reply::Delayed { ms: delay_ms };
+        }
+    }
+
+    /// Takes the bus and sends the first byte.
+    fn send(&mut self) {
+        self.gap.stop();
+        self.reply = Reply::Sending;
         if let Next::Byte(first) = self.transmitter.next() {
             self.uart.start_sending(first);
         }
@@ -95,7 +146,14 @@ impl Line {
         };
         match unneeded {
             Some(adu) => self.receiver.give_back(adu),
-            None => self.uart.resume_sending(),
+            None if self.reply == Reply::Sending => self.uart.resume_sending(),
+            None => {}
+        }
+    }
+
+    fn take_back(&mut self) {
+        if let Some(adu) = self.transmitter.take_buffer() {
+            self.receiver.give_back(adu);
         }
     }
 }

@@ -4,9 +4,9 @@
 //! |---|---|---|---|
 //! | `uart` | USART1 | 4 | a byte in or out, driver off at the end. At 921600 bit/s a byte comes every 12 us; later than that and it is lost, which the receiver reports and the frame pays for |
 //! | `gap` | TIM2 | 4 | t1.5 and t3.5. Late, it makes the silence longer, never shorter |
-//! | `serve` | EXTI3, pended by `gap` | 3 | a closed frame becomes a response. Late, the response is late |
-//! | `scan` | TIM4, 1 kHz, and pended by a write | 2 | inputs into the process image, outputs out of it. A missed beat stretches the debounce by 1 ms |
-//! | `background` | software, every 10 ms | 1 | LEDs and log. May be late at no cost |
+//! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | a closed frame becomes a response; an order is carried out when its response is out. Late, the response is late |
+//! | `scan` | TIM4, 1 kHz, and pended by a write | 2 | inputs into the device, outputs out of it, all clocks. A missed beat stretches them by 1 ms |
+//! | `background` | software, every 10 ms and on orders | 1 | DAC transfers, configuration store, LEDs, log. May be late at no cost |
 //! | `idle` | - | - | feeds the watchdog when all of the above have been alive; sleeps |
 //!
 //! `serve` is bound to an interrupt nothing else uses rather than spawned: an interrupt pended while
@@ -15,58 +15,64 @@
 #![no_std]
 #![no_main]
 
+mod converter;
 mod installed;
 mod line;
 mod log;
+mod pages;
+mod persistence;
+mod start;
 mod trap;
 
 #[rtic::app(device = board_support::pac, peripherals = true, dispatchers = [EXTI0])]
 mod app {
-    use board_support::{
-        GapEvent, Leds, ScanTimer, Watchdog, board, flash, pac::Interrupt, uart::LineSettings,
-    };
+    use board_support::{GapEvent, Leds, ScanTimer, Watchdog, fault, pac::Interrupt, stack};
     use firmware::{
-        alive::{Alive, Task},
-        image::ProcessImage,
-        lamps::{Lamps, Trouble},
-        start_up::{self, Address},
+        alive::{self, Task},
+        device::Device,
+        lamps::{Lamps, TICK_MS, Trouble},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
-    use modbus_server::{Adu, Server, Work, rtu};
-    use modio_drivers::IoModule;
-    use register_map::preset;
+    use modbus_server::{Adu, Outcome, Server, Work};
+    use modio_drivers::{ChannelSettings, IoModule};
+    use register_map::codes::Command;
 
     use crate::{
-        installed::Installed,
+        installed::{AnalogOutputs, Installed},
         line::Line,
         log::{Event, Log},
+        persistence::Persistence,
+        start::{self, Started},
     };
 
     /// Scans between two beats of the background, and between two proofs of life.
-    const SCANS_PER_BACKGROUND: u8 = firmware::lamps::TICK_MS as u8;
+    const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
     const SCANS_PER_PROOF: u8 = 100;
-
-    static ALIVE: Alive = Alive::new();
 
     #[shared]
     struct Shared {
         /// `None` while SW01 shows no unit address: the line is not served.
         line: Option<Line>,
-        image: ProcessImage,
+        device: Device,
         /// A request for this unit has been served since the LEDs were last set.
         activity: bool,
+        /// What a request has ordered of the background.
+        order: Option<Command>,
     }
 
     #[local]
     struct Local {
         server: Server,
         module: Installed,
+        settings: [ChannelSettings; 4],
         scan_timer: ScanTimer,
         events: Producer<'static, Event>,
-        failing: bool,
         until_background: u8,
         until_proof: u8,
+        analog_outputs: Option<AnalogOutputs>,
+        persistence: Persistence,
         lamps: Lamps,
+        lamps_at: u32,
         leds: Leds,
         log: Log,
         logged: Consumer<'static, Event>,
@@ -79,50 +85,47 @@ mod app {
         queue: Queue<Event, 8> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let mut log = Log::new();
-        let mut board = board::setup(cx.device);
-        let address = Address::from_dip(board.dip);
-        let wanted = start_up::module(flash::read(preset::ADDRESS), option_env!("MODIO_MODULE"));
-        let (module, drivable) = Installed::new(wanted, board.slot);
-        log.start(&crate::log::Start {
-            address,
-            dip: board.dip,
-            module: wanted,
-            drivable,
-            clock: board.clock,
-            reset_cause: board.reset_cause,
-        });
-
-        let settings = LineSettings::FACTORY;
-        let line = address.unit().and_then(|unit| {
-            let gaps = rtu::Gaps::standard(settings.baud, settings.format.bits() as u8);
-            let (uart, gap) = board.line.start(settings, gaps.t15, gaps.t35)?;
-            Some(Line::new(uart, gap, unit, cx.local.adus))
-        });
-
+        let Started {
+            line,
+            server,
+            device,
+            module,
+            analog_outputs,
+            persistence,
+            mut scan_timer,
+            mut watchdog,
+            leds,
+            log,
+            trouble,
+        } = start::up(cx.device, cx.local.adus);
         let (events, logged) = cx.local.queue.split();
-        board.scan_timer.start();
-        board.watchdog.start();
+        scan_timer.start();
+        watchdog.start();
+        let settings = *device.points.settings();
         (
             Shared {
                 line,
-                image: ProcessImage::new(module.kinds()),
+                device,
                 activity: false,
+                order: None,
             },
             Local {
-                server: Server::new(address.unit().unwrap_or_default()),
+                server,
                 module,
-                scan_timer: board.scan_timer,
+                settings,
+                scan_timer,
                 events,
-                failing: false,
                 until_background: 0,
                 until_proof: 0,
+                analog_outputs,
+                persistence,
                 lamps: Lamps::new(),
-                leds: board.leds,
+                lamps_at: 0,
+                leds,
                 log,
                 logged,
-                standing: Trouble::at_start(address, drivable, board.clock.is_crystal()),
-                watchdog: board.watchdog,
+                standing: trouble,
+                watchdog,
             },
         )
     }
@@ -130,7 +133,7 @@ mod app {
     #[idle(local = [watchdog])]
     fn idle(cx: idle::Context) -> ! {
         loop {
-            if ALIVE.take_all() {
+            if alive::take_all(fault::marks()) {
                 cx.local.watchdog.feed();
             }
             rtic::export::wfi();
@@ -139,12 +142,15 @@ mod app {
 
     #[task(binds = USART1, priority = 4, shared = [line])]
     fn uart(mut cx: uart::Context) {
-        cx.shared.line.lock(|line| {
-            if let Some(line) = line {
-                line.on_uart();
-            }
-        });
-        ALIVE.mark(Task::Line);
+        let sent = cx
+            .shared
+            .line
+            .lock(|line| line.as_mut().is_some_and(Line::on_uart));
+        if sent {
+            // An order may have waited for this.
+            rtic::pend(Interrupt::EXTI3);
+        }
+        alive::mark(fault::marks(), Task::Line);
     }
 
     #[task(binds = TIM2, priority = 4, shared = [line])]
@@ -163,30 +169,55 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI3, priority = 3, local = [server], shared = [line, image, activity])]
+    #[task(binds = EXTI3, priority = 3, local = [server], shared = [line, device, activity, order])]
     fn serve(cx: serve::Context) {
-        ALIVE.mark(Task::Serve);
+        alive::mark(fault::marks(), Task::Serve);
         let serve::SharedResources {
             mut line,
-            mut image,
+            mut device,
             mut activity,
+            mut order,
             ..
         } = cx.shared;
         let server = cx.local.server;
         let mut on_line = |f: &mut dyn FnMut(&mut Line)| line.lock(|line| line.as_mut().map(f));
 
+        // An order of the last request, whose reply is out or never comes.
+        let mut silent = true;
+        on_line(&mut |line| silent = !line.is_replying());
+        if silent {
+            let left = device.lock(|device| {
+                let order = device.take_order()?;
+                device.carry_out(order)
+            });
+            if left.is_some() {
+                order.lock(|order| *order = left);
+                // Still at something: it looks for orders before it ends.
+                let _ = background::spawn();
+            }
+        }
+
         let mut request = None;
         on_line(&mut |line| request = line.take_request());
-        let Some(adu) = request else {
+        let Some((adu, line_counters)) = request else {
             return;
         };
-        let decision = image.lock(|image| server.decide(adu, image));
+        let (decision, delay_ms) = device.lock(|device| {
+            let decision = server.decide(adu, device);
+            (decision, device.config.response_delay_ms())
+        });
         // The head leaves while the rest is being done.
         if let Some(head) = decision.reply {
-            on_line(&mut |line| line.start_reply(head));
+            on_line(&mut |line| line.start_reply(head, delay_ms));
         }
-        image.lock(|image| server.carry_out(&decision, adu, image));
         server.commit(&decision);
+        device.lock(|device| {
+            device.state.counters = server.counters(&line_counters);
+            if matches!(decision.outcome, Outcome::Accepted | Outcome::Refused(_)) {
+                device.request_seen();
+            }
+            server.carry_out(&decision, adu, device);
+        });
         let mut adu = Some(adu);
         on_line(&mut |line| {
             if let Some(adu) = adu.take() {
@@ -198,56 +229,84 @@ mod app {
             Work::WriteBits { .. } | Work::WriteWords { .. }
         ) {
             rtic::pend(Interrupt::TIM4);
+            if decision.reply.is_none() {
+                // No reply to wait for: an order is carried out now.
+                rtic::pend(Interrupt::EXTI3);
+            }
         }
         activity.lock(|activity| *activity = true);
     }
 
     #[task(
         binds = TIM4, priority = 2,
-        local = [module, scan_timer, events, failing, until_background, until_proof],
-        shared = [image],
+        local = [module, settings, scan_timer, events, until_background, until_proof],
+        shared = [line, device],
     )]
-    fn scan(mut cx: scan::Context) {
+    fn scan(cx: scan::Context) {
         let scan::LocalResources {
             module,
+            settings,
             scan_timer,
             events,
-            failing,
             until_background,
             until_proof,
             ..
         } = cx.local;
+        let scan::SharedResources {
+            mut line,
+            mut device,
+            ..
+        } = cx.shared;
         let beat = scan_timer.take_beat();
 
-        let mut channels = cx.shared.image.lock(|image| image.channels());
+        let (mut channels, wanted, uptime_s, tripped) = device.lock(|device| {
+            let tripped = beat && device.tick();
+            let wanted = *device.points.settings();
+            let uptime_s = device.state.uptime_s();
+            (*device.points.channels(), wanted, uptime_s, tripped)
+        });
+        if *settings != wanted {
+            *settings = wanted;
+            module.configure(settings);
+        }
         let mut result = module.drive_outputs(&channels);
         if beat {
             result = result.and(module.read_inputs(&mut channels));
         }
-        cx.shared
-            .image
-            .lock(|image| image.scanned(&channels, result.is_err()));
+        let was_failing = device.lock(|device| {
+            if beat {
+                device.points.scanned(&channels, settings);
+            }
+            let was_failing = device.points.failing();
+            device.points.set_failing(result.is_err());
+            was_failing
+        });
 
-        if result.is_err() != *failing {
-            *failing = result.is_err();
-            // A full queue loses a log line, no more.
+        // A full queue loses a log line, no more.
+        if result.is_err() != was_failing {
             let _ = events.enqueue(match result {
                 Ok(()) => Event::ModuleGood,
                 Err(error) => Event::ModuleFails(error),
             });
         }
+        if tripped {
+            let _ = events.enqueue(Event::CommunicationLost);
+        }
         if beat {
-            ALIVE.mark(Task::Scan);
-            if every(until_background, SCANS_PER_BACKGROUND) {
-                // Still at the last one: it comes ten milliseconds later.
-                let _ = background::spawn();
-            }
+            alive::mark(fault::marks(), Task::Scan);
+            fault::keep_uptime(uptime_s);
+            line.lock(|line| line.as_mut().map(Line::on_millisecond));
             if every(until_proof, SCANS_PER_PROOF) {
                 // A silent line gives these two no reason to run. Called for nothing they do
                 // nothing, but show that they could.
                 rtic::pend(Interrupt::USART1);
                 rtic::pend(Interrupt::EXTI3);
             }
+        }
+        // At once after a write too: it may be for the DAC.
+        if every(until_background, SCANS_PER_BACKGROUND) || !beat {
+            // Still at the last one: it comes ten milliseconds later.
+            let _ = background::spawn();
         }
     }
 
@@ -258,30 +317,60 @@ mod app {
         now
     }
 
-    #[task(priority = 1, local = [lamps, leds, log, logged, standing], shared = [image, activity])]
+    #[task(
+        priority = 1,
+        local = [analog_outputs, persistence, lamps, lamps_at, leds, log, logged, standing],
+        shared = [line, device, activity, order],
+    )]
     async fn background(cx: background::Context) {
         let background::SharedResources {
-            mut image,
+            mut device,
             mut activity,
+            mut order,
             ..
         } = cx.shared;
         let background::LocalResources {
+            analog_outputs,
+            persistence,
             lamps,
+            lamps_at,
             leds,
             log,
             logged,
             standing,
             ..
         } = cx.local;
-        let request = activity.lock(core::mem::take);
-        let failing = image.lock(|image| image.failing());
-        let lit = lamps.tick(request, standing.or_module(failing));
-        leds.set_activity(lit.activity);
-        leds.set_fault(lit.fault);
-        leds.set_run(lit.run);
+
+        if let Some(outputs) = analog_outputs {
+            outputs.work();
+        }
+
+        match order.lock(Option::take) {
+            Some(Command::Save) => persistence.begin(&mut device),
+            Some(Command::Restart) => persistence.restart_when_done(),
+            _ => {}
+        }
+        if let Some(event) = persistence.work(&mut device) {
+            log.event(event);
+        }
+
+        let free = stack::free_low_water();
+        let (failing, millis) = device.lock(|device| {
+            device.state.stack_free = free;
+            (device.points.failing(), device.state.millis())
+        });
+        // It runs more often than the patterns beat: a write wakes it too.
+        if millis.wrapping_sub(*lamps_at) >= u32::from(TICK_MS) {
+            *lamps_at = millis;
+            let request = activity.lock(core::mem::take);
+            let lit = lamps.tick(request, standing.or_module(failing));
+            leds.set_activity(lit.activity);
+            leds.set_fault(lit.fault);
+            leds.set_run(lit.run);
+        }
         while let Some(event) = logged.dequeue() {
             log.event(event);
         }
-        ALIVE.mark(Task::Background);
+        alive::mark(fault::marks(), Task::Background);
     }
 }

@@ -1,0 +1,253 @@
+//! The record as words, and what a start makes of it.
+
+use super::{Fault, FaultRecord, Kind, TASKS};
+
+/// Words of the record, the last of which is the checksum.
+pub(super) const WORDS: usize = 9;
+
+/// Tells this layout from what RAM holds after power-on, and from other layouts.
+const MAGIC: u32 = 0x4661_7501;
+/// Bit in the second word, over the kind: noted since the last start.
+const FRESH: u32 = 1 << 16;
+
+/// Bits of the reset cause (RM0008 7.3.10, from LPWRRSTF on).
+const BY_WATCHDOG: u8 = 1 << 2;
+const BY_POWER_ON: u8 = 1 << 4;
+
+/// A record and whether it was noted since the last start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Noted {
+    pub(super) record: FaultRecord,
+    pub(super) fresh: bool,
+}
+
+const fn kind_of(number: u8) -> Option<Kind> {
+    Some(match number {
+        0 => Kind::None,
+        1 => Kind::Panic,
+        2 => Kind::HardFault,
+        3 => Kind::Watchdog,
+        4 => Kind::Crystal,
+        5 => Kind::StackOverflow,
+        _ => return None,
+    })
+}
+
+/// A checksum that no zeroed, inverted or shifted record has, and that finds every flipped bit.
+fn checksum(words: &[u32; WORDS]) -> u32 {
+    let [content @ .., _] = words;
+    content.iter().fold(MAGIC, |sum, word| {
+        (sum ^ word).rotate_left(7).wrapping_add(1)
+    })
+}
+
+impl Noted {
+    pub(super) fn to_words(self) -> [u32; WORDS] {
+        let FaultRecord {
+            fault,
+            count,
+            uptime,
+            missing,
+        } = self.record;
+        let mut words = [
+            MAGIC,
+            fault.kind as u32 | if self.fresh { FRESH } else { 0 },
+            u32::from(count) | u32::from(missing) << 16,
+            fault.pc,
+            fault.lr,
+            fault.status,
+            fault.address,
+            uptime,
+            0,
+        ];
+        words[WORDS - 1] = checksum(&words);
+        words
+    }
+
+    /// `None` when these words are no record.
+    pub(super) fn from_words(words: &[u32; WORDS]) -> Option<Self> {
+        let [magic, kind, count, pc, lr, status, address, uptime, sum] = *words;
+        if magic != MAGIC || sum != checksum(words) {
+            return None;
+        }
+        let fault = Fault {
+            kind: kind_of(kind as u8)?,
+            pc,
+            lr,
+            status,
+            address,
+        };
+        Some(Self {
+            record: FaultRecord {
+                fault,
+                count: count as u16,
+                uptime,
+                missing: (count >> 16) as u16,
+            },
+            fresh: kind & FRESH != 0,
+        })
+    }
+
+    /// With another fault. The first since the start counts: one in its handler is its consequence.
+    pub(super) fn with(self, fault: Fault, uptime: u32, missing: u16) -> Self {
+        if self.fresh {
+            return self;
+        }
+        Self {
+            record: FaultRecord {
+                fault,
+                count: self.record.count.saturating_add(1),
+                uptime,
+                missing,
+            },
+            fresh: true,
+        }
+    }
+
+    /// What a start for `reset_cause` makes of the words it finds, with the uptime and the marks the
+    /// firmware had left.
+    pub(super) fn at_start(
+        words: &[u32; WORDS],
+        reset_cause: u8,
+        uptime: u32,
+        marks: [u8; TASKS],
+    ) -> Self {
+        if reset_cause & BY_POWER_ON != 0 {
+            return Self::default();
+        }
+        // Words that are no record say nothing about what lies beside them either.
+        let kept = Self::from_words(words);
+        let (uptime, missing) = kept.map_or((0, 0), |_| (uptime, missing(marks)));
+        let mut noted = kept.unwrap_or_default();
+        if reset_cause & BY_WATCHDOG != 0 {
+            let bite = Fault {
+                kind: Kind::Watchdog,
+                ..Fault::default()
+            };
+            noted = noted.with(bite, uptime, missing);
+        }
+        Self {
+            fresh: false,
+            ..noted
+        }
+    }
+}
+
+/// A bit for each mark that is not there.
+fn missing(marks: [u8; TASKS]) -> u16 {
+    marks
+        .iter()
+        .enumerate()
+        .filter(|(_, mark)| **mark == 0)
+        .fold(0, |missing, (task, _)| missing | 1 << task)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BY_SOFTWARE: u8 = 1 << 3 | 1 << 5;
+    const WATCHDOG: u8 = BY_WATCHDOG | 1 << 5;
+
+    fn fault() -> Fault {
+        Fault {
+            kind: Kind::HardFault,
+            pc: 0x0800_1234,
+            lr: 0x0800_5679,
+            status: 0x8200,
+            address: 0x6000_0000,
+        }
+    }
+
+    fn noted() -> Noted {
+        Noted::default().with(fault(), 77, 0)
+    }
+
+    #[test]
+    fn numbers_lead_back_to_their_kinds() {
+        for number in 0..=5 {
+            assert_eq!(kind_of(number).map(|kind| kind as u8), Some(number));
+        }
+        assert_eq!(kind_of(6), None);
+    }
+
+    #[test]
+    fn a_record_comes_back_from_its_words_and_no_flipped_bit_goes_unnoticed() {
+        let words = noted().to_words();
+        assert_eq!(Noted::from_words(&words), Some(noted()));
+        for word in 0..WORDS {
+            for bit in 0..32 {
+                let mut broken = words;
+                broken[word] ^= 1 << bit;
+                assert_eq!(Noted::from_words(&broken), None, "word {word} bit {bit}");
+            }
+        }
+        for other in [[0; WORDS], [u32::MAX; WORDS], words.map(|word| !word)] {
+            assert_eq!(Noted::from_words(&other), None);
+        }
+    }
+
+    #[test]
+    fn a_fault_outlives_a_reset_and_then_others_without_counting_again() {
+        let mut words = noted().to_words();
+        for cause in [BY_SOFTWARE, 1 << 5, BY_SOFTWARE] {
+            let start = Noted::at_start(&words, cause, 1_000, [1; TASKS]);
+            assert_eq!(start.record.fault, fault());
+            assert_eq!((start.record.count, start.record.uptime), (1, 77));
+            words = start.to_words();
+        }
+    }
+
+    #[test]
+    fn a_power_on_forgets_even_what_is_whole() {
+        let cause = BY_POWER_ON | 1 << 5;
+        let start = Noted::at_start(&noted().to_words(), cause, 5, [0; TASKS]);
+        assert_eq!(start, Noted::default());
+    }
+
+    #[test]
+    fn a_bite_tells_the_uptime_and_the_missing_marks() {
+        let words = Noted::default().to_words();
+        let start = Noted::at_start(&words, WATCHDOG, 42, [1, 0, 7, 0]);
+        assert_eq!(start.record.fault.kind, Kind::Watchdog);
+        assert_eq!(start.record.uptime, 42);
+        assert_eq!(start.record.missing, 0b1010);
+        assert_eq!(start.record.count, 1);
+        let again = Noted::at_start(&start.to_words(), WATCHDOG, 3, [0, 1, 1, 1]);
+        assert_eq!((again.record.count, again.record.missing), (2, 1));
+    }
+
+    #[test]
+    fn a_bite_after_a_fault_was_noted_is_that_faults() {
+        let start = Noted::at_start(&noted().to_words(), WATCHDOG, 42, [0; TASKS]);
+        assert_eq!(start.record.fault, fault());
+        assert_eq!((start.record.count, start.record.missing), (1, 0));
+    }
+
+    #[test]
+    fn a_bite_with_nothing_to_trust_in_ram_is_still_one() {
+        let start = Noted::at_start(&[0xA5A5_A5A5; WORDS], WATCHDOG, 0xA5A5_A5A5, [0xA5; TASKS]);
+        assert_eq!(start.record.fault.kind, Kind::Watchdog);
+        assert_eq!((start.record.uptime, start.record.missing), (0, 0));
+    }
+
+    #[test]
+    fn the_first_fault_since_the_start_counts() {
+        let second = Fault {
+            kind: Kind::Panic,
+            ..Fault::default()
+        };
+        assert_eq!(noted().with(second, 78, 0), noted());
+        let after = Noted::at_start(&noted().to_words(), BY_SOFTWARE, 0, [1; TASKS]);
+        let then = after.with(second, 5, 0);
+        assert_eq!((then.record.fault, then.record.count), (second, 2));
+    }
+
+    #[test]
+    fn faults_are_counted_as_far_as_it_goes() {
+        let mut noted = noted();
+        noted.record.count = u16::MAX;
+        noted.fresh = false;
+        assert_eq!(noted.with(fault(), 0, 0).record.count, u16::MAX);
+    }
+}

@@ -1,0 +1,74 @@
+//! Saving the configuration from the background, and restarts, which wait for it.
+
+use firmware::{
+    device::Device,
+    store::{Saving, Store},
+};
+use rtic::Mutex;
+
+use crate::{log::Event, pages::Pages};
+
+/// The store, and a save under way.
+pub struct Persistence {
+    store: Store,
+    pages: Pages,
+    saving: Option<Saving>,
+    restart: bool,
+}
+
+impl Persistence {
+    pub const fn new(store: Store, pages: Pages) -> Self {
+        Self {
+            store,
+            pages,
+            saving: None,
+            restart: false,
+        }
+    }
+
+    /// Begins to save what the configuration has set aside for it.
+    pub fn begin(&mut self, device: &mut impl Mutex<T = Device>) {
+        self.saving = device.lock(|device| {
+            let saving = Saving::new(&self.store, &self.pages, device.config.to_save());
+            if saving.is_none() {
+                // It is stored as it is: no wear.
+                device.config.end_save();
+            }
+            saving
+        });
+    }
+
+    /// Restarts the device when nothing is being saved.
+    pub const fn restart_when_done(&mut self) {
+        self.restart = true;
+    }
+
+    /// Goes on with a save to its end, one flash operation at a time with interrupts in between; then
+    /// restarts, if that was ordered.
+    pub fn work(&mut self, device: &mut impl Mutex<T = Device>) -> Option<Event> {
+        let event = self.saving.take().map(|saving| self.save(saving, device));
+        if self.restart {
+            board_support::restart();
+        }
+        event
+    }
+
+    fn save(&mut self, mut saving: Saving, device: &mut impl Mutex<T = Device>) -> Event {
+        let mut good = true;
+        while let Some(operation) = device.lock(|device| saving.next(device.config.to_save())) {
+            good = operation.perform(&mut self.pages).is_ok();
+            if !good {
+                break;
+            }
+        }
+        good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
+        if good {
+            device.lock(|device| device.config.end_save());
+            Event::Saved
+        } else {
+            let stored = self.store.load(&self.pages).settings;
+            device.lock(|device| device.config.save_failed(stored));
+            Event::SaveFailed
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Start-up: from the board and what is stored to everything the tasks need.
+
+use board_support::{Leds, ScanTimer, Watchdog, board, fault, pac, uart};
+use firmware::{
+    config::{self, Config},
+    device::{Device, Identity},
+    lamps::Trouble,
+    start_up::{self, Address},
+    store::Store,
+};
+use modbus_server::{Adu, Server, rtu};
+use modio_drivers::IoModule;
+use register_map::codes::{Format, GapRule};
+
+use crate::{
+    installed::{AnalogOutputs, Installed},
+    line::Line,
+    log::{self, Log},
+    pages::Pages,
+    persistence::Persistence,
+};
+
+/// What start-up brings about.
+pub struct Started {
+    pub line: Option<Line>,
+    pub server: Server,
+    pub device: Device,
+    pub module: Installed,
+    pub analog_outputs: Option<AnalogOutputs>,
+    pub persistence: Persistence,
+    pub scan_timer: ScanTimer,
+    pub watchdog: Watchdog,
+    pub leds: Leds,
+    pub log: Log,
+    pub trouble: Trouble,
+}
+
+/// Brings everything up, outputs first: they are driven by START as soon as the configuration is
+/// known, and the line is served last, when there is something to serve.
+pub fn up(device: pac::Peripherals, adus: &'static mut [Adu; 2]) -> Started {
+    let mut log = Log::new();
+    let board = board::setup(device);
+    let record = fault::take_at_start(board.reset_cause);
+    let address = Address::from_dip(board.dip);
+
+    let mut pages = Pages(board.flash);
+    let mut store = Store::open(&pages);
+    let loaded = store.load(&pages);
+    let config = Config::new(loaded.settings, loaded.invalid || loaded.rejected > 0);
+    let slot = config.slot();
+    let settings = start_up::line(address, config.line());
+
+    let mut module = Installed::new(slot.module, board.slot);
+    let analog_outputs = AnalogOutputs::of(slot.module, board.dac);
+    let identity = Identity {
+        unit: address.unit().unwrap_or_default(),
+        reset_cause: board.reset_cause,
+        unique_id: half_words(board.unique_id),
+        fault: log::fault_words(&record),
+    };
+    let device = Device::new(module.kinds(), config, identity);
+    module.configure(device.points.settings());
+    // A module that cannot be driven is told by the first scan.
+    let _ = module.drive_outputs(device.points.channels());
+
+    log.start(&log::Start {
+        address,
+        dip: board.dip,
+        line: settings,
+        module: slot.module,
+        clock: board.clock,
+        reset_cause: board.reset_cause,
+        fault: record.fault.kind,
+        config_invalid: loaded.invalid,
+    });
+    // Erases, where it has to: the line is not served yet.
+    if store.prepare(&mut pages).is_err() {
+        log.event(log::Event::SaveFailed);
+    }
+
+    let strict = settings.gap_rule == GapRule::Drop;
+    let line = address.unit().and_then(|unit| {
+        let on_wire = wire_settings(settings);
+        let gaps = rtu::Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
+        let t35 = settings
+            .frame_gap
+            .map_or(gaps.t35, |tenths| u32::from(tenths) * 100_000);
+        let (uart, gap) = board.line.start(on_wire, gaps.t15.min(t35), t35)?;
+        Some(Line::new(uart, gap, unit, strict, adus))
+    });
+
+    Started {
+        line,
+        server: Server::new(identity.unit),
+        device,
+        module,
+        analog_outputs,
+        persistence: Persistence::new(store, pages),
+        scan_timer: board.scan_timer,
+        watchdog: board.watchdog,
+        leds: board.leds,
+        log,
+        trouble: Trouble::at_start(address, board.clock.is_crystal()),
+    }
+}
+
+fn wire_settings(line: config::Line) -> uart::LineSettings {
+    uart::LineSettings {
+        baud: line.baud.bits_per_second(),
+        format: match line.format {
+            Format::F8N2 => uart::Format::N2,
+            Format::F8E1 => uart::Format::E1,
+            Format::F8O1 => uart::Format::O1,
+            Format::F8N1 => uart::Format::N1,
+        },
+    }
+}
+
+/// The identity as it stands in memory: six half-words, low byte first.
+fn half_words(bytes: [u8; 12]) -> [u16; 6] {
+    let (pairs, _) = bytes.as_chunks();
+    let mut words = [0; 6];
+    for (word, pair) in words.iter_mut().zip(pairs) {
+        *word = u16::from_le_bytes(*pair);
+    }
+    words
+}

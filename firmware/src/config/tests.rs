@@ -1,0 +1,384 @@
+//! The configuration as a master sees it.
+
+extern crate std;
+use std::vec::Vec;
+
+use super::*;
+use register_map::Module;
+use register_map::codes::{Baud, Format, Scale, Signal};
+use register_map::configuration::*;
+
+const ADDRESS: Result<Option<Command>, Exception> = Err(Exception::IllegalDataAddress);
+const VALUE: Result<Option<Command>, Exception> = Err(Exception::IllegalDataValue);
+const LOCKED: Result<Option<Command>, Exception> = Err(Exception::ServerDeviceBusy);
+const DONE: Result<Option<Command>, Exception> = Ok(None);
+
+const SLOT: u16 = SLOT_FIRST;
+
+/// Writes as the server does: only what was found good.
+fn write(config: &mut Config, start: u16, values: &[u16]) -> Result<Option<Command>, Exception> {
+    let bytes: Vec<u8> = values
+        .iter()
+        .flat_map(|value| value.to_be_bytes())
+        .collect();
+    let span = Span::new(start, values.len() as u16).unwrap();
+    config.check_write(span, Words::new(&bytes))?;
+    Ok(config.write(span, Words::new(&bytes)))
+}
+
+fn read(config: &Config, start: u16, count: u16) -> Result<Vec<u16>, Exception> {
+    let span = Span::new(start, count).unwrap();
+    config.check_read(span)?;
+    let mut bytes = std::vec![0xEE; usize::from(count) * 2];
+    config.read(span, &mut WordsOut::new(&mut bytes));
+    Ok(Words::new(&bytes).iter().collect())
+}
+
+fn all(config: &Config) -> Vec<u16> {
+    let runs = [
+        (0x101, 7),
+        (0x110, 8),
+        (0x120, 38),
+        (0x160, 96),
+        (0x1C0, 64),
+    ];
+    let read = |(start, count)| read(config, start, count).unwrap();
+    runs.into_iter().flat_map(read).collect()
+}
+
+fn config(pairs: &[(u16, u16)]) -> Config {
+    let (settings, rejected) = Settings::load(pairs.iter().copied());
+    assert_eq!(rejected, 0);
+    Config::new(settings, false)
+}
+
+fn unlocked(pairs: &[(u16, u16)]) -> Config {
+    let mut config = config(pairs);
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    config
+}
+
+fn status(config: &Config) -> u16 {
+    config.status() & !status::UNLOCKED
+}
+
+fn save(config: &mut Config) {
+    assert_eq!(write(config, COMMAND, &[1]), Ok(Some(Command::Save)));
+    config.begin_save();
+    config.end_save();
+}
+
+#[test]
+fn everything_reads_its_default_key_and_command_nothing() {
+    let config = config(&[]);
+    let first = read(&config, KEY, 9).unwrap();
+    assert_eq!(first, [0, 96, 0, 0, 0, 0, 0, 0, 0]);
+    let mut middle = std::vec![5; 32];
+    middle.extend([0, 0, 23, 2, 0, 50]);
+    assert_eq!(read(&config, FILTER, 38).unwrap(), middle);
+    assert_eq!(read(&config, BETA, 32).unwrap(), [3950; 32]);
+    assert_eq!(read(&config, RANGE, 125).unwrap(), [0; 125]);
+}
+
+#[test]
+fn gaps_are_no_addresses_neither_to_read_nor_to_write() {
+    let mut config = unlocked(&[]);
+    for (start, count) in [
+        (0x0108, 2),
+        (0x0109, 1),
+        (0x010F, 2),
+        (0x0117, 2),
+        (0x011F, 2),
+        (0x0145, 2),
+        (0x0146, 1),
+        (0x015F, 1),
+        (0x01FF, 2),
+        (0x00FF, 2),
+        (0x0110, 17),
+    ] {
+        assert_eq!(
+            read(&config, start, count),
+            Err(Exception::IllegalDataAddress)
+        );
+        let values = std::vec![0; usize::from(count)];
+        assert_eq!(
+            write(&mut config, start, &values),
+            ADDRESS,
+            "{start:#06x}+{count}"
+        );
+    }
+}
+
+#[test]
+fn a_gap_comes_before_a_bad_value_and_that_before_the_lock() {
+    let mut config = config(&[]);
+    assert_eq!(write(&mut config, COMMAND, &[99, 99]), ADDRESS);
+    assert_eq!(write(&mut config, BAUD, &[97]), VALUE);
+    assert_eq!(write(&mut config, BAUD, &[96]), LOCKED);
+    assert_eq!(write(&mut config, COMMAND, &[5]), LOCKED);
+    assert_eq!(write(&mut config, COMMAND, &[6]), VALUE);
+    assert_eq!(write(&mut config, KEY, &[0]), VALUE);
+    assert_eq!(read(&config, KEY, 1).unwrap(), [0]);
+}
+
+#[test]
+fn the_lock_stays_open_for_sixty_seconds_after_the_last_write() {
+    let mut config = unlocked(&[]);
+    assert_eq!(read(&config, KEY, 2).unwrap(), [1, 96]);
+    assert_eq!(config.status(), status::UNLOCKED);
+    config.tick(59_999);
+    assert_eq!(write(&mut config, BAUD, &[192]), DONE);
+    config.tick(59_999);
+    assert_eq!(
+        write(&mut config, BAUD, &[1]),
+        VALUE,
+        "refused: it keeps nothing open"
+    );
+    assert_eq!(read(&config, KEY, 1).unwrap(), [1]);
+    config.tick(1);
+    assert_eq!(read(&config, KEY, 1).unwrap(), [0]);
+    assert_eq!(write(&mut config, BAUD, &[96]), LOCKED);
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    assert_eq!(write(&mut config, BAUD, &[96]), DONE);
+}
+
+#[test]
+fn the_key_does_not_open_for_its_own_request() {
+    let mut config = config(&[]);
+    let values = [OPENING_KEY, 1152, 1];
+    assert_eq!(write(&mut config, KEY, &values), LOCKED);
+    assert_eq!(
+        read(&config, KEY, 3).unwrap(),
+        [0, 96, 0],
+        "nothing has happened"
+    );
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    assert_eq!(write(&mut config, KEY, &values), DONE);
+    assert_eq!(write(&mut config, KEY, &[0, 192, 1]), VALUE);
+    assert_eq!(read(&config, KEY, 3).unwrap(), [1, 1152, 1]);
+}
+
+#[test]
+fn one_bad_value_among_many_and_nothing_is_written() {
+    let mut config = unlocked(&[(MODULE_SLOT, 2)]);
+    let before = all(&config);
+    let good: Vec<u16> = [[2000; 32], [1; 32], [1; 32]].concat();
+    for bad in 0..good.len() {
+        let mut values = good.clone();
+        values[bad] = 6000;
+        assert_eq!(write(&mut config, BETA, &values), VALUE, "{bad}");
+    }
+    let mut bits = [1; 32];
+    bits[17] = 2;
+    assert_eq!(write(&mut config, SAFE, &bits), VALUE, "point 17 is a bit");
+    assert_eq!(all(&config), before);
+    assert_eq!(write(&mut config, BETA, &good), DONE);
+    assert_eq!(read(&config, BETA, 96).unwrap(), good);
+}
+
+#[test]
+fn the_module_as_written_last_says_what_its_points_take() {
+    let mut config = unlocked(&[(MODULE_SLOT, 1)]);
+    for (module, address, good, bad) in [
+        (1, FILTER, 1000, 1001),
+        (2, SAFE, HOLD, 2),
+        (2, START, 1, 2),
+        (3, SAFE + 2, 1, 4095),
+        (4, FILTER, 8, 9),
+        (4, RANGE, 2, 3),
+        (5, RANGE, 1, 2),
+        (5, SAFE, 4095, 4096),
+        (5, START, 4095, HOLD),
+        (6, FILTER, 8, 9),
+        (6, FILTER + 2, 1000, 1001),
+        (6, RANGE + 2, 1, 2),
+        (0, SAFE, 4095, 4096),
+    ] {
+        assert_eq!(write(&mut config, MODULE_SLOT, &[module]), DONE);
+        let address = address + SLOT;
+        assert_eq!(
+            write(&mut config, address, &[bad]),
+            VALUE,
+            "{module} {address:#06x}"
+        );
+        assert_eq!(
+            write(&mut config, address, &[good]),
+            DONE,
+            "{module} {address:#06x}"
+        );
+        assert_eq!(read(&config, address, 1).unwrap(), [good]);
+    }
+    assert_eq!(config.slot().module, Module::Di4, "until the restart");
+}
+
+#[test]
+fn a_port_without_a_slot_has_no_module() {
+    let mut config = unlocked(&[]);
+    assert_eq!(write(&mut config, MODULE, &[1]), VALUE);
+    assert_eq!(write(&mut config, MODULE, &[0, 0, 0, 0, 1, 0, 0, 1]), VALUE);
+    assert_eq!(write(&mut config, MODULE, &[0, 0, 0, 0, 6, 0, 0, 0]), DONE);
+    assert_eq!(read(&config, MODULE, 8).unwrap(), [0, 0, 0, 0, 6, 0, 0, 0]);
+}
+
+#[test]
+fn now_is_now_and_restart_is_after_the_restart() {
+    let mut config = unlocked(&[(MODULE_SLOT, 6)]);
+    assert_eq!(write(&mut config, BAUD, &[1152, 1, 0, 36_000, 7, 5]), DONE);
+    assert_eq!(write(&mut config, RANGE + SLOT, &[1, 0, 1]), DONE);
+    assert_eq!(write(&mut config, SCALE + SLOT + 1, &[1]), DONE);
+    assert_eq!(write(&mut config, SAFE + SLOT + 2, &[HOLD, 7]), DONE);
+    assert_eq!(write(&mut config, START + SLOT + 2, &[8]), DONE);
+    assert_eq!(write(&mut config, LORA, &[1, 2, 3]), DONE);
+    assert_eq!(
+        (config.comm_timeout_ms(), config.response_delay_ms()),
+        (Some(3_600_000), 7)
+    );
+    let [first, second, third] = [0, 1, 2].map(|channel| config.point(channel));
+    assert_eq!(
+        (first.signal, first.scale, first.filter),
+        (Signal::Current, Scale::Raw, 4)
+    );
+    assert_eq!(
+        (second.signal, second.scale),
+        (Signal::Voltage, Scale::Engineering)
+    );
+    assert_eq!((third.signal, third.safe), (Signal::Current, None));
+    assert_eq!(config.point(3).safe, Some(7));
+    assert_eq!((config.line(), config.lora()), (Line::FACTORY, None));
+    assert_eq!(config.slot().start, [0; 4]);
+
+    save(&mut config);
+    let restarted = Config::new(config.to_save().clone(), false);
+    let line = restarted.line();
+    assert_eq!(
+        (line.baud, line.format, line.frame_gap),
+        (Baud::B115200, Format::F8E1, Some(5))
+    );
+    let lora = restarted.lora().unwrap();
+    assert_eq!((lora.address, lora.channel, lora.frame_gap_ms), (2, 3, 50));
+    assert_eq!(restarted.slot().start, [0, 0, 8, 0]);
+    assert_eq!(all(&restarted), all(&config));
+}
+
+#[test]
+fn what_does_not_suit_the_module_in_force_counts_as_its_default() {
+    let mut config = unlocked(&[(MODULE_SLOT, 4), (FILTER + SLOT, 7)]);
+    assert_eq!(config.point(0).filter, 7);
+    assert_eq!(write(&mut config, MODULE_SLOT, &[1]), DONE);
+    assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
+    assert_eq!(config.point(0).filter, 4);
+}
+
+#[test]
+fn unsaved_is_what_differs_from_what_is_saved() {
+    let mut config = unlocked(&[]);
+    assert_eq!(write(&mut config, BETA, &[2000, 3950, 2000]), DONE);
+    assert_eq!(status(&config), status::UNSAVED);
+    assert_eq!(write(&mut config, BETA, &[3950, 3950]), DONE);
+    assert_eq!(status(&config), status::UNSAVED);
+    assert_eq!(write(&mut config, BETA + 2, &[3950]), DONE);
+    assert_eq!(status(&config), 0, "as it was");
+    assert_eq!(write(&mut config, MODULE_SLOT, &[4]), DONE);
+    assert_eq!(status(&config), status::UNSAVED);
+    assert_eq!(write(&mut config, MODULE_SLOT, &[0]), DONE);
+    assert_eq!(status(&config), 0);
+}
+
+#[test]
+fn a_saved_change_waits_for_the_restart_if_it_needs_one() {
+    let mut config = unlocked(&[]);
+    assert_eq!(write(&mut config, COMM_TIMEOUT, &[5]), DONE);
+    save(&mut config);
+    assert_eq!(status(&config), 0, "in force at once");
+    assert_eq!(write(&mut config, START, &[5]), DONE);
+    assert_eq!(status(&config), status::UNSAVED);
+    save(&mut config);
+    assert_eq!(status(&config), status::RESTART_NEEDED);
+    assert_eq!(write(&mut config, START, &[0]), DONE);
+    assert_eq!(status(&config), status::RESTART_NEEDED | status::UNSAVED);
+    save(&mut config);
+    assert_eq!(status(&config), 0, "as it was at the start");
+}
+
+#[test]
+fn a_save_takes_the_settings_of_its_moment() {
+    let mut config = unlocked(&[]);
+    assert_eq!(write(&mut config, BETA, &[2000]), DONE);
+    assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
+    assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED, "one at a time");
+    config.begin_save();
+    assert_eq!(write(&mut config, BETA, &[3000]), DONE);
+    assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);
+    assert_eq!(
+        write(&mut config, COMMAND, &[2]),
+        Ok(Some(Command::Restart))
+    );
+    assert_eq!(config.to_save().get(BETA), 2000);
+    assert!(config.is_saving());
+    config.end_save();
+    assert_eq!(status(&config), status::UNSAVED, "the later change");
+    config.drop_changes();
+    assert_eq!((config.edited.get(BETA), status(&config)), (2000, 0));
+}
+
+#[test]
+fn unsaved_stays_until_the_save_is_complete_or_when_it_fails() {
+    let mut config = unlocked(&[]);
+    assert_eq!(write(&mut config, BETA, &[2000]), DONE);
+    assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
+    config.begin_save();
+    assert_eq!(status(&config), status::UNSAVED);
+    config.save_failed(Settings::defaults());
+    assert_eq!(status(&config), status::UNSAVED);
+    assert_eq!(read(&config, BETA, 1).unwrap(), [2000]);
+    save(&mut config);
+    assert_eq!(status(&config), 0);
+}
+
+#[test]
+fn defaults_are_loaded_and_changes_dropped_as_if_written() {
+    let mut config = unlocked(&[(BAUD, 1152), (BETA, 2000)]);
+    assert_eq!(
+        write(&mut config, COMMAND, &[3]),
+        Ok(Some(Command::LoadDefaults))
+    );
+    assert_eq!(
+        read(&config, BAUD, 1).unwrap(),
+        [1152],
+        "not before the response is out"
+    );
+    let revision = config.revision();
+    config.load_defaults();
+    assert_ne!(config.revision(), revision);
+    assert_eq!(all(&config), all(&Config::new(Settings::defaults(), false)));
+    assert_eq!(status(&config), status::UNSAVED);
+    config.drop_changes();
+    assert_eq!(
+        (config.edited.get(BAUD), config.edited.get(BETA)),
+        (1152, 2000)
+    );
+    assert_eq!(status(&config), 0);
+}
+
+#[test]
+fn every_command_is_given_back_and_changes_nothing_itself() {
+    let mut config = unlocked(&[(BAUD, 1152)]);
+    let before = all(&config);
+    for command in Command::ALL {
+        assert_eq!(
+            write(&mut config, COMMAND, &[command.code()]),
+            Ok(Some(*command))
+        );
+    }
+    assert_eq!(all(&config), before);
+    assert_eq!(read(&config, COMMAND, 1).unwrap(), [0]);
+}
+
+#[test]
+fn an_invalid_store_is_reported() {
+    assert_eq!(
+        Config::new(Settings::defaults(), true).status(),
+        status::STORED_INVALID
+    );
+    assert_eq!(Config::new(Settings::defaults(), false).status(), 0);
+}

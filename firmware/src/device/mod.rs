@@ -1,0 +1,271 @@
+//! Everything a master reaches, as one data model: points, counters, configuration, state.
+//!
+//! ```text
+//!            requests (serve)
+//!                  |
+//!   +--------------v---------------------------------------------+
+//!   | points    what the modules' channels are: the process image |<--> scan, 1 kHz
+//!   | pulses    counters of digital inputs                        |
+//!   | config    settings, lock, commands                          |<--> store, in flash
+//!   | state     identity, counters, health                        |<--- whoever knows
+//!   +-------------------------------------------------------------+
+//! ```
+//!
+//! The scan copies inputs in and outputs out; requests read and write the device alone. Neither ever
+//! waits for the other's hardware, and a request that touches several points sees and leaves one
+//! consistent state.
+
+mod comm_watchdog;
+mod points;
+mod state;
+
+#[cfg(test)]
+mod tests;
+
+use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Words, WordsOut};
+use modio_drivers::{CHANNELS, ChannelSettings, Kind, Range, Scale};
+use register_map::{codes::Command, configuration, counters, fault, state as state_map};
+
+pub use comm_watchdog::CommWatchdog;
+pub use points::Points;
+pub use state::{Identity, State};
+
+use crate::config::Config;
+
+/// The device behind the line.
+#[derive(Debug)]
+pub struct Device {
+    /// The process image.
+    pub points: Points,
+    /// The settings.
+    pub config: Config,
+    /// Identity and health.
+    pub state: State,
+    comm_watchdog: CommWatchdog,
+    /// What a request has ordered, to be carried out when its reply is out.
+    ordered: Option<Command>,
+    /// Of the configuration, when the points' settings were last taken from it.
+    revision: u16,
+}
+
+/// Which block of the address space a span of words begins in; it may not leave it.
+enum Block {
+    Points,
+    Config,
+    State,
+    Fault,
+    Pulses,
+}
+
+impl Block {
+    const fn of(span: Span) -> Self {
+        match span.start() {
+            0x0100..=0x01FF => Self::Config,
+            0x0200..=0x025F => Self::State,
+            0x0260..=0x026F => Self::Fault,
+            0x0300..=0x033F => Self::Pulses,
+            _ => Self::Points,
+        }
+    }
+}
+
+impl Device {
+    /// A device with these settings whose slot has channels of these kinds; its outputs stand at
+    /// START.
+    #[must_use]
+    pub fn new(kinds: [Kind; CHANNELS], config: Config, identity: Identity) -> Self {
+        let start = config.slot().start;
+        let mut device = Self {
+            points: Points::new(kinds),
+            state: State::new(identity),
+            comm_watchdog: CommWatchdog::new(),
+            ordered: None,
+            revision: config.revision(),
+            config,
+        };
+        device.configure_points();
+        device.points.command_raw(start.map(Some));
+        device
+    }
+
+    /// The settings of the slot's channels in force.
+    #[must_use]
+    pub fn channel_settings(&self) -> [ChannelSettings; CHANNELS] {
+        [0, 1, 2, 3].map(|channel| {
+            let point = self.config.point(channel);
+            ChannelSettings {
+                filter: point.filter,
+                beta: point.beta,
+                range: Range::from_code(point.signal.code()).unwrap_or_default(),
+                scale: Scale::from_code(point.scale.code()).unwrap_or_default(),
+            }
+        })
+    }
+
+    /// Brings the points to the settings in force, after these may have changed.
+    fn configure_points(&mut self) {
+        self.revision = self.config.revision();
+        self.points.configure(self.channel_settings());
+    }
+
+    /// A millisecond has passed. Returns whether outputs went to SAFE.
+    pub fn tick(&mut self) -> bool {
+        self.state.tick();
+        self.config.tick(1);
+        let tripped = self.comm_watchdog.tick(self.config.comm_timeout_ms());
+        if tripped {
+            let safe = [0, 1, 2, 3].map(|channel| self.config.point(channel).safe);
+            self.points.command_raw(safe);
+        }
+        tripped
+    }
+
+    /// A valid request for this unit has come.
+    pub const fn request_seen(&mut self) {
+        self.comm_watchdog.feed();
+    }
+
+    /// Takes the command that a request ordered.
+    pub const fn take_order(&mut self) -> Option<Command> {
+        self.ordered.take()
+    }
+
+    /// Carries out what of an order needs nothing but memory; the reply is out. Gives back what is
+    /// left to do: a save that has begun, a restart, or the loader.
+    pub fn carry_out(&mut self, order: Command) -> Option<Command> {
+        match order {
+            Command::LoadDefaults => self.config.load_defaults(),
+            Command::DropChanges => self.config.drop_changes(),
+            Command::ClearWatchdogFlag => self.comm_watchdog.clear(),
+            Command::Save => self.config.begin_save(),
+            Command::Restart | Command::EnterLoader => {}
+        }
+        self.settings_may_have_changed();
+        match order {
+            Command::Save | Command::Restart | Command::EnterLoader => Some(order),
+            Command::LoadDefaults | Command::DropChanges | Command::ClearWatchdogFlag => None,
+        }
+    }
+
+    fn settings_may_have_changed(&mut self) {
+        if self.revision != self.config.revision() {
+            self.configure_points();
+        }
+    }
+
+    /// The status register (0x020A).
+    fn status(&self) -> u16 {
+        use state_map::status;
+        let bit = |mask, set| if set { mask } else { 0 };
+        self.config.status()
+            | bit(status::COMM_WATCHDOG, self.comm_watchdog.has_tripped())
+            | bit(status::MODULE_FAULT, self.points.has_fault())
+    }
+
+    fn state_word(&self, address: u16) -> u16 {
+        match address {
+            state_map::STATUS => self.status(),
+            address => self
+                .state
+                .word(address, &self.points, self.config.slot().module),
+        }
+    }
+}
+
+/// Whether a span lies in a block of read-only registers; the rules know the gaps.
+fn check_rules(rules: &'static [register_map::Rule], span: Span) -> Result<(), Exception> {
+    match register_map::runs(rules, span.start(), span.count()) {
+        Some(_) => Ok(()),
+        None => Err(Exception::IllegalDataAddress),
+    }
+}
+
+impl DataModel for Device {
+    fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
+        self.points.check_read_bits(span)
+    }
+
+    fn check_read_words(&self, span: Span) -> Result<(), Exception> {
+        match Block::of(span) {
+            Block::Points => self.points.check_read_words(span),
+            Block::Config => self.config.check_read(span),
+            Block::State => check_rules(state_map::RULES, span),
+            Block::Fault => check_rules(fault::RULES, span),
+            Block::Pulses => check_rules(counters::RULES, span),
+        }
+    }
+
+    fn check_write_bits(&self, span: Span, _bits: Bits<'_>) -> Result<(), Exception> {
+        self.points.check_write_bits(span)
+    }
+
+    fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
+        match Block::of(span) {
+            Block::Points => self.points.check_write_words(span, words),
+            Block::Config => {
+                self.config.check_write(span, words)?;
+                check_ready(span, words)
+            }
+            Block::State | Block::Fault => Err(Exception::IllegalDataAddress),
+            Block::Pulses => {
+                check_rules(counters::RULES, span)?;
+                points::check_clear(span, words)
+            }
+        }
+    }
+
+    fn read_bits(&self, span: Span, out: &mut BitsOut<'_>) {
+        self.points.read_bits(span, out);
+    }
+
+    fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
+        match Block::of(span) {
+            Block::Points => self.points.read_words(span, out),
+            Block::Config => self.config.read(span, out),
+            Block::State => span
+                .addresses()
+                .for_each(|address| out.push(self.state_word(address))),
+            Block::Fault => span
+                .addresses()
+                .for_each(|address| out.push(self.state.fault_word(address))),
+            Block::Pulses => span
+                .addresses()
+                .for_each(|address| out.push(self.points.pulse_word(address))),
+        }
+    }
+
+    fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
+        self.points.write_bits(span, bits);
+    }
+
+    fn write_words(&mut self, span: Span, words: Words<'_>) {
+        match Block::of(span) {
+            Block::Points => self.points.write_words(span, words),
+            Block::Config => {
+                self.ordered = self.config.write(span, words);
+                self.settings_may_have_changed();
+            }
+            Block::Pulses => self.points.clear_pulses(span),
+            // Refused by the check.
+            Block::State | Block::Fault => {}
+        }
+    }
+}
+
+/// Refuses what this firmware cannot do yet, as a value that is not allowed: ASCII mode would leave a
+/// unit that nobody can talk to, and there is no loader to enter.
+fn check_ready(span: Span, words: Words<'_>) -> Result<(), Exception> {
+    let wants = |address: u16, value: u16| {
+        let index = address.wrapping_sub(span.start());
+        words.get(index) == Some(value)
+    };
+    let ascii = register_map::codes::Mode::Ascii.code();
+    if wants(configuration::MODE, ascii)
+        || wants(configuration::COMMAND, Command::EnterLoader.code())
+        || wants(configuration::LORA, 1)
+    {
+        Err(Exception::IllegalDataValue)
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,151 @@
+//! Identity and health: the registers to read at 0x0200 and the fault record at 0x0260.
+
+use modbus_server::Counters;
+use register_map::{
+    Module,
+    codes::ModuleState,
+    fault,
+    points::{PORTS, SLOT_PORT},
+    state as at,
+};
+
+use super::points::{Points, words_of};
+
+/// What is known of the device when it starts, and never changes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Identity {
+    /// Unit address in force.
+    pub unit: u8,
+    /// The RCC's flags: bit 0 low power, 1 window watchdog, 2 independent watchdog, 3 software,
+    /// 4 power-on, 5 pin.
+    pub reset_cause: u8,
+    /// The 96-bit unique identity, as its half-words stand in memory.
+    pub unique_id: [u16; 6],
+    /// The fault record as registers, from 0x0260 on.
+    pub fault: [u16; fault_words()],
+}
+
+const fn fault_words() -> usize {
+    (fault::RESERVED + 3 - fault::KIND) as usize
+}
+
+/// The firmware's version as its registers have it: major << 8 | minor, and patch.
+const VERSION: [u16; 2] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")) << 8 | number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+const fn number(text: &str) -> u16 {
+    match u16::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("cargo's version parts are numbers"),
+    }
+}
+
+/// Identity and health.
+#[derive(Debug)]
+pub struct State {
+    identity: Identity,
+    /// Milliseconds since the start, wrapping.
+    millis: u32,
+    until_second: u16,
+    uptime_s: u32,
+    /// The line's counters, as the server has them.
+    pub counters: Counters,
+    /// The least stack left free so far, in bytes.
+    pub stack_free: u16,
+}
+
+impl State {
+    /// The state at the start.
+    #[must_use]
+    pub fn new(identity: Identity) -> Self {
+        Self {
+            identity,
+            millis: 0,
+            until_second: 1000,
+            uptime_s: 0,
+            counters: Counters::default(),
+            stack_free: 0,
+        }
+    }
+
+    /// A millisecond has passed.
+    pub const fn tick(&mut self) {
+        self.millis = self.millis.wrapping_add(1);
+        self.until_second -= 1;
+        if self.until_second == 0 {
+            self.until_second = 1000;
+            self.uptime_s = self.uptime_s.wrapping_add(1);
+        }
+    }
+
+    /// Milliseconds since the start, wrapping after 49 days.
+    #[must_use]
+    pub const fn millis(&self) -> u32 {
+        self.millis
+    }
+
+    /// Seconds since the start.
+    #[must_use]
+    pub const fn uptime_s(&self) -> u32 {
+        self.uptime_s
+    }
+
+    /// A register that exists, but for the status; 0 for one that does not.
+    pub(super) fn word(&self, address: u16, points: &Points, module: Module) -> u16 {
+        let [product_high, product_low] = words_of(at::PRODUCT);
+        let [uptime_high, uptime_low] = words_of(self.uptime_s);
+        let [version, patch] = VERSION;
+        match address {
+            0x0200 => product_high,
+            0x0201 => product_low,
+            at::FIRMWARE_VERSION => version,
+            at::FIRMWARE_PATCH => patch,
+            at::MAP_VERSION => at::MAP_VERSION_VALUE,
+            at::BOARD => at::BOARD_MODIO_02,
+            at::UNIT_ADDRESS => self.identity.unit.into(),
+            at::RESET_CAUSE => self.identity.reset_cause.into(),
+            at::UPTIME => uptime_high,
+            0x0209 => uptime_low,
+            at::STACK_FREE => self.stack_free,
+            at::MODULE_IN_FORCE.. => self.by_index(address, points, module),
+            _ => 0,
+        }
+    }
+
+    /// The registers that stand in rows.
+    fn by_index(&self, address: u16, points: &Points, module: Module) -> u16 {
+        let slot = SLOT_PORT - 1;
+        let nth = |words: &[u16], first: u16| {
+            let index = usize::from(address.wrapping_sub(first));
+            words.get(index).copied().unwrap_or_default()
+        };
+        match address.wrapping_sub(at::MODULE_IN_FORCE) {
+            port if port < PORTS => {
+                let module = if port == slot { module } else { Module::None };
+                module.code()
+            }
+            port if port < 2 * PORTS => {
+                let is_slot = port - PORTS == slot;
+                let state = if is_slot {
+                    points.module_state()
+                } else {
+                    ModuleState::None
+                };
+                state.code()
+            }
+            _ if address < at::BUS_MESSAGES => nth(&self.identity.unique_id, at::UNIQUE_ID),
+            _ if address < at::CHANNEL_STATUS => nth(&self.counters.as_words(), at::BUS_MESSAGES),
+            _ => points
+                .status_of(address.wrapping_sub(at::CHANNEL_STATUS))
+                .code(),
+        }
+    }
+
+    /// A register of the fault record.
+    pub(super) fn fault_word(&self, address: u16) -> u16 {
+        let index = usize::from(address.wrapping_sub(fault::KIND));
+        self.identity.fault.get(index).copied().unwrap_or_default()
+    }
+}

@@ -1,0 +1,305 @@
+extern crate std;
+use std::vec::Vec;
+
+use modbus_server::{Adu, Server};
+use modio_drivers::ChannelStatus;
+use register_map::{Module, configuration as at};
+
+use super::*;
+use crate::config::Settings;
+
+/// A device with this module in its slot and these settings stored, and a server in front of it.
+struct Bench {
+    device: Device,
+    server: Server,
+}
+
+fn kinds(module: Module) -> [Kind; CHANNELS] {
+    use Kind::{BitInput, BitOutput, None, WordInput, WordOutput};
+    match module {
+        Module::None => [None; 4],
+        Module::Di4 => [BitInput; 4],
+        Module::Do4 => [BitOutput; 4],
+        Module::Relay2 => [BitInput, BitInput, BitOutput, BitOutput],
+        Module::Ai4 => [WordInput; 4],
+        Module::Ao4 => [WordOutput; 4],
+        Module::Ai2Ao2 => [WordInput, WordInput, WordOutput, WordOutput],
+    }
+}
+
+impl Bench {
+    fn new(module: Module, settings: &[(u16, u16)]) -> Self {
+        let module_setting = (at::MODULE + 4, module.code());
+        let pairs = [&[module_setting], settings].concat();
+        let (settings, rejected) = Settings::load(pairs.into_iter());
+        assert_eq!(rejected, 0);
+        let identity = Identity {
+            unit: 1,
+            reset_cause: 0b11_0000,
+            unique_id: [1, 2, 3, 4, 5, 6],
+            fault: [3; 16],
+        };
+        Self {
+            device: Device::new(kinds(module), Config::new(settings, false), identity),
+            server: Server::new(1),
+        }
+    }
+
+    /// The reply's PDU to a PDU for this unit, and what follows from it.
+    fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let mut adu = Adu::new();
+        adu.push(1);
+        pdu.iter().for_each(|byte| assert!(adu.push(*byte)));
+        let decision = self.server.decide(&adu, &self.device);
+        self.server.commit(&decision);
+        self.server.carry_out(&decision, &mut adu, &mut self.device);
+        if let Some(order) = self.device.take_order() {
+            self.device.carry_out(order);
+        }
+        let head = decision.reply.expect("it was asked");
+        let body = match head.body_len() {
+            0 => &[],
+            len => &adu.as_slice()[..len.into()],
+        };
+        [&head.as_slice()[1..], body].concat()
+    }
+
+    fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>, u8> {
+        let [[a, b], [c, d]] = [address, count].map(u16::to_be_bytes);
+        let reply = self.ask(&[3, a, b, c, d]);
+        if reply[0] & 0x80 != 0 {
+            return Err(reply[1]);
+        }
+        let words = reply[2..].chunks(2);
+        Ok(words.map(|w| u16::from_be_bytes([w[0], w[1]])).collect())
+    }
+
+    fn write(&mut self, address: u16, values: &[u16]) -> Result<(), u8> {
+        let [[a, b], [c, d]] = [address, values.len() as u16].map(u16::to_be_bytes);
+        let mut pdu = std::vec![16, a, b, c, d, values.len() as u8 * 2];
+        pdu.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+        let reply = self.ask(&pdu);
+        if reply[0] & 0x80 != 0 {
+            return Err(reply[1]);
+        }
+        Ok(())
+    }
+
+    fn unlock(&mut self) {
+        assert_eq!(self.ask(&[6, 1, 0, 0x5A, 0x17])[0], 6);
+    }
+
+    fn scan(&mut self, set: impl FnOnce(&mut modio_drivers::Channels)) {
+        let mut channels = *self.device.points.channels();
+        set(&mut channels);
+        let settings = *self.device.points.settings();
+        self.device.points.scanned(&channels, &settings);
+    }
+}
+
+#[test]
+fn points_exist_as_their_module_has_them() {
+    for module in Module::ALL {
+        let mut bench = Bench::new(module, &[]);
+        for (channel, kind) in (0u16..).zip(kinds(module)) {
+            let address = 0x10 + channel;
+            let low = address as u8;
+            let is_bit = matches!(kind, Kind::BitInput | Kind::BitOutput);
+            let is_word = matches!(kind, Kind::WordInput | Kind::WordOutput);
+            for function in [1, 2] {
+                let reply = bench.ask(&[function, 0, low, 0, 1]);
+                assert_eq!(
+                    reply[0] & 0x80 == 0,
+                    is_bit,
+                    "{module} {channel} by {function}"
+                );
+            }
+            assert_eq!(
+                bench.read(address, 1).is_ok(),
+                is_word,
+                "{module} {channel}"
+            );
+            let coil = bench.ask(&[5, 0, low, 0xFF, 0]);
+            assert_eq!(coil[0] == 5, kind == Kind::BitOutput, "{module} {channel}");
+            let written = bench.write(address, &[1]);
+            assert_eq!(
+                written.is_ok(),
+                kind == Kind::WordOutput,
+                "{module} {channel}"
+            );
+        }
+        assert_eq!(bench.read(0x14, 1), Err(2));
+        assert_eq!(bench.read(0x0F, 2), Err(2));
+    }
+}
+
+#[test]
+fn inputs_follow_the_scan_and_outputs_keep_what_was_commanded() {
+    let mut bench = Bench::new(Module::Ai2Ao2, &[]);
+    bench.write(0x12, &[100, 200]).unwrap();
+    bench.scan(|channels| {
+        channels.set_word(0, 7);
+        channels.set_word(1, 8);
+        channels.set_word(2, 9);
+        channels.set_status(1, ChannelStatus::OverRange);
+    });
+    assert_eq!(bench.read(0x10, 4), Ok(std::vec![7, 8, 100, 200]));
+    assert_eq!(bench.read(0x0250, 4), Ok(std::vec![0, 2, 0, 0]));
+    assert_eq!(
+        bench.read(0x021C, 1),
+        Ok(std::vec![3]),
+        "a channel out of range"
+    );
+    assert_eq!(bench.read(0x020A, 1).unwrap()[0] & 4, 4);
+}
+
+#[test]
+fn a_written_word_must_suit_range_and_scale_and_all_of_a_write_or_none() {
+    let ua = [
+        (at::RANGE + 0x11, 1),
+        (at::SCALE + 0x11, 1),
+        (at::SCALE + 0x12, 1),
+    ];
+    let mut bench = Bench::new(Module::Ao4, &ua);
+    // Raw, uA, mV, raw.
+    bench.write(0x10, &[4095, 4000, 10_000, 0]).unwrap();
+    for bad in [
+        [4096, 4000, 0, 0],
+        [0, 3999, 0, 0],
+        [0, 20_001, 0, 0],
+        [0, 4000, 10_001, 0],
+    ] {
+        assert_eq!(bench.write(0x10, &bad), Err(3), "{bad:?}");
+    }
+    assert_eq!(bench.read(0x10, 4), Ok(std::vec![4095, 4000, 10_000, 0]));
+    assert_eq!(
+        bench.write(0x13, &[5000, 5000]),
+        Err(2),
+        "the address comes before the value"
+    );
+}
+
+#[test]
+fn a_new_scale_does_not_move_an_output() {
+    let mut bench = Bench::new(Module::Ao4, &[]);
+    bench.write(0x10, &[2048]).unwrap();
+    bench.unlock();
+    bench.write(at::SCALE + 0x10, &[1]).unwrap();
+    assert_eq!(bench.read(0x10, 1), Ok(std::vec![5001]), "mV, at once");
+    bench.write(at::SCALE + 0x10, &[0]).unwrap();
+    assert_eq!(bench.read(0x10, 1), Ok(std::vec![2048]));
+}
+
+#[test]
+fn a_module_that_does_not_answer_is_04_after_all_other_checks() {
+    let mut bench = Bench::new(Module::Ao4, &[]);
+    bench.device.points.set_failing(true);
+    assert_eq!(bench.read(0x10, 4), Err(4));
+    assert_eq!(bench.write(0x10, &[1]), Err(4));
+    assert_eq!(bench.write(0x10, &[4096]), Err(3));
+    assert_eq!(bench.read(0x14, 1), Err(2));
+    assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
+    bench.device.points.set_failing(false);
+    assert_eq!(bench.read(0x10, 4), Ok(std::vec![0; 4]));
+}
+
+#[test]
+fn outputs_start_at_start_and_go_to_safe_in_silence() {
+    let stored = [
+        (at::START + 0x10, 1),
+        (at::START + 0x12, 1),
+        (at::SAFE + 0x11, 1),
+        (at::SAFE + 0x12, at::HOLD),
+        (at::COMM_TIMEOUT, 5),
+    ];
+    let mut bench = Bench::new(Module::Do4, &stored);
+    let bits = |bench: &mut Bench| bench.ask(&[1, 0, 0x10, 0, 4])[2];
+    assert_eq!(bits(&mut bench), 0b0101);
+    bench.device.request_seen();
+    let trips = (1..=600).filter(|_| bench.device.tick()).count();
+    assert_eq!(trips, 1);
+    assert_eq!(bits(&mut bench), 0b0110, "off, on, held, off");
+    let status = |bench: &mut Bench| bench.read(0x020A, 1).unwrap()[0] & 1;
+    assert_eq!(status(&mut bench), 1);
+    // Outputs stay until they are written; the flag until it is cleared.
+    bench.device.request_seen();
+    assert_eq!(bits(&mut bench), 0b0110);
+    bench.ask(&[5, 0, 0x10, 0xFF, 0]);
+    assert_eq!(bits(&mut bench), 0b0111);
+    bench.unlock();
+    bench.write(at::COMMAND, &[5]).unwrap();
+    assert_eq!(status(&mut bench), 0);
+}
+
+#[test]
+fn pulses_are_counted_on_rising_edges_and_cleared_whole() {
+    let mut bench = Bench::new(Module::Di4, &[]);
+    bench.scan(|channels| channels.set_bit(0, true));
+    assert_eq!(
+        bench.read(0x0320, 2),
+        Ok(std::vec![0, 0]),
+        "as it stood at the start"
+    );
+    for n in 0..0x1_0003 {
+        bench.scan(|channels| channels.set_bit(1, n % 2 == 0));
+    }
+    assert_eq!(bench.read(0x0322, 2), Ok(std::vec![0, 0x8002]));
+    for (address, values) in [
+        (0x0322, &[0][..]),
+        (0x0323, &[0, 0]),
+        (0x0322, &[0, 1]),
+        (0x0321, &[0, 0, 0]),
+    ] {
+        assert_eq!(bench.write(address, values), Err(3), "{address:#x}");
+    }
+    assert_eq!(bench.read(0x0322, 2), Ok(std::vec![0, 0x8002]));
+    bench.write(0x0322, &[0, 0]).unwrap();
+    assert_eq!(bench.read(0x0322, 2), Ok(std::vec![0, 0]));
+    assert_eq!(bench.read(0x0300, 64).unwrap(), [0; 64]);
+    assert_eq!(bench.read(0x0300, 65), Err(2));
+}
+
+#[test]
+fn identity_and_state_are_read_and_never_written() {
+    let mut bench = Bench::new(Module::Relay2, &[]);
+    (0..2500).for_each(|_| {
+        bench.device.tick();
+    });
+    assert_eq!(bench.read(0x0200, 2), Ok(std::vec![0x2383, 0x5860]));
+    assert_eq!(bench.read(0x0204, 4), Ok(std::vec![1, 1, 1, 0b11_0000]));
+    assert_eq!(bench.read(0x0208, 2), Ok(std::vec![0, 2]));
+    assert_eq!(bench.read(0x0210, 8), Ok(std::vec![0, 0, 0, 0, 3, 0, 0, 0]));
+    assert_eq!(bench.read(0x0218, 8), Ok(std::vec![1, 1, 1, 1, 0, 1, 1, 1]));
+    assert_eq!(bench.read(0x0220, 6), Ok(std::vec![1, 2, 3, 4, 5, 6]));
+    assert_eq!(bench.read(0x0230, 9).map(|c| c.len()), Ok(9));
+    assert_eq!(bench.read(0x0240, 32), Ok(std::vec![0; 32]));
+    assert_eq!(bench.read(0x0260, 16), Ok(std::vec![3; 16]));
+    for gap in [0x020C, 0x0226, 0x0239, 0x0270, 0x02FF, 0x0340] {
+        assert_eq!(bench.read(gap, 1), Err(2), "{gap:#x}");
+    }
+    assert_eq!(bench.read(0x020B, 2), Err(2), "into a gap");
+    assert_eq!(
+        bench.read(0x01FF, 2),
+        Err(2),
+        "from one block into the next"
+    );
+    assert_eq!(
+        bench.read(0x025F, 2),
+        Err(2),
+        "from one block into the next"
+    );
+    assert_eq!(bench.write(0x0200, &[1]), Err(2));
+    assert_eq!(bench.write(0x0260, &[0]), Err(2));
+}
+
+#[test]
+fn what_cannot_be_done_yet_is_refused() {
+    let mut bench = Bench::new(Module::Di4, &[]);
+    bench.unlock();
+    assert_eq!(bench.write(at::MODE, &[1]), Err(3));
+    assert_eq!(bench.write(at::BAUD, &[192, 0, 1]), Err(3));
+    assert_eq!(bench.write(at::COMMAND, &[0xB007]), Err(3));
+    assert_eq!(bench.write(at::LORA, &[1]), Err(3));
+    assert_eq!(bench.read(at::BAUD, 3), Ok(std::vec![96, 0, 0]));
+    bench.write(at::BAUD, &[192, 1, 0]).unwrap();
+}

@@ -1,0 +1,129 @@
+//! A save, one flash operation at a time.
+
+use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA};
+
+use super::operation::{Operation, Readying, Writing};
+use super::survey::record_at;
+use super::{Flash, Page, Store, StoreError};
+use crate::config::Settings;
+
+/// How far a save has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// There is more to do.
+    More,
+    /// The settings are stored.
+    Done,
+}
+
+/// A save that is under way. The settings must be the same at every step.
+#[derive(Clone, Debug)]
+pub struct Saving {
+    readying: Readying,
+    writing: Writing,
+    sequence: u32,
+    /// The address after the last one stored.
+    cursor: u16,
+}
+
+impl Saving {
+    /// The save of these settings; `None` when that is what is stored, and nothing is to be done.
+    #[must_use]
+    pub fn new(store: &Store, flash: &impl Flash, settings: &Settings) -> Option<Self> {
+        let newest = store.newest();
+        let stored = newest.and_then(|newest| record_at(flash.page(newest.page), newest.offset));
+        if stored.is_some_and(|stored| stored.pairs().eq(settings.changed_from(0))) {
+            return None;
+        }
+        let sequence = newest.map_or(1, |newest| newest.sequence.wrapping_add(1));
+        // There are as many settings as addresses at most.
+        let count = settings
+            .changed_from(0)
+            .fold(0, |count: u16, _| count.saturating_add(1));
+        let encoder = Encoder::new(SCHEMA, sequence, count);
+        let (page, offset, readying) = place(store, encoder.size());
+        Some(Self {
+            readying,
+            writing: Writing::new(page, offset, encoder),
+            sequence,
+            cursor: 0,
+        })
+    }
+
+    /// The next operation, to be performed at once; `None` when that was all.
+    ///
+    /// Together with [`Operation::perform`] and [`Self::finish`] this is [`Self::step`] for a caller
+    /// that shares the settings, but does not want to hold them while the flash works.
+    pub fn next(&mut self, settings: &Settings) -> Option<Operation> {
+        if let Some(operation) = self.readying.next() {
+            return Some(operation);
+        }
+        let cursor = &mut self.cursor;
+        self.writing.next(|| {
+            let pair = settings.changed_from(*cursor).next()?;
+            *cursor = pair.0.saturating_add(1);
+            Some(pair)
+        })
+    }
+
+    /// Ends the save, after the last operation or after one that failed.
+    ///
+    /// # Errors
+    ///
+    /// When the settings are not stored.
+    pub fn finish<F: Flash>(
+        &self,
+        store: &mut Store,
+        flash: &F,
+    ) -> Result<(), StoreError<F::Error>> {
+        store.look_again(flash);
+        match store.newest() {
+            Some(newest) if newest.sequence == self.sequence => Ok(()),
+            _ => {
+                store.avoid(self.writing.page);
+                Err(StoreError::Worn(self.writing.page, self.writing.offset()))
+            }
+        }
+    }
+
+    /// One flash operation, or the end.
+    ///
+    /// # Errors
+    ///
+    /// When the flash failed: the save is over, what was stored before still is, and the next save
+    /// tries another place.
+    pub fn step<F: Flash>(
+        &mut self,
+        store: &mut Store,
+        flash: &mut F,
+        settings: &Settings,
+    ) -> Result<Progress, StoreError<F::Error>> {
+        match self.next(settings) {
+            Some(operation) => {
+                let done = operation.perform(flash);
+                if done.is_err() {
+                    // The operation's error says more than that the settings are not stored.
+                    let _ = self.finish(store, flash);
+                }
+                done.map(|()| Progress::More)
+            }
+            None => self.finish(store, flash).map(|()| Progress::Done),
+        }
+    }
+}
+
+/// Where a record of that size goes, and what makes the place ready for it: behind the newest, else
+/// onto the other page, which is erased only if nothing fits there either.
+fn place(store: &Store, size: usize) -> (Page, usize, Readying) {
+    let active = store.newest().map(|newest| newest.page);
+    let first = active.unwrap_or(Page::First);
+    for page in [first, first.other()] {
+        let survey = store.survey(page);
+        if survey.room() >= size {
+            return (page, survey.end, Readying::Done);
+        }
+    }
+    let page = active.map_or_else(|| store.least_wanted(), Page::other);
+    let readying = Readying::new(page, store.survey(page).marked);
+    (page, FIRST_OFFSET, readying)
+}

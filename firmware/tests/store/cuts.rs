@@ -1,0 +1,214 @@
+//! The power is cut in every single operation of whole lives of a device, and every mess is tried: the
+//! next start finds the old or the new configuration, whole, and the device goes on as if nothing had
+//! happened.
+
+use firmware::config::Settings;
+use firmware::store::Operation;
+
+use crate::flash::{MESSES, Mess, MockFlash};
+use crate::running::{fullest_settings, random_settings, save, settings, start, start_well};
+
+enum Event {
+    Save(Box<Settings>),
+    Restart,
+}
+use Event::{Restart, Save};
+
+/// A place for a cut: the flash before an operation, the operation, and the configurations that a
+/// start may find after a cut in it.
+struct Place {
+    before: MockFlash,
+    operation: Operation,
+    old: Settings,
+    new: Settings,
+}
+
+/// Three of the messes, others for every place.
+fn some_messes(index: usize) -> impl Iterator<Item = Mess> {
+    MESSES
+        .into_iter()
+        .cycle()
+        .skip(index * 3 % MESSES.len())
+        .take(3)
+}
+
+/// Lives a life without a cut, from the first start on, and gives every place for one.
+fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
+    let mut flash = flash;
+    let mut places = Vec::new();
+    let mut note = |flash: &mut MockFlash, old: &Settings, new: &Settings| {
+        for (before, operation) in flash.journal.replace(Vec::new()).unwrap_or_default() {
+            let (old, new) = (old.clone(), new.clone());
+            places.push(Place {
+                before,
+                operation,
+                old,
+                new,
+            });
+        }
+    };
+    flash.journal = Some(Vec::new());
+    let mut stored = first.clone();
+    let (loaded, mut store) = start_well(&mut flash);
+    assert_eq!(loaded.settings, stored);
+    note(&mut flash, &stored, &stored);
+    for event in life {
+        match event {
+            Save(settings) => {
+                save(&mut store, &mut flash, settings).unwrap();
+                note(&mut flash, &stored, settings);
+                stored = Settings::clone(settings);
+            }
+            Restart => {
+                let loaded;
+                (loaded, store) = start_well(&mut flash);
+                assert_eq!(loaded.settings, stored);
+                assert!(!loaded.invalid && loaded.rejected == 0);
+                note(&mut flash, &stored, &stored);
+            }
+        }
+    }
+    places
+}
+
+/// Cuts, starts again, and expects the old or the new; then that everything still works.
+fn cut_and_recover(place: &Place, mess: Mess) {
+    let mut flash = place.before.clone();
+    flash.cut_in(place.operation, mess);
+    flash.power_on();
+    let what = format!("{:?} {mess:?}", place.operation);
+
+    let (loaded, mut store) = start_well(&mut flash);
+    assert!(!loaded.invalid && loaded.rejected == 0, "{what}");
+    let found = loaded.settings;
+    assert!(found == place.old || found == place.new, "{what}");
+
+    flash.power_on();
+    let (again, _) = start_well(&mut flash);
+    assert!(
+        again.settings == found,
+        "{what}: not the same at the next start"
+    );
+
+    let next = settings(&[(0x0101, 12), (0x0160, 2000)]);
+    let erases = flash.erases;
+    save(&mut store, &mut flash, &next).unwrap();
+    assert_eq!(
+        flash.erases, erases,
+        "{what}: erased while the line is served"
+    );
+    flash.power_on();
+    assert!(start_well(&mut flash).0.settings == next, "{what}");
+}
+
+fn cut_everywhere(flash: MockFlash, first: &Settings, life: &[Event]) -> usize {
+    let places = live(flash, first, life);
+    for place in &places {
+        MESSES.iter().for_each(|mess| cut_and_recover(place, *mess));
+    }
+    places.len()
+}
+
+fn saves(sizes: impl IntoIterator<Item = usize>) -> Vec<Event> {
+    let settings = (1..).zip(sizes);
+    settings
+        .map(|(seed, size)| Save(Box::new(random_settings(seed, size))))
+        .collect()
+}
+
+#[test]
+fn in_the_first_start_and_the_first_saves() {
+    let mut life = saves([0, 1, 5]);
+    life.push(Restart);
+    let cuts = cut_everywhere(MockFlash::erased(), &Settings::defaults(), &life);
+    assert!(cuts > 4 + 7 + 3 * 7, "{cuts}");
+}
+
+#[test]
+fn in_a_save_of_every_setting() {
+    let life = [Save(Box::new(fullest_settings(1))), Restart];
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    assert!(places.len() > 400, "{}", places.len());
+    for (index, place) in places.iter().enumerate() {
+        some_messes(index).for_each(|mess| cut_and_recover(place, mess));
+    }
+}
+
+#[test]
+fn in_saves_that_fill_both_pages_without_a_start_between() {
+    let life = saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2));
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    let erases = places
+        .iter()
+        .filter(|place| matches!(place.operation, Operation::Erase(_)));
+    let erases = erases.count();
+    assert!(erases > 2, "{erases} erases");
+    for (index, place) in places.iter().enumerate() {
+        let erase = matches!(place.operation, Operation::Erase(_));
+        let messes = some_messes(index).chain(MESSES.into_iter().filter(|_| erase));
+        messes.for_each(|mess| cut_and_recover(place, mess));
+    }
+}
+
+#[test]
+fn in_the_compaction_and_the_erases_of_a_start() {
+    let mut life = saves([25; 6]);
+    life.push(Restart);
+    life.extend(saves([25, 25]));
+    life.push(Restart);
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    // A compaction is of starts alone.
+    let in_starts: Vec<_> = places
+        .iter()
+        .filter(|place| place.old == place.new)
+        .collect();
+    assert!(in_starts.len() > 60, "{}", in_starts.len());
+    for place in in_starts {
+        MESSES.iter().for_each(|mess| cut_and_recover(place, *mess));
+    }
+}
+
+/// A second cut while the first is being mended.
+#[test]
+fn in_the_start_after_a_cut() {
+    let life = saves([2, 3]);
+    for place in live(MockFlash::erased(), &Settings::defaults(), &life) {
+        for (index, mess) in MESSES.into_iter().enumerate() {
+            let mut flash = place.before.clone();
+            flash.cut_in(place.operation, mess);
+            flash.power_on();
+            flash.journal = Some(Vec::new());
+            let (loaded, _) = start(&mut flash);
+            for (before, operation) in flash.journal.take().unwrap() {
+                let second = Place {
+                    before,
+                    operation,
+                    old: loaded.settings.clone(),
+                    new: loaded.settings.clone(),
+                };
+                cut_and_recover(&second, MESSES[(index + 3) % MESSES.len()]);
+            }
+        }
+    }
+}
+
+/// A setting that was saved once, long ago, is carried along.
+#[test]
+fn a_setting_that_never_changes_survives_any_number_of_compactions() {
+    let mut flash = MockFlash::erased();
+    let (_, mut store) = start_well(&mut flash);
+    for round in 0..200 {
+        let now = settings(&[(0x0141, 0xBEEF), (0x0160, 2000 + round)]);
+        save(&mut store, &mut flash, &now).unwrap();
+        if round % 7 == 0 {
+            let loaded;
+            (loaded, store) = start_well(&mut flash);
+            assert!(loaded.settings == now, "{round}");
+        }
+    }
+    assert!(
+        flash.erases[0] > 2 && flash.erases[1] > 2,
+        "{:?}",
+        flash.erases
+    );
+}

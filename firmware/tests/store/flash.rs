@@ -1,0 +1,214 @@
+//! A flash that insists on the rules of RM0008 3.3, and whose power can be cut in the middle of any
+//! operation.
+
+use firmware::store::{Flash, Operation, Page};
+use register_map::record::PAGE_SIZE;
+
+/// What a cut leaves of the operation it hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mess {
+    /// Nothing has happened yet.
+    Untouched,
+    /// It was just done; an erased page may still be weak.
+    Complete,
+    /// Any of the bits to be changed have changed.
+    Sprinkled(u64),
+    /// The bytes up to here have changed.
+    Front(usize),
+    /// The bytes from here on have changed.
+    Back(usize),
+    /// An erase leaves noise. A half-word as [`Self::Sprinkled`].
+    Noise(u64),
+}
+
+/// Messes of every sort.
+pub const MESSES: [Mess; 10] = [
+    Mess::Untouched,
+    Mess::Complete,
+    Mess::Sprinkled(1),
+    Mess::Sprinkled(2),
+    Mess::Sprinkled(3),
+    Mess::Front(1),
+    Mess::Front(512),
+    Mess::Back(1),
+    Mess::Back(2),
+    Mess::Noise(4),
+];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PowerCut;
+
+/// The flash, and what was done to it.
+#[derive(Clone, Debug)]
+pub struct MockFlash {
+    pub pages: [[u8; PAGE_SIZE]; 2],
+    /// An erase was cut off: the page, whatever it reads, must not be programmed.
+    weak: [bool; 2],
+    /// Its bits are not even the same at every start.
+    unsteady: [bool; 2],
+    /// The power is cut in the operation after so many more.
+    pub cut: Option<(usize, Mess)>,
+    off: bool,
+    /// This half-word keeps its ones.
+    pub worn: Option<(Page, usize)>,
+    /// What was done, for those who want it replayed, with the flash as it was before.
+    pub journal: Option<Vec<(MockFlash, Operation)>>,
+    pub programs: usize,
+    pub erases: [usize; 2],
+}
+
+impl MockFlash {
+    /// As it leaves the factory.
+    pub fn erased() -> Self {
+        Self::holding([[0xFF; PAGE_SIZE]; 2])
+    }
+
+    pub fn holding(pages: [[u8; PAGE_SIZE]; 2]) -> Self {
+        Self {
+            pages,
+            weak: [false; 2],
+            unsteady: [false; 2],
+            cut: None,
+            off: false,
+            worn: None,
+            journal: None,
+            programs: 0,
+            erases: [0; 2],
+        }
+    }
+
+    /// With these bytes at the start of its pages.
+    pub fn with(first: &[u8], second: &[u8]) -> Self {
+        let mut flash = Self::erased();
+        flash.pages[0][..first.len()].copy_from_slice(first);
+        flash.pages[1][..second.len()].copy_from_slice(second);
+        flash
+    }
+
+    pub fn operations(&self) -> usize {
+        self.programs + self.erases[0] + self.erases[1]
+    }
+
+    /// The power comes back. What is unsteady reads a little differently every time.
+    pub fn power_on(&mut self) {
+        (self.off, self.cut) = (false, None);
+        for index in 0..2 {
+            if self.unsteady[index] {
+                let mut noise = Noise(self.operations() as u64 + 99);
+                for _ in 0..4 {
+                    let bit = noise.next() as usize % (PAGE_SIZE * 8);
+                    self.pages[index][bit / 8] ^= 1 << (bit % 8);
+                }
+            }
+        }
+    }
+
+    /// Cuts the power in the middle of this operation.
+    pub fn cut_in(&mut self, operation: Operation, mess: Mess) {
+        self.power_on();
+        self.cut = Some((0, mess));
+        let result = match operation {
+            Operation::Program { page, offset, half } => self.program(page, offset, half),
+            Operation::Erase(page) => self.erase(page),
+        };
+        assert_eq!(result, Err(PowerCut));
+    }
+
+    /// Counts down to the cut; gives the mess when it is there.
+    fn begin(&mut self, operation: Operation) -> Option<Mess> {
+        assert!(!self.off, "{operation:?} without power");
+        if let Some(mut journal) = self.journal.take() {
+            journal.push((self.clone(), operation));
+            self.journal = Some(journal);
+        }
+        let (left, mess) = self.cut.as_mut()?;
+        if *left > 0 {
+            *left -= 1;
+            return None;
+        }
+        let mess = *mess;
+        self.off = true;
+        Some(mess)
+    }
+}
+
+impl Flash for MockFlash {
+    type Error = PowerCut;
+
+    fn page(&self, page: Page) -> &[u8; PAGE_SIZE] {
+        &self.pages[page as usize]
+    }
+
+    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), PowerCut> {
+        let operation = Operation::Program { page, offset, half };
+        let mess = self.begin(operation);
+        self.programs += 1;
+        assert!(offset.is_multiple_of(2), "{operation:?} is not aligned");
+        let place = self.pages[page as usize][offset..offset + 2]
+            .as_mut_array()
+            .unwrap();
+        let before = u16::from_le_bytes(*place);
+        assert!(
+            before == 0xFFFF || half == 0,
+            "{operation:?} over {before:#06x}"
+        );
+        assert!(
+            !self.weak[page as usize] || half == 0,
+            "{operation:?} on a weak page"
+        );
+        let mut after = match mess {
+            None | Some(Mess::Complete) => half,
+            Some(Mess::Untouched) => before,
+            Some(Mess::Front(_)) => half | (before & 0xFF00),
+            Some(Mess::Back(_)) => half | (before & 0x00FF),
+            Some(Mess::Sprinkled(seed) | Mess::Noise(seed)) => {
+                half | (before & Noise(seed ^ offset as u64).next() as u16)
+            }
+        };
+        if self.worn == Some((page, offset)) {
+            after |= before;
+        }
+        *place = after.to_le_bytes();
+        if self.off { Err(PowerCut) } else { Ok(()) }
+    }
+
+    fn erase(&mut self, page: Page) -> Result<(), PowerCut> {
+        let mess = self.begin(Operation::Erase(page));
+        let index = page as usize;
+        self.erases[index] += 1;
+        self.weak[index] = mess.is_some();
+        self.unsteady[index] = matches!(mess, Some(Mess::Sprinkled(_) | Mess::Noise(_)));
+        let bytes = &mut self.pages[index];
+        match mess {
+            None | Some(Mess::Complete) => bytes.fill(0xFF),
+            Some(Mess::Untouched) => {}
+            Some(Mess::Front(to)) => bytes[..to].fill(0xFF),
+            Some(Mess::Back(from)) => bytes[from..].fill(0xFF),
+            Some(Mess::Sprinkled(seed)) => {
+                let mut noise = Noise(seed);
+                bytes
+                    .iter_mut()
+                    .for_each(|byte| *byte |= noise.next() as u8);
+            }
+            Some(Mess::Noise(seed)) => {
+                let mut noise = Noise(seed);
+                bytes.fill_with(|| noise.next() as u8);
+            }
+        }
+        if self.off { Err(PowerCut) } else { Ok(()) }
+    }
+}
+
+/// Numbers without a pattern, the same in every run (xorshift64*).
+pub struct Noise(pub u64);
+
+impl Noise {
+    pub fn next(&mut self) -> u64 {
+        let mut x = self.0 | 1 << 63;
+        x ^= x >> 12;
+        x ^= x << 25;
+        x ^= x >> 27;
+        self.0 = x;
+        x.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 32
+    }
+}

@@ -1,0 +1,8 @@
+//! The configuration store on a strict mock of its flash, with the power cut wherever it can be.
+
+mod cuts;
+mod flash;
+mod model;
+mod running;
+mod vectors;
+mod wear;

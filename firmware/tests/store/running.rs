@@ -1,0 +1,92 @@
+//! A device's life as the store sees it.
+
+use firmware::config::Settings;
+use firmware::store::{Loaded, Progress, Saving, Store, StoreError};
+use register_map::configuration::{COMMAND, KEY, MODULE_SLOT, RULES};
+use register_map::rule_at;
+
+use crate::flash::{MockFlash, Noise, PowerCut};
+
+pub type Failure = StoreError<PowerCut>;
+
+/// Starts: what was loaded, and the store made ready.
+pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {
+    let mut store = Store::open(flash);
+    let loaded = store.load(flash);
+    let prepared = store.prepare(flash);
+    (loaded, prepared.map(|()| store))
+}
+
+/// Starts without a cut.
+pub fn start_well(flash: &mut MockFlash) -> (Loaded, Store) {
+    let (loaded, store) = start(flash);
+    (loaded, store.unwrap())
+}
+
+/// Saves, at most one operation a step; `false` when there was nothing to do.
+pub fn save(
+    store: &mut Store,
+    flash: &mut MockFlash,
+    settings: &Settings,
+) -> Result<bool, Failure> {
+    let Some(mut saving) = Saving::new(store, flash, settings) else {
+        return Ok(false);
+    };
+    loop {
+        let before = flash.operations();
+        let progress = saving.step(store, flash, settings)?;
+        assert!(flash.operations() <= before + 1, "one operation a step");
+        if progress == Progress::Done {
+            return Ok(true);
+        }
+    }
+}
+
+pub fn settings(pairs: &[(u16, u16)]) -> Settings {
+    let (settings, rejected) = Settings::load(pairs.iter().copied());
+    assert_eq!(rejected, 0, "{pairs:?}");
+    settings
+}
+
+/// Settings of which about `changed` are not the defaults, always the same for a seed.
+pub fn random_settings(seed: u64, changed: usize) -> Settings {
+    let mut noise = Noise(seed);
+    let rules = RULES
+        .iter()
+        .filter(|rule| ![KEY, COMMAND].contains(&rule.first));
+    let addresses: Vec<u16> = rules.flat_map(|rule| rule.addresses()).collect();
+    let mut pairs = vec![(MODULE_SLOT, noise.next() as u16 % 7)];
+    for _ in 0..changed {
+        let address = addresses[noise.next() as usize % addresses.len()];
+        if address != MODULE_SLOT {
+            pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
+        }
+    }
+    Settings::load(pairs.into_iter()).0
+}
+
+/// Settings of which none that can be changed is the default.
+pub fn fullest_settings(seed: u64) -> Settings {
+    let mut noise = Noise(seed);
+    let mut pairs = vec![(MODULE_SLOT, 5)];
+    for rule in RULES
+        .iter()
+        .filter(|rule| ![KEY, COMMAND].contains(&rule.first))
+    {
+        for address in rule.addresses().filter(|address| *address != MODULE_SLOT) {
+            pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
+        }
+    }
+    Settings::load(pairs.into_iter()).0
+}
+
+/// An allowed value that is not the default, if there is any among some.
+fn some_value(address: u16, noise: &mut Noise) -> Option<u16> {
+    let (rule, _) = rule_at(RULES, address)?;
+    let some = [1, 0xFFFE, 2000, 100, 12, 24, 384, 30, 3, 0, 1];
+    let some = some.map(|value: u16| value.wrapping_add(noise.next() as u16 % 2));
+    let from = noise.next() as usize % some.len();
+    let some = some[from..].iter().chain(&some);
+    some.copied()
+        .find(|value| *value != rule.default && rule.values.allow(*value))
+}

@@ -1,0 +1,146 @@
+//! Stores as literal bytes: what was once in the field is read by every later firmware.
+
+use firmware::config::Settings;
+use firmware::store::{Page, Saving, Store};
+use register_map::Module;
+use register_map::record::{PAGE_SIZE, module_in_slot, records};
+
+use crate::flash::MockFlash;
+use crate::running::{save, settings, start_well};
+
+/// Written by version 0.1: page mark, then two records, the second with another speed. The CRCs are
+/// those of Python's zlib.crc32.
+#[rustfmt::skip]
+const VERSION_0_1: [u8; 64] = [
+    0x6F, 0x6B,
+    0x6D, 0x6F, 0x01, 0x01, 1, 0, 0, 0, 3, 0,
+    0x01, 0x01, 0x80, 0x04, // BAUD 1152
+    0x14, 0x01, 0x06, 0x00, // MODULE of port 5: 2ai2ao
+    0xD2, 0x01, 0xFF, 0xFF, // SAFE of point 18: hold
+    0x07, 0x0B, 0x1C, 0x4C,
+    0x6D, 0x6F, 0x01, 0x01, 2, 0, 0, 0, 5, 0,
+    0x01, 0x01, 0xC0, 0x00, // BAUD 192
+    0x06, 0x01, 0xE8, 0x03, // FRAME_GAP 1000
+    0x14, 0x01, 0x06, 0x00,
+    0x62, 0x01, 0x70, 0x0D, // BETA of point 2: 3440
+    0xD2, 0x01, 0xFF, 0xFF,
+    0xBD, 0xED, 0x91, 0x3B,
+    0xFF, 0xFF,
+];
+
+/// Written by a later firmware with another register map in the same layout: settings that are not
+/// known here, and a speed and a filter that are not allowed here.
+#[rustfmt::skip]
+const LATER: [u8; 44] = [
+    0x6F, 0x6B,
+    0x6D, 0x6F, 0x02, 0x01, 9, 0, 0, 0, 6, 0,
+    0x01, 0x01, 0x00, 0x48, // BAUD 18432
+    0x14, 0x01, 0x04, 0x00, // MODULE of port 5: 4ai
+    0x30, 0x01, 0x09, 0x00, // FILTER of point 16: 9
+    0x50, 0x01, 0x34, 0x12, // 0x0150: not known
+    0x60, 0x01, 0xD0, 0x07, // BETA of point 0: 2000
+    0x00, 0x04, 0x01, 0x00, // 0x0400: not known
+    0x25, 0x94, 0x0C, 0x04,
+    0xFF, 0xFF, 0xFF, 0xFF,
+];
+
+fn page(bytes: &[u8]) -> [u8; PAGE_SIZE] {
+    let mut page = [0xFF; PAGE_SIZE];
+    page[..bytes.len()].copy_from_slice(bytes);
+    page
+}
+
+#[test]
+fn the_newest_record_of_version_0_1_is_read_on_either_page() {
+    let expected = settings(&[
+        (0x0101, 192),
+        (0x0106, 1000),
+        (0x0114, 6),
+        (0x0162, 3440),
+        (0x01D2, 0xFFFF),
+    ]);
+    for mut flash in [
+        MockFlash::with(&VERSION_0_1, &[]),
+        MockFlash::with(&[], &VERSION_0_1),
+    ] {
+        let (loaded, mut store) = start_well(&mut flash);
+        assert!(loaded.settings == expected && !loaded.invalid && loaded.rejected == 0);
+        assert!(
+            !save(&mut store, &mut flash, &expected).unwrap(),
+            "nothing to save"
+        );
+    }
+}
+
+#[test]
+fn a_later_firmware_s_record_is_read_as_far_as_it_is_known() {
+    let mut flash = MockFlash::with(&LATER, &[]);
+    let (loaded, mut store) = start_well(&mut flash);
+    let known = settings(&[(0x0114, 4), (0x0160, 2000)]);
+    assert!(loaded.settings == known && !loaded.invalid);
+    assert_eq!(loaded.rejected, 2, "BAUD and FILTER");
+    assert!(
+        save(&mut store, &mut flash, &known).unwrap(),
+        "the stored record is another"
+    );
+    assert_eq!(start_well(&mut flash).0.rejected, 0);
+}
+
+#[test]
+fn a_start_keeps_what_only_a_later_firmware_knows() {
+    let mut bytes = page(&LATER);
+    bytes[600] = 0; // left by a cut: the record must move
+    let mut flash = MockFlash::holding([bytes, [0xFF; PAGE_SIZE]]);
+    let before = records(&bytes).next().unwrap().1;
+    start_well(&mut flash);
+    let (_, moved) = records(&flash.pages[1]).next().unwrap();
+    assert!(moved.pairs().eq(before.pairs()) && moved.schema == before.schema);
+    assert_eq!(records(&flash.pages[0]).count(), 0);
+}
+
+#[test]
+fn another_layout_is_reported_and_left_alone_until_something_is_saved() {
+    let mut bytes = page(&LATER);
+    bytes[5] = 2;
+    let mut flash = MockFlash::holding([bytes, [0xFF; PAGE_SIZE]]);
+    for _ in 0..3 {
+        let (loaded, _) = start_well(&mut flash);
+        assert!(loaded.invalid && loaded.settings == Settings::defaults());
+        assert_eq!(flash.pages[0], bytes, "the evidence");
+    }
+    let (_, mut store) = start_well(&mut flash);
+    assert!(save(&mut store, &mut flash, &Settings::defaults()).unwrap());
+    assert!(!start_well(&mut flash).0.invalid);
+}
+
+#[test]
+fn a_preset_is_a_stored_configuration() {
+    for module in Module::ALL {
+        let mut flash = MockFlash::with(&module_in_slot(module), &[]);
+        let (loaded, _) = start_well(&mut flash);
+        assert_eq!(loaded.settings.module(5), module);
+        assert!(!loaded.invalid && loaded.rejected == 0);
+        assert_eq!(flash.erases, [0, 1], "the preset page is good as it is");
+    }
+}
+
+#[test]
+fn what_is_stored_is_the_documented_record() {
+    let mut flash = MockFlash::with(&VERSION_0_1[..28], &[]);
+    let (_, mut store) = start_well(&mut flash);
+    let settings = settings(&[
+        (0x0101, 192),
+        (0x0106, 1000),
+        (0x0114, 6),
+        (0x0162, 3440),
+        (0x01D2, 0xFFFF),
+    ]);
+    let mut saving = Saving::new(&store, &flash, &settings).unwrap();
+    while let Some(operation) = saving.next(&settings) {
+        operation.perform(&mut flash).unwrap();
+    }
+    saving.finish(&mut store, &flash).unwrap();
+    let bytes = firmware::store::Flash::page(&flash, Page::First);
+    assert_eq!(bytes[..VERSION_0_1.len()], VERSION_0_1);
+    assert!(Store::open(&flash).load(&flash).settings == settings);
+}

@@ -1,0 +1,64 @@
+//! ModIO-AIAO: two analog inputs on lines 1 and 2, as those of ModIO-AI, and two analog outputs 3 and
+//! 4, as those of ModIO-AO, on the channels C and D of an MCP4728.
+
+use crate::analog_inputs::AnalogInputs;
+use crate::ao4::{health, output_code};
+use crate::{
+    AnalogSource, CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError,
+};
+
+/// Two filtered analog inputs and two analog outputs.
+#[derive(Debug)]
+pub struct Ai2Ao2<'a, S> {
+    inputs: AnalogInputs<S, 2>,
+    link: &'a DacLink,
+    /// Those of the channels 3 and 4.
+    outputs: [ChannelSettings; 2],
+}
+
+impl<'a, S: AnalogSource> Ai2Ao2<'a, S> {
+    /// Takes over the converter, whose lines 1 and 2 are analog inputs by now, and the link to the
+    /// DAC.
+    pub const fn new(source: S, link: &'a DacLink) -> Self {
+        Self {
+            inputs: AnalogInputs::new(source),
+            link,
+            outputs: [ChannelSettings::default_for(Kind::WordOutput); 2],
+        }
+    }
+}
+
+impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
+    fn kinds(&self) -> [Kind; CHANNELS] {
+        use Kind::{WordInput, WordOutput};
+        [WordInput, WordInput, WordOutput, WordOutput]
+    }
+
+    /// As for [`Ai4`](crate::Ai4) and [`Ao4`](crate::Ao4).
+    fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
+        self.inputs.configure(settings);
+        let [_, _, third, fourth] = *settings;
+        self.outputs = [third, fourth];
+    }
+
+    /// Reads the inputs, then reports a DAC that does not answer, which the module's state is about.
+    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
+        let inputs = self.inputs.scan(channels);
+        health(self.link).and(inputs)
+    }
+
+    /// Leaves the codes in the link. The channels A and B, which are not wired, stay at 0.
+    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+        let [third, fourth] = &self.outputs;
+        self.link.post([
+            0,
+            0,
+            output_code(channels, 2, third),
+            output_code(channels, 3, fourth),
+        ]);
+        health(self.link)
+    }
+}
+
+#[cfg(test)]
+mod tests;

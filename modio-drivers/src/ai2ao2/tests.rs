@@ -1,0 +1,122 @@
+//! The driver over a link that is posted to and a converter that answers at once.
+
+extern crate std;
+use std::vec::Vec;
+
+use super::*;
+use crate::{ChannelStatus, DAC_ADDRESS, DacWorker, Range, Scale};
+use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+
+/// Two lines; any other fails the test.
+struct Lines([u16; 2], Vec<u8>);
+
+impl AnalogSource for Lines {
+    type Error = ();
+
+    fn read(&mut self, line: u8) -> nb::Result<u16, ()> {
+        self.1.push(line);
+        match self.0.get(usize::from(line)) {
+            Some(&u16::MAX) => Err(nb::Error::Other(())),
+            Some(&code) => Ok(code),
+            None => panic!("line {line} is not this module's"),
+        }
+    }
+}
+
+fn with(range: Range, scale: Scale) -> ChannelSettings {
+    ChannelSettings {
+        range,
+        scale,
+        ..ChannelSettings::default_for(Kind::WordInput)
+    }
+}
+
+fn commanded(third: u16, fourth: u16) -> Channels {
+    let mut channels = Channels::new();
+    channels.set_word(2, third);
+    channels.set_word(3, fourth);
+    channels
+}
+
+#[test]
+fn inputs_are_lines_1_and_2_and_outputs_are_not_touched_by_them() {
+    let link = DacLink::new();
+    let mut module = Ai2Ao2::new(Lines([1000, 2000], Vec::new()), &link);
+    use Kind::{WordInput, WordOutput};
+    assert_eq!(
+        module.kinds(),
+        [WordInput, WordInput, WordOutput, WordOutput]
+    );
+    let mut channels = commanded(7, 8);
+    for _ in 0..3 {
+        assert_eq!(module.read_inputs(&mut channels), Ok(()));
+    }
+    assert_eq!([0, 1, 2, 3].map(|c| channels.word(c)), [1000, 2000, 7, 8]);
+    assert_eq!(link.wanted(), None, "reading drives nothing");
+    assert_eq!(module.inputs.source_mut().1, [0, 1, 0, 1, 0, 1]);
+}
+
+#[test]
+fn outputs_are_the_channels_c_and_d_in_their_own_units() {
+    let link = DacLink::new();
+    let mut module = Ai2Ao2::new(Lines([0, 0], Vec::new()), &link);
+    let channels = commanded(4000, 4095);
+    module.drive_outputs(&channels).unwrap();
+    assert_eq!(link.wanted(), Some([0, 0, 4000, 4095]));
+    module.configure(&[
+        with(Range::Ntc, Scale::Engineering),
+        with(Range::Current, Scale::Engineering),
+        with(Range::Current, Scale::Engineering),
+        with(Range::Volts, Scale::Engineering),
+    ]);
+    module.drive_outputs(&channels).unwrap();
+    assert_eq!(link.wanted(), Some([0, 0, 819, 1677]));
+
+    let mut channels = channels;
+    module.read_inputs(&mut channels).unwrap();
+    use ChannelStatus::{Good, OpenCircuit, ShortCircuit};
+    let status = [0, 1, 2, 3].map(|c| channels.status(c));
+    assert_eq!(status, [ShortCircuit, OpenCircuit, Good, Good]);
+}
+
+#[test]
+fn a_dac_that_does_not_answer_fails_the_module_while_its_inputs_are_read() {
+    let bytes = |high, low| std::vec![0x40, 0, 0, 0x42, 0, 0, 0x44, high, low, 0x46, 0x0F, 0xFF];
+    let refused = || {
+        Transaction::write(DAC_ADDRESS, bytes(0, 5))
+            .with_error(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address))
+    };
+    let mut bus = Mock::new(&[
+        refused(),
+        refused(),
+        Transaction::write(DAC_ADDRESS, bytes(0, 6)),
+    ]);
+    let link = DacLink::new();
+    let mut worker = DacWorker::new(&mut bus);
+    let mut module = Ai2Ao2::new(Lines([1, 2], Vec::new()), &link);
+    let mut channels = commanded(5, 4095);
+    assert_eq!(module.drive_outputs(&channels), Ok(()));
+    assert!(worker.work(&link).is_err() && worker.work(&link).is_err());
+
+    let failed = Err(ModuleError::NotAnswering);
+    channels.set_word(2, 6);
+    assert_eq!(module.drive_outputs(&channels), failed);
+    assert_eq!(module.read_inputs(&mut channels), failed);
+    assert_eq!([0, 1].map(|c| channels.word(c)), [1, 2]);
+    module.inputs.source_mut().0 = [u16::MAX, 3];
+    assert_eq!(
+        module.read_inputs(&mut channels),
+        failed,
+        "the module's failure comes before a line's"
+    );
+
+    assert_eq!(worker.work(&link), Ok(false), "left out after two failures");
+    assert_eq!(worker.work(&link), Ok(true));
+    assert_eq!(module.drive_outputs(&channels), Ok(()));
+    assert_eq!(
+        module.read_inputs(&mut channels),
+        Err(ModuleError::Line { channel: 0 })
+    );
+    bus.done();
+}

@@ -1,0 +1,139 @@
+//! The analog inputs of a module: which line to sample, and what each channel makes of its samples.
+
+use crate::low_pass::{LOW_PASS_DEFAULT, LowPass};
+use crate::{
+    AnalogSource, CHANNELS, ChannelSettings, ChannelStatus, Channels, Kind, ModuleError, Scale,
+    input_status, scale::Measured,
+};
+
+/// The calls of [`AnalogSource::read`] a module makes in one scan at most, for all its lines together.
+/// A conversion of the F103 takes some 6 us, about 20 calls.
+pub const POLLS_PER_SCAN: u8 = 64;
+
+/// Scans in a row without any answer from the converter after which the line it is asked for counts as
+/// failed.
+pub const STALLED_SCANS: u8 = 10;
+
+/// `N` inputs, at most four, on the slot's first lines.
+#[derive(Debug)]
+pub(crate) struct AnalogInputs<S, const N: usize> {
+    source: S,
+    inputs: [Input; N],
+    /// The line to ask for next, or being asked for.
+    line: usize,
+    stalled: u8,
+}
+
+impl<S: AnalogSource, const N: usize> AnalogInputs<S, N> {
+    pub(crate) const fn new(source: S) -> Self {
+        Self {
+            source,
+            inputs: [Input::NEW; N],
+            line: 0,
+            stalled: 0,
+        }
+    }
+
+    pub(crate) fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
+        for (input, settings) in self.inputs.iter_mut().zip(settings) {
+            input.configure(settings);
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) const fn source_mut(&mut self) -> &mut S {
+        &mut self.source
+    }
+
+    /// Samples every line once, or as many as the converter has time for, and shows all channels.
+    pub(crate) fn scan(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
+        self.sample();
+        let mut result = Ok(());
+        for (channel, input) in self.inputs.iter_mut().enumerate() {
+            input.show(channels, channel);
+            if input.failed {
+                result = result.and(Err(ModuleError::Line { channel }));
+            }
+        }
+        result
+    }
+
+    fn sample(&mut self) {
+        let mut answers = 0;
+        for _ in 0..POLLS_PER_SCAN {
+            // At most three, so the cast keeps it.
+            let answer = self.source.read(self.line as u8);
+            let Some(input) = self.inputs.get_mut(self.line) else {
+                return;
+            };
+            match answer {
+                Ok(code) => input.sample(code),
+                Err(nb::Error::Other(_)) => input.fail(),
+                Err(nb::Error::WouldBlock) => continue,
+            }
+            self.line = if self.line + 1 < N { self.line + 1 } else { 0 };
+            answers += 1;
+            if answers == N {
+                break;
+            }
+        }
+        if answers > 0 {
+            self.stalled = 0;
+        } else if self.stalled < STALLED_SCANS - 1 {
+            self.stalled += 1;
+        } else if let Some(input) = self.inputs.get_mut(self.line) {
+            input.fail();
+        }
+    }
+}
+
+/// One analog input.
+#[derive(Clone, Copy, Debug)]
+struct Input {
+    settings: ChannelSettings,
+    filter: LowPass,
+    status: ChannelStatus,
+    failed: bool,
+}
+
+impl Input {
+    const NEW: Self = Self {
+        settings: ChannelSettings::default_for(Kind::WordInput),
+        filter: LowPass::new(LOW_PASS_DEFAULT),
+        status: ChannelStatus::Good,
+        failed: false,
+    };
+
+    fn configure(&mut self, settings: &ChannelSettings) {
+        if settings.range != self.settings.range {
+            // The other range's status says nothing about this one, not even as hysteresis.
+            self.status = ChannelStatus::Good;
+        }
+        self.filter.set_n(settings.filter);
+        self.settings = *settings;
+    }
+
+    fn sample(&mut self, code: u16) {
+        self.failed = false;
+        self.filter.sample(code);
+    }
+
+    /// The channel keeps what it shows. What was filtered is out of date when the line comes back.
+    fn fail(&mut self) {
+        self.failed = true;
+        self.filter.reset();
+    }
+
+    fn show(&mut self, channels: &mut Channels, channel: usize) {
+        if let Some(code) = self.filter.code() {
+            let measured = Measured::of(code, &self.settings);
+            self.status = input_status::judge(code, measured, self.status);
+            let word = match self.settings.scale {
+                Scale::Raw => code,
+                Scale::Engineering => measured.word(),
+            };
+            channels.set_word(channel, word);
+            channels.set_status(channel, self.status);
+        }
+    }
+}

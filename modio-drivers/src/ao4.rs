@@ -1,0 +1,137 @@
+//! ModIO-AO: four analog outputs, 0-10 V or 4-20 mA, each by its jumper: the channels A to D of an
+//! MCP4728 whose full scale is 10 V or 20 mA.
+
+use crate::{
+    CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError, scale::output_to_raw,
+};
+
+/// Four analog outputs.
+///
+/// The driver only leaves codes in a [`DacLink`], for a [`DacWorker`](crate::DacWorker) to transfer.
+#[derive(Debug)]
+pub struct Ao4<'a> {
+    link: &'a DacLink,
+    settings: [ChannelSettings; CHANNELS],
+}
+
+impl<'a> Ao4<'a> {
+    /// Drives what is at the other end of the link, from the first
+    /// [`drive_outputs`](IoModule::drive_outputs) on.
+    #[must_use]
+    pub const fn new(link: &'a DacLink) -> Self {
+        Self {
+            link,
+            settings: [ChannelSettings::default_for(Kind::WordOutput); CHANNELS],
+        }
+    }
+}
+
+impl IoModule for Ao4<'_> {
+    fn kinds(&self) -> [Kind; CHANNELS] {
+        [Kind::WordOutput; CHANNELS]
+    }
+
+    /// Takes range and scale. A word that stands in [`Channels`] is from then on read by these, so
+    /// the caller brings it along; see [`output_rescaled`](crate::scale::output_rescaled).
+    fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
+        self.settings = *settings;
+    }
+
+    /// There is nothing to read, but [`ModuleError::NotAnswering`] to report.
+    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
+        health(self.link)
+    }
+
+    /// Leaves the codes in the link; [`ModuleError::NotAnswering`] while they do not get through.
+    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+        let mut codes = [0; CHANNELS];
+        for (channel, (code, settings)) in codes.iter_mut().zip(&self.settings).enumerate() {
+            *code = output_code(channels, channel, settings);
+        }
+        self.link.post(codes);
+        health(self.link)
+    }
+}
+
+/// The DAC's code for a channel's word.
+pub(crate) fn output_code(channels: &Channels, channel: usize, settings: &ChannelSettings) -> u16 {
+    output_to_raw(channels.word(channel), settings.range, settings.scale)
+}
+
+/// What the worker says of the DAC.
+pub(crate) fn health(link: &DacLink) -> Result<(), ModuleError> {
+    if link.failed() {
+        Err(ModuleError::NotAnswering)
+    } else {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::{Range, Scale};
+
+    fn words(words: [u16; 4]) -> Channels {
+        let mut channels = Channels::new();
+        for (channel, word) in words.into_iter().enumerate() {
+            channels.set_word(channel, word);
+        }
+        channels
+    }
+
+    fn settings(range: Range, scale: Scale) -> ChannelSettings {
+        ChannelSettings {
+            range,
+            scale,
+            ..ChannelSettings::default_for(Kind::WordOutput)
+        }
+    }
+
+    #[test]
+    fn raw_words_are_posted_as_they_are_and_never_beyond_the_dac() {
+        let link = DacLink::new();
+        let mut module = Ao4::new(&link);
+        assert_eq!(module.kinds(), [Kind::WordOutput; 4]);
+        assert_eq!(link.wanted(), None, "nothing before the first scan");
+        module.drive_outputs(&words([0, 1, 4095, 4096])).unwrap();
+        assert_eq!(link.wanted(), Some([0, 1, 4095, 4095]));
+    }
+
+    #[test]
+    fn each_channel_has_its_own_units() {
+        let link = DacLink::new();
+        let mut module = Ao4::new(&link);
+        module.configure(&[
+            settings(Range::Volts, Scale::Engineering),
+            settings(Range::Current, Scale::Engineering),
+            settings(Range::Volts, Scale::Raw),
+            settings(Range::Current, Scale::Raw),
+        ]);
+        let channels = words([5_000, 12_000, 2_000, 819]);
+        module.drive_outputs(&channels).unwrap();
+        assert_eq!(link.wanted(), Some([2_048, 2_457, 2_000, 819]));
+
+        module.configure(&[settings(Range::Volts, Scale::Raw); 4]);
+        module.drive_outputs(&channels).unwrap();
+        assert_eq!(link.wanted(), Some([4_095, 4_095, 2_000, 819]));
+    }
+
+    #[test]
+    fn a_failed_link_is_reported_and_still_told_what_is_wanted() {
+        let link = DacLink::new();
+        let mut module = Ao4::new(&link);
+        let mut channels = words([1, 2, 3, 4]);
+        link.set_failed(true);
+        let failed = Err(ModuleError::NotAnswering);
+        assert_eq!(module.drive_outputs(&channels), failed);
+        assert_eq!(module.read_inputs(&mut channels), failed);
+        assert_eq!(channels, words([1, 2, 3, 4]));
+        assert_eq!(link.wanted(), Some([1, 2, 3, 4]));
+        link.set_failed(false);
+        assert_eq!(module.drive_outputs(&channels), Ok(()));
+        assert_eq!(module.read_inputs(&mut channels), Ok(()));
+    }
+}

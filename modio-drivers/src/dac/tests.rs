@@ -1,0 +1,290 @@
+//! The worker over the bus of embedded-hal-mock for every transfer and failure, and over a model of
+//! the MCP4728 for what a transfer does to it.
+
+extern crate std;
+use std::vec::Vec;
+
+use embedded_hal::i2c::{ErrorType, Operation};
+use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+
+use super::*;
+
+const NO_ANSWER: ErrorKind = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+
+/// Multi-Write of four codes: VDD as reference, gain 1, not powered down, put out at once.
+fn transfer(codes: [u16; 4]) -> Transaction {
+    let bytes = (0..4).zip(codes).flat_map(|(channel, code)| {
+        let [high, low] = code.to_be_bytes();
+        [0b0100_0000 | channel << 1, high, low]
+    });
+    Transaction::write(0x60, bytes.collect())
+}
+
+fn posted(codes: [u16; 4]) -> DacLink {
+    let link = DacLink::new();
+    link.post(codes);
+    link
+}
+
+#[test]
+fn nothing_is_transferred_before_the_first_post() {
+    let mut bus = Mock::new(&[]);
+    let mut worker = DacWorker::new(&mut bus);
+    let link = DacLink::new();
+    assert!((0..100).all(|_| worker.work(&link) == Ok(false)));
+    bus.done();
+}
+
+#[test]
+fn a_transfer_is_one_multi_write_of_codes_and_configuration() {
+    let bytes = std::vec![
+        0x40, 0x00, 0x00, 0x42, 0x01, 0x23, 0x44, 0x0A, 0xBC, 0x46, 0x0F, 0xFF,
+    ];
+    let mut bus = Mock::new(&[Transaction::write(0x60, bytes)]);
+    let mut worker = DacWorker::new(&mut bus);
+    assert_eq!(worker.work(&posted([0, 0x123, 0xABC, 0xFFF])), Ok(true));
+    bus.done();
+}
+
+#[test]
+fn a_code_beyond_the_dac_does_not_reach_into_its_configuration() {
+    let mut bus = Mock::new(&[transfer([0xFFF, 0xFFF, 0xFFF, 1])]);
+    let mut worker = DacWorker::new(&mut bus);
+    assert_eq!(worker.work(&posted([0x1000, 0x8001, 0xFFFF, 1])), Ok(true));
+    bus.done();
+}
+
+#[test]
+fn a_change_goes_at_the_next_call_and_everything_again_at_every_tenth() {
+    let mut bus = Mock::new(&[
+        transfer([1, 2, 3, 4]),
+        transfer([1, 2, 3, 5]),
+        transfer([1, 2, 3, 5]),
+        transfer([1, 2, 3, 5]),
+    ]);
+    let mut worker = DacWorker::new(&mut bus);
+    let link = posted([1, 2, 3, 4]);
+    assert_eq!(worker.work(&link), Ok(true));
+    assert_eq!(worker.work(&link), Ok(false));
+    link.post([1, 2, 3, 5]);
+    assert_eq!(worker.work(&link), Ok(true));
+    let transfers: Vec<_> = (1..=20)
+        .filter(|_| worker.work(&link) == Ok(true))
+        .collect();
+    assert_eq!(transfers, [10, 20]);
+    bus.done();
+}
+
+#[test]
+fn failures_are_sorted_by_what_can_be_done() {
+    let no_answer = [
+        NoAcknowledgeSource::Address,
+        NoAcknowledgeSource::Data,
+        NoAcknowledgeSource::Unknown,
+    ];
+    let bus = [
+        ErrorKind::Bus,
+        ErrorKind::ArbitrationLoss,
+        ErrorKind::Overrun,
+        ErrorKind::Other,
+    ];
+    let cases = no_answer
+        .map(|source| {
+            (
+                ErrorKind::NoAcknowledge(source),
+                DacError::NotAnswering(source),
+            )
+        })
+        .into_iter()
+        .chain(bus.map(|kind| (kind, DacError::Bus(kind))));
+    for (kind, expected) in cases {
+        let mut bus = Mock::new(&[transfer([9; 4]).with_error(kind)]);
+        let mut worker = DacWorker::new(&mut bus);
+        assert_eq!(worker.work(&posted([9; 4])), Err(expected));
+        bus.done();
+    }
+}
+
+#[test]
+fn one_failure_is_noise_and_two_are_a_fault_until_a_transfer_succeeds() {
+    let mut bus = Mock::new(&[
+        transfer([9; 4]).with_error(NO_ANSWER),
+        transfer([9; 4]),
+        transfer([7; 4]).with_error(NO_ANSWER),
+        transfer([7; 4]).with_error(ErrorKind::Bus),
+        transfer([8; 4]),
+    ]);
+    let mut worker = DacWorker::new(&mut bus);
+    let link = posted([9; 4]);
+    assert!(worker.work(&link).is_err());
+    assert!(!link.failed());
+    assert_eq!(worker.work(&link), Ok(true));
+    assert!(!link.failed());
+
+    link.post([7; 4]);
+    assert!(worker.work(&link).is_err());
+    assert!(!link.failed());
+    assert!(worker.work(&link).is_err());
+    assert!(link.failed());
+    link.post([8; 4]);
+    assert_eq!(worker.work(&link), Ok(false));
+    assert!(link.failed(), "nothing has been tried");
+    assert_eq!(worker.work(&link), Ok(true), "with what is wanted by now");
+    assert!(!link.failed());
+    bus.done();
+}
+
+#[test]
+fn tries_thin_out_to_one_in_seventeen_calls_and_never_end() {
+    let mut bus = Mock::new(&std::vec![transfer([1; 4]).with_error(NO_ANSWER); 300]);
+    let mut worker = DacWorker::new(&mut bus);
+    let link = posted([1; 4]);
+    let tries: Vec<_> = (0..6_000)
+        .filter(|_| worker.work(&link).is_err())
+        .take(300)
+        .collect();
+    assert_eq!(tries[..8], [0, 1, 3, 6, 11, 20, 37, 54]);
+    assert_eq!(
+        tries.len(),
+        300,
+        "far beyond where a counter of 8 bits ends"
+    );
+    assert!(tries[5..].windows(2).all(|pair| pair[1] - pair[0] == 17));
+    bus.done();
+}
+
+#[test]
+fn the_bus_can_be_freed_by_the_caller() {
+    let mut bus = Mock::new(&[Transaction::write(0x00, std::vec![0x06])]);
+    let mut worker = DacWorker::new(&mut bus);
+    worker.bus().write(0x00, &[0x06]).unwrap();
+    bus.done();
+}
+
+/// An MCP4728 as far as Multi-Write goes; every other command fails the test, those that write the
+/// EEPROM among them.
+struct Dac {
+    powered: bool,
+    /// Of each channel: reference, power-down, gain and code as they stand in the register.
+    eeprom: [u16; 4],
+    input: [u16; 4],
+    output: [u16; 4],
+    /// The bus loses its acknowledge after so many bytes.
+    cut_after: usize,
+}
+
+impl Dac {
+    /// With internal reference, gain 2 and powered down: the most wrong EEPROM there can be.
+    fn new() -> Self {
+        let eeprom = [0b1111_1000_0000_0000; 4];
+        Self {
+            powered: true,
+            eeprom,
+            input: eeprom,
+            output: eeprom,
+            cut_after: usize::MAX,
+        }
+    }
+
+    fn power(&mut self, on: bool) {
+        self.powered = on;
+        (self.input, self.output) = (self.eeprom, self.eeprom);
+    }
+}
+
+impl ErrorType for Dac {
+    type Error = ErrorKind;
+}
+
+impl I2c for Dac {
+    fn transaction(
+        &mut self,
+        address: u8,
+        operations: &mut [Operation<'_>],
+    ) -> Result<(), ErrorKind> {
+        assert_eq!(address, 0x60);
+        let [Operation::Write(bytes)] = operations else {
+            panic!("only writes are expected");
+        };
+        if !self.powered {
+            return Err(NO_ANSWER);
+        }
+        for channel in bytes[..bytes.len().min(self.cut_after)].chunks_exact(3) {
+            assert_eq!(channel[0] & 0b1111_1000, 0b0100_0000, "not Multi-Write");
+            let number = usize::from(channel[0] >> 1 & 0b11);
+            self.input[number] = u16::from_be_bytes([channel[1], channel[2]]);
+            if channel[0] & 1 == 0 {
+                self.output[number] = self.input[number];
+            }
+        }
+        if bytes.len() > self.cut_after {
+            return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data));
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_dac_with_any_eeprom_is_right_after_one_transfer_and_again_after_a_loss_of_power() {
+    let mut worker = DacWorker::new(Dac::new());
+    let link = posted([0, 819, 2048, 4095]);
+    assert_eq!(worker.work(&link), Ok(true));
+    assert_eq!(worker.bus().output, [0, 819, 2048, 4095]);
+
+    // Too short an absence to be noticed on the bus.
+    worker.bus().power(false);
+    worker.bus().power(true);
+    assert_ne!(worker.bus().output, [0, 819, 2048, 4095]);
+    for _ in 0..REFRESH_CALLS {
+        worker.work(&link).unwrap();
+    }
+    assert_eq!(worker.bus().output, [0, 819, 2048, 4095]);
+
+    // A long one, and other codes meanwhile.
+    worker.bus().power(false);
+    for _ in 0..1000 {
+        let _ = worker.work(&link);
+    }
+    assert!(link.failed());
+    link.post([1, 2, 3, 4]);
+    worker.bus().power(true);
+    let calls = (1..).find(|_| worker.work(&link) == Ok(true)).unwrap();
+    assert!(calls <= PAUSE_MAX_CALLS + 1, "{calls} calls");
+    assert!(!link.failed());
+    assert_eq!(worker.bus().output, [1, 2, 3, 4]);
+}
+
+#[test]
+fn a_transfer_cut_short_anywhere_is_made_again_whole() {
+    for cut_after in 0..12 {
+        let mut worker = DacWorker::new(Dac::new());
+        let link = posted([10, 20, 30, 40]);
+        worker.bus().cut_after = cut_after;
+        assert_eq!(
+            worker.work(&link),
+            Err(DacError::NotAnswering(NoAcknowledgeSource::Data))
+        );
+        worker.bus().cut_after = usize::MAX;
+        assert_eq!(worker.work(&link), Ok(true));
+        assert_eq!(worker.bus().output, [10, 20, 30, 40], "cut {cut_after}");
+    }
+}
+
+#[test]
+fn a_change_that_failed_half_way_is_undone_when_it_is_taken_back() {
+    let mut worker = DacWorker::new(Dac::new());
+    let link = posted([1; 4]);
+    assert_eq!(worker.work(&link), Ok(true));
+    link.post([2; 4]);
+    worker.bus().cut_after = 6;
+    assert!(worker.work(&link).is_err());
+    assert_eq!(worker.bus().output, [2, 2, 1, 1]);
+    link.post([1; 4]);
+    worker.bus().cut_after = usize::MAX;
+    assert_eq!(
+        worker.work(&link),
+        Ok(true),
+        "without waiting for a refresh"
+    );
+    assert_eq!(worker.bus().output, [1; 4]);
+}

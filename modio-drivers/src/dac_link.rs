@@ -1,0 +1,178 @@
+//! What goes between the fast side of the analog outputs, a module's driver in the scan, and the slow
+//! side, [`DacWorker`](crate::DacWorker) in a background task.
+
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::SeqCst};
+
+use crate::CHANNELS;
+
+/// A mailbox with the codes wanted on the four DAC channels one way and the DAC's health the other.
+/// Made to be a `static`. One driver posts, one worker collects.
+///
+/// Codes posted together are collected together: the posts are counted before and after, as in a
+/// seqlock, so a worker that was interrupted by a post notices and reads again.
+#[derive(Debug)]
+pub struct DacLink {
+    codes: [AtomicU16; CHANNELS],
+    /// Odd during a post.
+    posts: AtomicU32,
+    /// Something has been posted since the start.
+    posted: AtomicBool,
+    failed: AtomicBool,
+}
+
+/// Attempts to collect before it is left to the next call. Posts come once a millisecond, collecting
+/// takes well below a microsecond.
+const ATTEMPTS: u8 = 3;
+
+impl DacLink {
+    /// Nothing wanted yet, nothing known to be wrong.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            codes: [const { AtomicU16::new(0) }; CHANNELS],
+            posts: AtomicU32::new(0),
+            posted: AtomicBool::new(false),
+            failed: AtomicBool::new(false),
+        }
+    }
+
+    /// True while the DAC does not answer or its bus is stuck.
+    #[must_use]
+    pub fn failed(&self) -> bool {
+        self.failed.load(SeqCst)
+    }
+
+    /// The codes each channel is to have, A to D.
+    pub(crate) fn post(&self, wanted: [u16; CHANNELS]) {
+        let same = self.codes.iter().zip(wanted);
+        if self.posted.load(SeqCst) && same.into_iter().all(|(c, w)| c.load(SeqCst) == w) {
+            return;
+        }
+        self.posts.fetch_add(1, SeqCst);
+        for (code, wanted) in self.codes.iter().zip(wanted) {
+            code.store(wanted, SeqCst);
+        }
+        self.posts.fetch_add(1, SeqCst);
+        self.posted.store(true, SeqCst);
+    }
+
+    /// What was posted last; none before the first post, or in the unlikely case that posts came in
+    /// between at every attempt.
+    pub(crate) fn wanted(&self) -> Option<[u16; CHANNELS]> {
+        self.collect(|| ())
+    }
+
+    /// Collects, calling `interrupt` before each code, where a post may come in.
+    fn collect(&self, mut interrupt: impl FnMut()) -> Option<[u16; CHANNELS]> {
+        if !self.posted.load(SeqCst) {
+            return None;
+        }
+        for _ in 0..ATTEMPTS {
+            let before = self.posts.load(SeqCst);
+            let codes = self.codes.each_ref().map(|code| {
+                interrupt();
+                code.load(SeqCst)
+            });
+            if before.is_multiple_of(2) && self.posts.load(SeqCst) == before {
+                return Some(codes);
+            }
+        }
+        None
+    }
+
+    pub(crate) fn set_failed(&self, failed: bool) {
+        self.failed.store(failed, SeqCst);
+    }
+}
+
+impl Default for DacLink {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn what_was_posted_last_is_wanted_and_nothing_before_that() {
+        let link = DacLink::new();
+        assert_eq!(link.wanted(), None);
+        link.post([0; 4]);
+        assert_eq!(link.wanted(), Some([0; 4]), "zeros are a post too");
+        link.post([1, 2, 3, 4]);
+        link.post([1, 2, 3, 4]);
+        assert_eq!(link.wanted(), Some([1, 2, 3, 4]));
+        assert_eq!(link.posts.load(SeqCst), 4, "the same again is no post");
+        assert!(!link.failed());
+        link.set_failed(true);
+        assert!(link.failed());
+    }
+
+    #[test]
+    fn a_post_that_is_not_finished_is_not_collected() {
+        let link = DacLink::new();
+        link.post([7; 4]);
+        link.posts.fetch_add(1, SeqCst);
+        assert_eq!(link.wanted(), None);
+        link.posts.fetch_add(1, SeqCst);
+        assert_eq!(link.wanted(), Some([7; 4]));
+    }
+
+    #[test]
+    fn a_post_that_comes_in_anywhere_is_collected_whole() {
+        for place in 0..CHANNELS {
+            let link = DacLink::new();
+            link.post([1; 4]);
+            let mut calls = 0;
+            let collected = link.collect(|| {
+                if calls == place {
+                    link.post([2; 4]);
+                }
+                calls += 1;
+            });
+            assert_eq!(collected, Some([2; 4]), "before code {place}");
+        }
+
+        let link = DacLink::new();
+        link.post([0; 4]);
+        let mut calls = 0;
+        let collected = link.collect(|| {
+            calls += 1;
+            link.post([calls; 4]);
+        });
+        assert_eq!(collected, None, "posts come in all the time");
+        assert_eq!(calls, u16::from(ATTEMPTS) * 4);
+        assert_eq!(link.wanted(), Some([calls; 4]));
+    }
+
+    #[test]
+    fn codes_posted_together_are_collected_together() {
+        static LINK: DacLink = DacLink::new();
+        static DONE: AtomicBool = AtomicBool::new(false);
+        let poster = thread::spawn(|| {
+            for n in (0..u16::MAX).cycle() {
+                LINK.post([n; 4]);
+                if DONE.load(SeqCst) {
+                    return n;
+                }
+                (0..50).for_each(|_| core::hint::spin_loop());
+            }
+            unreachable!("the numbers never end");
+        });
+        let mut collected = 0;
+        while collected < 10_000 {
+            if let Some(codes) = LINK.wanted() {
+                assert_eq!(codes, [codes[0]; 4]);
+                collected += 1;
+            }
+        }
+        DONE.store(true, SeqCst);
+        let last = poster.join().unwrap();
+        assert_eq!(LINK.wanted(), Some([last; 4]));
+    }
+}

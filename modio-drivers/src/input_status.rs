@@ -1,0 +1,256 @@
+//! Whether an analog input's code can be what its signal says: wire breaks, short circuits, signals
+//! outside their range.
+//!
+//! Every threshold has a second one a little further in, at which the status goes away again, so that
+//! noise on a threshold does not make it flap.
+
+use crate::scale::{CODE_MAX, Measured};
+use crate::{ChannelStatus, ntc};
+
+/// A 4-20 mA loop below this many uA is under range: a transmitter signals a failure of its own with
+/// 3.6 mA or less, and measures down to 3.8 mA (NAMUR NE 43).
+pub const UNDER_RANGE_UA: u16 = 3_600;
+
+/// A 4-20 mA loop below this many uA is open: no transmitter lives on less, the rest is leakage.
+pub const OPEN_CIRCUIT_UA: u16 = 1_000;
+
+/// A loop must come this many uA above a threshold to leave it: half of the 0.2 mA that NE 43 keeps
+/// between a failure and a measurement.
+pub const HYSTERESIS_UA: u16 = 100;
+
+/// A voltage or current at this code is over range: the converter is at its end, so the signal can be
+/// anything from here up. Full scale itself, 10 V or 20 mA, counts with it, since nothing tells them
+/// apart.
+pub const OVER_RANGE_CODE: u16 = CODE_MAX;
+
+/// A thermistor at this code or below is shorted: 39 ohm, a quarter of what the steepest one has at
+/// 125 degC, and more than wires have.
+pub const SHORT_CIRCUIT_CODE: u16 = 16;
+
+/// A thermistor at this code or above is missing: 2.5 Mohm, more than twice what the steepest one has
+/// at -40 degC.
+pub const OPEN_CIRCUIT_CODE: u16 = CODE_MAX - 16;
+
+/// How far a code must come back from one of the thresholds above: two to three times the noise of
+/// the F103's converter.
+pub const HYSTERESIS_CODE: u16 = 8;
+
+/// How far a thermistor must come back into [`ntc::MIN_TENTHS`] to [`ntc::MAX_TENTHS`], in 0.1 degC.
+pub const HYSTERESIS_TENTHS: i16 = 10;
+
+/// The status of an input with this code, which has been found to mean so much, after it had the
+/// status `before` in the same range.
+#[must_use]
+pub fn judge(code: u16, measured: Measured, before: ChannelStatus) -> ChannelStatus {
+    match measured {
+        Measured::Millivolts(_) => saturation(code, before),
+        Measured::Microamps(ua) => current(code, ua, before),
+        Measured::TenthsCelsius(tenths) => thermistor(code, tenths, before),
+    }
+}
+
+fn saturation(code: u16, before: ChannelStatus) -> ChannelStatus {
+    let over = OVER_RANGE_CODE - back_off(before == ChannelStatus::OverRange, HYSTERESIS_CODE);
+    if code >= over {
+        ChannelStatus::OverRange
+    } else {
+        ChannelStatus::Good
+    }
+}
+
+fn current(code: u16, ua: u16, before: ChannelStatus) -> ChannelStatus {
+    use ChannelStatus::{OpenCircuit, UnderRange};
+    let was_open = before == OpenCircuit;
+    let was_under = was_open || before == UnderRange;
+    if ua < OPEN_CIRCUIT_UA + back_off(was_open, HYSTERESIS_UA) {
+        OpenCircuit
+    } else if ua < UNDER_RANGE_UA + back_off(was_under, HYSTERESIS_UA) {
+        UnderRange
+    } else {
+        saturation(code, before)
+    }
+}
+
+fn thermistor(code: u16, tenths: i16, before: ChannelStatus) -> ChannelStatus {
+    use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
+    let short = SHORT_CIRCUIT_CODE + back_off(before == ShortCircuit, HYSTERESIS_CODE);
+    let open = OPEN_CIRCUIT_CODE - back_off(before == OpenCircuit, HYSTERESIS_CODE);
+    if code <= short {
+        return ShortCircuit;
+    }
+    if code >= open {
+        return OpenCircuit;
+    }
+    let was_cold = matches!(before, UnderRange | OpenCircuit);
+    let was_hot = matches!(before, OverRange | ShortCircuit);
+    if tenths < ntc::MIN_TENTHS + if was_cold { HYSTERESIS_TENTHS } else { 0 } {
+        UnderRange
+    } else if tenths > ntc::MAX_TENTHS - if was_hot { HYSTERESIS_TENTHS } else { 0 } {
+        OverRange
+    } else {
+        Good
+    }
+}
+
+/// The hysteresis, while there is something to come back from.
+const fn back_off(active: bool, hysteresis: u16) -> u16 {
+    if active { hysteresis } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ChannelSettings, Kind, Range};
+    use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
+
+    fn settings(range: Range) -> ChannelSettings {
+        ChannelSettings {
+            range,
+            ..ChannelSettings::default_for(Kind::WordInput)
+        }
+    }
+
+    fn judge_code(
+        code: u16,
+        settings: &ChannelSettings,
+        before: Option<ChannelStatus>,
+    ) -> ChannelStatus {
+        judge(
+            code,
+            Measured::of(code, settings),
+            before.unwrap_or_default(),
+        )
+    }
+
+    /// Sweeps the codes and returns each status with the code at which it began.
+    fn sweep(
+        range: Range,
+        beta: u16,
+        codes: impl Iterator<Item = u16>,
+    ) -> [(u16, ChannelStatus); 5] {
+        let settings = ChannelSettings {
+            beta,
+            ..settings(range)
+        };
+        let mut seen = [(u16::MAX, Good); 5];
+        let (mut count, mut before) = (0, None);
+        for code in codes {
+            let status = judge_code(code, &settings, before);
+            if before != Some(status) {
+                seen[count] = (code, status);
+                count += 1;
+                before = Some(status);
+            }
+        }
+        seen
+    }
+
+    const NEVER: (u16, ChannelStatus) = (u16::MAX, Good);
+
+    #[test]
+    fn a_voltage_is_over_range_at_the_converters_end_alone() {
+        let up = sweep(Range::Volts, 3950, 0..=4095);
+        assert_eq!(up, [(0, Good), (4095, OverRange), NEVER, NEVER, NEVER]);
+        let down = sweep(Range::Volts, 3950, (0..=4095).rev());
+        assert_eq!(down, [(4095, OverRange), (4086, Good), NEVER, NEVER, NEVER]);
+    }
+
+    #[test]
+    fn a_loop_is_open_then_under_range_then_good_then_over_range() {
+        let code = |ua: f64| (ua * 4095.0 / 20_000.0).ceil() as u16;
+        let up = sweep(Range::Current, 3950, 0..=4095);
+        let expected = [
+            (0, OpenCircuit),
+            (code(1_100.0 - 0.5), UnderRange),
+            (code(3_700.0 - 0.5), Good),
+            (4095, OverRange),
+            NEVER,
+        ];
+        assert_eq!(up, expected);
+        let down = sweep(Range::Current, 3950, (0..=4095).rev());
+        let expected = [
+            (4095, OverRange),
+            (4086, Good),
+            (code(3_600.0 - 0.5) - 1, UnderRange),
+            (code(1_000.0 - 0.5) - 1, OpenCircuit),
+            NEVER,
+        ];
+        assert_eq!(down, expected);
+    }
+
+    #[test]
+    fn a_thermistor_goes_through_all_five_for_every_beta() {
+        for beta in (ntc::BETA_MIN..=ntc::BETA_MAX).step_by(50) {
+            let first = |limit: i16| {
+                (0..=4095)
+                    .find(|&code| ntc::tenths_celsius(code, beta) <= limit)
+                    .unwrap()
+            };
+            let up = sweep(Range::Ntc, beta, 0..=4095);
+            let expected = [
+                (0, ShortCircuit),
+                (25, OverRange),
+                (first(1240), Good),
+                (first(-401), UnderRange),
+                (4079, OpenCircuit),
+            ];
+            assert_eq!(up, expected, "beta {beta}");
+            let down = sweep(Range::Ntc, beta, (0..=4095).rev());
+            let expected = [
+                (4095, OpenCircuit),
+                (4070, UnderRange),
+                (first(-391) - 1, Good),
+                (first(1250) - 1, OverRange),
+                (16, ShortCircuit),
+            ];
+            assert_eq!(down, expected, "beta {beta}");
+        }
+    }
+
+    #[test]
+    fn a_jump_out_of_a_break_or_a_short_has_the_hysteresis_of_what_it_jumps_over() {
+        let loop_ = settings(Range::Current);
+        let ua = |ua: u32| (ua * 4095 / 20_000) as u16;
+        for (before, expected) in [
+            (OpenCircuit, UnderRange),
+            (UnderRange, UnderRange),
+            (Good, Good),
+            (OverRange, Good),
+        ] {
+            assert_eq!(judge_code(ua(3_650), &loop_, Some(before)), expected);
+        }
+        let settings = settings(Range::Ntc);
+        let code = |tenths| {
+            (0..4095)
+                .find(|&code| ntc::tenths_celsius(code, settings.beta) <= tenths)
+                .unwrap()
+        };
+        let (hot, cold) = (code(1_245), code(-395));
+        for (before, at_hot, at_cold) in [
+            (Good, Good, Good),
+            (OverRange, OverRange, Good),
+            (ShortCircuit, OverRange, Good),
+            (UnderRange, Good, UnderRange),
+            (OpenCircuit, Good, UnderRange),
+        ] {
+            assert_eq!(judge_code(hot, &settings, Some(before)), at_hot);
+            assert_eq!(judge_code(cold, &settings, Some(before)), at_cold);
+        }
+    }
+
+    #[test]
+    fn noise_within_the_hysteresis_changes_a_status_once() {
+        for range in [Range::Volts, Range::Current, Range::Ntc] {
+            for middle in 0..=4095_u16 {
+                let (mut changes, mut before) = (0, None);
+                for i in 0..20_u16 {
+                    let code = (middle + i % 2 * 3).min(4095);
+                    let status = judge_code(code, &settings(range), before);
+                    changes += u8::from(before.is_some_and(|before| before != status));
+                    before = Some(status);
+                }
+                assert!(changes <= 1, "{range:?} around {middle}: {changes}");
+            }
+        }
+    }
+}

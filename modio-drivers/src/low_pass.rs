@@ -1,0 +1,134 @@
+//! The filter of an analog input: a first-order low-pass, y += (x - y) / 2^n a sample.
+//!
+//! Its step response is that of an RC filter with a time constant of 2^n samples; n = 0 lets every
+//! sample through. The state is a code in fixed point whose place of the point does not depend on n,
+//! so another n changes the speed and not the value. Dropping bits of the difference leaves the state
+//! at most 2^n - 1 of 65536 below a steady input, so that the rounded code settles exactly.
+
+/// n of every analog input until told otherwise.
+pub const LOW_PASS_DEFAULT: u16 = 4;
+
+/// The largest n.
+pub const LOW_PASS_MAX: u16 = 8;
+
+/// Bits after the point. With the 12 bits of a code that makes 28, so differences fit an `i32`.
+const FRACTION: u32 = 16;
+
+const CODE_MAX: u16 = crate::scale::CODE_MAX;
+
+/// A low-pass over 12-bit codes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LowPass {
+    n: u16,
+    /// None before the first sample, which it takes as it is.
+    state: Option<i32>,
+}
+
+impl LowPass {
+    pub(crate) const fn new(n: u16) -> Self {
+        Self { n, state: None }
+    }
+
+    /// Sets n, at most [`LOW_PASS_MAX`].
+    pub(crate) fn set_n(&mut self, n: u16) {
+        self.n = n.min(LOW_PASS_MAX);
+    }
+
+    /// Forgets everything: the next sample is taken as it is.
+    pub(crate) const fn reset(&mut self) {
+        self.state = None;
+    }
+
+    /// Takes a sample; a code above 4095 counts as 4095.
+    pub(crate) fn sample(&mut self, code: u16) {
+        let input = i32::from(code.min(CODE_MAX)) << FRACTION;
+        self.state = Some(match self.state {
+            Some(state) => state + ((input - state) >> self.n),
+            None => input,
+        });
+    }
+
+    /// The filtered code, 0 to 4095; none before the first sample.
+    pub(crate) fn code(&self) -> Option<u16> {
+        const HALF: i32 = 1 << (FRACTION - 1);
+        self.state.map(|state| ((state + HALF) >> FRACTION) as u16)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settled(n: u16, code: u16) -> LowPass {
+        let mut filter = LowPass::new(n);
+        filter.sample(code);
+        filter
+    }
+
+    #[test]
+    fn the_first_sample_is_taken_as_it_is() {
+        for n in 0..=LOW_PASS_MAX {
+            assert_eq!(LowPass::new(n).code(), None);
+            assert_eq!(settled(n, 4095).code(), Some(4095));
+            let mut filter = settled(n, 4095);
+            filter.reset();
+            assert_eq!(filter.code(), None);
+            filter.sample(17);
+            assert_eq!(filter.code(), Some(17));
+        }
+    }
+
+    #[test]
+    fn a_step_is_answered_as_by_an_rc_filter() {
+        for n in 0..=LOW_PASS_MAX {
+            for (from, to) in [(0, 4095), (4095, 0), (1000, 1100), (2048, 2047)] {
+                let mut filter = settled(n, from);
+                let keep = 1.0 - 1.0 / f64::from(1 << n);
+                for k in 1..=3000 {
+                    filter.sample(to);
+                    let step = f64::from(from) - f64::from(to);
+                    let exact = f64::from(to) + step * keep.powi(k);
+                    let code = f64::from(filter.code().unwrap());
+                    assert!(
+                        (code - exact).abs() <= 0.51,
+                        "n {n}, {from} to {to}, sample {k}: {code} for {exact}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_code_settles_exactly_from_above_and_from_below() {
+        for n in 0..=LOW_PASS_MAX {
+            for code in (0..=4095).step_by(13).chain([1, 4094, 4095]) {
+                for from in [0, 4095] {
+                    let mut filter = settled(n, from);
+                    // 12 bits of step and one of rounding take 13 ln 2 = 9.01 time constants.
+                    (0..10 << n).for_each(|_| filter.sample(code));
+                    assert_eq!(filter.code(), Some(code), "n {n} from {from}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn another_n_does_not_move_the_value() {
+        let mut filter = settled(8, 0);
+        (0..100).for_each(|_| filter.sample(4000));
+        let before = filter.code();
+        for n in [0, 8, 3, u16::MAX] {
+            filter.set_n(n);
+            assert_eq!(filter.code(), before);
+        }
+        assert_eq!(filter.n, LOW_PASS_MAX);
+        filter.set_n(0);
+        filter.sample(4000);
+        assert_eq!(filter.code(), Some(4000));
+    }
+
+    #[test]
+    fn a_code_beyond_the_converter_counts_as_its_last() {
+        assert_eq!(settled(0, u16::MAX).code(), Some(4095));
+    }
+}

@@ -1,0 +1,178 @@
+//! ModIO-Relay: two relays for 2 A. Lines 1 and 2 show each relay's mode jumper, low for manual; lines
+//! 3 and 4 drive the coils, high for energised.
+
+use embedded_hal::digital::{InputPin, OutputPin, PinState};
+
+use crate::debounce::Debounce;
+use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+
+/// Debounce of the mode jumpers in milliseconds. They are moved by hand, and contacts that are plugged
+/// bounce for longer than a switch.
+pub const JUMPER_DEBOUNCE_MS: u16 = 20;
+
+/// The channel of the first coil.
+const FIRST_COIL: usize = 2;
+
+/// Two relays: channels 1 and 2 tell the jumpers, 1 for manual, channels 3 and 4 are the coils.
+///
+/// A relay in manual mode is driven by its jumper; the coil's line goes on following its channel, so
+/// that the relay takes its commanded position when the jumper is moved back.
+#[derive(Debug)]
+pub struct Relay2<I, O> {
+    jumpers: [I; 2],
+    filters: [Debounce; 2],
+    coils: [O; 2],
+}
+
+impl<I: InputPin, O: OutputPin> Relay2<I, O> {
+    /// Takes over the slot lines: the first two with pull-ups, the others outputs that the caller has
+    /// made drive low, so that no relay pulls in before the first scan. The first scan takes the
+    /// jumpers as they stand.
+    pub const fn new(jumpers: [I; 2], coils: [O; 2]) -> Self {
+        Self {
+            jumpers,
+            filters: [Debounce::new(JUMPER_DEBOUNCE_MS); 2],
+            coils,
+        }
+    }
+}
+
+impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
+    fn kinds(&self) -> [Kind; CHANNELS] {
+        use Kind::{BitInput, BitOutput};
+        [BitInput, BitInput, BitOutput, BitOutput]
+    }
+
+    /// There is nothing to set: the jumpers' debounce is [`JUMPER_DEBOUNCE_MS`].
+    fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
+
+    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
+        let mut result = Ok(());
+        let jumpers = self.jumpers.iter_mut().zip(&mut self.filters);
+        for (channel, (jumper, filter)) in jumpers.enumerate() {
+            match jumper.is_low() {
+                Ok(manual) => channels.set_bit(channel, filter.sample(manual)),
+                Err(_) => result = Err(ModuleError::Line { channel }),
+            }
+        }
+        result
+    }
+
+    /// Drives both coils every time, as [`Do4`](crate::Do4) does.
+    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+        let mut result = Ok(());
+        for (channel, coil) in (FIRST_COIL..).zip(&mut self.coils) {
+            let energised = PinState::from(channels.bit(channel));
+            if coil.set_state(energised).is_err() {
+                result = Err(ModuleError::Line { channel });
+            }
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use embedded_hal_mock::eh1::MockError;
+    use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
+
+    use super::*;
+
+    const BROKEN: MockError = MockError::Io(std::io::ErrorKind::NotConnected);
+
+    fn jumper(manual: &[bool]) -> Mock {
+        let states = manual
+            .iter()
+            .map(|&on| Transaction::get(if on { State::Low } else { State::High }));
+        Mock::new(&states.collect::<Vec<_>>())
+    }
+
+    fn coil(levels: &[State]) -> Mock {
+        let levels = levels.iter().map(|&level| Transaction::set(level));
+        Mock::new(&levels.collect::<Vec<_>>())
+    }
+
+    fn finish(mut module: Relay2<Mock, Mock>) {
+        module.jumpers.iter_mut().for_each(Mock::done);
+        module.coils.iter_mut().for_each(Mock::done);
+    }
+
+    #[test]
+    fn jumpers_show_at_once_at_the_first_scan_and_are_not_taken_for_coils() {
+        let mut module = Relay2::new([jumper(&[true]), jumper(&[false])], [coil(&[]), coil(&[])]);
+        use Kind::{BitInput, BitOutput};
+        assert_eq!(module.kinds(), [BitInput, BitInput, BitOutput, BitOutput]);
+        let mut channels = Channels::new();
+        channels.set_bit(3, true);
+        module.read_inputs(&mut channels).unwrap();
+        assert_eq!(
+            [0, 1, 2, 3].map(|c| channels.bit(c)),
+            [true, false, false, true]
+        );
+        finish(module);
+    }
+
+    #[test]
+    fn a_jumper_counts_when_it_has_stood_for_the_debounce_whatever_is_configured() {
+        let wait = usize::from(JUMPER_DEBOUNCE_MS);
+        let mut levels = std::vec![false; 1];
+        levels.resize(wait, true);
+        levels.push(false);
+        levels.resize(2 * wait + 1, true);
+        let mut module = Relay2::new([jumper(&levels), jumper(&levels)], [coil(&[]), coil(&[])]);
+        let settings = ChannelSettings {
+            filter: 0,
+            ..ChannelSettings::default_for(Kind::BitInput)
+        };
+        let mut channels = Channels::new();
+        for scan in 0..levels.len() {
+            module.configure(&[settings; 4]);
+            module.read_inputs(&mut channels).unwrap();
+            assert_eq!(channels.bit(0), scan == 2 * wait, "scan {scan}");
+            assert_eq!(channels.bit(1), channels.bit(0));
+        }
+        finish(module);
+    }
+
+    #[test]
+    fn coils_follow_channels_3_and_4_at_every_scan() {
+        use State::{High, Low};
+        let mut module = Relay2::new(
+            [jumper(&[]), jumper(&[])],
+            [coil(&[Low, High, High]), coil(&[Low, Low, High])],
+        );
+        let mut channels = Channels::new();
+        channels.set_bit(0, true);
+        channels.set_bit(1, true);
+        module.drive_outputs(&channels).unwrap();
+        channels.set_bit(2, true);
+        module.drive_outputs(&channels).unwrap();
+        channels.set_bit(3, true);
+        module.drive_outputs(&channels).unwrap();
+        finish(module);
+    }
+
+    #[test]
+    fn a_line_that_fails_is_named_and_the_others_go_on() {
+        let failing = |transaction: Transaction| Mock::new(&[transaction.with_error(BROKEN)]);
+        let mut module = Relay2::new(
+            [failing(Transaction::get(State::High)), jumper(&[true])],
+            [failing(Transaction::set(State::Low)), coil(&[State::High])],
+        );
+        let mut channels = Channels::new();
+        channels.set_bit(3, true);
+        assert_eq!(
+            module.read_inputs(&mut channels),
+            Err(ModuleError::Line { channel: 0 })
+        );
+        assert!(channels.bit(1));
+        assert_eq!(
+            module.drive_outputs(&channels),
+            Err(ModuleError::Line { channel: 2 })
+        );
+        finish(module);
+    }
+}

@@ -1,0 +1,206 @@
+//! Registers whose values are codes: one enum for each, with the code and a name for every value.
+
+/// Declares an enum of codes; the name of a value is its documentation, too.
+macro_rules! codes {
+    ($(#[$doc:meta])* $name:ident { $($variant:ident = $code:literal $text:literal,)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u16)]
+        pub enum $name {
+            $(#[doc = $text] $variant = $code,)+
+        }
+
+        impl $name {
+            /// Every value, in the order of the codes.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+            /// Every code, in ascending order.
+            pub const CODES: &'static [u16] = &[$($code),+];
+            /// Every code with its name, for people.
+            pub const NAMES: &'static [(u16, &'static str)] = &[$(($code, $text)),+];
+
+            /// The code that stands in the register.
+            #[inline]
+            #[must_use]
+            pub const fn code(self) -> u16 {
+                self as u16
+            }
+
+            /// The value with this code, if there is one.
+            #[inline]
+            #[must_use]
+            pub const fn from_code(code: u16) -> Option<Self> {
+                match code {
+                    $($code => Some(Self::$variant),)+
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+codes! {
+    /// BAUD: the speed of the RS-485 line, its code in units of 100 bit/s.
+    Baud {
+        B1200 = 12 "1200 bit/s",
+        B2400 = 24 "2400 bit/s",
+        B4800 = 48 "4800 bit/s",
+        B9600 = 96 "9600 bit/s",
+        B19200 = 192 "19200 bit/s",
+        B38400 = 384 "38400 bit/s",
+        B57600 = 576 "57600 bit/s",
+        B115200 = 1152 "115200 bit/s",
+        B230400 = 2304 "230400 bit/s",
+        B460800 = 4608 "460800 bit/s",
+        B921600 = 9216 "921600 bit/s",
+    }
+}
+
+impl Baud {
+    /// The speed in bit/s, 1200 to 921600.
+    #[inline]
+    #[must_use]
+    pub const fn bits_per_second(self) -> u32 {
+        self.code() as u32 * 100
+    }
+}
+
+codes! {
+    /// FORMAT: data bits, parity and stop bits of the RS-485 line.
+    Format {
+        F8N2 = 0 "8N2",
+        F8E1 = 1 "8E1",
+        F8O1 = 2 "8O1",
+        F8N1 = 3 "8N1",
+    }
+}
+
+codes! {
+    /// MODE: the transmission mode of the RS-485 line.
+    Mode {
+        Rtu = 0 "RTU",
+        Ascii = 1 "ASCII",
+    }
+}
+
+codes! {
+    /// STRICT_T15: what becomes of a frame with a gap above t1.5 in it.
+    GapRule {
+        Count = 0 "count gaps above t1.5, keep the frame",
+        Drop = 1 "drop the frame",
+    }
+}
+
+codes! {
+    /// COMMAND: what the device is to do once its response is out.
+    Command {
+        Save = 1 "save",
+        Restart = 2 "restart",
+        LoadDefaults = 3 "load defaults",
+        DropChanges = 4 "drop unsaved changes",
+        ClearWatchdogFlag = 5 "clear the communication-watchdog flag",
+        EnterLoader = 0xB007 "enter the loader",
+    }
+}
+
+codes! {
+    /// LORA and the like.
+    Switch {
+        Off = 0 "off",
+        On = 1 "on",
+    }
+}
+
+codes! {
+    /// LORA_AIR_RATE: the speed on the air.
+    AirRate {
+        K0d3 = 0 "0.3 kbit/s",
+        K1d2 = 1 "1.2 kbit/s",
+        K2d4 = 2 "2.4 kbit/s",
+        K4d8 = 3 "4.8 kbit/s",
+        K9d6 = 4 "9.6 kbit/s",
+        K19d2 = 5 "19.2 kbit/s",
+    }
+}
+
+codes! {
+    /// LORA_POWER: the power on the air.
+    Power {
+        Dbm20 = 0 "20 dBm",
+        Dbm17 = 1 "17 dBm",
+        Dbm14 = 2 "14 dBm",
+        Dbm10 = 3 "10 dBm",
+    }
+}
+
+codes! {
+    /// RANGE: the signal of an analog point.
+    Signal {
+        Voltage = 0 "0-10 V",
+        Current = 1 "4-20 mA",
+        Ntc = 2 "NTC",
+    }
+}
+
+codes! {
+    /// SCALE: how an analog point is counted.
+    Scale {
+        Raw = 0 "raw 12-bit",
+        Engineering = 1 "engineering units",
+    }
+}
+
+codes! {
+    /// How a module fares.
+    ModuleState {
+        Good = 0 "good",
+        None = 1 "none",
+        NotAnswering = 2 "not answering",
+        OutOfRange = 3 "a channel out of range",
+    }
+}
+
+codes! {
+    /// How a channel fares.
+    ChannelStatus {
+        Good = 0 "good",
+        UnderRange = 1 "under range",
+        OverRange = 2 "over range",
+        OpenCircuit = 3 "open circuit",
+        ShortCircuit = 4 "short circuit",
+    }
+}
+
+codes! {
+    /// What went wrong before the last fault's reset.
+    FaultKind {
+        None = 0 "none",
+        Panic = 1 "panic",
+        HardFault = 2 "hard fault",
+        Watchdog = 3 "the watchdog bit",
+        Crystal = 4 "the crystal failed while running",
+        StackOverflow = 5 "stack overflow",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_leads_back_to_its_value_and_no_other_does() {
+        for baud in Baud::ALL {
+            assert_eq!(Baud::from_code(baud.code()), Some(*baud));
+        }
+        let taken = (0..=0xFFFF).filter(|code| Baud::from_code(*code).is_some());
+        assert!(taken.eq(Baud::CODES.iter().copied()));
+        assert_eq!(Command::from_code(0xB007), Some(Command::EnterLoader));
+        assert_eq!(Command::from_code(0), None);
+        assert_eq!(Format::from_code(4), None);
+    }
+
+    #[test]
+    fn a_speed_is_a_hundred_times_its_code() {
+        assert_eq!(Baud::B9600.bits_per_second(), 9600);
+        assert_eq!(Baud::B921600.bits_per_second(), 921_600);
+    }
+}

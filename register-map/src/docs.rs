@@ -1,0 +1,263 @@
+//! `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
+
+use core::fmt::{Result, Write};
+
+use crate::block::{Block, Text};
+use crate::points::PointKind;
+use crate::rule::{InForce, Rule};
+use crate::values::Values;
+use crate::{BLOCKS, Module, configuration, counters, points, record};
+
+const INTRODUCTION: &str = "\
+# Register map, version 1
+
+<!-- Written by `cargo xtask docs` from crate register-map. Change it there. -->
+
+Addresses are as they stand in the frame, counted from zero. Many masters count from one, or put a digit for
+the table in front: 0x0010 is then 17, 00017 or 10017 as a bit, 40017 or 30017 as a word.
+
+## Rules
+
+- Every bit point reads through functions 01 and 02 alike, every word through 03 and 04 alike.
+- A request lies within one of the blocks below and within its defined registers: gaps are exception 02.
+- A write to something that can only be read, or is not there, is exception 02, and nothing is written.
+- A write to several registers is checked whole and then done whole, or not at all.
+- The first check that fails decides the exception: function (01), then quantity, byte count and the form of
+  the value (03), then the address (02), then the value (03), then the state (04: a module does not answer,
+  06: the configuration is locked or its store busy).
+- A value of two registers has its high word first, and is read as one when both are read in one request.
+";
+
+const CONFIGURATION_NOTES: &str = "
+- Every write to this block but that of KEY needs the lock open, COMMAND included; else it is exception 06.
+  What counts is whether it was open when the request came: KEY and a setting in one request need it open
+  already. A refused write neither opens it nor keeps it open. A value of KEY other than 0x5A17 is exception 03.
+- What is written here reads back at once. \"now\" counts at once, \"restart\" after the next start, and only if
+  it was saved before.
+- The response to COMMAND is out before the command acts. While a save runs another save is exception 06, a
+  restart waits for it, and a change made meanwhile is not part of it. Status bit 3 clears when the save is
+  complete. Saving what is stored already writes nothing to the flash.
+- Load defaults (3) and drop (4) change the settings as if they had been written: save to make them last.
+- A setting by point takes the values of the kind of point that MODULE, as last written, makes it; where a
+  point has no use for it, any value of the register. A change of MODULE from one module to another puts the
+  settings of its points to the defaults; from none to a module keeps those that suit.
+- Until the restart a \"now\" setting that does not suit the module in force counts as its default.
+";
+
+const FAULT_NOTES: &str = "
+The record outlives every reset but a loss of power; a new fault takes its place.
+";
+
+/// Writes the whole document.
+///
+/// # Errors
+///
+/// Those of `out`.
+pub fn write_markdown(out: &mut impl Write) -> Result {
+    out.write_str(INTRODUCTION)?;
+    for block in BLOCKS {
+        let Block {
+            title, first, last, ..
+        } = block;
+        write!(out, "\n## {title}: {first:#06X}-{last:04X}\n\n")?;
+        if block.first == points::BLOCK.first {
+            write_points(out)?;
+        } else {
+            write_registers(block, out)?;
+        }
+        if block.first == configuration::BLOCK.first {
+            out.write_str(CONFIGURATION_NOTES)?;
+            write_store(out)?;
+        } else if block.first == crate::fault::BLOCK.first {
+            out.write_str(FAULT_NOTES)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_registers(block: &Block, out: &mut impl Write) -> Result {
+    let settings = block.first == configuration::BLOCK.first;
+    out.write_str(if settings {
+        "| address | name | values (default) | unit | in force | what |\n|---|---|---|---|---|---|\n"
+    } else {
+        "| address | name | unit | what |\n|---|---|---|---|\n"
+    })?;
+    for (rule, text) in block.registers() {
+        out.write_str("| ")?;
+        write_addresses(rule, out)?;
+        write!(out, " | {} | ", text.name)?;
+        if settings {
+            write_values(rule, out)?;
+            let in_force = match rule.in_force {
+                InForce::Now => "now",
+                InForce::Restart => "restart",
+            };
+            write!(out, " | {} | {in_force} | ", text.unit)?;
+        } else {
+            write!(out, "{} | ", text.unit)?;
+        }
+        write_about(text, out)?;
+        out.write_str(" |\n")?;
+    }
+    Ok(())
+}
+
+fn write_addresses(rule: &Rule, out: &mut impl Write) -> Result {
+    write!(out, "{:#06X}", rule.first)?;
+    if rule.count > 1 {
+        write!(out, "-{:04X}", rule.end().wrapping_sub(1))?;
+    }
+    Ok(())
+}
+
+fn write_values(rule: &Rule, out: &mut impl Write) -> Result {
+    write_set(rule.values, out)?;
+    if rule.values.allow(rule.default) {
+        write!(out, " ({})", rule.default)?;
+    }
+    if let Some(narrower) = rule.narrower {
+        write!(out, "; {} ", plural(narrower.kind))?;
+        write_set(narrower.values, out)?;
+        write!(out, " ({})", narrower.default)?;
+    }
+    Ok(())
+}
+
+fn write_set(values: Values, out: &mut impl Write) -> Result {
+    match values {
+        Values::Range { min, max } => write_range(min, max, out),
+        Values::RangeOr { also, min, max } if also < min => {
+            write!(out, "{also}, ")?;
+            write_range(min, max, out)
+        }
+        Values::RangeOr { also, min, max } => {
+            write_range(min, max, out)?;
+            write!(out, ", {also:#06X}")
+        }
+        Values::OneOf(set) => set.iter().enumerate().try_for_each(|(i, value)| {
+            out.write_str(if i == 0 { "" } else { " " })?;
+            write!(out, "{value}")
+        }),
+    }
+}
+
+fn write_range(min: u16, max: u16, out: &mut impl Write) -> Result {
+    match max {
+        _ if min != max => write!(out, "{min}-{max}"),
+        0..=9 => write!(out, "{min}"),
+        _ => write!(out, "{min:#06X}"),
+    }
+}
+
+fn write_about(text: &Text, out: &mut impl Write) -> Result {
+    out.write_str(text.about.trim())?;
+    for (i, (code, name)) in text.codes.iter().enumerate() {
+        out.write_str(if i == 0 { ": " } else { ", " })?;
+        match code {
+            0..=0xFF => write!(out, "{code} = {name}")?,
+            _ => write!(out, "{code:#06X} = {name}")?,
+        }
+    }
+    Ok(())
+}
+
+fn plural(kind: PointKind) -> &'static str {
+    match kind {
+        PointKind::None => "absent points",
+        PointKind::BitInput => "bit inputs",
+        PointKind::BitOutput => "bit outputs",
+        PointKind::WordInput => "analog inputs",
+        PointKind::WordOutput => "analog outputs",
+    }
+}
+
+fn write_points(out: &mut impl Write) -> Result {
+    let slot = points::SLOT_PORT;
+    let first = points::SLOT_FIRST;
+    let last = first + points::CHANNELS - 1;
+    writeln!(
+        out,
+        "`address = (port - 1) * 4 + (channel - 1)`, for bits and words alike. The modio-02 has port {slot} alone: \
+         {first:#06X}-{last:04X}. Points of\nother ports, and those a module does not have, are exception 02.\n\n\
+         | code | module | channel 1 | 2 | 3 | 4 |\n|---|---|---|---|---|---|"
+    )?;
+    for module in Module::ALL {
+        write!(out, "| {} | {module} |", module.code())?;
+        for kind in module.points() {
+            let kind = match kind {
+                PointKind::None => "-",
+                PointKind::BitInput => "bit, read",
+                PointKind::BitOutput => "bit, read and write",
+                PointKind::WordInput => "word, read",
+                PointKind::WordOutput => "word, read and write",
+            };
+            write!(out, " {kind} |")?;
+        }
+        out.write_str("\n")?;
+    }
+    out.write_str(
+        "\nThe bits of 2relay: 1 and 2 are the mode jumpers of relays 1 and 2 (1 = manual), 3 and 4 their coils. \
+         An output reads back\nwhat was commanded. A word is raw, 0-4095, or in engineering units, as SCALE says: \
+         0-10 V in mV (0-10000),\n4-20 mA in uA (0-20000 in, 4000-20000 out), NTC in 0.1 degC (two's complement). \
+         Other values are exception 03.\n",
+    )?;
+    writeln!(
+        out,
+        "The pulse counter of a point is at {:#06X} + 2 * address.",
+        counters::PULSES
+    )
+}
+
+fn write_store(out: &mut impl Write) -> Result {
+    let [first, second] = record::PAGE_ADDRESSES;
+    writeln!(
+        out,
+        "\nA save goes to the flash pages at {first:#010X} and {second:#010X}, as a record of the settings that \
+         differ from their defaults,\nwith a CRC-32. A setting that this firmware does not know is passed over, and one \
+         whose stored value it does not\nallow has its default: status bit 1 then says so, as when nothing good was found."
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::string::String;
+
+    use super::*;
+
+    #[test]
+    fn every_register_of_every_block_has_a_line() {
+        let mut text = String::new();
+        write_markdown(&mut text).unwrap();
+        for (rule, about) in BLOCKS.iter().skip(1).flat_map(|block| block.registers()) {
+            let begin = std::format!("| {:#06X}", rule.first);
+            let line = text.lines().find(|line| line.starts_with(&begin));
+            assert!(
+                line.is_some_and(|line| line.contains(about.name)),
+                "{begin}"
+            );
+        }
+    }
+
+    #[test]
+    fn values_are_written_as_people_read_them() {
+        let written = |values| {
+            let mut text = String::new();
+            write_set(values, &mut text).unwrap();
+            text
+        };
+        assert_eq!(written(Values::range(5, 1000).or(0)), "0, 5-1000");
+        assert_eq!(written(Values::up_to(1).or(0xFFFF)), "0-1, 0xFFFF");
+        assert_eq!(written(Values::only(0x5A17)), "0x5A17");
+        assert_eq!(written(Values::only(0)), "0");
+        assert_eq!(written(Values::OneOf(&[12, 24])), "12 24");
+    }
+
+    #[test]
+    fn a_setting_by_point_names_the_kind_that_differs() {
+        let (rule, _) = crate::rule_at(configuration::RULES, configuration::FILTER).unwrap();
+        let mut text = String::new();
+        write_values(rule, &mut text).unwrap();
+        assert_eq!(text, "0-1000 (5); analog inputs 0-8 (4)");
+    }
+}

@@ -1,0 +1,166 @@
+//! Writing records.
+
+use crc::{Digest, NoTable};
+
+use super::{CRC, FIRST_OFFSET, HEAD, MARK, OVERHEAD, PAGE_MARK, SCHEMA};
+use crate::Module;
+use crate::configuration::MODULE_SLOT;
+
+/// Brings a record half-word by half-word, the unit in which this flash is programmed.
+#[derive(Clone)]
+pub struct Encoder {
+    head: [u16; HEAD / 2],
+    crc: Digest<'static, u32, NoTable>,
+    /// The value of the pair whose address was the last half-word.
+    value: Option<u16>,
+    /// Half-words brought.
+    at: usize,
+    count: u16,
+}
+
+impl Encoder {
+    /// A record of `count` pairs.
+    #[must_use]
+    pub fn new(schema: u16, sequence: u32, count: u16) -> Self {
+        let [q0, q1, q2, q3] = sequence.to_le_bytes();
+        Self {
+            head: [
+                MARK,
+                schema,
+                u16::from_le_bytes([q0, q1]),
+                u16::from_le_bytes([q2, q3]),
+                count,
+            ],
+            crc: CRC.digest(),
+            value: None,
+            at: 0,
+            count,
+        }
+    }
+
+    /// Bytes of the whole record.
+    #[must_use]
+    pub const fn size(&self) -> usize {
+        OVERHEAD + self.count as usize * 4
+    }
+
+    /// The next half-word; `None` after the last. Asks for the next pair of address and value when it
+    /// comes to one, `count` times in all; where `pair` has none, an address that nobody knows is stored.
+    pub fn next(&mut self, pair: impl FnOnce() -> Option<(u16, u16)>) -> Option<u16> {
+        let body = self.size().saturating_sub(4) / 2;
+        let half = if let Some(half) = self.head.get(self.at) {
+            *half
+        } else if self.at < body {
+            match self.value.take() {
+                Some(value) => value,
+                None => {
+                    let (address, value) = pair().unwrap_or((0xFFFF, 0xFFFF));
+                    self.value = Some(value);
+                    address
+                }
+            }
+        } else {
+            let [c0, c1, c2, c3] = self.crc.clone().finalize().to_le_bytes();
+            let half = match self.at.wrapping_sub(body) {
+                0 => [c0, c1],
+                1 => [c2, c3],
+                _ => return None,
+            };
+            self.at = self.at.saturating_add(1);
+            return Some(u16::from_le_bytes(half));
+        };
+        self.crc.update(&half.to_le_bytes());
+        self.at = self.at.saturating_add(1);
+        Some(half)
+    }
+}
+
+impl core::fmt::Debug for Encoder {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Encoder")
+            .field("head", &self.head)
+            .field("at", &self.at)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Writes a page's mark and one record into `page`, and gives how many bytes they take; `None`, and
+/// nothing of use in `page`, when there is not so much room.
+pub fn encode_page(sequence: u32, pairs: &[(u16, u16)], page: &mut [u8]) -> Option<usize> {
+    let mut encoder = Encoder::new(SCHEMA, sequence, u16::try_from(pairs.len()).ok()?);
+    let size = encoder.size().checked_add(FIRST_OFFSET)?;
+    let mut pairs = pairs.iter().copied();
+    let (halves, _) = page.get_mut(..size)?.as_chunks_mut();
+    let (mark, record) = halves.split_first_mut()?;
+    *mark = PAGE_MARK.to_le_bytes();
+    for place in record {
+        *place = encoder.next(|| pairs.next())?.to_le_bytes();
+    }
+    Some(size)
+}
+
+/// A record of defaults with sequence number 0: what a device stores that never stored anything.
+pub const BEGINNING: [u8; OVERHEAD] = [
+    0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 0, 0, // head
+    0xE9, 0xA2, 0x94, 0x2E, // CRC
+];
+
+/// Bytes of [`module_in_slot`].
+pub const PRESET_LEN: usize = FIRST_OFFSET + OVERHEAD + 4;
+
+/// What to put at the start of an erased first page so that the device starts with this module in its
+/// slot and defaults for the rest: what a simulator presets, and a programmer may.
+#[must_use]
+pub fn module_in_slot(module: Module) -> [u8; PRESET_LEN] {
+    let mut page = [0xFF; PRESET_LEN];
+    let pair = [(MODULE_SLOT, module.code())];
+    // An empty slot is the default, and defaults are not stored.
+    let pairs = match module {
+        Module::None => &[],
+        _ => pair.as_slice(),
+    };
+    // It fits: PRESET_LEN is the size with one pair.
+    let _ = encode_page(0, pairs, &mut page);
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::record::records;
+
+    /// Worked out by hand but for the CRC, which is that of Python's zlib.crc32.
+    const DI4_IN_SLOT: [u8; PRESET_LEN] = [
+        0x6F, 0x6B, // page mark
+        0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 1, 0, // head: schema 0x0101, sequence 0, one pair
+        0x14, 0x01, 0x01, 0x00, // 0x0114 = 1
+        0x6A, 0x52, 0xCA, 0x95, // CRC
+    ];
+
+    #[test]
+    fn the_layout_is_as_drawn() {
+        assert_eq!(module_in_slot(Module::Di4), DI4_IN_SLOT);
+    }
+
+    #[test]
+    fn a_preset_is_a_page_with_one_record() {
+        for module in Module::ALL {
+            let bytes = module_in_slot(module);
+            let found: Vec<_> = records(&bytes).collect();
+            let [(FIRST_OFFSET, record)] = found[..] else {
+                panic!("{module}: {found:?}");
+            };
+            let stored = record.pairs().find(|(address, _)| *address == MODULE_SLOT);
+            assert_eq!(stored.map_or(0, |(_, code)| code), module.code());
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_not_written() {
+        assert_eq!(encode_page(0, &[(1, 1)], &mut [0; PRESET_LEN - 1]), None);
+        assert_eq!(encode_page(0, &[], &mut []), None);
+    }
+}

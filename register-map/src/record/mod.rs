@@ -1,0 +1,257 @@
+//! The form in which a configuration is stored: two flash pages that hold records.
+//!
+//! A record holds the settings that differ from their defaults as pairs of address and value. So it is
+//! small, and an address keeps its meaning whatever firmware reads it: what a record does not name has
+//! its default, what a firmware does not know it passes over. All numbers are little-endian.
+//!
+//! ```text
+//!  a page            offset   bytes
+//!  +---------------+ 0        2      PAGE_MARK, programmed when an erase is complete
+//!  | page mark     | 2        ...    records, one after another, oldest first
+//!  +---------------+                 0xFF up to the end
+//!  | record        |
+//!  +---------------+
+//!  | newer record  |    a record     offset   bytes
+//!  +---------------+    +----------+ 0        2      MARK
+//!  | erased: 0xFF  |    | head     | 2        2      schema: high byte layout, low byte register map
+//!  |               |    |          | 4        4      sequence number: the newest record counts
+//!  +---------------+    |          | 8        2      n, the number of pairs
+//!                       +----------+ 10       4 n    n times address and value, two bytes each
+//!                       | pairs    |
+//!                       +----------+
+//!                       | CRC-32   | 10 + 4 n 4      CRC-32/ISO-HDLC over everything before
+//!                       +----------+
+//! ```
+//!
+//! The CRC comes last, so a record that was not completed is none. A page without its mark was left by
+//! an interrupted erase: its cells may read as erased and yet be weak, so it is erased again before use.
+
+mod encode;
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+pub use encode::{BEGINNING, Encoder, PRESET_LEN, encode_page, module_in_slot};
+
+/// Where the two pages stand: the last two of a 64 KiB part.
+pub const PAGE_ADDRESSES: [u32; 2] = [0x0800_F800, 0x0800_FC00];
+
+/// Bytes of a flash page: what an erase clears (medium density, RM0008 3.3.1).
+pub const PAGE_SIZE: usize = 1024;
+
+/// The first half-word of a page that was erased completely.
+pub const PAGE_MARK: u16 = u16::from_le_bytes(*b"ok");
+
+/// Where the first record of a page stands.
+pub const FIRST_OFFSET: usize = 2;
+
+/// The first half-word of a record.
+pub const MARK: u16 = u16::from_le_bytes(*b"mo");
+
+/// How records are written today: layout 1, the settings of register map 1.
+pub const SCHEMA: u16 = 0x0101;
+
+/// Bytes of a record beside its pairs.
+pub const OVERHEAD: usize = HEAD + 4;
+
+const HEAD: usize = 10;
+
+/// Without a table: the 1 to 2 ms this takes at the start are worth the kilobyte it saves.
+static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// A good record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record<'a> {
+    /// Layout (high byte; always that of [`SCHEMA`]) and register map (low byte) of the writer.
+    pub schema: u16,
+    /// Greater than that of every record written before, but for the wrap.
+    pub sequence: u32,
+    pairs: &'a [[u8; 4]],
+}
+
+impl<'a> Record<'a> {
+    /// The record that `bytes` begin with; `None` when there is none, or none that is good and of a
+    /// layout known here.
+    #[must_use]
+    pub fn decode(bytes: &'a [u8]) -> Option<Self> {
+        let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
+        let [m0, m1, s0, s1, q0, q1, q2, q3, n0, n1] = *head;
+        let schema = u16::from_le_bytes([s0, s1]);
+        if u16::from_le_bytes([m0, m1]) != MARK || schema >> 8 != SCHEMA >> 8 {
+            return None;
+        }
+        let count = usize::from(u16::from_le_bytes([n0, n1]));
+        let (body, rest) = rest.split_at_checked(count.checked_mul(4)?)?;
+        let stored = u32::from_le_bytes(*rest.first_chunk()?);
+        let mut crc = CRC.digest();
+        crc.update(head);
+        crc.update(body);
+        (crc.finalize() == stored).then_some(Self {
+            schema,
+            sequence: u32::from_le_bytes([q0, q1, q2, q3]),
+            pairs: body.as_chunks().0,
+        })
+    }
+
+    /// Bytes of the record.
+    #[must_use]
+    pub const fn size(&self) -> usize {
+        OVERHEAD + size_of_val(self.pairs)
+    }
+
+    /// How many pairs.
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// One pair of address and value; `None` beyond the last.
+    #[must_use]
+    pub fn pair(&self, index: usize) -> Option<(u16, u16)> {
+        self.pairs.get(index).copied().map(pair)
+    }
+
+    /// Every pair of address and value, in the order of the record.
+    pub fn pairs(&self) -> impl ExactSizeIterator<Item = (u16, u16)> + Clone + use<'a> {
+        self.pairs.iter().copied().map(pair)
+    }
+}
+
+/// Whether a record with the one sequence number was written after one with the other.
+#[inline]
+#[must_use]
+pub const fn is_newer(sequence: u32, than: u32) -> bool {
+    let ahead = sequence.wrapping_sub(than);
+    ahead != 0 && ahead < 1 << 31
+}
+
+/// A pair of a record that is known to be good: the one that `bytes` begin with.
+#[must_use]
+pub fn pair_of(bytes: &[u8], index: usize) -> Option<(u16, u16)> {
+    let (pairs, _) = bytes.get(HEAD..)?.as_chunks();
+    pairs.get(index).copied().map(pair)
+}
+
+fn pair([a0, a1, v0, v1]: [u8; 4]) -> (u16, u16) {
+    (u16::from_le_bytes([a0, a1]), u16::from_le_bytes([v0, v1]))
+}
+
+/// Every good record of a page with its offset, whatever lies between them.
+pub fn records(page: &[u8]) -> impl Iterator<Item = (usize, Record<'_>)> {
+    let mut offset = 0;
+    core::iter::from_fn(move || {
+        while let Some(bytes) = page.get(offset..).filter(|bytes| !bytes.is_empty()) {
+            let here = offset;
+            if let Some(record) = Record::decode(bytes) {
+                offset = offset.saturating_add(record.size());
+                return Some((here, record));
+            }
+            offset = offset.saturating_add(2);
+        }
+        None
+    })
+}
+
+/// Whether nothing was ever stored on this page, so that a preset may go there: it is erased, or has no
+/// more than its mark and the [`BEGINNING`], complete or cut off.
+#[must_use]
+pub fn is_vacant(page: &[u8]) -> bool {
+    let beginning = BEGINNING.iter().chain(core::iter::repeat(&0xFF));
+    // A cut leaves ones where there should be zeros, never the other way round.
+    let mut bytes = page.iter().skip(FIRST_OFFSET).zip(beginning);
+    bytes.all(|(byte, full)| byte & full == *full)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::Module;
+
+    fn encoded(sequence: u32, pairs: &[(u16, u16)]) -> Vec<u8> {
+        let mut page = [0xFF; PAGE_SIZE];
+        let size = encode_page(sequence, pairs, &mut page).unwrap();
+        page[FIRST_OFFSET..size].to_vec()
+    }
+
+    #[test]
+    fn a_record_is_read_back() {
+        let pairs = [(0x0101, 1152), (0x01C0, 0xFFFF), (0xFFFF, 0)];
+        let bytes = encoded(0xFFFF_FFFF, &pairs);
+        let record = Record::decode(&bytes).unwrap();
+        assert!(record.pairs().eq(pairs));
+        assert_eq!(record.pair(1), Some(pairs[1]));
+        assert_eq!(record.pair(3), None);
+        assert_eq!((record.size(), record.schema), (bytes.len(), SCHEMA));
+        assert_eq!(pair_of(&bytes, 2), Some(pairs[2]));
+    }
+
+    #[test]
+    fn any_wrong_bit_and_any_missing_byte_make_it_no_record() {
+        let bytes = encoded(7, &[(0x0101, 1152), (0x0141, 0xFFFF)]);
+        for bit in 0..bytes.len() * 8 {
+            let mut wrong = bytes.clone();
+            wrong[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(Record::decode(&wrong), None, "bit {bit}");
+        }
+        for len in 0..bytes.len() {
+            assert_eq!(Record::decode(&bytes[..len]), None, "{len} bytes");
+        }
+    }
+
+    #[test]
+    fn another_layout_is_no_record_but_another_register_map_is() {
+        let mut encoder = Encoder::new(SCHEMA + 1, 0, 0);
+        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(|| None))
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        assert_eq!(Record::decode(&bytes).unwrap().schema, SCHEMA + 1);
+        let mut encoder = Encoder::new(SCHEMA + 0x100, 0, 0);
+        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(|| None))
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        assert_eq!(Record::decode(&bytes), None);
+    }
+
+    #[test]
+    fn the_beginning_is_a_record_of_nothing_and_leaves_room_for_a_preset() {
+        assert_eq!(encoded(0, &[]), BEGINNING);
+        assert!(is_vacant(&[0xFF; PAGE_SIZE]) && is_vacant(&[0; FIRST_OFFSET]));
+        let mut page = [0xFF; PAGE_SIZE];
+        encode_page(0, &[], &mut page);
+        assert!(is_vacant(&page));
+        page[5] |= 0xFE;
+        assert!(is_vacant(&page), "cut off");
+        page[PAGE_SIZE - 1] = 0xFE;
+        assert!(!is_vacant(&page), "garbage is something");
+        let mut page = [0xFF; PAGE_SIZE];
+        encode_page(1, &[], &mut page);
+        assert!(!is_vacant(&page), "defaults that someone has saved");
+        assert!(!is_vacant(&module_in_slot(Module::Di4)));
+    }
+
+    #[test]
+    fn sequence_numbers_wrap() {
+        assert!(is_newer(1, 0) && is_newer(0, u32::MAX) && is_newer(5, u32::MAX - 5));
+        assert!(!is_newer(0, 0) && !is_newer(0, 1) && !is_newer(u32::MAX, 0));
+    }
+
+    #[test]
+    fn records_are_found_between_garbage() {
+        let (one, two) = (encoded(1, &[(0x0101, 12)]), encoded(2, &[]));
+        let page = [
+            &[0, 0, 0x6D, 0x6F],
+            &one[..],
+            &[0x6D, 0x6F],
+            &two,
+            &one[2..],
+        ]
+        .concat();
+        let found: Vec<_> = records(&page)
+            .map(|(offset, record)| (offset, record.sequence))
+            .collect();
+        assert_eq!(found, [(4, 1), (4 + one.len() + 2, 2)]);
+        assert_eq!(records(&[0xFF; PAGE_SIZE]).count(), 0);
+    }
+}

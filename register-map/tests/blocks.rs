@@ -1,0 +1,127 @@
+//! What must hold for the declarations of all blocks, and the map's own numbers once more, written
+//! out by hand.
+
+use register_map::*;
+
+#[test]
+fn registers_are_in_order_within_their_block_and_apart() {
+    let mut next = 0;
+    for block in BLOCKS {
+        assert!(
+            block.first >= next && block.first <= block.last,
+            "{}",
+            block.title
+        );
+        assert_eq!(block.rules.len(), block.texts.len());
+        next = block.first;
+        for (rule, text) in block.registers() {
+            assert!(rule.first >= next && rule.count > 0, "{}", text.name);
+            next = rule.end();
+            assert!(next - 1 <= block.last, "{}", text.name);
+        }
+    }
+}
+
+#[test]
+fn every_register_has_words_and_its_codes_are_its_values() {
+    for (rule, text) in BLOCKS.iter().flat_map(|block| block.registers()) {
+        assert!(
+            !text.name.is_empty() && text.about.trim().len() > 2,
+            "{text:?}"
+        );
+        if rule.access == Access::ReadWrite && !text.codes.is_empty() {
+            let allowed = (0..=0xFFFF).filter(|value| rule.values.allow(*value));
+            assert!(
+                allowed.eq(text.codes.iter().map(|(code, _)| *code)),
+                "{}",
+                text.name
+            );
+        }
+    }
+}
+
+/// first, count, some good values, some bad values, default, in force
+type Expected = (u16, u16, &'static [u16], &'static [u16], u16, InForce);
+
+const NOW: InForce = InForce::Now;
+const RESTART: InForce = InForce::Restart;
+
+#[rustfmt::skip]
+const CONFIGURATION: &[Expected] = &[
+    (0x0100, 1, &[0x5A17], &[0, 1, 0x175A, 0xFFFF], 0, NOW),
+    (0x0101, 1, &[12, 24, 48, 96, 192, 384, 576, 1152, 2304, 4608, 9216], &[0, 11, 13, 144, 9600, 0xFFFF], 96, RESTART),
+    (0x0102, 1, &[0, 1, 2, 3], &[4, 0xFFFF], 0, RESTART),
+    (0x0103, 1, &[0, 1], &[2, 0xFFFF], 0, RESTART),
+    (0x0104, 1, &[0, 1, 36_000], &[36_001, 0xFFFF], 0, NOW),
+    (0x0105, 1, &[0, 1000], &[1001, 0xFFFF], 0, NOW),
+    (0x0106, 1, &[0, 5, 1000], &[1, 4, 1001, 0xFFFF], 0, RESTART),
+    (0x0107, 1, &[0, 1], &[2], 0, RESTART),
+    (0x0108, 1, &[1, 2, 3, 4, 5, 0xB007], &[0, 6, 0xB006, 0xB008, 0xFFFF], 0, NOW),
+    (0x0110, 4, &[0], &[1, 6, 0xFFFF], 0, RESTART),
+    (0x0114, 1, &[0, 6], &[7, 0xFFFF], 0, RESTART),
+    (0x0115, 3, &[0], &[1, 6, 0xFFFF], 0, RESTART),
+    (0x0120, 32, &[0, 1000], &[1001, 0xFFFF], 5, NOW),
+    (0x0140, 1, &[0, 1], &[2], 0, RESTART),
+    (0x0141, 1, &[0, 0xFFFF], &[], 0, RESTART),
+    (0x0142, 1, &[0, 31], &[32, 0xFFFF], 23, RESTART),
+    (0x0143, 1, &[0, 5], &[6], 2, RESTART),
+    (0x0144, 1, &[0, 3], &[4], 0, RESTART),
+    (0x0145, 1, &[5, 500], &[0, 4, 501], 50, RESTART),
+    (0x0160, 32, &[2000, 5000], &[0, 1999, 5001], 3950, NOW),
+    (0x0180, 32, &[0, 2], &[3], 0, NOW),
+    (0x01A0, 32, &[0, 1], &[2], 0, NOW),
+    (0x01C0, 32, &[0, 4095, 0xFFFF], &[4096, 0xFFFE], 0, NOW),
+    (0x01E0, 32, &[0, 4095], &[4096, 0xFFFE, 0xFFFF], 0, RESTART),
+];
+
+#[test]
+fn the_configuration_is_as_the_contract_has_it() {
+    assert_eq!(configuration::RULES.len(), CONFIGURATION.len());
+    for (rule, expected) in configuration::RULES.iter().zip(CONFIGURATION) {
+        let (first, count, good, bad, default, in_force) = *expected;
+        assert_eq!((rule.first, rule.count), (first, count));
+        assert_eq!(
+            (rule.default, rule.in_force),
+            (default, in_force),
+            "{first:#06x}"
+        );
+        assert!(rule.values.allow_all(good.iter().copied()), "{first:#06x}");
+        assert!(
+            !bad.iter().any(|value| rule.values.allow(*value)),
+            "{first:#06x}"
+        );
+    }
+}
+
+#[test]
+fn the_state_registers_exist_and_their_gaps_do_not() {
+    let there = |start, count| runs(state::RULES, start, count).is_some();
+    for (start, count) in [(0x200, 12), (0x210, 22), (0x230, 9), (0x240, 32)] {
+        assert!(there(start, count), "{start:#06x}");
+        assert!(
+            !there(start, count + 1) && !there(start - 1, 2),
+            "{start:#06x}"
+        );
+    }
+    assert!(runs(fault::RULES, 0x260, 16).is_some());
+    assert!(runs(counters::RULES, 0x300, 64).is_some() && counters::of_point(16) == 0x320);
+}
+
+#[test]
+fn a_module_makes_its_points() {
+    use points::PointKind::{BitInput, BitOutput, None, WordInput, WordOutput};
+    for (module, kinds) in [
+        (Module::None, [None; 4]),
+        (Module::Di4, [BitInput; 4]),
+        (Module::Do4, [BitOutput; 4]),
+        (Module::Relay2, [BitInput, BitInput, BitOutput, BitOutput]),
+        (Module::Ai4, [WordInput; 4]),
+        (Module::Ao4, [WordOutput; 4]),
+        (
+            Module::Ai2Ao2,
+            [WordInput, WordInput, WordOutput, WordOutput],
+        ),
+    ] {
+        assert_eq!(module.points(), kinds, "{module}");
+    }
+}

@@ -1,0 +1,154 @@
+//! The options of the virtual modio-02, a package of their own so that `cargo xtask sim` can refuse a
+//! wrong one at once, before it builds the image and the simulator, without depending on either.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use register_map::Module;
+
+/// What the simulator is told on its command line.
+#[derive(clap::Args, Clone, Debug, PartialEq, Eq)]
+#[group(skip)]
+pub struct Options {
+    /// DIP switch SW01 as a number, 0 to 255: the unit address
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub dip: u8,
+
+    /// What is plugged into the slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    #[arg(long, value_name = "NAME", default_value = "4di")]
+    pub module: Module,
+
+    /// Write the plugged module's code into the stored configuration when nothing is stored yet (default)
+    #[arg(long, overrides_with = "no_preset")]
+    preset: bool,
+
+    /// Leave the stored configuration alone
+    #[arg(long)]
+    no_preset: bool,
+
+    /// Make LINK a symlink to the pseudo-terminal of the RS-485 line
+    #[arg(long, value_name = "LINK")]
+    pub pty: Option<PathBuf>,
+
+    /// Offer the RS-485 line as raw bytes over TCP as well, at HOST:PORT
+    #[arg(long, value_name = "ADDR", value_parser = address)]
+    pub tcp: Option<SocketAddr>,
+
+    /// Where the HTTP interface listens, HOST:PORT; port 0 takes a free one
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
+    pub http: SocketAddr,
+
+    /// Run this image instead of building one
+    #[arg(long, value_name = "FILE")]
+    pub elf: Option<PathBuf>,
+
+    /// Stop after this much time, such as 10s or 2m
+    #[arg(long = "for", value_name = "DURATION", value_parser = humantime::parse_duration)]
+    pub run_for: Option<Duration>,
+}
+
+impl Options {
+    /// Whether to write the plugged module's code into a configuration that holds nothing yet.
+    #[must_use]
+    pub fn preset(&self) -> bool {
+        !self.no_preset
+    }
+}
+
+/// `HOST:PORT` as an address; of a name with several, the first IPv4 one, as clients try that too.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let found: Vec<SocketAddr> = text
+        .to_socket_addrs()
+        .map_err(|error| format!("not an address such as 127.0.0.1:8502: {error}"))?
+        .collect();
+    found
+        .iter()
+        .find(|address| address.is_ipv4())
+        .or(found.first())
+        .copied()
+        .ok_or_else(|| "the name has no address".to_owned())
+}
+
+/// What is wrong with a command line in one line, without clap's hints and usage text below it.
+#[must_use]
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let what: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.is_empty())
+        .collect();
+    let what = what.join(" ");
+    what.strip_prefix("error: ").unwrap_or(&what).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        options: Options,
+    }
+
+    fn parse(arguments: &[&str]) -> Result<Options, String> {
+        Cli::try_parse_from(std::iter::once(&"sim").chain(arguments))
+            .map(|cli| cli.options)
+            .map_err(|error| one_line(&error))
+    }
+
+    #[test]
+    fn without_options_it_is_unit_1_with_four_inputs_and_a_preset() {
+        let options = parse(&[]).unwrap();
+        assert_eq!((options.dip, options.module), (1, Module::Di4));
+        assert_eq!(options.http, "127.0.0.1:8502".parse().unwrap());
+        assert!(options.preset());
+        assert_eq!((options.pty, options.tcp, options.elf), (None, None, None));
+        assert_eq!(options.run_for, None);
+    }
+
+    #[test]
+    fn every_module_and_every_switch_position_is_taken() {
+        for module in Module::ALL {
+            assert_eq!(parse(&["--module", module.name()]).unwrap().module, module);
+        }
+        for dip in 0..=255_u8 {
+            assert_eq!(parse(&["--dip", &dip.to_string()]).unwrap().dip, dip);
+        }
+    }
+
+    #[test]
+    fn the_later_of_preset_and_no_preset_counts() {
+        assert!(!parse(&["--no-preset"]).unwrap().preset());
+        assert!(parse(&["--no-preset", "--preset"]).unwrap().preset());
+        assert!(!parse(&["--preset", "--no-preset"]).unwrap().preset());
+    }
+
+    #[test]
+    fn times_are_written_as_people_write_them() {
+        let run_for = |text| parse(&["--for", text]).map(|options| options.run_for);
+        assert_eq!(run_for("10s"), Ok(Some(Duration::from_secs(10))));
+        assert_eq!(run_for("1m 500ms"), Ok(Some(Duration::from_millis(60_500))));
+        assert!(run_for("soon").unwrap_err().contains("'soon'"));
+    }
+
+    #[test]
+    fn a_wrong_value_is_named_in_one_line() {
+        for (arguments, part) in [
+            (&["--dip", "256"][..], "256 is not in 0..=255"),
+            (&["--module", "8di"][..], "one of none, 4di"),
+            (&["--tcp", "nowhere"][..], "not an address"),
+            (&["--http", "127.0.0.1:99999"][..], "not an address"),
+            (&["--flash", "x"][..], "unexpected argument '--flash'"),
+            (&["--gdb", "x"][..], "unexpected argument '--gdb'"),
+            (&["--pty"][..], "--pty <LINK>"),
+        ] {
+            let text = parse(arguments).unwrap_err();
+            assert!(text.contains(part), "{arguments:?}: {text}");
+            assert!(!text.contains('\n'), "{text:?}");
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! The HTTP interface, as a function of a request and the board: no socket, no thread.
+//!
+//! | request | what |
+//! |---|---|
+//! | `GET /api/state` | everything that can be seen of the board |
+//! | `GET /api/frames?since=K` | the last frames on the line, those numbered above K |
+//! | `POST /api/channels/N` | `{"energised":bool}`, `{"manual":bool}` or `{"millivolts":n}` outside channel N |
+//! | `POST /api/dip` | `{"value":n}`: moves the switch |
+//! | `POST /api/power` | `{"on":bool}` or `{"cycle":true}` |
+//! | `POST /api/module` | `{"name":...}`: plugs a module, with the power off |
+//!
+//! A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
+
+use serde_json::{Map, Value, json};
+
+use register_map::Module;
+use sim::Error;
+
+use super::bench::Bench;
+use super::{frames, state};
+
+/// A request as it came.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// `GET`, `POST`, ...
+    pub method: String,
+    /// Path and query.
+    pub target: String,
+    /// The body, empty when there is none.
+    pub body: Vec<u8>,
+}
+
+/// The answer to a request.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reply {
+    /// The HTTP status.
+    pub status: u16,
+    /// The body.
+    pub body: Value,
+}
+
+impl Reply {
+    /// A refusal.
+    pub fn error(status: u16, what: impl Into<String>) -> Self {
+        Self {
+            status,
+            body: json!({ "error": what.into() }),
+        }
+    }
+}
+
+impl From<Error> for Reply {
+    fn from(error: Error) -> Self {
+        let status = match error {
+            Error::Powered | Error::Channel => 409,
+            _ => 400,
+        };
+        Self::error(status, error.to_string())
+    }
+}
+
+type Outcome = Result<(), Reply>;
+
+/// Does what a request asks for.
+pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
+    let (path, query) = request
+        .target
+        .split_once('?')
+        .unwrap_or((&request.target, ""));
+    let answered = match path.strip_prefix("/api/") {
+        Some("state") => reading(request).map(|()| state::json(bench)),
+        Some("frames") => reading(request)
+            .and_then(|()| since(query))
+            .map(|k| frames::json(bench.board.line(), k)),
+        Some("dip") => changing(bench, request, set_dip),
+        Some("power") => changing(bench, request, set_power),
+        Some("module") => changing(bench, request, set_module),
+        Some(rest) => match rest.strip_prefix("channels/").map(channel_number) {
+            Some(Some(number)) => changing(bench, request, |bench, body| {
+                set_channel(bench, number, body)
+            }),
+            Some(None) => Err(Reply::error(404, "channels are numbered 1 to 4")),
+            None => Err(Reply::error(404, format!("there is no {path}"))),
+        },
+        None => Err(Reply::error(404, format!("there is no {path}"))),
+    };
+    match answered {
+        Ok(body) => Reply { status: 200, body },
+        Err(refusal) => refusal,
+    }
+}
+
+fn reading(request: &Request) -> Outcome {
+    match request.method.as_str() {
+        "GET" => Ok(()),
+        _ => Err(Reply::error(405, "only GET here")),
+    }
+}
+
+/// Does `change` with the body's JSON object, and answers with the state after it.
+fn changing(
+    bench: &mut Bench,
+    request: &Request,
+    change: impl FnOnce(&mut Bench, &Map<String, Value>) -> Outcome,
+) -> Result<Value, Reply> {
+    if request.method != "POST" {
+        return Err(Reply::error(405, "only POST here"));
+    }
+    let body: Value = serde_json::from_slice(&request.body)
+        .map_err(|error| Reply::error(400, format!("the body is not JSON: {error}")))?;
+    let body = body
+        .as_object()
+        .ok_or_else(|| Reply::error(400, "the body is not a JSON object"))?;
+    change(bench, body)?;
+    Ok(state::json(bench))
+}
+
+/// The only entry of an object that may have no other, as what was asked for may not be half done.
+fn only(body: &Map<String, Value>) -> Result<(&str, &Value), Reply> {
+    let mut entries = body.iter();
+    match (entries.next(), entries.next()) {
+        (Some((key, value)), None) => Ok((key, value)),
+        _ => Err(Reply::error(400, "one entry is wanted in the object")),
+    }
+}
+
+fn boolean(key: &str, value: &Value) -> Result<bool, Reply> {
+    value
+        .as_bool()
+        .ok_or_else(|| Reply::error(400, format!("`{key}` is true or false")))
+}
+
+fn number(key: &str, value: &Value, largest: u16) -> Result<u16, Reply> {
+    value
+        .as_u64()
+        .and_then(|value| u16::try_from(value).ok())
+        .filter(|value| *value <= largest)
+        .ok_or_else(|| {
+            Reply::error(
+                400,
+                format!("`{key}` is a whole number from 0 to {largest}"),
+            )
+        })
+}
+
+fn unknown(key: &str, wanted: &str) -> Reply {
+    Reply::error(
+        400,
+        format!("`{key}` means nothing here: {wanted} is wanted"),
+    )
+}
+
+fn channel_number(text: &str) -> Option<usize> {
+    ["1", "2", "3", "4"]
+        .iter()
+        .position(|number| *number == text)
+        .map(|position| position + 1)
+}
+
+fn set_channel(bench: &mut Bench, number_of: usize, body: &Map<String, Value>) -> Outcome {
+    let (key, value) = only(body)?;
+    let board = &mut bench.board;
+    match key {
+        "energised" => board.set_energised(number_of, boolean(key, value)?)?,
+        "manual" => board.set_manual(number_of, boolean(key, value)?)?,
+        "millivolts" => board.set_millivolts(number_of, number(key, value, 3300)?)?,
+        _ => return Err(unknown(key, "`energised`, `manual` or `millivolts`")),
+    }
+    Ok(())
+}
+
+fn set_dip(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
+    match only(body)? {
+        (key @ "value", value) => {
+            // 255 fits in eight switches.
+            bench
+                .board
+                .set_dip(number(key, value, 255)?.to_le_bytes()[0]);
+            Ok(())
+        }
+        (key, _) => Err(unknown(key, "`value`")),
+    }
+}
+
+fn set_power(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
+    match only(body)? {
+        (key @ "on", value) => match boolean(key, value)? {
+            true => bench.board.power_on(),
+            false => bench.board.power_off(),
+        },
+        ("cycle", Value::Bool(true)) => bench.board.cycle(),
+        ("cycle", _) => return Err(Reply::error(400, "`cycle` is true")),
+        (key, _) => return Err(unknown(key, "`on` or `cycle`")),
+    }
+    Ok(())
+}
+
+fn set_module(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
+    match only(body)? {
+        ("name", Value::String(name)) => {
+            let module: Module = name
+                .parse()
+                .map_err(|why| Reply::error(400, format!("`{name}` is {why}")))?;
+            Ok(bench.board.set_module(module)?)
+        }
+        ("name", _) => Err(Reply::error(400, "`name` is a string")),
+        (key, _) => Err(unknown(key, "`name`")),
+    }
+}
+
+/// The K of `since=K`; 0, which is before all frames, without a query.
+fn since(query: &str) -> Result<u64, Reply> {
+    if query.is_empty() {
+        return Ok(0);
+    }
+    query
+        .strip_prefix("since=")
+        .and_then(|number| number.parse().ok())
+        .ok_or_else(|| Reply::error(400, "only `since=K` is understood here, K a whole number"))
+}
+
+#[cfg(test)]
+#[path = "api_tests.rs"]
+mod tests;

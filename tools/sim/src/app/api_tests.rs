@@ -1,0 +1,192 @@
+//! The HTTP interface against a real board whose firmware does nothing.
+
+use serde_json::{Value, json};
+
+use super::*;
+use crate::app::testing::bench;
+
+fn get(bench: &mut Bench, target: &str) -> Reply {
+    ask(bench, "GET", target, "")
+}
+
+fn post(bench: &mut Bench, target: &str, body: &str) -> Reply {
+    ask(bench, "POST", target, body)
+}
+
+fn ask(bench: &mut Bench, method: &str, target: &str, body: &str) -> Reply {
+    let request = Request {
+        method: method.to_owned(),
+        target: target.to_owned(),
+        body: body.as_bytes().to_vec(),
+    };
+    answer(bench, &request)
+}
+
+fn state(bench: &mut Bench) -> Value {
+    let reply = get(bench, "/api/state");
+    assert_eq!(reply.status, 200);
+    reply.body
+}
+
+#[test]
+fn the_state_has_everything_of_the_contract() {
+    let mut bench = bench(Module::Di4);
+    bench.board.run_for(sim::Time::from_ms(3));
+    let state = state(&mut bench);
+    assert_eq!(state["virtual_ms"], 3);
+    assert_eq!(state["dip"], 1);
+    assert_eq!(state["module"], "4di");
+    for led in ["activity", "fault", "run"] {
+        assert!(state["leds"][led].is_boolean(), "{led}");
+    }
+    assert_eq!(state["driver_enable"], false);
+    let line = json!({ "baud": 9600, "format": "8N2", "rx_frames": 0, "tx_frames": 0 });
+    assert_eq!(state["line"], line);
+    let off = json!({ "kind": "di", "energised": false });
+    assert_eq!(state["channels"], json!([off, off, off, off]));
+    assert_eq!(state["log_tail"], json!([]));
+}
+
+#[test]
+fn inputs_follow_the_world_outside() {
+    let mut di = bench(Module::Di4);
+    let reply = post(&mut di, "/api/channels/3", r#"{"energised":true}"#);
+    assert_eq!(reply.status, 200);
+    assert_eq!(reply.body["channels"][2]["energised"], true);
+    assert_eq!(state(&mut di)["channels"][1]["energised"], false);
+
+    let mut relay = bench(Module::Relay2);
+    post(&mut relay, "/api/channels/2", r#"{"manual":true}"#);
+    assert_eq!(state(&mut relay)["channels"][1]["manual"], true);
+    assert_eq!(state(&mut relay)["channels"][2], json!({ "kind": "none" }));
+
+    let mut ai = bench(Module::Ai4);
+    post(&mut ai, "/api/channels/4", r#"{"millivolts":3300}"#);
+    assert_eq!(
+        state(&mut ai)["channels"][3],
+        json!({ "kind": "ai", "millivolts": 3300 })
+    );
+}
+
+#[test]
+fn what_a_channel_does_not_have_is_refused() {
+    let mut bench = bench(Module::Di4);
+    for body in [r#"{"manual":true}"#, r#"{"millivolts":100}"#] {
+        assert_eq!(
+            post(&mut bench, "/api/channels/1", body).status,
+            409,
+            "{body}"
+        );
+    }
+}
+
+#[test]
+fn power_and_switch_and_module() {
+    let mut bench = bench(Module::Di4);
+    assert_eq!(
+        post(&mut bench, "/api/module", r#"{"name":"4do"}"#).status,
+        409,
+        "power is on"
+    );
+    let off = post(&mut bench, "/api/power", r#"{"on":false}"#);
+    assert_eq!((off.status, &off.body["powered"]), (200, &json!(false)));
+    let plugged = post(&mut bench, "/api/module", r#"{"name":"4do"}"#);
+    assert_eq!(
+        (plugged.status, &plugged.body["module"]),
+        (200, &json!("4do"))
+    );
+    assert_eq!(
+        post(&mut bench, "/api/power", r#"{"on":true}"#).body["powered"],
+        true
+    );
+    assert_eq!(state(&mut bench)["channels"][0]["kind"], "do");
+    assert_eq!(
+        post(&mut bench, "/api/dip", r#"{"value":247}"#).body["dip"],
+        247
+    );
+    let before = bench.board.now();
+    assert_eq!(
+        post(&mut bench, "/api/power", r#"{"cycle":true}"#).body["powered"],
+        true
+    );
+    assert!(bench.board.now() > before);
+}
+
+#[test]
+fn frames_are_told_from_a_number_on() {
+    let mut bench = bench(Module::Di4);
+    for _ in 0..2 {
+        bench.board.run_for(sim::Time::from_ms(1));
+        bench.send(&[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C]);
+        bench.board.run_for(sim::Time::from_ms(20));
+    }
+    let all = get(&mut bench, "/api/frames").body;
+    assert_eq!(all["frames"].as_array().unwrap().len(), 2);
+    assert_eq!(all["frames"][0]["crc_ok"], true);
+    assert_eq!(all["frames"][0]["bytes"], "0101001000043c0c");
+    let first = all["frames"][0]["number"].as_u64().unwrap();
+    let later = get(&mut bench, &format!("/api/frames?since={first}")).body;
+    assert_eq!(later["frames"], json!([all["frames"][1]]));
+    assert_eq!(state(&mut bench)["line"]["rx_frames"], 2);
+}
+
+#[test]
+fn anything_ill_formed_is_refused_and_changes_nothing() {
+    let mut bench = bench(Module::Di4);
+    let before = state(&mut bench);
+    for (method, target, body, status) in [
+        ("GET", "/", "", 404),
+        ("GET", "/api", "", 404),
+        ("GET", "/api/", "", 404),
+        ("GET", "/api/states", "", 404),
+        ("GET", "/api/channels", "", 404),
+        ("GET", "/api/channels/1", "", 405),
+        ("GET", "/api/dip", "", 405),
+        ("DELETE", "/api/state", "", 405),
+        ("POST", "/api/state", "{}", 405),
+        ("POST", "/api/frames", "{}", 405),
+        ("GET", "/api/frames?since=-1", "", 400),
+        ("GET", "/api/frames?since=", "", 400),
+        ("GET", "/api/frames?after=1", "", 400),
+        ("POST", "/api/channels/0", r#"{"energised":true}"#, 404),
+        ("POST", "/api/channels/5", r#"{"energised":true}"#, 404),
+        ("POST", "/api/channels/01", r#"{"energised":true}"#, 404),
+        ("POST", "/api/channels/one", r#"{"energised":true}"#, 404),
+        ("POST", "/api/channels/1/", r#"{"energised":true}"#, 404),
+        ("POST", "/api/channels/1", "", 400),
+        ("POST", "/api/channels/1", "{", 400),
+        ("POST", "/api/channels/1", "[]", 400),
+        ("POST", "/api/channels/1", "{}", 400),
+        ("POST", "/api/channels/1", r#"{"energised":1}"#, 400),
+        ("POST", "/api/channels/1", r#"{"energised":null}"#, 400),
+        ("POST", "/api/channels/1", r#"{"energized":true}"#, 400),
+        (
+            "POST",
+            "/api/channels/1",
+            r#"{"energised":true,"manual":true}"#,
+            400,
+        ),
+        ("POST", "/api/channels/1", r#"{"millivolts":3301}"#, 400),
+        ("POST", "/api/channels/1", r#"{"millivolts":-1}"#, 400),
+        ("POST", "/api/channels/1", r#"{"millivolts":1.5}"#, 400),
+        ("POST", "/api/channels/1", "\u{0}\u{1}", 400),
+        ("POST", "/api/dip", r#"{"value":256}"#, 400),
+        ("POST", "/api/dip", r#"{"value":"1"}"#, 400),
+        ("POST", "/api/dip", r#"{"dip":1}"#, 400),
+        ("POST", "/api/power", r#"{"on":"yes"}"#, 400),
+        ("POST", "/api/power", r#"{"cycle":false}"#, 400),
+        ("POST", "/api/power", r#"{"off":true}"#, 400),
+        ("POST", "/api/module", r#"{"name":"8di"}"#, 400),
+        ("POST", "/api/module", r#"{"name":4}"#, 400),
+    ] {
+        let reply = ask(&mut bench, method, target, body);
+        assert_eq!(
+            reply.status, status,
+            "{method} {target} {body}: {}",
+            reply.body
+        );
+        let error = reply.body["error"].as_str().unwrap();
+        assert!(!error.is_empty());
+    }
+    assert_eq!(state(&mut bench), before);
+}

@@ -1,0 +1,160 @@
+//! The command `modio-sim`: the board in step with the wall clock, between the endpoints.
+//!
+//! ```text
+//! pty, TCP ──bytes──┐                     ┌──> bytes to pty and TCP
+//! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP
+//! Ctrl-C, SIGTERM ──┘    the board's only ├──> log on stdout
+//!                        thread           └──> findings on stderr
+//! ```
+//!
+//! One thread owns the board; the others wait for input and put it into the queue, which wakes that
+//! thread, so that nothing is locked and a request waits for no tick of a clock.
+
+use std::path::Path;
+use std::sync::mpsc;
+
+use register_map::{Module, record};
+use sim::{Board, Config, Image, Time};
+use sim_options::Options;
+
+mod api;
+mod bench;
+mod frames;
+mod http;
+mod pace;
+mod pty;
+mod run;
+mod state;
+mod summary;
+mod tcp;
+#[cfg(test)]
+mod testing;
+
+use bench::Bench;
+
+/// Flash of the STM32F103CB, in bytes, and where it begins.
+const FLASH_SIZE: usize = 128 * 1024;
+const FLASH_BASE: u32 = 0x0800_0000;
+
+/// So long the board has been on when the endpoints are announced: its start-up and the first silence on
+/// the line are over then, and it answers.
+const START_UP: Time = Time::from_ms(100);
+
+/// What wakes the thread that has the board.
+enum Event {
+    /// Bytes from a master, to go out on the line.
+    Bytes(Vec<u8>),
+    /// A request to the HTTP interface, and where its reply goes.
+    Request(api::Request, mpsc::Sender<api::Reply>),
+    /// Time to end.
+    Stop,
+}
+
+/// Runs the simulator until it is told to stop or its time is up.
+///
+/// # Errors
+///
+/// What keeps it from starting, in one line.
+pub fn run(options: &Options) -> Result<(), String> {
+    let mut bench = Bench::new(board(options)?);
+    let (events, queue) = mpsc::channel();
+
+    let stop = events.clone();
+    // The receiver is gone only when the end has come already.
+    ctrlc::set_handler(move || drop(stop.send(Event::Stop)))
+        .map_err(|error| format!("cannot catch Ctrl-C: {error}"))?;
+
+    let pty = pty::Pty::open(options.pty.as_deref(), events.clone())?;
+    let tcp = options
+        .tcp
+        .map(|address| tcp::Tcp::listen(address, events.clone()))
+        .transpose()?;
+    let http = http::listen(options.http, events)?;
+
+    bench.board.run_until(START_UP);
+    bench::say(&format!("pty: {}", pty.path().display()));
+    if let Some(tcp) = &tcp {
+        bench::say(&format!("tcp: {}", tcp.address()));
+    }
+    bench::say(&format!("http: http://{http}/"));
+
+    run::until_stopped(
+        &mut bench,
+        &queue,
+        &run::Endpoints { pty, tcp },
+        options.run_for,
+    );
+    Ok(())
+}
+
+fn board(options: &Options) -> Result<Board, String> {
+    let elf = options.elf.as_deref().ok_or(
+        "no image to run: give one with --elf FILE, or use `cargo xtask sim`, which builds one",
+    )?;
+    let image = image(elf)?;
+    let mut flash = vec![0xFF; FLASH_SIZE];
+    if options.preset() {
+        write_preset(&mut flash, options.module);
+    }
+    let config = Config {
+        dip: options.dip,
+        module: options.module,
+        flash: Some(flash),
+        ..Config::default()
+    };
+    Board::new(&image, config).map_err(|error| format!("{}: {error}", elf.display()))
+}
+
+fn image(elf: &Path) -> Result<Image, String> {
+    Image::read(elf).map_err(|error| format!("cannot run the image {error}"))
+}
+
+/// Stores a configuration that knows which module is plugged, when nothing is stored.
+fn write_preset(flash: &mut [u8], module: Module) {
+    let start = |address| (address - FLASH_BASE) as usize;
+    let page = |address| start(address)..start(address) + record::PAGE_SIZE;
+    let vacant = |address| record::is_vacant(&flash[page(address)]);
+    let [first, second] = record::PAGE_ADDRESSES;
+    if vacant(first) && vacant(second) {
+        let page = &mut flash[page(first)];
+        page.fill(0xFF);
+        page[..record::PRESET_LEN].copy_from_slice(&record::module_in_slot(module));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preset_is_stored_only_where_nothing_is() {
+        let mut flash = vec![0xFF; FLASH_SIZE];
+        write_preset(&mut flash, Module::Do4);
+        let at = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
+        let stored = record::module_in_slot(Module::Do4);
+        assert_eq!(flash[at..at + stored.len()], stored);
+        let written = flash.iter().filter(|byte| **byte != 0xFF).count();
+        assert!(written <= stored.len(), "nothing else is written");
+        let before = flash.clone();
+        write_preset(&mut flash, Module::Di4);
+        assert_eq!(flash, before, "what is stored stays");
+        let mut flash = vec![0xFF; FLASH_SIZE];
+        flash[(record::PAGE_ADDRESSES[1] - FLASH_BASE) as usize + 7] = 0;
+        let before = flash.clone();
+        write_preset(&mut flash, Module::Di4);
+        assert_eq!(flash, before, "even what is damaged");
+    }
+
+    #[test]
+    fn a_broken_image_is_told_with_its_path() {
+        let directory = tempfile::tempdir().unwrap();
+        let elf = directory.path().join("modio");
+        assert!(image(&elf).unwrap_err().contains("modio"), "missing");
+        std::fs::write(&elf, b"#!/bin/sh\n").unwrap();
+        let text = image(&elf).unwrap_err();
+        assert!(
+            text.contains("modio") && text.contains("ELF") && !text.contains('\n'),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,76 @@
+//! What can be seen of the board, as JSON: LEDs, channels, line, log.
+
+use serde_json::{Value, json};
+use sim::Channel;
+
+use super::bench::Bench;
+
+/// The body of `GET /api/state`.
+pub fn json(bench: &mut Bench) -> Value {
+    let line = bench.board.line();
+    let settings = line.settings();
+    let (to_unit, from_unit) = line.frame_counts();
+    let board = &bench.board;
+    let leds = board.leds();
+    let channels = [1, 2, 3, 4].map(|number| channel(board.channel(number)));
+    json!({
+        "virtual_ms": board.now().as_ms(),
+        "powered": board.powered(),
+        "dip": board.dip(),
+        "module": board.module().name(),
+        "leds": { "activity": leds.activity, "fault": leds.fault, "run": leds.run },
+        "driver_enable": board.driver_enable(),
+        "line": {
+            "baud": settings.baud,
+            "format": settings.format.name(),
+            "rx_frames": to_unit,
+            "tx_frames": from_unit,
+        },
+        "channels": channels,
+        "log_tail": bench.log_tail().collect::<Vec<_>>(),
+    })
+}
+
+fn channel(channel: Channel) -> Value {
+    match channel {
+        Channel::None => json!({ "kind": "none" }),
+        Channel::Di { energised } => json!({ "kind": "di", "energised": energised }),
+        Channel::Do { on } => json!({ "kind": "do", "on": on }),
+        Channel::Relay { energised, manual } => {
+            json!({ "kind": "relay", "energised": energised, "manual": manual })
+        }
+        Channel::Ai { millivolts } => json!({ "kind": "ai", "millivolts": millivolts }),
+        Channel::Ao { code } => json!({ "kind": "ao", "code": code }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_channel_has_its_form() {
+        for (seen, expected) in [
+            (Channel::None, r#"{"kind":"none"}"#),
+            (
+                Channel::Di { energised: true },
+                r#"{"energised":true,"kind":"di"}"#,
+            ),
+            (Channel::Do { on: false }, r#"{"kind":"do","on":false}"#),
+            (
+                Channel::Relay {
+                    energised: true,
+                    manual: false,
+                },
+                r#"{"energised":true,"kind":"relay","manual":false}"#,
+            ),
+            (
+                Channel::Ai { millivolts: 3300 },
+                r#"{"kind":"ai","millivolts":3300}"#,
+            ),
+            (Channel::Ao { code: 4095 }, r#"{"code":4095,"kind":"ao"}"#),
+        ] {
+            assert_eq!(channel(seen).to_string(), expected);
+        }
+    }
+}

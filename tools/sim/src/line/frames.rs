@@ -1,0 +1,239 @@
+//! The record of the line: words gathered into frames.
+
+use std::collections::VecDeque;
+
+use crc::{CRC_16_MODBUS, Crc};
+
+use super::receiver::Word;
+use crate::time::Time;
+
+/// Frames kept unless the record is told to keep them all.
+pub const KEPT: usize = 1000;
+
+/// A frame is cut after so many bytes: sixteen times the longest that RTU has, for a line that never falls
+/// silent.
+pub const LONGEST: usize = 4096;
+
+/// The CRC of RTU frames (Modbus over Serial Line V1.02, 6.2.2).
+const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+
+/// Who spoke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// The master, or noise.
+    FromMaster,
+    /// The unit on this board.
+    FromUnit,
+}
+
+/// A frame on the line, as a listener with the master's settings hears it: characters of one side with less
+/// than t3.5 of silence between them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Its number, from 1, never used again on this line.
+    pub number: u64,
+    /// Who spoke.
+    pub direction: Direction,
+    /// The first start bit.
+    pub start: Time,
+    /// The end of the last stop bit.
+    pub end: Time,
+    /// The characters' data.
+    pub bytes: Vec<u8>,
+    /// The last two bytes are the CRC of those before them, of which there are at least two.
+    pub crc_ok: bool,
+    /// Some character was not as it should be: parity, framing, noise, or both sides spoke.
+    pub damaged: bool,
+    /// The longest silence between two of its characters.
+    pub longest_gap: Time,
+}
+
+/// Gathers words into frames.
+#[derive(Clone, Debug, Default)]
+pub struct Record {
+    kept: VecDeque<Frame>,
+    open: Option<Frame>,
+    last_number: u64,
+    keep_all: bool,
+    from_master: u64,
+    from_unit: u64,
+}
+
+impl Record {
+    /// Keeps every frame, not just the last [`KEPT`].
+    pub fn set_keep_all(&mut self, all: bool) {
+        self.keep_all = all;
+        self.trim();
+    }
+
+    /// A word was heard. `silence` is what ends a frame.
+    pub fn word(&mut self, word: &Word, direction: Direction, collided: bool, silence: Time) {
+        let continues = self.open.as_ref().is_some_and(|frame| {
+            frame.direction == direction
+                && word.start.saturating_sub(frame.end) < silence
+                && frame.bytes.len() < LONGEST
+        });
+        if !continues {
+            self.close();
+        }
+        let number = self.last_number + 1;
+        let frame = self.open.get_or_insert_with(|| Frame {
+            number,
+            direction,
+            start: word.start,
+            end: word.start,
+            bytes: Vec::new(),
+            crc_ok: false,
+            damaged: false,
+            longest_gap: Time::ZERO,
+        });
+        let gap = word.start.saturating_sub(frame.end);
+        frame.longest_gap = frame.longest_gap.max(gap);
+        frame.end = word.end;
+        frame.bytes.push(word.data as u8);
+        frame.damaged |= collided || word.parity_error || word.framing_error || word.noise;
+    }
+
+    /// Nothing but silence up to `now`: a frame that has been followed by `silence` is complete.
+    pub fn quiet(&mut self, now: Time, silence: Time) {
+        if self.open.as_ref().is_some_and(|f| f.end + silence <= now) {
+            self.close();
+        }
+    }
+
+    /// The complete frames kept, oldest first.
+    pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
+        self.kept.iter()
+    }
+
+    /// The complete frames with numbers above `number`.
+    pub fn since(&self, number: u64) -> impl Iterator<Item = &Frame> {
+        let skip = self.kept.partition_point(|frame| frame.number <= number);
+        self.kept.range(skip..)
+    }
+
+    /// How many frames the master, and the unit, have sent so far.
+    #[must_use]
+    pub fn counts(&self) -> (u64, u64) {
+        (self.from_master, self.from_unit)
+    }
+
+    fn close(&mut self) {
+        let Some(mut frame) = self.open.take() else {
+            return;
+        };
+        frame.crc_ok = crc_ok(&frame.bytes);
+        self.last_number = frame.number;
+        match frame.direction {
+            Direction::FromMaster => self.from_master += 1,
+            Direction::FromUnit => self.from_unit += 1,
+        }
+        self.kept.push_back(frame);
+        self.trim();
+    }
+
+    fn trim(&mut self) {
+        while !self.keep_all && self.kept.len() > KEPT {
+            self.kept.pop_front();
+        }
+    }
+}
+
+/// Whether an RTU frame ends in its CRC, low byte first.
+#[must_use]
+pub fn crc_ok(frame: &[u8]) -> bool {
+    match frame.split_last_chunk::<2>() {
+        Some((body, sent)) if body.len() >= 2 => CRC.checksum(body) == u16::from_le_bytes(*sent),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn word(start_us: u64, data: u16) -> Word {
+        Word {
+            start: Time::from_us(start_us),
+            at: Time::from_us(start_us + 90),
+            end: Time::from_us(start_us + 100),
+            data,
+            parity_error: false,
+            framing_error: false,
+            noise: false,
+        }
+    }
+
+    const SILENCE: Time = Time::from_us(350);
+
+    #[test]
+    fn silence_and_direction_end_frames() {
+        let mut record = Record::default();
+        // Read coils of unit 17: the example of V1.1b3, with its CRC.
+        let request = [0x11_u8, 0x01, 0x00, 0x13, 0x00, 0x25, 0x0E, 0x84];
+        for (byte, n) in request.into_iter().zip(0..) {
+            record.word(
+                &word(n * 110, u16::from(byte)),
+                Direction::FromMaster,
+                false,
+                SILENCE,
+            );
+        }
+        record.word(&word(880, 0x55), Direction::FromUnit, false, SILENCE);
+        record.word(&word(1329, 0x56), Direction::FromUnit, false, SILENCE);
+        record.word(&word(1779, 0x57), Direction::FromUnit, true, SILENCE);
+        record.quiet(Time::from_us(2228), SILENCE);
+        assert_eq!(record.frames().count(), 2);
+        record.quiet(Time::from_us(2229), SILENCE);
+        let frames: Vec<_> = record.since(0).cloned().collect();
+        assert_eq!(frames.len(), 3);
+        assert_eq!(frames[0].bytes, [0x11, 1, 0, 0x13, 0, 0x25, 0x0E, 0x84]);
+        assert!(frames[0].crc_ok && !frames[0].damaged);
+        assert_eq!(frames[0].longest_gap, Time::from_us(10));
+        assert_eq!(frames[1].bytes, [0x55, 0x56]);
+        assert!(!frames[1].crc_ok && !frames[1].damaged);
+        assert!(frames[2].damaged);
+        assert_eq!(record.since(2).count(), 1);
+        assert_eq!(record.counts(), (1, 2));
+    }
+
+    #[test]
+    fn old_frames_go_numbers_stay() {
+        let mut record = Record::default();
+        for n in 0..1200 {
+            record.word(&word(n * 1000, 1), Direction::FromMaster, false, SILENCE);
+        }
+        record.quiet(Time::from_secs(2), SILENCE);
+        let numbers: Vec<_> = record.frames().map(|f| f.number).collect();
+        assert_eq!((numbers.len(), numbers[0], numbers[999]), (1000, 201, 1200));
+        assert_eq!(record.since(1190).count(), 10);
+        record.set_keep_all(true);
+        for n in 0..10 {
+            record.word(
+                &word(3_000_000 + n * 1000, 1),
+                Direction::FromUnit,
+                false,
+                SILENCE,
+            );
+        }
+        assert_eq!(record.frames().count(), 1009);
+    }
+
+    #[test]
+    fn a_line_that_never_rests_is_cut_into_frames() {
+        let mut record = Record::default();
+        for n in 0..10_000 {
+            record.word(&word(n * 100, 7), Direction::FromMaster, false, SILENCE);
+        }
+        let lengths: Vec<_> = record.frames().map(|f| f.bytes.len()).collect();
+        assert_eq!(lengths, [LONGEST, LONGEST]);
+    }
+
+    #[test]
+    fn a_frame_with_nothing_before_its_crc_is_not_good() {
+        // 0xFFFF is the CRC of no byte at all.
+        assert!(!crc_ok(&[0xFF, 0xFF]));
+        assert!(!crc_ok(&[1]));
+        assert!(!crc_ok(&[]));
+    }
+}

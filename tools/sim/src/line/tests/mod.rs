@@ -1,0 +1,261 @@
+//! The bus with a USART on it: who hears what, and when.
+
+mod faults;
+
+use super::*;
+use crate::periph::timer::{Kind, Timer};
+use crate::periph::usart::Usart;
+use crate::peripheral::Peripheral;
+
+const HZ: u32 = 72_000_000;
+/// 115200 baud at 72 MHz.
+const BRR: u32 = 0x271;
+const SR: u32 = 0x00;
+const DR: u32 = 0x04;
+const CR1: u32 = 0x0C;
+/// UE, TE, RE.
+const ON: u32 = 1 << 13 | 1 << 3 | 1 << 2;
+const RXNE: u32 = 1 << 5;
+
+struct Bench {
+    line: Line,
+    usart: Usart,
+    now: Time,
+}
+
+impl Bench {
+    /// Both ends at 115200 8N2, the USART past its preamble.
+    fn new() -> Self {
+        let mut bench = Self {
+            line: Line::default(),
+            usart: Usart::new(),
+            now: Time::ZERO,
+        };
+        bench.line.set_settings(Settings {
+            baud: 115_200,
+            format: Format::N2,
+        });
+        bench.usart.set_clock(HZ, Time::ZERO);
+        bench.line.set_tx_pin(TxPin::Usart, Time::ZERO);
+        for (offset, value) in [(0x08, BRR), (0x10, 2 << 12), (CR1, ON)] {
+            bench.write(offset, value);
+        }
+        bench.run_to(Time::from_ms(1));
+        bench
+    }
+
+    fn run_to(&mut self, at: Time) {
+        self.now = at;
+        self.line.exchange(&mut self.usart, at);
+    }
+
+    fn write(&mut self, offset: u32, value: u32) {
+        self.line.exchange(&mut self.usart, self.now);
+        assert_eq!(self.usart.write(offset, value, self.now), Ok(()));
+    }
+
+    fn read(&mut self, offset: u32) -> u32 {
+        self.line.exchange(&mut self.usart, self.now);
+        self.usart.read(offset, self.now).expect("modelled")
+    }
+
+    fn driver(&mut self, on: bool) {
+        self.line.exchange(&mut self.usart, self.now);
+        self.line.set_driver(on, self.now);
+    }
+
+    /// Takes the bytes the USART receives up to `end`, each at the event that brings it.
+    fn hear(&mut self, end: Time) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while let Some(at) = self.line.next_event(&self.usart).filter(|&at| at <= end) {
+            self.run_to(at);
+            if self.read(SR) & RXNE != 0 {
+                bytes.push(self.read(DR) as u8);
+            }
+        }
+        self.run_to(end);
+        bytes
+    }
+
+    /// The unit answers with `bytes`, as fast as it can, and lets go at the end of the last stop bit.
+    fn answer(&mut self, bytes: &[u8]) -> Time {
+        self.driver(true);
+        let begin = self.now;
+        for &byte in bytes {
+            while self.read(SR) & 1 << 7 == 0 {
+                self.run_to(self.usart.next_event().expect("sending"));
+            }
+            self.write(DR, u32::from(byte));
+        }
+        let end = begin + Time::cycles(bytes.len() as u64 * 11 * 625, HZ);
+        self.run_to(end);
+        assert_ne!(self.read(SR) & 1 << 6, 0, "TC");
+        self.driver(false);
+        end
+    }
+}
+
+#[test]
+fn a_request_and_its_answer_are_heard_and_recorded() {
+    let mut bench = Bench::new();
+    let request = [0x11, 0x01, 0x00, 0x13, 0x00, 0x25, 0x0E, 0x84];
+    let sent = Time::from_ms(2);
+    let end = bench.line.send(sent, &request);
+    assert_eq!(end, sent + Time::cycles(88, 115_200));
+    assert_eq!(bench.hear(end + Time::from_us(1750)), request);
+    let began = bench.now;
+    let done = bench.answer(&request[..4]);
+    bench.run_to(done + Time::from_us(1751));
+    let frames: Vec<_> = bench.line.frames().cloned().collect();
+    assert_eq!(frames.len(), 2);
+    assert_eq!(
+        (frames[0].start, frames[0].direction),
+        (sent, Direction::FromMaster)
+    );
+    assert!(frames[0].end.as_ps().abs_diff(end.as_ps()) < 100);
+    assert!(frames[0].crc_ok && !frames[0].damaged);
+    assert_eq!(
+        (frames[1].start, frames[1].direction),
+        (began, Direction::FromUnit)
+    );
+    assert_eq!(frames[1].bytes, request[..4]);
+    assert!(!frames[1].damaged);
+    let heard: Vec<_> = bench.line.received().map(|r| r.byte).collect();
+    assert_eq!(heard, request[..4]);
+    assert!(bench.line.received().all(Received::is_good));
+    assert_eq!(
+        bench.line.driver_edges().collect::<Vec<_>>(),
+        [(began, true), (done, false)]
+    );
+    assert_eq!(bench.line.collisions().count(), 0);
+    assert_eq!(bench.line.take_findings(), []);
+}
+
+#[test]
+fn one_big_step_is_the_same_as_many_small_ones() {
+    let run = |steps: u64| {
+        let mut bench = Bench::new();
+        let end = bench.line.send(Time::from_ms(2), &[1, 2, 3]);
+        for n in 1..=steps {
+            let at = Time::from_ms(2) + (end - Time::from_ms(2)) * n;
+            bench.run_to(Time::from_ps(at.as_ps() / steps).max(bench.now));
+        }
+        bench.run_to(Time::from_ms(9));
+        (
+            bench.read(SR),
+            bench.read(DR),
+            bench.line.frames().cloned().collect::<Vec<_>>(),
+        )
+    };
+    let (sr, dr, frames) = run(0);
+    // Nobody read: the first byte stays, the others are lost.
+    assert_eq!((sr & 0x28, dr), (0x28, 1));
+    assert_eq!(frames[0].bytes, [1, 2, 3]);
+    assert_eq!(run(1000), (sr, dr, frames));
+}
+
+#[test]
+fn the_unit_hears_its_echo_only_when_wired_so() {
+    for echo in [false, true] {
+        let mut bench = Bench::new();
+        bench.line.set_echo(echo);
+        bench.answer(&[0xA5]);
+        assert_eq!(bench.read(SR) & RXNE != 0, echo);
+        if echo {
+            assert_eq!(bench.read(DR), 0xA5);
+        }
+    }
+}
+
+#[test]
+fn tim1_captures_the_start_bits() {
+    let mut bench = Bench::new();
+    let mut tim1 = Timer::new(Kind::Advanced);
+    tim1.set_clock(HZ, Time::ZERO);
+    let ok = Ok(());
+    assert_eq!(tim1.write(0x1C, 1, Time::ZERO), ok);
+    assert_eq!(tim1.write(0x20, 3 << 8, Time::ZERO), ok);
+    assert_eq!(tim1.write(0x00, 1, Time::ZERO), ok);
+    let mut flags = |bench: &mut Bench, clear: bool| {
+        bench.line.exchange(&mut bench.usart, bench.now);
+        bench.line.feed_captures(&mut tim1);
+        tim1.advance(bench.now);
+        let sr = tim1.read(0x10, bench.now).expect("modelled") & 0x808;
+        if clear {
+            assert_eq!(tim1.write(0x10, 0, bench.now), Ok(()));
+        }
+        sr
+    };
+    flags(&mut bench, true);
+    let end = bench.line.send(Time::from_ms(2), &[0xFF, 0x55]);
+    bench.run_to(Time::from_ms(2) - Time::from_ps(1));
+    assert_eq!(flags(&mut bench, true), 0);
+    bench.run_to(Time::from_ms(2));
+    assert_eq!(flags(&mut bench, true), 1 << 3);
+    // The second start bit and four more falls: captured over a capture.
+    bench.run_to(end);
+    assert_eq!(flags(&mut bench, true), 1 << 3 | 1 << 11);
+    bench.run_to(end + Time::from_ms(1));
+    assert_eq!(flags(&mut bench, true), 0);
+    // What the unit sends itself is not on its RX pin.
+    bench.answer(&[0x00]);
+    assert_eq!(flags(&mut bench, true), 0);
+}
+
+#[test]
+fn a_master_that_follows_takes_over_the_units_settings() {
+    let mut bench = Bench::new();
+    bench.line.set_settings(Settings::default());
+    bench.run_to(Time::from_ms(2));
+    assert_eq!(bench.line.settings(), Settings::default());
+    bench.line.set_follow(true);
+    let end = bench.line.send(bench.now, &[0x55]);
+    // Not before its queue is out.
+    bench.run_to(end - Time::from_ps(1));
+    assert_eq!(bench.line.settings(), Settings::default());
+    bench.run_to(end);
+    let settings = Settings {
+        baud: 115_200,
+        format: Format::N2,
+    };
+    assert_eq!(bench.line.settings(), settings);
+    // 921600 baud from 72 MHz is 78 cycles, 923077; even parity.
+    bench.write(0x10, 0);
+    bench.write(0x08, 78);
+    bench.write(CR1, ON | 1 << 12 | 1 << 10);
+    bench.run_to(Time::from_ms(9));
+    let settings = Settings {
+        baud: 921_600,
+        format: Format::E1,
+    };
+    assert_eq!(bench.line.settings(), settings);
+    // An odd rate stays what it is; formats a Modbus line does not have change nothing.
+    bench.write(0x08, 1000);
+    bench.run_to(Time::from_ms(10));
+    assert_eq!(bench.line.settings().baud, 72_000);
+    bench.write(CR1, ON | 1 << 10);
+    bench.run_to(Time::from_ms(11));
+    assert_eq!(bench.line.settings().format, Format::E1);
+}
+
+#[test]
+fn a_long_run_does_not_grow() {
+    let mut bench = Bench::new();
+    for n in 0..20_000_u64 {
+        let at = Time::from_ms(2 + 3 * n);
+        let end = bench.line.send(at, &[0x55, 0xAA, n as u8]);
+        bench.run_to(end);
+        bench.write(DR, 0x55);
+    }
+    assert_eq!(bench.line.frames().count(), KEPT);
+    let (from_master, from_unit) = bench.line.frame_counts();
+    assert_eq!((from_master, from_unit), (19_999, 0));
+    let waves = [
+        &bench.line.bus,
+        &bench.line.usart,
+        &bench.line.master.wave,
+        &bench.line.unit,
+    ];
+    assert!(waves.iter().all(|wave| wave.len() < 2500), "100 ms at most");
+    assert!(bench.line.master.talking.len() < 3);
+}

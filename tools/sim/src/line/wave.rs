@@ -1,0 +1,186 @@
+//! A wire's level over time, as the edges it made.
+
+use std::collections::VecDeque;
+
+use crate::time::Time;
+
+/// The level of a wire over a stretch of time. High before its first edge, unless older edges have
+/// been dropped.
+#[derive(Clone, Debug)]
+pub struct Wave {
+    /// The level before the first edge kept.
+    before: bool,
+    /// Each edge and the level after it, in order; levels alternate.
+    edges: VecDeque<(Time, bool)>,
+}
+
+impl Default for Wave {
+    fn default() -> Self {
+        Self::new(true)
+    }
+}
+
+impl Wave {
+    /// A wire that has been at `level` for ever.
+    #[must_use]
+    pub const fn new(level: bool) -> Self {
+        Self {
+            before: level,
+            edges: VecDeque::new(),
+        }
+    }
+
+    /// The level is `level` from `at` on. Nothing happens when it already was; an edge that is taken back
+    /// at the instant it was made never happened. `at` is not before the last edge.
+    pub fn push(&mut self, at: Time, level: bool) {
+        if self.last_level() == level {
+            return;
+        }
+        match self.edges.back() {
+            Some(&(last, _)) if last >= at => {
+                debug_assert_eq!(last, at, "edges come in order");
+                self.edges.pop_back();
+            }
+            _ => self.edges.push_back((at, level)),
+        }
+    }
+
+    /// Takes back everything from `at` on: the level then stays as it was just before `at`.
+    pub fn truncate(&mut self, at: Time) {
+        while self.edges.back().is_some_and(|&(t, _)| t >= at) {
+            self.edges.pop_back();
+        }
+    }
+
+    /// Forgets the edges before `at`, not the level they led to.
+    pub fn drop_before(&mut self, at: Time) {
+        while let Some(&(t, level)) = self.edges.front() {
+            if t >= at {
+                break;
+            }
+            self.before = level;
+            self.edges.pop_front();
+        }
+    }
+
+    /// The level at `at`: the one after an edge at that very instant.
+    #[must_use]
+    pub fn level_at(&self, at: Time) -> bool {
+        match self.index_after(at) {
+            0 => self.before,
+            n => self.edges[n - 1].1,
+        }
+    }
+
+    /// The level after the last edge.
+    #[must_use]
+    pub fn last_level(&self) -> bool {
+        self.edges.back().map_or(self.before, |&(_, level)| level)
+    }
+
+    /// The edges after `from`, up to and including `to`.
+    pub fn edges(&self, from: Time, to: Time) -> impl Iterator<Item = (Time, bool)> + '_ {
+        self.edges
+            .range(self.index_after(from)..)
+            .copied()
+            .take_while(move |&(t, _)| t <= to)
+    }
+
+    /// The first edge after `from`.
+    #[must_use]
+    pub fn next_edge(&self, from: Time) -> Option<(Time, bool)> {
+        self.edges.get(self.index_after(from)).copied()
+    }
+
+    /// The first falling edge after `from`.
+    #[must_use]
+    pub fn next_fall(&self, from: Time) -> Option<Time> {
+        self.edges(from, Time::MAX)
+            .find(|&(_, level)| !level)
+            .map(|(t, _)| t)
+    }
+
+    /// Since when the level just before the edge at `edge` had stood: `None` when longer than known.
+    #[must_use]
+    pub fn previous_edge(&self, edge: Time) -> Option<Time> {
+        let n = self.edges.partition_point(|&(t, _)| t < edge);
+        n.checked_sub(1).map(|n| self.edges[n].0)
+    }
+
+    /// Whether the wire was low at any instant from `from` up to `to`.
+    #[must_use]
+    pub fn low_between(&self, from: Time, to: Time) -> bool {
+        !self.level_at(from) || self.edges(from, to).any(|(_, level)| !level)
+    }
+
+    /// How many edges are kept.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Whether no edge is kept.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.edges.is_empty()
+    }
+
+    /// The number of edges up to and including `at`.
+    fn index_after(&self, at: Time) -> usize {
+        self.edges.partition_point(|&(t, _)| t <= at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn us(n: u64) -> Time {
+        Time::from_us(n)
+    }
+
+    fn pulse() -> Wave {
+        let mut wave = Wave::default();
+        wave.push(us(10), false);
+        wave.push(us(20), true);
+        wave.push(us(30), false);
+        wave.push(us(40), true);
+        wave
+    }
+
+    #[test]
+    fn levels_and_edges() {
+        let wave = pulse();
+        assert!(wave.level_at(us(9)));
+        assert!(!wave.level_at(us(10)));
+        assert!(wave.level_at(us(20)));
+        assert_eq!(wave.next_fall(us(10)), Some(us(30)));
+        assert_eq!(wave.next_edge(us(10)), Some((us(20), true)));
+        assert_eq!(wave.edges(us(10), us(30)).count(), 2);
+        assert_eq!(wave.previous_edge(us(30)), Some(us(20)));
+        assert_eq!(wave.previous_edge(us(10)), None);
+        assert!(wave.low_between(us(5), us(10)));
+        assert!(!wave.low_between(us(21), us(29)));
+    }
+
+    #[test]
+    fn an_edge_taken_back_at_once_never_was() {
+        let mut wave = pulse();
+        wave.push(us(50), false);
+        wave.push(us(50), true);
+        assert_eq!(wave.len(), 4);
+        wave.push(us(50), true);
+        assert_eq!(wave.len(), 4);
+    }
+
+    #[test]
+    fn dropping_keeps_the_level() {
+        let mut wave = pulse();
+        wave.drop_before(us(15));
+        assert_eq!(wave.len(), 3);
+        assert!(!wave.level_at(us(15)));
+        wave.truncate(us(30));
+        assert!(wave.level_at(us(100)));
+        assert_eq!(wave.len(), 1);
+    }
+}

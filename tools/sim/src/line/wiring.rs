@@ -1,0 +1,297 @@
+//! How the bus is wired to the board: USART1 through the driver, RX back, and TIM1's capture input.
+
+use super::{Direction, Framing, HISTORY, Line, Received, Span, Wave, Word, keep};
+use crate::periph::timer::Timer;
+use crate::periph::usart::{Sent, Usart};
+use crate::peripheral::Peripheral;
+use crate::time::Time;
+
+/// Who drives the driver's data input, the board's TX pin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TxPin {
+    /// USART1: the pin is an alternate function output.
+    Usart,
+    /// The pin stands at this level: a plain output, or an input pulled one way. A floating input reads
+    /// high at the driver.
+    Level(bool),
+}
+
+/// TIM1's channel at the RX pin, PA10.
+const CAPTURE_CHANNEL: usize = 3;
+
+impl Line {
+    /// Everything up to `now` happens on the line and in USART1, in order: this takes the place of
+    /// `usart.advance(now)`. To be called before each access to USART1, before its pins or the driver change,
+    /// and at each event.
+    pub fn exchange(&mut self, usart: &mut Usart, now: Time) {
+        self.take_sent(usart);
+        loop {
+            // A stalled core lets more than one event pass: take them one by one.
+            let due = usart.next_event().filter(|&due| due > self.now);
+            let to = due.unwrap_or(now).min(now).max(self.now);
+            self.extend(to);
+            for (at, level) in self.rx_edges.drain(..) {
+                usart.receive_edge(at, level);
+            }
+            usart.advance(to);
+            self.take_sent(usart);
+            if to >= now {
+                break;
+            }
+        }
+        self.listen();
+        if self.follow && self.master_free() == self.now {
+            self.settings = usart.settings().unwrap_or(self.settings);
+        }
+    }
+
+    /// The next instant at which something happens in USART1, by itself or because of the line.
+    #[must_use]
+    pub fn next_event(&self, usart: &Usart) -> Option<Time> {
+        let edge = usart.awaits_start().then(|| self.next_capture()).flatten();
+        // An edge made by the driver itself, which USART1 has not heard of.
+        let pending = (!self.rx_edges.is_empty()).then_some(self.now);
+        [usart.next_event(), edge, pending]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// The next instant at which the RX pin may have an edge; to be scheduled while TIM1 captures with its
+    /// interrupt on.
+    #[must_use]
+    pub fn next_capture(&self) -> Option<Time> {
+        if self.driver && !self.echo {
+            return None;
+        }
+        let unit = self.driver.then_some(&self.usart);
+        [Some(&self.master.wave), Some(&self.noise), unit]
+            .into_iter()
+            .flatten()
+            .filter_map(|wave| wave.next_edge(self.now))
+            .map(|(at, _)| at)
+            .min()
+    }
+
+    /// Tells TIM1 what its channel 3 has seen on the RX pin since the last call: of each kind of edge the
+    /// last two, which is all its registers can show. To be called after [`Line::exchange`] and before each
+    /// access to TIM1.
+    pub fn feed_captures(&mut self, timer: &mut Timer) {
+        let mut edges: Vec<_> = std::mem::take(&mut self.captures)
+            .into_iter()
+            .zip([false, true])
+            .flat_map(|(times, rising)| times.into_iter().flatten().map(move |at| (at, rising)))
+            .collect();
+        edges.sort_unstable();
+        for (at, rising) in edges {
+            timer.capture_edge(CAPTURE_CHANNEL, at, rising);
+        }
+    }
+
+    /// The unit's driver goes on or off at `now`, right after [`Line::exchange`].
+    pub fn set_driver(&mut self, on: bool, now: Time) {
+        if on == self.driver {
+            return;
+        }
+        let now = now.max(self.now);
+        self.extend(now);
+        if self
+            .last_sent
+            .is_some_and(|span| span.start <= now && now < span.end)
+        {
+            self.findings.push((
+                now,
+                if on {
+                    "the RS-485 driver was switched on in the middle of a character"
+                } else {
+                    "the RS-485 driver was switched off before the end of the last stop bit"
+                },
+            ));
+        }
+        self.driver = on;
+        keep(&mut self.driver_edges, (now, on), self.keep_all);
+        self.settle(now);
+    }
+
+    /// The board's TX pin is driven by someone else from `now` on.
+    pub fn set_tx_pin(&mut self, pin: TxPin, now: Time) {
+        if pin != self.tx_pin {
+            let now = now.max(self.now);
+            self.extend(now);
+            self.tx_pin = pin;
+            self.settle(now);
+        }
+    }
+
+    /// Whether the unit hears itself: the receiver stays on while the driver is. Off at first: DE and RE
+    /// are tied.
+    pub fn set_echo(&mut self, echo: bool) {
+        self.echo = echo;
+        self.settle(self.now);
+    }
+
+    /// Whether the unit's driver is on.
+    #[must_use]
+    pub const fn driver(&self) -> bool {
+        self.driver
+    }
+
+    /// The level at the board's RX pin: the receiver's output, pulled high while it is off.
+    #[must_use]
+    pub const fn rx_level(&self) -> bool {
+        self.rx
+    }
+
+    fn take_sent(&mut self, usart: &mut Usart) {
+        for sent in usart.take_sent() {
+            self.sent(sent);
+        }
+    }
+
+    /// USART1 did something to its TX pin.
+    fn sent(&mut self, sent: Sent) {
+        match sent {
+            Sent::Character(character) => {
+                for bit in 0..character.bits {
+                    let at = character.start + character.bit * u64::from(bit);
+                    self.usart.push(at, character.level(bit));
+                }
+                self.last_sent = Some(Span {
+                    start: character.start,
+                    end: character.end(),
+                });
+                if self.tx_pin != TxPin::Usart {
+                    self.findings.push((
+                        character.start,
+                        "USART1 sent a character while its TX pin was not an alternate function",
+                    ));
+                } else if !self.driver {
+                    self.findings.push((
+                        character.start,
+                        "USART1 sent a character while the RS-485 driver was off: it is lost",
+                    ));
+                }
+            }
+            Sent::Cut(at) => {
+                self.usart.truncate(at);
+                self.usart.push(at, true);
+                if let Some(span) = &mut self.last_sent {
+                    span.end = span.end.min(at);
+                }
+            }
+        }
+    }
+
+    /// The waves of the unit, the bus and the RX pin are worked out from where they stand up to `to`. The
+    /// driver does not change on the way.
+    fn extend(&mut self, to: Time) {
+        self.collide(to);
+        // Something may have been queued or sent at this very instant.
+        self.settle(self.now);
+        loop {
+            let next = [&self.master.wave, &self.noise, &self.usart]
+                .into_iter()
+                .filter_map(|wave: &Wave| wave.next_edge(self.now))
+                .map(|(at, _)| at)
+                .min()
+                .filter(|&at| at <= to);
+            let Some(at) = next else { break };
+            self.now = at;
+            self.settle(at);
+        }
+        self.now = self.now.max(to);
+    }
+
+    /// The levels at `at`, the latest instant there is.
+    fn settle(&mut self, at: Time) {
+        let unit = !self.driver
+            || match self.tx_pin {
+                TxPin::Usart => self.usart.level_at(at),
+                TxPin::Level(level) => level,
+            };
+        let bus = (self.master.wave.level_at(at) && unit) == self.noise.level_at(at);
+        let rx = bus || (self.driver && !self.echo);
+        self.unit.push(at, unit);
+        self.bus.push(at, bus);
+        if rx != self.rx {
+            self.rx = rx;
+            self.rx_edges.push((at, rx));
+            let seen = &mut self.captures[usize::from(rx)];
+            *seen = [seen[1], Some(at)];
+        }
+    }
+
+    /// Notes where the master sends while the unit's driver is on, from where the line stands up to `to`.
+    fn collide(&mut self, to: Time) {
+        while self
+            .master
+            .talking
+            .front()
+            .is_some_and(|span| span.end <= self.now)
+        {
+            self.master.talking.pop_front();
+        }
+        if !self.driver {
+            return;
+        }
+        for span in &self.master.talking {
+            let (start, end) = (span.start.max(self.now), span.end.min(to));
+            if start >= end {
+                continue;
+            }
+            match self.collisions.back_mut() {
+                Some(last) if last.end == start => last.end = end,
+                _ => keep(&mut self.collisions, Span { start, end }, self.keep_all),
+            }
+        }
+    }
+
+    /// The listener hears what has come so far; what it needs no more is dropped.
+    fn listen(&mut self) {
+        let framing = Framing::of(self.settings);
+        let silence = self.settings.frame_silence();
+        while let Some(word) = self.listener.next_word(&self.bus, &framing, self.now) {
+            self.heard(&word, silence);
+        }
+        let quiet_until = self.listener.start().unwrap_or(self.now);
+        self.record.quiet(quiet_until, silence);
+        let mut oldest = self.now.saturating_sub(HISTORY);
+        if let Some(start) = self.listener.start() {
+            oldest = oldest.min(start.saturating_sub(framing.rate.bits(1)));
+        }
+        for wave in [
+            &mut self.master.wave,
+            &mut self.noise,
+            &mut self.usart,
+            &mut self.unit,
+            &mut self.bus,
+        ] {
+            wave.drop_before(oldest);
+        }
+    }
+
+    fn heard(&mut self, word: &Word, silence: Time) {
+        let unit = self.unit.low_between(word.start, word.at);
+        let master = self.master.wave.low_between(word.start, word.at);
+        let collided = unit && master;
+        let unit_began = unit && (!master || self.master.wave.level_at(word.start));
+        let direction = if unit_began {
+            Direction::FromUnit
+        } else {
+            Direction::FromMaster
+        };
+        self.record.word(word, direction, collided, silence);
+        if unit {
+            let received = Received {
+                byte: word.data as u8,
+                start: word.start,
+                end: word.end,
+                parity_error: word.parity_error,
+                framing_error: word.framing_error,
+                noise: word.noise,
+                collided,
+            };
+            keep(&mut self.received, received, self.keep_all);
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! The bus: what answers at every address that the core does not answer by itself, and what the core is told
+//! in return.
+//!
+//! The core reads flash and reads and writes SRAM without asking. All else comes here: stores to flash, the
+//! register blocks, the factory's words, the debug blocks. Bit-band aliases arrive as a read and a write of
+//! the word they stand for (PM0056 2.2.5).
+
+use rigless::device::Level;
+use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
+use rigless::soc::Width as CoreWidth;
+use rigless::time::VirtualNanos;
+
+use super::dwt::{self, Dwt};
+use super::memory::{FLASH_BASE, FLASH_SIZE};
+use super::timing::{InstructionClock, cycles_per_64};
+use crate::finding::{Findings, What, Width};
+use crate::periph::dbgmcu::Dbgmcu;
+use crate::periph::ident::{self, Ident};
+use crate::peripheral::{Peripheral, Unmodelled};
+use crate::soc::Soc;
+use crate::soc::map::{self, Block, Place, Widths};
+use crate::time::Time;
+
+/// Where the private peripheral bus starts.
+const PPB: u32 = 0xE000_0000;
+const DBGMCU: u32 = 0xE004_2000;
+
+/// Everything the core is lent while it runs, except the memories mapped into it.
+#[derive(Debug)]
+pub struct Bus {
+    /// The part around the core.
+    pub soc: Soc,
+    /// Instructions to time.
+    pub clock: InstructionClock,
+    /// What was wrong.
+    pub findings: Findings,
+    pub(super) ident: Ident,
+    pub(super) dbgmcu: Dbgmcu,
+    pub(super) dwt: Dwt,
+    /// The core is to come back before this instant, or before this many instructions (its own count).
+    pub(super) stop: (Time, u64),
+    /// The core has to come back at once.
+    pub(super) halt: bool,
+    /// What the core has to do before its next instruction.
+    pub(super) queued: Vec<Queued>,
+    /// The instruction that made the last access.
+    pub(super) pc: u32,
+}
+
+/// An access as the blocks see it.
+#[derive(Clone, Copy)]
+struct Request {
+    address: u32,
+    width: Width,
+    write: Option<u32>,
+    now: Time,
+    count: u64,
+    pc: u32,
+}
+
+impl Request {
+    /// Which byte of its word the access starts at.
+    const fn lane(&self) -> u32 {
+        self.address & 3
+    }
+
+    /// The part of `word` that this access reads.
+    const fn part_of(&self, word: u32) -> u32 {
+        let part = word >> (8 * self.lane());
+        match self.width {
+            Width::Byte => part & 0xFF,
+            Width::Half => part & 0xFFFF,
+            Width::Word => word,
+        }
+    }
+
+    /// The value a store puts on the bus: a narrow one is repeated on every lane.
+    const fn on_every_lane(&self, value: u32) -> u32 {
+        match self.width {
+            Width::Byte => (value & 0xFF) * 0x0101_0101,
+            Width::Half => (value & 0xFFFF) * 0x0001_0001,
+            Width::Word => value,
+        }
+    }
+}
+
+impl Bus {
+    /// Everything due up to `now` happens, and what came of it is taken up. `count` instructions are done.
+    pub(super) fn advance(&mut self, now: Time, count: u64) {
+        if self.soc.next_event() <= now {
+            self.soc.advance(now);
+        }
+        self.take_up(count);
+    }
+
+    /// Takes up what the blocks ask: interrupt lines, the instruction rate, findings, a reset.
+    fn take_up(&mut self, count: u64) {
+        if self.soc.lines_changed() {
+            let (mut changed, levels) = self.soc.take_lines();
+            while changed != 0 {
+                let line = changed.trailing_zeros() as u16;
+                changed &= changed - 1;
+                let level = Level::from(levels >> line & 1 != 0);
+                if let Some(line) = InterruptLine::new(line) {
+                    self.queued.push(Queued::Line(line, level));
+                }
+            }
+        }
+        if self.soc.has_notes() {
+            for (at, what) in self.soc.take_notes() {
+                self.findings.add(at, self.pc, what);
+            }
+        }
+        if core::mem::take(&mut self.soc.signals.rate) {
+            self.update_rate(count);
+        }
+        if let Some((first, end)) = self.soc.signals.flash.take() {
+            let base = u64::from(FLASH_BASE);
+            self.queued
+                .push(Queued::Invalidate(base + first as u64, base + end as u64));
+        }
+        // The machine makes the reset, and waits out the flash.
+        self.halt |= self.soc.signals.reset.is_some() || self.soc.flash.busy_until().is_some();
+    }
+
+    /// The instruction rate follows HCLK and the flash's wait states.
+    pub(super) fn update_rate(&mut self, count: u64) {
+        let (wait_states, prefetch) = self.soc.flash.access_control();
+        let hclk = self.soc.rcc.clocks().hclk;
+        self.clock
+            .set_rate(count, hclk, cycles_per_64(wait_states, prefetch));
+    }
+
+    /// Answers an access; `None` is a bus fault.
+    fn answer(&mut self, request: Request) -> Option<u32> {
+        let address = request.address;
+        match address {
+            0x4000_0000..0x6000_0000 => Some(self.peripheral(request)),
+            ident::BASE.. if address < ident::BASE + ident::SIZE => {
+                self.read_only(request, |bus, offset| bus.ident.read(offset))
+            }
+            PPB..0xE010_0000 => Some(self.debug_block(request)),
+            _ => match flash_offset(address) {
+                Some(offset) => self.store_to_flash(request, offset),
+                None => {
+                    self.note(
+                        request,
+                        What::NoSuchAddress {
+                            address,
+                            write: request.write.is_some(),
+                        },
+                    );
+                    None
+                }
+            },
+        }
+    }
+
+    fn read_only(&mut self, request: Request, read: impl FnOnce(&Self, u32) -> u32) -> Option<u32> {
+        if request.write.is_some() {
+            self.note(request, What::Other("a store to the factory's memory"));
+            return None;
+        }
+        let word = read(self, (request.address - ident::BASE) & !3);
+        Some(request.part_of(word))
+    }
+
+    fn peripheral(&mut self, request: Request) -> u32 {
+        let Request { address, write, .. } = request;
+        let (place, offset) = map::place(address);
+        let block = match place {
+            Place::Block(block) => block,
+            Place::Absent(name) => {
+                self.note_unmodelled(request, name);
+                return 0;
+            }
+            Place::Reserved => {
+                self.note_unmodelled(request, "a reserved address");
+                return 0;
+            }
+        };
+        if !self.soc.is_clocked(block) {
+            self.note(
+                request,
+                What::Unclocked {
+                    address,
+                    write: write.is_some(),
+                    block: block.name(),
+                },
+            );
+            return 0;
+        }
+        self.check_width(request, block);
+        let answer = match write {
+            Some(value) => self.write_block(request, block, offset, value),
+            None => self.soc.read(block, offset & !3, request.now),
+        };
+        match answer {
+            Ok(word) => request.part_of(word),
+            Err(Unmodelled(name)) => {
+                self.note_unmodelled(request, name);
+                0
+            }
+        }
+    }
+
+    fn write_block(
+        &mut self,
+        request: Request,
+        block: Block,
+        offset: u32,
+        value: u32,
+    ) -> Result<u32, Unmodelled> {
+        let mut word = request.on_every_lane(value);
+        if block.widths() == Widths::Any && request.width != Width::Word {
+            // A block that takes bytes changes only the lanes written.
+            let mask = if request.width == Width::Byte {
+                0xFF
+            } else {
+                0xFFFF
+            } << (8 * request.lane());
+            let held = self.soc.read(block, offset & !3, request.now)?;
+            word = held & !mask | word & mask;
+        }
+        self.soc
+            .write(block, offset & !3, word, request.now)
+            .map(|()| 0)
+    }
+
+    fn check_width(&mut self, request: Request, block: Block) {
+        let fits = match block.widths() {
+            Widths::Any => true,
+            Widths::HalfWord => request.width != Width::Byte,
+            Widths::Word => request.width == Width::Word,
+        };
+        if !fits {
+            self.note(
+                request,
+                What::OddAccess {
+                    address: request.address,
+                    width: request.width,
+                    block: block.name(),
+                },
+            );
+        }
+    }
+
+    /// The private peripheral bus outside what the core answers itself.
+    fn debug_block(&mut self, request: Request) -> u32 {
+        let Request {
+            address,
+            now,
+            count,
+            ..
+        } = request;
+        let cycle = self.clock.cycle(count);
+        let word = address & !3;
+        let answer = match (address, request.write) {
+            (dwt::BASE.., Some(value)) if address < dwt::BASE + dwt::SIZE => {
+                self.dwt.write(word - dwt::BASE, value, cycle).map(|()| 0)
+            }
+            (dwt::BASE.., None) if address < dwt::BASE + dwt::SIZE => {
+                self.dwt.read(word - dwt::BASE, cycle)
+            }
+            (DBGMCU.., Some(value)) if address < DBGMCU + 0x1000 => {
+                self.dbgmcu.write(word - DBGMCU, value, now).map(|()| 0)
+            }
+            (DBGMCU.., None) if address < DBGMCU + 0x1000 => self.dbgmcu.read(word - DBGMCU, now),
+            _ => Err(Unmodelled("a debug block of the core")),
+        };
+        match answer {
+            Ok(word) => request.part_of(word),
+            Err(Unmodelled(name)) => {
+                self.note_unmodelled(request, name);
+                0
+            }
+        }
+    }
+
+    /// Only stores come here: the core reads the flash without asking.
+    fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {
+        let value = request.write? as u16;
+        let half = request.width == Width::Half;
+        self.soc.program(offset, half, value, request.now);
+        Some(0)
+    }
+
+    fn note(&mut self, request: Request, what: What) {
+        self.findings.add(request.now, request.pc, what);
+    }
+
+    fn note_unmodelled(&mut self, request: Request, name: &'static str) {
+        self.note(
+            request,
+            What::Unmodelled {
+                address: request.address,
+                write: request.write.is_some(),
+                name,
+            },
+        );
+    }
+}
+
+/// The offset into flash of `address`, at its own place or at 0.
+fn flash_offset(address: u32) -> Option<u32> {
+    let size = FLASH_SIZE as u32;
+    [FLASH_BASE, 0]
+        .into_iter()
+        .map(|base| address.wrapping_sub(base))
+        .find(|&offset| offset < size)
+}
+
+impl CoreBus for Bus {
+    fn access(&mut self, access: Access, _from_code: bool) -> Option<u64> {
+        let now = self.clock.time(access.instruction_count);
+        let request = Request {
+            address: access.address as u32,
+            width: match access.width {
+                CoreWidth::W8 => Width::Byte,
+                CoreWidth::W16 => Width::Half,
+                _ => Width::Word,
+            },
+            write: (access.kind == AccessKind::Write).then_some(access.value as u32),
+            now,
+            count: access.instruction_count,
+            pc: access.program_counter.unwrap_or(0) as u32,
+        };
+        self.pc = request.pc;
+        if self.soc.next_event() <= now {
+            self.soc.advance(now);
+        }
+        let answer = self.answer(request);
+        self.take_up(access.instruction_count);
+        if let Some(complaint) = self.soc.flash.take_complaint() {
+            self.note(request, What::Flash(complaint.text));
+            if complaint.bus_error {
+                return None;
+            }
+        }
+        answer.map(u64::from)
+    }
+
+    /// The core's own time is the cycle of HCLK: its SysTick counts exactly those, whatever their rate.
+    fn time(&self, instructions: u64) -> VirtualNanos {
+        VirtualNanos(self.clock.cycle(instructions))
+    }
+
+    fn queued(&mut self) -> Vec<Queued> {
+        core::mem::take(&mut self.queued)
+    }
+
+    fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
+        if self.halt {
+            return None;
+        }
+        let mut until = self.stop.0.min(self.soc.next_event());
+        if let Some(VirtualNanos(cycle)) = event {
+            until = until.min(self.clock.time_of_cycle(cycle));
+        }
+        let budget = self
+            .clock
+            .instructions_until(instructions, until)
+            .min(self.stop.1.saturating_sub(instructions));
+        Some(u32::try_from(budget).unwrap_or(u32::MAX)).filter(|&budget| budget > 0)
+    }
+}

@@ -1,0 +1,321 @@
+//! The machine: the Cortex-M3 core with its memories, on the bus with everything else.
+//!
+//! The core is crate rigless's: it translates the firmware's instructions to host code and counts them. Its
+//! time is [`timing`]'s, its bus is [`bus`], and [`run`] takes it from event to event.
+
+pub mod bus;
+pub mod dwt;
+pub mod memory;
+mod run;
+pub mod timing;
+
+use core::num::{NonZeroU32, NonZeroU64};
+
+use rigless::cpu::armv7m::{Window, processor};
+use rigless::emulator::{Processor, Queued};
+use rigless::machine::armv7m::{Config, Core, MpuRegions, Variant};
+use rigless::soc::{Endian, Width};
+
+use crate::finding::Findings;
+use crate::periph::dbgmcu::Dbgmcu;
+use crate::periph::ident::Ident;
+use crate::periph::rcc::Cause;
+use crate::rtt::{Log, POLL};
+use crate::soc::Soc;
+use crate::soc::map::irq;
+use crate::time::Time;
+use bus::Bus;
+use dwt::Dwt;
+use memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
+pub use run::{Limit, Stop};
+use timing::{InstructionClock, cycles_per_64};
+
+/// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
+const CPUID: u32 = 0x411F_C231;
+/// From the supply's rise to the end of reset: DS5319 table 10, tRSTTEMPO, typical.
+const POWER_ON_RESET: Time = Time::from_us(2_500);
+/// The shortest reset pulse (RM0008 7.1.1).
+const RESET_PULSE: Time = Time::from_us(20);
+
+/// A power cut in the middle of a flash operation to come.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    /// The operation: how many the flash will have started by then.
+    operation: u64,
+    /// How much of it is done by then, 0 to 1.
+    fraction: f64,
+}
+
+/// The core, its memories and its bus.
+#[derive(Debug)]
+pub struct Machine {
+    /// Dropped before the memories mapped into it.
+    core: Box<dyn Processor>,
+    /// Everything else.
+    pub bus: Bus,
+    ram: Memory,
+    /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
+    fresh: Vec<u8>,
+    /// Instructions done before the core's last reset.
+    counted: u64,
+    powered: bool,
+    /// The core is held in reset until then.
+    held_until: Time,
+    locked_up: bool,
+    resets: u32,
+    power_ons: u64,
+    cut: Option<Cut>,
+    cut_at: Option<Time>,
+    log: Log,
+    /// When the log is emptied next.
+    poll_at: Time,
+}
+
+impl Machine {
+    /// A machine around `soc`, without power, at time 0, whose firmware keeps its RTT control block at
+    /// `rtt_block`.
+    ///
+    /// # Panics
+    ///
+    /// On a host that the core cannot generate code for.
+    #[must_use]
+    pub fn new(mut soc: Soc, ident: Ident, rtt_block: Option<u32>) -> Self {
+        let mut ram = Memory::new(RAM_SIZE, 0);
+        let mut core = core();
+        let fresh = core.save();
+        let flash = soc.flash.host();
+        let base = u64::from(FLASH_BASE);
+        // SAFETY: both memories are aligned to 4 KiB, as long as mapped, and live in this struct, behind
+        // pointers that do not move, until after `core` is dropped. Slices of them are lent out only by
+        // methods that borrow the machine while the core does not run, or by its bus inside a call.
+        unsafe {
+            core.map(base, FLASH_SIZE as u64, flash, false);
+            core.map(0, FLASH_SIZE as u64, flash, false);
+            core.map(u64::from(RAM_BASE), RAM_SIZE as u64, ram.host(), true);
+        }
+        let hclk = soc.rcc.clocks().hclk;
+        Self {
+            core,
+            bus: Bus {
+                soc,
+                clock: InstructionClock::new(Time::ZERO, hclk, cycles_per_64(0, true)),
+                findings: Findings::default(),
+                ident,
+                dbgmcu: Dbgmcu::default(),
+                dwt: Dwt::default(),
+                stop: (Time::ZERO, 0),
+                halt: false,
+                queued: Vec::new(),
+                pc: 0,
+            },
+            ram,
+            fresh,
+            counted: 0,
+            powered: false,
+            held_until: Time::ZERO,
+            locked_up: false,
+            resets: 0,
+            power_ons: 0,
+            cut: None,
+            cut_at: None,
+            log: Log::new(rtt_block),
+            poll_at: if rtt_block.is_some() { POLL } else { Time::MAX },
+        }
+    }
+
+    /// The virtual time.
+    #[must_use]
+    pub fn now(&self) -> Time {
+        self.bus.clock.time(self.core.retired())
+    }
+
+    /// Instructions done since the machine was made.
+    #[must_use]
+    pub fn instructions(&self) -> u64 {
+        self.counted + self.core.retired()
+    }
+
+    /// The address of the next instruction.
+    #[must_use]
+    pub fn pc(&self) -> u32 {
+        self.core.pc() as u32
+    }
+
+    /// Whether the power is on.
+    #[must_use]
+    pub fn powered(&self) -> bool {
+        self.powered
+    }
+
+    /// Whether the core has locked up.
+    #[must_use]
+    pub fn locked_up(&self) -> bool {
+        self.locked_up
+    }
+
+    /// Whether the core waits for an interrupt or an event.
+    #[must_use]
+    pub fn asleep(&self) -> bool {
+        self.core.waiting()
+    }
+
+    /// Resets since the power came on.
+    #[must_use]
+    pub fn resets(&self) -> u32 {
+        self.resets
+    }
+
+    /// What the firmware logged since the last call.
+    pub fn take_log(&mut self) -> String {
+        self.log.take(self.ram.bytes())
+    }
+
+    /// The SRAM.
+    #[must_use]
+    pub fn ram(&self) -> &[u8] {
+        self.ram.bytes()
+    }
+
+    /// The SRAM, to change: a debugger's write.
+    pub fn ram_mut(&mut self) -> &mut [u8] {
+        let base = u64::from(RAM_BASE);
+        self.core
+            .ask(Queued::Invalidate(base, base + RAM_SIZE as u64));
+        self.ram.bytes_mut()
+    }
+
+    /// The flash, to change: a programmer's write.
+    pub fn flash_mut(&mut self) -> &mut [u8] {
+        let base = u64::from(FLASH_BASE);
+        self.core
+            .ask(Queued::Invalidate(base, base + FLASH_SIZE as u64));
+        self.bus.soc.flash.bytes_mut()
+    }
+
+    /// A core register: 0 to 15, and 16 for xPSR.
+    #[must_use]
+    pub fn register(&self, number: usize) -> Option<u32> {
+        let bytes = self.core.gdb_register(number)?;
+        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    }
+
+    /// The power comes on, with SRAM as a cold part has it; nothing when it is on.
+    pub fn power_on(&mut self) {
+        if self.powered {
+            return;
+        }
+        self.powered = true;
+        self.power_ons += 1;
+        let seed = self.power_ons;
+        fill_with_noise(self.ram_mut(), seed);
+        self.bus.dbgmcu = Dbgmcu::default();
+        self.bus.dwt = Dwt::default();
+        self.bus.soc.set_power(true, self.now());
+        self.reset(Cause::PowerOn);
+        self.resets = 0;
+    }
+
+    /// The power goes at this instant; nothing when it is off.
+    pub fn power_off(&mut self) {
+        if !self.powered {
+            return;
+        }
+        let now = self.now();
+        self.bus.advance(now, self.core.retired());
+        self.log.poll(self.ram.bytes_mut());
+        self.powered = false;
+        self.locked_up = false;
+        self.cut = None;
+        self.cut_at = None;
+        self.bus.soc.set_power(false, now);
+        self.bus.soc.signals.reset = None;
+    }
+
+    /// Cuts the power in the middle of the `nth` flash operation from now (1 = the next), when `fraction` (0 to
+    /// 1) of it is done.
+    pub fn cut_in_flash_operation(&mut self, nth: u64, fraction: f64) {
+        self.cut = Some(Cut {
+            operation: self.bus.soc.flash.started() + nth.max(1),
+            fraction: fraction.clamp(0.0, 1.0),
+        });
+    }
+
+    /// A reset of the whole part.
+    pub fn reset(&mut self, cause: Cause) {
+        let now = self.now();
+        self.log.poll(self.ram.bytes_mut());
+        self.bus.soc.reset(cause, now);
+        let count = self.core.retired();
+        self.counted += count;
+        self.bus.clock.restart_count(count);
+        self.core
+            .load(&self.fresh)
+            .expect("the state the same core saved");
+        let vectors = self.bus.soc.flash.bytes();
+        let word = |address: u64, _: Width| {
+            let at = address as usize;
+            let bytes = vectors.get(at..at + 4)?;
+            Some(u64::from(u32::from_le_bytes(bytes.try_into().ok()?)))
+        };
+        self.core.boot(0, &word);
+        // The core knows no line level any more.
+        self.bus
+            .queued
+            .retain(|queued| !matches!(queued, Queued::Line(..)));
+        self.bus.soc.repeat_lines();
+        self.bus.update_rate(0);
+        self.locked_up = false;
+        self.resets = self.resets.saturating_add(1);
+        let pulse = if cause == Cause::PowerOn {
+            POWER_ON_RESET
+        } else {
+            RESET_PULSE
+        };
+        self.held_until = now + pulse;
+    }
+}
+
+/// The Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits, 43 interrupt lines.
+fn core() -> Box<dyn Processor> {
+    // The core's time unit is a cycle of HCLK, so its clock has as many to the second as the unit, a
+    // nanosecond by name, does. SysTick's other clock is HCLK / 8 (RM0008 figure 8).
+    const UNITS: NonZeroU64 = NonZeroU64::new(1_000_000_000).expect("not 0");
+    let core = Core {
+        variant: Variant::M3,
+        clock_hz: UNITS,
+        interrupt_lines: NonZeroU32::new(u32::from(irq::LINES)).expect("not 0"),
+        priority_bits: 4,
+        refclk_divider: NonZeroU32::new(8).expect("not 0"),
+        instructions_per_second: UNITS,
+        boot: "flash",
+    };
+    let window = |base, end| Window {
+        base,
+        size: end - base,
+    };
+    // All of the private peripheral bus but the ITM and the system control space.
+    let mut config = Config::new(
+        core,
+        &[
+            window(0xE000_1000, 0xE000_E000),
+            window(0xE000_F000, 0xE010_0000),
+        ],
+    );
+    config.mpu_regions = MpuRegions::None;
+    config.cpuid = CPUID;
+    match processor(&config, Endian::Little) {
+        Ok(core) => core,
+        Err(error) => panic!("no core for this host: {error}"),
+    }
+}
+
+/// What SRAM holds after power-on: anything, but the same in every run (xorshift64).
+fn fill_with_noise(bytes: &mut [u8], seed: u64) {
+    let mut state = 0x9E37_79B9_7F4A_7C15 ^ seed;
+    for chunk in bytes.chunks_mut(8) {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        chunk.copy_from_slice(&state.to_le_bytes()[..chunk.len()]);
+    }
+}

@@ -1,0 +1,232 @@
+//! The run loop: from event to event, in exact order.
+//!
+//! The core runs up to the next thing that happens by itself, a block's event, its own SysTick, a limit, and
+//! stops there; then the event happens, then the core goes on. While it waits (WFI), stalls on the flash or is
+//! held in reset, time jumps from event to event.
+
+use rigless::emulator::Exit;
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+
+use super::Machine;
+use crate::finding::What;
+use crate::machine::memory::{FLASH_BASE, FLASH_SIZE};
+use crate::periph::rcc::Cause;
+use crate::rtt::POLL;
+use crate::time::Time;
+
+/// The system control register and its bit that asks for more than sleep (PM0056 4.4.6).
+const SCR: u64 = 0xE000_ED10;
+const SCR_SLEEPDEEP: u64 = 1 << 2;
+
+/// A run by a count of instructions ends when the core has done none for this long.
+const GIVE_UP: Time = Time::from_secs(60);
+
+/// When a run is to end, whichever comes first.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit {
+    /// At this instant.
+    pub time: Time,
+    /// When this many instructions are done, counted since the machine was made.
+    pub instructions: u64,
+    /// Before the instruction at this address.
+    pub pc: Option<u32>,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The instant has come.
+    Time,
+    /// The instructions are done.
+    Instructions,
+    /// The instruction at the address is next.
+    Pc,
+    /// The power is off, or the core has done nothing for a minute, in a run without an instant to end at.
+    Stuck,
+}
+
+impl Machine {
+    /// Runs to `limit`. With the power off, time passes for the board's other parts.
+    pub fn run(&mut self, limit: Limit) -> Stop {
+        let address = limit.pc.map(|pc| u64::from(pc & !1));
+        if let Some(address) = address {
+            self.core.add_breakpoint(address);
+            self.core.pass_breakpoint(address);
+        }
+        let stop = self.run_to(limit);
+        if let Some(address) = address {
+            self.core.remove_breakpoint(address);
+        }
+        stop
+    }
+
+    fn run_to(&mut self, limit: Limit) -> Stop {
+        let mut patience = self.now() + GIVE_UP;
+        loop {
+            let now = self.now();
+            self.bus.advance(now, self.core.retired());
+            self.serve_core_timer(now);
+            if self.cut_is_due(now) {
+                self.power_off();
+            }
+            if self.powered && self.serve_resets() {
+                continue;
+            }
+            if now >= self.poll_at {
+                self.log.poll(self.ram.bytes_mut());
+                self.poll_at = POLL * (now.as_ps() / POLL.as_ps() + 1);
+            }
+            if now >= limit.time {
+                return Stop::Time;
+            }
+            if self.instructions() >= limit.instructions {
+                return Stop::Instructions;
+            }
+            if let Some(end) = self.idle_end(now) {
+                if !self.idle(end, limit, patience) {
+                    return Stop::Stuck;
+                }
+                continue;
+            }
+            match self.execute(limit) {
+                Exit::Breakpoint => return Stop::Pc,
+                Exit::Waiting if self.bus.queued.is_empty() => {
+                    self.check_sleep();
+                    if !self.idle(Time::MAX, limit, patience) {
+                        return Stop::Stuck;
+                    }
+                    continue;
+                }
+                Exit::Lockup => {
+                    self.locked_up = true;
+                    let (now, pc) = (self.now(), self.pc());
+                    self.bus.findings.add(now, pc, What::LockedUp);
+                }
+                // No host serves semihosting: BKPT is then a fault, as on a board without a debugger.
+                Exit::HostCall => self.core.answer_host_call(None),
+                _ => {}
+            }
+            patience = self.now() + GIVE_UP;
+        }
+    }
+
+    /// Sleep alone is modelled: stop and standby (RM0008 4.3.4, 4.3.5) would halt the clocks too.
+    fn check_sleep(&mut self) {
+        let now = VirtualNanos(self.bus.clock.cycle(self.core.retired()));
+        let scr = self.core.debugger_access(None, SCR, Width::W32, now);
+        if scr.is_some_and(|scr| scr & SCR_SLEEPDEEP != 0) {
+            let what = What::Other("stop and standby modes (SLEEPDEEP) are not modelled");
+            self.bus.findings.add(self.now(), self.pc(), what);
+        }
+    }
+
+    /// Lets time pass without an instruction up to `end`, or less when something happens before. False when
+    /// that is never, or when patience has run out in a run without an instant to end at.
+    fn idle(&mut self, end: Time, limit: Limit, patience: Time) -> bool {
+        let until = end.min(self.next_event()).min(limit.time);
+        if until == Time::MAX || (limit.time == Time::MAX && until > patience) {
+            return false;
+        }
+        self.bus
+            .clock
+            .jump(self.core.retired(), until.min(self.poll_at));
+        true
+    }
+
+    /// Lets the core run until something has to happen.
+    fn execute(&mut self, limit: Limit) -> Exit {
+        let count = self.core.retired();
+        let stop = limit
+            .time
+            .min(self.cut_at.unwrap_or(Time::MAX))
+            .min(self.poll_at);
+        let most = limit.instructions - self.counted;
+        let mut budget = self
+            .bus
+            .clock
+            .instructions_until(count, self.next_event().min(stop))
+            .min(most - count);
+        self.bus.stop = (stop, most);
+        // Code in SRAM that runs beside a flash operation is looked at after every instruction: once it
+        // comes back to flash it stalls.
+        self.bus.halt = self.bus.soc.flash.busy_until().is_some();
+        if self.bus.halt {
+            budget = budget.min(1);
+        }
+        let budget = u32::try_from(budget).unwrap_or(u32::MAX);
+        self.core.run(budget.max(1), &mut self.bus).0
+    }
+
+    /// The earliest instant at which anything but an instruction happens; [`Time::MAX`] for never.
+    fn next_event(&self) -> Time {
+        let timer = self.core.next_event().filter(|_| self.powered);
+        let timer = timer.map_or(Time::MAX, |VirtualNanos(cycle)| {
+            self.bus.clock.time_of_cycle(cycle)
+        });
+        self.bus
+            .soc
+            .next_event()
+            .min(timer)
+            .min(self.cut_at.unwrap_or(Time::MAX))
+    }
+
+    /// Until when the core does nothing for sure: no power, held in reset, locked up, stalled by the flash.
+    fn idle_end(&self, now: Time) -> Option<Time> {
+        if !self.powered || self.locked_up {
+            return Some(Time::MAX);
+        }
+        if now < self.held_until {
+            return Some(self.held_until);
+        }
+        self.bus
+            .soc
+            .flash
+            .busy_until()
+            .filter(|_| is_flash(self.pc()))
+    }
+
+    /// SysTick reaches zero in a cycle of HCLK that has come.
+    fn serve_core_timer(&mut self, now: Time) {
+        while let Some(VirtualNanos(cycle)) = self.core.next_event() {
+            if !self.powered || self.bus.clock.time_of_cycle(cycle) > now {
+                return;
+            }
+            let count = self.core.retired();
+            self.bus.clock.reach_cycle(count, cycle);
+            self.core
+                .on_event(VirtualNanos(self.bus.clock.cycle(count)));
+        }
+    }
+
+    /// Makes the reset that a block or the core asks for.
+    fn serve_resets(&mut self) -> bool {
+        let asked = self.core.take_reset_request().then_some(Cause::Software);
+        let cause = self.bus.soc.signals.reset.take().or(asked);
+        if let Some(cause) = cause {
+            self.reset(cause);
+        }
+        cause.is_some()
+    }
+
+    /// Whether the power is to go now, in the middle of a flash operation.
+    fn cut_is_due(&mut self, now: Time) -> bool {
+        if let Some(cut) = self.cut
+            && let Some((from, until)) = self.bus.soc.flash.busy_span()
+            && self.bus.soc.flash.started() >= cut.operation
+        {
+            let whole = (until - from).as_ps();
+            let done = (whole as f64 * cut.fraction) as u64;
+            self.cut_at = Some(from + Time::from_ps(done.min(whole.saturating_sub(1))));
+            self.cut = None;
+        }
+        self.cut_at.is_some_and(|at| at <= now)
+    }
+}
+
+/// Whether an instruction at `pc` is fetched from flash.
+fn is_flash(pc: u32) -> bool {
+    [FLASH_BASE, 0]
+        .into_iter()
+        .any(|base| (pc.wrapping_sub(base) as usize) < FLASH_SIZE)
+}

@@ -1,0 +1,34 @@
+//! `modio-sim`: the virtual modio-02 on the command line, its RS-485 line on a pseudo-terminal and on TCP,
+//! its front panel over HTTP.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+mod app;
+
+/// The virtual modio-02: runs the firmware image on an emulated STM32F103 with the board around it
+#[derive(Parser)]
+#[command(name = "modio-sim")]
+struct Cli {
+    #[command(flatten)]
+    options: sim_options::Options,
+}
+
+fn main() -> ExitCode {
+    let options = match Cli::try_parse() {
+        Ok(cli) => cli.options,
+        Err(error) if error.use_stderr() => return refused(&sim_options::one_line(&error)),
+        Err(help) => help.exit(),
+    };
+    match app::run(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(what) => refused(&what),
+    }
+}
+
+/// What was asked for cannot be: a line on stderr, exit status 2.
+fn refused(what: &str) -> ExitCode {
+    eprintln!("modio-sim: {what}");
+    ExitCode::from(2)
+}

@@ -1,0 +1,341 @@
+//! ADC1: the regular sequence, started by software, without DMA, injected channels and watchdog
+//! (RM0008 11).
+//!
+//! It goes by ADCCLK, which its clock is set to. Inputs are levels in millivolts against 3300 mV of VDDA. What
+//! a real converter would do badly without saying so is reported: a clock above 14 MHz, a start before it has
+//! settled, a start while it calibrates.
+
+mod sequence;
+
+#[cfg(test)]
+mod tests;
+
+use crate::peripheral::{Peripheral, Unmodelled};
+use crate::time::Time;
+use sequence::{Run, Sequence};
+
+/// Offsets, RM0008 11.12.15.
+mod offset {
+    pub const SR: u32 = 0x00;
+    pub const CR1: u32 = 0x04;
+    pub const CR2: u32 = 0x08;
+    pub const SMPR1: u32 = 0x0C;
+    pub const SMPR2: u32 = 0x10;
+    pub const HTR: u32 = 0x24;
+    pub const LTR: u32 = 0x28;
+    pub const SQR1: u32 = 0x2C;
+    pub const SQR2: u32 = 0x30;
+    pub const SQR3: u32 = 0x34;
+    pub const DR: u32 = 0x4C;
+}
+
+/// SR, 11.12.1.
+mod sr {
+    pub const EOC: u32 = 1 << 1;
+    pub const STRT: u32 = 1 << 4;
+}
+
+/// CR1, 11.12.2.
+mod cr1 {
+    pub const EOCIE: u32 = 1 << 5;
+    pub const SCAN: u32 = 1 << 8;
+    pub const MASK: u32 = 0x00CF_FFFF;
+    /// What has no effect without the features below.
+    pub const IDLE: u32 = 0xE01F;
+}
+
+/// CR2, 11.12.3.
+mod cr2 {
+    pub const ADON: u32 = 1 << 0;
+    pub const CONT: u32 = 1 << 1;
+    pub const CAL: u32 = 1 << 2;
+    pub const RSTCAL: u32 = 1 << 3;
+    pub const ALIGN: u32 = 1 << 11;
+    pub const EXTSEL: u32 = 7 << 17;
+    pub const EXTTRIG: u32 = 1 << 20;
+    pub const SWSTART: u32 = 1 << 22;
+    pub const TSVREFE: u32 = 1 << 23;
+    pub const MASK: u32 = 0x00FE_F90F;
+    pub const MODELLED: u32 =
+        ADON | CONT | CAL | RSTCAL | ALIGN | EXTSEL | EXTTRIG | SWSTART | TSVREFE;
+}
+
+/// The inputs: 16 pins, the temperature sensor and the internal reference.
+const CHANNELS: usize = 18;
+const TEMPERATURE: usize = 16;
+const REFERENCE: usize = 17;
+/// The sensor at 25 degC: V25 typ. (DS5319 table 50).
+const TEMPERATURE_MV: u16 = 1430;
+/// VREFINT typ. (DS5319 table 13).
+const REFERENCE_MV: u16 = 1200;
+/// VDDA = VREF+.
+const SUPPLY_MV: u32 = 3300;
+/// fADC at most (DS5319 table 46).
+const MAX_HZ: u32 = 14_000_000;
+/// tSTAB at most (DS5319 table 46).
+const SETTLING: Time = Time::from_us(1);
+/// tCAL in ADCCLK cycles (DS5319 table 46).
+const CALIBRATION_CYCLES: u64 = 83;
+/// The reset of the calibration registers: the manual names no time; a few cycles.
+const RESET_CALIBRATION_CYCLES: u64 = 4;
+
+/// ADC1.
+#[derive(Clone, Debug)]
+pub struct Adc {
+    hz: u32,
+    sr: u32,
+    cr1: u32,
+    cr2: u32,
+    htr: u32,
+    ltr: u32,
+    sequence: Sequence,
+    data: u16,
+    levels: [u16; CHANNELS],
+    powered_at: Time,
+    /// The bit, CAL or RSTCAL, that is cleared at that instant.
+    calibration: Option<(u32, Time)>,
+    run: Option<Run>,
+}
+
+impl Default for Adc {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Adc {
+    /// A converter out of reset, without a clock, its pins at 0 V.
+    #[must_use]
+    pub fn new() -> Self {
+        let mut levels = [0; CHANNELS];
+        levels[TEMPERATURE] = TEMPERATURE_MV;
+        levels[REFERENCE] = REFERENCE_MV;
+        Self {
+            hz: 0,
+            sr: 0,
+            cr1: 0,
+            cr2: 0,
+            htr: 0xFFF,
+            ltr: 0,
+            sequence: Sequence::default(),
+            data: 0,
+            levels,
+            powered_at: Time::ZERO,
+            calibration: None,
+            run: None,
+        }
+    }
+
+    /// The voltage at the pin of `channel`, 0 to 15, is `millivolts` from `now` on. Any other channel is
+    /// ignored.
+    pub fn set_millivolts(&mut self, channel: usize, millivolts: u16, now: Time) {
+        self.advance(now);
+        if channel < TEMPERATURE {
+            self.levels[channel] = millivolts;
+        }
+    }
+
+    /// What a level converts to: the nearest of 4096 steps (11.1; the last one saturates).
+    fn convert(&self, channel: usize) -> u16 {
+        let internal = channel >= TEMPERATURE;
+        if internal && self.cr2 & cr2::TSVREFE == 0 {
+            return 0;
+        }
+        let level = self.levels.get(channel).copied().unwrap_or(0);
+        let code = (u32::from(level) * 4096 + SUPPLY_MV / 2) / SUPPLY_MV;
+        code.min(4095) as u16
+    }
+
+    fn start(&mut self, now: Time) -> Result<(), Unmodelled> {
+        let scanned = if self.cr1 & cr1::SCAN != 0 {
+            self.sequence.length()
+        } else {
+            1
+        };
+        self.run = Some(Run::start(&self.sequence, self.hz, now));
+        self.sr |= sr::STRT;
+        let internal = (0..scanned).any(|rank| self.sequence.channel(rank) >= TEMPERATURE);
+        if self.hz > MAX_HZ {
+            Err(Unmodelled("ADC conversion with ADCCLK above 14 MHz"))
+        } else if now < self.powered_at + SETTLING {
+            Err(Unmodelled("ADC conversion within 1 us of power-up (tSTAB)"))
+        } else if self.calibration.is_some() {
+            Err(Unmodelled("ADC conversion during calibration"))
+        } else if internal && self.cr2 & cr2::TSVREFE == 0 {
+            Err(Unmodelled(
+                "ADC conversion of an internal channel without TSVREFE",
+            ))
+        } else {
+            Ok(())
+        }
+    }
+
+    fn calibrate(&mut self, bit: u32, cycles: u64, now: Time) -> Result<(), Unmodelled> {
+        self.calibration = Some((bit, now + Time::cycles(cycles, self.hz)));
+        let settled = self.powered_at + Time::cycles(2, self.hz);
+        if self.cr2 & cr2::ADON == 0 || now < settled {
+            // 11.4, note 2.
+            return Err(Unmodelled("ADC calibration within two cycles of power-up"));
+        }
+        Ok(())
+    }
+
+    fn write_cr2(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
+        let value = value & cr2::MASK;
+        let old = std::mem::replace(&mut self.cr2, value & !cr2::SWSTART);
+        // A calibration bit stays until its time is over; it cannot be cleared (11.12.3).
+        let running = self.calibration.map_or(0, |(bit, _)| bit);
+        self.cr2 |= running;
+        if value & cr2::ADON == 0 {
+            self.run = None;
+            self.calibration = None;
+            self.cr2 &= !(cr2::CAL | cr2::RSTCAL);
+        } else if old & cr2::ADON == 0 {
+            self.powered_at = now;
+        }
+        if value & !cr2::MODELLED != 0 {
+            return Err(Unmodelled(
+                "ADC DMA, injected channels or external trigger (CR2)",
+            ));
+        }
+        let fresh = value & !running;
+        if fresh & cr2::RSTCAL != 0 {
+            return self.calibrate(cr2::RSTCAL, RESET_CALIBRATION_CYCLES, now);
+        }
+        if fresh & cr2::CAL != 0 {
+            return self.calibrate(cr2::CAL, CALIBRATION_CYCLES, now);
+        }
+        if value & cr2::SWSTART != 0 {
+            let by_software = cr2::EXTTRIG | cr2::EXTSEL;
+            if value & by_software != by_software || value & cr2::ADON == 0 {
+                return Err(Unmodelled(
+                    "ADC SWSTART without ADON, EXTTRIG and EXTSEL = SWSTART: nothing starts, which",
+                ));
+            }
+            return self.start(now);
+        }
+        // 11.12.3, ADON: written as 1 again with nothing else changed, it starts a conversion.
+        if old & cr2::ADON != 0 && value == old {
+            return self.start(now);
+        }
+        Ok(())
+    }
+
+    /// The conversion under way has ended.
+    fn finish(&mut self, mut run: Run) {
+        let code = run.sampled.take().unwrap_or(0);
+        self.data = if self.cr2 & cr2::ALIGN == 0 {
+            code
+        } else {
+            code << 4
+        };
+        let scan = self.cr1 & cr1::SCAN != 0;
+        let last = !scan || run.rank + 1 >= self.sequence.length();
+        if last {
+            // 11.12.1: at the end of the group.
+            self.sr |= sr::EOC;
+        }
+        self.run = if !last {
+            run.next(&self.sequence, run.rank + 1);
+            Some(run)
+        } else if self.cr2 & cr2::CONT != 0 {
+            run.next(&self.sequence, 0);
+            Some(run)
+        } else {
+            None
+        };
+    }
+}
+
+impl Peripheral for Adc {
+    fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
+        Ok(match offset {
+            offset::SR => self.sr,
+            offset::CR1 => self.cr1,
+            offset::CR2 => self.cr2,
+            offset::SMPR1 => self.sequence.smpr[0],
+            offset::SMPR2 => self.sequence.smpr[1],
+            offset::HTR => self.htr,
+            offset::LTR => self.ltr,
+            offset::SQR1 => self.sequence.sqr[0],
+            offset::SQR2 => self.sequence.sqr[1],
+            offset::SQR3 => self.sequence.sqr[2],
+            offset::DR => {
+                self.sr &= !sr::EOC;
+                u32::from(self.data)
+            }
+            _ => return Err(Unmodelled("ADC register")),
+        })
+    }
+
+    fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Unmodelled> {
+        match offset {
+            offset::SR => self.sr &= value,
+            offset::CR1 => {
+                self.cr1 = value & cr1::MASK;
+                if self.cr1 & !(cr1::EOCIE | cr1::SCAN | cr1::IDLE) != 0 {
+                    return Err(Unmodelled(
+                        "ADC watchdog, injected, discontinuous or dual mode (CR1)",
+                    ));
+                }
+            }
+            offset::CR2 => return self.write_cr2(value, now),
+            offset::SMPR1 => self.sequence.smpr[0] = value & 0x00FF_FFFF,
+            offset::SMPR2 => self.sequence.smpr[1] = value & 0x3FFF_FFFF,
+            // Thresholds of the watchdog, which is off.
+            offset::HTR => self.htr = value & 0xFFF,
+            offset::LTR => self.ltr = value & 0xFFF,
+            offset::SQR1 => self.sequence.sqr[0] = value & 0x00FF_FFFF,
+            offset::SQR2 => self.sequence.sqr[1] = value & 0x3FFF_FFFF,
+            offset::SQR3 => self.sequence.sqr[2] = value & 0x3FFF_FFFF,
+            offset::DR => {}
+            _ => return Err(Unmodelled("ADC register")),
+        }
+        Ok(())
+    }
+
+    fn next_event(&self) -> Option<Time> {
+        // Only an interrupt is an event; the rest is worked out when it is looked at.
+        let waits = self.cr1 & cr1::EOCIE != 0 && self.sr & sr::EOC == 0;
+        self.run.filter(|_| waits).map(|run| run.end())
+    }
+
+    fn advance(&mut self, now: Time) {
+        if let Some((bit, end)) = self.calibration
+            && end <= now
+        {
+            self.calibration = None;
+            self.cr2 &= !bit;
+        }
+        while let Some(mut run) = self.run {
+            if run.sampled.is_none() {
+                if now < run.sample_end() {
+                    return;
+                }
+                run.sampled = Some(self.convert(run.channel));
+                self.run = Some(run);
+            }
+            if now < run.end() {
+                return;
+            }
+            self.finish(run);
+        }
+    }
+
+    fn irq(&self) -> bool {
+        self.cr1 & cr1::EOCIE != 0 && self.sr & sr::EOC != 0
+    }
+
+    fn reset(&mut self, _now: Time) {
+        *self = Self {
+            hz: self.hz,
+            levels: self.levels,
+            ..Self::new()
+        };
+    }
+
+    /// The clock of a conversion under way is not changed.
+    fn set_clock(&mut self, hz: u32, _now: Time) {
+        self.hz = hz;
+    }
+}

@@ -1,0 +1,114 @@
+//! The clock tree as a calculation: from RCC_CFGR to the frequency of every bus (RM0008 figure 8, 7.3.2).
+
+/// The internal oscillator.
+pub const HSI_HZ: u32 = 8_000_000;
+/// The crystal of the modio-02 board.
+pub const HSE_HZ: u32 = 8_000_000;
+
+/// The frequencies, in Hz.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clocks {
+    /// SYSCLK, at most 72 MHz.
+    pub sysclk: u32,
+    /// HCLK: the core, the memories, SysTick.
+    pub hclk: u32,
+    /// PCLK1: USART3, I2C1, ..., at most 36 MHz.
+    pub pclk1: u32,
+    /// PCLK2: USART1, GPIO, ..., at most 72 MHz.
+    pub pclk2: u32,
+    /// TIM2 to TIM4: PCLK1, twice that when APB1 is divided.
+    pub apb1_timers: u32,
+    /// TIM1: PCLK2, twice that when APB2 is divided.
+    pub apb2_timers: u32,
+    /// ADCCLK, at most 14 MHz.
+    pub adc: u32,
+}
+
+impl Clocks {
+    /// The clocks with `cfgr` in RCC_CFGR and `sws` as the clock in use (0 HSI, 1 HSE, 2 PLL).
+    #[must_use]
+    pub const fn of(cfgr: u32, sws: u32) -> Self {
+        let sysclk = match sws {
+            0 => HSI_HZ,
+            1 => HSE_HZ,
+            _ => pll(cfgr),
+        };
+        let hclk = sysclk >> ahb_shift(cfgr >> 4 & 0xF);
+        let apb1 = apb_shift(cfgr >> 8 & 7);
+        let apb2 = apb_shift(cfgr >> 11 & 7);
+        let (pclk1, pclk2) = (hclk >> apb1, hclk >> apb2);
+        Self {
+            sysclk,
+            hclk,
+            pclk1,
+            pclk2,
+            apb1_timers: pclk1 << (apb1 != 0) as u32,
+            apb2_timers: pclk2 << (apb2 != 0) as u32,
+            adc: pclk2 / (2 * ((cfgr >> 14 & 3) + 1)),
+        }
+    }
+
+    /// What is above the part's limits (RM0008 7.2), if anything is.
+    #[must_use]
+    pub const fn over_limit(&self) -> Option<&'static str> {
+        if self.sysclk > 72_000_000 {
+            Some("SYSCLK above 72 MHz")
+        } else if self.pclk1 > 36_000_000 {
+            Some("PCLK1 above 36 MHz")
+        } else {
+            None
+        }
+    }
+}
+
+const fn pll(cfgr: u32) -> u32 {
+    let source = if cfgr & 1 << 16 == 0 {
+        HSI_HZ / 2
+    } else if cfgr & 1 << 17 == 0 {
+        HSE_HZ
+    } else {
+        HSE_HZ / 2
+    };
+    let times = (cfgr >> 18 & 0xF) + 2;
+    source * if times > 16 { 16 } else { times }
+}
+
+/// HPRE: 0xxx undivided, then 2, 4, 8, 16, 64, 128, 256, 512.
+const fn ahb_shift(hpre: u32) -> u32 {
+    match hpre {
+        0..=7 => 0,
+        8..=11 => hpre - 7,
+        _ => hpre - 6,
+    }
+}
+
+/// PPRE: 0xx undivided, then 2, 4, 8, 16.
+const fn apb_shift(ppre: u32) -> u32 {
+    if ppre < 4 { 0 } else { ppre - 3 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prescalers_divide_as_rm0008_says() {
+        let divided = Clocks::of(0b1100 << 4 | 0b100 << 8 | 0b111 << 11 | 0b11 << 14, 0);
+        assert_eq!(divided.hclk, 8_000_000 / 64);
+        assert_eq!(divided.pclk1, divided.hclk / 2);
+        assert_eq!(divided.apb1_timers, divided.hclk);
+        assert_eq!(divided.pclk2, divided.hclk / 16);
+        assert_eq!(divided.adc, divided.pclk2 / 8);
+        assert_eq!(Clocks::of(0b1111 << 4, 0).hclk, 8_000_000 / 512);
+    }
+
+    #[test]
+    fn the_pll_multiplies_its_source() {
+        assert_eq!(Clocks::of(0b1110 << 18, 2).sysclk, 64_000_000, "HSI/2 x16");
+        assert_eq!(Clocks::of(1 << 16 | 7 << 18, 2).sysclk, 72_000_000);
+        assert_eq!(
+            Clocks::of(1 << 16 | 14 << 18, 2).over_limit(),
+            Some("SYSCLK above 72 MHz")
+        );
+    }
+}

@@ -1,0 +1,376 @@
+//! The flash program and erase controller, PM0075 (STM32F10xxx flash programming manual) chapters 2 and 3.
+//!
+//! It owns the flash's cells. An operation takes real time and changes them when it ends, or half-way when
+//! the power goes ([`array`]). Option bytes can be read but not programmed.
+
+mod array;
+
+use crate::machine::memory::FLASH_SIZE;
+use crate::peripheral::{Peripheral, Unmodelled};
+use crate::time::Time;
+
+use array::{Cells, Operation};
+pub use array::{PAGE, Torn};
+
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+
+const ACR_LATENCY: u32 = 0b111;
+const ACR_PRFTBE: u32 = 1 << 4;
+const ACR_PRFTBS: u32 = 1 << 5;
+const ACR_WRITABLE: u32 = ACR_LATENCY | 1 << 3 | ACR_PRFTBE;
+
+const SR_BSY: u32 = 1 << 0;
+const SR_PGERR: u32 = 1 << 2;
+const SR_WRPRTERR: u32 = 1 << 4;
+const SR_EOP: u32 = 1 << 5;
+
+const CR_PG: u32 = 1 << 0;
+const CR_PER: u32 = 1 << 1;
+const CR_MER: u32 = 1 << 2;
+const CR_STRT: u32 = 1 << 6;
+const CR_LOCK: u32 = 1 << 7;
+const CR_ERRIE: u32 = 1 << 10;
+const CR_EOPIE: u32 = 1 << 12;
+const CR_OPTION: u32 = 1 << 4 | 1 << 5 | 1 << 9;
+const CR_WRITABLE: u32 = CR_PG | CR_PER | CR_MER | CR_ERRIE | CR_EOPIE;
+
+/// How long the part takes; DS5319 table 29 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Durations {
+    /// A page erase or a mass erase; 30 ms, the middle of the range, unless set.
+    pub erase: Time,
+    /// A half-word; 52.5 us, the typical value, unless set.
+    pub program: Time,
+}
+
+impl Default for Durations {
+    fn default() -> Self {
+        Self {
+            erase: Time::from_ms(30),
+            program: Time::from_ns(52_500),
+        }
+    }
+}
+
+/// What the controller has against a write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Complaint {
+    /// In words.
+    pub text: &'static str,
+    /// Whether the part answers with a bus error, a fault in the core.
+    pub bus_error: bool,
+}
+
+/// How the key sequence stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lock {
+    /// This many keys were right so far.
+    Keys(usize),
+    Open,
+    /// A wrong key: closed until reset (PM0075 2.3.1).
+    Jammed,
+}
+
+/// An operation under way.
+#[derive(Clone, Copy, Debug)]
+struct Busy {
+    operation: Operation,
+    from: Time,
+    until: Time,
+}
+
+/// The controller and the cells.
+#[derive(Debug)]
+pub struct Flash {
+    cells: Cells,
+    /// How long operations take.
+    pub durations: Durations,
+    /// What a power cut in the middle of one leaves.
+    pub torn: Torn,
+    /// Whether the HSI, which times the operations, runs (PM0075 2.3).
+    pub hsi_on: bool,
+    /// FLASH_WRPR: bit n clear protects pages 4n to 4n + 3 (medium density).
+    wrpr: u32,
+    acr: u32,
+    lock: Lock,
+    cr: u32,
+    sr: u32,
+    ar: u32,
+    busy: Option<Busy>,
+    /// Operations started since the part was made.
+    started: u64,
+    complaint: Option<Complaint>,
+    changed: Option<(usize, usize)>,
+}
+
+impl Flash {
+    /// The controller after power-on over an erased flash, with these write-protection bits.
+    #[must_use]
+    pub fn new(wrpr: u32) -> Self {
+        Self {
+            cells: Cells::erased(),
+            durations: Durations::default(),
+            torn: Torn::default(),
+            hsi_on: true,
+            wrpr,
+            acr: ACR_PRFTBE,
+            lock: Lock::Keys(0),
+            cr: 0,
+            sr: 0,
+            ar: 0,
+            busy: None,
+            started: 0,
+            complaint: None,
+            changed: None,
+        }
+    }
+
+    /// Where the core finds the cells ([`crate::machine::memory::Memory::host`]).
+    pub fn host(&mut self) -> *mut u8 {
+        self.cells.host()
+    }
+
+    /// The contents.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.cells.bytes()
+    }
+
+    /// The contents, to change from outside.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        self.cells.bytes_mut()
+    }
+
+    /// Wait states of a fetch, and whether the prefetch buffer is on (FLASH_ACR).
+    #[must_use]
+    pub fn access_control(&self) -> (u32, bool) {
+        (self.acr & ACR_LATENCY, self.acr & ACR_PRFTBE != 0)
+    }
+
+    /// The end of the operation under way: fetches from flash stall until then.
+    #[must_use]
+    pub fn busy_until(&self) -> Option<Time> {
+        self.busy.map(|busy| busy.until)
+    }
+
+    /// When the operation under way began and ends.
+    #[must_use]
+    pub fn busy_span(&self) -> Option<(Time, Time)> {
+        self.busy.map(|busy| (busy.from, busy.until))
+    }
+
+    /// Operations started since the part was made.
+    #[must_use]
+    pub fn started(&self) -> u64 {
+        self.started
+    }
+
+    /// What there was against the last write, since the last call.
+    pub fn take_complaint(&mut self) -> Option<Complaint> {
+        self.complaint.take()
+    }
+
+    /// The bytes (first, end) that an operation changed since the last call.
+    pub fn take_changed(&mut self) -> Option<(usize, usize)> {
+        self.changed.take()
+    }
+
+    /// The power goes at `now`: an operation under way is torn.
+    pub fn power_off(&mut self, now: Time) {
+        if let Some(busy) = self.busy.take() {
+            let whole = (busy.until - busy.from).as_ps().max(1);
+            let done = now.saturating_sub(busy.from).as_ps();
+            let parts = (u128::from(done) * 65_536 / u128::from(whole)).min(65_536) as u32;
+            self.changed = Some(self.cells.tear(busy.operation, self.torn, parts));
+        }
+    }
+
+    /// The core stores `value` at `offset` into the flash; `half` when the store is 16 bits wide.
+    pub fn program(&mut self, offset: u32, half: bool, value: u16, now: Time) {
+        let complain = |text, bus_error| Some(Complaint { text, bus_error });
+        if !half {
+            self.complaint = complain("flash is written by half-words only", true);
+        } else if self.busy.is_some() {
+            self.complaint = complain("flash written while an operation runs", false);
+        } else if self.cr & CR_PG == 0 || self.lock != Lock::Open {
+            self.complaint = complain("a store to flash with PG clear", false);
+        } else if self.is_protected(offset as usize / PAGE) {
+            self.sr |= SR_WRPRTERR;
+        } else {
+            let at = offset as usize & !1;
+            // A half-word that is not erased takes only 0x0000 (PM0075 2.3.3).
+            if self.cells.half(at) != 0xFFFF && value != 0 {
+                self.sr |= SR_PGERR;
+                self.complaint = complain("a half-word that was not erased was programmed", false);
+                return;
+            }
+            self.start(Operation::Program { at, value }, now);
+        }
+    }
+
+    fn is_protected(&self, page: usize) -> bool {
+        self.wrpr >> (page / 4).min(31) & 1 == 0
+    }
+
+    fn start(&mut self, operation: Operation, now: Time) {
+        if !self.hsi_on {
+            self.complaint = Some(Complaint {
+                text: "flash operation with the HSI off",
+                bus_error: false,
+            });
+            return;
+        }
+        let lasts = match operation {
+            Operation::Program { .. } => self.durations.program,
+            Operation::Page { .. } | Operation::Mass => self.durations.erase,
+        };
+        self.started += 1;
+        self.sr |= SR_BSY;
+        self.busy = Some(Busy {
+            operation,
+            from: now,
+            until: now + lasts,
+        });
+    }
+
+    /// STRT: the erase that PER or MER asks for.
+    fn erase(&mut self, now: Time) {
+        let complain = |text| {
+            Some(Complaint {
+                text,
+                bus_error: false,
+            })
+        };
+        let page = self.ar.wrapping_sub(crate::machine::memory::FLASH_BASE) as usize / PAGE;
+        match self.cr & (CR_PG | CR_PER | CR_MER) {
+            CR_PER if page >= FLASH_SIZE / PAGE => {
+                self.complaint = complain("erase of a page that does not exist");
+            }
+            CR_PER if self.is_protected(page) => self.sr |= SR_WRPRTERR,
+            CR_PER => self.start(Operation::Page { page }, now),
+            CR_MER if self.wrpr != u32::MAX => self.sr |= SR_WRPRTERR,
+            CR_MER => self.start(Operation::Mass, now),
+            _ => self.complaint = complain("STRT without exactly one of PER and MER"),
+        }
+    }
+
+    fn write_cr(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
+        if self.lock != Lock::Open {
+            if value & !CR_LOCK != 0 {
+                self.complaint = Some(Complaint {
+                    text: "FLASH_CR written while locked",
+                    bus_error: false,
+                });
+            }
+            return Ok(());
+        }
+        if self.busy.is_some() {
+            self.complaint = Some(Complaint {
+                text: "FLASH_CR written while an operation runs",
+                bus_error: false,
+            });
+            return Ok(());
+        }
+        self.cr = value & CR_WRITABLE;
+        if value & CR_STRT != 0 {
+            self.erase(now);
+        }
+        if value & CR_LOCK != 0 {
+            self.lock = Lock::Keys(0);
+        }
+        if value & CR_OPTION != 0 {
+            return Err(Unmodelled("option byte programming (FLASH_CR)"));
+        }
+        Ok(())
+    }
+
+    fn write_key(&mut self, value: u32) {
+        self.lock = match self.lock {
+            Lock::Keys(n) if value == KEYS[n] => {
+                if n + 1 == KEYS.len() {
+                    Lock::Open
+                } else {
+                    Lock::Keys(n + 1)
+                }
+            }
+            _ => {
+                self.complaint = Some(Complaint {
+                    text: "wrong key: FLASH_CR is locked until reset",
+                    bus_error: true,
+                });
+                Lock::Jammed
+            }
+        };
+    }
+}
+
+impl Peripheral for Flash {
+    fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
+        let locked = if self.lock == Lock::Open { 0 } else { CR_LOCK };
+        let strt = match self.busy.map(|busy| busy.operation) {
+            Some(Operation::Page { .. } | Operation::Mass) => CR_STRT,
+            _ => 0,
+        };
+        Ok(match offset {
+            // PRFTBS follows PRFTBE.
+            0x00 => self.acr | (self.acr & ACR_PRFTBE) << 1 & ACR_PRFTBS,
+            // The key registers are write-only.
+            0x04 | 0x08 => 0,
+            0x0C => self.sr,
+            0x10 => self.cr | locked | strt,
+            0x14 => 0,
+            // FLASH_OBR: no read protection, option bytes as from the factory.
+            0x1C => 0x03FF_FFFC,
+            0x20 => self.wrpr,
+            _ => return Err(Unmodelled("a reserved address of FLASH")),
+        })
+    }
+
+    fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Unmodelled> {
+        match offset {
+            0x00 => self.acr = value & ACR_WRITABLE,
+            0x04 => self.write_key(value),
+            0x08 => return Err(Unmodelled("option byte programming (FLASH_OPTKEYR)")),
+            // EOP, WRPRTERR and PGERR are cleared by writing 1.
+            0x0C => self.sr &= !(value & (SR_EOP | SR_WRPRTERR | SR_PGERR)),
+            0x10 => return self.write_cr(value, now),
+            0x14 => self.ar = value,
+            _ => return Err(Unmodelled("a reserved address of FLASH")),
+        }
+        Ok(())
+    }
+
+    fn next_event(&self) -> Option<Time> {
+        self.busy_until()
+    }
+
+    fn advance(&mut self, now: Time) {
+        if let Some(busy) = self.busy
+            && busy.until <= now
+        {
+            self.busy = None;
+            self.changed = Some(self.cells.finish(busy.operation));
+            self.sr = self.sr & !SR_BSY | SR_EOP;
+        }
+    }
+
+    fn irq(&self) -> bool {
+        let done = self.cr & CR_EOPIE != 0 && self.sr & SR_EOP != 0;
+        let failed = self.cr & CR_ERRIE != 0 && self.sr & (SR_PGERR | SR_WRPRTERR) != 0;
+        done || failed
+    }
+
+    fn reset(&mut self, now: Time) {
+        // A reset in the middle of an operation leaves what a power cut would (PM0075 2.3.2 warns of it).
+        self.power_off(now);
+        self.acr = ACR_PRFTBE;
+        self.lock = Lock::Keys(0);
+        self.cr = 0;
+        self.sr = 0;
+        self.ar = 0;
+        self.complaint = None;
+    }
+}
+
+#[cfg(test)]
+mod tests;

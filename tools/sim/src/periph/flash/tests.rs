@@ -1,0 +1,152 @@
+//! The controller against PM0075.
+
+use super::*;
+use crate::machine::memory::FLASH_BASE;
+
+const NOW: Time = Time::ZERO;
+
+fn open() -> Flash {
+    let mut flash = Flash::new(u32::MAX);
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    assert_eq!(flash.read(0x10, NOW), Ok(0));
+    flash
+}
+
+fn program(flash: &mut Flash, offset: u32, value: u16) {
+    flash.write(0x10, CR_PG, NOW).unwrap();
+    flash.program(offset, true, value, NOW);
+}
+
+#[test]
+fn a_half_word_takes_its_time_and_then_stands() {
+    let mut flash = open();
+    program(&mut flash, 0x400, 0x1234);
+    assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY));
+    assert_eq!(flash.bytes()[0x400], 0xFF);
+    let end = flash.next_event().unwrap();
+    assert_eq!(end, Time::from_ns(52_500));
+    flash.advance(end);
+    assert_eq!(flash.read(0x0C, end), Ok(SR_EOP));
+    assert_eq!(flash.bytes()[0x400..0x402], [0x34, 0x12]);
+    assert_eq!(flash.take_changed(), Some((0x400, 0x402)));
+    assert_eq!(flash.take_complaint(), None);
+}
+
+#[test]
+fn a_programmed_half_word_takes_only_zero() {
+    let mut flash = open();
+    flash.bytes_mut()[0x400] = 0xFE;
+    program(&mut flash, 0x400, 0xFEFE);
+    assert_eq!(flash.read(0x0C, NOW), Ok(SR_PGERR));
+    assert!(flash.take_complaint().is_some());
+    flash.write(0x0C, SR_PGERR, NOW).unwrap();
+    program(&mut flash, 0x400, 0);
+    flash.advance(Time::from_ms(1));
+    assert_eq!(flash.half_at(0x400), 0);
+}
+
+#[test]
+fn a_wrong_key_locks_until_reset() {
+    let mut flash = Flash::new(u32::MAX);
+    flash.write(4, KEYS[1], NOW).unwrap();
+    assert!(flash.take_complaint().unwrap().bus_error);
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    assert_eq!(flash.read(0x10, NOW), Ok(CR_LOCK));
+    flash.reset(NOW);
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    assert_eq!(flash.read(0x10, NOW), Ok(0));
+}
+
+#[test]
+fn an_erase_takes_30_ms_and_only_its_page() {
+    let mut flash = open();
+    flash.bytes_mut().fill(0);
+    flash.write(0x10, CR_PER, NOW).unwrap();
+    flash.write(0x14, FLASH_BASE + 0x800, NOW).unwrap();
+    flash.write(0x10, CR_PER | CR_STRT, NOW).unwrap();
+    assert_eq!(flash.next_event(), Some(Time::from_ms(30)));
+    flash.advance(Time::from_ms(30));
+    assert!(flash.bytes()[0x800..0xC00].iter().all(|&b| b == 0xFF));
+    assert_eq!((flash.bytes()[0x7FF], flash.bytes()[0xC00]), (0, 0));
+}
+
+#[test]
+fn a_torn_erase_is_between_old_and_new_and_grows() {
+    let torn_at = |ms| {
+        let mut flash = open();
+        flash.bytes_mut()[..1024].fill(0);
+        flash.write(0x10, CR_PER, NOW).unwrap();
+        flash.write(0x14, FLASH_BASE, NOW).unwrap();
+        flash.write(0x10, CR_PER | CR_STRT, NOW).unwrap();
+        flash.power_off(Time::from_ms(ms));
+        assert_eq!(flash.next_event(), None);
+        flash.bytes()[..1024].to_vec()
+    };
+    let ones = |page: &[u8]| page.iter().map(|b| b.count_ones()).sum::<u32>();
+    let (early, late) = (torn_at(6), torn_at(24));
+    assert!((1_000..2_500).contains(&ones(&early)), "{}", ones(&early));
+    assert!((6_000..7_200).contains(&ones(&late)), "{}", ones(&late));
+    assert!(
+        early.iter().zip(&late).all(|(e, l)| e & !l == 0),
+        "monotonic"
+    );
+    assert_eq!(early, torn_at(6), "the same every time");
+}
+
+#[test]
+fn torn_can_be_set_to_nothing_or_everything() {
+    for (torn, left) in [(Torn::Before, 0xFFFF), (Torn::After, 0x0102)] {
+        let mut flash = open();
+        flash.torn = torn;
+        program(&mut flash, 0, 0x0102);
+        flash.power_off(Time::from_us(20));
+        assert_eq!(flash.half_at(0), left);
+    }
+}
+
+#[test]
+fn protected_pages_refuse_and_bytes_are_a_bus_error() {
+    let mut flash = Flash::new(!1);
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    program(&mut flash, 0, 0);
+    assert_eq!(flash.read(0x0C, NOW), Ok(SR_WRPRTERR));
+    flash.program(0x4000, false, 0, NOW);
+    assert!(flash.take_complaint().unwrap().bus_error);
+    flash.write(0x10, 0, NOW).unwrap();
+    flash.program(0x4000, true, 0, NOW);
+    assert_eq!(flash.next_event(), None, "PG is clear");
+    assert!(!flash.take_complaint().unwrap().bus_error);
+}
+
+#[test]
+fn locking_again_closes_and_a_write_while_locked_is_reported() {
+    let mut flash = open();
+    flash.write(0x10, CR_LOCK, NOW).unwrap();
+    assert_eq!(flash.take_complaint(), None);
+    flash.write(0x10, CR_PG, NOW).unwrap();
+    assert!(flash.take_complaint().is_some());
+    assert_eq!(flash.read(0x10, NOW), Ok(CR_LOCK));
+}
+
+#[test]
+fn nothing_happens_without_the_hsi() {
+    let mut flash = open();
+    flash.hsi_on = false;
+    program(&mut flash, 0, 0);
+    assert_eq!(flash.next_event(), None);
+    assert!(flash.take_complaint().is_some());
+}
+
+impl Flash {
+    fn half_at(&self, at: usize) -> u16 {
+        self.cells.half(at)
+    }
+}

@@ -1,0 +1,38 @@
+//! What an I2C master meets on its bus, byte by byte.
+
+use crate::time::Time;
+
+/// The two wires as everyone but the I2C block leaves them: `true` = released, pulled high.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wires {
+    /// The clock.
+    pub scl: bool,
+    /// The data.
+    pub sda: bool,
+}
+
+impl Wires {
+    /// Both released: a free bus.
+    pub const FREE: Self = Self {
+        scl: true,
+        sda: true,
+    };
+}
+
+/// The devices on a bus, all of them together.
+pub trait Bus {
+    /// What the devices, and whoever drives the pins by hand, do to the wires.
+    fn wires(&self) -> Wires;
+
+    /// A start condition and an address byte (bit 0 = read) have come. Tells whether someone acknowledges.
+    fn address(&mut self, byte: u8, now: Time) -> bool;
+
+    /// A data byte has come from the master. Tells whether it is acknowledged.
+    fn write(&mut self, byte: u8, now: Time) -> bool;
+
+    /// The next byte for the master: 0xFF when nobody drives the wire.
+    fn read(&mut self, now: Time) -> u8;
+
+    /// A stop condition.
+    fn stop(&mut self, now: Time);
+}

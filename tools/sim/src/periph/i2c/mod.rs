@@ -1,0 +1,335 @@
+//! I2C1 as a bus master in 7-bit addressing, without DMA, SMBus, PEC and slave mode (RM0008 26).
+//!
+//! What happens on the bus happens in [`I2c::exchange`]. One bit lasts what CCR says of PCLK1 (26.6.8): 2, 3
+//! or 25 times CCR cycles; the wires' rise time is not counted. A start or stop condition takes one bit.
+//! Rules that a real block enforces by misbehaving are reported: CR1 written while START or STOP is
+//! pending, CCR written while PE = 1, FREQ that is not PCLK1's.
+
+mod bits;
+mod bus;
+mod master;
+
+#[cfg(test)]
+mod tests;
+
+use crate::peripheral::{Peripheral, Unmodelled};
+use crate::time::Time;
+use bits::{ccr, cr1, cr2, offset, sr1, sr2};
+pub use bus::{Bus, Wires};
+use master::Phase;
+
+/// TRISE out of reset, 26.6.9.
+const TRISE_RESET: u32 = 2;
+
+/// The I2C block.
+#[derive(Clone, Debug)]
+pub struct I2c {
+    hz: u32,
+    cr1: u32,
+    cr2: u32,
+    oar: [u32; 2],
+    ccr: u32,
+    trise: u32,
+    sr1: u32,
+    /// MSL and TRA; BUSY is `busy`.
+    sr2: u32,
+    busy: bool,
+    /// The flags that the last read of SR1 showed: the first half of a clearing sequence.
+    shown: u32,
+    /// DR as received.
+    data: u8,
+    /// A received byte that waits for DR to be read.
+    behind: Option<u8>,
+    /// DR as written, waiting for the shift register.
+    pending: Option<u8>,
+    phase: Phase,
+    /// When what is under way ends.
+    due: Option<Time>,
+    /// It has ended but for a wire that someone holds.
+    stalled: bool,
+    /// The wires as the others leave them.
+    wires: Wires,
+}
+
+impl Default for I2c {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl I2c {
+    /// A block out of reset, without a clock.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            hz: 0,
+            cr1: 0,
+            cr2: 0,
+            oar: [0; 2],
+            ccr: 0,
+            trise: TRISE_RESET,
+            sr1: 0,
+            sr2: 0,
+            busy: false,
+            shown: 0,
+            data: 0,
+            behind: None,
+            pending: None,
+            phase: Phase::Idle,
+            due: None,
+            stalled: false,
+            wires: Wires::FREE,
+        }
+    }
+
+    /// The event interrupt, I2C1_EV (26.4, table 189).
+    #[must_use]
+    pub const fn irq_event(&self) -> bool {
+        self.cr2 & cr2::ITEVTEN != 0
+            && (self.sr1 & sr1::EVENTS != 0
+                || self.cr2 & cr2::ITBUFEN != 0 && self.sr1 & sr1::BUFFER != 0)
+    }
+
+    /// The error interrupt, I2C1_ER.
+    #[must_use]
+    pub const fn irq_error(&self) -> bool {
+        self.cr2 & cr2::ITERREN != 0 && self.sr1 & sr1::ERRORS != 0
+    }
+
+    /// PCLK1 cycles of one SCL period (26.6.8).
+    fn bit_cycles(&self) -> u64 {
+        let factor = match self.ccr & (ccr::FAST | ccr::DUTY) {
+            0 | ccr::DUTY => 2,
+            ccr::FAST => 3,
+            _ => 25,
+        };
+        u64::from(self.ccr & ccr::CCR) * factor
+    }
+
+    /// The span of `n` bits.
+    fn bits(&self, n: u64) -> Time {
+        Time::cycles(n * self.bit_cycles(), self.hz)
+    }
+
+    fn read_data(&mut self, now: Time) -> u32 {
+        let data = u32::from(self.data);
+        match self.behind.take() {
+            // The byte behind it moves up and RXNE stays (26.3.3, master receiver).
+            Some(next) => {
+                self.data = next;
+                self.sr1 &= !sr1::BTF;
+                if self.phase == Phase::ReceiveWait {
+                    self.receive_next(now);
+                }
+            }
+            None => self.sr1 &= !(sr1::RXNE | self.shown & sr1::BTF),
+        }
+        data
+    }
+
+    fn write_data(&mut self, byte: u8, now: Time) -> Result<(), Unmodelled> {
+        match self.phase {
+            Phase::Started if self.sr1 & sr1::SB != 0 => {
+                if self.shown & sr1::SB == 0 {
+                    return Err(Unmodelled(
+                        "I2C address written without reading SR1 (SB stays), which",
+                    ));
+                }
+                self.sr1 &= !sr1::SB;
+                self.shown &= !sr1::SB;
+                self.phase = Phase::Address(byte);
+                self.due = Some(now + self.bits(9));
+            }
+            Phase::Addressed(false) | Phase::Send(_) => {
+                let overwritten = self.pending.replace(byte).is_some();
+                self.sr1 &= !sr1::TXE;
+                if overwritten {
+                    return Err(Unmodelled("I2C DR written while TXE = 0, which"));
+                }
+            }
+            Phase::SendWait => {
+                self.pending = Some(byte);
+                self.send_next(now);
+            }
+            _ => return Err(Unmodelled("I2C DR written outside a transfer, which")),
+        }
+        Ok(())
+    }
+
+    /// SR1 has been read; reading SR2 now clears ADDR, and the transfer goes on.
+    fn clear_addr(&mut self, now: Time) {
+        if self.shown & self.sr1 & sr1::ADDR == 0 {
+            return;
+        }
+        self.sr1 &= !sr1::ADDR;
+        self.shown &= !sr1::ADDR;
+        if let Phase::Addressed(receiver) = self.phase {
+            if receiver {
+                self.receive_next(now);
+            } else {
+                self.phase = Phase::SendWait;
+                self.send_next(now);
+            }
+            self.begin(now);
+        }
+    }
+
+    fn write_cr1(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
+        if value & cr1::SWRST != 0 {
+            let held = self.wires;
+            self.software_reset();
+            self.cr1 = cr1::SWRST;
+            self.look(held, now);
+            return Ok(());
+        }
+        let asked = cr1::START | cr1::STOP;
+        let value = value & cr1::MASK;
+        let mut finding = Ok(());
+        if self.cr1 & asked != 0 && value & cr1::PE != 0 {
+            finding = Err(Unmodelled("I2C CR1 written while START or STOP is pending"));
+        }
+        let enabled = value & cr1::PE != 0 && self.cr1 & cr1::PE == 0;
+        self.cr1 = value;
+        if value & cr1::PE == 0 {
+            return self.disable();
+        }
+        if enabled {
+            finding = finding.and_then(|()| self.check_timing());
+        }
+        if value & cr1::STOP != 0 && self.phase == Phase::Idle && value & cr1::START == 0 {
+            self.cr1 &= !cr1::STOP;
+            finding = Err(Unmodelled("I2C STOP outside a transfer"));
+        }
+        self.begin(now);
+        if value & !cr1::MODELLED != 0 {
+            return Err(Unmodelled(
+                "I2C SMBus, PEC, general call or slave mode (CR1)",
+            ));
+        }
+        finding
+    }
+
+    /// PE is 0: the flags and requests are dropped.
+    fn disable(&mut self) -> Result<(), Unmodelled> {
+        let idle = self.phase == Phase::Idle;
+        self.cr1 &= !(cr1::START | cr1::STOP | cr1::ACK);
+        self.sr1 = 0;
+        self.sr2 = 0;
+        self.phase = Phase::Idle;
+        self.due = None;
+        self.stalled = false;
+        self.pending = None;
+        self.behind = None;
+        if idle {
+            Ok(())
+        } else {
+            // 26.6.1: in master mode PE must not be reset before the end of the transfer.
+            Err(Unmodelled("I2C PE cleared in the middle of a transfer"))
+        }
+    }
+
+    /// What must be right before a transfer can be (26.6.2, 26.6.8).
+    fn check_timing(&self) -> Result<(), Unmodelled> {
+        let fast = self.ccr & ccr::FAST != 0;
+        let count = self.ccr & ccr::CCR;
+        let limit = if fast { 400_000 } else { 100_000 };
+        if self.cr2 & cr2::FREQ != self.hz / 1_000_000
+            || !(2..=36).contains(&(self.cr2 & cr2::FREQ))
+        {
+            return Err(Unmodelled(
+                "I2C CR2.FREQ that is not PCLK1 in MHz, 2 to 36,",
+            ));
+        }
+        if count < if fast { 1 } else { 4 } {
+            return Err(Unmodelled("I2C CCR below its minimum"));
+        }
+        if u64::from(self.hz) > limit * self.bit_cycles() {
+            return Err(Unmodelled(
+                "I2C clock above 100 kHz, or 400 kHz in fast mode,",
+            ));
+        }
+        Ok(())
+    }
+
+    fn software_reset(&mut self) {
+        *self = Self {
+            hz: self.hz,
+            wires: self.wires,
+            ..Self::new()
+        };
+    }
+}
+
+impl Peripheral for I2c {
+    fn read(&mut self, offset: u32, now: Time) -> Result<u32, Unmodelled> {
+        Ok(match offset {
+            offset::CR1 => self.cr1,
+            offset::CR2 => self.cr2,
+            offset::OAR1 => self.oar[0],
+            offset::OAR2 => self.oar[1],
+            offset::DR => self.read_data(now),
+            offset::SR1 => {
+                self.shown = self.sr1;
+                self.sr1
+            }
+            offset::SR2 => {
+                let value = self.sr2 | if self.busy { sr2::BUSY } else { 0 };
+                self.clear_addr(now);
+                value
+            }
+            offset::CCR => self.ccr,
+            offset::TRISE => self.trise,
+            _ => return Err(Unmodelled("I2C register")),
+        })
+    }
+
+    fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Unmodelled> {
+        let in_reset = self.cr1 & cr1::SWRST != 0;
+        if in_reset && offset != offset::CR1 {
+            return Err(Unmodelled("I2C register written while SWRST = 1"));
+        }
+        match offset {
+            offset::CR1 => return self.write_cr1(value, now),
+            offset::CR2 => {
+                self.cr2 = value & cr2::MASK;
+                if value & cr2::DMA != 0 {
+                    return Err(Unmodelled("I2C DMA (CR2)"));
+                }
+            }
+            // Addresses of its own: without another master nobody calls them.
+            offset::OAR1 => self.oar[0] = value & 0xC3FF,
+            offset::OAR2 => self.oar[1] = value & 0xFF,
+            offset::DR => return self.write_data(value as u8, now),
+            offset::SR1 => self.sr1 &= value | !sr1::RC_W0,
+            offset::SR2 => {}
+            offset::CCR | offset::TRISE => {
+                if offset == offset::CCR {
+                    self.ccr = value & ccr::MASK;
+                } else {
+                    self.trise = value & 0x3F;
+                }
+                if self.cr1 & cr1::PE != 0 {
+                    return Err(Unmodelled("I2C CCR or TRISE written while PE = 1"));
+                }
+            }
+            _ => return Err(Unmodelled("I2C register")),
+        }
+        Ok(())
+    }
+
+    fn next_event(&self) -> Option<Time> {
+        self.due
+    }
+
+    fn irq(&self) -> bool {
+        self.irq_event() || self.irq_error()
+    }
+
+    fn reset(&mut self, _now: Time) {
+        self.software_reset();
+    }
+
+    fn set_clock(&mut self, hz: u32, _now: Time) {
+        self.hz = hz;
+    }
+}

@@ -1,0 +1,353 @@
+//! Transfers with an MCP4728 as stm32f1xx-hal 0.11 makes them, their times, and a bus that misbehaves.
+
+use register_map::Module;
+
+use super::*;
+use crate::slot::{BusFault, Channel, Slot};
+
+const HZ: u32 = 36_000_000;
+const ON: u32 = cr1::PE | cr1::ACK;
+
+/// The block and the bus, with a clock of its own that the register accesses move.
+struct Bench {
+    i2c: I2c,
+    slot: Slot,
+    now: Time,
+}
+
+impl Bench {
+    /// 400 kHz from 36 MHz: CCR = 30, three cycles each: 2.5 us a bit.
+    fn new() -> Self {
+        let mut bench = Self {
+            i2c: I2c::new(),
+            slot: Slot::new(Module::Ao4),
+            now: Time::ZERO,
+        };
+        bench.i2c.set_clock(HZ, Time::ZERO);
+        bench.init();
+        bench
+    }
+
+    fn init(&mut self) {
+        self.write(offset::CR2, 36);
+        self.write(offset::TRISE, 11);
+        self.write(offset::CCR, ccr::FAST | 30);
+        self.write(offset::CR1, ON);
+    }
+
+    fn write(&mut self, offset: u32, value: u32) {
+        let done = self.try_write(offset, value);
+        assert_eq!(done, Ok(()), "{offset:#x} <- {value:#x}");
+    }
+
+    fn try_write(&mut self, offset: u32, value: u32) -> Result<(), Unmodelled> {
+        self.i2c.exchange(&mut self.slot, self.now);
+        self.i2c.write(offset, value, self.now)
+    }
+
+    fn read(&mut self, offset: u32) -> u32 {
+        self.i2c.exchange(&mut self.slot, self.now);
+        self.i2c.read(offset, self.now).expect("modelled")
+    }
+
+    fn set(&mut self, bits: u32) {
+        let cr1 = self.read(offset::CR1);
+        self.write(offset::CR1, cr1 | bits);
+    }
+
+    fn clear(&mut self, bits: u32) {
+        let cr1 = self.read(offset::CR1);
+        self.write(offset::CR1, cr1 & !bits);
+    }
+
+    /// Waits for one of `flags` in SR1, event by event; `false` when nothing will ever happen.
+    fn wait(&mut self, flags: u32) -> bool {
+        while self.read(offset::SR1) & flags == 0 {
+            match self.i2c.next_event() {
+                Some(at) => self.now = at,
+                None => return false,
+            }
+        }
+        true
+    }
+
+    fn address(&mut self, byte: u8) -> bool {
+        self.set(cr1::START);
+        assert!(self.wait(sr1::SB));
+        self.write(offset::DR, u32::from(byte));
+        assert!(self.wait(sr1::ADDR | sr1::AF));
+        self.read(offset::SR1) & sr1::AF == 0
+    }
+
+    fn clear_addr(&mut self) {
+        self.read(offset::SR1);
+        self.read(offset::SR2);
+    }
+
+    fn stop(&mut self) {
+        self.set(cr1::STOP);
+        self.until_stopped();
+    }
+
+    fn until_stopped(&mut self) {
+        while self.read(offset::CR1) & cr1::STOP != 0 {
+            self.now = self.i2c.next_event().expect("a stop ends");
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        assert!(self.address(0xC0));
+        self.clear_addr();
+        for &byte in bytes {
+            assert!(self.wait(sr1::TXE));
+            self.write(offset::DR, u32::from(byte));
+        }
+        assert!(self.wait(sr1::BTF));
+        self.stop();
+    }
+
+    fn bits(n: u64) -> Time {
+        Time::cycles(n * 90, HZ)
+    }
+}
+
+#[test]
+fn a_fast_write_takes_nine_bits_a_byte() {
+    let mut bench = Bench::new();
+    bench.send(&[0x0F, 0xFF, 0x01, 0x23]);
+    assert_eq!(bench.slot.channel(1), Channel::Ao { code: 4095 });
+    assert_eq!(bench.slot.channel(2), Channel::Ao { code: 0x123 });
+    // Start, address, four bytes, stop.
+    assert_eq!(bench.now, Bench::bits(1 + 9 + 4 * 9 + 1));
+    assert_eq!(bench.read(offset::SR2), 0);
+    assert_eq!(bench.read(offset::SR1), 0);
+}
+
+#[test]
+fn flags_of_a_write_as_the_manual_has_them() {
+    let mut bench = Bench::new();
+    bench.set(cr1::START);
+    assert!(bench.wait(sr1::SB));
+    assert_eq!(bench.read(offset::SR2), sr2::MSL | sr2::BUSY);
+    bench.write(offset::DR, 0xC0);
+    assert!(bench.wait(sr1::ADDR));
+    assert_eq!(bench.read(offset::SR1), sr1::ADDR | sr1::TXE);
+    assert_eq!(bench.read(offset::SR2), sr2::MSL | sr2::BUSY | sr2::TRA);
+    // Stretched until there is a byte; it goes straight on to the shift register.
+    assert_eq!(bench.i2c.next_event(), None);
+    bench.write(offset::DR, 0x00);
+    assert_eq!(bench.read(offset::SR1), sr1::TXE);
+    bench.write(offset::DR, 0x10);
+    assert_eq!(bench.read(offset::SR1), 0);
+    assert!(bench.wait(sr1::TXE));
+    assert!(bench.wait(sr1::BTF));
+    assert_eq!(bench.read(offset::SR1), sr1::TXE | sr1::BTF);
+    // One more byte clears BTF.
+    bench.write(offset::DR, 0x00);
+    assert_eq!(bench.read(offset::SR1), sr1::TXE);
+    assert!(bench.wait(sr1::BTF));
+    bench.stop();
+}
+
+#[test]
+fn an_absent_device_is_not_acknowledged() {
+    let mut bench = Bench::new();
+    bench.slot.set_bus_fault(BusFault::Absent);
+    bench.write(offset::CR2, 36 | cr2::ITERREN);
+    assert!(!bench.address(0xC0));
+    assert_eq!(bench.now, Bench::bits(10));
+    assert!(bench.i2c.irq_error());
+    bench.write(offset::SR1, !sr1::AF);
+    assert!(!bench.i2c.irq_error());
+    bench.stop();
+    assert_eq!(bench.read(offset::SR2), 0);
+    bench.slot.set_bus_fault(BusFault::None);
+    bench.send(&[0x01, 0x00]);
+    assert_eq!(bench.slot.channel(1), Channel::Ao { code: 0x100 });
+}
+
+/// Reads `n` bytes the way the HAL's blocking driver does for 1, 2 and more.
+fn receive(bench: &mut Bench, n: usize) -> Vec<u8> {
+    assert!(bench.address(0xC1));
+    let mut bytes = Vec::new();
+    let mut take = |bench: &mut Bench| bytes.push(bench.read(offset::DR) as u8);
+    match n {
+        1 => {
+            bench.clear(cr1::ACK);
+            bench.clear_addr();
+            bench.set(cr1::STOP);
+            assert!(bench.wait(sr1::RXNE));
+            take(bench);
+        }
+        2 => {
+            bench.set(cr1::POS | cr1::ACK);
+            bench.clear_addr();
+            bench.clear(cr1::ACK);
+            assert!(bench.wait(sr1::BTF));
+            bench.set(cr1::STOP);
+            take(bench);
+            take(bench);
+        }
+        _ => {
+            bench.clear_addr();
+            for _ in 0..n - 3 {
+                assert!(bench.wait(sr1::RXNE));
+                take(bench);
+            }
+            assert!(bench.wait(sr1::BTF));
+            bench.clear(cr1::ACK);
+            take(bench);
+            bench.set(cr1::STOP);
+            take(bench);
+            assert!(bench.wait(sr1::RXNE));
+            take(bench);
+        }
+    }
+    bench.until_stopped();
+    bench.clear(cr1::POS);
+    bench.set(cr1::ACK);
+    bytes
+}
+
+#[test]
+fn one_two_and_twenty_four_bytes_are_read_back() {
+    let mut bench = Bench::new();
+    bench.send(&[0x01, 0x23, 0x04, 0x56, 0x07, 0x89, 0x0A, 0xBC]);
+    let all = [
+        0xC0, 0x01, 0x23, 0xC0, 0, 0, 0xD0, 0x04, 0x56, 0xD0, 0, 0, 0xE0, 0x07, 0x89, 0xE0, 0, 0,
+        0xF0, 0x0A, 0xBC, 0xF0, 0, 0,
+    ];
+    for n in [1, 2, 3, 4, 24] {
+        let began = bench.now;
+        assert_eq!(receive(&mut bench, n), all[..n], "{n} bytes");
+        assert_eq!(bench.read(offset::SR1), 0);
+        assert_eq!(bench.read(offset::SR2), 0);
+        // Nothing is stretched by a program that takes no time: exact to the bit.
+        let bits = 1 + 9 + 9 * n as u64 + 1;
+        let off = (bench.now - began)
+            .as_ps()
+            .abs_diff(Bench::bits(bits).as_ps());
+        assert!(off < 100, "{n} bytes: {off} ps");
+    }
+}
+
+#[test]
+fn a_repeated_start_turns_round() {
+    let mut bench = Bench::new();
+    assert!(bench.address(0xC0));
+    bench.clear_addr();
+    bench.write(offset::DR, 0x08);
+    assert!(bench.wait(sr1::BTF));
+    assert_eq!(receive(&mut bench, 2), [0xC0, 0x00]);
+}
+
+#[test]
+fn a_held_clock_stretches_and_goes_on() {
+    let mut bench = Bench::new();
+    assert!(bench.address(0xC0));
+    bench.clear_addr();
+    bench.write(offset::DR, 0x0F);
+    bench.slot.set_bus_fault(BusFault::HoldsScl);
+    assert!(!bench.wait(sr1::BTF), "nothing will happen");
+    bench.now += Time::from_ms(5);
+    bench.slot.set_bus_fault(BusFault::None);
+    assert!(bench.wait(sr1::BTF));
+    bench.write(offset::DR, 0xFF);
+    assert!(bench.wait(sr1::BTF));
+    bench.stop();
+    assert_eq!(bench.slot.channel(1), Channel::Ao { code: 4095 });
+}
+
+#[test]
+fn a_held_data_wire_keeps_the_bus_busy_until_it_is_clocked_free() {
+    let mut bench = Bench::new();
+    bench
+        .slot
+        .set_bus_fault(BusFault::HoldsSda { clocks: Some(9) });
+    bench.set(cr1::START);
+    assert!(!bench.wait(sr1::SB));
+    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    // A software reset alone does not help: the wire is still low.
+    bench.write(offset::CR1, cr1::PE | cr1::SWRST);
+    bench.write(offset::CR1, 0);
+    bench.init();
+    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    // Nine pulses by hand, then a stop condition by hand: SDA rises while SCL is high.
+    for scl in [false, true].into_iter().cycle().take(18) {
+        bench.slot.set_pins(Wires { scl, sda: true });
+        bench.read(offset::SR2);
+    }
+    for (scl, sda) in [(false, true), (false, false), (true, false), (true, true)] {
+        bench.slot.set_pins(Wires { scl, sda });
+        bench.read(offset::SR2);
+    }
+    assert_eq!(bench.read(offset::SR2), 0);
+    bench.send(&[0x02, 0x00]);
+    assert_eq!(bench.slot.channel(1), Channel::Ao { code: 0x200 });
+}
+
+#[test]
+fn a_pulse_on_the_clock_leaves_busy_that_only_a_reset_clears() {
+    let mut bench = Bench::new();
+    bench.slot.set_bus_fault(BusFault::HoldsScl);
+    bench.read(offset::SR1);
+    bench.slot.set_bus_fault(BusFault::None);
+    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    bench.set(cr1::START);
+    assert!(!bench.wait(sr1::SB));
+    bench.write(offset::CR1, cr1::PE | cr1::SWRST);
+    bench.write(offset::CR1, 0);
+    bench.init();
+    bench.send(&[0x02, 0x00]);
+}
+
+#[test]
+fn a_data_wire_pulled_low_in_mid_byte_loses_arbitration() {
+    let mut bench = Bench::new();
+    assert!(bench.address(0xC0));
+    bench.clear_addr();
+    bench.write(offset::DR, 0x0F);
+    bench
+        .slot
+        .set_bus_fault(BusFault::HoldsSda { clocks: None });
+    assert!(bench.wait(sr1::ARLO));
+    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    assert_eq!(bench.slot.channel(1), Channel::Ao { code: 0 });
+}
+
+#[test]
+fn interrupts_follow_their_enables() {
+    let mut bench = Bench::new();
+    bench.write(offset::CR2, 36 | cr2::ITEVTEN);
+    bench.set(cr1::START);
+    assert!(bench.wait(sr1::SB));
+    assert!(bench.i2c.irq_event() && !bench.i2c.irq_error());
+    bench.write(offset::DR, 0xC0);
+    assert!(!bench.i2c.irq_event());
+    assert!(bench.wait(sr1::ADDR));
+    bench.clear_addr();
+    assert!(!bench.i2c.irq_event(), "TXE needs ITBUFEN");
+    bench.write(offset::CR2, 36 | cr2::ITEVTEN | cr2::ITBUFEN);
+    assert!(bench.i2c.irq_event());
+}
+
+#[test]
+fn misuse_is_reported() {
+    let mut bench = Bench::new();
+    assert!(bench.try_write(offset::CCR, 180).is_err(), "PE = 1");
+    assert!(bench.try_write(offset::CR1, ON | cr1::STOP).is_err());
+    assert!(bench.try_write(offset::DR, 0).is_err());
+    assert!(bench.try_write(offset::CR2, 36 | 1 << 11).is_err(), "DMA");
+    assert!(bench.try_write(offset::CR1, ON | 2).is_err(), "SMBus");
+    bench.write(offset::CR1, ON);
+    bench.set(cr1::START);
+    assert!(bench.try_write(offset::CR1, ON).is_err(), "START pending");
+    assert!(bench.read(0x20) == 11 && bench.i2c.read(0x24, Time::ZERO).is_err());
+    for (cr2, ccr) in [(8, 180), (36, 3), (36, 179), (36, ccr::FAST | 29)] {
+        let mut bench = Bench::new();
+        bench.write(offset::CR1, 0);
+        bench.write(offset::CR2, cr2);
+        bench.write(offset::CCR, ccr);
+        assert!(bench.try_write(offset::CR1, ON).is_err(), "{cr2} {ccr}");
+    }
+}

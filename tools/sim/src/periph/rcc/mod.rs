@@ -1,0 +1,368 @@
+//! Reset and clock control, RM0008 chapter 7: oscillators, PLL, prescalers, clock enables, reset flags.
+//!
+//! The backup domain (BDCR), ready interrupts (CIR) and MCO are not modelled. The clock security system
+//! can be switched on, but has nothing to do: a crystal of this board that has started never stops.
+
+use crate::peripheral::{Peripheral, Unmodelled};
+use crate::time::Time;
+
+use crate::periph::clocks::{Clocks, HSE_HZ, HSI_HZ};
+
+/// HSE start-up: datasheet DS5319 table 22, typical with the crystal in its recommended circuit.
+const HSE_START: Time = Time::from_us(2_000);
+/// HSI wake-up: DS5319 table 24, maximum.
+const HSI_START: Time = Time::from_us(2);
+/// LSI start-up: DS5319 table 25, maximum.
+const LSI_START: Time = Time::from_us(85);
+/// PLL lock: DS5319 table 27, maximum.
+const PLL_LOCK: Time = Time::from_us(200);
+
+const CR_HSION: u32 = 1 << 0;
+const CR_HSIRDY: u32 = 1 << 1;
+const CR_HSITRIM: u32 = 0x1F << 3;
+const CR_HSICAL: u32 = 0x5A << 8;
+const CR_HSEON: u32 = 1 << 16;
+const CR_HSERDY: u32 = 1 << 17;
+const CR_HSEBYP: u32 = 1 << 18;
+const CR_CSSON: u32 = 1 << 19;
+const CR_PLLON: u32 = 1 << 24;
+const CR_PLLRDY: u32 = 1 << 25;
+const CR_RESET: u32 = CR_HSION | 16 << 3;
+
+const CFGR_SW: u32 = 0b11;
+/// PLLSRC, PLLXTPRE, PLLMUL: written only while the PLL is off (RM0008 7.3.2).
+const CFGR_PLL: u32 = 0b11_1111 << 16;
+const CFGR_MCO: u32 = 0b111 << 24;
+const CFGR_WRITABLE: u32 = 0x077F_FFF3;
+
+const CSR_LSION: u32 = 1 << 0;
+const CSR_LSIRDY: u32 = 1 << 1;
+const CSR_RMVF: u32 = 1 << 24;
+/// SRAMEN and FLITFEN.
+const AHBENR_RESET: u32 = 0x14;
+
+/// What reset the part: the flag in RCC_CSR (RM0008 7.3.10). Every reset pulls NRST low as well
+/// (RM0008 7.1.1), so PINRSTF always comes with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// Power came on.
+    PowerOn,
+    /// The NRST pin alone.
+    Pin,
+    /// SYSRESETREQ.
+    Software,
+    /// The independent watchdog.
+    Iwdg,
+}
+
+impl Cause {
+    const fn flags(self) -> u32 {
+        const PIN: u32 = 1 << 26;
+        match self {
+            Self::PowerOn => PIN | 1 << 27,
+            Self::Pin => PIN,
+            Self::Software => PIN | 1 << 28,
+            Self::Iwdg => PIN | 1 << 29,
+        }
+    }
+}
+
+/// What the part asks of the rest after a write to RCC.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Changes {
+    /// Clock frequencies or clock enables have changed.
+    pub clocks: bool,
+    /// Bits newly set in APB2RSTR and APB1RSTR: those blocks are to be reset.
+    pub resets: (u32, u32),
+}
+
+/// An oscillator or the PLL: off, or on and ready at an instant (never, for a broken crystal).
+type Ready = Option<Time>;
+
+/// The RCC registers.
+#[derive(Debug)]
+pub struct Rcc {
+    crystal: bool,
+    cr: u32,
+    cfgr: u32,
+    sws: u32,
+    rstr: (u32, u32),
+    ahbenr: u32,
+    enr: (u32, u32),
+    csr_flags: u32,
+    hsi: Ready,
+    hse: Ready,
+    pll: Ready,
+    lsi: Ready,
+    iwdg_needs_lsi: bool,
+    now: Time,
+    changes: Changes,
+}
+
+impl Rcc {
+    /// RCC as power-on leaves it, on a board whose crystal works or not.
+    #[must_use]
+    pub fn new(crystal: bool) -> Self {
+        Self {
+            crystal,
+            cr: CR_RESET,
+            cfgr: 0,
+            sws: 0,
+            rstr: (0, 0),
+            ahbenr: AHBENR_RESET,
+            enr: (0, 0),
+            csr_flags: Cause::PowerOn.flags(),
+            hsi: Some(Time::ZERO),
+            hse: None,
+            pll: None,
+            lsi: None,
+            iwdg_needs_lsi: false,
+            now: Time::ZERO,
+            changes: Changes::default(),
+        }
+    }
+
+    /// Notes why the part was reset; a power-on forgets the flags before it.
+    pub fn note_reset(&mut self, cause: Cause) {
+        if cause == Cause::PowerOn {
+            self.csr_flags = 0;
+        }
+        self.csr_flags |= cause.flags();
+    }
+
+    /// The watchdog has started and keeps the LSI on (RM0008 7.2.9).
+    pub fn hold_lsi(&mut self, now: Time) {
+        self.iwdg_needs_lsi = true;
+        self.lsi.get_or_insert(now + LSI_START);
+    }
+
+    /// Whether the HSI runs: flash is programmed and erased by its clock (PM0075 2.3).
+    #[must_use]
+    pub fn hsi_on(&self) -> bool {
+        self.hsi.is_some()
+    }
+
+    /// The clock enables of APB2 and APB1.
+    #[must_use]
+    pub fn enabled(&self) -> (u32, u32) {
+        self.enr
+    }
+
+    /// The resets that RSTR holds, of APB2 and APB1.
+    #[must_use]
+    pub fn held_in_reset(&self) -> (u32, u32) {
+        self.rstr
+    }
+
+    /// What has changed since the last call.
+    pub fn take_changes(&mut self) -> Changes {
+        core::mem::take(&mut self.changes)
+    }
+
+    /// The frequencies of every clock.
+    #[must_use]
+    pub fn clocks(&self) -> Clocks {
+        Clocks::of(self.cfgr, self.sws)
+    }
+
+    fn is_ready(&self, source: Ready) -> bool {
+        source.is_some_and(|at| at <= self.now)
+    }
+
+    /// The source SW asks for.
+    fn wanted(&self) -> Ready {
+        match self.cfgr & CFGR_SW {
+            0 => self.hsi,
+            1 => self.hse,
+            _ => self.pll,
+        }
+    }
+
+    /// A switch happens once the clock asked for is ready (RM0008 7.2.6).
+    fn switch(&mut self) {
+        let wanted = self.cfgr & CFGR_SW;
+        if wanted != self.sws && self.is_ready(self.wanted()) {
+            self.sws = wanted;
+            self.changes.clocks = true;
+        }
+    }
+
+    /// Whether the system clock runs from the HSE, directly or through the PLL.
+    fn hse_in_use(&self) -> bool {
+        self.sws == 1 || (self.sws == 2 && self.pll_from_hse())
+    }
+
+    fn pll_from_hse(&self) -> bool {
+        self.cfgr & 1 << 16 != 0
+    }
+
+    fn read_cr(&self) -> u32 {
+        let flag = |source, bit| if self.is_ready(source) { bit } else { 0 };
+        self.cr
+            | CR_HSICAL
+            | flag(self.hsi, CR_HSIRDY)
+            | flag(self.hse, CR_HSERDY)
+            | flag(self.pll, CR_PLLRDY)
+    }
+
+    fn write_cr(&mut self, value: u32, now: Time) {
+        let mut cr = value & (CR_HSION | CR_HSITRIM | CR_HSEON | CR_HSEBYP | CR_PLLON);
+        // An oscillator that feeds the system clock cannot be stopped (RM0008 7.3.1).
+        if self.sws == 0 || (self.sws == 2 && !self.pll_from_hse()) {
+            cr |= CR_HSION;
+        }
+        if self.hse_in_use() {
+            cr |= CR_HSEON;
+        }
+        if self.sws == 2 {
+            cr |= CR_PLLON;
+        }
+        let start = |was: Ready, on: bool, ready: Time| match (on, was) {
+            (true, None) => Some(ready),
+            (true, running) => running,
+            (false, _) => None,
+        };
+        self.hsi = start(self.hsi, cr & CR_HSION != 0, now + HSI_START);
+        let hse_ready = if self.crystal {
+            now + HSE_START
+        } else {
+            Time::MAX
+        };
+        self.hse = start(self.hse, cr & CR_HSEON != 0, hse_ready);
+        // The PLL locks once its source runs.
+        let source = if self.pll_from_hse() {
+            self.hse
+        } else {
+            self.hsi
+        };
+        let lock = source.map_or(Time::MAX, |ready| ready.max(now) + PLL_LOCK);
+        self.pll = start(self.pll, cr & CR_PLLON != 0, lock);
+        // Once on, only a reset switches it off; it goes on when the HSE is ready (RM0008 7.3.1).
+        let secured = self.cr & CR_CSSON != 0 || value & CR_CSSON != 0;
+        self.cr = cr | if secured { CR_CSSON } else { 0 };
+    }
+
+    fn write_cfgr(&mut self, value: u32) -> Result<(), Unmodelled> {
+        let mut value = value & CFGR_WRITABLE;
+        if self.cr & CR_PLLON != 0 {
+            value = value & !CFGR_PLL | self.cfgr & CFGR_PLL;
+        }
+        if value & CFGR_SW == 3 {
+            // "Not allowed" (RM0008 7.3.2): the switch stays where it was.
+            value = value & !CFGR_SW | self.cfgr & CFGR_SW;
+        }
+        self.cfgr = value;
+        self.changes.clocks = true;
+        if value & CFGR_MCO != 0 {
+            return Err(Unmodelled("RCC_CFGR.MCO, the clock output"));
+        }
+        Ok(())
+    }
+
+    fn read_csr(&self) -> u32 {
+        let mut csr = self.csr_flags;
+        if self.lsi.is_some() {
+            csr |= CSR_LSION;
+        }
+        if self.is_ready(self.lsi) {
+            csr |= CSR_LSIRDY;
+        }
+        csr
+    }
+
+    fn write_csr(&mut self, value: u32, now: Time) {
+        if value & CSR_RMVF != 0 {
+            self.csr_flags = 0;
+        }
+        if value & CSR_LSION != 0 {
+            self.lsi.get_or_insert(now + LSI_START);
+        } else if !self.iwdg_needs_lsi {
+            self.lsi = None;
+        }
+    }
+}
+
+impl Peripheral for Rcc {
+    fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
+        Ok(match offset {
+            0x00 => self.read_cr(),
+            0x04 => self.cfgr | self.sws << 2,
+            // No ready interrupt can be enabled, and without its enable no flag is set.
+            0x08 => 0,
+            0x0C => self.rstr.0,
+            0x10 => self.rstr.1,
+            0x14 => self.ahbenr,
+            0x18 => self.enr.0,
+            0x1C => self.enr.1,
+            0x20 => return Err(Unmodelled("RCC_BDCR, the backup domain")),
+            0x24 => self.read_csr(),
+            _ => return Err(Unmodelled("a reserved address of RCC")),
+        })
+    }
+
+    fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Unmodelled> {
+        match offset {
+            0x00 => self.write_cr(value, now),
+            0x04 => {
+                let written = self.write_cfgr(value);
+                self.switch();
+                return written;
+            }
+            0x08 if value & 0x1F00 != 0 => return Err(Unmodelled("RCC_CIR's ready interrupts")),
+            0x08 => {}
+            0x0C => {
+                self.changes.resets.0 |= value & !self.rstr.0;
+                self.rstr.0 = value;
+            }
+            0x10 => {
+                self.changes.resets.1 |= value & !self.rstr.1;
+                self.rstr.1 = value;
+            }
+            0x14 => self.ahbenr = value & 0x57,
+            0x18 => {
+                self.enr.0 = value;
+                self.changes.clocks = true;
+            }
+            0x1C => {
+                self.enr.1 = value;
+                self.changes.clocks = true;
+            }
+            0x20 => return Err(Unmodelled("RCC_BDCR, the backup domain")),
+            0x24 => self.write_csr(value, now),
+            _ => return Err(Unmodelled("a reserved address of RCC")),
+        }
+        Ok(())
+    }
+
+    fn next_event(&self) -> Option<Time> {
+        // Only a switch that waits for its clock happens by itself; ready flags are worked out when read.
+        if self.cfgr & CFGR_SW == self.sws {
+            return None;
+        }
+        self.wanted().filter(|&at| at < Time::MAX)
+    }
+
+    fn advance(&mut self, now: Time) {
+        self.now = now;
+        self.switch();
+    }
+
+    fn reset(&mut self, now: Time) {
+        let fresh = Self::new(self.crystal);
+        *self = Self {
+            csr_flags: self.csr_flags,
+            now,
+            hsi: Some(now),
+            changes: Changes {
+                clocks: true,
+                ..Changes::default()
+            },
+            ..fresh
+        };
+    }
+}
+
+const _: () = assert!(HSE_HZ == HSI_HZ, "the board's crystal is 8 MHz, as the HSI");
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,257 @@
+//! What the receiver makes of its pin, and how its flags are cleared.
+
+use super::*;
+use crate::line::{Character, Rate};
+
+const HZ: u32 = 72_000_000;
+/// 115200 baud at 72 MHz: 625 cycles a bit (RM0008 table 192).
+const BRR: u32 = 0x271;
+const ON: u32 = cr1::UE | cr1::RE;
+
+fn cycles(n: u64) -> Time {
+    Time::cycles(n, HZ)
+}
+
+fn receiver(cr1: u32, cr2: u32) -> Usart {
+    let mut usart = Usart::new();
+    usart.set_clock(HZ, Time::ZERO);
+    for (offset, value) in [
+        (offset::BRR, BRR),
+        (offset::CR2, cr2),
+        (offset::CR1, ON | cr1),
+    ] {
+        assert_eq!(usart.write(offset, value, Time::ZERO), Ok(()));
+    }
+    usart
+}
+
+fn settings(format: Format) -> Settings {
+    Settings {
+        baud: 115_200,
+        format,
+    }
+}
+
+fn play(usart: &mut Usart, c: Character) {
+    for bit in 0..c.bits {
+        usart.receive_edge(c.start + c.bit * u64::from(bit), c.level(bit));
+    }
+    usart.receive_edge(c.end(), true);
+}
+
+/// SR without IDLE, which has a test of its own.
+fn status(usart: &mut Usart, at: Time) -> u32 {
+    usart.advance(at);
+    usart.read(offset::SR, at).expect("modelled") & !sr::IDLE
+}
+
+fn data(usart: &mut Usart, at: Time) -> u32 {
+    usart.advance(at);
+    usart.read(offset::DR, at).expect("modelled")
+}
+
+const START: Time = Time::from_us(100);
+
+#[test]
+fn rxne_rises_at_the_tenth_sample_of_the_stop_bit() {
+    let mut usart = receiver(cr1::RXNEIE, 0);
+    assert!(usart.awaits_start());
+    play(
+        &mut usart,
+        Character::new(settings(Format::N1), 0x5A).at(START),
+    );
+    usart.advance(START);
+    assert!(!usart.awaits_start());
+    // 9 bits and 10/16: 9.625 * 625 = 6015.6 cycles = 83.55 us.
+    let due = START + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
+    assert_eq!(usart.next_event(), Some(due));
+    usart.advance(due - Time::from_ps(1));
+    assert!(!usart.irq());
+    usart.advance(due);
+    assert!(usart.irq());
+    assert_eq!(status(&mut usart, due), sr::RESET | sr::RXNE);
+    assert_eq!(data(&mut usart, due), 0x5A);
+    assert!(!usart.irq());
+    assert!(usart.awaits_start());
+}
+
+#[test]
+fn with_two_stop_bits_rxne_rises_at_the_end_of_the_first() {
+    let mut usart = receiver(0, cr2::STOP_TWO);
+    play(
+        &mut usart,
+        Character::new(settings(Format::N2), 0).at(START),
+    );
+    usart.advance(START);
+    assert_eq!(usart.next_event(), Some(START + cycles(10 * 625)));
+}
+
+#[test]
+fn overrun_keeps_the_first_byte_and_is_cleared_by_reading_sr_then_dr() {
+    let mut usart = receiver(cr1::RXNEIE, 0);
+    let c = |byte, n: u64| {
+        Character::new(settings(Format::N1), byte).at(START + Time::from_us(100) * n)
+    };
+    play(&mut usart, c(0x11, 0));
+    play(&mut usart, c(0x22, 1));
+    let t = START + Time::from_us(200);
+    assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE | sr::ORE);
+    assert_eq!(data(&mut usart, t), 0x11);
+    assert_eq!(status(&mut usart, t), sr::RESET);
+
+    // ORE that comes between the two reads is not cleared by them.
+    play(&mut usart, c(0x33, 3));
+    let between = START + Time::from_us(390);
+    assert_eq!(status(&mut usart, between), sr::RESET | sr::RXNE);
+    play(&mut usart, c(0x44, 4));
+    let after = START + Time::from_us(490);
+    assert_eq!(data(&mut usart, after), 0x33);
+    assert!(usart.irq(), "ORE alone interrupts by RXNEIE");
+    assert_eq!(status(&mut usart, after), sr::RESET | sr::ORE);
+    // RXNE = 0: what DR holds has been read before.
+    assert_eq!(data(&mut usart, after), 0x33);
+    assert_eq!(status(&mut usart, after), sr::RESET);
+}
+
+#[test]
+fn parity_framing_and_noise_errors_have_their_flags() {
+    let even = cr1::M | cr1::PCE;
+    for (format, parity) in [(Format::E1, even), (Format::O1, even | cr1::PS)] {
+        let mut usart = receiver(parity, 0);
+        let c = Character::new(settings(format), 0x31).at(START);
+        play(&mut usart, c);
+        let t = START + Time::from_us(100);
+        assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE, "{format:?}");
+        // The parity bit is the ninth: of 0x31 with three ones, 1 for even, 0 for odd.
+        let ninth = if format == Format::E1 { 0x100 } else { 0 };
+        assert_eq!(data(&mut usart, t), 0x31 | ninth);
+        play(&mut usart, c.with_wrong_parity().at(t));
+        let t = t + Time::from_us(100);
+        assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE | sr::PE);
+        data(&mut usart, t);
+        assert_eq!(status(&mut usart, t), sr::RESET);
+    }
+
+    let mut usart = receiver(0, 0);
+    let n1 = settings(Format::N1);
+    play(
+        &mut usart,
+        Character::new(n1, 0xFF).with_bad_stop(n1).at(START),
+    );
+    let t = START + Time::from_us(100);
+    assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE | sr::FE);
+    assert_eq!(data(&mut usart, t), 0xFF);
+    // A glitch of a sixteenth on sample 9 of the first data bit.
+    usart.receive_edge(t, false);
+    usart.receive_edge(t + cycles(625), true);
+    let rate = Rate::from_clock(BRR, HZ);
+    usart.receive_edge(t + rate.sixteenths(24) + cycles(5), false);
+    usart.receive_edge(t + rate.sixteenths(25) + cycles(5), true);
+    let t = t + Time::from_us(100);
+    assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE | sr::NE);
+    assert_eq!(data(&mut usart, t), 0xFF);
+}
+
+#[test]
+fn a_break_is_a_framing_error_once_and_the_next_start_needs_an_edge() {
+    let mut usart = receiver(0, 0);
+    usart.receive_edge(START, false);
+    let t = START + Time::from_ms(5);
+    assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE | sr::FE);
+    assert_eq!(data(&mut usart, t), 0);
+    assert_eq!(status(&mut usart, t + Time::from_ms(5)), sr::RESET);
+    usart.receive_edge(t + Time::from_ms(6), true);
+    let c = Character::new(settings(Format::N1), 0x42).at(t + Time::from_ms(7));
+    play(&mut usart, c);
+    assert_eq!(data(&mut usart, t + Time::from_ms(8)), 0x42);
+}
+
+#[test]
+fn a_deaf_receiver_joins_at_the_next_edge() {
+    let mut usart = receiver(0, 0);
+    usart
+        .write(offset::CR1, cr1::UE, Time::ZERO)
+        .expect("modelled");
+    assert!(!usart.awaits_start());
+    play(
+        &mut usart,
+        Character::new(settings(Format::N1), 0x00).at(START),
+    );
+    // Switched on during the low data bits: no edge before the stop bit, nothing received.
+    let on = START + Time::from_us(30);
+    usart.advance(on);
+    usart.write(offset::CR1, ON, on).expect("modelled");
+    assert_eq!(status(&mut usart, on + Time::from_ms(1)) & sr::RXNE, 0);
+}
+
+#[test]
+fn the_wrong_rate_is_heard_wrongly() {
+    let mut usart = receiver(0, 0);
+    let slow = Settings {
+        baud: 57_600,
+        format: Format::N1,
+    };
+    // Each bit at 57600 is two here: 0 0, 0 0, 1 1, 1 1, 0 0, ... The first is the start bit, eight are
+    // data, and the second half of the fourth data bit stands where the stop bit should.
+    play(&mut usart, Character::new(slow, 0b0011_0110).at(START));
+    let first = START + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
+    assert_eq!(status(&mut usart, first), sr::RESET | sr::RXNE | sr::FE);
+    assert_eq!(data(&mut usart, first), 0b0111_1000);
+}
+
+#[test]
+fn idle_comes_one_frame_after_the_last_character_and_only_once() {
+    let mut usart = receiver(cr1::IDLEIE, 0);
+    // An idle line when the receiver is switched on counts too.
+    assert_eq!(usart.next_event(), Some(cycles(10 * 625)));
+    usart.advance(START);
+    assert!(usart.irq());
+    status(&mut usart, START);
+    data(&mut usart, START);
+    assert!(!usart.irq());
+    assert_eq!(usart.next_event(), None);
+    play(
+        &mut usart,
+        Character::new(settings(Format::N1), 1).at(START),
+    );
+    let rxne = START + Time::from_us(85);
+    usart.advance(rxne);
+    // Ten bits of the character, ten of silence.
+    let idle = START + cycles(6250) + cycles(6250);
+    assert_eq!(usart.next_event(), Some(idle));
+    usart.advance(idle - Time::from_ps(1));
+    assert!(!usart.irq());
+    usart.advance(idle);
+    assert!(usart.irq());
+    status(&mut usart, idle);
+    data(&mut usart, idle);
+    usart.advance(idle + Time::from_secs(1));
+    assert!(!usart.irq());
+}
+
+#[test]
+fn rxne_is_cleared_by_writing_zero_too() {
+    let mut usart = receiver(0, 0);
+    play(
+        &mut usart,
+        Character::new(settings(Format::N1), 1).at(START),
+    );
+    let t = START + Time::from_us(90);
+    usart.advance(t);
+    usart.write(offset::SR, !sr::RXNE, t).expect("modelled");
+    assert_eq!(status(&mut usart, t), sr::RESET);
+}
+
+#[test]
+fn a_long_run_keeps_few_edges() {
+    let mut usart = receiver(0, 0);
+    for n in 0..1000_u64 {
+        let at = START + Time::from_us(100) * n;
+        play(
+            &mut usart,
+            Character::new(settings(Format::N1), 0x55).at(at),
+        );
+        assert_eq!(data(&mut usart, at + Time::from_us(99)), 0x55);
+    }
+    assert!(usart.rx_pin.len() < 20, "{}", usart.rx_pin.len());
+}

@@ -1,0 +1,289 @@
+//! The slot: the module plugged into it, and the world outside on its channels.
+//!
+//! Four lines lead from the slot to the part's pins; the modules with analog outputs also sit on I2C1.
+//!
+//! | module | lines |
+//! |---|---|
+//! | 4DI | an energised input pulls its line low, else it lets go |
+//! | 4DO | line high = the transistor conducts |
+//! | 2Relay | lines 1, 2: jumper of relay 1, 2, low = manual; lines 3, 4: coil, high = energised |
+//! | 4AI | the voltage at the pin |
+//! | 4AO | none: an MCP4728 on I2C |
+//! | 2AI2AO | lines 1, 2 as 4AI; outputs 3, 4 are DAC channels C, D |
+
+mod channel;
+pub mod mcp4728;
+
+#[cfg(test)]
+mod tests;
+
+pub use channel::{Channel, Error, MAX_MILLIVOLTS};
+use mcp4728::{Mcp4728, Setting};
+use register_map::Module;
+
+use crate::periph::gpio::Drive;
+use crate::periph::i2c::{Bus, Wires};
+use crate::time::Time;
+
+/// What is wrong with the DAC or its wires.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BusFault {
+    /// Nothing.
+    #[default]
+    None,
+    /// The DAC does not answer its address.
+    Absent,
+    /// Something holds the clock low.
+    HoldsScl,
+    /// Something holds the data wire low: a slave that lost count of its clocks.
+    HoldsSda {
+        /// It lets go after that many clock pulses made by hand; `None` = never.
+        clocks: Option<u8>,
+    },
+}
+
+/// The slot.
+#[derive(Clone, Debug)]
+pub struct Slot {
+    module: Module,
+    powered: bool,
+    energised: [bool; 4],
+    manual: [bool; 2],
+    millivolts: [u16; 4],
+    /// The levels the part's pins give the lines.
+    driven: [bool; 4],
+    dac: Mcp4728,
+    fault: BusFault,
+    /// The I2C pins as the part drives them by hand.
+    pins: Wires,
+}
+
+impl Default for Slot {
+    fn default() -> Self {
+        Self::new(Module::None)
+    }
+}
+
+impl Slot {
+    /// A slot with `module` in it, its power on and nothing applied from outside.
+    #[must_use]
+    pub fn new(module: Module) -> Self {
+        Self {
+            module,
+            powered: true,
+            energised: [false; 4],
+            manual: [false; 2],
+            millivolts: [0; 4],
+            driven: [false; 4],
+            dac: Mcp4728::default(),
+            fault: BusFault::None,
+            pins: Wires::FREE,
+        }
+    }
+
+    /// What is plugged in.
+    #[must_use]
+    pub const fn module(&self) -> Module {
+        self.module
+    }
+
+    /// Plugs another module, a new one: nothing is applied to it, and its DAC is as the factory left it.
+    pub fn set_module(&mut self, module: Module) {
+        *self = Self {
+            powered: self.powered,
+            ..Self::new(module)
+        };
+    }
+
+    /// The board's power comes or goes. What the outside applies stays; the DAC starts from its EEPROM.
+    pub fn set_power(&mut self, on: bool, _now: Time) {
+        if on && !self.powered {
+            self.dac.power_on();
+        }
+        if !on {
+            self.driven = [false; 4];
+            self.pins = Wires::FREE;
+        }
+        self.powered = on;
+    }
+
+    /// Channel `ch` (1 to 4); [`Channel::None`] for any other number.
+    #[must_use]
+    pub fn channel(&self, ch: usize) -> Channel {
+        if !(1..=4).contains(&ch) {
+            return Channel::None;
+        }
+        let n = ch - 1;
+        match self.module {
+            Module::Di4 => Channel::Di {
+                energised: self.energised[n],
+            },
+            Module::Do4 => Channel::Do {
+                on: self.powered && self.driven[n],
+            },
+            Module::Relay2 if n < 2 => Channel::Relay {
+                energised: self.powered && self.driven[n + 2],
+                manual: self.manual[n],
+            },
+            Module::Ai4 => self.analog_input(n),
+            Module::Ai2Ao2 if n < 2 => self.analog_input(n),
+            Module::Ao4 | Module::Ai2Ao2 => Channel::Ao {
+                code: if self.powered { self.dac.output(n) } else { 0 },
+            },
+            Module::None | Module::Relay2 => Channel::None,
+        }
+    }
+
+    const fn analog_input(&self, n: usize) -> Channel {
+        Channel::Ai {
+            millivolts: self.millivolts[n],
+        }
+    }
+
+    /// Energises the digital input on channel `ch` (1 to 4), or takes the voltage away.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Channel`] when that channel is no digital input.
+    pub fn set_energised(&mut self, ch: usize, energised: bool) -> Result<(), Error> {
+        match self.channel(ch) {
+            Channel::Di { .. } => self.energised[ch - 1] = energised,
+            _ => return Err(Error::Channel),
+        }
+        Ok(())
+    }
+
+    /// Sets the jumper of relay `ch` (1 or 2) to manual or back.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Channel`] when that channel is no relay.
+    pub fn set_manual(&mut self, ch: usize, manual: bool) -> Result<(), Error> {
+        match self.channel(ch) {
+            Channel::Relay { .. } => self.manual[ch - 1] = manual,
+            _ => return Err(Error::Channel),
+        }
+        Ok(())
+    }
+
+    /// Puts a voltage on the analog input of channel `ch` (1 to 4), 0 to 3300 mV at the pin.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Channel`] when that channel is no analog input, [`Error::Millivolts`] above 3300.
+    pub fn set_millivolts(&mut self, ch: usize, millivolts: u16) -> Result<(), Error> {
+        match self.channel(ch) {
+            Channel::Ai { .. } if millivolts > MAX_MILLIVOLTS => return Err(Error::Millivolts),
+            Channel::Ai { .. } => self.millivolts[ch - 1] = millivolts,
+            _ => return Err(Error::Channel),
+        }
+        Ok(())
+    }
+
+    /// What the module does to line `line` (1 to 4).
+    #[must_use]
+    pub fn drive(&self, line: usize) -> Drive {
+        let pulls = |low| if low { Drive::Low } else { Drive::Floating };
+        match (self.module, line) {
+            (Module::Di4, 1..=4) => pulls(self.energised[line - 1]),
+            (Module::Relay2, 1 | 2) => pulls(self.manual[line - 1]),
+            (Module::Ai4, 1..=4) | (Module::Ai2Ao2, 1 | 2) => {
+                Drive::Millivolts(self.millivolts[line - 1])
+            }
+            _ => Drive::Floating,
+        }
+    }
+
+    /// The part's pin drives line `line` (1 to 4) high or not; low for a pin that drives nothing. Any
+    /// other line is ignored.
+    pub fn set_line(&mut self, line: usize, high: bool) {
+        if let Some(driven) = line.checked_sub(1).and_then(|n| self.driven.get_mut(n)) {
+            *driven = high;
+        }
+    }
+
+    /// Whether the module has a DAC on I2C1.
+    #[must_use]
+    pub const fn has_dac(&self) -> bool {
+        matches!(self.module, Module::Ao4 | Module::Ai2Ao2)
+    }
+
+    /// The DAC's four input registers and its EEPROM, A to D.
+    #[must_use]
+    pub const fn dac(&self) -> ([Setting; 4], [Setting; 4]) {
+        (self.dac.registers(), self.dac.eeprom())
+    }
+
+    /// Something goes wrong with the DAC or its wires, or is put right.
+    pub const fn set_bus_fault(&mut self, fault: BusFault) {
+        self.fault = fault;
+    }
+
+    /// What is wrong with the DAC or its wires.
+    #[must_use]
+    pub const fn bus_fault(&self) -> BusFault {
+        self.fault
+    }
+
+    /// The I2C pins as the part drives them by hand, `true` = not pulled low; [`Wires::FREE`] while they are
+    /// the I2C block's. Clock pulses made so free a stuck data wire.
+    pub fn set_pins(&mut self, pins: Wires) {
+        let rises = pins.scl && !self.pins.scl;
+        self.pins = pins;
+        if let BusFault::HoldsSda {
+            clocks: Some(clocks),
+        } = &mut self.fault
+            && rises
+        {
+            *clocks = clocks.saturating_sub(1);
+            if *clocks == 0 {
+                self.fault = BusFault::None;
+            }
+        }
+    }
+
+    /// What the devices do to the I2C wires, whatever the part does: for the part's input pins.
+    #[must_use]
+    pub fn held(&self) -> Wires {
+        Wires {
+            scl: self.fault != BusFault::HoldsScl,
+            sda: !matches!(self.fault, BusFault::HoldsSda { .. }),
+        }
+    }
+
+    const fn answers(&self) -> bool {
+        self.powered && self.has_dac() && !matches!(self.fault, BusFault::Absent)
+    }
+}
+
+impl Bus for Slot {
+    fn wires(&self) -> Wires {
+        let held = self.held();
+        Wires {
+            scl: held.scl && self.pins.scl,
+            sda: held.sda && self.pins.sda,
+        }
+    }
+
+    fn address(&mut self, byte: u8, now: Time) -> bool {
+        self.answers() && self.dac.address(byte, now)
+    }
+
+    fn write(&mut self, byte: u8, now: Time) -> bool {
+        self.answers() && self.dac.write(byte, now)
+    }
+
+    fn read(&mut self, now: Time) -> u8 {
+        if self.answers() {
+            self.dac.read(now)
+        } else {
+            0xFF
+        }
+    }
+
+    fn stop(&mut self, now: Time) {
+        if self.answers() {
+            self.dac.stop(now);
+        }
+    }
+}

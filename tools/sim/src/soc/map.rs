@@ -1,0 +1,296 @@
+//! Where the register blocks are (RM0008 table 3), which clock feeds each, and how wide its accesses may be.
+
+/// A register block that is modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Block {
+    /// General-purpose timer 2.
+    Tim2,
+    /// General-purpose timer 3.
+    Tim3,
+    /// General-purpose timer 4.
+    Tim4,
+    /// Independent watchdog.
+    Iwdg,
+    /// USART3: the radio line.
+    Usart3,
+    /// I2C1: the analog-output module.
+    I2c1,
+    /// Alternate-function I/O.
+    Afio,
+    /// External interrupts.
+    Exti,
+    /// Port A.
+    GpioA,
+    /// Port B.
+    GpioB,
+    /// Port C.
+    GpioC,
+    /// Port D.
+    GpioD,
+    /// Analog-to-digital converter 1.
+    Adc1,
+    /// Advanced timer 1.
+    Tim1,
+    /// USART1: the RS-485 line.
+    Usart1,
+    /// Reset and clock control.
+    Rcc,
+    /// Flash interface.
+    Flash,
+}
+
+/// How many blocks there are.
+pub const BLOCKS: usize = 17;
+
+/// What answers at an address of the peripheral region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A modelled block.
+    Block(Block),
+    /// A block of the part that is not modelled: its name.
+    Absent(&'static str),
+    /// Reserved.
+    Reserved,
+}
+
+/// Where the peripherals start.
+pub const BASE: u32 = 0x4000_0000;
+/// Every block starts at a multiple of 1 KiB.
+const GRAIN: u32 = 0x400;
+const GRAINS: usize = 0x2_4000 / GRAIN as usize;
+
+/// The blocks of the part, by base address.
+const PLACES: [(u32, Place); 34] = {
+    use Block as B;
+    use Place::{Absent, Reserved};
+    [
+        (0x4000_0000, Place::Block(B::Tim2)),
+        (0x4000_0400, Place::Block(B::Tim3)),
+        (0x4000_0800, Place::Block(B::Tim4)),
+        (0x4000_2800, Absent("RTC")),
+        (0x4000_2C00, Absent("WWDG")),
+        (0x4000_3000, Place::Block(B::Iwdg)),
+        (0x4000_3800, Absent("SPI2")),
+        (0x4000_4400, Absent("USART2")),
+        (0x4000_4800, Place::Block(B::Usart3)),
+        (0x4000_5400, Place::Block(B::I2c1)),
+        (0x4000_5800, Absent("I2C2")),
+        (0x4000_5C00, Absent("USB")),
+        (0x4000_6000, Absent("USB/CAN SRAM")),
+        (0x4000_6400, Absent("CAN")),
+        (0x4000_6C00, Absent("BKP")),
+        (0x4000_7000, Absent("PWR")),
+        (0x4001_0000, Place::Block(B::Afio)),
+        (0x4001_0400, Place::Block(B::Exti)),
+        (0x4001_0800, Place::Block(B::GpioA)),
+        (0x4001_0C00, Place::Block(B::GpioB)),
+        (0x4001_1000, Place::Block(B::GpioC)),
+        (0x4001_1400, Place::Block(B::GpioD)),
+        (0x4001_1800, Absent("GPIOE")),
+        (0x4001_2400, Place::Block(B::Adc1)),
+        (0x4001_2800, Absent("ADC2")),
+        (0x4001_2C00, Place::Block(B::Tim1)),
+        (0x4001_3000, Absent("SPI1")),
+        (0x4001_3800, Place::Block(B::Usart1)),
+        (0x4002_0000, Absent("DMA1")),
+        (0x4002_1000, Place::Block(B::Rcc)),
+        (0x4002_2000, Place::Block(B::Flash)),
+        (0x4002_3000, Absent("CRC")),
+        // The rest of the last grains of AHB blocks is reserved.
+        (0x4002_1400, Reserved),
+        (0x4002_2400, Reserved),
+    ]
+};
+
+static TABLE: [Place; GRAINS] = {
+    let mut table = [Place::Reserved; GRAINS];
+    let mut n = 0;
+    while n < PLACES.len() {
+        let (base, place) = PLACES[n];
+        table[((base - BASE) / GRAIN) as usize] = place;
+        n += 1;
+    }
+    table
+};
+
+/// What answers at `address`, and the offset into it.
+#[must_use]
+pub fn place(address: u32) -> (Place, u32) {
+    let grain = (address.wrapping_sub(BASE) / GRAIN) as usize;
+    match TABLE.get(grain) {
+        Some(&place) => (place, address % GRAIN),
+        None => (Place::Reserved, 0),
+    }
+}
+
+/// How wide an access a block takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Widths {
+    /// Words only.
+    Word,
+    /// Half-words and words.
+    HalfWord,
+    /// Bytes too.
+    Any,
+}
+
+impl Block {
+    /// Every block, in the order of its number.
+    pub const ALL: [Self; BLOCKS] = [
+        Self::Tim2,
+        Self::Tim3,
+        Self::Tim4,
+        Self::Iwdg,
+        Self::Usart3,
+        Self::I2c1,
+        Self::Afio,
+        Self::Exti,
+        Self::GpioA,
+        Self::GpioB,
+        Self::GpioC,
+        Self::GpioD,
+        Self::Adc1,
+        Self::Tim1,
+        Self::Usart1,
+        Self::Rcc,
+        Self::Flash,
+    ];
+
+    /// The block whose clock and reset are bit `bit` of RCC's registers for APB2 (0) or APB1 (1).
+    #[must_use]
+    pub fn of_bit(bus: usize, bit: u32) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|block| block.clock() == Some((bus, bit)))
+    }
+
+    /// Which bit enables its clock and resets it: APB2 (0) or APB1 (1), and the bit (RM0008 7.3.4 to
+    /// 7.3.8). `None`: it always has its clock.
+    #[must_use]
+    pub const fn clock(self) -> Option<(usize, u32)> {
+        Some(match self {
+            Self::Afio => (0, 0),
+            Self::GpioA => (0, 2),
+            Self::GpioB => (0, 3),
+            Self::GpioC => (0, 4),
+            Self::GpioD => (0, 5),
+            Self::Adc1 => (0, 9),
+            Self::Tim1 => (0, 11),
+            Self::Usart1 => (0, 14),
+            Self::Tim2 => (1, 0),
+            Self::Tim3 => (1, 1),
+            Self::Tim4 => (1, 2),
+            Self::Usart3 => (1, 18),
+            Self::I2c1 => (1, 21),
+            Self::Iwdg | Self::Exti | Self::Rcc | Self::Flash => return None,
+        })
+    }
+
+    /// How wide an access it takes, as the first lines of its registers' section in RM0008 say.
+    #[must_use]
+    pub const fn widths(self) -> Widths {
+        match self {
+            Self::Rcc => Widths::Any,
+            Self::Tim1
+            | Self::Tim2
+            | Self::Tim3
+            | Self::Tim4
+            | Self::Iwdg
+            | Self::Usart1
+            | Self::Usart3
+            | Self::I2c1 => Widths::HalfWord,
+            Self::Afio
+            | Self::Exti
+            | Self::GpioA
+            | Self::GpioB
+            | Self::GpioC
+            | Self::GpioD
+            | Self::Adc1
+            | Self::Flash => Widths::Word,
+        }
+    }
+
+    /// Its name in RM0008.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tim2 => "TIM2",
+            Self::Tim3 => "TIM3",
+            Self::Tim4 => "TIM4",
+            Self::Iwdg => "IWDG",
+            Self::Usart3 => "USART3",
+            Self::I2c1 => "I2C1",
+            Self::Afio => "AFIO",
+            Self::Exti => "EXTI",
+            Self::GpioA => "GPIOA",
+            Self::GpioB => "GPIOB",
+            Self::GpioC => "GPIOC",
+            Self::GpioD => "GPIOD",
+            Self::Adc1 => "ADC1",
+            Self::Tim1 => "TIM1",
+            Self::Usart1 => "USART1",
+            Self::Rcc => "RCC",
+            Self::Flash => "FLASH",
+        }
+    }
+}
+
+/// The interrupt lines of the medium-density STM32F103 (RM0008 table 63).
+pub mod irq {
+    /// Lines in all.
+    pub const LINES: u16 = 43;
+    /// FLASH.
+    pub const FLASH: u16 = 4;
+    /// ADC1 and ADC2.
+    pub const ADC1: u16 = 18;
+    /// TIM1 update.
+    pub const TIM1_UP: u16 = 25;
+    /// TIM1 capture and compare.
+    pub const TIM1_CC: u16 = 27;
+    /// TIM2.
+    pub const TIM2: u16 = 28;
+    /// TIM3.
+    pub const TIM3: u16 = 29;
+    /// TIM4.
+    pub const TIM4: u16 = 30;
+    /// I2C1 event.
+    pub const I2C1_EV: u16 = 31;
+    /// I2C1 error.
+    pub const I2C1_ER: u16 = 32;
+    /// USART1.
+    pub const USART1: u16 = 37;
+    /// USART3.
+    pub const USART3: u16 = 39;
+
+    /// EXTI's own lines, and the pins (one bit each) that share each.
+    pub const EXTI: [(u16, u32); 7] = [
+        (6, 1 << 0),
+        (7, 1 << 1),
+        (8, 1 << 2),
+        (9, 1 << 3),
+        (10, 1 << 4),
+        (23, 0x03E0),
+        (40, 0xFC00),
+    ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_lead_to_their_blocks() {
+        assert_eq!(place(0x4001_3804), (Place::Block(Block::Usart1), 4));
+        assert_eq!(place(0x4000_0C00).0, Place::Reserved);
+        assert_eq!(place(0x4002_3000).0, Place::Absent("CRC"));
+        assert_eq!(place(0x4003_0000).0, Place::Reserved);
+        assert_eq!(place(0x3FFF_FFFF).0, Place::Reserved);
+        for (n, block) in Block::ALL.into_iter().enumerate() {
+            assert_eq!(block as usize, n);
+            if let Some((bus, bit)) = block.clock() {
+                assert_eq!(Block::of_bit(bus, bit), Some(block));
+            }
+        }
+    }
+}

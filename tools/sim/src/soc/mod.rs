@@ -1,0 +1,383 @@
+//! The part around its core: every register block, its clock, its interrupt lines, and the wires between the
+//! blocks and to the board.
+//!
+//! Blocks know nothing of each other. Whatever one means to another goes through [`wires`], after every
+//! access to a block and after everything a block does by itself. Time moves from event to event: each
+//! block's next one is remembered, and [`Soc::advance`] takes them in their order.
+
+pub mod map;
+mod wires;
+
+use crate::finding::What;
+use crate::line::{Line, TxPin};
+use crate::periph::adc::Adc;
+use crate::periph::afio::Afio;
+use crate::periph::clocks::Clocks;
+use crate::periph::exti::Exti;
+use crate::periph::flash::Flash;
+use crate::periph::gpio::Gpio;
+use crate::periph::i2c::{I2c, Wires};
+use crate::periph::iwdg::Iwdg;
+use crate::periph::rcc::{Cause, Rcc};
+use crate::periph::timer::{Kind, Timer};
+use crate::periph::usart::Usart;
+use crate::peripheral::{Peripheral, Unmodelled};
+use crate::slot::Slot;
+use crate::time::Time;
+use map::{BLOCKS, Block, irq};
+
+/// The blocks, and what they are wired to.
+#[derive(Debug)]
+pub struct Soc {
+    /// Reset and clock control.
+    pub rcc: Rcc,
+    /// The flash controller and its cells.
+    pub flash: Flash,
+    /// Ports A to D.
+    pub gpio: [Gpio; 4],
+    /// The RS-485 bus.
+    pub line: Line,
+    /// The slot and what is plugged into it.
+    pub slot: Slot,
+    afio: Afio,
+    exti: Exti,
+    iwdg: Iwdg,
+    usart1: Usart,
+    usart3: Usart,
+    tim1: Timer,
+    tim2: Timer,
+    tim3: Timer,
+    tim4: Timer,
+    adc1: Adc,
+    i2c1: I2c,
+    /// What the wires last passed on: port levels, the TX pin, the I2C pins, clocks, FLASH_ACR.
+    seen: [u16; 4],
+    tx_pin: TxPin,
+    i2c_pins: Wires,
+    clocks: Clocks,
+    flash_access: (u32, bool),
+    /// When each block acts by itself next, and the earliest of them.
+    due: [Time; BLOCKS],
+    next: Time,
+    /// The levels of the interrupt lines, one bit each, and those that changed.
+    levels: u64,
+    changed_lines: u64,
+    /// What the machine has to take up.
+    pub signals: Signals,
+    notes: Vec<(Time, What)>,
+}
+
+/// What the blocks ask of the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Signals {
+    /// HCLK or the flash's wait states have changed.
+    pub rate: bool,
+    /// A block resets the part.
+    pub reset: Option<Cause>,
+    /// These bytes of flash have changed: first and end.
+    pub flash: Option<(usize, usize)>,
+}
+
+impl Soc {
+    /// The part after power-on, around these flash cells; `crystal`: whether the HSE works.
+    #[must_use]
+    pub fn new(crystal: bool, flash: Flash, slot: Slot) -> Self {
+        let rcc = Rcc::new(crystal);
+        let flash_access = flash.access_control();
+        let mut soc = Self {
+            clocks: rcc.clocks(),
+            rcc,
+            flash,
+            flash_access,
+            gpio: Default::default(),
+            line: Line::default(),
+            slot,
+            afio: Afio::default(),
+            exti: Exti::default(),
+            iwdg: Iwdg::default(),
+            usart1: Usart::new(),
+            usart3: Usart::new(),
+            tim1: Timer::new(Kind::Advanced),
+            tim2: Timer::new(Kind::General),
+            tim3: Timer::new(Kind::General),
+            tim4: Timer::new(Kind::General),
+            adc1: Adc::new(),
+            i2c1: I2c::new(),
+            seen: [0; 4],
+            tx_pin: TxPin::Level(true),
+            i2c_pins: Wires::FREE,
+            due: [Time::MAX; BLOCKS],
+            next: Time::MAX,
+            levels: 0,
+            changed_lines: 0,
+            signals: Signals::default(),
+            notes: Vec::new(),
+        };
+        soc.set_clocks(Time::ZERO);
+        soc
+    }
+
+    /// A reset of the part.
+    pub fn reset(&mut self, cause: Cause, now: Time) {
+        self.advance(now);
+        self.rcc.note_reset(cause);
+        for block in Block::ALL {
+            self.reset_block(block, now);
+        }
+        self.set_clocks(now);
+        self.signals.reset = None;
+    }
+
+    /// The power comes or goes. Without it the part lets go of its pins, and a flash operation is torn.
+    pub fn set_power(&mut self, on: bool, now: Time) {
+        if !on {
+            self.flash.power_off(now);
+            for block in Block::ALL {
+                self.reset_block(block, now);
+            }
+            self.set_clocks(now);
+        }
+        self.slot.set_power(on, now);
+        self.wire_slot(now);
+    }
+
+    /// Brings everything that is worked out lazily up to `now`, before someone outside looks or acts.
+    pub fn sync(&mut self, now: Time) {
+        self.advance(now);
+        self.sync_line(now);
+        self.find_next();
+    }
+
+    /// Takes up what someone outside did to the line or the slot.
+    pub fn refresh(&mut self, now: Time) {
+        self.wire_slot(now);
+        self.note_due(Block::Usart1);
+        self.note_due(Block::Tim1);
+        self.find_next();
+    }
+
+    /// Takes the findings that blocks and wires have had, each with its instant.
+    pub fn take_notes(&mut self) -> Vec<(Time, What)> {
+        core::mem::take(&mut self.notes)
+    }
+
+    /// Whether there are findings to take.
+    #[must_use]
+    pub fn has_notes(&self) -> bool {
+        !self.notes.is_empty()
+    }
+
+    /// Forgets which interrupt lines were told: all that are high will be told again.
+    pub fn repeat_lines(&mut self) {
+        self.changed_lines = self.levels;
+    }
+
+    /// Takes the interrupt lines whose level changed, one bit each, with the levels of all.
+    pub fn take_lines(&mut self) -> (u64, u64) {
+        (core::mem::take(&mut self.changed_lines), self.levels)
+    }
+
+    /// Whether an interrupt line has changed since they were taken.
+    #[must_use]
+    pub fn lines_changed(&self) -> bool {
+        self.changed_lines != 0
+    }
+
+    /// The earliest instant at which any block acts by itself; [`Time::MAX`] for never.
+    #[must_use]
+    pub fn next_event(&self) -> Time {
+        self.next
+    }
+
+    /// Everything due up to and including `now` happens, in order.
+    pub fn advance(&mut self, now: Time) {
+        while self.next <= now {
+            let at = self.next;
+            for source in 0..BLOCKS {
+                if self.due[source] <= at {
+                    self.act(source, at);
+                }
+            }
+            self.find_next();
+        }
+    }
+
+    /// `source` does what is due at `at`.
+    fn act(&mut self, source: usize, at: Time) {
+        let block = Block::ALL[source];
+        self.catch_up(block, at);
+        self.settle(block, at);
+        debug_assert!(self.due[source] > at, "{source} did not move on at {at}");
+        self.due[source] = self.due[source].max(at + Time::from_ps(1));
+    }
+
+    /// A read of `block`'s register at `offset` (word aligned).
+    ///
+    /// # Errors
+    ///
+    /// As [`Peripheral::read`].
+    pub fn read(&mut self, block: Block, offset: u32, now: Time) -> Result<u32, Unmodelled> {
+        self.catch_up(block, now);
+        let answer = self.block(block).read(offset, now);
+        self.settle(block, now);
+        self.find_next();
+        answer
+    }
+
+    /// A write to `block`'s register at `offset` (word aligned). It is lost while RCC holds the block in
+    /// reset.
+    ///
+    /// # Errors
+    ///
+    /// As [`Peripheral::write`].
+    pub fn write(
+        &mut self,
+        block: Block,
+        offset: u32,
+        value: u32,
+        now: Time,
+    ) -> Result<(), Unmodelled> {
+        let (apb2, apb1) = self.rcc.held_in_reset();
+        if apb2 | apb1 != 0
+            && block
+                .clock()
+                .is_some_and(|(bus, bit)| [apb2, apb1][bus] >> bit & 1 != 0)
+        {
+            return Ok(());
+        }
+        self.catch_up(block, now);
+        let answer = self.block(block).write(offset, value, now);
+        self.settle(block, now);
+        self.find_next();
+        answer
+    }
+
+    /// Whether `block` has its clock (RM0008 7.3.7, 7.3.8).
+    #[must_use]
+    pub fn is_clocked(&self, block: Block) -> bool {
+        let (apb2, apb1) = self.rcc.enabled();
+        block
+            .clock()
+            .is_none_or(|(bus, bit)| [apb2, apb1][bus] >> bit & 1 != 0)
+    }
+
+    /// The core stores into the flash.
+    pub fn program(&mut self, offset: u32, half: bool, value: u16, now: Time) {
+        self.flash.advance(now);
+        self.flash.program(offset, half, value, now);
+        self.settle(Block::Flash, now);
+        self.find_next();
+    }
+
+    /// A block's own past, and what comes to it over a wire, up to `now`.
+    fn catch_up(&mut self, block: Block, now: Time) {
+        match block {
+            Block::Usart1 => self.sync_line(now),
+            Block::Tim1 => {
+                self.sync_line(now);
+                self.line.feed_captures(&mut self.tim1);
+                self.tim1.advance(now);
+            }
+            Block::GpioA => {
+                self.sync_line(now);
+                self.drive_rx(now);
+            }
+            Block::I2c1 => self.i2c1.exchange(&mut self.slot, now),
+            _ => self.block(block).advance(now),
+        }
+    }
+
+    fn reset_block(&mut self, block: Block, now: Time) {
+        self.catch_up(block, now);
+        self.block(block).reset(now);
+        self.settle(block, now);
+        self.find_next();
+    }
+
+    /// Passes on what a block has done: to other blocks and the board, to the interrupt lines, to the
+    /// memory of what happens next.
+    fn settle(&mut self, block: Block, now: Time) {
+        self.wire(block, now);
+        self.note_requests(block);
+        self.note_due(block);
+    }
+
+    fn note_due(&mut self, block: Block) {
+        let next = match block {
+            Block::Usart1 => self.line.next_event(&self.usart1),
+            Block::Tim1 if self.tim1.capture_interrupt_enabled(wires::RX_CAPTURE) => {
+                let edge = self.line.next_capture();
+                [self.tim1.next_event(), edge].into_iter().flatten().min()
+            }
+            _ => self.block(block).next_event(),
+        };
+        self.due[block as usize] = next.unwrap_or(Time::MAX);
+    }
+
+    fn find_next(&mut self) {
+        self.next = self.due.iter().copied().fold(Time::MAX, Time::min);
+    }
+
+    /// Brings the interrupt lines of `block` to where its requests are.
+    fn note_requests(&mut self, block: Block) {
+        let line = match block {
+            Block::Exti => {
+                let requests = self.exti.requests();
+                for (line, pins) in irq::EXTI {
+                    self.set_line(line, requests & pins != 0);
+                }
+                return;
+            }
+            Block::I2c1 => {
+                self.set_line(irq::I2C1_EV, self.i2c1.irq_event());
+                self.set_line(irq::I2C1_ER, self.i2c1.irq_error());
+                return;
+            }
+            Block::Tim1 => {
+                self.set_line(irq::TIM1_UP, self.tim1.update_irq());
+                self.set_line(irq::TIM1_CC, self.tim1.capture_compare_irq());
+                return;
+            }
+            Block::Tim2 => irq::TIM2,
+            Block::Tim3 => irq::TIM3,
+            Block::Tim4 => irq::TIM4,
+            Block::Usart1 => irq::USART1,
+            Block::Usart3 => irq::USART3,
+            Block::Adc1 => irq::ADC1,
+            Block::Flash => irq::FLASH,
+            _ => return,
+        };
+        let level = self.block(block).irq();
+        self.set_line(line, level);
+    }
+
+    fn set_line(&mut self, line: u16, level: bool) {
+        let bit = 1u64 << line;
+        if (self.levels & bit != 0) != level {
+            self.levels ^= bit;
+            self.changed_lines |= bit;
+        }
+    }
+
+    fn block(&mut self, block: Block) -> &mut dyn Peripheral {
+        match block {
+            Block::Tim2 => &mut self.tim2,
+            Block::Tim3 => &mut self.tim3,
+            Block::Tim4 => &mut self.tim4,
+            Block::Iwdg => &mut self.iwdg,
+            Block::Usart3 => &mut self.usart3,
+            Block::I2c1 => &mut self.i2c1,
+            Block::Afio => &mut self.afio,
+            Block::Exti => &mut self.exti,
+            Block::GpioA => &mut self.gpio[0],
+            Block::GpioB => &mut self.gpio[1],
+            Block::GpioC => &mut self.gpio[2],
+            Block::GpioD => &mut self.gpio[3],
+            Block::Adc1 => &mut self.adc1,
+            Block::Tim1 => &mut self.tim1,
+            Block::Usart1 => &mut self.usart1,
+            Block::Rcc => &mut self.rcc,
+            Block::Flash => &mut self.flash,
+        }
+    }
+}

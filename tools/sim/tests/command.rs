@@ -1,0 +1,237 @@
+//! The command `modio-sim` as a process: what it prints, how it ends, what it refuses.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// An ELF file whose firmware is an endless loop: one load segment at the start of flash.
+fn endless_loop(directory: &Path) -> PathBuf {
+    let code: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
+    let mut elf = b"\x7fELF\x01\x01\x01".to_vec();
+    elf.resize(16, 0);
+    let half = |elf: &mut Vec<u8>, value: u16| elf.extend(value.to_le_bytes());
+    let word = |elf: &mut Vec<u8>, value: u32| elf.extend(value.to_le_bytes());
+    half(&mut elf, 2); // ET_EXEC
+    half(&mut elf, 40); // EM_ARM
+    // Version, entry, program headers, section headers, flags.
+    [1, 0x0800_0009, 52, 0, 0]
+        .into_iter()
+        .for_each(|value| word(&mut elf, value));
+    // Sizes and counts: header, program headers, section headers.
+    [52, 32, 1, 40, 0, 0]
+        .into_iter()
+        .for_each(|value| half(&mut elf, value));
+    let size = code.len() as u32;
+    // PT_LOAD, offset, virtual and physical address, sizes, flags, alignment.
+    [1, 84, 0x0800_0000, 0x0800_0000, size, size, 5, 4]
+        .into_iter()
+        .for_each(|value| word(&mut elf, value));
+    elf.extend(code);
+    let path = directory.join("loop.elf");
+    fs::write(&path, elf).unwrap();
+    path
+}
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
+    command
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// A simulator that runs, ended with the test.
+struct Running {
+    child: Child,
+    lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
+}
+
+impl Running {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = command(arguments).spawn().unwrap();
+        let stdout = child.stdout.take().unwrap();
+        Self {
+            child,
+            lines: BufReader::new(stdout).lines(),
+        }
+    }
+
+    /// What follows `prefix` on the next line.
+    fn endpoint(&mut self, prefix: &str) -> String {
+        let line = self.lines.next().expect("a line").unwrap();
+        line.strip_prefix(prefix)
+            .unwrap_or_else(|| panic!("{line:?}"))
+            .to_owned()
+    }
+
+    fn signal(&self, name: &str) {
+        let id = self.child.id().to_string();
+        assert!(
+            Command::new("kill")
+                .args([name, &id])
+                .status()
+                .unwrap()
+                .success()
+        );
+    }
+
+    /// The exit status, and what was said on stderr.
+    fn end(&mut self) -> (Option<i32>, String) {
+        let limit = Instant::now() + Duration::from_secs(60);
+        while self.child.try_wait().unwrap().is_none() {
+            assert!(Instant::now() < limit, "it does not end");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let mut said = String::new();
+        self.child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut said)
+            .unwrap();
+        (self.child.wait().unwrap().code(), said)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It has ended already unless the test has failed.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What is wrong is told in one line, which names `parts`, with exit status 2.
+fn refused(arguments: &[&str], parts: &[&str]) {
+    let output = command(arguments).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    for part in parts {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert!(output.stdout.is_empty(), "nothing is announced");
+}
+
+#[test]
+fn signals_end_it_well_and_remove_the_link() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    for signal in ["-INT", "-TERM"] {
+        let link = directory.path().join("line");
+        let (elf, link_name) = (elf.to_str().unwrap(), link.to_str().unwrap());
+        let mut running =
+            Running::start(&["--elf", elf, "--pty", link_name, "--http", "127.0.0.1:0"]);
+        let pty = running.endpoint("pty: ");
+        assert_eq!(fs::read_link(&link).unwrap(), Path::new(&pty));
+        running.endpoint("http: http://127.0.0.1:");
+        running.signal(signal);
+        assert_eq!(running.end(), (Some(0), String::new()), "{signal}");
+        assert!(
+            fs::symlink_metadata(&link).is_err(),
+            "{signal}: the link is gone"
+        );
+    }
+}
+
+#[test]
+fn it_stops_by_itself_after_the_time_given() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let begin = Instant::now();
+    let mut running = Running::start(&[
+        "--elf",
+        elf.to_str().unwrap(),
+        "--for",
+        "300ms",
+        "--http",
+        "127.0.0.1:0",
+    ]);
+    assert_eq!(running.end().0, Some(0));
+    assert!(begin.elapsed() >= Duration::from_millis(300));
+}
+
+#[test]
+fn every_endpoint_is_announced_and_answers() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let mut running = Running::start(&[
+        "--elf",
+        elf.to_str().unwrap(),
+        "--tcp",
+        "127.0.0.1:0",
+        "--http",
+        "127.0.0.1:0",
+        "--dip",
+        "17",
+        "--module",
+        "2relay",
+    ]);
+    running.endpoint("pty: /");
+    let mut line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
+    let url = running.endpoint("http: http://");
+    let state = || {
+        let mut stream = TcpStream::connect(url.trim_end_matches('/')).unwrap();
+        stream
+            .write_all(b"GET /api/state HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+            .unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        let body = answer.split("\r\n\r\n").nth(1).unwrap().to_owned();
+        serde_json::from_str::<serde_json::Value>(&body).unwrap()
+    };
+    let before = state();
+    assert_eq!(
+        (&before["dip"], &before["module"]),
+        (&17.into(), &"2relay".into())
+    );
+    line.write_all(&[1, 2, 3]).unwrap();
+    let end = Instant::now() + Duration::from_secs(60);
+    while state()["line"]["rx_frames"] != 1 {
+        assert!(Instant::now() < end, "the bytes cross the line");
+    }
+}
+
+#[test]
+fn an_image_that_is_missing_or_broken_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let broken = directory.path().join("modio");
+    let broken = broken.to_str().unwrap();
+    refused(&[], &["--elf", "cargo xtask sim"]);
+    refused(&["--elf", broken], &[broken, "No such file"]);
+    fs::write(broken, "#!/bin/sh\n").unwrap();
+    refused(&["--elf", broken], &[broken, "ELF"]);
+    let whole = fs::read(endless_loop(directory.path())).unwrap();
+    fs::write(broken, &whole[..whole.len() - 2]).unwrap();
+    refused(&["--elf", broken], &[broken, "cut short"]);
+}
+
+#[test]
+fn a_port_or_a_link_in_use_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let elf = elf.to_str().unwrap();
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    refused(&["--elf", elf, "--http", &address], &[&address, "in use"]);
+    let tcp = ["--elf", elf, "--http", "127.0.0.1:0", "--tcp", &address];
+    refused(&tcp, &[&address, "in use"]);
+    refused(
+        &["--elf", elf, "--http", "127.0.0.1:0", "--pty", elf],
+        &[elf],
+    );
+}
+
+#[test]
+fn a_wrong_option_is_refused() {
+    refused(&["--dip", "256"], &["--dip", "0..=255"]);
+    refused(&["--module", "4xx"], &["--module", "2ai2ao"]);
+    refused(&["--for", "ever"], &["--for"]);
+    refused(&["--flash", "x"], &["--flash"]);
+}

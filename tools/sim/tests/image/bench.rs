@@ -1,0 +1,165 @@
+//! A board with the image on it and a master on its line.
+
+use std::{env, path::Path, sync::OnceLock};
+
+use register_map::record;
+use sim::{Board, Config, Image, Module, Time, line::Settings};
+
+/// The length of the flash.
+const FLASH: usize = 128 * 1024;
+const FLASH_START: u32 = 0x0800_0000;
+
+/// The image under test.
+pub fn image() -> &'static Image {
+    static IMAGE: OnceLock<Image> = OnceLock::new();
+    IMAGE.get_or_init(|| {
+        let path = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
+        Image::read(Path::new(&path)).expect("the image can be read")
+    })
+}
+
+/// A flash whose stored configuration knows nothing but the slot's module.
+pub fn flash_with(module: Module) -> Vec<u8> {
+    let mut flash = vec![0xFF; FLASH];
+    let at = (record::PAGE_ADDRESSES[0] - FLASH_START) as usize;
+    flash[at..at + record::PRESET_LEN].copy_from_slice(&record::module_in_slot(module));
+    flash
+}
+
+/// CRC-16/MODBUS bit by bit, as the standard's appendix B says it: slow, and nobody else's code.
+pub fn crc(bytes: &[u8]) -> [u8; 2] {
+    let mut crc = 0xFFFFu16;
+    for byte in bytes {
+        crc ^= u16::from(*byte);
+        for _ in 0..8 {
+            let out = crc & 1 != 0;
+            crc >>= 1;
+            if out {
+                crc ^= 0xA001;
+            }
+        }
+    }
+    crc.to_le_bytes()
+}
+
+/// An ADU: these bytes and their CRC.
+pub fn adu(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &crc(bytes)].concat()
+}
+
+/// A board and its master.
+pub struct Bench {
+    pub board: Board,
+    settings: Settings,
+    /// Findings, resets and the like are what the test is about.
+    pub tolerant: bool,
+}
+
+impl Bench {
+    /// A board with this module and switch, powered and given time to start.
+    pub fn new(module: Module, dip: u8) -> Self {
+        Self::with(Config {
+            dip,
+            module,
+            flash: Some(flash_with(module)),
+            ..Config::default()
+        })
+    }
+
+    /// A board fitted like this, powered and given time to start.
+    pub fn with(config: Config) -> Self {
+        let mut bench = Self::cold(config);
+        bench.board.run_for(Time::from_ms(150));
+        bench
+    }
+
+    /// A board powered just now.
+    pub fn cold(config: Config) -> Self {
+        Self {
+            board: Board::new(image(), config).expect("the image fits"),
+            settings: Settings::default(),
+            tolerant: false,
+        }
+    }
+
+    /// Sets the master to another rate and format.
+    pub fn settings(&mut self, settings: Settings) {
+        self.settings = settings;
+        self.board.line().set_settings(settings);
+    }
+
+    /// The length of `n` characters on the line.
+    pub fn characters(&self, n: u64) -> Time {
+        self.settings.characters(n)
+    }
+
+    /// The length of a bit on the line.
+    pub fn bit(&self) -> Time {
+        self.settings.rate().bits(1)
+    }
+
+    /// t3.5 on the line.
+    pub fn t35(&self) -> Time {
+        self.settings.frame_silence()
+    }
+
+    /// Sends bytes as they are, now, and gives the unit time to answer in. What it says, if anything.
+    pub fn exchange(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let now = self.board.now();
+        let end = self.board.line().send(now, bytes);
+        self.answer_after(end)
+    }
+
+    /// What the unit says within a moment after `end`, the end of what it was sent.
+    pub fn answer_after(&mut self, end: Time) -> Vec<u8> {
+        self.board.run_until(end + self.t35() + self.characters(2));
+        while self.board.driver_enable() {
+            self.board.run_for(self.characters(1));
+        }
+        // The next request is to find the line silent.
+        self.board.run_for(self.t35() + self.characters(1));
+        let heard = self.board.line().take_received();
+        assert!(
+            heard.iter().all(sim::line::Received::is_good),
+            "the unit's characters are good: {heard:?}"
+        );
+        heard.iter().map(|character| character.byte).collect()
+    }
+
+    /// Sends a PDU to a unit; its reply's PDU, or `None` when it is silent. Checks the reply's frame.
+    pub fn ask(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+        let reply = self.exchange(&adu(&[&[unit], pdu].concat()));
+        if reply.is_empty() {
+            return None;
+        }
+        assert!(reply.len() >= 4, "too short for a frame: {reply:02X?}");
+        let (body, check) = reply.split_at(reply.len() - 2);
+        assert_eq!(check, crc(body), "the reply's CRC: {reply:02X?}");
+        assert_eq!(body[0], unit, "the reply's unit: {reply:02X?}");
+        Some(body[1..].to_vec())
+    }
+
+    /// Asserts that the unit answers an ordinary request.
+    pub fn assert_answers(&mut self, unit: u8) {
+        let reply = self.ask(unit, &[1, 0, 0x10, 0, 4]);
+        assert!(
+            matches!(reply.as_deref(), Some([1, 1, _])),
+            "a good request is answered: {reply:02X?}"
+        );
+    }
+
+    /// Asserts that the firmware did nothing a real part would not take well.
+    pub fn assert_sound(&mut self) {
+        assert_eq!(self.board.findings(), [], "nothing odd on the bus");
+        assert!(!self.board.locked_up(), "the core runs");
+        assert_eq!(self.board.resets(), 0, "no reset since power-on");
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        if !self.tolerant && !std::thread::panicking() {
+            self.assert_sound();
+        }
+    }
+}

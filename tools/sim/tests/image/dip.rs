@@ -1,0 +1,71 @@
+//! SW01.
+
+use sim::{Module, Time};
+
+use crate::bench::Bench;
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_unit_answers_to_its_own_address_alone() {
+    for dip in [1, 2, 17, 64, 128, 170, 247] {
+        let mut bench = Bench::new(Module::Di4, dip);
+        bench.assert_answers(dip);
+        for other in [dip ^ 1, 248, 254, 255].into_iter().filter(|&o| o != 0) {
+            assert_eq!(
+                bench.ask(other, &[1, 0, 0x10, 0, 4]),
+                None,
+                "{dip} hears {other}"
+            );
+            assert_eq!(bench.ask(other, &[0x55]), None);
+        }
+        assert!(!bench.board.leds().fault);
+        bench.assert_answers(dip);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn with_all_positions_on_it_is_unit_255_at_9600_8n2() {
+    let mut bench = Bench::new(Module::Di4, 255);
+    bench.assert_answers(255);
+    assert_eq!(bench.ask(1, &[1, 0, 0x10, 0, 4]), None);
+    assert!(!bench.board.leds().fault);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn without_a_unit_address_it_is_silent_and_blinks() {
+    for dip in [0, 248, 251, 254] {
+        let mut bench = Bench::new(Module::Do4, dip);
+        for unit in [0, 1, dip, 255] {
+            assert_eq!(
+                bench.ask(unit, &[1, 0, 0x10, 0, 4]),
+                None,
+                "{dip} hears {unit}"
+            );
+        }
+        bench.board.watch_pin('B', 9);
+        let from = bench.board.now();
+        bench.board.run_for(Time::from_secs(2));
+        let edges = bench.board.pin_edges('B', 9);
+        assert!((8..=12).contains(&edges.len()), "{dip} blinks: {edges:?}");
+        assert!(edges.iter().all(|(at, _)| *at > from));
+        assert_eq!(bench.board.line().driver_edges().count(), 0);
+        let log = bench.board.take_log();
+        assert!(log.contains("no unit address"), "{log}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_switch_counts_at_power_on_only() {
+    let mut bench = Bench::new(Module::Di4, 17);
+    bench.board.set_dip(18);
+    bench.board.run_for(Time::from_secs(1));
+    bench.assert_answers(17);
+    assert_eq!(bench.ask(18, &[1, 0, 0x10, 0, 4]), None);
+    bench.board.cycle();
+    bench.board.run_for(Time::from_ms(150));
+    bench.assert_answers(18);
+    assert_eq!(bench.ask(17, &[1, 0, 0x10, 0, 4]), None);
+}

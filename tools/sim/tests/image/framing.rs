@@ -1,0 +1,254 @@
+//! Frames that are damaged, cut, joined or somebody else's.
+
+use sim::{
+    Config, Module, Time,
+    line::{Character, Settings},
+};
+
+use crate::bench::{Bench, adu, flash_with};
+
+const READ: [u8; 6] = [1, 1, 0, 0x10, 0, 4];
+
+/// Sends `bytes` with a silence before the byte at `index`, and what the unit says.
+fn with_gap(bench: &mut Bench, bytes: &[u8], index: usize, gap: Time) -> Vec<u8> {
+    let (first, rest) = bytes.split_at(index);
+    let now = bench.board.now();
+    let end = bench.board.line().send(now, first);
+    let end = bench.board.line().send(end + gap, rest);
+    bench.answer_after(end)
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_frame_with_a_wrong_crc_gets_silence() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let good = adu(&READ);
+    for bit in 0..good.len() * 8 {
+        let mut bad = good.clone();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        assert_eq!(bench.exchange(&bad), [], "bit {bit}");
+    }
+    let mut swapped = good.clone();
+    swapped.swap(6, 7);
+    assert_eq!(bench.exchange(&swapped), []);
+    let mut unknown = adu(&[1, 0x55, 0, 0]);
+    unknown[4] ^= 0x40;
+    assert_eq!(
+        bench.exchange(&unknown),
+        [],
+        "a wrong function and a wrong CRC"
+    );
+    bench.assert_answers(1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn short_noise_gets_silence() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    for length in 1..=3 {
+        for byte in [0x00, 0x01, 0xFF] {
+            assert_eq!(bench.exchange(&vec![byte; length]), []);
+            bench.assert_answers(1);
+        }
+    }
+    // A unit address whose CRC is right, but nothing between them.
+    assert_eq!(bench.exchange(&adu(&[1])), []);
+    assert_eq!(bench.exchange(&adu(&[])), []);
+    bench.assert_answers(1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_frame_of_256_bytes_is_taken_and_a_longer_one_dropped_whole() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let longest = adu(&[&[1, 0x41][..], &[0x33; 252]].concat());
+    assert_eq!(longest.len(), 256);
+    assert_eq!(bench.exchange(&longest), adu(&[1, 0xC1, 1]));
+    for length in [257, 258, 300, 512, 1000] {
+        let long = adu(&[&[1, 0x41][..], &vec![0x33; length - 4]].concat());
+        assert_eq!(long.len(), length);
+        assert_eq!(bench.exchange(&long), [], "{length} bytes");
+        bench.assert_answers(1);
+    }
+    // 44 bytes too many in front of a good request, without a gap between them.
+    let joined = [&[0x33; 300][..], &adu(&READ)].concat();
+    assert_eq!(bench.exchange(&joined), []);
+    bench.assert_answers(1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn gaps_inside_a_frame_are_taken_up_to_t35_and_split_it_beyond() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let request = adu(&READ);
+    let reply = adu(&[1, 1, 1, 0]);
+    let character = bench.characters(1);
+    for index in [1, 2, 4, 7] {
+        for tenths in [1, 5, 10, 14, 16, 20, 25, 27, 30, 33, 34] {
+            let gap = Time::from_ps(character.as_ps() * tenths / 10);
+            let heard = with_gap(&mut bench, &request, index, gap);
+            assert_eq!(heard, reply, "{tenths}/10 characters before byte {index}");
+        }
+        for tenths in [37, 40, 50, 80, 300] {
+            let gap = Time::from_ps(character.as_ps() * tenths / 10);
+            let heard = with_gap(&mut bench, &request, index, gap);
+            assert_eq!(heard, [], "{tenths}/10 characters before byte {index}");
+        }
+    }
+    bench.assert_answers(1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_request_too_soon_after_another_joins_it_and_both_are_lost() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let two = [adu(&READ), adu(&READ)].concat();
+    let gap = bench.characters(3);
+    assert_eq!(with_gap(&mut bench, &two, 8, gap), []);
+    assert_eq!(with_gap(&mut bench, &two, 8, Time::ZERO), []);
+    // To another unit, and the second to this one.
+    let other = [adu(&[2, 1, 0, 0x10, 0, 4]), adu(&READ)].concat();
+    assert_eq!(with_gap(&mut bench, &other, 8, gap), []);
+    // With t3.5 between them the second is answered.
+    let gap = bench.t35() + bench.bit();
+    assert_eq!(with_gap(&mut bench, &other, 8, gap), adu(&[1, 1, 1, 0]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_master_need_not_wait_after_the_units_own_reply() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let now = bench.board.now();
+    let end = bench.board.line().send(now, &adu(&READ));
+    bench
+        .board
+        .run_until(end + bench.t35() + bench.characters(1));
+    while bench.board.driver_enable() {
+        bench.board.run_for(Time::from_us(10));
+    }
+    // A bit or two after the reply's last stop bit.
+    let start = bench.board.now() + bench.bit() * 2;
+    let end = bench.board.line().send(start, &adu(&READ));
+    let heard = bench.answer_after(end);
+    let reply = adu(&[1, 1, 1, 0]);
+    assert_eq!(heard, [reply.clone(), reply].concat());
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_character_with_a_fault_spoils_its_frame() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let request = adu(&READ);
+    for index in 0..request.len() {
+        let now = bench.board.now();
+        let line = bench.board.line();
+        let mut end = line.send(now, &request[..index]);
+        // The stop bits are low: a framing error, with the right data.
+        let mut character = Character::new(Settings::default(), request[index]);
+        character.levels &= (1 << 9) - 1;
+        character.levels |= 1 << 10;
+        end = line.send_character(end, character);
+        end = line.send(end, &request[index + 1..]);
+        assert_eq!(bench.answer_after(end), [], "byte {index}");
+        bench.assert_answers(1);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_break_and_a_stray_zero_cost_their_own_frame_at_most() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let now = bench.board.now();
+    let long = Character::line_break(Settings::default().rate(), 15);
+    let end = bench.board.line().send_character(now, long);
+    assert_eq!(bench.answer_after(end), []);
+    bench.assert_answers(1);
+    let stray = [&[0][..], &adu(&READ)].concat();
+    assert_eq!(bench.exchange(&stray), []);
+    bench.assert_answers(1);
+    // Far enough ahead it costs nothing.
+    let gap = bench.characters(5);
+    assert_eq!(with_gap(&mut bench, &stray, 1, gap), adu(&[1, 1, 1, 0]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn other_units_traffic_makes_it_neither_deaf_nor_talkative() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let others: [&[u8]; 6] = [
+        &adu(&[2, 3, 0, 0, 0, 2]),
+        &adu(&[2, 3, 4, 1, 1, 0, 0x10]),
+        &adu(&[2, 0x83, 2]),
+        &adu(&[17, 0x41, 9, 9]),
+        &[2, 3, 4, 1],
+        &[2],
+    ];
+    for round in 0..30 {
+        for other in others {
+            assert_eq!(bench.exchange(other), []);
+        }
+        let other = others[round % others.len()];
+        let now = bench.board.now();
+        let end = bench.board.line().send(now, other);
+        let gap = bench.t35() + bench.bit();
+        let end = bench.board.line().send(end + gap, &adu(&READ));
+        assert_eq!(
+            bench.answer_after(end),
+            adu(&[1, 1, 1, 0]),
+            "after {other:02X?}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn switched_on_in_the_middle_of_traffic_it_waits_for_a_silence() {
+    let mut bench = Bench::cold(Config {
+        flash: Some(flash_with(Module::Di4)),
+        ..Config::default()
+    });
+    // Traffic from before the start to well after it, ending in what would be a good request.
+    let traffic = [vec![0x55; 300], adu(&READ)].concat();
+    let end = bench.board.line().send(Time::from_us(1), &traffic);
+    assert!(end > Time::from_ms(300));
+    assert_eq!(bench.answer_after(end), []);
+    bench.assert_answers(1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_truncated_request_is_forgotten() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let request = adu(&READ);
+    for length in 1..request.len() {
+        assert_eq!(bench.exchange(&request[..length]), []);
+        bench.assert_answers(1);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn its_own_echo_is_not_taken_for_a_request() {
+    let mut bench = Bench::new(Module::Do4, 1);
+    bench.board.line().set_echo(true);
+    // The reply to a write is the request: taken for one it would be answered for ever.
+    let request = adu(&[1, 5, 0, 0x10, 0xFF, 0]);
+    for _ in 0..20 {
+        assert_eq!(bench.exchange(&request), request);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn glitches_on_an_idle_line_cost_nothing() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    for us in [1, 5, 20, 40] {
+        let now = bench.board.now();
+        bench.board.line().noise(now, Time::from_us(us));
+        let end = bench
+            .board
+            .line()
+            .send(now + Time::from_ms(10), &adu(&READ));
+        assert_eq!(bench.answer_after(end), adu(&[1, 1, 1, 0]), "{us} us");
+    }
+}

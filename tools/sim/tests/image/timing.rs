@@ -1,0 +1,87 @@
+//! When the unit speaks, and how long it holds the bus.
+
+use sim::{Module, Time, line::Direction};
+
+use crate::bench::{Bench, adu};
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_reply_starts_at_t35_and_the_driver_is_on_just_as_long_as_needed() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let bit = bench.bit();
+    for _ in 0..10 {
+        let now = bench.board.now();
+        let end = bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
+        bench.answer_after(end);
+
+        let line = bench.board.line();
+        let frame = line.frames().next_back().expect("a reply").clone();
+        assert_eq!(frame.direction, Direction::FromUnit);
+        assert!(frame.crc_ok && !frame.damaged);
+        let turnaround = frame.start - end;
+        assert!(turnaround >= Settings::T35, "{turnaround:?} is before t3.5");
+        let late = turnaround - Settings::T35;
+        assert!(late <= Time::from_us(60), "{late:?} after t3.5");
+
+        let edges: Vec<_> = line.driver_edges().collect();
+        let [.., (on, true), (off, false)] = edges[..] else {
+            panic!("the driver goes on and off: {edges:?}");
+        };
+        assert!(on <= frame.start && frame.start - on <= bit, "on {on:?}");
+        assert!(
+            off >= frame.end && off - frame.end <= bit,
+            "off {off:?}, end {:?}",
+            frame.end
+        );
+        assert_eq!(line.collisions().count(), 0);
+        assert!(
+            frame.longest_gap <= bit,
+            "gaps in the reply: {:?}",
+            frame.longest_gap
+        );
+    }
+}
+
+struct Settings;
+
+impl Settings {
+    /// t3.5 at 9600 bit/s with 11 bits a character: 38.5 bits.
+    const T35: Time = Time::from_ps(38_500_000_000_000 / 9600);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn nothing_leaves_the_unit_but_replies() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    for unit in [1, 2, 1, 0, 1] {
+        bench.exchange(&adu(&[unit, 1, 0, 0x10, 0, 4]));
+    }
+    let line = bench.board.line();
+    let (from_master, from_unit) = line.frame_counts();
+    assert_eq!((from_master, from_unit), (5, 3));
+    assert_eq!(line.driver_edges().count(), 6);
+    for frame in line.frames().filter(|f| f.direction == Direction::FromUnit) {
+        assert_eq!(frame.bytes, adu(&[1, 1, 1, 0]), "no byte around the reply");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn requests_back_to_back_at_t35_are_all_answered() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let request = adu(&[1, 1, 0, 0x10, 0, 4]);
+    let mut replies = 0;
+    for _ in 0..200 {
+        let now = bench.board.now();
+        let end = bench.board.line().send(now, &request);
+        bench
+            .board
+            .run_until(end + bench.t35() + bench.characters(1));
+        while bench.board.driver_enable() {
+            bench.board.run_for(Time::from_us(50));
+        }
+        bench.board.run_for(bench.t35());
+        replies += bench.board.line().take_received().len() / 6;
+    }
+    assert_eq!(replies, 200);
+}

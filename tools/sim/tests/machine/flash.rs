@@ -1,0 +1,248 @@
+//! The flash: stalls, code in SRAM beside an operation, power cuts.
+
+use sim::periph::flash::{Durations, Torn};
+use sim::{Config, Time};
+
+use super::asm::{Asm, When};
+use super::regs::*;
+use super::{board, board_with, findings, out};
+
+/// The page the programs work on: the last but one.
+const PAGE: u32 = 0x0801_F800;
+const OFFSET: usize = 0x1_F800;
+
+fn unlock(program: &mut Asm) {
+    program.store(FLASH_KEYR, 0x4567_0123);
+    program.store(FLASH_KEYR, 0xCDEF_89AB);
+}
+
+/// Erases [`PAGE`]; the last instruction starts it.
+fn erase(program: &mut Asm) {
+    program.store(FLASH_CR, 2);
+    program.store(FLASH_AR, PAGE);
+    program.store(FLASH_CR, 0x42);
+}
+
+fn program_half(program: &mut Asm, offset: u32, value: u32) {
+    program.store(FLASH_CR, 1);
+    program.set(0, PAGE + offset);
+    program.set(1, value);
+    program.strh(1, 0, 0);
+}
+
+fn filled() -> Config {
+    Config {
+        flash: Some(vec![0; 128 * 1024]),
+        ..Config::default()
+    }
+}
+
+#[test]
+fn code_in_flash_stalls_for_the_whole_operation() {
+    let mut program = Asm::new();
+    unlock(&mut program);
+    erase(&mut program);
+    let after = program.address();
+    program.copy(FLASH_SR, OUT);
+    program_half(&mut program, 0, 0x1234);
+    let programmed = program.address();
+    program.copy(FLASH_SR, OUT + 4);
+    program.spin();
+    let mut board = board_with(&program.image(), filled());
+    let limit = Time::from_ms(100);
+
+    assert!(board.run_until_pc(after - 2, limit), "at the store");
+    let (before, count) = (board.now(), board.instructions());
+    assert!(board.run_until_pc(after, limit));
+    assert_eq!(board.instructions(), count + 1);
+    // One instruction and 30 ms later.
+    let one = Time::cycles(77, 8_000_000).as_ps() / 64;
+    let spent = (board.now() - before).as_ps();
+    assert!((spent - 30_000_000_000).abs_diff(one) <= 1, "{spent}");
+    assert!(board.run_until_pc(programmed, limit));
+    assert!(
+        board.flash()[OFFSET + 2..OFFSET + 1024]
+            .iter()
+            .all(|&b| b == 0xFF)
+    );
+    assert_eq!(board.flash()[OFFSET..OFFSET + 2], [0x34, 0x12]);
+    assert_eq!(board.flash()[OFFSET - 1], 0);
+    board.step(20);
+    assert_eq!((out(&board, 0), out(&board, 1)), (0x20, 0x20), "EOP");
+    assert_eq!(findings(&board), [""; 0]);
+}
+
+#[test]
+fn time_can_be_stopped_in_the_middle_of_a_stall() {
+    let mut program = Asm::new();
+    unlock(&mut program);
+    erase(&mut program);
+    let after = program.address();
+    program.spin();
+    let mut board = board_with(&program.image(), filled());
+    board.run_until(Time::from_ms(10));
+    assert_eq!((board.now(), board.pc()), (Time::from_ms(10), after));
+    let count = board.instructions();
+    board.run_until(Time::from_ms(30));
+    assert_eq!(board.instructions(), count);
+    assert_eq!(board.flash()[OFFSET], 0, "not yet");
+    board.run_until(Time::from_ms(40));
+    assert!(board.instructions() > count);
+    assert_eq!(board.flash()[OFFSET], 0xFF);
+}
+
+/// A piece of code in SRAM that erases, counts in r7 while BSY is set, and comes back.
+#[test]
+fn code_in_sram_goes_on_beside_an_operation_and_stalls_on_its_way_back() {
+    const CODE: u32 = 0x2000_1000;
+    let mut ram = Asm::at(CODE);
+    erase(&mut ram);
+    ram.set(7, 0);
+    let top = ram.here();
+    ram.add(7, 1);
+    ram.set(6, 20_000);
+    ram.raw(0x42B7); // cmp r7, r6
+    ram.branch(When::NotEqual, top);
+    ram.copy(FLASH_SR, OUT);
+    ram.bx(14);
+
+    let mut program = Asm::new();
+    unlock(&mut program);
+    program.set(3, CODE | 1);
+    program.blx(3);
+    let back = program.address();
+    program.copy(FLASH_SR, OUT + 4);
+    program.spin();
+    let mut board = board_with(&program.image(), filled());
+    let code = ram.bytes();
+    board.ram_mut()[0x1000..0x1000 + code.len()].copy_from_slice(&code);
+
+    assert!(board.run_until_pc(back, Time::from_ms(200)));
+    assert_eq!(out(&board, 0), 1, "BSY is seen from SRAM");
+    // 100 000 instructions are 15 ms; the erase lasts twice that.
+    assert!(board.instructions() > 100_000);
+    board.step(10);
+    assert_eq!(out(&board, 1), 0x20, "and over when flash is fetched again");
+    let at = board.now().as_us();
+    assert!((32_500..32_700).contains(&at), "{at}");
+}
+
+#[test]
+fn a_power_cut_in_an_erase_leaves_a_mess_that_is_the_same_every_time() {
+    let run = |fraction, torn| {
+        let mut program = Asm::new();
+        unlock(&mut program);
+        erase(&mut program);
+        program.spin();
+        let mut board = board_with(&program.image(), filled());
+        board.set_torn(torn);
+        board.cut_in_flash_operation(1, fraction);
+        board.run_until(Time::from_ms(60));
+        assert!(!board.powered());
+        assert_eq!(board.now(), Time::from_ms(60));
+        board.flash()[OFFSET..OFFSET + 1024].to_vec()
+    };
+    let ones = |page: &[u8]| page.iter().map(|b| b.count_ones()).sum::<u32>();
+    let half = run(0.5, Torn::Mess);
+    assert!((3_500..4_700).contains(&ones(&half)), "{}", ones(&half));
+    assert_eq!(half, run(0.5, Torn::Mess));
+    assert_eq!(ones(&run(0.999, Torn::Before)), 0);
+    assert_eq!(ones(&run(0.0, Torn::After)), 8192);
+    assert_eq!(ones(&run(0.0, Torn::Mess)), 0);
+}
+
+#[test]
+fn a_power_cut_between_any_two_instructions_keeps_what_was_written() {
+    // Programs 0x1111 to 0x4444 into four half-words, then spins.
+    let image = || {
+        let mut program = Asm::new();
+        unlock(&mut program);
+        for n in 0..4 {
+            program_half(&mut program, 2 * n, 0x1111 * (n + 1));
+        }
+        program.store(OUT, 0xD0);
+        program.spin();
+        program.image()
+    };
+    let all: Vec<u8> = (1..=4u8).flat_map(|n| [n * 0x11; 2]).collect();
+    for cut in 0..70 {
+        let mut board = board_with(&image(), Config::default());
+        board.step(cut);
+        board.power_off();
+        let left = board.flash()[OFFSET..OFFSET + 8].to_vec();
+        let written = left.iter().take_while(|&&b| b != 0xFF).count();
+        assert_eq!(written % 2, 0, "an operation that had ended stands whole");
+        assert_eq!(left[..written], all[..written], "after {cut}");
+        board.power_on();
+        assert_eq!(board.resets(), 0);
+        assert_eq!(board.flash()[OFFSET..OFFSET + 8], left);
+        board.run_for(Time::from_ms(10));
+        // Programming the same value again is refused, so the rest is as the second run left it.
+        assert_eq!(board.flash()[OFFSET..OFFSET + 8], all, "after {cut}");
+    }
+}
+
+#[test]
+fn durations_can_be_set_and_a_locked_flash_refuses() {
+    let mut program = Asm::new();
+    program.store(FLASH_CR, 2);
+    program.store(FLASH_CR, 0x42);
+    unlock(&mut program);
+    erase(&mut program);
+    program.spin();
+    let mut board = board_with(&program.image(), filled());
+    board.set_flash_durations(Durations {
+        erase: Time::from_ms(40),
+        ..Durations::default()
+    });
+    board.run_until(Time::from_ms(42));
+    assert_eq!(board.flash()[OFFSET], 0);
+    board.run_until(Time::from_ms(43));
+    assert_eq!(board.flash()[OFFSET], 0xFF);
+    assert_eq!(board.flash_operations(), 1);
+    assert_eq!(
+        findings(&board),
+        ["flash: FLASH_CR written while locked"; 2]
+    );
+}
+
+#[test]
+fn a_wrong_key_is_a_bus_fault() {
+    let mut program = Asm::new();
+    program.store(FLASH_KEYR, 0x1234);
+    program.spin();
+    program.handler(3);
+    program.store(OUT, 0xFA);
+    program.spin();
+    let mut board = board(program);
+    board.step(50);
+    assert_eq!(out(&board, 0), 0xFA);
+}
+
+#[test]
+fn new_code_in_flash_is_what_runs() {
+    // A function at PAGE returns 1; it is erased and programmed to return 2, called each time.
+    let mut program = Asm::new();
+    program.set(3, PAGE | 1);
+    program.blx(3);
+    program.set(0, OUT);
+    program.str(5, 0, 0);
+    unlock(&mut program);
+    erase(&mut program);
+    program_half(&mut program, 0, 0x2502); // movs r5, #2
+    program_half(&mut program, 2, 0x4770); // bx lr
+    program.set(3, PAGE | 1);
+    program.blx(3);
+    program.set(0, OUT);
+    program.str(5, 0, 4);
+    program.spin();
+    let mut flash = vec![0xFF; 128 * 1024];
+    flash[OFFSET..OFFSET + 4].copy_from_slice(&[0x01, 0x25, 0x70, 0x47]);
+    let config = Config {
+        flash: Some(flash),
+        ..Config::default()
+    };
+    let mut board = board_with(&program.image(), config);
+    board.run_until(Time::from_ms(50));
+    assert_eq!((out(&board, 0), out(&board, 1)), (1, 2));
+}

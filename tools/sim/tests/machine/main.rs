@@ -1,0 +1,37 @@
+//! The machine, with programs written by hand: time, stalls, faults, resets, power cuts, wires.
+
+mod asm;
+mod core;
+mod flash;
+mod regs;
+mod resets;
+mod wires;
+
+use asm::Asm;
+use sim::{Board, Config, Image, Time};
+
+/// From power-on to the first instruction: the part's own reset delay.
+const START: Time = Time::from_us(2_500);
+
+/// A board with `program` on it.
+fn board(program: Asm) -> Board {
+    board_with(&program.image(), Config::default())
+}
+
+fn board_with(image: &Image, config: Config) -> Board {
+    Board::new(image, config).expect("the program fits")
+}
+
+/// The `n`th word that a program has put out.
+fn out(board: &Board, n: u32) -> u32 {
+    board.word(regs::OUT + 4 * n).expect("in SRAM")
+}
+
+/// The findings, as text.
+fn findings(board: &Board) -> Vec<String> {
+    board
+        .findings()
+        .iter()
+        .map(|f| f.what.to_string())
+        .collect()
+}

@@ -1,0 +1,155 @@
+//! Resets and start-up: flags, the watchdog, the crystal, the power.
+
+use sim::{Config, Time};
+
+use super::asm::{Asm, When};
+use super::regs::*;
+use super::{START, board, board_with, findings, out};
+
+const POWER_ON: u32 = 0x0C00_0000;
+const PIN: u32 = 0x0400_0000;
+const SOFTWARE: u32 = 0x1400_0000;
+const WATCHDOG: u32 = 0x2400_0000;
+
+/// Puts RCC_CSR out, clears its flags, then goes on with what is added.
+fn report_cause() -> Asm {
+    let mut program = Asm::new();
+    program.copy(RCC_CSR, OUT);
+    program.store(RCC_CSR, 1 << 24);
+    program
+}
+
+#[test]
+fn the_watchdog_resets_after_its_timeout_and_says_so() {
+    let mut program = report_cause();
+    program.store(IWDG_KR, 0x5555);
+    program.store(IWDG_PR, 1);
+    program.store(IWDG_KR, 0xCCCC);
+    program.spin();
+    let mut board = board(program);
+    board.run_until(Time::from_ms(100));
+    assert_eq!(out(&board, 0) & 0xFF00_0000, POWER_ON);
+    assert_eq!(board.resets(), 0);
+    // 4096 x 8 / 40 kHz.
+    board.run_until(START + Time::from_us(819_200 - 100));
+    assert_eq!(board.resets(), 0);
+    board.run_until(START + Time::from_us(819_200 + 200));
+    assert_eq!(board.resets(), 1);
+    assert_eq!(out(&board, 0) & 0xFF00_0000, WATCHDOG);
+    board.run_until(Time::from_secs(9));
+    assert_eq!(board.resets(), 10);
+    assert_eq!(findings(&board), [""; 0]);
+}
+
+#[test]
+fn a_fed_watchdog_stays_quiet_and_wakes_a_locked_core() {
+    let mut program = report_cause();
+    program.store(IWDG_KR, 0xCCCC);
+    let top = program.here();
+    program.store(IWDG_KR, 0xAAAA);
+    program.branch(When::Always, top);
+    let mut fed = board(program);
+    fed.run_until(Time::from_secs(2));
+    assert_eq!(fed.resets(), 0);
+
+    let mut program = report_cause();
+    program.store(IWDG_KR, 0xCCCC);
+    program.raw(0xDE00);
+    program.handler(3);
+    program.raw(0xDE00);
+    let mut locked = board(program);
+    locked.run_until(Time::from_ms(400));
+    assert!(locked.locked_up());
+    locked.run_until(Time::from_ms(420));
+    assert_eq!(locked.resets(), 1);
+    assert_eq!(out(&locked, 0) & 0xFF00_0000, WATCHDOG);
+}
+
+#[test]
+fn a_software_reset_keeps_sram_and_starts_anew() {
+    let mut program = report_cause();
+    program.set(0, OUT + 4);
+    program.ldr(1, 0, 0);
+    program.add(1, 1);
+    program.str(1, 0, 0);
+    program.set(2, 0xFF);
+    program.raw(0x4011); // ands r1, r2
+    program.cmp(1, 3);
+    let done = program.forward(When::Equal);
+    program.store(AIRCR, 0x05FA_0004);
+    program.spin();
+    program.land(done);
+    program.store(OUT + 8, 0xD0);
+    program.spin();
+    let mut board = board(program);
+    board.ram_mut()[4..8].fill(0);
+    board.run_until(Time::from_ms(5));
+    assert_eq!((out(&board, 1), out(&board, 2)), (3, 0xD0));
+    assert_eq!(board.resets(), 2);
+    assert_eq!(out(&board, 0) & 0xFF00_0000, SOFTWARE);
+}
+
+#[test]
+fn a_power_cycle_forgets_sram_and_says_power_on() {
+    let mut program = report_cause();
+    program.spin();
+    let mut board = board(program);
+    board.run_for(Time::from_ms(3));
+    board.ram_mut()[64..72].copy_from_slice(b"remember");
+    board.reset();
+    board.run_for(Time::from_ms(1));
+    assert_eq!(&board.ram()[64..72], b"remember");
+    assert_eq!(out(&board, 0) & 0xFF00_0000, PIN);
+    assert_eq!(board.resets(), 1);
+    board.cycle();
+    assert_ne!(&board.ram()[64..72], b"remember");
+    board.run_for(Time::from_ms(3));
+    assert_eq!(out(&board, 0) & 0xFF00_0000, POWER_ON);
+    assert_eq!(board.resets(), 0);
+    board.power_off();
+    let count = board.instructions();
+    board.run_for(Time::from_secs(1));
+    assert_eq!(board.instructions(), count);
+}
+
+#[test]
+fn the_crystal_comes_after_two_milliseconds_or_never() {
+    for crystal in [true, false] {
+        let mut program = Asm::new();
+        program.store(RCC_CR, 0x1_0083);
+        program.wait_set(RCC_CR, 1 << 17);
+        program.store(OUT, 0xC0);
+        program.spin();
+        let config = Config {
+            crystal,
+            ..Config::default()
+        };
+        let mut board = board_with(&program.image(), config);
+        board.ram_mut()[0] = 0;
+        board.run_until(START + Time::from_us(1_990));
+        assert_ne!(out(&board, 0), 0xC0);
+        board.run_until(Time::from_secs(1));
+        assert_eq!(out(&board, 0) == 0xC0, crystal);
+    }
+}
+
+#[test]
+fn factory_words_read_as_configured() {
+    let mut program = Asm::new();
+    program.copy(0x1FFF_F7E0, OUT);
+    program.copy(0x1FFF_F7E8, OUT + 4);
+    program.copy(0xE004_2000, OUT + 8);
+    program.copy(0xE000_ED00, OUT + 12);
+    program.spin();
+    let config = Config {
+        unique_id: *b"abcdefghijkl",
+        ..Config::default()
+    };
+    let mut board = board_with(&program.image(), config);
+    board.step(60);
+    assert_eq!(out(&board, 0) & 0xFFFF, 128);
+    assert_eq!(out(&board, 1), u32::from_le_bytes(*b"abcd"));
+    assert_eq!(out(&board, 2) & 0xFFF, 0x410);
+    assert_eq!(out(&board, 3), 0x411F_C231);
+    assert_eq!(findings(&board), [""; 0]);
+}

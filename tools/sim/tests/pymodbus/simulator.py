@@ -1,0 +1,183 @@
+"""The simulator as a child process, and masters on its RS-485 line."""
+
+import json
+import pathlib
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+import urllib.error
+import urllib.request
+
+import serial
+from pymodbus.client import ModbusSerialClient
+from pymodbus.exceptions import ModbusIOException
+
+# Set by run.py.
+PROGRAM: pathlib.Path
+IMAGE: pathlib.Path
+
+# Seconds in which a unit answers: a long request and its response take 0.6 s at 9600 baud.
+ANSWER = 3.0
+# Seconds after which no answer is taken to mean silence: many times t3.5 and a short response.
+SILENCE = 0.5
+# Seconds for the simulator to start on a busy machine.
+START = 60.0
+
+
+class Simulator:
+    """A running modio-sim, with `--pty` and an HTTP port of its own."""
+
+    def __init__(self, *, dip: int = 1, module: str = "4di"):
+        self._directory = tempfile.TemporaryDirectory(prefix="modio-")
+        self.port = str(pathlib.Path(self._directory.name, "line"))
+        self._process = subprocess.Popen(
+            [PROGRAM, "--elf", IMAGE, "--dip", str(dip), "--module", module,
+             "--pty", self.port, "--http", "127.0.0.1:0"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.lines: list[str] = []
+        self.complaints: list[str] = []
+        self._readers = [
+            threading.Thread(target=self._read, args=(pipe, lines), daemon=True)
+            for pipe, lines in ((self._process.stdout, self.lines),
+                                (self._process.stderr, self.complaints))]
+        for reader in self._readers:
+            reader.start()
+        try:
+            self.url = self._endpoint("http: ").rstrip("/")
+        except BaseException:
+            self.stop()
+            raise
+
+    @staticmethod
+    def _read(pipe, lines):
+        for line in pipe:
+            lines.append(line.rstrip("\n"))
+
+    def _endpoint(self, prefix: str) -> str:
+        end = time.monotonic() + START
+        while time.monotonic() < end and self._process.poll() is None:
+            for line in list(self.lines):
+                if line.startswith(prefix):
+                    return line.removeprefix(prefix)
+            time.sleep(0.01)
+        raise RuntimeError(f"the simulator did not start: {self.complaints or self.lines}")
+
+    def stop(self) -> int:
+        """Ends it as Ctrl-C would; the exit status."""
+        if self._process.poll() is None:
+            self._process.terminate()
+        try:
+            status = self._process.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            status = self._process.wait()
+        for reader in self._readers:
+            reader.join(timeout=10)
+        self._process.stdout.close()
+        self._process.stderr.close()
+        self._directory.cleanup()
+        return status
+
+    def http(self, method: str, path: str, body=None) -> tuple[int, dict]:
+        """Status and JSON of a request."""
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.url + path, data=data, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=10) as answer:
+                return answer.status, json.load(answer)
+        except urllib.error.HTTPError as refusal:
+            with refusal:
+                return refusal.code, json.load(refusal)
+
+    def state(self) -> dict:
+        """GET /api/state."""
+        status, state = self.http("GET", "/api/state")
+        assert status == 200, state
+        return state
+
+    def post(self, path: str, body) -> dict:
+        """A POST that is accepted."""
+        status, answer = self.http("POST", path, body)
+        assert status == 200, answer
+        return answer
+
+    def outputs(self) -> list[bool]:
+        """The four digital outputs, as they stand."""
+        return [channel["on"] for channel in self.state()["channels"]]
+
+    def master(self, timeout: float = ANSWER) -> ModbusSerialClient:
+        """pymodbus on the line, which asks once."""
+        client = ModbusSerialClient(
+            self.port, baudrate=9600, stopbits=2, timeout=timeout, retries=0)
+        assert client.connect()
+        return client
+
+    def wire(self) -> serial.Serial:
+        """The line for bytes of one's own."""
+        return serial.Serial(self.port, 9600, stopbits=2, timeout=SILENCE)
+
+
+class OnSimulator(unittest.TestCase):
+    """Tests that share a simulator of their class."""
+
+    DIP = 1
+    MODULE = "4di"
+
+    @classmethod
+    def setUpClass(cls):
+        cls.simulator = Simulator(dip=cls.DIP, module=cls.MODULE)
+        # First in, last out: nothing may be complained of, and Ctrl-C must end it well.
+        cls.addClassCleanup(cls._end)
+
+    @classmethod
+    def _end(cls):
+        status = cls.simulator.stop()
+        if status != 0 or cls.simulator.complaints:
+            raise AssertionError(f"exit status {status}, stderr {cls.simulator.complaints}")
+
+    def setUp(self):
+        self.master = self.simulator.master()
+        self.addCleanup(self.master.close)
+
+    def bits(self, answer, count: int) -> list[bool]:
+        """The bits of a good answer."""
+        self.assertFalse(answer.isError(), answer)
+        return answer.bits[:count]
+
+    def refused(self, answer, code: int):
+        """An exception response with this code."""
+        self.assertTrue(answer.isError(), answer)
+        self.assertEqual(answer.exception_code, code, answer)
+
+    def silent(self, ask):
+        """`ask(master)` gets no answer."""
+        # pymodbus wants the port for itself.
+        self.master.close()
+        master = self.simulator.master(timeout=SILENCE)
+        try:
+            before = self.simulator.state()["line"]["tx_frames"]
+            with self.assertRaises(ModbusIOException):
+                ask(master)
+            self.assertEqual(self.simulator.state()["line"]["tx_frames"], before)
+        finally:
+            master.close()
+            assert self.master.connect()
+
+    def eventually(self, what, wanted):
+        """`what()` becomes `wanted` within a second: an input is debounced, an output is scanned."""
+        end = time.monotonic() + 1
+        while (seen := what()) != wanted and time.monotonic() < end:
+            time.sleep(0.005)
+        self.assertEqual(seen, wanted)
+
+
+def crc(frame: bytes) -> bytes:
+    """A frame with its CRC (Modbus over Serial Line V1.02, 6.2.2)."""
+    value = 0xFFFF
+    for byte in frame:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return frame + value.to_bytes(2, "little")

@@ -1,0 +1,115 @@
+"""Frames that no decent master sends, byte by byte on the line."""
+
+import time
+
+from simulator import SILENCE, OnSimulator, crc
+
+# Reads the four points of the slot of unit 1.
+GOOD = crc(bytes([1, 1, 0x00, 0x10, 0, 4]))
+# Far more than t3.5 at 9600 baud, 4 ms, and than a busy machine delays a thread.
+APART = 0.1
+
+
+class Frames(OnSimulator):
+    MODULE = "4di"
+
+    def setUp(self):
+        self.line = self.simulator.wire()
+        self.addCleanup(self.line.close)
+
+    def ask(self, frame: bytes) -> bytes:
+        """The answer to a frame; empty for silence."""
+        time.sleep(APART)
+        self.line.write(frame)
+        # The timeout runs from the write: the frame's own time on the line comes on top.
+        self.line.timeout = SILENCE + len(frame) * 11 / 9600
+        answer = self.line.read(1)
+        if answer:
+            time.sleep(APART)
+            answer += self.line.read(self.line.in_waiting)
+        return answer
+
+    def answers(self):
+        """A good request is answered, whatever went before."""
+        self.assertEqual(self.ask(GOOD), crc(bytes([1, 1, 1, 0])))
+
+    def ignored(self, frame: bytes):
+        """Silence; and the unit is still there."""
+        self.assertEqual(self.ask(frame), b"", frame.hex(" "))
+        self.answers()
+
+    def test_a_good_frame_is_answered(self):
+        self.answers()
+
+    def test_a_bad_crc_is_ignored(self):
+        self.ignored(GOOD[:-1] + bytes([GOOD[-1] ^ 1]))
+        self.ignored(GOOD[:-2] + GOOD[:-3:-1])
+        self.ignored(bytes([GOOD[0] ^ 0x80]) + GOOD[1:])
+        self.ignored(bytes([1, 0x55, 0, 0, 0, 0]))
+
+    def test_an_unknown_function_is_refused(self):
+        for function in (0x09, 0x41, 0x64, 0x7F):
+            answer = self.ask(crc(bytes([1, function, 0, 0])))
+            self.assertEqual(answer, crc(bytes([1, function | 0x80, 1])), hex(function))
+        self.answers()
+
+    def test_quantities_out_of_range_are_refused(self):
+        for quantity in (0, 2001, 0xFFFF):
+            answer = self.ask(crc(bytes([1, 1, 0x00, 0x10]) + quantity.to_bytes(2, "big")))
+            self.assertEqual(answer, crc(bytes([1, 0x81, 3])), quantity)
+
+    def test_noise_is_ignored(self):
+        for noise in (b"\x00", b"\xff\xff", b"\x01\x01\x00"):
+            self.ignored(noise)
+
+    def test_a_frame_of_300_bytes_is_ignored(self):
+        self.ignored(crc(bytes([1, 1]) + bytes(296)))
+        self.ignored(bytes([0x55]) * 300)
+
+    def test_a_frame_of_257_bytes_is_ignored(self):
+        self.ignored(crc(bytes([1, 0x41]) + bytes(253)))
+
+    def test_a_frame_of_256_bytes_is_still_a_frame(self):
+        answer = self.ask(crc(bytes([1, 0x41]) + bytes(252)))
+        self.assertEqual(answer, crc(bytes([1, 0xC1, 1])))
+
+    def test_two_requests_without_a_gap_are_both_lost(self):
+        self.ignored(GOOD + GOOD)
+
+    def test_a_request_with_a_long_gap_inside_is_lost(self):
+        time.sleep(APART)
+        self.line.write(GOOD[:4])
+        self.ignored(GOOD[4:])
+
+    def test_the_bytes_on_the_line_are_recorded(self):
+        since = max((frame["number"] for frame in self.frames(0)), default=0)
+        self.answers()
+        request, response = self.frames(since)
+        self.assertEqual((request["direction"], response["direction"]), ("rx", "tx"))
+        self.assertEqual(request["bytes"], GOOD.hex())
+        self.assertTrue(request["crc_ok"] and response["crc_ok"])
+        # t3.5 at 9600 baud is 4.01 ms: no answer before, and none much later.
+        gap = response["start_us"] - request["end_us"]
+        self.assertGreaterEqual(gap, 4010)
+        self.assertLess(gap, 6000)
+
+    def frames(self, since: int) -> list[dict]:
+        status, answer = self.simulator.http("GET", f"/api/frames?since={since}")
+        self.assertEqual(status, 200)
+        return answer["frames"]
+
+
+class Http(OnSimulator):
+    def test_ill_formed_requests_are_refused_and_the_simulator_goes_on(self):
+        for method, path, body, wanted in (
+                ("GET", "/nowhere", None, 404),
+                ("POST", "/api/channels/9", {"energised": True}, 404),
+                ("POST", "/api/channels/1", {"energised": "yes"}, 400),
+                ("POST", "/api/channels/1", {"manual": True}, 409),
+                ("POST", "/api/module", {"name": "4do"}, 409),
+                ("POST", "/api/power", {}, 400),
+                ("DELETE", "/api/state", None, 405)):
+            status, answer = self.simulator.http(method, path, body)
+            self.assertEqual(status, wanted, (method, path, answer))
+            self.assertIn("error", answer)
+        self.assertEqual(self.simulator.state()["module"], "4di")

@@ -1,0 +1,102 @@
+//! `cargo xtask build`: the release image, as an ELF file for a debugger or the simulator and as a
+//! .bin for a programmer.
+
+use std::fs;
+use std::path::PathBuf;
+
+use register_map::Module;
+
+use crate::toolchain::{Need, TARGET};
+use crate::workspace::Workspace;
+use crate::{Failure, Result, command, image};
+
+/// The profile of the root Cargo.toml that the image is built with.
+pub const PROFILE: &str = "firmware";
+
+/// Read by the firmware's build when its slot module is to be fixed in the image.
+const MODULE_VARIABLE: &str = "MODIO_MODULE";
+
+/// A board the firmware runs on.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Board {
+    /// The modio-02 carrier, or a Blue Pill with an RS-485 transceiver.
+    #[value(name = "modio-02")]
+    Modio02,
+}
+
+/// What to build.
+#[derive(clap::Args, Clone, Debug)]
+#[group(skip)]
+pub struct Options {
+    /// The board to build for
+    #[arg(long, value_enum, default_value_t = Board::Modio02)]
+    pub board: Board,
+
+    /// What is plugged into the slot of a bench: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    #[arg(long, value_name = "NAME")]
+    pub module: Option<Module>,
+}
+
+impl Options {
+    /// The image as released: for the modio-02, no module fixed.
+    #[must_use]
+    pub const fn release() -> Self {
+        Self {
+            board: Board::Modio02,
+            module: None,
+        }
+    }
+}
+
+/// A built image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// With symbols and debug information.
+    pub elf: PathBuf,
+    /// The flash from 0x0800_0000 on.
+    pub bin: PathBuf,
+}
+
+/// `cargo xtask build`: builds and prints where the files are.
+///
+/// # Errors
+///
+/// When there is no toolchain for the target, or the image does not build.
+pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    let image = image(workspace, options)?;
+    println!("{}", image.elf.display());
+    println!("{}", image.bin.display());
+    Ok(())
+}
+
+/// Builds the image.
+///
+/// # Errors
+///
+/// When there is no toolchain for the target, or the image does not build.
+pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
+    let Board::Modio02 = options.board;
+    let mut cargo = workspace.target_cargo(Need::Build, "build")?;
+    cargo.args([
+        "--profile",
+        PROFILE,
+        "--package",
+        "firmware",
+        "--bin",
+        "modio",
+    ]);
+    cargo.args(["--features", "board"]);
+    match options.module {
+        Some(module) => cargo.env(MODULE_VARIABLE, module.name()),
+        // What the environment happens to hold must not end up in an image.
+        None => cargo.env_remove(MODULE_VARIABLE),
+    };
+    command::run(&mut cargo)?;
+
+    let elf = workspace.target().join(TARGET).join(PROFILE).join("modio");
+    let bin = elf.with_extension("bin");
+    let bytes = image::read(&elf).and_then(|bytes| image::flat(&bytes).map_err(Failure::new))?;
+    fs::write(&bin, bytes)
+        .map_err(|error| Failure::new(format!("cannot write {}: {error}", bin.display())))?;
+    Ok(Image { elf, bin })
+}

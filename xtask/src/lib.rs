@@ -1,0 +1,111 @@
+//! What stands behind `cargo xtask`: one module for each command, and what they share.
+//!
+//! A command says what is wrong in one line and what to do about it; it neither panics nor shows a
+//! backtrace for anything a user, a network or a missing tool can cause.
+
+#![forbid(unsafe_code)]
+
+use clap::{Parser, Subcommand};
+
+pub mod build;
+pub mod ci;
+pub mod command;
+pub mod docs;
+mod failure;
+pub mod flash;
+pub mod image;
+pub mod pymodbus;
+pub mod sim;
+pub mod size;
+pub mod steps;
+pub mod test;
+pub mod toolchain;
+pub mod workspace;
+
+pub use failure::{Failure, Result};
+use workspace::Workspace;
+
+/// The command line of `cargo xtask`.
+#[derive(Parser, Debug)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", about, long_about = None)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+impl Cli {
+    /// Whether a parse error is clap's way to show the whole usage, as for no command at all.
+    #[must_use]
+    pub fn wants_usage(error: &clap::Error) -> bool {
+        error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+    }
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Build the release image: ELF and .bin
+    Build(build::Options),
+    /// Write the image into a board with probe-rs, verify and start it
+    Flash(flash::Options),
+    /// Show flash and RAM by crate and section, with what is left of the parts and budgets
+    Size(size::Options),
+    /// Build the image and run it on the virtual board
+    Sim(sim_options::Options),
+    /// Renew docs/register-map.md
+    Docs,
+    /// Everything a change must pass
+    Test,
+    /// What CI runs: formatting, lints and documentation, then the same as `test`
+    Ci,
+}
+
+/// Does what the command line asks for.
+///
+/// # Errors
+///
+/// [`Failure`] says what is wrong and what to do, in a line, and carries the exit status.
+pub fn run(cli: Cli) -> Result<()> {
+    let mut workspace = Workspace::open()?;
+    match cli.command {
+        Command::Build(options) => build::run(&mut workspace, &options),
+        Command::Flash(options) => flash::run(&mut workspace, &options),
+        Command::Size(options) => size::run(&mut workspace, &options),
+        Command::Sim(options) => sim::run(&mut workspace, &options, std::env::args_os().skip(2)),
+        Command::Docs => docs::run(&workspace),
+        Command::Test => test::run(&mut workspace),
+        Command::Ci => ci::run(&mut workspace),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_board_that_is_not_ours_is_refused_with_the_list() {
+        let error = Cli::try_parse_from(["xtask", "build", "--board", "nucleo"]).unwrap_err();
+        let text = sim_options::one_line(&error);
+        assert!(
+            text.contains("'nucleo'") && text.contains("modio-02"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn no_command_shows_the_usage() {
+        let error = Cli::try_parse_from(["xtask"]).unwrap_err();
+        assert!(Cli::wants_usage(&error));
+    }
+
+    #[test]
+    fn a_wrong_option_of_the_simulator_is_refused_before_anything_is_built() {
+        let error = Cli::try_parse_from(["xtask", "sim", "--dip", "300"]).unwrap_err();
+        assert!(sim_options::one_line(&error).contains("300 is not in 0..=255"));
+    }
+}
