@@ -1,10 +1,9 @@
 //! The modio-02 board: an STM32F103CB (or a bare "Blue Pill" with a transceiver) as named devices.
 //!
-//! [`setup`](board::setup) brings the clocks up, reads the DIP switch and returns one
-//! [`Board`](board::Board) whose fields are the devices. This is the only crate that names the HAL; a
-//! port to another board is a new module beside [`board`]. What needs no hardware ([`design`],
-//! [`uart`], [`gap`], the logic of [`fault`] and of freeing an I2C bus) is built and tested on the
-//! host.
+//! `board::setup` brings the clocks up, reads the DIP switch and returns one `Board` whose fields are
+//! the devices. This is the only crate that names the HAL; a port to another board is a new module
+//! beside `board`. What needs no hardware ([`design`], [`uart`], [`gap`], the logic of [`fault`] and of
+//! freeing an I2C bus) is built and tested on the host.
 
 #![no_std]
 

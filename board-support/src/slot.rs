@@ -104,7 +104,7 @@ impl InputPin for SlotInput {
     fn is_high(&mut self) -> Result<bool, Infallible> {
         // SAFETY: reading a port's input register has no side effect.
         let levels = unsafe { (*pac::GPIOA::ptr()).idr().read().bits() };
-        Ok(u32::from(levels) & self.0.0 != 0)
+        Ok(levels & self.0.0 != 0)
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {

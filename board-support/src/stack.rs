@@ -31,7 +31,7 @@ pub fn top() -> u32 {
 
 /// Bytes of the stack that were never used since the start: 0 to its size, in steps of 4.
 ///
-/// Takes some 50 us with all 4 KiB free and less with less; meant for the background.
+/// Takes some 20 us for each KiB that is free; meant for the background.
 #[must_use]
 pub fn free_low_water() -> u16 {
     let unused = (bottom()..top())

@@ -91,12 +91,12 @@ impl Lamps {
         Lit {
             activity: self.activity > 0,
             fault: match trouble {
-                Trouble::NoAddress => tick / BLINK % 2 == 0,
+                Trouble::NoAddress => (tick / BLINK).is_multiple_of(2),
                 Trouble::Module => true,
                 Trouble::NoCrystal => tick < FLASH,
                 Trouble::None => false,
             },
-            run: tick / RUN % 2 == 0,
+            run: (tick / RUN).is_multiple_of(2),
         }
     }
 }

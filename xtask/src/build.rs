@@ -4,17 +4,12 @@
 use std::fs;
 use std::path::PathBuf;
 
-use register_map::Module;
-
 use crate::toolchain::{Need, TARGET};
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command, image};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
-
-/// Read by the firmware's build when its slot module is to be fixed in the image.
-const MODULE_VARIABLE: &str = "MODIO_MODULE";
 
 /// A board the firmware runs on.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,19 +26,14 @@ pub struct Options {
     /// The board to build for
     #[arg(long, value_enum, default_value_t = Board::Modio02)]
     pub board: Board,
-
-    /// What is plugged into the slot of a bench: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
-    #[arg(long, value_name = "NAME")]
-    pub module: Option<Module>,
 }
 
 impl Options {
-    /// The image as released: for the modio-02, no module fixed.
+    /// The image as released: for the modio-02.
     #[must_use]
     pub const fn release() -> Self {
         Self {
             board: Board::Modio02,
-            module: None,
         }
     }
 }
@@ -86,11 +76,6 @@ pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
         "modio",
     ]);
     cargo.args(["--features", "board"]);
-    match options.module {
-        Some(module) => cargo.env(MODULE_VARIABLE, module.name()),
-        // What the environment happens to hold must not end up in an image.
-        None => cargo.env_remove(MODULE_VARIABLE),
-    };
     command::run(&mut cargo)?;
 
     let elf = workspace.target().join(TARGET).join(PROFILE).join("modio");

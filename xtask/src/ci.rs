@@ -36,8 +36,14 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
             .and_then(|cargo| command::run(&mut target_lints(cargo)))
             .into()
     });
-    steps.run("documentation", || {
-        command::run(&mut documentation(workspace.cargo("doc"))).into()
+    steps.run("documentation, host", || {
+        command::run(&mut host_documentation(workspace.cargo("doc"))).into()
+    });
+    steps.run("documentation, target", || {
+        let cargo = workspace.target_cargo(Need::Lint, "doc");
+        cargo
+            .and_then(|cargo| command::run(&mut target_documentation(cargo)))
+            .into()
     });
     test::add(workspace, &mut steps, true);
     steps.finish()
@@ -63,15 +69,26 @@ fn target_lints(mut cargo: Command) -> Command {
     cargo
 }
 
-fn documentation(mut cargo: Command) -> Command {
-    cargo.args([
-        "--workspace",
-        "--no-deps",
-        "--ignore-rust-version",
-        "--document-private-items",
-    ]);
-    cargo.env("RUSTDOCFLAGS", "-Dwarnings");
+fn host_documentation(mut cargo: Command) -> Command {
+    cargo.args(["--workspace", "--ignore-rust-version"]);
+    // Most of it exists for the target alone.
+    cargo.args(["--exclude", "board-support"]);
+    documentation(&mut cargo);
     cargo
+}
+
+fn target_documentation(mut cargo: Command) -> Command {
+    cargo.args(["--profile", build::PROFILE, "--features", "firmware/board"]);
+    cargo.args(["--package", "board-support", "--package", "firmware"]);
+    documentation(&mut cargo);
+    cargo
+}
+
+fn documentation(cargo: &mut Command) {
+    cargo.args(["--no-deps", "--document-private-items"]);
+    // Private items are documented too, so links to them lead somewhere.
+    let flags = "-Dwarnings -Arustdoc::private-intra-doc-links";
+    cargo.env("RUSTDOCFLAGS", flags);
 }
 
 #[cfg(test)]
@@ -93,11 +110,13 @@ mod tests {
         ] {
             assert_eq!(arguments(&lints).last().unwrap(), "-Dwarnings");
         }
-        let documentation = documentation(Command::new("cargo"));
-        let flags = documentation
-            .get_envs()
-            .find(|(name, _)| *name == "RUSTDOCFLAGS");
-        assert_eq!(flags.unwrap().1.unwrap(), "-Dwarnings");
+        let cargo = || Command::new("cargo");
+        for documentation in [host_documentation(cargo()), target_documentation(cargo())] {
+            let mut variables = documentation.get_envs();
+            let flags = variables.find(|(name, _)| *name == "RUSTDOCFLAGS");
+            let flags = flags.unwrap().1.unwrap();
+            assert!(flags.to_str().unwrap().starts_with("-Dwarnings"));
+        }
     }
 
     #[test]

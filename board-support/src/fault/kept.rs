@@ -89,5 +89,5 @@ pub fn keep_uptime(seconds: u32) {
 pub fn marks() -> &'static [AtomicU8; TASKS] {
     // SAFETY: the static is aligned for it and holds bytes, of which any is a valid `AtomicU8`.
     // `take_at_start` writes them otherwise than through this, in volatile stores that tear no byte.
-    unsafe { &*(&raw const (*place()).marks) }
+    unsafe { &(*place()).marks }
 }

@@ -1,9 +1,9 @@
 //! What went wrong before the last start, kept across the reset.
 //!
 //! A record in RAM that nothing initialises: a reset leaves it, a loss of power does not. A handler
-//! [notes](note) what happened and resets the chip; the next start [takes](take_at_start) it. The
+//! notes what happened (`note`) and resets the chip; the next start takes it (`take_at_start`). The
 //! watchdog calls no handler, so the running firmware leaves what there is to know about a bite where
-//! the next start finds it: the [uptime](keep_uptime) and the [marks](marks) of its tasks.
+//! the next start finds it: the uptime (`keep_uptime`) and the marks of its tasks (`marks`).
 //!
 //! ```text
 //! word  0      1            2      3   4   5     6        7       8

@@ -3,48 +3,15 @@
 use core::mem;
 
 use cortex_m::interrupt;
-use embedded_hal::i2c::{
-    Error, ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation, SevenBitAddress,
-};
+use embedded_hal::i2c::{ErrorType, I2c, NoAcknowledgeSource, Operation, SevenBitAddress};
 use stm32f1xx_hal::pac;
 
-use super::{
-    freeing::{Held, free},
-    pins::BusPins,
-};
+use super::{error::DacBusError, freeing::free, pins::BusPins};
 use crate::{
     ClockSource,
     design::{I2C_HZ, I2C_STEP_US},
     wait::within_us,
 };
-
-/// Why a transfer failed. All may be tried again; the bus is set right by itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DacBusError {
-    /// Nobody acknowledged the address, or the slave did not take a byte.
-    NoAcknowledge(NoAcknowledgeSource),
-    /// The bus did not go where it was driven, as if there were another master.
-    ArbitrationLost,
-    /// A start or stop condition where none should be: a disturbance.
-    Misplaced,
-    /// A step took too long; the clock was stretched or held.
-    Timeout,
-    /// Somebody holds a wire low and could not be brought to let go.
-    Held(Held),
-    /// A read of no bytes, which the peripheral cannot do.
-    NothingToRead,
-}
-
-impl Error for DacBusError {
-    fn kind(&self) -> ErrorKind {
-        match self {
-            Self::NoAcknowledge(source) => ErrorKind::NoAcknowledge(*source),
-            Self::ArbitrationLost => ErrorKind::ArbitrationLoss,
-            Self::Misplaced | Self::Held(_) => ErrorKind::Bus,
-            Self::Timeout | Self::NothingToRead => ErrorKind::Other,
-        }
-    }
-}
 
 /// Flags in SR1 (RM0008 26.6.6).
 mod flag {
@@ -305,7 +272,10 @@ impl I2c for DacBus {
         let result = self.transfer(address, operations);
         let clean = match result {
             Ok(()) => true,
-            Err(DacBusError::NoAcknowledge(_)) => self.stop_after_no_acknowledge().is_ok(),
+            Err(DacBusError::NoAcknowledge(source)) => {
+                // After a data byte the next may wait in DR, and would begin the next transfer.
+                self.stop_after_no_acknowledge().is_ok() && source == NoAcknowledgeSource::Address
+            }
             Err(_) => false,
         };
         if !clean {

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | panic | panic; there is none in a release image, see `cargo xtask build` |
 //! | HardFault, to which every other fault of the core escalates | hard fault, or stack overflow |
-//! | NMI | crystal failed: the clock security system's only way to say so (RM0008 7.2.7) |
+//! | NMI | crystal failed: the clock security system is all that raises it (RM0008 7.2.7, table 63) |
 //! | an interrupt without a handler | hard fault with CFSR 0 |
 //!
 //! Safe is: the slot's lines floating and the RS-485 driver off. An analog module's DAC is out of reach
@@ -16,7 +16,7 @@ use core::{arch::naked_asm, panic::PanicInfo, ptr};
 
 use board_support::{
     fault::{self, Fault, Kind},
-    outputs_off, pac, restart, stack,
+    outputs_off, restart, stack,
 };
 use cortex_m::{interrupt, peripheral::SCB};
 
@@ -96,7 +96,7 @@ extern "C" fn on_trap(stack_pointer: u32) -> ! {
     let scb = unsafe { &*SCB::PTR };
     let status = scb.cfsr.read();
     let address = failed_address(scb, status);
-    let kind = if scb.icsr.read() & 0x1FF == NMI && crystal_failed() {
+    let kind = if scb.icsr.read() & 0x1FF == NMI {
         Kind::Crystal
     } else if fault::is_stack_overflow(stack_pointer, stack::bottom(), address) {
         Kind::StackOverflow
@@ -146,10 +146,4 @@ fn failed_address(scb: &cortex_m::peripheral::scb::RegisterBlock, status: u32) -
     } else {
         0
     }
-}
-
-/// Whether the clock security system has seen the crystal stop.
-fn crystal_failed() -> bool {
-    // SAFETY: reading the flag has no side effect.
-    unsafe { (*pac::RCC::ptr()).cir().read().cssf().bit_is_set() }
 }

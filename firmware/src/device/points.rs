@@ -251,7 +251,7 @@ impl Points {
         if offset.is_multiple_of(2) { high } else { low }
     }
 
-    /// Clears the counters of a span that [`check_clear`] found good.
+    /// Clears the counters of a span that `check_clear` found good.
     pub fn clear_pulses(&mut self, span: Span) {
         for address in span.addresses() {
             let point = address.wrapping_sub(counters::PULSES) / counters::WORDS;

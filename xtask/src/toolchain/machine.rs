@@ -13,6 +13,10 @@ const RUSTUP_LIMIT: Duration = Duration::from_secs(120);
 /// apt-get fetches some 150 MB.
 const APT_LIMIT: Duration = Duration::from_secs(900);
 
+/// The linker that rustc looks for. Debian's package brings it as a link to the lld of its LLVM, and
+/// leaves that lld out.
+const LINKER: &str = "/usr/bin/rust-lld";
+
 type Answer = Result<(), String>;
 
 /// This machine.
@@ -63,7 +67,7 @@ impl Machine for ThisMachine {
         output.is_ok_and(|output| {
             let states = String::from_utf8_lossy(&output.stdout);
             states.lines().filter(|state| *state == "installed").count() == packages.len()
-        })
+        }) && Path::new(LINKER).exists()
     }
 
     fn may_install(&mut self) -> Answer {
@@ -92,12 +96,19 @@ impl Machine for ThisMachine {
             command
         };
         bounded(APT_LIMIT, apt().arg("update"))?;
-        bounded(
-            APT_LIMIT,
-            apt()
-                .args(["install", "-y", "--no-install-recommends"])
-                .args(packages),
-        )
+        let install = |packages: &[&str]| {
+            bounded(
+                APT_LIMIT,
+                apt()
+                    .args(["install", "-y", "--no-install-recommends"])
+                    .args(packages),
+            )
+        };
+        install(packages)?;
+        match missing_linker(Path::new(LINKER)) {
+            Some(package) => install(&[&package]),
+            None => Ok(()),
+        }
     }
 
     fn debian_is_new_enough(&mut self) -> Answer {
@@ -105,6 +116,15 @@ impl Machine for ThisMachine {
             .map_err(|error| error.to_string())?;
         new_enough(&version, env!("CARGO_PKG_RUST_VERSION"))
     }
+}
+
+/// The package of the lld that a dangling link names: `rust-lld -> lld-22` is in `lld-22`.
+fn missing_linker(link: &Path) -> Option<String> {
+    if link.exists() {
+        return None;
+    }
+    let target = link.read_link().ok()?;
+    Some(target.file_name()?.to_str()?.to_owned())
 }
 
 fn bounded(limit: Duration, command: &mut Command) -> Answer {
@@ -166,6 +186,18 @@ mod tests {
             gist("E: Unable to locate package x"),
             "Unable to locate package x"
         );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_dangling_linker_names_its_package() {
+        let directory = tempfile::tempdir().unwrap();
+        let link = directory.path().join("rust-lld");
+        assert_eq!(missing_linker(&link), None, "no link, nothing known");
+        std::os::unix::fs::symlink("lld-22", &link).unwrap();
+        assert_eq!(missing_linker(&link).as_deref(), Some("lld-22"));
+        std::fs::write(directory.path().join("lld-22"), "").unwrap();
+        assert_eq!(missing_linker(&link), None);
     }
 
     #[test]

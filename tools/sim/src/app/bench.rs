@@ -20,7 +20,9 @@ pub struct Bench {
 
 impl Bench {
     /// A board that nobody has listened to yet.
-    pub fn new(board: Board) -> Self {
+    pub fn new(mut board: Board) -> Self {
+        // A pty or socket carries no rate: a master behind it speaks at the unit's.
+        board.line().set_follow(true);
         Self {
             board,
             log: VecDeque::new(),

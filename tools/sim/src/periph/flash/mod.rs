@@ -1,7 +1,7 @@
 //! The flash program and erase controller, PM0075 (STM32F10xxx flash programming manual) chapters 2 and 3.
 //!
 //! It owns the flash's cells. An operation takes real time and changes them when it ends, or half-way when
-//! the power goes ([`array`]). Option bytes can be read but not programmed.
+//! the power goes ([`mod@array`]). Option bytes can be read but not programmed.
 
 mod array;
 

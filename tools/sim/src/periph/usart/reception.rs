@@ -7,13 +7,13 @@ use crate::time::Time;
 
 impl Usart {
     /// The level at the RX pin is `level` from `at` on. Edges come in order, and before the
-    /// [`Peripheral::advance`] to or past their instant.
+    /// [`Peripheral::advance`](crate::peripheral::Peripheral::advance) to or past their instant.
     pub fn receive_edge(&mut self, at: Time, level: bool) {
         self.rx_pin.push(at, level);
     }
 
     /// Whether the receiver is on and waits for a start bit: only then does the next edge at its pin
-    /// matter before [`Peripheral::next_event`].
+    /// matter before [`Peripheral::next_event`](crate::peripheral::Peripheral::next_event).
     #[must_use]
     pub fn awaits_start(&self) -> bool {
         self.receiving() && self.receiver.is_idle()
