@@ -73,15 +73,13 @@ impl Flash {
         Self { flash }
     }
 
-    /// The bytes of one of the [store's pages](STORE_PAGES); `None` for any other address.
+    /// The bytes of the [store's pages](STORE_PAGES).
     #[must_use]
-    pub fn page(&self, address: u32) -> Option<&Page> {
+    pub fn pages(&self) -> [&Page; 2] {
         // SAFETY: a page of flash is readable at any time, of bytes, and changed by nothing but this
         // value's `&mut` methods, which the borrow keeps from being called. Those end in a barrier
         // that the compiler takes as a change of any memory.
-        STORE_PAGES
-            .contains(&address)
-            .then(|| unsafe { &*(address as *const Page) })
+        STORE_PAGES.map(|address| unsafe { &*(address as *const Page) })
     }
 
     /// Programs an erased half-word, or any with 0.

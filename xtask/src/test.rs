@@ -21,11 +21,11 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
 /// Adds the steps of `cargo xtask test`; when `strict` none may be skipped for want of a tool.
 pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) {
     steps.run("host tests", || {
-        command::run(
-            workspace
-                .cargo("test")
-                .args(["--workspace", "--ignore-rust-version"]),
-        )
+        command::run(workspace.cargo("test").args([
+            "--workspace",
+            "--ignore-rust-version",
+            "--no-fail-fast",
+        ]))
         .into()
     });
     let mut elf = None;
@@ -42,6 +42,7 @@ pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) {
             let mut cargo = workspace.cargo("test");
             cargo.args([
                 "--ignore-rust-version",
+                "--no-fail-fast",
                 "--package",
                 "sim",
                 "--",

@@ -6,11 +6,12 @@
 //! | `gap` | TIM2 | 4 | t1.5 and t3.5. Late, it makes the silence longer, never shorter |
 //! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | a closed frame becomes a response; an order is carried out when its response is out. Late, the response is late |
 //! | `scan` | TIM4, 1 kHz, and pended by a write | 2 | inputs into the device, outputs out of it, all clocks. A missed beat stretches them by 1 ms |
-//! | `background` | software, every 10 ms and on orders | 1 | DAC transfers, configuration store, LEDs, log. May be late at no cost |
+//! | `background` | EXTI0, pended every 10 ms and on orders | 1 | DAC transfers, configuration store, LEDs, log. May be late at no cost |
 //! | `idle` | - | - | feeds the watchdog when all of the above have been alive; sleeps |
 //!
-//! `serve` is bound to an interrupt nothing else uses rather than spawned: an interrupt pended while
-//! its handler runs comes again, where a second spawn would be refused and the request left lying.
+//! `serve` and `background` are software tasks in all but name: each is bound to an interrupt that
+//! nothing else uses. Pended while its handler runs, an interrupt comes again, where a second spawn
+//! would be refused and the request left lying; and no executor's panic is linked.
 
 #![no_std]
 #![no_main]
@@ -24,7 +25,7 @@ mod persistence;
 mod start;
 mod trap;
 
-#[rtic::app(device = board_support::pac, peripherals = true, dispatchers = [EXTI0])]
+#[rtic::app(device = board_support::pac, peripherals = true)]
 mod app {
     use board_support::{GapEvent, Leds, ScanTimer, Watchdog, fault, pac::Interrupt, stack};
     use firmware::{
@@ -192,8 +193,7 @@ mod app {
             });
             if left.is_some() {
                 order.lock(|order| *order = left);
-                // Still at something: it looks for orders before it ends.
-                let _ = background::spawn();
+                rtic::pend(Interrupt::EXTI0);
             }
         }
 
@@ -305,8 +305,7 @@ mod app {
         }
         // At once after a write too: it may be for the DAC.
         if every(until_background, SCANS_PER_BACKGROUND) || !beat {
-            // Still at the last one: it comes ten milliseconds later.
-            let _ = background::spawn();
+            rtic::pend(Interrupt::EXTI0);
         }
     }
 
@@ -318,11 +317,11 @@ mod app {
     }
 
     #[task(
-        priority = 1,
+        binds = EXTI0, priority = 1,
         local = [analog_outputs, persistence, lamps, lamps_at, leds, log, logged, standing],
         shared = [line, device, activity, order],
     )]
-    async fn background(cx: background::Context) {
+    fn background(cx: background::Context) {
         let background::SharedResources {
             mut device,
             mut activity,

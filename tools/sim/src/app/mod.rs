@@ -139,7 +139,7 @@ mod tests {
         write_preset(&mut flash, Module::Di4);
         assert_eq!(flash, before, "what is stored stays");
         let mut flash = vec![0xFF; FLASH_SIZE];
-        flash[(record::PAGE_ADDRESSES[1] - FLASH_BASE) as usize + 7] = 0;
+        flash[(record::PAGE_ADDRESSES[1] - FLASH_BASE) as usize + 500] = 0;
         let before = flash.clone();
         write_preset(&mut flash, Module::Di4);
         assert_eq!(flash, before, "even what is damaged");
