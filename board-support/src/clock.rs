@@ -32,6 +32,12 @@ impl ClockSource {
         }
     }
 
+    /// The same in whole MHz.
+    #[must_use]
+    pub const fn core_mhz(self) -> u8 {
+        (self.core_hz() / 1_000_000) as u8
+    }
+
     /// The clock of APB1 in Hz: half the core's.
     #[must_use]
     pub const fn apb1_hz(self) -> u32 {

@@ -18,32 +18,34 @@ pub struct GapTicks {
 
 impl GapTicks {
     /// Settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock
-    /// in Hz. The coarsest tick is used that 16 bits need, and every time is rounded up.
+    /// in whole MHz, up to 128. The coarsest tick is used that 16 bits need, and every time is rounded
+    /// up.
     ///
-    /// `None` when the silence is longer than any prescaler reaches (some minutes).
+    /// `None` without a clock or a rate.
     #[must_use]
-    pub const fn new(clock_hz: u32, line: LineSettings, t15_ns: u32, t35_ns: u32) -> Option<Self> {
-        let clock = clock_hz as u64;
-        if line.baud == 0 || clock == 0 {
+    pub const fn new(clock_mhz: u8, line: LineSettings, t15_ns: u32, t35_ns: u32) -> Option<Self> {
+        if line.baud == 0 || clock_mhz == 0 || clock_mhz > 128 {
             return None;
         }
-        let rest =
-            (clock * line.format.sixteenths_after_flag() as u64).div_ceil(16 * line.baud as u64);
-        let cycles = [
-            rest + (clock * t15_ns as u64).div_ceil(1_000_000_000),
-            rest + (clock * t35_ns as u64).div_ceil(1_000_000_000),
-        ];
-        let divider = cycles[1].div_ceil(0xFFFF);
-        if divider > 0x1_0000 {
-            return None;
-        }
+        let clock = clock_mhz as u32;
+        // At most 128 * 62,500 * 16, so that 32 bits are enough: a division of 64 bits takes 400 bytes.
+        let rest = (clock * 62_500 * line.format.sixteenths_after_flag()).div_ceil(line.baud);
+        // 4.3 s at most, of 128 MHz: 30 bits.
+        let t15 = rest.saturating_add(cycles(clock, t15_ns));
+        let t35 = rest.saturating_add(cycles(clock, t35_ns));
+        let divider = t35.div_ceil(0xFFFF);
         let divider = if divider == 0 { 1 } else { divider };
         Some(Self {
             prescaler: (divider - 1) as u16,
-            t15: cycles[0].div_ceil(divider) as u16,
-            t35: cycles[1].div_ceil(divider) as u16,
+            t15: t15.div_ceil(divider) as u16,
+            t35: t35.div_ceil(divider) as u16,
         })
     }
+}
+
+/// Nanoseconds in cycles of so many MHz, rounded up.
+const fn cycles(clock_mhz: u32, ns: u32) -> u32 {
+    clock_mhz * (ns / 1000) + (clock_mhz * (ns % 1000)).div_ceil(1000)
 }
 
 #[cfg(test)]
@@ -70,7 +72,7 @@ mod tests {
         ] {
             for format in [Format::N2, Format::E1, Format::O1, Format::N1] {
                 let line = LineSettings { baud, format };
-                let ticks = GapTicks::new(72_000_000, line, t15, t35).unwrap();
+                let ticks = GapTicks::new(72, line, t15, t35).unwrap();
                 let tick_ns = (i64::from(ticks.prescaler) + 1) * 1_000_000_000 / 72_000_000 + 1;
                 for (count, wanted) in [(ticks.t15, t15), (ticks.t35, t35)] {
                     let over = after_end(ticks, count, line) - i64::from(wanted);
@@ -89,11 +91,11 @@ mod tests {
             baud: 0,
             format: Format::N2,
         };
-        assert_eq!(GapTicks::new(72_000_000, line, 1, 2), None);
+        assert_eq!(GapTicks::new(72, line, 1, 2), None);
         let line = LineSettings::FACTORY;
         assert_eq!(GapTicks::new(0, line, 1, 2), None);
         assert!(
-            GapTicks::new(72_000_000, line, u32::MAX, u32::MAX).is_some(),
+            GapTicks::new(72, line, u32::MAX, u32::MAX).is_some(),
             "4.3 s is fine"
         );
     }

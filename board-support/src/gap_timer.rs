@@ -42,7 +42,7 @@ impl GapTimer {
         clock: ClockSource,
         rcc: &mut pac::RCC,
     ) -> Option<Self> {
-        let ticks = GapTicks::new(clock.core_hz(), line, t15_ns, t35_ns)?;
+        let ticks = GapTicks::new(clock.core_mhz(), line, t15_ns, t35_ns)?;
         pac::TIM2::enable(rcc);
         pac::TIM2::reset(rcc);
         timer.psc().write(|w| w.psc().set(ticks.prescaler));

@@ -70,9 +70,9 @@ pub const fn divider(clock_hz: u32, baud: u32) -> Option<u16> {
     if divider < 16 || divider > u16::MAX as u32 {
         return None;
     }
-    let had = divider as u64 * baud as u64;
-    let error = had.abs_diff(clock_hz as u64) * 1_000_000 / clock_hz as u64;
-    if error <= BAUD_ERROR_PPM as u64 {
+    // The product is the clock and half a rate at most.
+    let error = (divider * baud).abs_diff(clock_hz);
+    if error <= clock_hz / 1_000_000 * BAUD_ERROR_PPM {
         Some(divider as u16)
     } else {
         None

@@ -63,7 +63,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 ///
 /// # Errors
 ///
-/// When there is no toolchain for the target, or the image does not build.
+/// When there is no toolchain for the target, the image does not build, or it could panic.
 pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
     let Board::Modio02 = options.board;
     let mut cargo = workspace.target_cargo(Need::Build, "build")?;
@@ -80,8 +80,27 @@ pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
 
     let elf = workspace.target().join(TARGET).join(PROFILE).join("modio");
     let bin = elf.with_extension("bin");
-    let bytes = image::read(&elf).and_then(|bytes| image::flat(&bytes).map_err(Failure::new))?;
+    let bytes = image::read(&elf)?;
+    check_panics(&bytes)?;
+    let bytes = image::flat(&bytes).map_err(Failure::new)?;
     fs::write(&bin, bytes)
         .map_err(|error| Failure::new(format!("cannot write {}: {error}", bin.display())))?;
     Ok(Image { elf, bin })
+}
+
+/// Refuses an image into which something is linked that panics.
+fn check_panics(image: &[u8]) -> Result<()> {
+    let panics = image::panics::linked(image).map_err(Failure::new)?;
+    if panics.is_empty() {
+        return Ok(());
+    }
+    let mut text = "the image can panic, which a release image must not".to_owned();
+    for panic in panics {
+        let callers = match panic.callers.as_slice() {
+            [] => "nothing directly".to_owned(),
+            callers => callers.join(", "),
+        };
+        text.push_str(&format!("\n  {}, called by {callers}", panic.name));
+    }
+    Err(Failure::new(text))
 }

@@ -5,8 +5,10 @@ use board_support::{ClockSource, fault};
 use firmware::{config::Line, start_up::Address};
 use modio_drivers::ModuleError;
 use register_map::{Module, codes::Format};
-use rtt_target::{UpChannel, rtt_init};
+use rtt_target::UpChannel;
 use ufmt::uwriteln;
+
+use crate::rtt;
 
 /// What can happen while the device runs.
 #[derive(Clone, Copy)]
@@ -36,7 +38,7 @@ pub struct Start {
 }
 
 /// The log's writer.
-pub struct Log(UpChannel);
+pub struct Log(Option<UpChannel>);
 
 /// The names of the reset flags, from bit 0.
 const CAUSES: [&str; 6] = [
@@ -49,10 +51,9 @@ const CAUSES: [&str; 6] = [
 ];
 
 impl Log {
-    /// Opens the channel. Called once, first of all.
+    /// Opens the channel.
     pub fn new() -> Self {
-        let channels = rtt_init! { up: { 0: { size: 512, name: "Terminal" } } };
-        Self(channels.up.0)
+        Self(rtt::open())
     }
 
     /// How the device starts.
@@ -118,7 +119,9 @@ impl Log {
 
     /// Writes a line. RTT's writer cannot fail: it leaves out what does not fit.
     fn line<E>(&mut self, write: impl FnOnce(&mut rtt_target::uWriter<'_>) -> Result<(), E>) {
-        let _ = write(&mut self.0.u());
+        if let Some(channel) = &mut self.0 {
+            let _ = write(&mut channel.u());
+        }
     }
 }
 

@@ -22,6 +22,7 @@ mod line;
 mod log;
 mod pages;
 mod persistence;
+mod rtt;
 mod start;
 mod trap;
 

@@ -23,7 +23,7 @@ impl Settings {
     #[must_use]
     pub fn defaults() -> Self {
         let mut settings = Self { values: [0; 256] };
-        for (rule, address) in held() {
+        for (rule, address) in Held::from(KEY) {
             settings.put(address, rule.default);
         }
         settings
@@ -83,19 +83,12 @@ impl Settings {
     }
 
     /// Every setting that differs from its default, from this address on, in ascending order.
-    pub fn changed_from(&self, first: u16) -> impl Iterator<Item = (u16, u16)> {
-        let rules = RULES.iter().filter(move |rule| rule.end() > first);
-        rules
-            .filter(|rule| holds(rule))
-            .flat_map(move |rule| (first.max(rule.first)..rule.end()).map(move |a| (rule, a)))
-            .filter_map(|(rule, address)| {
-                let value = self.get(address);
-                let default = match rule.narrower {
-                    Some(_) => rule.default_for(self.kind_at(address)),
-                    None => rule.default,
-                };
-                (value != default).then_some((address, value))
-            })
+    #[must_use]
+    pub const fn changed_from(&self, first: u16) -> Changed<'_> {
+        Changed {
+            settings: self,
+            held: Held::from(first),
+        }
     }
 
     /// Sets a value, which must be allowed. With MODULE go the settings of the port's points.
@@ -131,7 +124,7 @@ impl Settings {
 
     /// The settings that count only after a restart, in the order of their addresses.
     pub(super) fn restart_values(&self) -> impl Iterator<Item = u16> {
-        held()
+        Held::from(KEY)
             .filter(|(rule, _)| rule.in_force == InForce::Restart)
             .map(|(_, address)| self.get(address))
     }
@@ -186,10 +179,62 @@ const fn holds(rule: &Rule) -> bool {
     rule.first != KEY && rule.first != COMMAND
 }
 
-/// Every address that holds a setting, with its rule.
-fn held() -> impl Iterator<Item = (&'static Rule, u16)> {
-    let rules = RULES.iter().filter(|rule| holds(rule));
-    rules.flat_map(|rule| rule.addresses().map(move |address| (rule, address)))
+/// Every address that holds a setting, with its rule, in ascending order.
+struct Held {
+    rules: &'static [Rule],
+    from: u16,
+}
+
+impl Held {
+    const fn from(first: u16) -> Self {
+        Self {
+            rules: RULES,
+            from: first,
+        }
+    }
+}
+
+impl Iterator for Held {
+    type Item = (&'static Rule, u16);
+
+    // Start-up and every save go through it in several places: one copy for all.
+    #[inline(never)]
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let (rule, rest) = self.rules.split_first()?;
+            let address = self.from.max(rule.first);
+            if address < rule.end() && holds(rule) {
+                self.from = address.wrapping_add(1);
+                return Some((rule, address));
+            }
+            self.rules = rest;
+        }
+    }
+}
+
+/// The settings that differ from their defaults, from [`Settings::changed_from`].
+pub struct Changed<'a> {
+    settings: &'a Settings,
+    held: Held,
+}
+
+impl Iterator for Changed<'_> {
+    type Item = (u16, u16);
+
+    #[inline(never)]
+    fn next(&mut self) -> Option<(u16, u16)> {
+        loop {
+            let (rule, address) = self.held.next()?;
+            let value = self.settings.get(address);
+            let default = match rule.narrower {
+                Some(_) => rule.default_for(self.settings.kind_at(address)),
+                None => rule.default,
+            };
+            if value != default {
+                return Some((address, value));
+            }
+        }
+    }
 }
 
 /// Worked out by the compiler.

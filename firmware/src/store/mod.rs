@@ -143,7 +143,7 @@ impl Store {
         let encoder = Encoder::new(record.schema, sequence, count);
         let mut writing = Writing::new(to, FIRST_OFFSET, encoder);
         let mut index: usize = 0;
-        while let Some(operation) = writing.next(|| {
+        while let Some(operation) = writing.next(&mut || {
             let bytes = flash.page(page).get(offset..)?;
             let pair = pair_of(bytes, index);
             index = index.saturating_add(1);
@@ -180,7 +180,7 @@ impl Store {
             self.make_ready(page, flash)?;
         }
         let mut writing = Writing::new(page, FIRST_OFFSET, Encoder::new(SCHEMA, 0, 0));
-        while let Some(operation) = writing.next(|| None) {
+        while let Some(operation) = writing.next(&mut || None) {
             operation.perform(flash)?;
         }
         self.make_ready(page.other(), flash)

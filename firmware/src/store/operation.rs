@@ -111,7 +111,10 @@ impl Writing {
     }
 
     /// The next operation; `None` when the record is complete. For `pair` see [`Encoder::next`].
-    pub(super) fn next(&mut self, pair: impl FnOnce() -> Option<(u16, u16)>) -> Option<Operation> {
+    pub(super) fn next(
+        &mut self,
+        pair: &mut dyn FnMut() -> Option<(u16, u16)>,
+    ) -> Option<Operation> {
         let half = self.encoder.next(pair)?;
         let offset = self.offset;
         self.offset = offset.saturating_add(2);

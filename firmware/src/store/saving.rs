@@ -59,7 +59,7 @@ impl Saving {
             return Some(operation);
         }
         let cursor = &mut self.cursor;
-        self.writing.next(|| {
+        self.writing.next(&mut || {
             let pair = settings.changed_from(*cursor).next()?;
             *cursor = pair.0.saturating_add(1);
             Some(pair)

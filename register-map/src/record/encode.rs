@@ -46,7 +46,7 @@ impl Encoder {
 
     /// The next half-word; `None` after the last. Asks for the next pair of address and value when it
     /// comes to one, `count` times in all; where `pair` has none, an address that nobody knows is stored.
-    pub fn next(&mut self, pair: impl FnOnce() -> Option<(u16, u16)>) -> Option<u16> {
+    pub fn next(&mut self, pair: &mut dyn FnMut() -> Option<(u16, u16)>) -> Option<u16> {
         let body = self.size().saturating_sub(4) / 2;
         let half = if let Some(half) = self.head.get(self.at) {
             *half
@@ -94,7 +94,7 @@ pub fn encode_page(sequence: u32, pairs: &[(u16, u16)], page: &mut [u8]) -> Opti
     let (mark, record) = halves.split_first_mut()?;
     *mark = PAGE_MARK.to_le_bytes();
     for place in record {
-        *place = encoder.next(|| pairs.next())?.to_le_bytes();
+        *place = encoder.next(&mut || pairs.next())?.to_le_bytes();
     }
     Some(size)
 }

@@ -203,12 +203,12 @@ mod tests {
     #[test]
     fn another_layout_is_no_record_but_another_register_map_is() {
         let mut encoder = Encoder::new(SCHEMA + 1, 0, 0);
-        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(|| None))
+        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
             .flat_map(u16::to_le_bytes)
             .collect();
         assert_eq!(Record::decode(&bytes).unwrap().schema, SCHEMA + 1);
         let mut encoder = Encoder::new(SCHEMA + 0x100, 0, 0);
-        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(|| None))
+        let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
             .flat_map(u16::to_le_bytes)
             .collect();
         assert_eq!(Record::decode(&bytes), None);

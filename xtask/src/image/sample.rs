@@ -103,10 +103,16 @@ pub(crate) fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
         let home = segments
             .iter()
             .position(|segment| (segment.run..segment.run + segment.size).contains(&address));
+        // A function's address has the Thumb bit.
+        let kind = if address & 1 == 1 {
+            elf::STT_FUNC
+        } else {
+            elf::STT_OBJECT
+        };
         writer.write_symbol(&Sym {
             name: Some(name),
             section: Some(sections[home.expect("a symbol in a segment")].1),
-            st_info: elf::STB_GLOBAL << 4 | elf::STT_OBJECT,
+            st_info: elf::STB_GLOBAL << 4 | kind,
             st_other: 0,
             st_shndx: 0,
             st_value: address.into(),
