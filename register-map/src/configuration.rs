@@ -6,7 +6,7 @@ use crate::codes::{
     AirRate, Baud, Command, Format, GapRule, Mode, Power, Scale, Signal, Switch as OnOff,
 };
 use crate::points::PointKind::{BitOutput, WordInput, WordOutput};
-use crate::rule::Rule;
+use crate::rule::{Narrower, Rule};
 use crate::values::Values;
 
 /// The value of KEY that opens the lock.
@@ -29,12 +29,16 @@ const SLOT: Rule = Rule::restart(Values::up_to(6), 0);
 /// MODULE of a port without a slot: `none`.
 const NO_SLOT: Rule = Rule::restart(Values::only(0), 0);
 
-const SAFE_RULE: Rule =
-    Rule::now(Values::up_to(RAW_MAX).or(HOLD), 0).but(BitOutput, Values::up_to(1).or(HOLD), 0);
-const START_RULE: Rule =
-    Rule::restart(Values::up_to(RAW_MAX), 0).but(BitOutput, Values::up_to(1), 0);
+const SAFE_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1).or(HOLD), 0);
+const START_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1), 0);
+const FILTER_OF_A_WORD: Narrower = Narrower::new(WordInput, Values::up_to(8), 4);
+const RANGE_OF_AN_OUTPUT: Narrower = Narrower::new(WordOutput, Values::up_to(1), 0);
+
+const SAFE_RULE: Rule = Rule::now(Values::up_to(RAW_MAX).or(HOLD), 0).but(&SAFE_OF_A_BIT);
+const START_RULE: Rule = Rule::restart(Values::up_to(RAW_MAX), 0).but(&START_OF_A_BIT);
 const FILTER_RULE: Rule =
-    Rule::now(Values::up_to(1000), DEBOUNCE_DEFAULT_MS).but(WordInput, Values::up_to(8), 4);
+    Rule::now(Values::up_to(1000), DEBOUNCE_DEFAULT_MS).but(&FILTER_OF_A_WORD);
+const RANGE_RULE: Rule = Rule::now(Values::up_to(2), 0).but(&RANGE_OF_AN_OUTPUT);
 
 block! {
     "Configuration", 0x0100..=0x01FF;
@@ -80,7 +84,7 @@ block! {
     /// By point. NTC constant of an analog input
     BETA "BETA": 0x0160 x 32, "K", Rule::now(Values::range(2000, 5000), 3950), &[];
     /// By point. Signal of an analog input; of an analog output 0 or 1, as its jumper is set
-    RANGE "RANGE": 0x0180 x 32, "", Rule::now(Values::up_to(2), 0).but(WordOutput, Values::up_to(1), 0), Signal::NAMES;
+    RANGE "RANGE": 0x0180 x 32, "", RANGE_RULE, Signal::NAMES;
     /// By point. How an analog point is counted
     SCALE "SCALE": 0x01A0 x 32, "", Rule::now(Values::up_to(1), 0), Scale::NAMES;
     /// By point. Output when the line falls silent: 0xFFFF = hold, 0-1 for a bit, 0-4095 raw for a word

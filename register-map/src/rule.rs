@@ -34,6 +34,18 @@ pub struct Narrower {
     pub default: u16,
 }
 
+impl Narrower {
+    /// What holds for points of this kind.
+    #[must_use]
+    pub const fn new(kind: PointKind, values: Values, default: u16) -> Self {
+        Self {
+            kind,
+            values,
+            default,
+        }
+    }
+}
+
 /// What holds for a run of registers: for each the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rule {
@@ -50,7 +62,7 @@ pub struct Rule {
     /// The factory default.
     pub default: u16,
     /// For a setting by point: the kind of point that takes other values.
-    pub narrower: Option<Narrower>,
+    pub narrower: Option<&'static Narrower>,
 }
 
 impl Rule {
@@ -97,12 +109,8 @@ impl Rule {
 
     /// The same, with other values and another default for points of one kind.
     #[must_use]
-    pub const fn but(mut self, kind: PointKind, values: Values, default: u16) -> Self {
-        self.narrower = Some(Narrower {
-            kind,
-            values,
-            default,
-        });
+    pub const fn but(mut self, narrower: &'static Narrower) -> Self {
+        self.narrower = Some(narrower);
         self
     }
 
