@@ -70,13 +70,15 @@ impl DacBus {
         self.i2c
             .cr2()
             .write(|w| unsafe { w.freq().bits(mhz as u8) });
-        // Half a period, rounded up (26.6.8); the longest rise is 1 us (26.6.9).
-        let half = self.apb1_hz.div_ceil(2 * I2C_HZ);
-        // SAFETY: at most 225 in a field of twelve bits whose least is 4.
+        // A third of a period, rounded up: fast mode is low for two and high for one (26.6.8). The
+        // longest rise is 0.3 us (26.6.9).
+        let third = self.apb1_hz.div_ceil(3 * I2C_HZ);
+        // SAFETY: at most 40 in a field of twelve bits whose least is 1.
         self.i2c
             .ccr()
-            .write(|w| unsafe { w.ccr().bits(half as u16) });
-        self.i2c.trise().write(|w| w.trise().set(mhz as u8 + 1));
+            .write(|w| unsafe { w.f_s().fast().ccr().bits(third as u16) });
+        let rise = mhz * 3 / 10 + 1;
+        self.i2c.trise().write(|w| w.trise().set(rise as u8));
         self.i2c.cr1().write(|w| w.pe().enabled());
         self.ready = true;
         Ok(())

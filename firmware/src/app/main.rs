@@ -65,6 +65,7 @@ mod app {
     #[local]
     struct Local {
         server: Server,
+        frame_gap_ms: u32,
         module: Installed,
         settings: [ChannelSettings; 4],
         scan_timer: ScanTimer,
@@ -89,6 +90,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let Started {
             line,
+            frame_gap_ms,
             server,
             device,
             module,
@@ -113,6 +115,7 @@ mod app {
             },
             Local {
                 server,
+                frame_gap_ms,
                 module,
                 settings,
                 scan_timer,
@@ -171,7 +174,7 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI3, priority = 3, local = [server], shared = [line, device, activity, order])]
+    #[task(binds = EXTI3, priority = 3, local = [server, frame_gap_ms], shared = [line, device, activity, order])]
     fn serve(cx: serve::Context) {
         alive::mark(fault::marks(), Task::Serve);
         let serve::SharedResources {
@@ -181,7 +184,11 @@ mod app {
             mut order,
             ..
         } = cx.shared;
-        let server = cx.local.server;
+        let serve::LocalResources {
+            server,
+            frame_gap_ms,
+            ..
+        } = cx.local;
         let mut on_line = |f: &mut dyn FnMut(&mut Line)| line.lock(|line| line.as_mut().map(f));
 
         // An order of the last request, whose reply is out or never comes.
@@ -215,7 +222,7 @@ mod app {
         device.lock(|device| {
             device.state.counters = server.counters(&line_counters);
             if matches!(decision.outcome, Outcome::Accepted | Outcome::Refused(_)) {
-                device.request_seen();
+                device.request_seen(*frame_gap_ms);
             }
             server.carry_out(&decision, adu, device);
         });
@@ -304,8 +311,8 @@ mod app {
                 rtic::pend(Interrupt::EXTI3);
             }
         }
-        // At once after a write too: it may be for the DAC.
-        if every(until_background, SCANS_PER_BACKGROUND) || !beat {
+        // At once when outputs may have changed: they may be the DAC's.
+        if every(until_background, SCANS_PER_BACKGROUND) || !beat || tripped {
             rtic::pend(Interrupt::EXTI0);
         }
     }

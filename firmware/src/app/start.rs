@@ -23,6 +23,8 @@ use crate::{
 /// What start-up brings about.
 pub struct Started {
     pub line: Option<Line>,
+    /// The silence that ends a frame, in ms, rounded up.
+    pub frame_gap_ms: u32,
     pub server: Server,
     pub device: Device,
     pub module: Installed,
@@ -79,18 +81,19 @@ pub fn up(device: pac::Peripherals, adus: &'static mut [Adu; 2]) -> Started {
     }
 
     let strict = settings.gap_rule == GapRule::Drop;
+    let on_wire = wire_settings(settings);
+    let gaps = rtu::Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
+    let t35 = settings
+        .frame_gap
+        .map_or(gaps.t35, |tenths| u32::from(tenths) * 100_000);
     let line = address.unit().and_then(|unit| {
-        let on_wire = wire_settings(settings);
-        let gaps = rtu::Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
-        let t35 = settings
-            .frame_gap
-            .map_or(gaps.t35, |tenths| u32::from(tenths) * 100_000);
         let (uart, gap) = board.line.start(on_wire, gaps.t15.min(t35), t35)?;
         Some(Line::new(uart, gap, unit, strict, adus))
     });
 
     Started {
         line,
+        frame_gap_ms: t35.div_ceil(1_000_000),
         server: Server::new(identity.unit),
         device,
         module,

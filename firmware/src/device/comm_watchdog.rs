@@ -20,9 +20,9 @@ impl CommWatchdog {
         }
     }
 
-    /// A valid request has come.
-    pub const fn feed(&mut self) {
-        self.silent_ms = 0;
+    /// A valid request has come, whose end is so many milliseconds past.
+    pub const fn feed(&mut self, passed_ms: u32) {
+        self.silent_ms = passed_ms;
         self.safe = false;
     }
 
@@ -31,7 +31,7 @@ impl CommWatchdog {
     pub const fn tick(&mut self, timeout_ms: Option<u32>) -> bool {
         let Some(timeout_ms) = timeout_ms else {
             // Switched on later, it counts from then.
-            self.feed();
+            self.feed(0);
             return false;
         };
         self.silent_ms = self.silent_ms.saturating_add(1);
@@ -70,7 +70,7 @@ mod tests {
         let mut watchdog = CommWatchdog::new();
         assert_eq!(ticks_to_trip(&mut watchdog, 100), 100);
         assert!((0..1000).all(|_| !watchdog.tick(Some(100))));
-        watchdog.feed();
+        watchdog.feed(0);
         assert!(
             watchdog.has_tripped(),
             "a request does not take the flag back"
@@ -82,11 +82,24 @@ mod tests {
     }
 
     #[test]
+    fn the_time_counts_from_the_request_s_end() {
+        let mut watchdog = CommWatchdog::new();
+        watchdog.feed(33);
+        assert_eq!(ticks_to_trip(&mut watchdog, 100), 67);
+        watchdog.feed(100);
+        assert_eq!(
+            ticks_to_trip(&mut watchdog, 10),
+            1,
+            "the silence was longer"
+        );
+    }
+
+    #[test]
     fn requests_hold_it_off_and_it_counts_from_when_it_is_switched_on() {
         let mut watchdog = CommWatchdog::new();
         for _ in 0..100 {
             assert!((0..99).all(|_| !watchdog.tick(Some(100))));
-            watchdog.feed();
+            watchdog.feed(0);
         }
         assert!((0..1000).all(|_| !watchdog.tick(None)));
         assert_eq!(ticks_to_trip(&mut watchdog, 100), 100);

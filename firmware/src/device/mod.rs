@@ -120,9 +120,9 @@ impl Device {
         tripped
     }
 
-    /// A valid request for this unit has come.
-    pub const fn request_seen(&mut self) {
-        self.comm_watchdog.feed();
+    /// A valid request for this unit has come, whose end is so many milliseconds past.
+    pub const fn request_seen(&mut self, passed_ms: u32) {
+        self.comm_watchdog.feed(passed_ms);
     }
 
     /// Takes the command that a request ordered.

@@ -215,14 +215,14 @@ fn outputs_start_at_start_and_go_to_safe_in_silence() {
     let mut bench = Bench::new(Module::Do4, &stored);
     let bits = |bench: &mut Bench| bench.ask(&[1, 0, 0x10, 0, 4])[2];
     assert_eq!(bits(&mut bench), 0b0101);
-    bench.device.request_seen();
+    bench.device.request_seen(0);
     let trips = (1..=600).filter(|_| bench.device.tick()).count();
     assert_eq!(trips, 1);
     assert_eq!(bits(&mut bench), 0b0110, "off, on, held, off");
     let status = |bench: &mut Bench| bench.read(0x020A, 1).unwrap()[0] & 1;
     assert_eq!(status(&mut bench), 1);
     // Outputs stay until they are written; the flag until it is cleared.
-    bench.device.request_seen();
+    bench.device.request_seen(0);
     assert_eq!(bits(&mut bench), 0b0110);
     bench.ask(&[5, 0, 0x10, 0xFF, 0]);
     assert_eq!(bits(&mut bench), 0b0111);
