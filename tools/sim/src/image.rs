@@ -7,6 +7,7 @@ use object::{Object, ObjectSegment, ObjectSymbol};
 
 use crate::board::Error;
 use crate::machine::memory::{FLASH_BASE, FLASH_SIZE};
+use crate::periph::flash::PAGE;
 
 /// A firmware image, ready to be written into flash.
 #[derive(Clone, Debug)]
@@ -117,8 +118,14 @@ impl Image {
         self.segments.iter().map(|(_, data)| data.len()).sum()
     }
 
-    /// Writes it into `flash`, as a programmer on the SWD pins would.
+    /// Writes it into `flash`, as a programmer on the SWD pins would: the pages it needs are erased first,
+    /// the others keep what they hold.
     pub(crate) fn load(&self, flash: &mut [u8]) {
+        for (offset, data) in &self.segments {
+            let first = offset / PAGE * PAGE;
+            let end = (offset + data.len()).next_multiple_of(PAGE);
+            flash[first..end].fill(0xFF);
+        }
         for (offset, data) in &self.segments {
             flash[*offset..*offset + data.len()].copy_from_slice(data);
         }

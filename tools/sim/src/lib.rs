@@ -23,7 +23,7 @@ pub mod slot;
 pub mod soc;
 pub mod time;
 
-pub use board::{Board, Config, Error, Leds};
+pub use board::{Board, Config, CoreTime, Error, Leds, Wait};
 pub use finding::Finding;
 pub use image::Image;
 pub use register_map::Module;

@@ -27,6 +27,10 @@ pub struct Options {
     #[arg(long)]
     no_preset: bool,
 
+    /// Keep the flash in FILE, made if it is not there: what the firmware stores survives
+    #[arg(long, value_name = "FILE")]
+    pub flash: Option<PathBuf>,
+
     /// Make LINK a symlink to the pseudo-terminal of the RS-485 line
     #[arg(long, value_name = "LINK")]
     pub pty: Option<PathBuf>,
@@ -38,6 +42,10 @@ pub struct Options {
     /// Where the HTTP interface listens, HOST:PORT; port 0 takes a free one
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
     pub http: SocketAddr,
+
+    /// Let a GDB connect to the core, at HOST:PORT
+    #[arg(long, value_name = "ADDR", value_parser = address)]
+    pub gdb: Option<SocketAddr>,
 
     /// Run this image instead of building one
     #[arg(long, value_name = "FILE")]
@@ -107,6 +115,7 @@ mod tests {
         assert_eq!(options.http, "127.0.0.1:8502".parse().unwrap());
         assert!(options.preset());
         assert_eq!((options.pty, options.tcp, options.elf), (None, None, None));
+        assert_eq!((options.flash, options.gdb), (None, None));
         assert_eq!(options.run_for, None);
     }
 
@@ -142,8 +151,8 @@ mod tests {
             (&["--module", "8di"][..], "one of none, 4di"),
             (&["--tcp", "nowhere"][..], "not an address"),
             (&["--http", "127.0.0.1:99999"][..], "not an address"),
-            (&["--flash", "x"][..], "unexpected argument '--flash'"),
-            (&["--gdb", "x"][..], "unexpected argument '--gdb'"),
+            (&["--flash"][..], "--flash <FILE>"),
+            (&["--gdb", "x"][..], "not an address"),
             (&["--pty"][..], "--pty <LINK>"),
         ] {
             let text = parse(arguments).unwrap_err();

@@ -5,6 +5,8 @@ use std::io::Write;
 
 use sim::Board;
 
+use super::gdb::Debug;
+
 /// Lines of the log that the HTTP interface shows.
 const TAIL: usize = 50;
 
@@ -12,6 +14,8 @@ const TAIL: usize = 50;
 pub struct Bench {
     /// The virtual modio-02.
     pub board: Board,
+    /// What a debugger has set up.
+    pub debug: Debug,
     log: VecDeque<String>,
     /// A line of the log that has not ended yet.
     unfinished: String,
@@ -25,6 +29,7 @@ impl Bench {
         board.line().set_follow(true);
         Self {
             board,
+            debug: Debug::default(),
             log: VecDeque::new(),
             unfinished: String::new(),
             findings: 0,

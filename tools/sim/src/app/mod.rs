@@ -3,6 +3,7 @@
 //! ```text
 //! pty, TCP ──bytes──┐                     ┌──> bytes to pty and TCP
 //! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP
+//! GDB ─────bytes────┤                     ├──> bytes to GDB
 //! Ctrl-C, SIGTERM ──┘    the board's only ├──> log on stdout
 //!                        thread           └──> findings on stderr
 //! ```
@@ -19,7 +20,9 @@ use sim_options::Options;
 
 mod api;
 mod bench;
+mod flash_file;
 mod frames;
+mod gdb;
 mod http;
 mod pace;
 mod pty;
@@ -31,6 +34,7 @@ mod tcp;
 mod testing;
 
 use bench::Bench;
+use flash_file::FlashFile;
 
 /// Flash of the STM32F103CB, in bytes, and where it begins.
 const FLASH_SIZE: usize = 128 * 1024;
@@ -46,6 +50,8 @@ enum Event {
     Bytes(Vec<u8>),
     /// A request to the HTTP interface, and where its reply goes.
     Request(api::Request, mpsc::Sender<api::Reply>),
+    /// From the debugger.
+    Gdb(gdb::Message),
     /// Time to end.
     Stop,
 }
@@ -54,9 +60,13 @@ enum Event {
 ///
 /// # Errors
 ///
-/// What keeps it from starting, in one line.
+/// In one line: what keeps it from starting, or the flash's file from being written at the end.
 pub fn run(options: &Options) -> Result<(), String> {
-    let mut bench = Bench::new(board(options)?);
+    let (mut flash, stored) = match options.flash.as_deref().map(FlashFile::open) {
+        Some(opened) => opened.map(|(file, stored)| (Some(file), stored))?,
+        None => (None, None),
+    };
+    let mut bench = Bench::new(board(options, stored)?);
     let (events, queue) = mpsc::channel();
 
     let stop = events.clone();
@@ -69,7 +79,15 @@ pub fn run(options: &Options) -> Result<(), String> {
         .tcp
         .map(|address| tcp::Tcp::listen(address, events.clone()))
         .transpose()?;
-    let http = http::listen(options.http, events)?;
+    let http = http::listen(options.http, events.clone())?;
+    let gdb = options
+        .gdb
+        .map(|address| gdb::listen(address, events))
+        .transpose()?;
+    // A place where nothing can be written is told now, not when something is to be saved.
+    flash
+        .as_mut()
+        .map_or(Ok(()), |file| file.keep(&bench.board))?;
 
     bench.board.run_until(START_UP);
     bench::say(&format!("pty: {}", pty.path().display()));
@@ -77,22 +95,29 @@ pub fn run(options: &Options) -> Result<(), String> {
         bench::say(&format!("tcp: {}", tcp.address()));
     }
     bench::say(&format!("http: http://{http}/"));
+    if let Some(gdb) = gdb {
+        bench::say(&format!("gdb: {gdb}"));
+    }
 
     run::until_stopped(
         &mut bench,
         &queue,
         &run::Endpoints { pty, tcp },
+        flash.as_mut(),
         options.run_for,
     );
-    Ok(())
+    flash
+        .as_mut()
+        .map_or(Ok(()), |file| file.keep(&bench.board))
 }
 
-fn board(options: &Options) -> Result<Board, String> {
+/// The board, over the flash that a file held, with the image written over its own pages of it.
+fn board(options: &Options, stored: Option<Vec<u8>>) -> Result<Board, String> {
     let elf = options.elf.as_deref().ok_or(
         "no image to run: give one with --elf FILE, or use `cargo xtask sim`, which builds one",
     )?;
     let image = image(elf)?;
-    let mut flash = vec![0xFF; FLASH_SIZE];
+    let mut flash = stored.unwrap_or_else(|| vec![0xFF; FLASH_SIZE]);
     if options.preset() {
         write_preset(&mut flash, options.module);
     }

@@ -13,9 +13,11 @@ pub struct Config {
     pub dip: u8,
     /// What is plugged into the slot.
     pub module: Module,
-    /// Whether the 8 MHz crystal works. Without it HSERDY never comes.
+    /// Whether the 8 MHz crystal works. Without it HSERDY never comes. It can die later as well
+    /// ([`crate::Board::set_crystal`]).
     pub crystal: bool,
-    /// The flash's 128 KiB before the image is written into it; erased when `None`.
+    /// The flash's 128 KiB before the image is written into it, which erases the pages that it needs;
+    /// erased when `None`.
     pub flash: Option<Vec<u8>>,
     /// The 96-bit unique identity, as its bytes stand at 0x1FFF_F7E8 (RM0008 30.2).
     pub unique_id: [u8; 12],

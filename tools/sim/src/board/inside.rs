@@ -39,11 +39,17 @@ impl Board {
         let outside = Error::Range("an address in flash");
         let at = address.checked_sub(FLASH_BASE).ok_or(outside.clone())? as usize;
         self.machine
-            .flash_mut()
-            .get_mut(at..at.saturating_add(bytes.len()))
+            .flash_range_mut(at..at.saturating_add(bytes.len()))
             .ok_or(outside)?
             .copy_from_slice(bytes);
         Ok(())
+    }
+
+    /// Grows whenever the flash's contents may have changed: when an operation has ended or was torn, or
+    /// someone was lent them to change.
+    #[must_use]
+    pub fn flash_changes(&self) -> u64 {
+        self.machine.bus.soc.flash.changes()
     }
 
     /// Flash operations started since the board was made.
@@ -114,7 +120,8 @@ impl Board {
         self.machine.pc()
     }
 
-    /// A core register: 0 to 12, 13 SP, 14 LR, 15 PC, 16 xPSR; `None` above.
+    /// A core register: 0 to 12, 13 SP, 14 LR, 15 PC, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK, 20 BASEPRI,
+    /// 21 FAULTMASK, 22 CONTROL; `None` above.
     #[must_use]
     pub fn register(&self, number: usize) -> Option<u32> {
         self.machine.register(number)

@@ -1,13 +1,19 @@
-//! The board as its user sees it: power and time here, its outside in [`outside`], its memories in [`inside`].
+//! The board as its user sees it: power and time here, its outside in [`outside`], its memories in [`inside`],
+//! measurements in [`measure`], a debugger's doings in [`debug`].
 
 mod config;
+mod debug;
 mod inside;
+mod measure;
 mod outside;
 
 use std::collections::BTreeMap;
 
 pub use config::{Config, Error};
 pub use outside::Leds;
+
+pub use crate::machine::usage::CoreTime;
+pub use crate::machine::waits::Wait;
 
 use crate::image::Image;
 use crate::machine::memory::FLASH_SIZE;
@@ -69,12 +75,6 @@ impl Board {
         self.machine.now()
     }
 
-    /// Instructions retired since the board was made.
-    #[must_use]
-    pub fn instructions(&self) -> u64 {
-        self.machine.instructions()
-    }
-
     /// Runs until the virtual time is `t`, or the end of the instruction under way then; at once when it is
     /// past. Time passes with the power off too.
     pub fn run_until(&mut self, t: Time) {
@@ -82,6 +82,7 @@ impl Board {
             time: t,
             instructions: u64::MAX,
             pc: None,
+            breakpoints: false,
         });
     }
 
@@ -97,6 +98,7 @@ impl Board {
             time: Time::MAX,
             instructions: self.instructions().saturating_add(n),
             pc: None,
+            breakpoints: false,
         });
     }
 
@@ -107,6 +109,7 @@ impl Board {
             time: limit,
             instructions: u64::MAX,
             pc: Some(address),
+            breakpoints: false,
         }) == Stop::Pc
     }
 

@@ -33,6 +33,19 @@ impl Board {
         self.machine.bus.soc.set_switch(dip, now);
     }
 
+    /// Whether the 8 MHz crystal works.
+    #[must_use]
+    pub fn crystal(&self) -> bool {
+        self.machine.bus.soc.rcc.crystal()
+    }
+
+    /// Lets the crystal die at this instant, or come back: then it starts again where RCC still has it on.
+    pub fn set_crystal(&mut self, works: bool) {
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.set_crystal(works, now);
+    }
+
     /// What is plugged into the slot.
     #[must_use]
     pub fn module(&self) -> Module {

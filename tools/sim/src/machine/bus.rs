@@ -13,6 +13,7 @@ use rigless::time::VirtualNanos;
 use super::dwt::{self, Dwt};
 use super::memory::{FLASH_BASE, FLASH_SIZE};
 use super::timing::{InstructionClock, cycles_per_64};
+use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::{self, Ident};
@@ -45,6 +46,8 @@ pub struct Bus {
     pub(super) queued: Vec<Queued>,
     /// The instruction that made the last access.
     pub(super) pc: u32,
+    /// How long interrupts wait, when that is measured.
+    pub(super) waits: Option<Box<Waits>>,
 }
 
 /// An access as the blocks see it.
@@ -141,6 +144,7 @@ impl Bus {
             }
             PPB..0xE010_0000 => Some(self.debug_block(request)),
             _ => match flash_offset(address) {
+                Some(offset) if request.write.is_none() => Some(self.vectors(request, offset)),
                 Some(offset) => self.store_to_flash(request, offset),
                 None => {
                     self.note(
@@ -277,7 +281,14 @@ impl Bus {
         }
     }
 
-    /// Only stores come here: the core reads the flash without asking.
+    /// The core reads the flash without asking, all but the page of the vector table while [`Waits`] has it
+    /// sent here.
+    fn vectors(&self, request: Request, offset: u32) -> u32 {
+        let at = (offset & !3) as usize;
+        let flash = self.soc.flash.bytes();
+        request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| flash[at + n])))
+    }
+
     fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {
         let value = request.write? as u16;
         let half = request.width == Width::Half;
@@ -311,8 +322,11 @@ fn flash_offset(address: u32) -> Option<u32> {
 }
 
 impl CoreBus for Bus {
-    fn access(&mut self, access: Access, _from_code: bool) -> Option<u64> {
+    fn access(&mut self, access: Access, from_code: bool) -> Option<u64> {
         let now = self.clock.time(access.instruction_count);
+        if let Some(waits) = self.waits.as_mut().filter(|_| !from_code) {
+            waits.vector_read(access.address as u32, now);
+        }
         let request = Request {
             address: access.address as u32,
             width: match access.width {
@@ -350,7 +364,7 @@ impl CoreBus for Bus {
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        if self.halt {
+        if self.halt || self.waits.is_some() {
             return None;
         }
         let mut until = self.stop.0.min(self.soc.next_event());

@@ -4,10 +4,13 @@
 //! time is [`timing`]'s, its bus is [`bus`], and [`run`] takes it from event to event.
 
 pub mod bus;
+mod debug;
 pub mod dwt;
 pub mod memory;
 mod run;
 pub mod timing;
+pub mod usage;
+pub mod waits;
 
 use core::num::{NonZeroU32, NonZeroU64};
 
@@ -29,6 +32,8 @@ use dwt::Dwt;
 use memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
 pub use run::{Limit, Stop};
 use timing::{InstructionClock, cycles_per_64};
+use usage::{CoreTime, Resting};
+use waits::{Wait, Waits};
 
 /// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
 const CPUID: u32 = 0x411F_C231;
@@ -66,6 +71,7 @@ pub struct Machine {
     power_ons: u64,
     cut: Option<Cut>,
     cut_at: Option<Time>,
+    resting: Resting,
     log: Log,
     /// When the log is emptied next.
     poll_at: Time,
@@ -107,6 +113,7 @@ impl Machine {
                 halt: false,
                 queued: Vec::new(),
                 pc: 0,
+                waits: None,
             },
             ram,
             fresh,
@@ -118,6 +125,7 @@ impl Machine {
             power_ons: 0,
             cut: None,
             cut_at: None,
+            resting: Resting::default(),
             log: Log::new(rtt_block),
             poll_at: if rtt_block.is_some() { POLL } else { Time::MAX },
         }
@@ -133,6 +141,35 @@ impl Machine {
     #[must_use]
     pub fn instructions(&self) -> u64 {
         self.counted + self.core.retired()
+    }
+
+    /// Cycles of HCLK since the machine was made.
+    #[must_use]
+    pub fn cycles(&self) -> u64 {
+        self.bus.clock.cycle(self.core.retired())
+    }
+
+    /// How the core has spent the time since the machine was made.
+    #[must_use]
+    pub fn core_time(&self) -> CoreTime {
+        self.resting.of(self.now())
+    }
+
+    /// Measures how long interrupts wait from now on, anew, or no longer.
+    pub fn measure_waits(&mut self, on: bool) {
+        if let Some(mut waits) = self.bus.waits.take() {
+            waits.leave(&mut *self.core);
+        }
+        self.bus.waits = on.then(|| Box::new(Waits::new()));
+    }
+
+    /// How long exception `number` had to wait, as measured.
+    #[must_use]
+    pub fn wait(&self, number: usize) -> Wait {
+        self.bus
+            .waits
+            .as_ref()
+            .map_or_else(Wait::default, |waits| waits.of(number))
     }
 
     /// The address of the next instruction.
@@ -186,13 +223,22 @@ impl Machine {
 
     /// The flash, to change: a programmer's write.
     pub fn flash_mut(&mut self) -> &mut [u8] {
-        let base = u64::from(FLASH_BASE);
-        self.core
-            .ask(Queued::Invalidate(base, base + FLASH_SIZE as u64));
-        self.bus.soc.flash.bytes_mut()
+        self.flash_range_mut(0..FLASH_SIZE).unwrap_or_default()
     }
 
-    /// A core register: 0 to 15, and 16 for xPSR.
+    /// A part of the flash, to change; only the code in it is translated anew. `None` when it does not
+    /// all lie in flash.
+    pub fn flash_range_mut(&mut self, range: core::ops::Range<usize>) -> Option<&mut [u8]> {
+        if range.start > range.end || range.end > FLASH_SIZE {
+            return None;
+        }
+        let at = |offset: usize| u64::from(FLASH_BASE) + offset as u64;
+        self.core
+            .ask(Queued::Invalidate(at(range.start), at(range.end)));
+        self.bus.soc.flash.bytes_mut().get_mut(range)
+    }
+
+    /// A core register: 0 to 15, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK, 20 BASEPRI, 21 FAULTMASK, 22 CONTROL.
     #[must_use]
     pub fn register(&self, number: usize) -> Option<u32> {
         let bytes = self.core.gdb_register(number)?;
@@ -258,6 +304,9 @@ impl Machine {
             Some(u64::from(u32::from_le_bytes(bytes.try_into().ok()?)))
         };
         self.core.boot(0, &word);
+        if let Some(waits) = &mut self.bus.waits {
+            waits.reset(&mut *self.core);
+        }
         // The core knows no line level any more.
         self.bus
             .queued

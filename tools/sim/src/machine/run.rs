@@ -10,7 +10,8 @@ use rigless::time::VirtualNanos;
 
 use super::Machine;
 use crate::finding::What;
-use crate::machine::memory::{FLASH_BASE, FLASH_SIZE};
+use crate::machine::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
+use crate::machine::usage::Rest;
 use crate::periph::rcc::Cause;
 use crate::rtt::POLL;
 use crate::time::Time;
@@ -18,6 +19,14 @@ use crate::time::Time;
 /// The system control register and its bit that asks for more than sleep (PM0056 4.4.6).
 const SCR: u64 = 0xE000_ED10;
 const SCR_SLEEPDEEP: u64 = 1 << 2;
+
+/// The register that pends the NMI, and its bit (PM0056 4.4.3): a debugger's way to the core's NMI line.
+const ICSR: u64 = 0xE000_ED04;
+const NMIPENDSET: u64 = 1 << 31;
+/// xPSR by its number, its field with the exception being handled, and the NMI's number (PM0056 2.1.3).
+const XPSR: usize = 16;
+const IPSR: u32 = 0x1FF;
+const NMI: u32 = 2;
 
 /// A run by a count of instructions ends when the core has done none for this long.
 const GIVE_UP: Time = Time::from_secs(60);
@@ -31,6 +40,8 @@ pub struct Limit {
     pub instructions: u64,
     /// Before the instruction at this address.
     pub pc: Option<u32>,
+    /// Before an instruction with a debugger's breakpoint on it.
+    pub breakpoints: bool,
 }
 
 /// Why a run ended.
@@ -52,7 +63,10 @@ impl Machine {
         let address = limit.pc.map(|pc| u64::from(pc & !1));
         if let Some(address) = address {
             self.core.add_breakpoint(address);
-            self.core.pass_breakpoint(address);
+            // Not when an interrupt's entry leads there first.
+            if self.core.pc() == address {
+                self.core.pass_breakpoint(address);
+            }
         }
         let stop = self.run_to(limit);
         if let Some(address) = address {
@@ -73,6 +87,7 @@ impl Machine {
             if self.powered && self.serve_resets() {
                 continue;
             }
+            self.serve_nmi();
             if now >= self.poll_at {
                 self.log.poll(self.ram.bytes_mut());
                 self.poll_at = POLL * (now.as_ps() / POLL.as_ps() + 1);
@@ -83,17 +98,24 @@ impl Machine {
             if self.instructions() >= limit.instructions {
                 return Stop::Instructions;
             }
-            if let Some(end) = self.idle_end(now) {
-                if !self.idle(end, limit, patience) {
+            self.look_at_waits(now);
+            if let Some((end, why)) = self.idle_end(now) {
+                if !self.idle(end, why, limit, patience) {
                     return Stop::Stuck;
                 }
                 continue;
             }
             match self.execute(limit) {
-                Exit::Breakpoint => return Stop::Pc,
+                Exit::Breakpoint => {
+                    let pc = self.pc();
+                    if limit.breakpoints || limit.pc.is_some_and(|wanted| wanted & !1 == pc) {
+                        return Stop::Pc;
+                    }
+                    self.core.pass_breakpoint(u64::from(pc));
+                }
                 Exit::Waiting if self.bus.queued.is_empty() => {
                     self.check_sleep();
-                    if !self.idle(Time::MAX, limit, patience) {
+                    if !self.idle(Time::MAX, self.why_waiting(), limit, patience) {
                         return Stop::Stuck;
                     }
                     continue;
@@ -123,15 +145,62 @@ impl Machine {
 
     /// Lets time pass without an instruction up to `end`, or less when something happens before. False when
     /// that is never, or when patience has run out in a run without an instant to end at.
-    fn idle(&mut self, end: Time, limit: Limit, patience: Time) -> bool {
+    fn idle(&mut self, end: Time, why: Rest, limit: Limit, patience: Time) -> bool {
         let until = end.min(self.next_event()).min(limit.time);
         if until == Time::MAX || (limit.time == Time::MAX && until > patience) {
             return false;
         }
+        let from = self.now();
         self.bus
             .clock
             .jump(self.core.retired(), until.min(self.poll_at));
+        self.resting.add(why, self.now() - from);
         true
+    }
+
+    /// The core waits: behind a WFI or WFE, or in a branch to itself, which it takes for a wait.
+    fn why_waiting(&self) -> Rest {
+        const BRANCH: u16 = 0xE7FE;
+        const WIDE_BRANCH: [u16; 2] = [0xF7FF, 0xBFFE];
+        const WAITS: [u16; 2] = [0xBF20, 0xBF30];
+        let pc = self.pc();
+        let [before, at, behind] = [pc.wrapping_sub(2), pc, pc.wrapping_add(2)]
+            .map(|address| self.half(address).unwrap_or(0));
+        let branch = at == BRANCH || [at, behind] == WIDE_BRANCH;
+        if branch && !WAITS.contains(&before) {
+            Rest::Spinning
+        } else {
+            Rest::Asleep
+        }
+    }
+
+    /// The half-word of code at `address`.
+    fn half(&self, address: u32) -> Option<u16> {
+        let offset = |base, size| {
+            let offset = address.wrapping_sub(base) as usize;
+            (offset + 1 < size).then_some(offset)
+        };
+        let (bytes, at) = if let Some(at) = offset(RAM_BASE, RAM_SIZE) {
+            (self.ram(), at)
+        } else {
+            let at = offset(FLASH_BASE, FLASH_SIZE).or_else(|| offset(0, FLASH_SIZE))?;
+            (self.bus.soc.flash.bytes(), at)
+        };
+        Some(u16::from_le_bytes([bytes[at], bytes[at + 1]]))
+    }
+
+    /// What is pending now, for the measurement of waits; the core is told of its lines first.
+    fn look_at_waits(&mut self, now: Time) {
+        if self.bus.waits.is_none() || !self.powered {
+            return;
+        }
+        for queued in core::mem::take(&mut self.bus.queued) {
+            self.core.ask(queued);
+        }
+        let cycle = self.cycles();
+        if let Some(waits) = &mut self.bus.waits {
+            waits.look(&mut *self.core, now, cycle);
+        }
     }
 
     /// Lets the core run until something has to happen.
@@ -150,7 +219,8 @@ impl Machine {
         self.bus.stop = (stop, most);
         // Code in SRAM that runs beside a flash operation is looked at after every instruction: once it
         // comes back to flash it stalls.
-        self.bus.halt = self.bus.soc.flash.busy_until().is_some();
+        // So is the NMI's handler, whose line is tested when it returns.
+        self.bus.halt = self.bus.soc.flash.busy_until().is_some() || self.bus.soc.rcc.nmi();
         if self.bus.halt {
             budget = budget.min(1);
         }
@@ -171,19 +241,21 @@ impl Machine {
             .min(self.cut_at.unwrap_or(Time::MAX))
     }
 
-    /// Until when the core does nothing for sure: no power, held in reset, locked up, stalled by the flash.
-    fn idle_end(&self, now: Time) -> Option<Time> {
-        if !self.powered || self.locked_up {
-            return Some(Time::MAX);
+    /// Until when the core does nothing for sure: no power, no clock, held in reset, locked up, stalled by the
+    /// flash.
+    fn idle_end(&self, now: Time) -> Option<(Time, Rest)> {
+        if !self.powered || self.locked_up || self.bus.soc.rcc.stopped() {
+            return Some((Time::MAX, Rest::Off));
         }
         if now < self.held_until {
-            return Some(self.held_until);
+            return Some((self.held_until, Rest::Off));
         }
         self.bus
             .soc
             .flash
             .busy_until()
             .filter(|_| is_flash(self.pc()))
+            .map(|end| (end, Rest::Stalled))
     }
 
     /// SysTick reaches zero in a cycle of HCLK that has come.
@@ -196,6 +268,21 @@ impl Machine {
             self.bus.clock.reach_cycle(count, cycle);
             self.core
                 .on_event(VirtualNanos(self.bus.clock.cycle(count)));
+        }
+    }
+
+    /// The NMI's line is high until CSSC is written (RM0008 7.2.7): a handler that leaves it so is entered
+    /// again. It gets even a core out that is locked up in its hard fault handler.
+    fn serve_nmi(&mut self) {
+        if !self.bus.soc.rcc.nmi() {
+            return;
+        }
+        let active = self.register(XPSR).is_some_and(|xpsr| xpsr & IPSR == NMI);
+        if !active {
+            let now = VirtualNanos(self.bus.clock.cycle(self.core.retired()));
+            self.core
+                .debugger_access(Some(NMIPENDSET), ICSR, Width::W32, now);
+            self.locked_up = false;
         }
     }
 

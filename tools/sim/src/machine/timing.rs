@@ -83,6 +83,9 @@ impl InstructionClock {
     #[must_use]
     pub fn time_of_cycle(&self, cycle: u64) -> Time {
         let (at, base) = self.since;
+        if self.hclk == 0 {
+            return if cycle > base { Time::MAX } else { at };
+        }
         at + Time::from_ps(self.hclk_cycle.times(cycle.saturating_sub(base)))
     }
 
@@ -101,6 +104,10 @@ impl InstructionClock {
     pub fn jump(&mut self, count: u64, until: Time) {
         let until = until.max(self.time(count));
         let (at, base) = self.since;
+        if self.hclk == 0 {
+            (self.at, self.count) = (until, count);
+            return;
+        }
         let cycle = base + self.hclk_cycle.whole((until - at).as_ps());
         self.cycle = cycle.max(self.cycle(count));
         self.at = until;
@@ -122,6 +129,7 @@ impl InstructionClock {
     }
 
     /// From the `count`th instruction on HCLK runs at `hclk` Hz and 64 instructions take `per_64` of its cycles.
+    /// At 0 Hz no cycle comes; no instruction may be counted then.
     pub fn set_rate(&mut self, count: u64, hclk: u32, per_64: u32) {
         let (now, cycle) = (self.time(count), self.cycle(count));
         (self.at, self.cycle, self.count) = (now, cycle, count);

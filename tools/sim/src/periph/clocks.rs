@@ -25,6 +25,17 @@ pub struct Clocks {
 }
 
 impl Clocks {
+    /// SYSCLK's source has died, and nothing took its place.
+    pub const STOPPED: Self = Self {
+        sysclk: 0,
+        hclk: 0,
+        pclk1: 0,
+        pclk2: 0,
+        apb1_timers: 0,
+        apb2_timers: 0,
+        adc: 0,
+    };
+
     /// The clocks with `cfgr` in RCC_CFGR and `sws` as the clock in use (0 HSI, 1 HSE, 2 PLL).
     #[must_use]
     pub const fn of(cfgr: u32, sws: u32) -> Self {

@@ -79,6 +79,12 @@ pub struct Signals {
 }
 
 impl Soc {
+    /// The line's USART.
+    #[must_use]
+    pub const fn usart1(&self) -> &Usart {
+        &self.usart1
+    }
+
     /// The part after power-on, around these flash cells; `crystal`: whether the HSE works.
     #[must_use]
     pub fn new(crystal: bool, flash: Flash, slot: Slot) -> Self {

@@ -11,6 +11,7 @@ use super::Soc;
 use super::map::Block;
 use crate::finding::What;
 use crate::line::TxPin;
+use crate::periph::clocks::Clocks;
 use crate::periph::gpio::Drive;
 use crate::periph::i2c::Wires;
 use crate::periph::rcc::Cause;
@@ -191,6 +192,10 @@ impl Soc {
         let clocks = self.rcc.clocks();
         self.clocks = clocks;
         self.signals.rate = true;
+        if clocks == Clocks::STOPPED {
+            let text = "SYSCLK's source has died with the clock security system off: the core stands still";
+            self.notes.push((now, What::Other(text)));
+        }
         if let Some(text) = clocks.over_limit() {
             self.notes.push((now, What::Other(text)));
         }
@@ -250,6 +255,14 @@ impl Soc {
         };
         self.gpio[0].drive(RX, drive, now);
         self.wire_port(0, now);
+    }
+
+    /// The crystal works or does not from `now` on.
+    pub fn set_crystal(&mut self, works: bool, now: Time) {
+        self.catch_up(Block::Rcc, now);
+        self.rcc.set_crystal(works, now);
+        self.settle(Block::Rcc, now);
+        self.find_next();
     }
 
     /// SW01 stands at `positions`: bit 0 = position 1, a set bit = ON = connected to ground.

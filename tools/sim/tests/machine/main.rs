@@ -2,7 +2,10 @@
 
 mod asm;
 mod core;
+mod crystal;
+mod debug;
 mod flash;
+mod measure;
 mod regs;
 mod resets;
 mod wires;

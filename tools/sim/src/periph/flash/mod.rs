@@ -101,6 +101,7 @@ pub struct Flash {
     started: u64,
     complaint: Option<Complaint>,
     changed: Option<(usize, usize)>,
+    changes: u64,
 }
 
 impl Flash {
@@ -122,6 +123,7 @@ impl Flash {
             started: 0,
             complaint: None,
             changed: None,
+            changes: 0,
         }
     }
 
@@ -138,6 +140,7 @@ impl Flash {
 
     /// The contents, to change from outside.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
+        self.changes += 1;
         self.cells.bytes_mut()
     }
 
@@ -165,6 +168,12 @@ impl Flash {
         self.started
     }
 
+    /// Grows whenever the contents may have changed, by an operation or from outside.
+    #[must_use]
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
     /// What there was against the last write, since the last call.
     pub fn take_complaint(&mut self) -> Option<Complaint> {
         self.complaint.take()
@@ -182,6 +191,7 @@ impl Flash {
             let done = now.saturating_sub(busy.from).as_ps();
             let parts = (u128::from(done) * 65_536 / u128::from(whole)).min(65_536) as u32;
             self.changed = Some(self.cells.tear(busy.operation, self.torn, parts));
+            self.changes += 1;
         }
     }
 
@@ -350,6 +360,7 @@ impl Peripheral for Flash {
         {
             self.busy = None;
             self.changed = Some(self.cells.finish(busy.operation));
+            self.changes += 1;
             self.sr = self.sr & !SR_BSY | SR_EOP;
         }
     }

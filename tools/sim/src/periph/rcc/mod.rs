@@ -1,7 +1,9 @@
 //! Reset and clock control, RM0008 chapter 7: oscillators, PLL, prescalers, clock enables, reset flags.
 //!
-//! The backup domain (BDCR), ready interrupts (CIR) and MCO are not modelled. The clock security system
-//! can be switched on, but has nothing to do: a crystal of this board that has started never stops.
+//! The backup domain (BDCR), ready interrupts (CIR) and MCO are not modelled. What a dying crystal does is in
+//! [`mod@crystal`].
+
+mod crystal;
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
@@ -16,6 +18,10 @@ const HSI_START: Time = Time::from_us(2);
 const LSI_START: Time = Time::from_us(85);
 /// PLL lock: DS5319 table 27, maximum.
 const PLL_LOCK: Time = Time::from_us(200);
+
+/// CSSF in CIR, and CSSC, which clears it (RM0008 7.3.3).
+const CIR_CSSF: u32 = 1 << 7;
+const CIR_CSSC: u32 = 1 << 23;
 
 const CR_HSION: u32 = 1 << 0;
 const CR_HSIRDY: u32 = 1 << 1;
@@ -95,6 +101,8 @@ pub struct Rcc {
     pll: Ready,
     lsi: Ready,
     iwdg_needs_lsi: bool,
+    /// CSSF: the clock security system has seen the HSE die.
+    failed: bool,
     now: Time,
     changes: Changes,
 }
@@ -117,6 +125,7 @@ impl Rcc {
             pll: None,
             lsi: None,
             iwdg_needs_lsi: false,
+            failed: false,
             now: Time::ZERO,
             changes: Changes::default(),
         }
@@ -162,6 +171,9 @@ impl Rcc {
     /// The frequencies of every clock.
     #[must_use]
     pub fn clocks(&self) -> Clocks {
+        if self.stopped() {
+            return Clocks::STOPPED;
+        }
         Clocks::of(self.cfgr, self.sws)
     }
 
@@ -171,7 +183,11 @@ impl Rcc {
 
     /// The source SW asks for.
     fn wanted(&self) -> Ready {
-        match self.cfgr & CFGR_SW {
+        self.source(self.cfgr & CFGR_SW)
+    }
+
+    fn source(&self, number: u32) -> Ready {
+        match number {
             0 => self.hsi,
             1 => self.hse,
             _ => self.pll,
@@ -206,7 +222,7 @@ impl Rcc {
     }
 
     fn write_cr(&mut self, value: u32, now: Time) {
-        let mut cr = value & (CR_HSION | CR_HSITRIM | CR_HSEON | CR_HSEBYP | CR_PLLON);
+        let mut cr = value & (CR_HSION | CR_HSITRIM | CR_HSEON | CR_HSEBYP | CR_CSSON | CR_PLLON);
         // An oscillator that feeds the system clock cannot be stopped (RM0008 7.3.1).
         if self.sws == 0 || (self.sws == 2 && !self.pll_from_hse()) {
             cr |= CR_HSION;
@@ -223,23 +239,20 @@ impl Rcc {
             (false, _) => None,
         };
         self.hsi = start(self.hsi, cr & CR_HSION != 0, now + HSI_START);
-        let hse_ready = if self.crystal {
-            now + HSE_START
-        } else {
-            Time::MAX
-        };
-        self.hse = start(self.hse, cr & CR_HSEON != 0, hse_ready);
-        // The PLL locks once its source runs.
+        self.hse = start(self.hse, cr & CR_HSEON != 0, self.hse_start(now));
+        self.pll = start(self.pll, cr & CR_PLLON != 0, self.pll_lock(now));
+        // The detector acts when the HSE is ready (RM0008 7.3.1).
+        self.cr = cr;
+    }
+
+    /// When a PLL switched on now locks: once its source runs.
+    fn pll_lock(&self, now: Time) -> Time {
         let source = if self.pll_from_hse() {
             self.hse
         } else {
             self.hsi
         };
-        let lock = source.map_or(Time::MAX, |ready| ready.max(now) + PLL_LOCK);
-        self.pll = start(self.pll, cr & CR_PLLON != 0, lock);
-        // Once on, only a reset switches it off; it goes on when the HSE is ready (RM0008 7.3.1).
-        let secured = self.cr & CR_CSSON != 0 || value & CR_CSSON != 0;
-        self.cr = cr | if secured { CR_CSSON } else { 0 };
+        source.map_or(Time::MAX, |ready| ready.max(now) + PLL_LOCK)
     }
 
     fn write_cfgr(&mut self, value: u32) -> Result<(), Unmodelled> {
@@ -287,8 +300,8 @@ impl Peripheral for Rcc {
         Ok(match offset {
             0x00 => self.read_cr(),
             0x04 => self.cfgr | self.sws << 2,
-            // No ready interrupt can be enabled, and without its enable no flag is set.
-            0x08 => 0,
+            // No ready interrupt can be enabled, and without its enable no flag is set but CSSF.
+            0x08 => CIR_CSSF * u32::from(self.failed),
             0x0C => self.rstr.0,
             0x10 => self.rstr.1,
             0x14 => self.ahbenr,
@@ -308,8 +321,12 @@ impl Peripheral for Rcc {
                 self.switch();
                 return written;
             }
-            0x08 if value & 0x1F00 != 0 => return Err(Unmodelled("RCC_CIR's ready interrupts")),
-            0x08 => {}
+            0x08 => {
+                self.failed &= value & CIR_CSSC == 0;
+                if value & 0x1F00 != 0 {
+                    return Err(Unmodelled("RCC_CIR's ready interrupts"));
+                }
+            }
             0x0C => {
                 self.changes.resets.0 |= value & !self.rstr.0;
                 self.rstr.0 = value;
@@ -335,7 +352,11 @@ impl Peripheral for Rcc {
     }
 
     fn next_event(&self) -> Option<Time> {
-        // Only a switch that waits for its clock happens by itself; ready flags are worked out when read.
+        // Only a switch that waits for its clock happens by itself, and a clock that comes back; ready flags
+        // are worked out when read.
+        if self.stopped() {
+            return self.source(self.sws).filter(|&at| at < Time::MAX);
+        }
         if self.cfgr & CFGR_SW == self.sws {
             return None;
         }
@@ -343,7 +364,9 @@ impl Peripheral for Rcc {
     }
 
     fn advance(&mut self, now: Time) {
+        let stopped = self.stopped();
         self.now = now;
+        self.changes.clocks |= stopped && !self.stopped();
         self.switch();
     }
 

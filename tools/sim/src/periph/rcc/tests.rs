@@ -63,3 +63,82 @@ fn the_clock_in_use_cannot_be_stopped() {
     rcc.write(0, 0, now).unwrap();
     assert_ne!(rcc.read(0, now).unwrap() & CR_HSIRDY, 0);
 }
+
+/// 72 MHz from the crystal, with the clock security system on.
+fn secured() -> Rcc {
+    let mut rcc = Rcc::new(true);
+    let now = at(&mut rcc, 0);
+    rcc.write(0, 0x9_0083, now).unwrap();
+    rcc.write(4, 0x001D_0400, now).unwrap();
+    rcc.write(0, 0x0109_0083, now).unwrap();
+    rcc.write(4, 0x001D_0402, now).unwrap();
+    at(&mut rcc, 5_000);
+    assert_eq!(rcc.clocks().sysclk, 72_000_000);
+    rcc
+}
+
+#[test]
+fn after_a_failure_the_crystal_can_be_taken_into_use_again() {
+    let mut rcc = secured();
+    let now = at(&mut rcc, 6_000);
+    rcc.set_crystal(false, now);
+    assert!(rcc.nmi() && !rcc.stopped());
+    assert_eq!(rcc.clocks().sysclk, 8_000_000);
+    assert_eq!(rcc.read(4, now).unwrap(), 0x001D_0400);
+    rcc.write(8, CIR_CSSC, now).unwrap();
+    assert!(!rcc.nmi());
+    // It is back: nothing happens before it is switched on again.
+    let now = at(&mut rcc, 7_000);
+    rcc.set_crystal(true, now);
+    let now = at(&mut rcc, 17_000);
+    assert_eq!(rcc.read(0, now).unwrap() & (CR_HSEON | CR_HSERDY), 0);
+    rcc.write(0, 0x9_0083, now).unwrap();
+    let now = at(&mut rcc, 19_000);
+    assert_ne!(rcc.read(0, now).unwrap() & CR_HSERDY, 0);
+    rcc.set_crystal(false, now);
+    assert!(rcc.nmi(), "and it is watched again");
+}
+
+#[test]
+fn a_crystal_that_dies_while_it_starts_is_no_failure() {
+    let mut rcc = Rcc::new(true);
+    let now = at(&mut rcc, 0);
+    rcc.write(0, 0x9_0083, now).unwrap();
+    let now = at(&mut rcc, 1_000);
+    rcc.set_crystal(false, now);
+    let now = at(&mut rcc, 9_000);
+    assert!(!rcc.nmi());
+    assert_eq!(rcc.read(0, now).unwrap() & CR_HSERDY, 0);
+    rcc.set_crystal(true, now);
+    let now = at(&mut rcc, 11_000);
+    assert_ne!(rcc.read(0, now).unwrap() & CR_HSERDY, 0, "it starts anew");
+}
+
+#[test]
+fn the_security_system_can_be_switched_off() {
+    let mut rcc = secured();
+    let now = at(&mut rcc, 6_000);
+    rcc.write(0, 0x0101_0083, now).unwrap();
+    rcc.set_crystal(false, now);
+    assert!(!rcc.nmi() && rcc.stopped());
+    assert_eq!(rcc.clocks(), Clocks::STOPPED);
+    assert_eq!(rcc.next_event(), None);
+    rcc.set_crystal(true, now);
+    assert_eq!(rcc.next_event(), Some(Time::from_us(8_200)));
+    at(&mut rcc, 8_200);
+    assert_eq!(rcc.clocks().sysclk, 72_000_000);
+}
+
+#[test]
+fn the_hsi_as_the_pll_s_source_outlives_the_crystal() {
+    let mut rcc = Rcc::new(true);
+    let now = at(&mut rcc, 0);
+    rcc.write(4, 0x0038_0400, now).unwrap();
+    rcc.write(0, 0x0109_0083, now).unwrap();
+    rcc.write(4, 0x0038_0402, now).unwrap();
+    let now = at(&mut rcc, 5_000);
+    assert_eq!(rcc.clocks().sysclk, 64_000_000);
+    rcc.set_crystal(false, now);
+    assert!(rcc.nmi());
+    assert_eq!(rcc.clocks().sysclk, 64_000_000);
+}

@@ -63,6 +63,8 @@ pub struct Usart {
     idle_armed: bool,
     /// Since when nothing has been received.
     quiet_since: Time,
+    /// Writes to DR.
+    data_writes: u64,
 }
 
 impl Default for Usart {
@@ -90,7 +92,14 @@ impl Usart {
             receiver: Receiver::default(),
             idle_armed: false,
             quiet_since: Time::ZERO,
+            data_writes: 0,
         }
+    }
+
+    /// Writes to the data register since the last reset, good ones or not.
+    #[must_use]
+    pub const fn data_writes(&self) -> u64 {
+        self.data_writes
     }
 
     /// What the transmitter did to its TX pin since the last call, in order: a character is there as soon
@@ -190,6 +199,7 @@ impl Usart {
     }
 
     fn write_data(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
+        self.data_writes += 1;
         let done = self.shown & (sr::TC | sr::PE);
         self.sr &= !(done | sr::TXE);
         self.shown &= !done;

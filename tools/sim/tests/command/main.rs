@@ -2,6 +2,9 @@
 
 #![cfg(unix)]
 
+mod gdb;
+mod unit;
+
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -9,9 +12,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// An ELF file whose firmware is an endless loop: one load segment at the start of flash.
+/// An ELF file whose firmware is an endless loop.
 fn endless_loop(directory: &Path) -> PathBuf {
-    let code: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
+    elf(directory, &[0xE7FE])
+}
+
+/// An ELF file with `program` behind a vector table: one load segment at the start of flash.
+fn elf(directory: &Path, program: &[u16]) -> PathBuf {
+    let mut code = vec![0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08];
+    code.extend(program.iter().flat_map(|half| half.to_le_bytes()));
     let mut elf = b"\x7fELF\x01\x01\x01".to_vec();
     elf.resize(16, 0);
     let half = |elf: &mut Vec<u8>, value: u16| elf.extend(value.to_le_bytes());
@@ -32,7 +41,7 @@ fn endless_loop(directory: &Path) -> PathBuf {
         .into_iter()
         .for_each(|value| word(&mut elf, value));
     elf.extend(code);
-    let path = directory.join("loop.elf");
+    let path = directory.join("program.elf");
     fs::write(&path, elf).unwrap();
     path
 }
@@ -107,6 +116,17 @@ impl Drop for Running {
     }
 }
 
+/// The body of `GET /api/state` of the simulator at `url`, as host, port and a slash.
+fn state(url: &str) -> serde_json::Value {
+    let mut stream = TcpStream::connect(url.trim_end_matches('/')).unwrap();
+    stream
+        .write_all(b"GET /api/state HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        .unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap()
+}
+
 /// What is wrong is told in one line, which names `parts`, with exit status 2.
 fn refused(arguments: &[&str], parts: &[&str]) {
     let output = command(arguments).output().unwrap();
@@ -176,24 +196,14 @@ fn every_endpoint_is_announced_and_answers() {
     running.endpoint("pty: /");
     let mut line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
     let url = running.endpoint("http: http://");
-    let state = || {
-        let mut stream = TcpStream::connect(url.trim_end_matches('/')).unwrap();
-        stream
-            .write_all(b"GET /api/state HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
-            .unwrap();
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).unwrap();
-        let body = answer.split("\r\n\r\n").nth(1).unwrap().to_owned();
-        serde_json::from_str::<serde_json::Value>(&body).unwrap()
-    };
-    let before = state();
+    let before = state(&url);
     assert_eq!(
         (&before["dip"], &before["module"]),
         (&17.into(), &"2relay".into())
     );
     line.write_all(&[1, 2, 3]).unwrap();
     let end = Instant::now() + Duration::from_secs(60);
-    while state()["line"]["rx_frames"] != 1 {
+    while state(&url)["line"]["rx_frames"] != 1 {
         assert!(Instant::now() < end, "the bytes cross the line");
     }
 }
@@ -222,6 +232,8 @@ fn a_port_or_a_link_in_use_is_refused() {
     refused(&["--elf", elf, "--http", &address], &[&address, "in use"]);
     let tcp = ["--elf", elf, "--http", "127.0.0.1:0", "--tcp", &address];
     refused(&tcp, &[&address, "in use"]);
+    let gdb = ["--elf", elf, "--http", "127.0.0.1:0", "--gdb", &address];
+    refused(&gdb, &[&address, "in use"]);
     refused(
         &["--elf", elf, "--http", "127.0.0.1:0", "--pty", elf],
         &[elf],
@@ -229,9 +241,48 @@ fn a_port_or_a_link_in_use_is_refused() {
 }
 
 #[test]
+fn a_flash_that_is_none_or_cannot_be_kept_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let elf = elf.to_str().unwrap();
+    let refused = |flash: &str, part: &str| {
+        let arguments = ["--elf", elf, "--http", "127.0.0.1:0", "--flash", flash];
+        crate::refused(&arguments, &[flash, part]);
+    };
+    refused(directory.path().to_str().unwrap(), "not a file");
+    refused(elf, "bytes, the flash 131072");
+    refused("/nowhere/flash", "No such file");
+    refused("/proc/flash", "");
+}
+
+#[test]
+fn the_flash_file_is_made_at_the_start_and_holds_image_and_preset() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let flash = directory.path().join("flash");
+    let run = |more: &[&str]| {
+        let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--for", "10ms"];
+        arguments.extend(["--http", "127.0.0.1:0", "--flash", flash.to_str().unwrap()]);
+        arguments.extend(more);
+        let mut running = Running::start(&arguments);
+        assert_eq!(running.end(), (Some(0), String::new()));
+        fs::read(&flash).unwrap()
+    };
+    let page = (register_map::record::PAGE_ADDRESSES[0] - 0x0800_0000) as usize;
+    let bare = run(&["--no-preset"]);
+    assert_eq!(bare.len(), 128 * 1024);
+    assert_eq!(bare[..4], [0x00, 0x50, 0x00, 0x20], "the image");
+    assert!(bare[16..].iter().all(|byte| *byte == 0xFF), "all else");
+    let preset = register_map::record::module_in_slot(register_map::Module::Do4);
+    let fitted = run(&["--module", "4do"]);
+    assert_eq!(fitted[page..page + preset.len()], preset);
+    assert_eq!(run(&["--module", "4ai"]), fitted, "what is stored stays");
+}
+
+#[test]
 fn a_wrong_option_is_refused() {
     refused(&["--dip", "256"], &["--dip", "0..=255"]);
     refused(&["--module", "4xx"], &["--module", "2ai2ao"]);
     refused(&["--for", "ever"], &["--for"]);
-    refused(&["--flash", "x"], &["--flash"]);
+    refused(&["--flash"], &["--flash"]);
 }

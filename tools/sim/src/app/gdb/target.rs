@@ -1,0 +1,236 @@
+//! The board as gdbstub sees it: a core with registers, memory and breakpoints.
+
+use core::convert::Infallible;
+
+use gdbstub::arch::{Arch, Registers};
+use gdbstub::common::Signal;
+use gdbstub::outputln;
+use gdbstub::target::ext::base::BaseOps;
+use gdbstub::target::ext::base::singlethread::{
+    SingleThreadBase, SingleThreadResume, SingleThreadResumeOps, SingleThreadSingleStep,
+    SingleThreadSingleStepOps,
+};
+use gdbstub::target::ext::breakpoints::{
+    Breakpoints, BreakpointsOps, HwBreakpoint, HwBreakpointOps, SwBreakpoint, SwBreakpointOps,
+};
+use gdbstub::target::ext::monitor_cmd::{ConsoleOutput, MonitorCmd, MonitorCmdOps};
+use gdbstub::target::{Target, TargetError, TargetResult};
+
+use super::super::bench::Bench;
+
+/// Registers told to GDB, in the order of [`CortexM::target_description_xml`] and of [`sim::Board::register`].
+const REGISTERS: usize = 23;
+const PC: usize = 15;
+
+/// What the debugger wants the core to do, and what it has set up.
+#[derive(Debug, Default)]
+pub struct Debug {
+    /// One instruction is wanted, not a run.
+    pub step: bool,
+    /// Every breakpoint added and not removed.
+    breakpoints: Vec<u32>,
+}
+
+/// The Cortex-M3; gdbstub's own list of architectures has no M profile.
+#[derive(Debug)]
+pub enum CortexM {}
+
+impl Arch for CortexM {
+    type Usize = u32;
+    type Registers = CoreRegisters;
+    type BreakpointKind = usize;
+    type RegId = ();
+
+    fn target_description_xml() -> Option<&'static str> {
+        Some(concat!(
+            r#"<?xml version="1.0"?><!DOCTYPE target SYSTEM "gdb-target.dtd"><target version="1.0">"#,
+            r#"<architecture>arm</architecture><feature name="org.gnu.gdb.arm.m-profile">"#,
+            r#"<reg name="r0" bitsize="32"/><reg name="r1" bitsize="32"/><reg name="r2" bitsize="32"/>"#,
+            r#"<reg name="r3" bitsize="32"/><reg name="r4" bitsize="32"/><reg name="r5" bitsize="32"/>"#,
+            r#"<reg name="r6" bitsize="32"/><reg name="r7" bitsize="32"/><reg name="r8" bitsize="32"/>"#,
+            r#"<reg name="r9" bitsize="32"/><reg name="r10" bitsize="32"/><reg name="r11" bitsize="32"/>"#,
+            r#"<reg name="r12" bitsize="32"/><reg name="sp" bitsize="32" type="data_ptr"/>"#,
+            r#"<reg name="lr" bitsize="32"/><reg name="pc" bitsize="32" type="code_ptr"/>"#,
+            r#"<reg name="xpsr" bitsize="32"/></feature><feature name="org.gnu.gdb.arm.m-system">"#,
+            r#"<reg name="msp" bitsize="32" type="data_ptr"/><reg name="psp" bitsize="32" type="data_ptr"/>"#,
+            r#"<reg name="primask" bitsize="32"/><reg name="basepri" bitsize="32"/>"#,
+            r#"<reg name="faultmask" bitsize="32"/><reg name="control" bitsize="32"/></feature></target>"#,
+        ))
+    }
+}
+
+/// The core's registers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CoreRegisters([u32; REGISTERS]);
+
+impl Registers for CoreRegisters {
+    type ProgramCounter = u32;
+
+    fn pc(&self) -> u32 {
+        self.0[PC]
+    }
+
+    fn gdb_serialize(&self, mut write_byte: impl FnMut(Option<u8>)) {
+        for byte in self.0.iter().flat_map(|register| register.to_le_bytes()) {
+            write_byte(Some(byte));
+        }
+    }
+
+    fn gdb_deserialize(&mut self, bytes: &[u8]) -> Result<(), ()> {
+        let (words, rest) = bytes.as_chunks::<4>();
+        if words.len() != REGISTERS || !rest.is_empty() {
+            return Err(());
+        }
+        for (register, word) in self.0.iter_mut().zip(words) {
+            *register = u32::from_le_bytes(*word);
+        }
+        Ok(())
+    }
+}
+
+impl Bench {
+    /// Takes away every breakpoint: the debugger has gone.
+    pub fn forget_breakpoints(&mut self) {
+        for address in core::mem::take(&mut self.debug.breakpoints) {
+            self.board.remove_breakpoint(address);
+        }
+    }
+
+    fn add_breakpoint(&mut self, address: u32) -> bool {
+        self.board.add_breakpoint(address);
+        self.debug.breakpoints.push(address);
+        true
+    }
+
+    fn remove_breakpoint(&mut self, address: u32) -> bool {
+        let breakpoints = &mut self.debug.breakpoints;
+        let Some(at) = breakpoints.iter().position(|set| *set == address) else {
+            return false;
+        };
+        breakpoints.swap_remove(at);
+        self.board.remove_breakpoint(address);
+        true
+    }
+}
+
+impl Target for Bench {
+    type Arch = CortexM;
+    type Error = Infallible;
+
+    fn base_ops(&mut self) -> BaseOps<'_, CortexM, Infallible> {
+        BaseOps::SingleThread(self)
+    }
+
+    fn support_breakpoints(&mut self) -> Option<BreakpointsOps<'_, Self>> {
+        Some(self)
+    }
+
+    fn support_monitor_cmd(&mut self) -> Option<MonitorCmdOps<'_, Self>> {
+        Some(self)
+    }
+}
+
+impl SingleThreadBase for Bench {
+    fn read_registers(&mut self, registers: &mut CoreRegisters) -> TargetResult<(), Self> {
+        for (number, register) in registers.0.iter_mut().enumerate() {
+            *register = self.board.register(number).ok_or(TargetError::NonFatal)?;
+        }
+        Ok(())
+    }
+
+    fn write_registers(&mut self, registers: &CoreRegisters) -> TargetResult<(), Self> {
+        for (number, value) in registers.0.into_iter().enumerate() {
+            // Only what changes: SP is MSP or PSP under another name.
+            if self.board.register(number) != Some(value) {
+                self.board
+                    .set_register(number, value)
+                    .map_err(|_| TargetError::NonFatal)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_addrs(&mut self, address: u32, bytes: &mut [u8]) -> TargetResult<usize, Self> {
+        match self.board.read_memory(address, bytes) {
+            0 if !bytes.is_empty() => Err(TargetError::NonFatal),
+            read => Ok(read),
+        }
+    }
+
+    fn write_addrs(&mut self, address: u32, bytes: &[u8]) -> TargetResult<(), Self> {
+        self.board
+            .write_memory(address, bytes)
+            .map_err(|_| TargetError::NonFatal)
+    }
+
+    fn support_resume(&mut self) -> Option<SingleThreadResumeOps<'_, Self>> {
+        Some(self)
+    }
+}
+
+impl SingleThreadResume for Bench {
+    fn resume(&mut self, _signal: Option<Signal>) -> Result<(), Infallible> {
+        self.debug.step = false;
+        self.board.pass_breakpoint();
+        Ok(())
+    }
+
+    fn support_single_step(&mut self) -> Option<SingleThreadSingleStepOps<'_, Self>> {
+        Some(self)
+    }
+}
+
+impl SingleThreadSingleStep for Bench {
+    fn step(&mut self, _signal: Option<Signal>) -> Result<(), Infallible> {
+        self.debug.step = true;
+        Ok(())
+    }
+}
+
+impl Breakpoints for Bench {
+    fn support_sw_breakpoint(&mut self) -> Option<SwBreakpointOps<'_, Self>> {
+        Some(self)
+    }
+
+    fn support_hw_breakpoint(&mut self) -> Option<HwBreakpointOps<'_, Self>> {
+        Some(self)
+    }
+}
+
+impl SwBreakpoint for Bench {
+    fn add_sw_breakpoint(&mut self, address: u32, _kind: usize) -> TargetResult<bool, Self> {
+        Ok(self.add_breakpoint(address))
+    }
+
+    fn remove_sw_breakpoint(&mut self, address: u32, _kind: usize) -> TargetResult<bool, Self> {
+        Ok(self.remove_breakpoint(address))
+    }
+}
+
+impl HwBreakpoint for Bench {
+    fn add_hw_breakpoint(&mut self, address: u32, _kind: usize) -> TargetResult<bool, Self> {
+        Ok(self.add_breakpoint(address))
+    }
+
+    fn remove_hw_breakpoint(&mut self, address: u32, _kind: usize) -> TargetResult<bool, Self> {
+        Ok(self.remove_breakpoint(address))
+    }
+}
+
+impl MonitorCmd for Bench {
+    fn handle_monitor_cmd(
+        &mut self,
+        command: &[u8],
+        mut out: ConsoleOutput<'_>,
+    ) -> Result<(), Infallible> {
+        match command.trim_ascii() {
+            b"reset" => {
+                self.board.reset();
+                outputln!(out, "reset; halted before the first instruction");
+            }
+            b"time" => outputln!(out, "{}", self.board.now()),
+            _ => outputln!(out, "reset: pulls the reset pin\ntime: the virtual time"),
+        }
+        Ok(())
+    }
+}

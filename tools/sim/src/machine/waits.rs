@@ -1,0 +1,123 @@
+//! How long interrupts wait: from the instant one is pending and enabled to the entry of its handler.
+//!
+//! What holds one up counts: PRIMASK, BASEPRI, a handler of the same or a higher priority, a flash operation.
+//! The twelve cycles of the entry itself do not, see [`super::timing`].
+//!
+//! While this is on, the core comes back to the run loop after every access beside the memories, so that no
+//! change of the NVIC's registers is missed. An entry is seen by its read of the vector table, whose page is
+//! sent to the bus for that. The run is the same to the instruction as without, it only takes longer.
+
+use rigless::emulator::{Processor, Queued};
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+
+use crate::soc::map::irq;
+use crate::time::Time;
+
+/// Exceptions of the part: 16 of the core's, then its interrupt lines (RM0008 table 63).
+pub const EXCEPTIONS: usize = 16 + irq::LINES as usize;
+/// The core's exceptions that can be pending (PM0056 table 17).
+pub const PENDSV: usize = 14;
+/// SysTick's exception.
+pub const SYSTICK: usize = 15;
+
+/// Registers of the NVIC and the system control block (PM0056 4.3, 4.4).
+const ISER: u64 = 0xE000_E100;
+const ISPR: u64 = 0xE000_E200;
+const ICSR: u64 = 0xE000_ED04;
+const VTOR: u64 = 0xE000_ED08;
+const PENDSVSET: u64 = 1 << 28;
+const PENDSTSET: u64 = 1 << 26;
+
+/// How long one exception had to wait.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wait {
+    /// Entries of its handler.
+    pub entries: u64,
+    /// The longest wait.
+    pub longest: Time,
+    /// When the handler was entered after the longest wait.
+    pub at: Time,
+}
+
+/// The measurement.
+#[derive(Debug)]
+pub(super) struct Waits {
+    /// Since when each exception is pending and enabled.
+    since: [Option<Time>; EXCEPTIONS],
+    done: [Wait; EXCEPTIONS],
+    /// The vector table whose page is sent to the bus.
+    table: Option<u32>,
+}
+
+impl Waits {
+    pub(super) fn new() -> Self {
+        Self {
+            since: [None; EXCEPTIONS],
+            done: [Wait::default(); EXCEPTIONS],
+            table: None,
+        }
+    }
+
+    /// What exception `number` had to wait so far.
+    pub(super) fn of(&self, number: usize) -> Wait {
+        self.done.get(number).copied().unwrap_or_default()
+    }
+
+    /// The core was reset: nothing waits any more, and the vector table is to be found again.
+    pub(super) fn reset(&mut self, core: &mut dyn Processor) {
+        self.since = [None; EXCEPTIONS];
+        self.leave(core);
+    }
+
+    /// Sends nothing to the bus any more.
+    pub(super) fn leave(&mut self, core: &mut dyn Processor) {
+        if let Some(table) = self.table.take() {
+            core.ask(Queued::Unroute(u64::from(table)));
+        }
+    }
+
+    /// Looks at what is pending, between two instructions.
+    pub(super) fn look(&mut self, core: &mut dyn Processor, now: Time, cycle: u64) {
+        let mut read = |address| {
+            core.debugger_access(None, address, Width::W32, VirtualNanos(cycle))
+                .unwrap_or(0)
+        };
+        let table = read(VTOR) as u32;
+        let icsr = read(ICSR);
+        let lines = |base, read: &mut dyn FnMut(u64) -> u64| read(base) | read(base + 4) << 32;
+        let waiting = lines(ISPR, &mut read) & lines(ISER, &mut read);
+        for (number, since) in self.since.iter_mut().enumerate() {
+            let waits = match number {
+                PENDSV => icsr & PENDSVSET != 0,
+                SYSTICK => icsr & PENDSTSET != 0,
+                16.. => waiting >> (number - 16) & 1 != 0,
+                _ => false,
+            };
+            *since = waits.then(|| since.unwrap_or(now));
+        }
+        if self.table != Some(table) {
+            self.leave(core);
+            core.ask(Queued::Route(u64::from(table)));
+            self.table = Some(table);
+        }
+    }
+
+    /// The core itself reads the word at `address` at `now`: the entry of a handler when it is a vector.
+    pub(super) fn vector_read(&mut self, address: u32, now: Time) {
+        let Some(offset) = self.table.and_then(|table| address.checked_sub(table)) else {
+            return;
+        };
+        let number = offset as usize / 4;
+        if number < EXCEPTIONS {
+            let waited = self.since[number]
+                .take()
+                .map_or(Time::ZERO, |since| now.saturating_sub(since));
+            let done = &mut self.done[number];
+            done.entries += 1;
+            if waited > done.longest {
+                (done.longest, done.at) = (waited, now);
+            }
+        }
+    }
+}

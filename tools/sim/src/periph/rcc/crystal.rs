@@ -1,0 +1,100 @@
+//! The crystal dies, or comes back, while the part runs: the clock security system (RM0008 7.2.7), and what
+//! happens without it.
+//!
+//! With CSSON the HSE is switched off, and when SYSCLK came from it, directly or through the PLL, the PLL too,
+//! and the HSI takes over at once. CSSF then holds the NMI until CSSC is written. Without CSSON nothing takes
+//! over: HSERDY falls, and a SYSCLK that came from the crystal stands still until it is back or the part is
+//! reset. (A real PLL without its input runs wild for a while; nothing can be said about that.) The break input
+//! of TIM1 is not modelled.
+
+use super::{CFGR_SW, CR_CSSON, CR_HSEON, CR_HSION, CR_PLLON, HSE_START, Rcc};
+use crate::time::Time;
+
+impl Rcc {
+    /// Whether the crystal works.
+    #[must_use]
+    pub fn crystal(&self) -> bool {
+        self.crystal
+    }
+
+    /// From `now` on the crystal works or does not.
+    pub fn set_crystal(&mut self, works: bool, now: Time) {
+        if works == self.crystal {
+            return;
+        }
+        self.now = now;
+        let ran = self.is_ready(self.hse);
+        self.crystal = works;
+        if works {
+            self.come_back(now);
+        } else if ran && self.cr & CR_CSSON != 0 {
+            self.fail_over(now);
+        } else {
+            self.die();
+        }
+        self.changes.clocks = true;
+    }
+
+    /// Whether the clock security system holds the NMI.
+    #[must_use]
+    pub fn nmi(&self) -> bool {
+        self.failed
+    }
+
+    /// Whether SYSCLK's source has died, and nothing took its place.
+    #[must_use]
+    pub fn stopped(&self) -> bool {
+        !self.is_ready(self.source(self.sws))
+    }
+
+    /// When an HSE switched on now is ready.
+    pub(super) fn hse_start(&self, now: Time) -> Time {
+        if self.crystal {
+            now + HSE_START
+        } else {
+            Time::MAX
+        }
+    }
+
+    /// The clock security system acts.
+    fn fail_over(&mut self, now: Time) {
+        self.failed = true;
+        if self.hse_in_use() {
+            self.cr |= CR_HSION;
+            self.hsi.get_or_insert(now);
+            if self.sws == 2 {
+                self.cr &= !CR_PLLON;
+                self.pll = None;
+            }
+            self.sws = 0;
+            self.cfgr &= !CFGR_SW;
+        }
+        self.cr &= !CR_HSEON;
+        self.hse = None;
+        self.wait_for_hse(Time::MAX);
+    }
+
+    /// Nothing watches it: what it fed waits for it.
+    fn die(&mut self) {
+        if self.hse.is_some() {
+            self.hse = Some(Time::MAX);
+        }
+        self.wait_for_hse(Time::MAX);
+    }
+
+    fn come_back(&mut self, now: Time) {
+        if self.hse.is_some() {
+            let ready = self.hse_start(now);
+            self.hse = Some(ready);
+            let lock = self.pll_lock(now);
+            self.wait_for_hse(lock);
+        }
+    }
+
+    /// A PLL that runs from the HSE locks at `lock`.
+    fn wait_for_hse(&mut self, lock: Time) {
+        if self.pll_from_hse() {
+            self.pll = self.pll.map(|_| lock);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The real image in the running command, with a master on its TCP line.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::{Running, endless_loop, state};
+
+/// KEY, which opens the configuration's lock with 0x5A17.
+const KEY: u16 = 0x0100;
+/// Line rate in 100 bit/s.
+const BAUD: u16 = 0x0101;
+/// 1 saves, 2 restarts.
+const COMMAND: u16 = 0x0108;
+/// The first channel's filter time in ms.
+const FILTER: u16 = 0x0130;
+/// Bit 3: changed, not saved.
+const STATUS: u16 = 0x020A;
+
+/// A simulator that runs the image, and the master's end of its line.
+struct Unit {
+    running: Running,
+    line: TcpStream,
+    http: String,
+}
+
+impl Unit {
+    fn start(more: &[&str]) -> Self {
+        let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
+        let mut arguments = vec!["--elf", &image, "--tcp", "127.0.0.1:0"];
+        arguments.extend(["--http", "127.0.0.1:0"]);
+        arguments.extend(more);
+        let mut running = Running::start(&arguments);
+        running.endpoint("pty: ");
+        let line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
+        line.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        let http = running.endpoint("http: http://");
+        Self {
+            running,
+            line,
+            http,
+        }
+    }
+
+    /// Asks unit 1; the reply's PDU, `length` bytes of it. What gets lost because the machine is too busy
+    /// to keep time is asked again.
+    fn ask(&mut self, pdu: &[u8], length: usize) -> Vec<u8> {
+        let crc = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
+        let mut request = [&[1], pdu].concat();
+        request.extend(crc.checksum(&request).to_le_bytes());
+        for _ in 0..10 {
+            // The silence before a frame.
+            std::thread::sleep(Duration::from_millis(20));
+            self.line.write_all(&request).unwrap();
+            let mut reply = vec![0; length + 3];
+            if self.line.read_exact(&mut reply).is_ok() {
+                assert_eq!(crc.checksum(&reply), 0, "{reply:02X?}");
+                return reply[1..=length].to_vec();
+            }
+        }
+        panic!("no answer to {pdu:02X?}");
+    }
+
+    fn read(&mut self, address: u16) -> u16 {
+        let [high, low] = address.to_be_bytes();
+        let reply = self.ask(&[3, high, low, 0, 1], 4);
+        assert_eq!(reply[..2], [3, 2]);
+        u16::from_be_bytes([reply[2], reply[3]])
+    }
+
+    fn write(&mut self, address: u16, value: u16) {
+        let pdu = [&[6][..], &address.to_be_bytes(), &value.to_be_bytes()].concat();
+        assert_eq!(self.ask(&pdu, 5), pdu);
+    }
+
+    /// Saves `value` as the filter time.
+    fn save_filter(&mut self, value: u16) {
+        self.write(KEY, 0x5A17);
+        self.write(FILTER, value);
+        self.save();
+    }
+
+    fn save(&mut self) {
+        self.write(COMMAND, 1);
+        while self.read(STATUS) & 8 != 0 {}
+    }
+
+    /// The rate that the simulator's own end of the line has.
+    fn rate(&self) -> u64 {
+        state(&self.http)["line"]["baud"].as_u64().unwrap()
+    }
+
+    fn end(mut self, signal: &str) -> Option<i32> {
+        self.running.signal(signal);
+        self.running.end().0
+    }
+}
+
+fn flash_in(directory: &Path) -> PathBuf {
+    directory.join("flash")
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_saved_configuration_survives_the_simulator_however_it_ends() {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = flash_in(directory.path());
+    let option = ["--flash", flash.to_str().unwrap()];
+    let mut stored = 5;
+    for (value, signal, status) in [
+        (50, "-TERM", Some(0)),
+        (60, "-INT", Some(0)),
+        (70, "-KILL", None),
+    ] {
+        let mut unit = Unit::start(&option);
+        assert_eq!(unit.read(FILTER), stored);
+        unit.save_filter(value);
+        assert_eq!(unit.end(signal), status, "{signal}");
+        assert_eq!(fs::metadata(&flash).unwrap().len(), 128 * 1024);
+        stored = value;
+    }
+    // Another image is written over its own pages; the stored configuration is not among them.
+    let other = endless_loop(directory.path());
+    let mut running = Running::start(&[
+        "--elf",
+        other.to_str().unwrap(),
+        "--http",
+        "127.0.0.1:0",
+        "--for",
+        "10ms",
+        option[0],
+        option[1],
+    ]);
+    assert_eq!(running.end().0, Some(0));
+    let mut unit = Unit::start(&option);
+    assert_eq!(unit.read(FILTER), 70);
+    assert_eq!(unit.end("-TERM"), Some(0));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn without_a_file_nothing_survives() {
+    let mut unit = Unit::start(&[]);
+    unit.save_filter(50);
+    drop(unit);
+    assert_eq!(Unit::start(&[]).read(FILTER), 5);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_line_follows_the_unit_to_another_rate() {
+    let mut unit = Unit::start(&[]);
+    assert_eq!(unit.rate(), 9600);
+    unit.write(KEY, 0x5A17);
+    unit.write(BAUD, 1152);
+    unit.save();
+    assert_eq!(unit.rate(), 9600, "a rate counts from the next start on");
+    unit.write(COMMAND, 2);
+    // It answers first, then starts anew.
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(unit.read(BAUD), 1152);
+    assert_eq!(unit.rate(), 115_200);
+}

@@ -1,0 +1,159 @@
+//! The crystal dies while the part runs from it, and comes back.
+
+use sim::{Board, Time};
+
+use super::asm::{Asm, When};
+use super::regs::*;
+use super::{board, findings, out};
+
+const CSSON: u32 = 1 << 19;
+const HSERDY: u32 = 1 << 17;
+const RCC_CIR: u32 = 0x4002_1008;
+const CSSF: u32 = 1 << 7;
+const CSSC: u32 = 1 << 23;
+
+/// So long after power-on every program here runs from the crystal.
+const RUNNING: Time = Time::from_ms(10);
+
+/// Starts the crystal and 72 MHz from it, with the clock security system or without.
+fn fast(security: bool) -> Asm {
+    let cr = 0x1_0083 | if security { CSSON } else { 0 };
+    let mut program = Asm::new();
+    program.store(FLASH_ACR, 0x12);
+    program.store(RCC_CR, cr);
+    program.wait_set(RCC_CR, HSERDY);
+    program.store(RCC_CFGR, 0x001D_0400);
+    program.store(RCC_CR, cr | 1 << 24);
+    program.wait_set(RCC_CR, 1 << 25);
+    program.store(RCC_CFGR, 0x001D_0402);
+    program.wait_set(RCC_CFGR, 8);
+    program.set(6, 0);
+    program
+}
+
+/// An endless loop; its NMI handler counts its entries in r6, puts RCC's registers out and, in its
+/// `clears`th round, clears CSSF.
+fn with_handler(mut program: Asm, clears: u16) -> Board {
+    program.spin();
+    program.handler(2);
+    program.add(6, 1);
+    program.copy(RCC_CR, OUT);
+    program.copy(RCC_CFGR, OUT + 4);
+    program.copy(RCC_CIR, OUT + 8);
+    program.cmp(6, clears);
+    let not_yet = program.forward(When::NotEqual);
+    program.store(RCC_CIR, CSSC);
+    program.copy(RCC_CIR, OUT + 12);
+    program.land(not_yet);
+    program.bx(14);
+    board(program)
+}
+
+#[test]
+fn the_clock_security_system_goes_to_the_hsi_and_raises_the_nmi() {
+    let mut board = with_handler(fast(true), 1);
+    board.run_until(RUNNING);
+    assert_eq!((board.hclk(), board.register(6)), (72_000_000, Some(0)));
+    board.set_crystal(false);
+    assert!(!board.crystal());
+    board.step(1);
+    assert_eq!(board.register(16).unwrap() & 0x1FF, 2, "in the NMI at once");
+    assert_eq!(board.hclk(), 8_000_000);
+    board.run_for(Time::from_ms(1));
+    assert_eq!(board.register(6), Some(1), "once");
+    let [cr, cfgr, cir, cleared] = [0, 1, 2, 3].map(|n| out(&board, n));
+    // HSEON, HSERDY, PLLON and PLLRDY are off, HSION and HSIRDY on.
+    assert_eq!(cr & 0x0303_0003, 3, "{cr:#x}");
+    assert_eq!(cfgr & 0xF, 0, "SW and SWS say HSI: {cfgr:#x}");
+    assert_eq!((cir & CSSF, cleared & CSSF), (CSSF, 0));
+    // Two wait states and the prefetch buffer: 96 cycles for 64 instructions, now of 8 MHz.
+    let before = (board.now(), board.instructions());
+    board.step(64_000);
+    assert_eq!(
+        board.now() - before.0,
+        Time::cycles(96_000, 8_000_000),
+        "time goes by the HSI"
+    );
+    assert_eq!(findings(&board), [""; 0]);
+}
+
+#[test]
+fn the_nmi_comes_again_until_cssc_is_written() {
+    let mut board = with_handler(fast(true), 5);
+    board.run_until(RUNNING);
+    board.set_crystal(false);
+    board.run_for(Time::from_ms(1));
+    assert_eq!(board.register(6), Some(5));
+    assert_eq!(board.register(16).unwrap() & 0x1FF, 0, "back in the loop");
+    board.run_for(Time::from_ms(10));
+    assert_eq!(board.register(6), Some(5));
+}
+
+#[test]
+fn the_nmi_wakes_a_core_that_sleeps() {
+    let mut program = fast(true);
+    program.wfi();
+    let mut board = with_handler(program, 1);
+    board.run_until(RUNNING);
+    assert!(board.asleep());
+    board.set_crystal(false);
+    board.run_for(Time::from_ms(1));
+    assert_eq!(board.register(6), Some(1));
+    assert!(!board.asleep());
+}
+
+#[test]
+fn a_crystal_that_nothing_runs_from_leaves_the_clock_alone() {
+    let mut program = Asm::new();
+    program.set(6, 0);
+    program.store(RCC_CR, 0x1_0083 | CSSON);
+    program.wait_set(RCC_CR, HSERDY);
+    let mut board = with_handler(program, 1);
+    board.run_until(RUNNING);
+    board.set_crystal(false);
+    board.run_for(Time::from_ms(1));
+    assert_eq!(board.register(6), Some(1), "the NMI comes all the same");
+    assert_eq!(out(&board, 0) & (1 << 16 | HSERDY), 0);
+    assert_eq!(board.hclk(), 8_000_000);
+}
+
+#[test]
+fn without_the_security_system_the_core_stands_still_until_the_crystal_is_back() {
+    let mut board = with_handler(fast(false), 1);
+    board.run_until(RUNNING);
+    board.set_crystal(false);
+    let done = board.instructions();
+    let died = board.now();
+    board.run_for(Time::from_secs(1));
+    assert_eq!((board.instructions(), board.hclk()), (done, 0));
+    assert_eq!(board.now(), died + Time::from_secs(1), "time goes on");
+    board.step(10);
+    assert_eq!(board.instructions(), done, "it gives up");
+    assert_eq!(findings(&board).len(), 1);
+    assert!(findings(&board)[0].contains("clock security system off"));
+    let back = board.now();
+    board.set_crystal(true);
+    board.step(1);
+    assert_eq!(
+        board.now().as_us() - back.as_us(),
+        2_200,
+        "crystal and PLL start"
+    );
+    board.step(64_000);
+    assert_eq!((board.hclk(), board.register(6)), (72_000_000, Some(0)));
+}
+
+#[test]
+fn the_watchdog_gets_a_core_without_a_clock_going_again() {
+    let mut program = fast(false);
+    program.store(IWDG_KR, 0xCCCC);
+    let mut board = with_handler(program, 1);
+    board.run_until(RUNNING);
+    board.set_crystal(false);
+    // 4096 x 4 / 40 kHz are 409.6 ms; the program then waits for the crystal in vain.
+    board.run_for(Time::from_ms(420));
+    assert_eq!((board.resets(), board.hclk()), (1, 8_000_000));
+    let done = board.instructions();
+    board.run_for(Time::from_ms(1));
+    assert!(board.instructions() > done);
+}

@@ -1,0 +1,168 @@
+//! The board under a debugger: breakpoints, steps, registers, memory.
+
+use sim::{Error, Time};
+
+use super::asm::{Asm, When};
+use super::regs::*;
+use super::{START, board, findings, out};
+
+/// Counts in r3, round after round; where the counting is, and the program.
+fn counting() -> (u32, Asm) {
+    let mut program = Asm::new();
+    program.set(3, 0);
+    let top = program.here();
+    let address = program.address();
+    program.add(3, 1);
+    program.nop();
+    program.branch(When::Always, top);
+    (address, program)
+}
+
+#[test]
+fn a_breakpoint_halts_every_time_it_is_come_to_and_only_a_debugged_run() {
+    let (address, program) = counting();
+    let mut board = board(program);
+    let before = board.flash().to_vec();
+    let limit = Time::from_ms(10);
+    board.add_breakpoint(address | 1);
+    for round in 0..3 {
+        assert!(board.run_debugged(limit));
+        assert_eq!((board.pc(), board.register(3)), (address, Some(round)));
+        assert!(board.run_debugged(limit), "not passed, it is still there");
+        assert_eq!(board.register(3), Some(round));
+        board.pass_breakpoint();
+    }
+    assert_eq!(board.flash(), before, "the firmware sees none of it");
+    board.run_until(Time::from_ms(3));
+    assert!(board.register(3) > Some(1_000), "a plain run passes it");
+    assert!(
+        board.run_until_pc(address + 2, limit),
+        "and so does one to another place"
+    );
+    board.remove_breakpoint(address);
+    assert!(!board.run_debugged(limit));
+    assert_eq!(board.now().as_ms(), 10);
+}
+
+#[test]
+fn a_breakpoint_outlasts_a_reset() {
+    let (address, program) = counting();
+    let mut board = board(program);
+    board.add_breakpoint(address);
+    assert!(board.run_debugged(Time::from_ms(10)));
+    board.reset();
+    assert_eq!(board.pc(), address - 8, "before the first instruction");
+    assert!(board.run_debugged(Time::from_ms(10)));
+    assert_eq!(board.pc(), address);
+}
+
+#[test]
+fn a_step_is_one_instruction_and_takes_no_interrupt() {
+    let mut program = Asm::new();
+    program.store(NVIC_ISER, 1 << 28);
+    program.store(NVIC_ISER + 0x100, 1 << 28); // ISPR
+    let behind = program.address();
+    program.nop();
+    program.nop();
+    program.raw(0xE7FE);
+    let handler = program.address();
+    program.handler(16 + 28);
+    program.bx(14);
+    let mut board = board(program);
+    board.step(9);
+    board.step_instruction();
+    assert_eq!(board.pc(), behind, "the request is pending now");
+    board.add_breakpoint(behind);
+    for n in 1..=2 {
+        let (now, done) = (board.now(), board.instructions());
+        board.step_instruction();
+        assert_eq!(board.pc(), behind + 2 * n);
+        assert_eq!(board.instructions(), done + 1);
+        assert!(board.now() - now < Time::from_us(1));
+    }
+    board.step_instruction();
+    assert_eq!(board.pc(), behind + 4, "a branch to itself is a step, too");
+    assert!(
+        board.run_until_pc(handler, Time::from_ms(10)),
+        "it was kept"
+    );
+}
+
+#[test]
+fn a_step_of_a_core_that_sleeps_waits_for_what_wakes_it() {
+    let mut program = Asm::new();
+    program.store(SYST_RVR, 79_999);
+    program.store(SYST_CVR, 0);
+    program.store(SYST_CSR, 7);
+    program.wfi();
+    program.spin();
+    let handler = program.address();
+    program.handler(15);
+    program.nop();
+    program.bx(14);
+    let mut board = board(program);
+    board.run_until(Time::from_ms(5));
+    assert!(board.asleep());
+    board.step_instruction();
+    assert_eq!(board.pc(), handler + 2);
+    assert_eq!((board.now() - START).as_ms(), 10);
+    // And one that nothing wakes is let be.
+    let mut program = Asm::new();
+    program.wfi();
+    let mut board = super::board(program);
+    board.run_until(Time::from_ms(5));
+    let now = board.now();
+    board.step_instruction();
+    assert!(board.asleep());
+    assert_eq!(board.now(), now + Time::from_secs(1));
+}
+
+#[test]
+fn registers_can_be_changed() {
+    let (address, program) = counting();
+    let mut board = board(program);
+    board.step(20);
+    board.set_register(3, 1_000).unwrap();
+    board.set_register(15, address).unwrap();
+    board.step_instruction();
+    assert_eq!(board.register(3), Some(1_001));
+    assert_eq!(
+        (board.register(13), board.register(17)),
+        (Some(0x2000_5000), Some(0x2000_5000))
+    );
+    board.set_register(13, 0x2000_4000).unwrap();
+    assert_eq!(board.register(17), Some(0x2000_4000), "MSP is in use");
+    assert_eq!(board.register(23), None);
+    assert!(matches!(board.set_register(23, 0), Err(Error::Range(_))));
+}
+
+#[test]
+fn memory_is_read_and_sram_written_without_notice() {
+    let (_, program) = counting();
+    let mut board = board(program);
+    let mut word = [0; 4];
+    for vectors in [0, 0x0800_0000] {
+        assert_eq!(board.read_memory(vectors, &mut word), 4);
+        assert_eq!(word, 0x2000_5000_u32.to_le_bytes());
+    }
+    assert_eq!(board.read_memory(0xE000_ED00, &mut word), 4);
+    assert_eq!(word, 0x411F_C231_u32.to_le_bytes());
+    for nothing in [0x0802_0000, 0x2000_5000, RCC_CR, 0xE001_0000, 0x0002_0000] {
+        assert_eq!(board.read_memory(nothing, &mut word), 0, "{nothing:#x}");
+    }
+    assert_eq!(
+        board.read_memory(0x0801_FFFE, &mut word),
+        2,
+        "up to the end"
+    );
+    assert_eq!(board.read_memory(0xFFFF_FFFE, &mut word), 0);
+    board.write_memory(OUT, &[1, 2, 3, 4]).unwrap();
+    assert_eq!(out(&board, 0), 0x0403_0201);
+    for nothing in [0x0800_0000, 0x2000_4FFE, RCC_CR, 0] {
+        assert!(
+            board.write_memory(nothing, &[0; 4]).is_err(),
+            "{nothing:#x}"
+        );
+    }
+    assert_eq!(findings(&board), [""; 0]);
+}

@@ -1,0 +1,265 @@
+//! Measurements: where the core's time goes, and how long interrupts wait.
+
+use sim::{Board, CoreTime, Time, Wait};
+
+use super::asm::{Asm, When};
+use super::regs::*;
+use super::{START, board, board_with};
+
+const NVIC_ISPR: u32 = 0xE000_E200;
+const ICSR: u32 = 0xE000_ED04;
+const TIM2_IRQ: usize = 16 + 28;
+const PENDSV: usize = 14;
+const SYSTICK: usize = 15;
+
+/// The time of `n` instructions from the HSI without wait states.
+fn instructions(n: u64) -> Time {
+    Time::cycles(n * 77, 8_000_000 * 64)
+}
+
+/// The same but for what is rounded.
+fn assert_close(a: Time, b: Time) {
+    let off = a.max(b) - a.min(b);
+    assert!(off <= Time::from_ns(1), "{a} is not {b}");
+}
+
+/// Switches interrupts off or on at PRIMASK.
+fn mask(program: &mut Asm, on: bool) {
+    program.raw(if on { 0xB672 } else { 0xB662 });
+}
+
+/// `3 n` instructions and one, in r7.
+fn delay(program: &mut Asm, n: u32) {
+    program.set(7, n);
+    let top = program.here();
+    program.raw(0x3F01); // subs r7, #1
+    program.nop();
+    program.branch(When::NotEqual, top);
+}
+
+/// TIM2 interrupts every millisecond, started by the instruction that is returned; its handler takes
+/// `3 rounds + 7` instructions.
+fn ticking(program: &mut Asm) -> u32 {
+    program.store(RCC_APB1ENR, 1);
+    program.store(TIM2 + 0x28, 7);
+    program.store(TIM2 + 0x2C, 999);
+    program.store(TIM2 + 0x14, 1);
+    program.store(TIM2 + 0x10, 0);
+    program.store(TIM2 + 0x0C, 1);
+    program.store(NVIC_ISER, 1 << 28);
+    program.set(3, 0);
+    program.set(4, TIM2);
+    program.set(5, 1);
+    program.str(5, 4, 0);
+    program.address()
+}
+
+fn tick_handler(program: &mut Asm, rounds: u32) {
+    program.handler(TIM2_IRQ);
+    program.str(3, 4, 0x10);
+    delay(program, rounds);
+    program.bx(14);
+}
+
+#[test]
+fn the_load_is_what_the_instructions_take() {
+    let mut program = Asm::new();
+    ticking(&mut program);
+    let top = program.here();
+    program.wfi();
+    program.branch(When::Always, top);
+    tick_handler(&mut program, 50);
+    let mut board = board(program);
+    board.run_until(Time::from_ms(20));
+    let (before, done, cycles) = (board.core_time(), board.instructions(), board.cycles());
+    assert_eq!(before.off, START);
+    board.run_for(Time::from_ms(100));
+    let spent = board.core_time().since(before);
+    let done = board.instructions() - done;
+    // Two of the loop, and the handler's.
+    assert_eq!(done, 100 * (2 + 1 + 2 + 150 + 1));
+    assert_close(spent.running, instructions(done));
+    assert_close(spent.asleep, Time::from_ms(100) - spent.running);
+    assert_eq!((spent.stalled, spent.off), (Time::ZERO, Time::ZERO));
+    assert!((spent.load() - 0.0235).abs() < 0.0001, "{}", spent.load());
+    let slept_through = board.cycles() - cycles;
+    assert!(slept_through.abs_diff(800_000) <= 1, "{slept_through}");
+}
+
+#[test]
+fn a_branch_to_itself_is_no_sleep_and_a_board_without_power_is_off() {
+    let mut program = Asm::new();
+    program.raw(0xE7FE);
+    let mut board = board(program);
+    board.run_until(Time::from_ms(10));
+    let running = Time::from_ms(10) - START;
+    let expected = CoreTime {
+        running,
+        off: START,
+        ..CoreTime::default()
+    };
+    assert_eq!(board.core_time(), expected);
+    board.power_off();
+    board.run_for(Time::from_ms(5));
+    assert_eq!(board.core_time().off, START + Time::from_ms(5));
+    assert_eq!(board.core_time().running, running);
+}
+
+#[test]
+fn a_flash_operation_stalls_the_core() {
+    let mut program = Asm::new();
+    program.store(FLASH_KEYR, 0x4567_0123);
+    program.store(FLASH_KEYR, 0xCDEF_89AB);
+    program.store(FLASH_CR, 1 << 1);
+    program.store(FLASH_AR, 0x0800_4000);
+    program.store(FLASH_CR, 1 << 1 | 1 << 6);
+    program.wfi();
+    let mut board = board(program);
+    board.run_until(Time::from_ms(100));
+    let spent = board.core_time();
+    assert_close(spent.stalled, Time::from_ms(30));
+    assert!(spent.asleep > Time::from_ms(67));
+    assert!(spent.running < Time::from_us(10));
+    assert_close(spent.running, instructions(board.instructions()));
+}
+
+/// Counts what the interrupt has waited by two places in the program: where it is pended, and its handler.
+fn waited(mut board: Board, number: usize, pended: u32, handler: u32) -> (Time, Wait) {
+    board.measure_waits(true);
+    let limit = Time::from_secs(1);
+    assert!(board.run_until_pc(pended, limit));
+    let from = board.now();
+    assert!(board.run_until_pc(handler, limit));
+    (board.now() - from, board.wait(number))
+}
+
+#[test]
+fn a_masked_interrupt_waits_from_its_request_to_its_handler() {
+    let mut program = Asm::new();
+    mask(&mut program, true);
+    let started = ticking(&mut program);
+    delay(&mut program, 5_000);
+    mask(&mut program, false);
+    program.spin();
+    let handler = program.address();
+    tick_handler(&mut program, 1);
+    let (between, wait) = waited(board(program), TIM2_IRQ, started, handler);
+    assert_eq!(wait.entries, 1);
+    // The timer asks a millisecond after its start; the core sees it at the end of an instruction.
+    let expected = between - Time::from_ms(1);
+    let off = wait.longest.max(expected) - wait.longest.min(expected);
+    assert!(off < instructions(2), "{} is not {expected}", wait.longest);
+    assert!(wait.at > Time::from_ms(4));
+}
+
+#[test]
+fn what_software_pends_waits_from_the_instruction_that_pends_it() {
+    for (number, register, bit) in [
+        (TIM2_IRQ, NVIC_ISPR, 28),
+        (PENDSV, ICSR, 28),
+        (SYSTICK, ICSR, 26),
+    ] {
+        let mut program = Asm::new();
+        program.store(NVIC_ISER, 1 << 28);
+        mask(&mut program, true);
+        program.store(register, 1 << bit);
+        let pended = program.address();
+        delay(&mut program, 700);
+        mask(&mut program, false);
+        program.spin();
+        let handler = program.address();
+        program.handler(number);
+        program.bx(14);
+        let (between, wait) = waited(board(program), number, pended, handler);
+        assert_eq!((wait.entries, wait.longest), (1, between), "{number}");
+        assert_close(between, instructions(2 + 3 * 700 + 1));
+    }
+}
+
+#[test]
+fn systick_s_wait_begins_with_its_event() {
+    let mut program = Asm::new();
+    mask(&mut program, true);
+    program.store(SYST_RVR, 7_999);
+    program.store(SYST_CVR, 0);
+    program.store(SYST_CSR, 7);
+    let started = program.address();
+    delay(&mut program, 3_000);
+    mask(&mut program, false);
+    program.spin();
+    let handler = program.address();
+    program.handler(SYSTICK);
+    program.bx(14);
+    let (between, wait) = waited(board(program), SYSTICK, started, handler);
+    let expected = between - Time::from_ms(1);
+    let off = wait.longest.max(expected) - wait.longest.min(expected);
+    assert!(off < instructions(2), "{} is not {expected}", wait.longest);
+}
+
+#[test]
+fn an_interrupt_does_not_wait_before_it_is_enabled_nor_after_it_is_withdrawn() {
+    let mut program = Asm::new();
+    program.store(NVIC_ISPR, 1 << 28);
+    delay(&mut program, 1_000);
+    program.store(NVIC_ISER, 1 << 28);
+    mask(&mut program, true);
+    program.store(NVIC_ISPR, 1 << 28);
+    delay(&mut program, 1_000);
+    program.store(NVIC_ISPR + 0x80, 1 << 28); // ICPR
+    mask(&mut program, false);
+    program.store(NVIC_ISPR, 1 << 28);
+    program.spin();
+    program.handler(TIM2_IRQ);
+    program.bx(14);
+    let mut board = board(program);
+    board.measure_waits(true);
+    board.run_until(Time::from_ms(20));
+    let wait = board.wait(TIM2_IRQ);
+    assert_eq!((wait.entries, wait.longest), (2, Time::ZERO));
+    assert_eq!(board.wait(PENDSV), Wait::default());
+    assert_eq!(board.wait(1_000), Wait::default());
+    board.measure_waits(true);
+    assert_eq!(board.wait(TIM2_IRQ), Wait::default(), "anew");
+}
+
+#[test]
+fn a_measured_run_is_the_same_run() {
+    let program = || {
+        let mut program = Asm::new();
+        ticking(&mut program);
+        program.store(NVIC_ISER, 1 << 28 | 1 << 6);
+        program.store(SYST_RVR, 6_543);
+        program.store(SYST_CSR, 7);
+        let top = program.here();
+        mask(&mut program, true);
+        delay(&mut program, 123);
+        mask(&mut program, false);
+        program.store(NVIC_ISPR, 1 << 6);
+        program.copy(TIM2 + 0x24, OUT);
+        program.wfi();
+        program.branch(When::Always, top);
+        tick_handler(&mut program, 40);
+        program.handler(SYSTICK);
+        program.copy(TIM2 + 0x24, OUT + 4);
+        program.bx(14);
+        program.handler(16 + 6);
+        program.bx(14);
+        program.image()
+    };
+    let mut plain = board_with(&program(), sim::Config::default());
+    let mut measured = board_with(&program(), sim::Config::default());
+    measured.measure_waits(true);
+    for board in [&mut plain, &mut measured] {
+        board.run_until(Time::from_ms(30));
+        board.reset();
+        board.run_until(Time::from_ms(60));
+    }
+    assert!(measured.wait(TIM2_IRQ).entries > 50);
+    assert!(measured.wait(TIM2_IRQ).longest > Time::from_us(1));
+    assert!(measured.wait(SYSTICK).entries > 60);
+    assert_eq!(plain.wait(SYSTICK), Wait::default());
+    assert_eq!(plain.instructions(), measured.instructions());
+    assert_eq!(plain.now(), measured.now());
+    assert_eq!(plain.ram(), measured.ram());
+    assert_eq!(plain.core_time(), measured.core_time());
+}
