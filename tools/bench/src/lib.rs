@@ -1,0 +1,98 @@
+//! Measures the release image on the virtual board, in instructions: the same image gives the same
+//! figures on every machine. Beside it, minimal servers on other crates are given the same requests.
+//!
+//! `cargo xtask bench` builds the images, runs this, adds the sizes, shows it all and holds it against the
+//! baseline; what is here only measures.
+
+pub mod load;
+pub mod requests;
+pub mod rival;
+pub mod unit;
+
+use std::collections::BTreeMap;
+
+use register_map::Module;
+use serde::Serialize;
+use sim::Image;
+
+use rival::Rival;
+use unit::Unit;
+
+/// The rates of [`load`], in units of 100 bit/s.
+const RATES: [u16; 3] = [96, 1152, 9216];
+
+/// What a request costs, in instructions.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The function and what is asked for.
+    pub request: String,
+    /// From t3.5's expiry to the first byte of the response in the UART's data register.
+    pub to_first_byte: u32,
+    /// The line's three interrupt handlers, from the request's first byte until the driver is off.
+    pub transaction: u32,
+    /// The longest handler for a byte received.
+    pub byte_in: u32,
+    /// The longest handler for a byte sent.
+    pub byte_out: u32,
+    /// The rivals', from complete frame to complete response; `None` where one does not answer.
+    pub rivals: BTreeMap<String, Option<u32>>,
+}
+
+/// All that is measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The requests.
+    pub requests: Vec<Row>,
+    /// The processor under load.
+    pub load: Vec<load::Load>,
+}
+
+/// Measures an image, and rivals by name.
+///
+/// # Errors
+///
+/// When the image does not serve a request as it should: which, and what it did.
+pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, String> {
+    let mut units: BTreeMap<&str, Unit> = BTreeMap::new();
+    let mut rivals = rivals
+        .iter()
+        .map(|(name, image)| Ok((name.clone(), Rival::new(image)?)))
+        .collect::<Result<Vec<_>, String>>()?;
+    let mut requests = Vec::new();
+    for request in requests::all() {
+        let module: Module = request.module;
+        let unit = match units.entry(module.name()) {
+            std::collections::btree_map::Entry::Occupied(unit) => unit.into_mut(),
+            std::collections::btree_map::Entry::Vacant(place) => {
+                place.insert(Unit::new(image, module, 1152)?)
+            }
+        };
+        let cost = unit.measure(&request);
+        let cost = cost.map_err(|error| format!("{}: {error}", request.name))?;
+        let mut others = BTreeMap::new();
+        for (name, rival) in &mut rivals {
+            let taken = match &request.rival {
+                Some(pdu) => rival
+                    .measure(pdu)
+                    .map_err(|error| format!("{name}: {error}"))?,
+                None => None,
+            };
+            others.insert(name.clone(), taken);
+        }
+        requests.push(Row {
+            request: request.name,
+            to_first_byte: cost.to_first_byte,
+            transaction: cost.transaction,
+            byte_in: cost.byte_in,
+            byte_out: cost.byte_out,
+            rivals: others,
+        });
+    }
+    let mut load = Vec::new();
+    for rate in RATES {
+        for long in [false, true] {
+            load.push(load::measure(image, rate, long)?);
+        }
+    }
+    Ok(Report { requests, load })
+}

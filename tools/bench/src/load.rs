@@ -1,0 +1,78 @@
+//! What the line asks of the processor when a master leaves it no rest: requests back to back, each sent
+//! as soon as t3.5 has passed since the last response.
+
+use register_map::Module;
+use register_map::configuration::BETA;
+use serde::Serialize;
+use sim::{Image, Time};
+
+use crate::requests::{adu, is_adu};
+use crate::unit::{BYTE, GAP, SERVE, Unit};
+
+/// How long it goes on.
+const SPAN: Time = Time::from_ms(1_000);
+
+/// The exceptions of the image's tasks (RM0008 table 63) and what they are for.
+const TASKS: [(u32, &str); 5] = [
+    (BYTE, "byte (USART1)"),
+    (GAP, "frame gap (TIM2)"),
+    (SERVE, "serve (EXTI3)"),
+    (16 + 30, "scan (TIM4)"),
+    (16 + 6, "background (EXTI0)"),
+];
+
+/// The processor under load.
+#[derive(Clone, Debug, Serialize)]
+pub struct Load {
+    /// Bits per second.
+    pub baud: u32,
+    /// What is asked.
+    pub request: &'static str,
+    /// Requests in [`SPAN`], all answered.
+    pub answered: u32,
+    /// The part of its time that the processor was awake, in percent.
+    pub awake_percent: f64,
+    /// The longest wait of every interrupt, in microseconds of virtual time.
+    pub longest_waits_us: Vec<(&'static str, f64)>,
+}
+
+/// Loads the unit at a rate in units of 100 bit/s.
+///
+/// # Errors
+///
+/// When it leaves a request unanswered.
+pub fn measure(image: &Image, hundreds: u16, long: bool) -> Result<Load, String> {
+    let mut unit = Unit::new(image, Module::Di4, hundreds)?;
+    let (name, count) = if long {
+        ("03, 125 registers", 125)
+    } else {
+        ("03, 1 register", 1)
+    };
+    let [high, low] = BETA.to_be_bytes();
+    let request = adu(&[3, high, low, 0, count]);
+    unit.board.measure_waits(true);
+    let before = unit.board.core_time();
+    let end = unit.board.now() + SPAN;
+    let mut answered = 0;
+    while unit.board.now() < end {
+        if !is_adu(&unit.back_to_back(&request)) {
+            return Err(format!(
+                "request {} of those back to back at {hundreds}00 bit/s is not answered",
+                answered + 1
+            ));
+        }
+        answered += 1;
+    }
+    let load = unit.board.core_time().since(before).load();
+    let waits = TASKS.map(|(exception, name)| {
+        let longest = unit.board.wait(exception as usize).longest;
+        (name, longest.as_secs_f64() * 1e6)
+    });
+    Ok(Load {
+        baud: u32::from(hundreds) * 100,
+        request: name,
+        answered,
+        awake_percent: load * 100.0,
+        longest_waits_us: waits.into(),
+    })
+}

@@ -1,0 +1,208 @@
+//! The requests that are measured: every function at its smallest and its largest.
+//!
+//! The addresses are modio's. A rival has its points from address 0 on, so a request goes to it with
+//! its addresses changed and all else the same.
+
+use crc::{CRC_16_MODBUS, Crc};
+use register_map::Module;
+use register_map::configuration::{BETA, FILTER, KEY, OPENING_KEY};
+use register_map::points::SLOT_FIRST;
+
+/// The unit that is asked.
+pub const UNIT: u8 = 1;
+
+/// The longest run of registers that can be written, from here on: BETA to START.
+const LONG: u16 = BETA;
+
+/// A request, and what it takes to make it.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The function and what is asked for, as the table shows it.
+    pub name: String,
+    /// The module in the slot.
+    pub module: Module,
+    /// What is asked first, not measured: opens the lock where the request needs it.
+    pub before: Option<Vec<u8>>,
+    /// The PDU for modio.
+    pub pdu: Vec<u8>,
+    /// The same for a rival; `None` when it has no such function.
+    pub rival: Option<Vec<u8>>,
+}
+
+/// A PDU: the function code and 16-bit fields, high byte first.
+fn pdu(function: u8, fields: &[u16]) -> Vec<u8> {
+    let mut pdu = vec![function];
+    pdu.extend(fields.iter().flat_map(|field| field.to_be_bytes()));
+    pdu
+}
+
+/// A PDU with a byte count and data behind its fields.
+fn with_data(function: u8, fields: &[u16], data: &[u8]) -> Vec<u8> {
+    let mut pdu = pdu(function, fields);
+    pdu.push(u8::try_from(data.len()).expect("a PDU has 253 bytes"));
+    pdu.extend(data);
+    pdu
+}
+
+/// The ADU for the unit.
+#[must_use]
+pub fn adu(pdu: &[u8]) -> Vec<u8> {
+    const MODBUS: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+    let mut adu = vec![UNIT];
+    adu.extend(pdu);
+    let check = MODBUS.checksum(&adu);
+    adu.extend(check.to_le_bytes());
+    adu
+}
+
+/// Whether these bytes are an ADU with a good CRC.
+#[must_use]
+pub fn is_adu(bytes: &[u8]) -> bool {
+    bytes
+        .len()
+        .checked_sub(2)
+        .is_some_and(|end| end >= 2 && adu(&bytes[1..end]) == bytes)
+}
+
+/// Values that these settings take, `count` from [`LONG`] on: those of the factory.
+fn settings(count: usize) -> Vec<u8> {
+    let rules = register_map::configuration::RULES;
+    let values = (LONG..)
+        .map_while(|address| register_map::rule_at(rules, address).map(|(rule, _)| rule.default));
+    values.take(count).flat_map(u16::to_be_bytes).collect()
+}
+
+/// All of them.
+#[must_use]
+pub fn all() -> Vec<Request> {
+    let of = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
+        name: name.to_owned(),
+        module,
+        before: None,
+        pdu: make(address),
+        rival: Some(make(0)),
+    };
+    let open = || Some(pdu(0x06, &[KEY, OPENING_KEY]));
+    let bits =
+        |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>| of(name, module, make, SLOT_FIRST);
+    let setting = |name: &str, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
+        before: open(),
+        ..of(name, Module::Di4, make, address)
+    };
+    let alone = |name: &str, pdu: Vec<u8>| Request {
+        name: name.to_owned(),
+        module: Module::Di4,
+        before: None,
+        pdu,
+        rival: None,
+    };
+    let own = |request: Request| Request {
+        rival: None,
+        ..request
+    };
+
+    vec![
+        bits("01 read coils, 1", Module::Do4, &|a| pdu(1, &[a, 1])),
+        bits("01 read coils, 4", Module::Do4, &|a| pdu(1, &[a, 4])),
+        bits("02 read discrete inputs, 1", Module::Di4, &|a| {
+            pdu(2, &[a, 1])
+        }),
+        bits("02 read discrete inputs, 4", Module::Di4, &|a| {
+            pdu(2, &[a, 4])
+        }),
+        bits("03 read holding registers, 1", Module::Ai4, &|a| {
+            pdu(3, &[a, 1])
+        }),
+        of(
+            "03 read holding registers, 125",
+            Module::Di4,
+            &|a| pdu(3, &[a, 125]),
+            LONG,
+        ),
+        bits("04 read input registers, 1", Module::Ai4, &|a| {
+            pdu(4, &[a, 1])
+        }),
+        of(
+            "04 read input registers, 125",
+            Module::Di4,
+            &|a| pdu(4, &[a, 125]),
+            LONG,
+        ),
+        bits("05 write single coil", Module::Do4, &|a| {
+            pdu(5, &[a, 0xFF00])
+        }),
+        bits("06 write single register, output", Module::Ao4, &|a| {
+            pdu(6, &[a, 100])
+        }),
+        setting(
+            "06 write single register, setting",
+            &|a| pdu(6, &[a, 5]),
+            FILTER,
+        ),
+        bits("0F write multiple coils, 1", Module::Do4, &|a| {
+            with_data(0x0F, &[a, 1], &[1])
+        }),
+        bits("0F write multiple coils, 4", Module::Do4, &|a| {
+            with_data(0x0F, &[a, 4], &[5])
+        }),
+        setting(
+            "10 write multiple registers, 1",
+            &|a| with_data(0x10, &[a, 1], &settings(1)),
+            LONG,
+        ),
+        setting(
+            "10 write multiple registers, 123",
+            &|a| with_data(0x10, &[a, 123], &settings(123)),
+            LONG,
+        ),
+        own(setting(
+            "16 mask write register",
+            &|a| pdu(0x16, &[a, 0xFFFF, 0]),
+            LONG,
+        )),
+        own(setting(
+            "17 read/write registers, 1 and 1",
+            &|a| with_data(0x17, &[a, 1, a, 1], &settings(1)),
+            LONG,
+        )),
+        own(setting(
+            "17 read/write registers, 125 and 121",
+            &|a| with_data(0x17, &[a, 125, a, 121], &settings(121)),
+            LONG,
+        )),
+        alone("07 read exception status", pdu(7, &[])),
+        alone("08/00 return query data, 2 bytes", pdu(8, &[0, 0x1234])),
+        alone("08/00 return query data, 250 bytes", {
+            let mut pdu = pdu(8, &[0]);
+            pdu.resize(253, 0xA5);
+            pdu
+        }),
+        alone("08/0B return bus message count", pdu(8, &[0x0B, 0])),
+        alone("0B get comm event counter", pdu(0x0B, &[])),
+        alone("0C get comm event log", pdu(0x0C, &[])),
+        alone("11 report server id", pdu(0x11, &[])),
+        alone(
+            "2B/0E device identification, one object",
+            vec![0x2B, 0x0E, 4, 0],
+        ),
+        alone("2B/0E device identification, all", vec![0x2B, 0x0E, 3, 0]),
+        alone("an unknown function", pdu(0x41, &[])),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_are_frames_and_settings_are_allowed() {
+        for request in all() {
+            assert!(request.pdu.len() <= 253, "{}", request.name);
+            assert!(is_adu(&adu(&request.pdu)), "{}", request.name);
+        }
+        assert_eq!(settings(123).len(), 246);
+        assert!(!is_adu(&[1, 2, 3, 4]) && !is_adu(&[1]));
+        // From the standard's appendix B: 02 07 with the CRC 41 12.
+        assert_eq!(adu(&[0x07])[..2], [UNIT, 7]);
+    }
+}

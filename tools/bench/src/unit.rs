@@ -1,0 +1,226 @@
+//! The image on the virtual board, and what serving a request costs there.
+
+use register_map::{Module, configuration, record};
+use sim::line::{Format, Settings};
+use sim::machine::memory::{FLASH_BASE, FLASH_SIZE};
+use sim::{Board, Config, Image, Time};
+
+use crate::requests::{Request, adu, is_adu};
+
+/// The exceptions that serve the line (RM0008 table 63): USART1, TIM2 (the frame gap), EXTI3 (the server).
+pub(crate) const BYTE: u32 = 16 + 37;
+pub(crate) const GAP: u32 = 16 + 28;
+pub(crate) const SERVE: u32 = 16 + 9;
+
+/// Time for the image to start in.
+const START: Time = Time::from_ms(150);
+/// The longest that any transaction takes at 115200 bit/s.
+const LONGEST: Time = Time::from_ms(100);
+/// More instructions than anything measured needs: then it hangs.
+const TOO_MANY: u32 = 1_000_000;
+
+/// What one request costs, in instructions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// From the expiry of t3.5 to the first byte of the response in the UART's data register.
+    pub to_first_byte: u32,
+    /// The line's three interrupt handlers, from the request's first byte until the driver is off.
+    pub transaction: u32,
+    /// The longest handler for a byte received.
+    pub byte_in: u32,
+    /// The longest handler for a byte sent.
+    pub byte_out: u32,
+}
+
+/// A board with the image on it.
+pub struct Unit {
+    pub(crate) board: Board,
+    settings: Settings,
+    /// When a master may send again.
+    free: Time,
+}
+
+impl Unit {
+    /// A board with this module, at a rate in units of 100 bit/s, started.
+    ///
+    /// # Errors
+    ///
+    /// When the image does not fit the board.
+    pub fn new(image: &Image, module: Module, hundreds: u16) -> Result<Self, String> {
+        let pairs = [
+            (configuration::BAUD, hundreds),
+            (configuration::MODULE_SLOT, module.code()),
+        ];
+        let mut flash = vec![0xFF; FLASH_SIZE];
+        let page = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
+        // It fits: two pairs in a page of a kilobyte.
+        record::encode_page(1, &pairs, &mut flash[page..page + 1024]);
+        let config = Config {
+            module,
+            flash: Some(flash),
+            ..Config::default()
+        };
+        let mut board = Board::new(image, config).map_err(|error| error.to_string())?;
+        let settings = Settings {
+            baud: u32::from(hundreds) * 100,
+            format: Format::N2,
+        };
+        board.line().set_settings(settings);
+        board.run_for(START);
+        Ok(Self {
+            board,
+            settings,
+            free: Time::ZERO,
+        })
+    }
+
+    /// Sends a request; the unit's response once it is complete, empty when there is none.
+    pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let now = self.board.now();
+        let end = self.board.line().send(now, &adu(pdu));
+        self.board.run_until(end + self.silence());
+        while self.board.driver_enable() {
+            self.board.run_for(self.settings.characters(1));
+        }
+        self.board.run_for(self.silence());
+        self.heard()
+    }
+
+    /// Sends an ADU the moment t3.5 has passed since the last response, and gives the unit time to answer.
+    pub(crate) fn back_to_back(&mut self, adu: &[u8]) -> Vec<u8> {
+        let start = self.board.now().max(self.free);
+        let end = self.board.line().send(start, adu);
+        let late = end + self.silence();
+        self.board.run_until(end + self.settings.frame_silence());
+        let step = self.settings.rate().bits(1);
+        while !self.board.driver_enable() && self.board.now() < late {
+            self.board.run_for(step);
+        }
+        while self.board.driver_enable() {
+            self.board.run_for(step);
+        }
+        self.free = self.board.now() + self.settings.frame_silence();
+        self.heard()
+    }
+
+    fn silence(&self) -> Time {
+        self.settings.frame_silence() + self.settings.characters(2)
+    }
+
+    fn heard(&mut self) -> Vec<u8> {
+        let heard = self.board.line().take_received();
+        heard.iter().map(|character| character.byte).collect()
+    }
+
+    /// What it costs to serve a request.
+    ///
+    /// # Errors
+    ///
+    /// When the unit does not answer, or not with a good frame, or hangs.
+    pub fn measure(&mut self, request: &Request) -> Result<Cost, String> {
+        if let Some(before) = &request.before
+            && !is_adu(&self.ask(before))
+        {
+            return Err("the lock does not open".to_owned());
+        }
+        // Twice: the first time the code may behave otherwise, as for a value that changes.
+        self.count(&request.pdu)?;
+        self.count(&request.pdu)
+    }
+
+    /// Counts every instruction of a transaction by the handler it is of.
+    fn count(&mut self, pdu: &[u8]) -> Result<Cost, String> {
+        let now = self.board.now();
+        let end = self.board.line().send(now, &adu(pdu));
+        let expiry = end + self.settings.frame_silence();
+        let mut cost = Cost::default();
+        let mut handler = Handler::default();
+        let mut waiting = Expiry::Before;
+        let written = self.board.line_bytes_written();
+        let mut replied = false;
+        loop {
+            let before = self.board.line_bytes_written();
+            let retired = self.board.instructions();
+            let exception = self.exception();
+            self.board.step(1);
+            let retired = self.board.instructions() - retired;
+            let retired = u32::try_from(retired).unwrap_or(u32::MAX);
+            let wrote = self.board.line_bytes_written() > before;
+
+            if exception == GAP && waiting == Expiry::Before && self.board.now() >= expiry {
+                waiting = Expiry::Counting;
+            }
+            if waiting == Expiry::Counting {
+                cost.to_first_byte += retired;
+                if wrote {
+                    waiting = Expiry::Done;
+                }
+            }
+            if matches!(exception, BYTE | GAP | SERVE) {
+                cost.transaction += retired;
+            }
+            if exception == BYTE {
+                handler.count(retired, wrote || self.board.line_bytes_written() > written);
+            }
+            if exception != BYTE || self.exception() != BYTE {
+                handler.end(&mut cost);
+            }
+
+            let on = self.board.driver_enable();
+            replied |= on;
+            if replied && !on && self.exception() != BYTE {
+                break;
+            }
+            if cost.to_first_byte > TOO_MANY {
+                return Err("the response never begins".to_owned());
+            }
+            if self.board.now() > end + LONGEST {
+                return Err("there is no response".to_owned());
+            }
+        }
+        self.board.run_for(self.silence());
+        let response = self.heard();
+        if is_adu(&response) {
+            Ok(cost)
+        } else {
+            Err(format!("the response is no frame: {response:02X?}"))
+        }
+    }
+
+    /// The exception whose handler runs; 0 in the program itself.
+    fn exception(&self) -> u32 {
+        self.board.register(16).unwrap_or_default() & 0x1FF
+    }
+}
+
+/// Where the counting to the first byte stands.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Expiry {
+    Before,
+    Counting,
+    Done,
+}
+
+/// A run of the byte handler.
+#[derive(Default)]
+struct Handler {
+    instructions: u32,
+    out: bool,
+}
+
+impl Handler {
+    fn count(&mut self, instructions: u32, out: bool) {
+        self.instructions += instructions;
+        self.out |= out;
+    }
+
+    fn end(&mut self, cost: &mut Cost) {
+        let longest = if self.out {
+            &mut cost.byte_out
+        } else {
+            &mut cost.byte_in
+        };
+        *longest = self.instructions.max(*longest);
+        *self = Self::default();
+    }
+}
