@@ -2,8 +2,11 @@
 
 use std::{env, path::Path, sync::OnceLock};
 
-use register_map::record;
-use sim::{Board, Config, Image, Module, Time, line::Settings};
+use register_map::{configuration, record};
+use sim::{
+    Board, Config, Image, Module, Time,
+    line::{Format, Settings},
+};
 
 /// The length of the flash.
 const FLASH: usize = 128 * 1024;
@@ -23,6 +26,14 @@ pub fn flash_with(module: Module) -> Vec<u8> {
     let mut flash = vec![0xFF; FLASH];
     let at = (record::PAGE_ADDRESSES[0] - FLASH_START) as usize;
     flash[at..at + record::PRESET_LEN].copy_from_slice(&record::module_in_slot(module));
+    flash
+}
+
+/// A flash whose stored configuration is these settings: address and value.
+pub fn flash_with_settings(pairs: &[(u16, u16)]) -> Vec<u8> {
+    let mut flash = vec![0xFF; FLASH];
+    let at = (record::PAGE_ADDRESSES[0] - FLASH_START) as usize;
+    record::encode_page(0, pairs, &mut flash[at..at + record::PAGE_SIZE]).expect("they fit");
     flash
 }
 
@@ -47,10 +58,19 @@ pub fn adu(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc(bytes)].concat()
 }
 
+/// The line's format for a value of FORMAT.
+pub fn format(code: u16) -> Format {
+    [Format::N2, Format::E1, Format::O1, Format::N1][usize::from(code)]
+}
+
 /// A board and its master.
 pub struct Bench {
     pub board: Board,
     settings: Settings,
+    /// The end of the last stop bit of what was sent last.
+    pub sent: Time,
+    /// How much later than after t3.5 a reply may begin: the unit's response delay.
+    pub patience: Time,
     /// Findings, resets and the like are what the test is about.
     pub tolerant: bool,
 }
@@ -66,6 +86,22 @@ impl Bench {
         })
     }
 
+    /// A board with this module and unit address 1, and settings stored beside that of the module.
+    pub fn set_up(module: Module, settings: &[(u16, u16)]) -> Self {
+        let pairs = [&[(configuration::MODULE_SLOT, module.code())], settings].concat();
+        let mut bench = Self::with(Config {
+            module,
+            flash: Some(flash_with_settings(&pairs)),
+            ..Config::default()
+        });
+        let stored = |address| pairs.iter().find(|pair| pair.0 == address);
+        bench.settings(Settings {
+            baud: stored(configuration::BAUD).map_or(9600, |pair| u32::from(pair.1) * 100),
+            format: stored(configuration::FORMAT).map_or(Format::N2, |pair| format(pair.1)),
+        });
+        bench
+    }
+
     /// A board fitted like this, powered and given time to start.
     pub fn with(config: Config) -> Self {
         let mut bench = Self::cold(config);
@@ -78,6 +114,8 @@ impl Bench {
         Self {
             board: Board::new(image(), config).expect("the image fits"),
             settings: Settings::default(),
+            sent: Time::ZERO,
+            patience: Time::ZERO,
             tolerant: false,
         }
     }
@@ -106,13 +144,14 @@ impl Bench {
     /// Sends bytes as they are, now, and gives the unit time to answer in. What it says, if anything.
     pub fn exchange(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.board.now();
-        let end = self.board.line().send(now, bytes);
-        self.answer_after(end)
+        self.sent = self.board.line().send(now, bytes);
+        self.answer_after(self.sent)
     }
 
     /// What the unit says within a moment after `end`, the end of what it was sent.
     pub fn answer_after(&mut self, end: Time) -> Vec<u8> {
-        self.board.run_until(end + self.t35() + self.characters(2));
+        self.board
+            .run_until(end + self.t35() + self.characters(2) + self.patience);
         while self.board.driver_enable() {
             self.board.run_for(self.characters(1));
         }

@@ -1,18 +1,52 @@
-//! Registers as a master reads and writes them.
+//! Bits and registers of unit 1 as a master reads and writes them.
 
 use crate::bench::Bench;
 
 impl Bench {
+    /// What is behind the function code of the reply to a PDU, or the exception's code.
+    pub fn request(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+        let reply = self.ask(1, pdu);
+        match reply.as_deref() {
+            Some(&[function, code]) if function == pdu[0] | 0x80 => Err(code),
+            Some([function, rest @ ..]) if *function == pdu[0] => Ok(rest.to_vec()),
+            _ => panic!("{pdu:02X?} was answered by {reply:02X?}"),
+        }
+    }
+
+    fn read(&mut self, function: u8, address: u16, count: u16) -> Result<Vec<u8>, u8> {
+        let [[a, b], [c, d]] = [address, count].map(u16::to_be_bytes);
+        let data = self.request(&[function, a, b, c, d])?;
+        assert_eq!(usize::from(data[0]), data.len() - 1, "the byte count");
+        Ok(data[1..].to_vec())
+    }
+
+    /// Bits by function 01 or 02.
+    pub fn bits(&mut self, function: u8, address: u16, count: u16) -> Result<Vec<bool>, u8> {
+        let data = self.read(function, address, count)?;
+        let bits = data
+            .iter()
+            .flat_map(|byte| (0..8).map(move |n| byte >> n & 1 != 0));
+        let mut bits: Vec<bool> = bits.collect();
+        assert_eq!(data.len(), usize::from(count).div_ceil(8));
+        let padding = bits.split_off(count.into());
+        assert!(
+            !padding.contains(&true),
+            "unused bits are zero: {data:02X?}"
+        );
+        Ok(bits)
+    }
+
+    /// Words by function 03 or 04.
+    pub fn words(&mut self, function: u8, address: u16, count: u16) -> Result<Vec<u16>, u8> {
+        let data = self.read(function, address, count)?;
+        assert_eq!(data.len(), usize::from(count) * 2);
+        let words = data.chunks(2);
+        Ok(words.map(|w| u16::from_be_bytes([w[0], w[1]])).collect())
+    }
+
     /// Registers by function 03, or the exception.
     pub fn registers(&mut self, address: u16, count: u16) -> Result<Vec<u16>, u8> {
-        let [[a, b], [c, d]] = [address, count].map(u16::to_be_bytes);
-        let reply = self.ask(1, &[3, a, b, c, d]).expect("an answer");
-        if reply[0] & 0x80 != 0 {
-            return Err(reply[1]);
-        }
-        assert_eq!(usize::from(reply[1]), usize::from(count) * 2);
-        let words = reply[2..].chunks(2);
-        Ok(words.map(|w| u16::from_be_bytes([w[0], w[1]])).collect())
+        self.words(3, address, count)
     }
 
     /// One register by function 03, which must exist.
@@ -20,17 +54,60 @@ impl Bench {
         self.registers(address, 1).expect("the register exists")[0]
     }
 
+    /// A value of two registers, high word first.
+    pub fn long(&mut self, address: u16) -> u32 {
+        let words = self.registers(address, 2).expect("the registers exist");
+        u32::from(words[0]) << 16 | u32::from(words[1])
+    }
+
+    /// Writes by function 05 or 06, the value as it stands in the frame.
+    pub fn write_single(&mut self, function: u8, address: u16, value: u16) -> Result<(), u8> {
+        let [[a, b], [c, d]] = [address, value].map(u16::to_be_bytes);
+        let echo = self.request(&[function, a, b, c, d])?;
+        assert_eq!(echo, [a, b, c, d]);
+        Ok(())
+    }
+
+    /// Switches one bit by function 05.
+    pub fn write_bit(&mut self, address: u16, on: bool) -> Result<(), u8> {
+        self.write_single(5, address, if on { 0xFF00 } else { 0 })
+    }
+
+    /// Writes bits by function 0F.
+    pub fn write_bits(&mut self, address: u16, bits: &[bool]) -> Result<(), u8> {
+        let mut bytes = vec![0; bits.len().div_ceil(8)];
+        for (n, bit) in bits.iter().enumerate() {
+            bytes[n / 8] |= u8::from(*bit) << (n % 8);
+        }
+        self.write_several(15, address, bits.len(), &bytes)
+    }
+
     /// Writes registers by function 10, or the exception.
     pub fn write(&mut self, address: u16, values: &[u16]) -> Result<(), u8> {
-        let [[a, b], [c, d]] = [address, values.len() as u16].map(u16::to_be_bytes);
-        let mut pdu = vec![16, a, b, c, d, values.len() as u8 * 2];
-        pdu.extend(values.iter().flat_map(|value| value.to_be_bytes()));
-        let reply = self.ask(1, &pdu).expect("an answer");
-        if reply[0] & 0x80 != 0 {
-            return Err(reply[1]);
-        }
-        assert_eq!(reply, pdu[..5]);
+        let bytes: Vec<u8> = values
+            .iter()
+            .flat_map(|value| value.to_be_bytes())
+            .collect();
+        self.write_several(16, address, values.len(), &bytes)
+    }
+
+    fn write_several(
+        &mut self,
+        function: u8,
+        address: u16,
+        count: usize,
+        bytes: &[u8],
+    ) -> Result<(), u8> {
+        let [[a, b], [c, d]] = [address, count as u16].map(u16::to_be_bytes);
+        let pdu = [&[function, a, b, c, d, bytes.len() as u8], bytes].concat();
+        let echo = self.request(&pdu)?;
+        assert_eq!(echo, [a, b, c, d]);
         Ok(())
+    }
+
+    /// Whether a bit of the status register (0x020A) is set.
+    pub fn status(&mut self, mask: u16) -> bool {
+        self.register(0x020A) & mask != 0
     }
 
     /// Opens the configuration's lock.
@@ -38,16 +115,41 @@ impl Bench {
         self.write(0x0100, &[0x5A17]).expect("KEY opens the lock");
     }
 
+    /// Opens the lock and writes settings.
+    pub fn configure(&mut self, address: u16, values: &[u16]) {
+        self.unlock();
+        self.write(address, values)
+            .unwrap_or_else(|code| panic!("{address:#06x} <- {values:?}: exception {code}"));
+    }
+
+    /// Gives a COMMAND, with the lock opened for it.
+    pub fn command(&mut self, command: u16) {
+        self.configure(0x0108, &[command]);
+    }
+
     /// Saves the configuration and waits for it.
     pub fn save(&mut self) {
         self.write(0x0108, &[1]).expect("COMMAND takes a save");
         self.board.run_for(sim::Time::from_ms(100));
-        assert_eq!(self.register(0x020A) & 8, 0, "it is saved");
+        assert!(!self.status(8), "it is saved");
     }
 
     /// Power off and on, and time to start.
     pub fn power_cycle(&mut self) {
         self.board.cycle();
+        self.started();
+    }
+
+    /// Orders a restart over the line, and gives it time.
+    pub fn restart(&mut self) {
+        let before = self.board.resets();
+        self.command(2);
+        self.started();
+        assert_eq!(self.board.resets(), before + 1, "it restarted once");
+    }
+
+    /// Time to start, then an empty line.
+    pub fn started(&mut self) {
         self.board.run_for(sim::Time::from_ms(300));
         self.board.line().take_received();
     }

@@ -107,10 +107,11 @@ class Simulator:
         """The four digital outputs, as they stand."""
         return [channel["on"] for channel in self.state()["channels"]]
 
-    def master(self, timeout: float = ANSWER) -> ModbusSerialClient:
-        """pymodbus on the line, which asks once."""
+    def master(self, timeout: float = ANSWER, baudrate: int = 9600,
+               stopbits: int = 2) -> ModbusSerialClient:
+        """pymodbus on the line, which asks once. Without parity: a pseudo-terminal has none."""
         client = ModbusSerialClient(
-            self.port, baudrate=9600, stopbits=2, timeout=timeout, retries=0)
+            self.port, baudrate=baudrate, stopbits=stopbits, timeout=timeout, retries=0)
         assert client.connect()
         return client
 

@@ -1,0 +1,264 @@
+//! The communication watchdog: on time, per point, fed by the right requests alone, and how it ends.
+
+use register_map::configuration::{COMM_TIMEOUT, HOLD, SAFE};
+use sim::{Channel, Module, Time};
+
+use crate::{
+    analog_outputs::codes,
+    bench::{Bench, adu},
+};
+
+const SLOT: u16 = 0x10;
+const TRIPPED: u16 = 1;
+
+fn outputs(bench: &Bench) -> [bool; 4] {
+    [1, 2, 3, 4].map(|n| match bench.board.channel(n) {
+        Channel::Do { on } => on,
+        other => panic!("channel {n} is {other:?}"),
+    })
+}
+
+/// That `at` is the time-out after `from`, give or take 2 ms.
+fn assert_on_time(from: Time, tenths: u16, at: Time) {
+    let due = from + Time::from_ms(100 * u64::from(tenths));
+    let off = at.max(due) - at.min(due);
+    let side = if at > due { "late" } else { "early" };
+    assert!(off <= Time::from_ms(2), "{tenths}00 ms: {off:?} {side}");
+}
+
+/// What a master sets up: a time-out in 100 ms, everything on.
+fn armed(bench: &mut Bench, tenths: u16) {
+    bench.configure(COMM_TIMEOUT, &[tenths]);
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn digital_outputs_go_to_safe_two_milliseconds_around_the_time_out_at_any_rate() {
+    for (baud, format) in [(96, 0), (1152, 1), (12, 0)] {
+        let mut bench = Bench::set_up(Module::Do4, &[(0x0101, baud), (0x0102, format)]);
+        // At 1200 bit/s a request and its reply take longer than the shortest time-out.
+        let more = if baud == 12 { 2 } else { 0 };
+        for (n, tenths) in (0..).zip([1, 2, 3, 7, 10, 1, 5, 1, 20, 1]) {
+            let tenths = tenths + more;
+            armed(&mut bench, tenths);
+            // At any place between two scans.
+            bench.board.run_for(Time::from_us(n * 137));
+            bench.board.watch_pin('A', 3);
+            assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true; 4]));
+            let last = bench.sent;
+            bench
+                .board
+                .run_for(Time::from_ms(100 * u64::from(tenths) + 50));
+            let edges = bench.board.pin_edges('A', 3);
+            let &[.., (at, false)] = edges else {
+                panic!("it went off: {edges:?}");
+            };
+            assert!(at > last);
+            assert_on_time(last, tenths, at);
+            assert_eq!(outputs(&bench), [false; 4]);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
+    let safe = [4095, 0, HOLD, 1234];
+    let stored: Vec<_> = (0..).zip(safe).map(|(n, v)| (SAFE + SLOT + n, v)).collect();
+    let mut bench = Bench::set_up(Module::Ao4, &stored);
+    for (n, tenths) in (0..).zip([1, 2, 1, 3, 1, 10, 1, 1, 2, 1]) {
+        bench.configure(COMM_TIMEOUT, &[tenths]);
+        bench.board.run_for(Time::from_us(n * 1_370));
+        bench.write(SLOT, &[1, 2, 3, 4]).unwrap();
+        let last = bench.sent;
+        bench.board.run_for(Time::from_ms(30));
+        assert_eq!(codes(&bench, [1, 2, 3, 4]), [1, 2, 3, 4]);
+        bench
+            .board
+            .run_until(last + Time::from_ms(100 * u64::from(tenths) - 10));
+        // Each of the four channels by itself: the DAC takes them one by one.
+        let (mut first, mut all) = (None, None);
+        while all.is_none()
+            && bench.board.now() < last + Time::from_ms(100 * u64::from(tenths) + 50)
+        {
+            bench.board.run_for(Time::from_us(50));
+            let now = codes(&bench, [1, 2, 3, 4]);
+            if now != [1, 2, 3, 4] && first.is_none() {
+                first = Some(bench.board.now());
+            }
+            if now == [4095, 0, 3, 1234] {
+                all = Some(bench.board.now());
+            }
+        }
+        assert_on_time(last, tenths, first.expect("it trips"));
+        assert_on_time(last, tenths, all.expect("all go to SAFE"));
+        assert_eq!(
+            bench.registers(SLOT, 4),
+            Ok(vec![4095, 0, 3, 1234]),
+            "and read back"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn each_point_has_its_own_safe_value_or_holds() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    for (safe, commanded, then) in [
+        (
+            [1, 0, HOLD, HOLD],
+            [false, true, true, false],
+            [true, false, true, false],
+        ),
+        (
+            [HOLD, HOLD, 1, 0],
+            [true, false, false, true],
+            [true, false, true, false],
+        ),
+        ([1; 4], [false; 4], [true; 4]),
+        ([HOLD; 4], [true; 4], [true; 4]),
+    ] {
+        bench.configure(SAFE + SLOT, &safe);
+        armed(&mut bench, 1);
+        bench.write_bits(SLOT, &commanded).unwrap();
+        bench.board.run_for(Time::from_ms(150));
+        assert_eq!(outputs(&bench), then, "{safe:?}");
+        assert_eq!(bench.bits(1, SLOT, 4), Ok(then.to_vec()), "what is read");
+    }
+
+    let stored = [
+        (SAFE + SLOT + 2, 1),
+        (SAFE + SLOT + 3, HOLD),
+        (COMM_TIMEOUT, 1),
+    ];
+    let mut bench = Bench::set_up(Module::Relay2, &stored);
+    bench.write_bits(SLOT + 2, &[false, true]).unwrap();
+    bench.board.run_for(Time::from_ms(150));
+    for relay in [1, 2] {
+        let energised = matches!(
+            bench.board.channel(relay),
+            Channel::Relay {
+                energised: true,
+                ..
+            }
+        );
+        assert!(energised, "relay {relay}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn requests_and_broadcasts_feed_it_and_nothing_else_does() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    // A pause of 60 ms and 15 to 25 for the frame and its reply: never 100.
+    let hold = |bench: &mut Bench, what: &str, frame: &[u8]| {
+        armed(bench, 1);
+        for _ in 0..10 {
+            bench.board.run_for(Time::from_ms(60));
+            bench.exchange(frame);
+        }
+        assert_eq!(outputs(bench)[1..], [true; 3], "{what} feeds it");
+        assert!(!bench.status(TRIPPED), "{what} feeds it");
+    };
+    hold(&mut bench, "a request", &adu(&[1, 1, 0, 0x10, 0, 4]));
+    hold(&mut bench, "a broadcast", &adu(&[0, 5, 0, 0x10, 0, 0]));
+
+    let mut spoilt = adu(&[1, 1, 0, 0x10, 0, 4]);
+    spoilt[6] ^= 1;
+    let mut spoilt_broadcast = adu(&[0, 5, 0, 0x10, 0xFF, 0]);
+    spoilt_broadcast[7] ^= 0x80;
+    for (what, frame) in [
+        ("another unit's request", adu(&[2, 1, 0, 0x10, 0, 4])),
+        ("another unit's reply", adu(&[2, 1, 1, 0x0F])),
+        ("a bad CRC", spoilt),
+        ("a broadcast with a bad CRC", spoilt_broadcast),
+        ("noise", vec![0x00]),
+        ("half a request", vec![1, 1, 0, 0x10]),
+    ] {
+        armed(&mut bench, 3);
+        let last = bench.sent;
+        bench.board.watch_pin('A', 0);
+        while bench.board.now() < last + Time::from_ms(350) {
+            bench.exchange(&frame);
+            bench.board.run_for(Time::from_ms(20));
+        }
+        let edges = bench.board.pin_edges('A', 0);
+        let &[.., (at, false)] = edges else {
+            panic!("{what} fed it: {edges:?}");
+        };
+        assert_on_time(last, 3, at);
+        assert!(bench.status(TRIPPED), "{what}");
+        bench.command(5);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn outputs_stay_safe_until_they_are_written_and_the_flag_until_it_is_cleared() {
+    let mut bench = Bench::set_up(Module::Do4, &[(SAFE + SLOT + 2, 1)]);
+    bench.tolerant = true;
+    armed(&mut bench, 1);
+    assert!(!bench.status(TRIPPED));
+    bench.board.run_for(Time::from_ms(300));
+    let safe = [false, false, true, false];
+    assert_eq!(outputs(&bench), safe);
+
+    // The line is back: reads and refused writes move nothing.
+    for _ in 0..20 {
+        assert_eq!(bench.bits(1, SLOT, 4), Ok(safe.to_vec()));
+        assert_eq!(bench.write_single(5, SLOT, 0x0100), Err(3));
+        assert_eq!(bench.write_bits(SLOT + 2, &[true; 3]), Err(2));
+        assert!(bench.status(TRIPPED), "it latches");
+    }
+    assert_eq!(outputs(&bench), safe);
+    bench.write_bit(SLOT, true).unwrap();
+    assert_eq!(
+        outputs(&bench),
+        [true, false, true, false],
+        "the one that was written"
+    );
+    assert!(bench.status(TRIPPED), "a write does not clear it");
+    bench.command(5);
+    assert!(!bench.status(TRIPPED));
+    assert_eq!(outputs(&bench), [true, false, true, false]);
+
+    // It trips again, and a restart clears the flag too.
+    bench.board.run_for(Time::from_ms(300));
+    assert_eq!(outputs(&bench), safe);
+    assert!(bench.status(TRIPPED));
+    bench.restart();
+    assert!(!bench.status(TRIPPED), "COMM_TIMEOUT was not saved");
+    assert_eq!(outputs(&bench), [false; 4]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn off_it_never_trips_and_set_anew_it_counts_at_once() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    armed(&mut bench, 0);
+    bench.board.run_for(Time::from_secs(20));
+    assert_eq!(outputs(&bench), [true; 4]);
+    assert!(!bench.status(TRIPPED));
+    // From long to short, in the middle of the time: the write itself is a request.
+    armed(&mut bench, 36_000);
+    bench.board.run_for(Time::from_secs(10));
+    assert_eq!(outputs(&bench), [true; 4]);
+    bench.board.watch_pin('A', 0);
+    bench.configure(COMM_TIMEOUT, &[2]);
+    let last = bench.sent;
+    bench.board.run_for(Time::from_ms(250));
+    assert_on_time(last, 2, bench.board.pin_edges('A', 0)[0].0);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_master_that_never_speaks_after_power_on_is_noticed_too() {
+    let stored = [(COMM_TIMEOUT, 5), (0x01F0, 1), (SAFE + SLOT + 1, 1)];
+    let mut bench = Bench::set_up(Module::Do4, &stored);
+    bench.power_cycle();
+    assert_eq!(outputs(&bench), [true, false, false, false], "START");
+    bench.board.run_for(Time::from_ms(400));
+    assert_eq!(outputs(&bench), [false, true, false, false], "SAFE");
+    assert!(bench.status(TRIPPED));
+}

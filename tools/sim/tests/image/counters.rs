@@ -1,0 +1,162 @@
+//! The pulse counters of digital inputs, and the debounce before them.
+
+use register_map::configuration::FILTER;
+use sim::{Module, Time};
+
+use crate::bench::Bench;
+
+const SLOT: u16 = 0x10;
+const PULSES: u16 = 0x0300 + 2 * SLOT;
+
+fn pulse(bench: &mut Bench, channel: usize, high_us: u64, low_us: u64) {
+    bench.board.set_energised(channel, true).unwrap();
+    bench.board.run_for(Time::from_us(high_us));
+    bench.board.set_energised(channel, false).unwrap();
+    bench.board.run_for(Time::from_us(low_us));
+}
+
+fn counts(bench: &mut Bench) -> [u32; 4] {
+    let words = bench.registers(PULSES, 8).unwrap();
+    [0, 1, 2, 3].map(|n| u32::from(words[2 * n]) << 16 | u32::from(words[2 * n + 1]))
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn rising_edges_are_counted_on_each_channel_after_its_debounce() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    for (channel, debounce_ms) in (1..).zip([0, 2, 5, 100]) {
+        bench.configure(FILTER + SLOT + channel as u16 - 1, &[debounce_ms]);
+        let settled = u64::from(debounce_ms) * 1000 + 3_000;
+        for _ in 0..5 {
+            pulse(&mut bench, channel, settled, settled);
+        }
+        // Shorter than the debounce by more than a scan: not seen, high or low.
+        if let Some(short) = (u64::from(debounce_ms) * 1000).checked_sub(1_500) {
+            pulse(&mut bench, channel, short, settled);
+            bench.board.set_energised(channel, true).unwrap();
+            bench.board.run_for(Time::from_us(settled));
+            bench.board.set_energised(channel, false).unwrap();
+            bench.board.run_for(Time::from_us(short));
+            pulse(&mut bench, channel, settled, settled);
+        } else {
+            pulse(&mut bench, channel, settled, settled);
+        }
+        let mut expected = [0; 4];
+        expected[..channel].fill(6);
+        assert_eq!(counts(&mut bench), expected, "{debounce_ms} ms");
+    }
+    // Both functions, one counter, all of them at once; the ports without a slot stand at 0.
+    for function in [3, 4] {
+        assert_eq!(bench.words(function, PULSES + 2, 2), Ok(vec![0, 6]));
+        let all = bench.words(function, 0x0300, 64).unwrap();
+        assert_eq!(all.iter().map(|w| u32::from(*w)).sum::<u32>(), 24);
+    }
+    assert_eq!(bench.registers(0x0300, 65), Err(2));
+    assert_eq!(bench.registers(0x02FF, 2), Err(2));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_input_that_is_on_at_power_on_is_no_edge() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    for channel in 1..=4 {
+        bench.board.set_energised(channel, true).unwrap();
+    }
+    bench.power_cycle();
+    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true; 4]));
+    assert_eq!(counts(&mut bench), [0; 4]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_counter_is_cleared_by_zeros_to_both_its_words_and_by_nothing_else() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    let settled = 8_000;
+    for channel in 1..=4 {
+        for _ in 0..channel + 2 {
+            pulse(&mut bench, channel, settled, settled);
+        }
+    }
+    let full = [3, 4, 5, 6];
+    assert_eq!(counts(&mut bench), full);
+    for (address, words, code) in [
+        (PULSES, &[0][..], 3),
+        (PULSES + 1, &[0], 3),
+        (PULSES + 1, &[0, 0], 3),
+        (PULSES, &[0, 0, 0], 3),
+        (PULSES, &[0, 1], 3),
+        (PULSES, &[1, 0], 3),
+        (PULSES, &[0, 0, 0, 1], 3),
+        (0x033E, &[0, 0, 0], 2),
+        (0x02FF, &[0, 0], 2),
+    ] {
+        assert_eq!(
+            bench.write(address, words),
+            Err(code),
+            "{address:#x} {words:?}"
+        );
+    }
+    assert_eq!(bench.write_single(6, PULSES, 0), Err(3), "half a counter");
+    assert_eq!(
+        counts(&mut bench),
+        full,
+        "a refused write changed something"
+    );
+    bench.write(PULSES + 2, &[0, 0]).unwrap();
+    assert_eq!(counts(&mut bench), [3, 0, 5, 6]);
+    bench.write(PULSES + 4, &[0; 4]).unwrap();
+    assert_eq!(counts(&mut bench), [3, 0, 0, 0]);
+    pulse(&mut bench, 2, settled, settled);
+    assert_eq!(counts(&mut bench), [3, 1, 0, 0]);
+    // Not kept over a power cycle, and not by the configuration's lock.
+    bench.power_cycle();
+    assert_eq!(counts(&mut bench), [0; 4]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_counter_is_read_as_one_snapshot_while_its_low_word_overflows() {
+    // At 115200, with pulses all the time: the 32 bits read never go backwards nor jump by a word.
+    let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 1152), (FILTER + SLOT, 0)]);
+    // 65 536 pulses take minutes; the counter is brought near its overflow by finding it in RAM.
+    for _ in 0..5 {
+        pulse(&mut bench, 1, 2_000, 2_000);
+    }
+    assert_eq!(counts(&mut bench)[0], 5);
+    let place = find_counter(&mut bench);
+    bench.board.ram_mut()[place..place + 4].copy_from_slice(&0x0000_FFF0_u32.to_le_bytes());
+    let mut last = bench.long(PULSES);
+    assert_eq!(last, 0xFFF0);
+    let mut energised = false;
+    let mut crossed = false;
+    for n in 0..400 {
+        energised = !energised;
+        bench.board.set_energised(1, energised).unwrap();
+        bench.board.run_for(Time::from_us(37 * (n % 27)));
+        let now = bench.long(PULSES);
+        assert!((last..=last + 2).contains(&now), "{last:#x} then {now:#x}");
+        crossed |= last < 0x1_0000 && now >= 0x1_0000;
+        last = now;
+    }
+    assert!(crossed, "it never overflowed: {last:#x}");
+}
+
+/// Where channel 1's counter is in RAM: the only word that follows its pulses.
+fn find_counter(bench: &mut Bench) -> usize {
+    let words = |bench: &Bench| -> Vec<u32> {
+        let words = bench.board.ram().chunks(4);
+        words
+            .map(|w| u32::from_le_bytes(w.try_into().unwrap()))
+            .collect()
+    };
+    let mut count = bench.long(PULSES);
+    let mut places: Vec<usize> = (0..words(bench).len()).collect();
+    for _ in 0..4 {
+        let now = words(bench);
+        places.retain(|place| now[*place] == count);
+        pulse(bench, 1, 2_000, 2_000);
+        count = bench.long(PULSES);
+    }
+    assert_eq!(places.len(), 1, "one word counts pulses: {places:?}");
+    places[0] * 4
+}

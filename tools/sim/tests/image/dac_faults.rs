@@ -1,0 +1,135 @@
+//! A DAC that is absent, or a bus that is held: exception 04 and a state to read, a line that does not
+//! wait for it, and recovery without help.
+
+use sim::{Module, Time, line::Direction, slot::BusFault};
+
+use crate::{analog_outputs::codes, bench::Bench};
+
+const SLOT: u16 = 0x10;
+const MODULE_STATE: u16 = 0x021C;
+const MODULE_FAULT: u16 = 4;
+/// A device is taken to be gone, or back, within this time: what a master may count on.
+const NOTICED: Time = Time::from_ms(500);
+
+const FAULTS: [BusFault; 3] = [
+    BusFault::Absent,
+    BusFault::HoldsScl,
+    BusFault::HoldsSda { clocks: None },
+];
+
+/// Every request to the points is 04, whether it reads or writes; the rest of the device goes on.
+fn assert_out(bench: &mut Bench, first: u16) {
+    for function in [3, 4] {
+        assert_eq!(bench.words(function, first, 1), Err(4));
+        assert_eq!(bench.words(function, SLOT, 4), Err(4));
+    }
+    assert_eq!(bench.write(SLOT + 2, &[1, 2]), Err(4));
+    assert_eq!(bench.write_single(6, SLOT + 3, 1), Err(4));
+    // Address and value come before the module's state.
+    assert_eq!(bench.registers(SLOT, 5), Err(2));
+    assert_eq!(bench.write_single(6, SLOT + 3, 4096), Err(3));
+    assert_eq!(bench.register(MODULE_STATE), 2);
+    assert!(bench.status(MODULE_FAULT));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn points_answer_04_and_come_back_by_themselves() {
+    for (module, channels) in [(Module::Ao4, [1, 4]), (Module::Ai2Ao2, [3, 4])] {
+        let first = SLOT + channels[0] as u16 - 1;
+        let mut bench = Bench::set_up(module, &[]);
+        for (n, fault) in (1..).zip(FAULTS) {
+            let commanded = [n * 100, n * 200];
+            bench.write_single(6, first, commanded[0]).unwrap();
+            bench.write_single(6, SLOT + 3, commanded[1]).unwrap();
+            bench.board.run_for(Time::from_ms(30));
+            bench.board.set_bus_fault(fault);
+            bench.board.run_for(NOTICED);
+            assert_out(&mut bench, first);
+            bench.board.run_for(Time::from_secs(2));
+            assert_out(&mut bench, first);
+            assert!(bench.board.leds().fault, "the fault LED says so");
+
+            bench.board.set_bus_fault(BusFault::None);
+            bench.board.run_for(NOTICED);
+            assert_eq!(bench.register(MODULE_STATE), 0, "{fault:?}");
+            assert!(!bench.status(MODULE_FAULT));
+            assert_eq!(bench.register(first), commanded[0]);
+            assert_eq!(
+                codes(&bench, channels),
+                commanded,
+                "a refused write was done"
+            );
+            bench.write_single(6, SLOT + 3, 17).unwrap();
+            bench.board.run_for(Time::from_ms(30));
+            assert_eq!(codes(&bench, [4]), [17]);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_device_that_lost_count_of_its_clocks_is_clocked_free() {
+    let mut bench = Bench::set_up(Module::Ao4, &[]);
+    bench
+        .board
+        .set_bus_fault(BusFault::HoldsSda { clocks: Some(7) });
+    bench.write(SLOT, &[10, 20, 30, 40]).unwrap();
+    bench.board.run_for(NOTICED);
+    assert_eq!(bench.board.slot().bus_fault(), BusFault::None, "it let go");
+    assert_eq!(bench.registers(SLOT, 4), Ok(vec![10, 20, 30, 40]));
+    assert_eq!(codes(&bench, [1, 2, 3, 4]), [10, 20, 30, 40]);
+    assert_eq!(bench.register(MODULE_STATE), 0);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_line_never_waits_for_the_bus() {
+    let mut bench = Bench::set_up(Module::Ao4, &[]);
+    for fault in FAULTS {
+        bench.board.set_bus_fault(fault);
+        let mut asked = 0;
+        let from = bench.board.now();
+        while bench.board.now() < from + Time::from_secs(2) {
+            // Registers that have nothing to do with the module, and points that have.
+            let good = bench.registers(0x0200, 2).is_ok();
+            assert!(good);
+            asked += 1;
+            assert_in_time(&mut bench);
+            let _ = bench.write_single(6, SLOT, asked);
+            assert_in_time(&mut bench);
+            bench
+                .board
+                .run_for(Time::from_us(u64::from(asked % 7) * 130));
+        }
+        assert!(asked > 20);
+        bench.board.set_bus_fault(BusFault::None);
+        bench.board.run_for(NOTICED);
+    }
+}
+
+fn assert_in_time(bench: &mut Bench) {
+    let due = bench.sent + bench.t35();
+    let line = bench.board.line();
+    let reply = line.frames().next_back().expect("a reply");
+    assert_eq!(reply.direction, Direction::FromUnit);
+    let late = reply.start - due;
+    assert!(late <= Time::from_us(60), "{late:?} after t3.5");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_device_without_its_dac_starts_and_finds_it_later() {
+    let mut bench = Bench::set_up(Module::Ao4, &[(0x01F0, 1000), (0x01F3, 4000)]);
+    for fault in FAULTS {
+        bench.board.power_off();
+        bench.board.set_bus_fault(fault);
+        bench.board.power_on();
+        bench.started();
+        assert_eq!(bench.registers(SLOT, 4), Err(4), "{fault:?}");
+        bench.board.set_bus_fault(BusFault::None);
+        bench.board.run_for(NOTICED);
+        assert_eq!(bench.registers(SLOT, 4), Ok(vec![1000, 0, 0, 4000]));
+        assert_eq!(codes(&bench, [1, 2, 3, 4]), [1000, 0, 0, 4000], "START");
+    }
+}

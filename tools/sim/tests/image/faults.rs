@@ -1,0 +1,132 @@
+//! Faults of the core: outputs safe at once, a record of where it was, and a restart.
+
+use sim::{Channel, Module, Time};
+
+use crate::bench::{Bench, adu};
+
+const HARD_FAULT: u16 = 2;
+const STACK_OVERFLOW: u16 = 5;
+
+/// `udf #0`
+const UNDEFINED: &[u16] = &[0xDE00];
+/// `movs r0, #0; ldr r0, [r0]` would read the vector table; this reads 0xFFFFFFF0, where nothing is:
+/// `movs r0, #15; mvns r0, r0; ldr r0, [r0]`.
+const WILD_READ: &[u16] = &[0x200F, 0x43C0, 0x6800];
+/// `push {r0-r7, lr}; b .-2`: until the stack is at its end.
+const RECURSION: &[u16] = &[0xB5FF, 0xE7FD];
+
+const HANDLERS: [&str; 5] = ["USART1", "TIM2", "EXTI3", "TIM4", "EXTI0"];
+
+fn bench() -> Bench {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    bench.tolerant = true;
+    bench
+}
+
+/// Puts `code` in the place of a handler until the device has reset itself because of it.
+fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
+    bench.write_bits(0x10, &[true; 4]).unwrap();
+    let before = bench.board.resets();
+    bench.board.watch_pin('A', 3);
+    let address = bench.board.symbol(handler).expect("a handler") & !1;
+    let at = (address - 0x0800_0000) as usize;
+    let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+    let was = bench.board.flash()[at..at + bytes.len()].to_vec();
+    bench.board.patch_code(address, &bytes).unwrap();
+    let from = bench.board.now();
+    bench.board.line().send(from, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    let called = bench.board.run_until_pc(address, from + Time::from_ms(120));
+    assert!(called, "{handler} runs");
+    let called = bench.board.now();
+    while bench.board.resets() == before {
+        bench.board.run_for(Time::from_us(20));
+        assert!(!bench.board.locked_up(), "{handler}: locked up");
+        assert!(
+            bench.board.now() < called + Time::from_ms(5),
+            "{handler}: no reset"
+        );
+    }
+    let edges = bench.board.pin_edges('A', 3);
+    let &[.., (off, false)] = edges else {
+        panic!("{handler}: the output went off: {edges:?}");
+    };
+    let after = off - called;
+    assert!(
+        after < Time::from_ms(1),
+        "{handler}: off {after:?} after the fault"
+    );
+    for channel in 1..=4 {
+        assert_eq!(bench.board.channel(channel), Channel::Do { on: false });
+    }
+    bench.board.patch_code(address, &was).unwrap();
+    bench.started();
+    assert_eq!(bench.board.resets(), before + 1);
+    assert_eq!(
+        bench.register(0x0207) & 8,
+        8,
+        "{handler}: reset by software"
+    );
+    address
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_instruction_that_is_none_is_recorded_with_its_place() {
+    let mut bench = bench();
+    for (count, handler) in (1..).zip(HANDLERS) {
+        let address = fault_in(&mut bench, handler, UNDEFINED);
+        assert_eq!(bench.register(0x0260), HARD_FAULT, "{handler}");
+        assert_eq!(bench.register(0x0261), count, "{handler}");
+        assert_eq!(
+            bench.long(0x0262),
+            address,
+            "{handler}: the program counter"
+        );
+        assert_eq!(
+            bench.long(0x0266) >> 16 & 1,
+            1,
+            "{handler}: CFSR says UNDEFINSTR"
+        );
+        assert_eq!(bench.long(0x0268), 0, "no address failed");
+        assert_eq!(bench.register(0x026C), 0, "no watchdog");
+    }
+    let log = bench.board.take_log();
+    assert!(log.contains("hard fault"), "{log}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn an_access_to_nothing_is_recorded_with_its_address() {
+    let mut bench = bench();
+    let address = fault_in(&mut bench, "TIM4", WILD_READ);
+    assert_eq!(bench.register(0x0260), HARD_FAULT);
+    assert_eq!(bench.long(0x0262), address + 4);
+    assert_eq!(bench.long(0x0266) >> 8 & 0x82, 0x82, "PRECISERR, BFARVALID");
+    assert_eq!(bench.long(0x0268), 0xFFFF_FFF0);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_stack_that_overflows_harms_nothing_and_is_recorded_as_that() {
+    let mut bench = bench();
+    for handler in HANDLERS {
+        fault_in(&mut bench, handler, RECURSION);
+        assert_eq!(bench.register(0x0260), STACK_OVERFLOW, "{handler}");
+        assert_eq!(bench.write_bits(0x10, &[true; 4]), Ok(()));
+    }
+    assert_eq!(bench.register(0x0261), HANDLERS.len() as u16);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn there_is_stack_to_spare_after_all_kinds_of_work() {
+    let mut bench = Bench::set_up(Module::Ai2Ao2, &[]);
+    for address in (0x0100..0x0340).step_by(16) {
+        let _ = bench.registers(address, 16);
+    }
+    bench.configure(0x0120, &[7; 30]);
+    bench.save();
+    bench.board.run_for(Time::from_ms(50));
+    let free = bench.register(0x020B);
+    assert!((1024..20 * 1024).contains(&free), "{free} bytes");
+}

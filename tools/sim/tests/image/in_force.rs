@@ -1,0 +1,168 @@
+//! When a setting counts: "restart" ones after the next start, "now" ones at once.
+
+use register_map::codes::Baud;
+use sim::{Module, Time, line::Settings};
+
+use crate::bench::{Bench, adu, format};
+
+const BAUD: u16 = 0x0101;
+const RESPONSE_DELAY: u16 = 0x0105;
+const FRAME_GAP: u16 = 0x0106;
+const STRICT_T15: u16 = 0x0107;
+
+/// How long after the request's end the reply to a read begins.
+fn turnaround(bench: &mut Bench) -> Time {
+    bench.bits(1, 0x10, 4).unwrap();
+    let sent = bench.sent;
+    let line = bench.board.line();
+    line.frames().next_back().expect("a reply").start - sent
+}
+
+/// `at` is `due` or up to `slack` later.
+fn assert_at(at: Time, due: Time, slack: Time) {
+    assert!(at >= due && at <= due + slack, "{at:?}, due at {due:?}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.tolerant = true;
+    let mut before = Settings::default();
+    // Every rate, and every format with several of them.
+    for (n, baud) in (1..).zip(Baud::ALL.iter().chain([&Baud::B115200, &Baud::B9600])) {
+        let code = n % 4;
+        let settings = Settings {
+            baud: baud.bits_per_second(),
+            format: format(code),
+        };
+        bench.configure(BAUD, &[baud.code(), code]);
+        assert_eq!(bench.registers(BAUD, 2), Ok(vec![baud.code(), code]));
+        bench.save();
+        assert_eq!(bench.bits(1, 0x10, 4), Ok(vec![false; 4]), "still the old");
+        assert_eq!(bench.status(16), settings != before, "waits for a restart");
+
+        // The response to the restart goes out under the old settings: `restart` checks it.
+        bench.restart();
+        if settings != before {
+            // The old master is not understood, nor spoken to.
+            let heard = bench.exchange(&adu(&[1, 1, 0, 0x10, 0, 4]));
+            assert_eq!(heard, [], "{settings:?}");
+            bench.board.run_for(Time::from_ms(50));
+        }
+        bench.settings(settings);
+        // 3.5 characters of the format's own length; 1750 us above 19200 bit/s.
+        let bits = u64::from(settings.format.bits());
+        let half_characters = settings.rate().bits(bits * 7).as_ps() / 2;
+        let t35 = if settings.baud > 19_200 {
+            bench.t35()
+        } else {
+            Time::from_ps(half_characters)
+        };
+        assert_at(turnaround(&mut bench), t35, Time::from_us(60));
+        for _ in 0..10 {
+            assert_eq!(
+                bench.registers(0x0100, 9).unwrap()[1..3],
+                [baud.code(), code]
+            );
+        }
+        bench.write(0x0330, &[0; 8]).unwrap();
+        before = settings;
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_921600_and_115200_a_thousand_of_the_longest_requests_lose_nothing() {
+    for baud in [1152, 9216] {
+        let mut bench = Bench::set_up(Module::Di4, &[(BAUD, baud)]);
+        bench.unlock();
+        for n in 0..500 {
+            let values: Vec<u16> = (0..32).map(|i| (n + i) % 1001).collect();
+            bench.write(0x0120, &values).unwrap();
+            assert_eq!(bench.registers(0x0120, 32), Ok(values));
+        }
+        assert_eq!(bench.register(0x0237), 0, "no overrun");
+        assert_eq!(bench.register(0x0231), 0, "no error");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_response_delay_counts_at_once() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    for ms in [10, 1, 250, 1000, 0] {
+        bench.patience = Time::from_ms(1_002);
+        bench.configure(RESPONSE_DELAY, &[ms]);
+        let due = bench.t35() + Time::from_ms(ms.into());
+        let slack = if ms == 0 {
+            Time::from_us(60)
+        } else {
+            Time::from_ms(2)
+        };
+        assert_at(turnaround(&mut bench), due, slack);
+    }
+}
+
+/// Sends a read with a pause of `gap` in its middle; whether it is answered.
+fn answered_with_gap(bench: &mut Bench, gap: Time) -> bool {
+    let frame = adu(&[1, 1, 0, 0x10, 0, 4]);
+    let now = bench.board.now();
+    let end = bench.board.line().send(now, &frame[..4]);
+    let end = bench.board.line().send(end + gap, &frame[4..]);
+    // The longest gap tried here is 10 ms.
+    bench.board.run_until(end + Time::from_ms(12));
+    !bench.answer_after(end).is_empty()
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_longer_frame_gap_counts_after_the_restart() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.tolerant = true;
+    bench.configure(FRAME_GAP, &[100]);
+    bench.save();
+    assert_at(turnaround(&mut bench), bench.t35(), Time::from_us(60));
+    assert!(!answered_with_gap(&mut bench, Time::from_ms(6)));
+    bench.restart();
+    assert!(answered_with_gap(&mut bench, Time::from_ms(6)));
+    assert!(answered_with_gap(&mut bench, Time::from_us(9_500)));
+    assert!(!answered_with_gap(&mut bench, Time::from_us(10_500)));
+    let now = bench.board.now();
+    let end = bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    bench.board.run_until(end + Time::from_ms(11));
+    assert!(!bench.answer_after(end).is_empty());
+    let start = bench.board.line().frames().next_back().unwrap().start - end;
+    assert_at(start, Time::from_ms(10), Time::from_us(60));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_shorter_frame_gap_counts_after_the_restart() {
+    let mut bench = Bench::set_up(Module::Di4, &[(FRAME_GAP, 20)]);
+    // 2 ms at 9600: less than two characters.
+    assert_at(turnaround(&mut bench), Time::from_ms(2), Time::from_us(60));
+    assert!(answered_with_gap(&mut bench, Time::from_us(1_800)));
+    assert!(!answered_with_gap(&mut bench, Time::from_us(2_300)));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn gaps_above_t15_are_counted_or_cost_the_frame() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.tolerant = true;
+    // Of silence: a character, and nearly two and a half.
+    let (within, between) = (bench.characters(1), bench.bit() * 27);
+    assert!(answered_with_gap(&mut bench, within));
+    assert_eq!(bench.register(0x0238), 0);
+    assert!(answered_with_gap(&mut bench, between));
+    assert_eq!(bench.register(0x0238), 1, "counted");
+    bench.configure(STRICT_T15, &[1]);
+    bench.save();
+    assert!(answered_with_gap(&mut bench, between), "not yet");
+    bench.restart();
+    assert!(answered_with_gap(&mut bench, within));
+    assert!(!answered_with_gap(&mut bench, between), "dropped");
+    bench.assert_answers(1);
+    assert_eq!(bench.register(0x0238), 1, "counted as well");
+}

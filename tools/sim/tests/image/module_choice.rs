@@ -1,0 +1,129 @@
+//! MODULE: another module needs a setting and a restart, and no other firmware.
+
+use register_map::configuration::{FILTER, MODULE_SLOT, RANGE, SAFE, SCALE, START};
+use sim::{Module, Time};
+
+use crate::bench::Bench;
+
+const SLOT: u16 = 0x10;
+
+/// What the points of a module answer to a read of bits and of words.
+fn assert_points(bench: &mut Bench, module: Module) {
+    let [bits, words] = match module {
+        Module::None => [false, false],
+        Module::Di4 | Module::Do4 | Module::Relay2 => [true, false],
+        Module::Ai4 | Module::Ao4 | Module::Ai2Ao2 => [false, true],
+    };
+    assert_eq!(bench.bits(1, SLOT, 4).is_ok(), bits, "{module:?}");
+    assert_eq!(bench.registers(SLOT, 4).is_ok(), words, "{module:?}");
+    let mut in_force = [0; 8];
+    in_force[4] = module.code();
+    assert_eq!(bench.registers(0x0210, 8), Ok(in_force.to_vec()));
+    let mut state = [1; 8];
+    state[4] = u16::from(module == Module::None);
+    assert_eq!(bench.registers(0x0218, 8), Ok(state.to_vec()), "{module:?}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn every_module_can_follow_every_other() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    // An Euler tour through all ordered pairs: each step leads from one module to another.
+    let mut last = Module::Di4;
+    let mut pairs: Vec<(Module, Module)> = Module::ALL
+        .iter()
+        .flat_map(|from| Module::ALL.iter().map(move |to| (*from, *to)))
+        .filter(|(from, to)| from != to)
+        .collect();
+    let mut steps = 0;
+    while !pairs.is_empty() {
+        // Hierholzer's choice is not needed: what is left over is reached by a step that repeats.
+        let next = pairs.iter().position(|(from, _)| *from == last);
+        let (_, module) = next.map_or((last, pairs[0].0), |at| pairs.remove(at));
+        bench.configure(MODULE_SLOT, &[module.code()]);
+        assert_eq!(
+            bench.register(0x0214),
+            last.code(),
+            "in force after the restart"
+        );
+        assert_points(&mut bench, last);
+        bench.save();
+        assert!(bench.status(16), "waits for a restart");
+        bench.board.power_off();
+        bench.board.set_module(module).unwrap();
+        bench.board.power_on();
+        bench.started();
+        assert_points(&mut bench, module);
+        assert!(!bench.status(16 | 8 | 2));
+        last = module;
+        steps += 1;
+    }
+    assert!((42..60).contains(&steps), "{steps}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn only_the_slot_s_port_takes_a_module() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.unlock();
+    for port in (1..=8).filter(|port| *port != 5) {
+        let address = 0x0110 + port - 1;
+        assert_eq!(bench.write(address, &[1]), Err(3), "port {port}");
+        assert_eq!(bench.write(address, &[0]), Ok(()), "port {port}");
+    }
+    assert_eq!(bench.write(MODULE_SLOT, &[7]), Err(3));
+    assert_eq!(
+        bench.write(0x0110, &[0, 0, 0, 0, 2, 0, 0, 1]),
+        Err(3),
+        "all or nothing"
+    );
+    assert_eq!(bench.register(MODULE_SLOT), 1);
+    assert_eq!(bench.write(0x0110, &[0, 0, 0, 0, 2, 0, 0, 0]), Ok(()));
+    assert_eq!(bench.register(MODULE_SLOT), 2);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn settings_made_for_one_module_switch_nothing_on_at_another() {
+    let mut bench = Bench::set_up(Module::Ao4, &[]);
+    for (first, value) in [
+        (FILTER, 900),
+        (RANGE, 1),
+        (SCALE, 1),
+        (SAFE, 4095),
+        (START, 4095),
+    ] {
+        bench.configure(first + SLOT, &[value; 4]);
+    }
+    bench.configure(MODULE_SLOT, &[Module::Do4.code()]);
+    for (first, default) in [(FILTER, 5), (RANGE, 0), (SCALE, 0), (SAFE, 0), (START, 0)] {
+        assert_eq!(
+            bench.registers(first + SLOT, 4),
+            Ok(vec![default; 4]),
+            "{first:#x}"
+        );
+    }
+    // And takes the values of the new one from now on.
+    assert_eq!(bench.write(START + SLOT, &[2]), Err(3));
+    bench.write(START + SLOT, &[1, 0, 0, 1]).unwrap();
+    bench.save();
+    bench.board.power_off();
+    bench.board.set_module(Module::Do4).unwrap();
+    bench.board.power_on();
+    bench.started();
+    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true, false, false, true]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn settings_for_the_next_module_do_not_disturb_the_one_in_force() {
+    // A running 4DO, told that a 4AO comes next, with a SAFE no bit has.
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
+    bench.configure(MODULE_SLOT, &[Module::Ao4.code()]);
+    bench.write(SAFE + SLOT, &[4095; 4]).unwrap();
+    bench.write(0x0104, &[1]).unwrap();
+    bench.board.run_for(Time::from_ms(200));
+    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]), "SAFE's default");
+    assert_eq!(bench.write_bits(SLOT, &[true; 4]), Ok(()));
+}

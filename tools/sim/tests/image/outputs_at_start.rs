@@ -1,0 +1,147 @@
+//! Outputs from reset to the first scan: off, then START, with nothing in between, whatever the reset.
+
+use register_map::configuration::START;
+use sim::{Module, Time};
+
+use crate::{analog_outputs::codes, bench::Bench};
+
+const SLOT: u16 = 0x10;
+/// From reset to outputs that stand at START: what a plant may count on.
+const SOON: Time = Time::from_ms(50);
+
+fn stored(values: [u16; 4]) -> Vec<(u16, u16)> {
+    (0..)
+        .zip(values)
+        .map(|(n, v)| (START + SLOT + n, v))
+        .collect()
+}
+
+/// How a start comes about, and what it is called.
+type Begin = fn(&mut Bench);
+
+const BEGINNINGS: [(&str, Begin); 4] = [
+    ("power-on", |bench| bench.board.cycle()),
+    ("the reset pin", |bench| bench.board.reset()),
+    ("COMMAND 2", |bench| {
+        bench.command(2);
+    }),
+    ("the watchdog", |bench| {
+        // The scan's handler: a branch to itself.
+        let scan = bench.board.symbol("TIM4").expect("the handler") & !1;
+        let at = (scan - 0x0800_0000) as usize;
+        let was = bench.board.flash()[at..at + 2].to_vec();
+        bench
+            .board
+            .patch_code(scan, &0xE7FEu16.to_le_bytes())
+            .unwrap();
+        let resets = bench.board.resets();
+        while bench.board.resets() == resets {
+            bench.board.run_for(Time::from_us(100));
+        }
+        bench.board.patch_code(scan, &was).unwrap();
+    }),
+];
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn digital_outputs_are_off_and_then_at_start_without_a_click() {
+    let mut bench = Bench::set_up(Module::Do4, &stored([1, 0, 1, 0]));
+    bench.tolerant = true;
+    for (what, begin) in BEGINNINGS {
+        // Before it, each output is what START is not.
+        bench.write_bits(SLOT, &[false, true, false, true]).unwrap();
+        (0..4).for_each(|pin| bench.board.watch_pin('A', pin));
+        let from = bench.board.now();
+        begin(&mut bench);
+        bench.started();
+        for pin in 0..4 {
+            let edges: Vec<_> = bench
+                .board
+                .pin_edges('A', pin)
+                .iter()
+                .filter(|e| e.0 >= from)
+                .collect();
+            match (pin % 2, &edges[..]) {
+                (0, [(_, true)]) | (1, [(_, false)]) => {}
+                _ => panic!("{what}, pin {pin}: {edges:?}"),
+            }
+        }
+        // The two that went off did so at the reset; START came soon after.
+        let off = bench.board.pin_edges('A', 1).last().unwrap().0;
+        let on = bench.board.pin_edges('A', 0).last().unwrap().0;
+        let cut = if what == "power-on" {
+            Time::from_ms(100)
+        } else {
+            Time::ZERO
+        };
+        let after = on - off - cut;
+        assert!(after <= SOON, "{what}: START {after:?} after the reset");
+        assert_eq!(
+            bench.bits(1, SLOT, 4),
+            Ok(vec![true, false, true, false]),
+            "{what}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn relays_do_not_click_at_power_on() {
+    let mut bench = Bench::set_up(Module::Relay2, &[]);
+    bench.tolerant = true;
+    for (what, begin) in BEGINNINGS {
+        (0..4).for_each(|pin| bench.board.watch_pin('A', pin));
+        begin(&mut bench);
+        bench.started();
+        for pin in 2..4 {
+            assert_eq!(bench.board.pin_edges('A', pin), [], "{what}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn analog_outputs_go_from_what_the_dac_had_straight_to_start() {
+    let start = [100, 4095, 0, 2048];
+    let mut bench = Bench::set_up(Module::Ao4, &stored(start));
+    bench.tolerant = true;
+    for (what, begin) in BEGINNINGS {
+        bench.write(SLOT, &[4000, 3000, 2000, 1000]).unwrap();
+        bench.board.run_for(Time::from_ms(30));
+        begin(&mut bench);
+        let before = codes(&bench, [1, 2, 3, 4]);
+        let from = bench.board.now();
+        while codes(&bench, [1, 2, 3, 4]) != start {
+            bench.board.run_for(Time::from_us(100));
+            let now = codes(&bench, [1, 2, 3, 4]);
+            let known = (0..4).all(|n| now[n] == before[n] || now[n] == start[n]);
+            // COMMAND 2 restarts some milliseconds after its response.
+            assert!(known, "{what}: {now:?}");
+            assert!(
+                bench.board.now() - from < Time::from_ms(100),
+                "{what}: {now:?}"
+            );
+        }
+        bench.started();
+        assert_eq!(bench.registers(SLOT, 4), Ok(start.to_vec()), "{what}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn start_counts_from_the_next_start_and_only_when_saved() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    bench.tolerant = true;
+    bench.configure(START + SLOT, &[1, 1, 0, 1]);
+    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]), "not now");
+    bench.power_cycle();
+    assert_eq!(
+        bench.bits(1, SLOT, 4),
+        Ok(vec![false; 4]),
+        "it was not saved"
+    );
+    bench.configure(START + SLOT, &[1, 1, 0, 1]);
+    bench.save();
+    bench.power_cycle();
+    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true, true, false, true]));
+}

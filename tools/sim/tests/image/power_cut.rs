@@ -1,0 +1,260 @@
+//! Power cuts: at every single flash operation of a save and of the start after it, and at any instant
+//! under traffic. The configuration is the old or the new one, whole, and the device lives on.
+
+use fastrand::Rng;
+use register_map::record::{PAGE_ADDRESSES, PAGE_SIZE};
+use sim::{Channel, Module, Time, periph::flash::Torn};
+
+use crate::bench::{Bench, adu};
+
+const FILTER: u16 = 0x0130;
+const INVALID: u16 = 2;
+/// How far an operation is when the power goes.
+const FRACTIONS: [f64; 3] = [0.0, 0.5, 1.0];
+/// The half-words of the record these tests save: head, six pairs, CRC.
+const HALF_WORDS: u64 = 19;
+
+fn bench() -> Bench {
+    let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 1152)]);
+    bench.tolerant = true;
+    bench
+}
+
+/// Four settings that no other round has.
+fn set(round: u16) -> [u16; 4] {
+    [0, 1, 2, 3].map(|n| 10 + (round * 4 + n) % 900)
+}
+
+/// Saves these settings; the lock is open. A save takes 2 ms, one that has to erase 30 more.
+fn save(bench: &mut Bench, values: [u16; 4]) {
+    bench.write(FILTER, &values).unwrap();
+    bench.write(0x0108, &[1]).unwrap();
+    while bench.status(8) {
+        bench.board.run_for(Time::from_ms(5));
+    }
+}
+
+/// Erased bytes at the end of each of the store's pages.
+fn rooms(bench: &Bench) -> [usize; 2] {
+    let flash = bench.board.flash();
+    [0xF800, 0xFC00].map(|page| {
+        let bytes = flash[page..page + PAGE_SIZE].iter().rev();
+        bytes.take_while(|byte| **byte == 0xFF).count()
+    })
+}
+
+/// Which of two sets is stored after a cut, and that all else is as it should be.
+fn after_cut(bench: &mut Bench, sets: [[u16; 4]; 2], what: &str) -> usize {
+    bench.board.power_on();
+    bench.started();
+    let values = bench.registers(FILTER, 4).unwrap();
+    let place = sets.iter().position(|set| set[..] == values);
+    assert!(!bench.status(INVALID), "{what}: the store is not damaged");
+    assert_eq!(bench.registers(0x0101, 2), Ok(vec![1152, 0]), "{what}");
+    assert_eq!(bench.register(0x0214), 1, "{what}");
+    place.unwrap_or_else(|| panic!("{what}: {values:?} is neither of {sets:?}"))
+}
+
+/// Cuts the power in every operation of a save. `prepare` brings the store to where that save is to
+/// find it. The number of operations the save has.
+fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u64 {
+    let mut bench = bench();
+    let mut round = 0;
+    let mut seen = [0, 0];
+    for operation in 1.. {
+        for fraction in FRACTIONS {
+            round += 1;
+            bench.unlock();
+            save(&mut bench, set(round));
+            prepare(&mut bench, &mut round);
+            let sets = [set(round), set(round + 1)];
+            round += 1;
+            bench.configure(FILTER, &sets[1]);
+            bench.board.cut_in_flash_operation(operation, fraction);
+            bench.write(0x0108, &[1]).unwrap();
+            bench.board.run_for(Time::from_ms(100));
+            if bench.board.powered() {
+                assert!(seen[0] > 0 && seen[1] > 0, "{what}: {seen:?}");
+                return operation - 1;
+            }
+            let what = format!("{what}, operation {operation}, {fraction} of it");
+            seen[after_cut(&mut bench, sets, &what)] += 1;
+        }
+    }
+    unreachable!()
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_operation_of_a_save_behind_the_last_record() {
+    let operations = every_cut_of_a_save(|_, _| {}, "behind the last");
+    assert_eq!(operations, HALF_WORDS, "half-words of the record alone");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_operation_of_a_save_that_changes_pages() {
+    let fill = |bench: &mut Bench, round: &mut u16| {
+        // Both pages have something, or a mark; the one with more is in use.
+        while rooms(bench).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
+            *round += 1;
+            save(bench, set(*round));
+        }
+        assert!(
+            rooms(bench).iter().max() >= Some(&1000),
+            "{:?}",
+            rooms(bench)
+        );
+    };
+    let operations = every_cut_of_a_save(fill, "onto the other page");
+    assert_eq!(operations, HALF_WORDS, "it finds the other page erased");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_operation_of_a_save_that_has_to_erase() {
+    let fill = |bench: &mut Bench, round: &mut u16| {
+        while rooms(bench).iter().max() >= Some(&(HALF_WORDS as usize * 2)) {
+            *round += 1;
+            save(bench, set(*round));
+        }
+    };
+    let operations = every_cut_of_a_save(fill, "with an erase");
+    assert_eq!(operations, HALF_WORDS + 3, "mark destroyed, erase, mark");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_operation_of_the_start_that_makes_room_again() {
+    let mut bench = bench();
+    let mut round = 0;
+    for torn in [Torn::Mess, Torn::Before, Torn::After] {
+        bench.board.set_torn(torn);
+        'cuts: for operation in 1.. {
+            for fraction in FRACTIONS {
+                round += 2;
+                bench.unlock();
+                save(&mut bench, set(round));
+                bench.configure(FILTER, &set(round + 1));
+                // A record cut in two: the next start moves the one before it to the other page.
+                bench.board.cut_in_flash_operation(HALF_WORDS / 2, 0.5);
+                bench.write(0x0108, &[1]).unwrap();
+                bench.board.run_for(Time::from_ms(60));
+                assert!(!bench.board.powered());
+
+                bench.board.cut_in_flash_operation(operation, fraction);
+                bench.board.power_on();
+                bench.board.run_for(Time::from_ms(300));
+                let done = bench.board.powered();
+                bench.board.power_off();
+                let what = format!("{torn:?}, operation {operation}, {fraction} of it");
+                let sets = [set(round); 2];
+                after_cut(&mut bench, sets, &what);
+                if done {
+                    let least = HALF_WORDS + 2;
+                    assert!(operation > least, "only {operation} operations");
+                    break 'cuts;
+                }
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_operation_of_the_very_first_start() {
+    let mut bench = Bench::with(sim::Config::default());
+    bench.tolerant = true;
+    for operation in 1.. {
+        for fraction in FRACTIONS {
+            bench.board.power_off();
+            let [first, _] = PAGE_ADDRESSES;
+            bench
+                .board
+                .patch_code(first, &[0xFF; 2 * PAGE_SIZE])
+                .unwrap();
+            bench.board.cut_in_flash_operation(operation, fraction);
+            bench.board.power_on();
+            bench.board.run_for(Time::from_ms(300));
+            if bench.board.powered() {
+                assert!(
+                    operation > 8,
+                    "a mark and a record are more than {operation}"
+                );
+                return;
+            }
+            bench.board.power_on();
+            bench.started();
+            assert!(
+                !bench.status(INVALID),
+                "nothing was stored: operation {operation}"
+            );
+            assert_eq!(bench.register(0x0101), 96);
+            // What is saved now is there to stay.
+            bench.unlock();
+            save(&mut bench, set(1));
+            bench.power_cycle();
+            assert_eq!(bench.registers(FILTER, 4), Ok(set(1).to_vec()));
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_instant_under_traffic_and_it_answers_again() {
+    let mut rng = Rng::with_seed(0x6D6F_6469_6F03);
+    let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152)]);
+    bench.tolerant = true;
+    let mut stored = [0u16; 4];
+    let mut saves = 0;
+    for round in 0..150 {
+        // What may have come to be stored by the end of this round.
+        let mut candidates = vec![stored];
+        let cut = bench.board.now() + Time::from_us(rng.u64(1_000..150_000));
+        bench.unlock();
+        while bench.board.now() < cut {
+            let settings = [0; 4].map(|_| rng.u16(0..2));
+            let words: Vec<u8> = settings
+                .iter()
+                .flat_map(|word| word.to_be_bytes())
+                .collect();
+            let save = rng.bool();
+            let requests: &[Vec<u8>] = &[
+                [&[1, 15, 0, 0x10, 0, 4, 1], &[rng.u8(0..16)][..]].concat(),
+                [&[1, 16, 1, 0xF0, 0, 4, 8], &words[..]].concat(),
+                if save {
+                    vec![1, 6, 1, 8, 0, 1]
+                } else {
+                    vec![1, 1, 0, 0x10, 0, 4]
+                },
+                vec![1, 3, 1, 0xE0, 0, 32],
+            ];
+            if save {
+                candidates.push(settings);
+                saves += 1;
+            }
+            for request in requests {
+                let now = bench.board.now();
+                let end = bench.board.line().send(now, &adu(request));
+                bench.board.run_until(cut.min(end + Time::from_ms(4)));
+                bench.board.line().take_received();
+            }
+        }
+        bench.board.power_off();
+        for channel in 1..=4 {
+            assert_eq!(bench.board.channel(channel), Channel::Do { on: false });
+        }
+        bench.board.run_for(Time::from_us(rng.u64(1..50_000)));
+        bench.board.power_on();
+        bench.started();
+        let start = bench.registers(0x01F0, 4).unwrap();
+        let known = candidates.iter().find(|set| set[..] == start);
+        stored =
+            *known.unwrap_or_else(|| panic!("round {round}: {start:?}, not of {candidates:?}"));
+        let on: Vec<bool> = stored.iter().map(|value| *value != 0).collect();
+        assert_eq!(bench.bits(1, 0x10, 4), Ok(on), "round {round}: START");
+        assert!(!bench.status(INVALID), "round {round}");
+        assert!(!bench.board.locked_up());
+    }
+    assert!(saves > 100, "only {saves} saves");
+}

@@ -1,0 +1,145 @@
+//! Every configuration register takes the ends of its range and refuses what is just beyond.
+//!
+//! Driven by the register map's rules, which firmware and documentation share; that those are the
+//! contract's is for `register-map`'s own tests.
+
+use register_map::{
+    Module, Rule, Values,
+    configuration::{COMMAND, KEY, LORA, MODE, MODULE_SLOT, RESPONSE_DELAY, RULES, point_of},
+    points::{PointKind, SLOT_FIRST},
+};
+use sim::Time;
+
+use crate::bench::Bench;
+
+/// Allowed by the map, but refused as a value until the firmware can do it: ASCII mode, the LoRa line.
+const NOT_YET: [(u16, u16); 2] = [(MODE, 1), (LORA, 1)];
+
+/// The values at the ends of a set, and those just outside.
+fn ends(values: Values) -> (Vec<u16>, Vec<u16>) {
+    let inside: Vec<u16> = match values {
+        Values::Range { min, max } => vec![min, max],
+        Values::RangeOr { also, min, max } => vec![also, min, max],
+        Values::OneOf(set) => set.to_vec(),
+    };
+    let beside = inside
+        .iter()
+        .flat_map(|v| [v.checked_sub(1), v.checked_add(1)]);
+    let outside = beside.flatten().chain([0x7FFF, 0xFFFF]);
+    let outside = outside.filter(|value| !values.allow(*value)).collect();
+    (inside, outside)
+}
+
+/// The registers of a rule to try: all of a few, the first, the slot's and the last of those by point.
+fn some(rule: &Rule) -> Vec<u16> {
+    let slot = rule.first + SLOT_FIRST;
+    match point_of(rule.first) {
+        Some(_) => vec![
+            rule.first,
+            slot,
+            slot + 1,
+            slot + 2,
+            slot + 3,
+            rule.end() - 1,
+        ],
+        None => rule.addresses().collect(),
+    }
+}
+
+fn try_every_register(module: Module) {
+    let mut bench = Bench::set_up(module, &[(0x0101, 1152)]);
+    let mut tried = 0;
+    for rule in RULES
+        .iter()
+        .filter(|rule| ![KEY, COMMAND].contains(&rule.first))
+    {
+        for address in some(rule) {
+            // MODULE itself is for `module_choice`: it changes what others take.
+            if address == MODULE_SLOT {
+                continue;
+            }
+            let kind = point_of(address)
+                .and_then(|point| point.checked_sub(SLOT_FIRST))
+                .and_then(|channel| module.points().get(usize::from(channel)).copied())
+                .unwrap_or(PointKind::None);
+            let (inside, outside) = ends(rule.values_for(kind));
+            let stored = bench.register(address);
+            bench.unlock();
+            // What it says of itself counts at once.
+            let delayed = address == RESPONSE_DELAY;
+            bench.patience = Time::from_ms(if delayed { 1_002 } else { 0 });
+            for value in inside {
+                let expected = if NOT_YET.contains(&(address, value)) {
+                    Err(3)
+                } else {
+                    Ok(())
+                };
+                let written = bench.write_single(6, address, value);
+                assert_eq!(written, expected, "{address:#06x} <- {value}");
+                if expected.is_ok() {
+                    assert_eq!(bench.register(address), value, "{address:#06x}");
+                }
+                tried += 1;
+            }
+            let before = bench.register(address);
+            for value in outside {
+                assert_eq!(
+                    bench.write_single(6, address, value),
+                    Err(3),
+                    "{address:#06x} <- {value}"
+                );
+                assert_eq!(
+                    bench.write(address, &[value]),
+                    Err(3),
+                    "{address:#06x} <- {value}"
+                );
+            }
+            assert_eq!(bench.register(address), before, "{address:#06x}");
+            bench.write_single(6, address, stored).unwrap();
+        }
+    }
+    assert!(tried > 100, "only {tried}");
+    assert!(!bench.status(8), "all are as they were");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn with_bit_outputs() {
+    try_every_register(Module::Do4);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn with_bit_inputs() {
+    try_every_register(Module::Di4);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn with_word_inputs_and_outputs() {
+    try_every_register(Module::Ai2Ao2);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn key_and_command_take_what_they_name_alone() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    bench.unlock();
+    for value in [0, 1, 0x5A16, 0x5A18, 0x175A, 0xFFFF] {
+        assert_eq!(bench.write_single(6, KEY, value), Err(3), "KEY {value:#x}");
+    }
+    // 0xB007 is refused until there is a loader.
+    for value in [0, 6, 0xB006, 0xB007, 0xB008, 0xFFFF] {
+        assert_eq!(
+            bench.write_single(6, COMMAND, value),
+            Err(3),
+            "COMMAND {value:#x}"
+        );
+    }
+    assert_eq!(bench.register(COMMAND), 0);
+    for value in [3, 4, 5, 1] {
+        bench.write_single(6, COMMAND, value).unwrap();
+        bench.board.run_for(Time::from_ms(100));
+        assert_eq!(bench.register(COMMAND), 0, "it reads 0");
+    }
+}

@@ -1,0 +1,217 @@
+//! Saving while the line is busy: at 115200, each request t3.5 behind the last reply, none is lost, as long
+//! as the store need not erase.
+
+use register_map::record::PAGE_SIZE;
+use sim::{Module, Time, periph::flash::Durations};
+
+use crate::bench::{Bench, adu};
+
+const FILTER: u16 = 0x0130;
+const UNSAVED: u16 = 8;
+
+/// The slowest flash there is (DS5319 table 29).
+const SLOWEST: Durations = Durations {
+    erase: Time::from_ms(40),
+    program: Time::from_us(70),
+};
+
+/// Settings whose record has 400 bytes: two fill a page, so the third goes to the other, and a start
+/// makes room.
+fn large() -> Vec<(u16, u16)> {
+    let blocks = [(0x0160, 4000), (0x01A0, 1), (0x01C0, 1)];
+    let pairs = blocks.map(|(first, value)| (0..32).map(move |n| (first + n, value)));
+    pairs.into_iter().flatten().collect()
+}
+
+/// A master that asks without a pause, and keeps count.
+struct Master {
+    bench: Bench,
+    asked: u32,
+}
+
+impl Master {
+    fn new(module: Module, settings: &[(u16, u16)]) -> Self {
+        let settings = [&[(0x0101, 1152)], settings].concat();
+        let mut bench = Bench::set_up(module, &settings);
+        bench.board.set_flash_durations(SLOWEST);
+        Self { bench, asked: 0 }
+    }
+
+    /// One request t3.5 after the last reply; its reply must come.
+    fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let reply = self.try_ask(pdu);
+        reply.unwrap_or_else(|| panic!("request {} {pdu:02X?} got no answer", self.asked))
+    }
+
+    /// The same; `None` when no reply begins within half a millisecond of t3.5.
+    fn try_ask(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
+        let bench = &mut self.bench;
+        self.asked += 1;
+        let now = bench.board.now();
+        let end = bench.board.line().send(now, &adu(&[&[1], pdu].concat()));
+        // A half-word's programming may hold the reply up by as long as it takes.
+        bench
+            .board
+            .run_until(end + bench.t35() + Time::from_us(300));
+        while bench.board.driver_enable() {
+            bench.board.run_for(Time::from_us(20));
+        }
+        bench.board.run_for(bench.t35());
+        let heard = bench.board.line().take_received();
+        let reply: Vec<u8> = heard.iter().map(|character| character.byte).collect();
+        if reply.is_empty() {
+            return None;
+        }
+        assert_eq!(
+            reply[..2],
+            [1, pdu[0]],
+            "request {}: {reply:02X?}",
+            self.asked
+        );
+        Some(reply[2..reply.len() - 2].to_vec())
+    }
+
+    fn write(&mut self, address: u16, value: u16) {
+        let [[a, b], [c, d]] = [address, value].map(u16::to_be_bytes);
+        self.ask(&[6, a, b, c, d]);
+    }
+
+    /// Orders a save, and asks on until it is complete.
+    fn save(&mut self) {
+        self.write(0x0108, 1);
+        let from = self.asked;
+        loop {
+            // Short and long ones, reads and writes.
+            self.ask(&[1, 0, 0x10, 0, 4]);
+            self.ask(&[3, 1, 0x20, 0, 32]);
+            self.ask(&[16, 3, 0x30, 0, 2, 4, 0, 0, 0, 0]);
+            let status = self.ask(&[3, 0x02, 0x0A, 0, 1]);
+            if u16::from_be_bytes([status[1], status[2]]) & UNSAVED == 0 {
+                return;
+            }
+            assert!(self.asked - from < 4_000, "the save never ends");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn no_request_goes_unanswered_while_saves_run_one_after_another() {
+    let mut master = Master::new(Module::Di4, &[]);
+    master.write(0x0100, 0x5A17);
+    let operations = master.bench.board.flash_operations();
+    for n in 0..40 {
+        master.write(FILTER + n % 4, 10 + n);
+        master.save();
+    }
+    let programmed = master.bench.board.flash_operations() - operations;
+    assert!(programmed > 40 * 8, "only {programmed} operations");
+    assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
+    assert_eq!(master.bench.register(0x0237), 0, "no character was lost");
+    master.bench.power_cycle();
+    assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![46, 47, 48, 49]));
+}
+
+/// The store has room for some fifty such saves between two starts. One more has to erase a page, which
+/// stalls the core: that is the one time requests are lost, and then only those of the erase itself.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_save_that_has_to_erase_costs_no_more_than_the_erase() {
+    let mut master = Master::new(Module::Di4, &[]);
+    master.write(0x0100, 0x5A17);
+    let mut deaf = Vec::new();
+    for n in 0..80 {
+        master.write(FILTER + n % 4, 10 + n);
+        master.write(0x0108, 1);
+        let mut lost_from = None;
+        for _ in 0..30 {
+            let asked = master.bench.board.now();
+            match master.try_ask(&[1, 0, 0x10, 0, 4]) {
+                None => {
+                    lost_from.get_or_insert(asked);
+                }
+                Some(_) => deaf.extend(lost_from.take().map(|from| asked - from)),
+            }
+        }
+        assert_eq!(lost_from, None, "it answers again");
+        assert!(!master.bench.status(UNSAVED), "saved");
+    }
+    assert!(
+        deaf.len() <= 2,
+        "one erase, perhaps two in 80 saves: {deaf:?}"
+    );
+    for span in deaf {
+        assert!(
+            span <= SLOWEST.erase + Time::from_ms(8),
+            "deaf for {span:?}"
+        );
+    }
+    assert_eq!(master.bench.board.resets(), 0);
+    master.bench.power_cycle();
+    assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![86, 87, 88, 89]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn no_request_goes_unanswered_when_pages_change_over() {
+    let mut master = Master::new(Module::Di4, &large());
+    for round in 0..3 {
+        master.write(0x0100, 0x5A17);
+        let pages = |master: &Master| {
+            let flash = master.bench.board.flash();
+            [0xF800, 0xFC00].map(|page| {
+                flash[page..page + PAGE_SIZE]
+                    .iter()
+                    .filter(|b| **b != 0xFF)
+                    .count()
+            })
+        };
+        let before = pages(&master);
+        let mut changed_over = false;
+        for n in 0..2 {
+            master.write(FILTER, 100 * round + n);
+            let operations = master.bench.board.flash_operations();
+            master.save();
+            assert!(master.bench.board.flash_operations() > operations + 190);
+            let now = pages(&master);
+            changed_over |= (0..2).any(|page| before[page] <= 2 && now[page] > 2);
+        }
+        assert!(changed_over || round == 0, "{before:?}: no change-over");
+        master.bench.power_cycle();
+        assert_eq!(master.bench.register(FILTER), 100 * round + 1);
+        assert!(!master.bench.status(2));
+    }
+    assert_eq!(master.bench.board.resets(), 0);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_change_made_while_a_save_runs_is_not_part_of_it_and_another_save_is_busy() {
+    let mut bench = Master::new(Module::Di4, &large()).bench;
+    bench.configure(FILTER, &[77]);
+    bench.write(0x0108, &[1]).unwrap();
+    bench.write(FILTER, &[88]).unwrap();
+    assert_eq!(
+        bench.write(0x0108, &[1]),
+        Err(6),
+        "the last is not complete"
+    );
+    bench.board.run_for(Time::from_ms(300));
+    assert_eq!(bench.register(FILTER), 88);
+    assert!(bench.status(UNSAVED), "88 is not saved");
+    bench.power_cycle();
+    assert_eq!(bench.register(FILTER), 77);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_restart_waits_for_a_running_save() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.tolerant = true;
+    bench.configure(FILTER, &[77]);
+    bench.write(0x0108, &[1]).unwrap();
+    bench.write(0x0108, &[2]).unwrap();
+    bench.started();
+    assert_eq!(bench.board.resets(), 1);
+    assert_eq!(bench.register(FILTER), 77);
+}

@@ -1,0 +1,140 @@
+//! What is saved survives, what is not does not, and what a damaged store leads to.
+
+use sim::{
+    Module,
+    line::{Format, Settings},
+};
+
+use crate::bench::Bench;
+
+const FILTER: u16 = 0x0130;
+const INVALID: u16 = 2;
+/// Where the store's pages are in the flash.
+const PAGES: std::ops::Range<usize> = 0xF800..0x1_0000;
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn what_is_saved_survives_and_what_is_not_does_not() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.configure(FILTER, &[50, 60, 70, 80]);
+    bench.save();
+    bench.write(FILTER, &[1, 2, 3, 4]).unwrap();
+    bench.power_cycle();
+    assert_eq!(bench.registers(FILTER, 4), Ok(vec![50, 60, 70, 80]));
+    assert_eq!(bench.register(0x0114), 1);
+    // Thirty saves and some restarts: pages fill and are made room in.
+    for n in 0..30 {
+        bench.configure(FILTER, &[100 + n]);
+        bench.save();
+        if n % 3 == 0 {
+            bench.power_cycle();
+        }
+        assert_eq!(bench.register(FILTER), 100 + n);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn everything_there_is_to_set_survives_together() {
+    // The largest record: every register differs from its default.
+    let mut bench = Bench::set_up(Module::Ai2Ao2, &[(0x0101, 1152)]);
+    bench.patience = sim::Time::from_ms(5);
+    let blocks = [
+        (0x0120, 7),
+        (0x0160, 4000),
+        (0x0180, 1),
+        (0x01A0, 1),
+        (0x01C0, 99),
+        (0x01E0, 77),
+    ];
+    bench.unlock();
+    for (first, value) in blocks {
+        bench.write(first, &[value; 32]).unwrap();
+    }
+    bench.write(0x0104, &[600, 3, 30, 1]).unwrap();
+    bench.write(0x0141, &[513, 11, 4, 2, 60]).unwrap();
+    for _ in 0..3 {
+        bench.save();
+        bench.power_cycle();
+        for (first, value) in blocks {
+            assert_eq!(
+                bench.registers(first, 32),
+                Ok(vec![value; 32]),
+                "{first:#x}"
+            );
+        }
+        assert_eq!(
+            bench.registers(0x0101, 7),
+            Ok(vec![1152, 0, 0, 600, 3, 30, 1])
+        );
+        assert_eq!(bench.registers(0x0140, 6), Ok(vec![0, 513, 11, 4, 2, 60]));
+        assert!(!bench.status(INVALID));
+        bench.configure(0x0105, &[3]);
+        // Another record: what is stored already is not written again.
+        bench.write(0x0141, &[513]).unwrap();
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn saving_what_is_stored_already_wears_nothing() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.configure(FILTER, &[50]);
+    bench.save();
+    let operations = bench.board.flash_operations();
+    for _ in 0..10 {
+        bench.command(1);
+        bench.board.run_for(sim::Time::from_ms(50));
+    }
+    bench.power_cycle();
+    assert_eq!(bench.board.flash_operations(), operations);
+    assert_eq!(bench.register(FILTER), 50);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_damaged_store_leaves_defaults_and_says_so_until_something_is_saved() {
+    let mut bench = Bench::set_up(Module::Di4, &[(0x0104, 77)]);
+    bench.board.power_off();
+    for byte in &mut bench.board.flash_mut().unwrap()[PAGES] {
+        *byte = byte.wrapping_mul(31).wrapping_add(7);
+    }
+    bench.board.power_on();
+    for _ in 0..2 {
+        bench.started();
+        assert!(bench.status(INVALID));
+        assert_eq!(bench.registers(0x0101, 4), Ok(vec![96, 0, 0, 0]));
+        assert_eq!(bench.register(0x0214), 0);
+        bench.board.cycle();
+    }
+    bench.started();
+    bench.configure(0x0114, &[1]);
+    bench.save();
+    bench.power_cycle();
+    assert!(!bench.status(INVALID));
+    assert_eq!(bench.register(0x0214), 1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn all_switches_on_is_the_factory_s_line_whatever_is_stored() {
+    let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 9216), (0x0102, 2)]);
+    assert_eq!(bench.register(0x0101), 9216);
+    bench.board.set_dip(255);
+    bench.power_cycle();
+    bench.settings(Settings::default());
+    let reply = bench.ask(255, &[3, 1, 1, 0, 2]).expect("it can be reached");
+    assert_eq!(reply, [3, 4, 0x24, 0, 0, 2], "what is stored is shown");
+    // And mended.
+    bench.ask(255, &[6, 1, 0, 0x5A, 0x17]).unwrap();
+    bench.ask(255, &[16, 1, 1, 0, 2, 4, 0, 192, 0, 1]).unwrap();
+    bench.ask(255, &[6, 1, 8, 0, 1]).unwrap();
+    bench.board.run_for(sim::Time::from_ms(100));
+    bench.board.set_dip(1);
+    bench.power_cycle();
+    bench.settings(Settings {
+        baud: 19_200,
+        format: Format::E1,
+    });
+    bench.assert_answers(1);
+}
