@@ -1,0 +1,316 @@
+//! Characters and silences in, good requests for this unit out.
+
+use super::ascii::{self, Part, Reader, Width};
+use super::{Faults, Framing};
+use crate::counters::count;
+use crate::server::BROADCAST;
+use crate::{Adu, LineCounters, crc};
+
+/// A good request for this unit, or a broadcast.
+#[derive(Debug)]
+pub struct Closed<'a> {
+    /// Unit address and PDU; the CRC or LRC is cut off. Give the buffer back to the receiver when
+    /// it is free again.
+    pub adu: &'a mut Adu,
+    /// The counters of the line, this frame included.
+    pub line: LineCounters,
+}
+
+/// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
+///
+/// In RTU mode it starts deaf: whatever arrives before the first t3.5 of silence belongs to a frame
+/// whose start was missed. In ASCII mode nothing counts that comes before a colon.
+///
+/// It needs two buffers ([`give_back`](Self::give_back)): one to fill, and a spare to go on with
+/// while the first is away with a request. Without a spare the next frame is followed to its end,
+/// and counted, but not kept.
+#[derive(Debug)]
+pub struct Receiver<'a> {
+    unit: u8,
+    strict_t15: bool,
+    state: u8,
+    /// The first byte of the frame: the unit address.
+    address: u8,
+    /// The CRC of the frame so far; in ASCII mode the sum of its bytes.
+    check: u16,
+    /// Bytes of a frame that is not kept.
+    unkept: u16,
+    filling: Option<&'a mut Adu>,
+    spare: Option<&'a mut Adu>,
+    counters: LineCounters,
+    reader: Reader,
+}
+
+// `state`: 0 while all is well in the middle of an RTU frame, so that a character needs a single
+// test.
+/// Everything is ignored up to the next t3.5.
+const DEAF: u8 = 1;
+/// No frame yet: the next character, or colon, starts one.
+const IDLE: u8 = 1 << 1;
+/// t1.5 has passed since the last character.
+const PAUSED: u8 = 1 << 2;
+/// Always set in ASCII mode, never in RTU mode.
+const ASCII: u8 = 1 << 3;
+/// A gap above t1.5 was in the frame, and that is not tolerated.
+const TORN: u8 = 1 << 4;
+/// A character that is faulty, or wrong where it stands, or too many of them.
+const SPOILED: u8 = 1 << 5;
+/// One of the faults was an overrun.
+const OVERRUN: u8 = 1 << 6;
+/// There was no buffer when the frame started: it is only followed.
+const UNKEPT: u8 = 1 << 7;
+
+/// Unit address, function code and CRC; 253 bytes of PDU at the most.
+const RTU_LEN: (usize, usize) = (4, 256);
+/// Unit address, function code and LRC; 253 bytes of PDU at the most.
+const ASCII_LEN: (usize, usize) = (3, 255);
+/// Bytes of the CRC.
+const CRC_LEN: usize = 2;
+/// Bytes of the LRC.
+const LRC_LEN: usize = 1;
+
+impl<'a> Receiver<'a> {
+    /// A receiver of an RTU line, without buffers, for unit address `unit`. `strict_t15`: drop a
+    /// frame with a gap above t1.5 in it, as the standard asks for; otherwise only count the gap.
+    pub const fn rtu(unit: u8, strict_t15: bool) -> Self {
+        Self::new(unit, strict_t15, Width::Eight, DEAF)
+    }
+
+    /// A receiver of an ASCII line, without buffers, for unit address `unit`. Frames end with CR
+    /// LF, until [`set_framing`](Self::set_framing).
+    pub const fn ascii(unit: u8, width: Width) -> Self {
+        Self::new(unit, false, width, ASCII | IDLE)
+    }
+
+    const fn new(unit: u8, strict_t15: bool, width: Width, state: u8) -> Self {
+        Self {
+            unit,
+            strict_t15,
+            state,
+            address: 0,
+            check: 0,
+            unkept: 0,
+            filling: None,
+            spare: None,
+            counters: LineCounters::ZERO,
+            reader: Reader::new(width),
+        }
+    }
+
+    /// Takes over the end mark of an ASCII line; the mode itself does not change.
+    pub const fn set_framing(&mut self, framing: Framing) {
+        if let Framing::Ascii { delimiter } = framing {
+            self.reader.set_delimiter(delimiter);
+        }
+    }
+
+    /// Gives the receiver a buffer, at the start or after use. A third one at a time is not kept.
+    #[inline]
+    pub fn give_back(&mut self, adu: &'a mut Adu) {
+        let place = if self.spare.is_none() {
+            &mut self.spare
+        } else {
+            &mut self.filling
+        };
+        if place.is_none() {
+            *place = Some(adu);
+        }
+    }
+
+    /// A character has arrived. `true`, in ASCII mode only: it was the end of a frame, and
+    /// [`close`](Self::close) is to be called at once.
+    #[inline]
+    #[must_use = "an ASCII frame ends with a character"]
+    pub fn character(&mut self, byte: u8, faults: Faults) -> bool {
+        if (self.state | faults.bits()) != 0 {
+            return self.special(byte, faults);
+        }
+        self.check = crc::step(self.check, byte);
+        self.keep(byte);
+        false
+    }
+
+    /// 1.5 characters of silence have passed, in RTU mode; in ASCII mode it means nothing.
+    #[inline]
+    pub const fn pause(&mut self) {
+        if self.state & (DEAF | IDLE | ASCII) == 0 {
+            self.state |= PAUSED;
+        }
+    }
+
+    /// The frame is at its end. In RTU mode: 3.5 characters of silence have passed. In ASCII mode:
+    /// [`character`](Self::character) said so, or one second has passed without any, which makes
+    /// what there is of a frame a faulty one.
+    ///
+    /// `Some` only for a good one to this unit or to all; everything else is counted and dropped.
+    #[inline]
+    pub fn close(&mut self) -> Option<Closed<'a>> {
+        let state = self.state;
+        self.state = IDLE | (state & ASCII);
+        if state & (DEAF | IDLE) != 0 {
+            return None;
+        }
+        if state & OVERRUN != 0 {
+            count(&mut self.counters.overruns);
+        }
+        if state & SPOILED != 0 || !self.is_complete(state) {
+            count(&mut self.counters.communication_errors);
+            return None;
+        }
+        count(&mut self.counters.bus_messages);
+        if state & TORN != 0 || !self.is_for_us() {
+            return None;
+        }
+        if state & UNKEPT != 0 {
+            count(&mut self.counters.dropped);
+            return None;
+        }
+        let adu = self.filling.take()?;
+        adu.cut(if state & ASCII == 0 { CRC_LEN } else { LRC_LEN });
+        Some(Closed {
+            adu,
+            line: self.counters,
+        })
+    }
+
+    /// The unit has been sending, with its receiver off, and is done: the next character starts a
+    /// frame.
+    #[inline]
+    pub fn resume(&mut self) {
+        self.state = IDLE | (self.state & ASCII);
+    }
+
+    /// What has been counted so far.
+    pub const fn counters(&self) -> &LineCounters {
+        &self.counters
+    }
+
+    /// Sees to a character that is not just the next good one of an RTU frame. Whether it ends the
+    /// frame.
+    #[cold]
+    #[inline(never)]
+    fn special(&mut self, byte: u8, faults: Faults) -> bool {
+        if self.state & ASCII != 0 {
+            return self.ascii_character(self.reader.masked(byte), faults);
+        }
+        if self.state & DEAF != 0 {
+            return false;
+        }
+        if self.state & IDLE != 0 {
+            self.begin();
+            self.address = byte;
+            self.check = crc::START;
+        }
+        if self.state & PAUSED != 0 {
+            count(&mut self.counters.gaps);
+            self.state &= !PAUSED;
+            if self.strict_t15 {
+                self.state |= TORN;
+            }
+        }
+        self.note(faults);
+        self.check = crc::step(self.check, byte);
+        self.keep_or_follow(byte);
+        false
+    }
+
+    /// A character in ASCII mode. Whether it ends the frame.
+    fn ascii_character(&mut self, character: u8, faults: Faults) -> bool {
+        let idle = self.state & IDLE != 0;
+        if character == ascii::START && (idle || faults == Faults::NONE) {
+            // What was before it had no end: it is counted as faulty. Had it one, it is too late.
+            if let Some(late) = self.close() {
+                self.give_back(late.adu);
+            }
+            self.begin();
+            self.reader.begin();
+            self.check = 0;
+            self.note(faults);
+            return false;
+        }
+        if idle {
+            return false;
+        }
+        self.note(faults);
+        match self.reader.take(character) {
+            Part::Byte(byte) => {
+                if self.len(self.state) == 0 {
+                    self.address = byte;
+                }
+                self.check = (self.check + u16::from(byte)) & 0xFF;
+                self.keep_or_follow(byte);
+            }
+            Part::Nothing => {}
+            Part::Wrong => self.state |= SPOILED,
+            Part::End => return true,
+        }
+        false
+    }
+
+    /// Starts a frame.
+    fn begin(&mut self) {
+        self.state &= ASCII;
+        self.unkept = 0;
+        if self.filling.is_none() {
+            self.filling = self.spare.take();
+        }
+        match &mut self.filling {
+            Some(adu) => adu.clear(),
+            None => self.state |= UNKEPT,
+        }
+    }
+
+    fn note(&mut self, faults: Faults) {
+        if faults != Faults::NONE {
+            self.state |= SPOILED;
+        }
+        if faults.contains(Faults::OVERRUN) {
+            self.state |= OVERRUN;
+        }
+    }
+
+    /// Keeps a byte of the frame.
+    #[inline]
+    fn keep(&mut self, byte: u8) {
+        if let Some(adu) = &mut self.filling
+            && !adu.push(byte)
+        {
+            self.state |= SPOILED;
+        }
+    }
+
+    /// Keeps a byte of the frame, or only counts it.
+    fn keep_or_follow(&mut self, byte: u8) {
+        if self.state & UNKEPT == 0 {
+            self.keep(byte);
+            return;
+        }
+        self.unkept = self.unkept.saturating_add(1);
+        if usize::from(self.unkept) > Adu::CAPACITY {
+            self.state |= SPOILED;
+        }
+    }
+
+    /// How many bytes a frame in this state has.
+    fn len(&self, state: u8) -> usize {
+        match &self.filling {
+            Some(adu) if state & UNKEPT == 0 => adu.len(),
+            _ => usize::from(self.unkept),
+        }
+    }
+
+    /// Whether the bytes of a frame in this state make a good one.
+    fn is_complete(&self, state: u8) -> bool {
+        let ((shortest, longest), ended) = if state & ASCII == 0 {
+            (RTU_LEN, true)
+        } else {
+            (ASCII_LEN, self.reader.is_over())
+        };
+        // Sum and CRC alike are zero over a frame with its LRC or CRC.
+        ended && self.check == crc::GOOD && (shortest..=longest).contains(&self.len(state))
+    }
+
+    fn is_for_us(&self) -> bool {
+        self.address == self.unit || self.address == BROADCAST
+    }
+}
