@@ -27,7 +27,7 @@ impl Head {
 
     /// One byte; 0 beyond the end.
     #[inline]
-    pub(crate) fn get(&self, index: u16) -> u8 {
+    pub(crate) fn get(&self, index: u8) -> u8 {
         self.bytes.get(usize::from(index)).copied().unwrap_or(0)
     }
 
@@ -66,7 +66,7 @@ impl Head {
         Self {
             bytes: [unit, 0, 0, 0, 0, 0, 0, 0],
             len: 1,
-            body: NO_BODY,
+            body: 0,
         }
     }
 

@@ -3,7 +3,7 @@
 use board_support::{GapTimer, Rs485};
 use modbus_server::{
     Adu, Head, LineCounters,
-    rtu::{Closed, Faults, Next, Receiver, Transmitter},
+    line::{Closed, Faults, Framing, Next, Receiver, Transmitter},
 };
 
 /// The line in use.
@@ -28,15 +28,14 @@ enum Reply {
 }
 
 impl Line {
-    /// Listens as `unit`. The first frame is taken after the first t3.5 of silence.
+    /// Listens with this receiver. The gap timer's t1.5 and t3.5 are, on an ASCII line, t3.5 and the
+    /// time-out.
     pub fn new(
         uart: Rs485,
         mut gap: GapTimer,
-        unit: u8,
-        strict_t15: bool,
+        mut receiver: Receiver<'static>,
         adus: &'static mut [Adu; 2],
     ) -> Self {
-        let mut receiver = Receiver::new(unit, strict_t15);
         adus.iter_mut().for_each(|adu| receiver.give_back(adu));
         gap.restart();
         Self {
@@ -77,14 +76,31 @@ impl Line {
         sent
     }
 
-    /// t1.5 of silence.
-    pub fn on_t15(&mut self) {
-        self.receiver.t15();
+    /// t1.5 of silence; on an ASCII line t3.5, after which a frame that is over is taken: its sender
+    /// has left the line by then. `Some` when a request waits to be taken.
+    pub fn on_t15(&mut self) -> Option<()> {
+        self.receiver.pause();
+        if self.receiver.is_over() {
+            return self.take();
+        }
+        None
     }
 
-    /// t3.5 of silence: `Some` when a request waits to be taken.
+    /// t3.5 of silence; on an ASCII line the time-out, which spoils what there is of a frame. `Some`
+    /// when a request waits to be taken.
     pub fn on_t35(&mut self) -> Option<()> {
-        let closed = self.receiver.t35()?;
+        // A frame that was over long ago has found no silence for its reply: it is too late.
+        let late = self.receiver.is_over();
+        self.take()?;
+        if late && let Some(closed) = self.request.take() {
+            self.receiver.give_back(closed.adu);
+            return None;
+        }
+        Some(())
+    }
+
+    fn take(&mut self) -> Option<()> {
+        let closed = self.receiver.close()?;
         // One that has not been taken by now will never be answered in time.
         if let Some(late) = self.request.replace(closed) {
             self.receiver.give_back(late.adu);
@@ -118,9 +134,10 @@ impl Line {
         Some((closed.adu, closed.line))
     }
 
-    /// A reply that begins with `head`: its first byte leaves now, or after a delay in milliseconds.
-    pub fn start_reply(&mut self, head: Head, delay_ms: u16) {
-        self.transmitter = Transmitter::new(head);
+    /// A reply of `unit` will come: its first byte leaves now, or after a delay in milliseconds.
+    #[inline]
+    pub fn open_reply(&mut self, unit: u8, framing: Framing, delay_ms: u16) {
+        self.transmitter = Transmitter::open(unit, framing);
         if delay_ms == 0 {
             self.send();
         } else {
@@ -128,7 +145,21 @@ impl Line {
         }
     }
 
+    /// The reply is settled: this is how it begins.
+    pub fn continue_reply(&mut self, head: Head) {
+        self.transmitter.head(head);
+        if self.reply == Reply::Sending {
+            self.uart.resume_sending();
+        }
+    }
+
+    /// How frames end from the next one on.
+    pub fn set_framing(&mut self, framing: Framing) {
+        self.receiver.set_framing(framing);
+    }
+
     /// Takes the bus and sends the first byte.
+    #[inline]
     fn send(&mut self) {
         self.gap.stop();
         self.reply = Reply::Sending;

@@ -34,7 +34,7 @@ mod app {
         lamps::{Lamps, TICK_MS, Trouble},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
-    use modbus_server::{Adu, Outcome, Server, Work};
+    use modbus_server::{Adu, Outcome, Server};
     use modio_drivers::{ChannelSettings, IoModule};
     use register_map::codes::Command;
 
@@ -159,7 +159,7 @@ mod app {
         let request = cx.shared.line.lock(|line| {
             let line = line.as_mut()?;
             match line.gap.take_event() {
-                GapEvent::T15 => line.on_t15(),
+                GapEvent::T15 => return line.on_t15(),
                 GapEvent::T35 => return line.on_t35(),
                 GapEvent::Nothing => {}
             }
@@ -183,9 +183,21 @@ mod app {
         let server = cx.local.server;
         let mut on_line = |f: &mut dyn FnMut(&mut Line)| line.lock(|line| line.as_mut().map(f));
 
-        // An order of the last request, whose reply is out or never comes.
+        let delay_ms = device.lock(|device| device.config.response_delay_ms());
+        let mut request = None;
         let mut silent = true;
-        on_line(&mut |line| silent = !line.is_replying());
+        on_line(&mut |line| {
+            request = line.take_request();
+            silent = !line.is_replying();
+            // The unit address leaves while all that follows is being done.
+            if let Some((adu, _)) = &request
+                && server.answers(adu)
+            {
+                line.open_reply(server.unit(), server.framing(), delay_ms);
+            }
+        });
+
+        // An order of the last request, whose reply is out or never comes.
         if silent {
             let left = device.lock(|device| {
                 let order = device.take_order()?;
@@ -197,37 +209,30 @@ mod app {
             }
         }
 
-        let mut request = None;
-        on_line(&mut |line| request = line.take_request());
         let Some((adu, line_counters)) = request else {
             return;
         };
-        let (decision, delay_ms) = device.lock(|device| {
-            let decision = server.decide(adu, device);
-            (decision, device.config.response_delay_ms())
-        });
-        // The head leaves while the rest is being done.
+        let decision = device.lock(|device| server.decide(adu, device));
         if let Some(head) = decision.reply {
-            on_line(&mut |line| line.start_reply(head, delay_ms));
+            on_line(&mut |line| line.continue_reply(head));
         }
-        server.commit(&decision);
+        server.commit(&decision, &line_counters);
         device.lock(|device| {
-            device.state.counters = server.counters(&line_counters);
-            if matches!(decision.outcome, Outcome::Accepted | Outcome::Refused(_)) {
+            device.state.counters = server.counters();
+            // In listen-only mode the outputs are to fall to SAFE.
+            if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
                 device.request_seen();
             }
             server.carry_out(&decision, adu, device);
         });
         let mut adu = Some(adu);
         on_line(&mut |line| {
+            line.set_framing(server.framing());
             if let Some(adu) = adu.take() {
                 line.finish_reply(adu, decision.reply.is_some());
             }
         });
-        if matches!(
-            decision.work,
-            Work::WriteBits { .. } | Work::WriteWords { .. }
-        ) {
+        if decision.work.writes() {
             rtic::pend(Interrupt::TIM4);
             if decision.reply.is_none() {
                 // No reply to wait for: an order is carried out now.

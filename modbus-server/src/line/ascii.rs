@@ -45,10 +45,8 @@ enum Place {
 pub(super) enum Part {
     /// A byte is complete.
     Byte(u8),
-    /// Nothing yet.
+    /// Nothing yet, or the end.
     Nothing,
-    /// The frame is at its end.
-    End,
     /// It does not belong there.
     Wrong,
 }
@@ -88,14 +86,15 @@ impl Reader {
     }
 
     /// Whether the frame has come to its end.
-    pub(super) fn is_over(&self) -> bool {
-        self.place == Place::Over
+    #[inline]
+    pub(super) const fn is_over(&self) -> bool {
+        matches!(self.place, Place::Over)
     }
 
     /// The next character of the frame, masked.
     pub(super) fn take(&mut self, character: u8) -> Part {
         let (place, part) = match (self.place, character) {
-            (Place::Delimiter, end) if end == self.delimiter => (Place::Over, Part::End),
+            (Place::Delimiter, end) if end == self.delimiter => (Place::Over, Part::Nothing),
             (Place::Byte, CR) => (Place::Delimiter, Part::Nothing),
             // Of a spoiled frame, too, these two are the end.
             (_, CR) => (Place::Delimiter, Part::Wrong),
@@ -170,7 +169,7 @@ mod tests {
         assert_eq!(reader.take(b'2'), Part::Byte(0x12));
         assert_eq!(reader.take(b'\r'), Part::Nothing);
         assert!(!reader.is_over());
-        assert_eq!(reader.take(b'\n'), Part::End);
+        assert_eq!(reader.take(b'\n'), Part::Nothing);
         assert!(reader.is_over());
         assert_eq!(reader.take(b'\n'), Part::Wrong);
         assert!(!reader.is_over());

@@ -29,12 +29,13 @@ pub struct Receiver<'a> {
     unit: u8,
     strict_t15: bool,
     state: u8,
-    /// The first byte of the frame: the unit address.
+    /// The first byte of a frame that is not kept: the unit address.
     address: u8,
     /// The CRC of the frame so far; in ASCII mode the sum of its bytes.
     check: u16,
     /// Bytes of a frame that is not kept.
     unkept: u16,
+    /// Of the frame, or empty for the next one.
     filling: Option<&'a mut Adu>,
     spare: Option<&'a mut Adu>,
     counters: LineCounters,
@@ -88,7 +89,7 @@ impl<'a> Receiver<'a> {
             strict_t15,
             state,
             address: 0,
-            check: 0,
+            check: if state & ASCII == 0 { crc::START } else { 0 },
             unkept: 0,
             filling: None,
             spare: None,
@@ -107,27 +108,28 @@ impl<'a> Receiver<'a> {
     /// Gives the receiver a buffer, at the start or after use. A third one at a time is not kept.
     #[inline]
     pub fn give_back(&mut self, adu: &'a mut Adu) {
-        let place = if self.spare.is_none() {
-            &mut self.spare
-        } else {
-            &mut self.filling
-        };
-        if place.is_none() {
-            *place = Some(adu);
+        adu.clear();
+        // A frame that began without one is followed to its end all the same.
+        if self.filling.is_none() {
+            self.filling = Some(adu);
+        } else if self.spare.is_none() {
+            self.spare = Some(adu);
         }
     }
 
-    /// A character has arrived. `true`, in ASCII mode only: it was the end of a frame, and
-    /// [`close`](Self::close) is to be called at once.
+    /// A character has arrived.
     #[inline]
-    #[must_use = "an ASCII frame ends with a character"]
-    pub fn character(&mut self, byte: u8, faults: Faults) -> bool {
+    pub fn character(&mut self, byte: u8, faults: Faults) {
         if (self.state | faults.bits()) != 0 {
-            return self.special(byte, faults);
+            if self.state != IDLE || faults != Faults::NONE || self.filling.is_none() {
+                self.special(byte, faults);
+                return;
+            }
+            // The first of a frame: all is ready for it.
+            self.state = 0;
         }
         self.check = crc::step(self.check, byte);
         self.keep(byte);
-        false
     }
 
     /// 1.5 characters of silence have passed, in RTU mode; in ASCII mode it means nothing.
@@ -138,15 +140,50 @@ impl<'a> Receiver<'a> {
         }
     }
 
+    /// In ASCII mode, whether the last character was the end of a frame, which
+    /// [`close`](Self::close) takes, at once or when the line is free for a reply. Another
+    /// character before that, and the frame is lost. Always `false` in RTU mode, where silence
+    /// ends a frame.
+    #[inline]
+    pub fn is_over(&self) -> bool {
+        self.state & ASCII != 0 && self.reader.is_over()
+    }
+
     /// The frame is at its end. In RTU mode: 3.5 characters of silence have passed. In ASCII mode:
-    /// [`character`](Self::character) said so, or one second has passed without any, which makes
+    /// it [`is_over`](Self::is_over), or one second has passed without any character, which makes
     /// what there is of a frame a faulty one.
     ///
     /// `Some` only for a good one to this unit or to all; everything else is counted and dropped.
     #[inline]
     pub fn close(&mut self) -> Option<Closed<'a>> {
-        let state = self.state;
-        self.state = IDLE | (state & ASCII);
+        let request = self.judge(self.state);
+        self.resume();
+        request
+    }
+
+    /// The unit has been sending, with its receiver off, and is done: the next character starts a
+    /// frame.
+    #[inline]
+    pub fn resume(&mut self) {
+        self.state = IDLE | (self.state & ASCII);
+        self.check = if self.state & ASCII == 0 {
+            crc::START
+        } else {
+            0
+        };
+        self.unkept = 0;
+        self.reader.begin();
+        if self.filling.is_none() {
+            self.filling = self.spare.take();
+        }
+        if let Some(adu) = &mut self.filling {
+            adu.clear();
+        }
+    }
+
+    /// What becomes of what has been received.
+    #[inline]
+    fn judge(&mut self, state: u8) -> Option<Closed<'a>> {
         if state & (DEAF | IDLE) != 0 {
             return None;
         }
@@ -158,7 +195,7 @@ impl<'a> Receiver<'a> {
             return None;
         }
         count(&mut self.counters.bus_messages);
-        if state & TORN != 0 || !self.is_for_us() {
+        if state & TORN != 0 || !self.is_for_us(state) {
             return None;
         }
         if state & UNKEPT != 0 {
@@ -173,33 +210,24 @@ impl<'a> Receiver<'a> {
         })
     }
 
-    /// The unit has been sending, with its receiver off, and is done: the next character starts a
-    /// frame.
-    #[inline]
-    pub fn resume(&mut self) {
-        self.state = IDLE | (self.state & ASCII);
-    }
-
     /// What has been counted so far.
     pub const fn counters(&self) -> &LineCounters {
         &self.counters
     }
 
-    /// Sees to a character that is not just the next good one of an RTU frame. Whether it ends the
-    /// frame.
+    /// Sees to a character that is not just the next good one of an RTU frame.
     #[cold]
     #[inline(never)]
-    fn special(&mut self, byte: u8, faults: Faults) -> bool {
+    fn special(&mut self, byte: u8, faults: Faults) {
         if self.state & ASCII != 0 {
-            return self.ascii_character(self.reader.masked(byte), faults);
+            self.ascii_character(self.reader.masked(byte), faults);
+            return;
         }
         if self.state & DEAF != 0 {
-            return false;
+            return;
         }
         if self.state & IDLE != 0 {
             self.begin();
-            self.address = byte;
-            self.check = crc::START;
         }
         if self.state & PAUSED != 0 {
             count(&mut self.counters.gaps);
@@ -211,52 +239,40 @@ impl<'a> Receiver<'a> {
         self.note(faults);
         self.check = crc::step(self.check, byte);
         self.keep_or_follow(byte);
-        false
     }
 
-    /// A character in ASCII mode. Whether it ends the frame.
-    fn ascii_character(&mut self, character: u8, faults: Faults) -> bool {
+    /// A character in ASCII mode.
+    fn ascii_character(&mut self, character: u8, faults: Faults) {
         let idle = self.state & IDLE != 0;
         if character == ascii::START && (idle || faults == Faults::NONE) {
-            // What was before it had no end: it is counted as faulty. Had it one, it is too late.
+            // What was before it had no end: it is counted as faulty. Had it one, its reply would
+            // come too late.
             if let Some(late) = self.close() {
                 self.give_back(late.adu);
             }
             self.begin();
-            self.reader.begin();
-            self.check = 0;
             self.note(faults);
-            return false;
+            return;
         }
         if idle {
-            return false;
+            return;
         }
         self.note(faults);
         match self.reader.take(character) {
             Part::Byte(byte) => {
-                if self.len(self.state) == 0 {
-                    self.address = byte;
-                }
                 self.check = (self.check + u16::from(byte)) & 0xFF;
                 self.keep_or_follow(byte);
             }
             Part::Nothing => {}
             Part::Wrong => self.state |= SPOILED,
-            Part::End => return true,
         }
-        false
     }
 
-    /// Starts a frame.
+    /// Starts a frame; all is ready for it but, perhaps, a buffer.
     fn begin(&mut self) {
         self.state &= ASCII;
-        self.unkept = 0;
         if self.filling.is_none() {
-            self.filling = self.spare.take();
-        }
-        match &mut self.filling {
-            Some(adu) => adu.clear(),
-            None => self.state |= UNKEPT,
+            self.state |= UNKEPT;
         }
     }
 
@@ -285,6 +301,9 @@ impl<'a> Receiver<'a> {
             self.keep(byte);
             return;
         }
+        if self.unkept == 0 {
+            self.address = byte;
+        }
         self.unkept = self.unkept.saturating_add(1);
         if usize::from(self.unkept) > Adu::CAPACITY {
             self.state |= SPOILED;
@@ -310,7 +329,11 @@ impl<'a> Receiver<'a> {
         ended && self.check == crc::GOOD && (shortest..=longest).contains(&self.len(state))
     }
 
-    fn is_for_us(&self) -> bool {
-        self.address == self.unit || self.address == BROADCAST
+    fn is_for_us(&self, state: u8) -> bool {
+        let address = match &self.filling {
+            Some(adu) if state & UNKEPT == 0 => adu.get(0),
+            _ => self.address,
+        };
+        address == self.unit || address == BROADCAST
     }
 }

@@ -19,47 +19,42 @@ pub enum Next {
 #[derive(Debug)]
 pub struct Transmitter<'a> {
     framing: Framing,
-    head: Head,
-    body: Option<&'a mut Adu>,
-    /// How many bytes of unit address and PDU, and in RTU mode of the CRC, have gone.
-    sent: u16,
-    /// How many bytes unit address and PDU are, or `UNKNOWN`.
-    end: u16,
-    /// The CRC of the bytes sent; in ASCII mode their sum.
-    check: u16,
+    stage: Stage,
     /// In ASCII mode: the second digit of a byte whose first has gone, else 0.
     second: u8,
-    /// In ASCII mode.
-    stage: Stage,
+    /// How many bytes of the head have gone.
+    sent: u8,
+    head: Head,
+    body: Option<&'a mut Adu>,
+    /// The next byte of the body.
+    at: u16,
+    /// How many bytes of the body are left that need no more than to be sent, in RTU mode.
+    plain: u16,
+    /// The CRC of the bytes sent; in ASCII mode their sum.
+    check: u16,
 }
 
-/// What of an ASCII frame comes next.
+/// What of a frame comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    Colon,
+    /// In ASCII mode, the colon.
+    Start,
+    /// Head and body, and after them the LRC or the first byte of the CRC.
     Bytes,
-    CarriageReturn,
+    /// The second byte of the CRC, or the carriage return.
+    End,
+    /// In ASCII mode, the delimiter.
     Delimiter,
+    /// Nothing.
     Over,
 }
-
-/// Bytes of the CRC.
-const CRC_LEN: u16 = 2;
-/// There is more to come, who knows how much.
-const UNKNOWN: u16 = u16::MAX;
 
 impl<'a> Transmitter<'a> {
     /// Nothing to send.
     pub const fn idle() -> Self {
         Self {
-            framing: Framing::Rtu,
-            head: Head::opening(0),
-            body: None,
-            sent: CRC_LEN,
-            end: 0,
-            check: 0,
-            second: 0,
             stage: Stage::Over,
+            ..Self::open(0, Framing::Rtu)
         }
     }
 
@@ -67,18 +62,20 @@ impl<'a> Transmitter<'a> {
     /// at once.
     #[inline]
     pub const fn open(unit: u8, framing: Framing) -> Self {
+        let (stage, check) = match framing {
+            Framing::Rtu => (Stage::Bytes, crc::START),
+            Framing::Ascii { .. } => (Stage::Start, 0),
+        };
         Self {
             framing,
+            stage,
+            second: 0,
+            sent: 0,
             head: Head::opening(unit),
             body: None,
-            sent: 0,
-            end: UNKNOWN,
-            check: match framing {
-                Framing::Rtu => crc::START,
-                Framing::Ascii { .. } => 0,
-            },
-            second: 0,
-            stage: Stage::Colon,
+            at: 0,
+            plain: 0,
+            check,
         }
     }
 
@@ -86,23 +83,18 @@ impl<'a> Transmitter<'a> {
     #[inline]
     pub const fn head(&mut self, head: Head) {
         self.head = head;
-        if !head.has_body() {
-            self.end = head.len() as u16;
-        }
     }
 
-    /// Hands over the body: what [`Server::carry_out`](crate::Server::carry_out) has left in the
-    /// buffer. A buffer that is not needed, because the head is the whole reply or the body is here
-    /// already, comes straight back, for the receiver.
+    /// Hands over the body, after the head: what [`Server::carry_out`](crate::Server::carry_out)
+    /// has left in the buffer. A buffer that is not needed, because the head is the whole reply or
+    /// the body is here already, comes straight back, for the receiver.
     #[inline]
     #[must_use = "a buffer that is not needed belongs back in the receiver"]
     pub fn body(&mut self, adu: &'a mut Adu) -> Option<&'a mut Adu> {
-        if !self.head.has_body() || self.body.is_some() {
+        if !self.head.has_body() || self.body.is_some() || self.stage == Stage::Over {
             return Some(adu);
         }
-        let body = self.head.body_in(adu).len();
-        // Neither is above 256.
-        self.end = self.head.len() as u16 + body as u16;
+        self.at = u16::from(self.head.body_from());
         self.body = Some(adu);
         None
     }
@@ -115,70 +107,97 @@ impl<'a> Transmitter<'a> {
         reason = "not an iterator: it may have to wait"
     )]
     pub fn next(&mut self) -> Next {
-        if let Framing::Ascii { delimiter } = self.framing {
-            return self.next_character(delimiter);
+        if self.plain > 0
+            && let Some(adu) = &self.body
+        {
+            let byte = adu.get(self.at);
+            self.plain -= 1;
+            self.at += 1;
+            self.check = crc::step(self.check, byte);
+            return Next::Byte(byte);
         }
-        let byte = match self.payload() {
-            Next::Byte(byte) => byte,
-            Next::Wait => return Next::Wait,
-            // Low byte first; a CRC fed with its own low byte moves its high byte down to be the
-            // next one.
-            Next::Done if self.sent < self.end + CRC_LEN => {
-                let [low, _] = self.check.to_le_bytes();
-                low
-            }
-            Next::Done => return Next::Done,
-        };
-        self.check = crc::step(self.check, byte);
-        self.sent += 1;
-        Next::Byte(byte)
+        self.special()
     }
 
-    /// In ASCII mode.
-    fn next_character(&mut self, delimiter: u8) -> Next {
+    /// What is not just the next byte of an RTU reply's body.
+    #[inline(never)]
+    fn special(&mut self) -> Next {
         if self.second != 0 {
             let second = self.second;
             self.second = 0;
             return Next::Byte(second);
         }
-        let (character, stage) = match self.stage {
-            Stage::Colon => (ascii::START, Stage::Bytes),
-            Stage::Bytes => {
-                let (byte, stage) = match self.payload() {
-                    Next::Byte(byte) => (byte, Stage::Bytes),
-                    Next::Wait => return Next::Wait,
-                    Next::Done => {
-                        let [sum, _] = self.check.to_le_bytes();
-                        (sum.wrapping_neg(), Stage::CarriageReturn)
-                    }
-                };
-                self.check = self.check.wrapping_add(u16::from(byte));
-                self.sent += 1;
-                let [first, second] = ascii::digits(byte);
-                self.second = second;
-                (first, stage)
+        let byte = match self.stage {
+            Stage::Bytes => match self.payload() {
+                Next::Byte(byte) => byte,
+                Next::Wait => return Next::Wait,
+                Next::Done => {
+                    self.stage = Stage::End;
+                    self.check_byte()
+                }
+            },
+            Stage::End if self.framing == Framing::Rtu => {
+                self.stage = Stage::Over;
+                self.check_byte()
             }
-            Stage::CarriageReturn => (ascii::CR, Stage::Delimiter),
-            Stage::Delimiter => (delimiter, Stage::Over),
-            Stage::Over => return Next::Done,
+            stage => return self.around(stage),
+        };
+        if self.framing == Framing::Rtu {
+            self.check = crc::step(self.check, byte);
+            return Next::Byte(byte);
+        }
+        self.check = self.check.wrapping_add(u16::from(byte));
+        let [first, second] = ascii::digits(byte);
+        self.second = second;
+        Next::Byte(first)
+    }
+
+    /// What an ASCII frame has around its bytes.
+    fn around(&mut self, stage: Stage) -> Next {
+        let (stage, character) = match (stage, self.framing) {
+            (Stage::Start, _) => (Stage::Bytes, ascii::START),
+            (Stage::End, _) => (Stage::Delimiter, ascii::CR),
+            (Stage::Delimiter, Framing::Ascii { delimiter }) => (Stage::Over, delimiter),
+            _ => return Next::Done,
         };
         self.stage = stage;
         Next::Byte(character)
     }
 
     /// The next byte of head and body.
-    #[inline]
-    fn payload(&self) -> Next {
-        let head = u16::from(self.head.len());
-        if self.sent < head {
-            return Next::Byte(self.head.get(self.sent));
+    fn payload(&mut self) -> Next {
+        if self.sent < self.head.len() {
+            let byte = self.head.get(self.sent);
+            self.sent += 1;
+            return Next::Byte(byte);
         }
-        if self.sent >= self.end {
+        let Some(adu) = &self.body else {
+            return if self.head.has_body() {
+                Next::Wait
+            } else {
+                Next::Done
+            };
+        };
+        // Both are at most 256.
+        let left = (adu.len() as u16).saturating_sub(self.at);
+        if left == 0 {
             return Next::Done;
         }
-        match &self.body {
-            Some(adu) => Next::Byte(adu.get(self.sent - head + u16::from(self.head.body_from()))),
-            None => Next::Wait,
+        if self.framing == Framing::Rtu {
+            self.plain = left - 1;
+        }
+        let byte = adu.get(self.at);
+        self.at += 1;
+        Next::Byte(byte)
+    }
+
+    /// The LRC, or the next byte of the CRC: the low one first; fed with its own low byte, it moves
+    /// its high byte down to be the next.
+    const fn check_byte(&self) -> u8 {
+        let [low, _] = self.check.to_le_bytes();
+        match self.framing {
+            Framing::Rtu => low,
+            Framing::Ascii { .. } => low.wrapping_neg(),
         }
     }
 

@@ -181,7 +181,8 @@ impl Unit {
 
     /// One character.
     pub fn character(&mut self, byte: u8, faults: Faults) {
-        if self.receiver.character(byte, faults) {
+        self.receiver.character(byte, faults);
+        if self.receiver.is_over() {
             assert_ne!(self.server.framing(), Framing::Rtu);
             self.said = self.close();
         }
