@@ -61,14 +61,13 @@ const OVERRUN: u8 = 1 << 6;
 /// There was no buffer when the frame started: it is only followed.
 const UNKEPT: u8 = 1 << 7;
 
+// The shortest and the longest frame in bytes, and how many of them are the check.
 /// Unit address, function code and CRC; 253 bytes of PDU at the most.
-const RTU_LEN: (usize, usize) = (4, 256);
+const RTU: (usize, usize, usize) = (4, 256, 2);
 /// Unit address, function code and LRC; 253 bytes of PDU at the most.
-const ASCII_LEN: (usize, usize) = (3, 255);
-/// Bytes of the CRC.
-const CRC_LEN: usize = 2;
-/// Bytes of the LRC.
-const LRC_LEN: usize = 1;
+const ASCII_ENDED: (usize, usize, usize) = (3, 255, 1);
+/// No length is right for a frame without its end.
+const NOT_ENDED: (usize, usize, usize) = (1, 0, 0);
 
 impl<'a> Receiver<'a> {
     /// A receiver of an RTU line, without buffers, for unit address `unit`. `strict_t15`: drop a
@@ -190,12 +189,26 @@ impl<'a> Receiver<'a> {
         if state & OVERRUN != 0 {
             count(&mut self.counters.overruns);
         }
-        if state & SPOILED != 0 || !self.is_complete(state) {
+        let (len, address) = match &self.filling {
+            Some(adu) if state & UNKEPT == 0 => (adu.len(), adu.get(0)),
+            _ => (usize::from(self.unkept), self.address),
+        };
+        let (shortest, longest, check_len) = if state & ASCII == 0 {
+            RTU
+        } else if self.reader.is_over() {
+            ASCII_ENDED
+        } else {
+            NOT_ENDED
+        };
+        // Over a frame with its CRC or LRC, CRC and sum alike are zero.
+        let good = self.check == crc::GOOD && shortest <= len && len <= longest;
+        if state & SPOILED != 0 || !good {
             count(&mut self.counters.communication_errors);
             return None;
         }
         count(&mut self.counters.bus_messages);
-        if state & TORN != 0 || !self.is_for_us(state) {
+        let is_for_us = address == self.unit || address == BROADCAST;
+        if state & TORN != 0 || !is_for_us {
             return None;
         }
         if state & UNKEPT != 0 {
@@ -203,7 +216,7 @@ impl<'a> Receiver<'a> {
             return None;
         }
         let adu = self.filling.take()?;
-        adu.cut(if state & ASCII == 0 { CRC_LEN } else { LRC_LEN });
+        adu.cut(check_len);
         Some(Closed {
             adu,
             line: self.counters,
@@ -308,32 +321,5 @@ impl<'a> Receiver<'a> {
         if usize::from(self.unkept) > Adu::CAPACITY {
             self.state |= SPOILED;
         }
-    }
-
-    /// How many bytes a frame in this state has.
-    fn len(&self, state: u8) -> usize {
-        match &self.filling {
-            Some(adu) if state & UNKEPT == 0 => adu.len(),
-            _ => usize::from(self.unkept),
-        }
-    }
-
-    /// Whether the bytes of a frame in this state make a good one.
-    fn is_complete(&self, state: u8) -> bool {
-        let ((shortest, longest), ended) = if state & ASCII == 0 {
-            (RTU_LEN, true)
-        } else {
-            (ASCII_LEN, self.reader.is_over())
-        };
-        // Sum and CRC alike are zero over a frame with its LRC or CRC.
-        ended && self.check == crc::GOOD && (shortest..=longest).contains(&self.len(state))
-    }
-
-    fn is_for_us(&self, state: u8) -> bool {
-        let address = match &self.filling {
-            Some(adu) if state & UNKEPT == 0 => adu.get(0),
-            _ => self.address,
-        };
-        address == self.unit || address == BROADCAST
     }
 }

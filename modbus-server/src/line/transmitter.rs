@@ -20,19 +20,22 @@ pub enum Next {
 pub struct Transmitter<'a> {
     framing: Framing,
     stage: Stage,
+    /// In RTU mode: how many bytes of the head have gone. In ASCII mode: `ELSEWHERE`.
+    sent: u8,
     /// In ASCII mode: the second digit of a byte whose first has gone, else 0.
     second: u8,
-    /// How many bytes of the head have gone.
-    sent: u8,
     head: Head,
     body: Option<&'a mut Adu>,
-    /// The next byte of the body.
+    /// In RTU mode: how many bytes of the body are left. In ASCII mode: 0.
+    left: u16,
+    /// In RTU mode: the next byte of the body. In ASCII mode: the next of head and body.
     at: u16,
-    /// How many bytes of the body are left that need no more than to be sent, in RTU mode.
-    plain: u16,
     /// The CRC of the bytes sent; in ASCII mode their sum.
     check: u16,
 }
+
+/// More than a head is long.
+const ELSEWHERE: u8 = u8::MAX;
 
 /// What of a frame comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +57,7 @@ impl<'a> Transmitter<'a> {
     pub const fn idle() -> Self {
         Self {
             stage: Stage::Over,
+            sent: ELSEWHERE,
             ..Self::open(0, Framing::Rtu)
         }
     }
@@ -62,19 +66,19 @@ impl<'a> Transmitter<'a> {
     /// at once.
     #[inline]
     pub const fn open(unit: u8, framing: Framing) -> Self {
-        let (stage, check) = match framing {
-            Framing::Rtu => (Stage::Bytes, crc::START),
-            Framing::Ascii { .. } => (Stage::Start, 0),
+        let (stage, sent, check) = match framing {
+            Framing::Rtu => (Stage::Bytes, 0, crc::START),
+            Framing::Ascii { .. } => (Stage::Start, ELSEWHERE, 0),
         };
         Self {
             framing,
             stage,
+            sent,
             second: 0,
-            sent: 0,
             head: Head::opening(unit),
             body: None,
+            left: 0,
             at: 0,
-            plain: 0,
             check,
         }
     }
@@ -94,111 +98,103 @@ impl<'a> Transmitter<'a> {
         if !self.head.has_body() || self.body.is_some() || self.stage == Stage::Over {
             return Some(adu);
         }
-        self.at = u16::from(self.head.body_from());
+        if self.framing == Framing::Rtu {
+            self.at = u16::from(self.head.body_from());
+            // At most 256.
+            self.left = self.head.body_in(adu).len() as u16;
+        }
         self.body = Some(adu);
         None
     }
 
     /// The next thing to do. Called at each "transmit register empty"; in the end it is
     /// [`Next::Done`] as often as asked.
-    #[inline]
+    #[inline(always)]
     #[expect(
         clippy::should_implement_trait,
         reason = "not an iterator: it may have to wait"
     )]
     pub fn next(&mut self) -> Next {
-        if self.plain > 0
+        let byte = if self.sent < self.head.len() {
+            let byte = self.head.get(self.sent);
+            self.sent += 1;
+            byte
+        } else if self.left > 0
             && let Some(adu) = &self.body
         {
             let byte = adu.get(self.at);
-            self.plain -= 1;
             self.at += 1;
-            self.check = crc::step(self.check, byte);
-            return Next::Byte(byte);
-        }
-        self.special()
+            self.left -= 1;
+            byte
+        } else {
+            return self.rest();
+        };
+        self.check = crc::step(self.check, byte);
+        Next::Byte(byte)
     }
 
-    /// What is not just the next byte of an RTU reply's body.
+    /// What is not the next byte of an RTU reply.
     #[inline(never)]
-    fn special(&mut self) -> Next {
+    fn rest(&mut self) -> Next {
+        if let Framing::Ascii { delimiter } = self.framing {
+            return self.ascii(delimiter);
+        }
+        self.stage = match self.stage {
+            Stage::Bytes if self.must_wait() => return Next::Wait,
+            Stage::Bytes => Stage::End,
+            Stage::End => Stage::Over,
+            _ => return Next::Done,
+        };
+        // Low byte first; a CRC fed with its own low byte moves its high byte down to be the next.
+        let [low, _] = self.check.to_le_bytes();
+        self.check = crc::step(self.check, low);
+        Next::Byte(low)
+    }
+
+    /// The next character in ASCII mode.
+    fn ascii(&mut self, delimiter: u8) -> Next {
         if self.second != 0 {
             let second = self.second;
             self.second = 0;
             return Next::Byte(second);
         }
-        let byte = match self.stage {
-            Stage::Bytes => match self.payload() {
-                Next::Byte(byte) => byte,
-                Next::Wait => return Next::Wait,
-                Next::Done => {
-                    self.stage = Stage::End;
-                    self.check_byte()
-                }
-            },
-            Stage::End if self.framing == Framing::Rtu => {
-                self.stage = Stage::Over;
-                self.check_byte()
+        let (stage, character) = match self.stage {
+            Stage::Start => (Stage::Bytes, ascii::START),
+            Stage::Bytes => {
+                let [sum, _] = self.check.to_le_bytes();
+                let (stage, byte) = match self.byte_at(self.at) {
+                    Some(byte) => (Stage::Bytes, byte),
+                    None if self.must_wait() => return Next::Wait,
+                    None => (Stage::End, sum.wrapping_neg()),
+                };
+                self.at += 1;
+                self.check = self.check.wrapping_add(u16::from(byte));
+                let [first, second] = ascii::digits(byte);
+                self.second = second;
+                (stage, first)
             }
-            stage => return self.around(stage),
-        };
-        if self.framing == Framing::Rtu {
-            self.check = crc::step(self.check, byte);
-            return Next::Byte(byte);
-        }
-        self.check = self.check.wrapping_add(u16::from(byte));
-        let [first, second] = ascii::digits(byte);
-        self.second = second;
-        Next::Byte(first)
-    }
-
-    /// What an ASCII frame has around its bytes.
-    fn around(&mut self, stage: Stage) -> Next {
-        let (stage, character) = match (stage, self.framing) {
-            (Stage::Start, _) => (Stage::Bytes, ascii::START),
-            (Stage::End, _) => (Stage::Delimiter, ascii::CR),
-            (Stage::Delimiter, Framing::Ascii { delimiter }) => (Stage::Over, delimiter),
-            _ => return Next::Done,
+            Stage::End => (Stage::Delimiter, ascii::CR),
+            Stage::Delimiter => (Stage::Over, delimiter),
+            Stage::Over => return Next::Done,
         };
         self.stage = stage;
         Next::Byte(character)
     }
 
-    /// The next byte of head and body.
-    fn payload(&mut self) -> Next {
-        if self.sent < self.head.len() {
-            let byte = self.head.get(self.sent);
-            self.sent += 1;
-            return Next::Byte(byte);
+    /// The byte at this place of head and body, if it is here and not beyond the end.
+    fn byte_at(&self, at: u16) -> Option<u8> {
+        let at = usize::from(at);
+        let head = self.head.as_slice();
+        match (head.get(at), &self.body) {
+            (Some(byte), _) => Some(*byte),
+            (None, Some(adu)) => self.head.body_in(adu).get(at - head.len()).copied(),
+            (None, None) => None,
         }
-        let Some(adu) = &self.body else {
-            return if self.head.has_body() {
-                Next::Wait
-            } else {
-                Next::Done
-            };
-        };
-        // Both are at most 256.
-        let left = (adu.len() as u16).saturating_sub(self.at);
-        if left == 0 {
-            return Next::Done;
-        }
-        if self.framing == Framing::Rtu {
-            self.plain = left - 1;
-        }
-        let byte = adu.get(self.at);
-        self.at += 1;
-        Next::Byte(byte)
     }
 
-    /// The LRC, or the next byte of the CRC: the low one first; fed with its own low byte, it moves
-    /// its high byte down to be the next.
-    const fn check_byte(&self) -> u8 {
-        let [low, _] = self.check.to_le_bytes();
-        match self.framing {
-            Framing::Rtu => low,
-            Framing::Ascii { .. } => low.wrapping_neg(),
-        }
+    /// Whether there is more to come than is here.
+    fn must_wait(&self) -> bool {
+        self.head.has_body() && self.body.is_none()
     }
 
     /// Takes the buffer of the body back, for the receiver. Before [`Next::Done`] this cuts the
