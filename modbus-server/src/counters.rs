@@ -3,6 +3,8 @@
 /// What the receiver of a line has counted since it was made. Only ever counts up, so that a reader
 /// that keeps an older copy can always tell the difference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+// Whole words: a copy is made of them with every request, without a call of memcpy.
+#[repr(align(4))]
 pub struct LineCounters {
     /// Frames with a good CRC or LRC, for whatever unit (sub-function 0B).
     pub bus_messages: u16,

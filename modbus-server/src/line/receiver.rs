@@ -28,7 +28,7 @@ pub struct Closed<'a> {
 pub struct Receiver<'a> {
     unit: u8,
     strict_t15: bool,
-    state: u8,
+    state: u16,
     /// The first byte of a frame that is not kept: the unit address.
     address: u8,
     /// The CRC of the frame so far; in ASCII mode the sum of its bytes.
@@ -43,23 +43,23 @@ pub struct Receiver<'a> {
 }
 
 // `state`: 0 while all is well in the middle of an RTU frame, so that a character needs a single
-// test.
+// test. The four bits below are those of `Faults`.
 /// Everything is ignored up to the next t3.5.
-const DEAF: u8 = 1;
+const DEAF: u16 = 1 << 4;
 /// No frame yet: the next character, or colon, starts one.
-const IDLE: u8 = 1 << 1;
+const IDLE: u16 = 1 << 5;
 /// t1.5 has passed since the last character.
-const PAUSED: u8 = 1 << 2;
+const PAUSED: u16 = 1 << 6;
 /// Always set in ASCII mode, never in RTU mode.
-const ASCII: u8 = 1 << 3;
+const ASCII: u16 = 1 << 7;
 /// A gap above t1.5 was in the frame, and that is not tolerated.
-const TORN: u8 = 1 << 4;
+const TORN: u16 = 1 << 8;
 /// A character that is faulty, or wrong where it stands, or too many of them.
-const SPOILED: u8 = 1 << 5;
+const SPOILED: u16 = 1 << 9;
 /// One of the faults was an overrun.
-const OVERRUN: u8 = 1 << 6;
-/// There was no buffer when the frame started: it is only followed.
-const UNKEPT: u8 = 1 << 7;
+const OVERRUN: u16 = 1 << 10;
+/// There was no buffer when the frame started: it is only followed. While idle: there is none.
+const UNKEPT: u16 = 1 << 11;
 
 // The shortest and the longest frame in bytes, and how many of them are the check.
 /// Unit address, function code and CRC; 253 bytes of PDU at the most.
@@ -73,16 +73,16 @@ impl<'a> Receiver<'a> {
     /// A receiver of an RTU line, without buffers, for unit address `unit`. `strict_t15`: drop a
     /// frame with a gap above t1.5 in it, as the standard asks for; otherwise only count the gap.
     pub const fn rtu(unit: u8, strict_t15: bool) -> Self {
-        Self::new(unit, strict_t15, Width::Eight, DEAF)
+        Self::new(unit, strict_t15, Width::Eight, DEAF | UNKEPT)
     }
 
     /// A receiver of an ASCII line, without buffers, for unit address `unit`. Frames end with CR
     /// LF, until [`set_framing`](Self::set_framing).
     pub const fn ascii(unit: u8, width: Width) -> Self {
-        Self::new(unit, false, width, ASCII | IDLE)
+        Self::new(unit, false, width, ASCII | IDLE | UNKEPT)
     }
 
-    const fn new(unit: u8, strict_t15: bool, width: Width, state: u8) -> Self {
+    const fn new(unit: u8, strict_t15: bool, width: Width, state: u16) -> Self {
         Self {
             unit,
             strict_t15,
@@ -108,9 +108,12 @@ impl<'a> Receiver<'a> {
     #[inline]
     pub fn give_back(&mut self, adu: &'a mut Adu) {
         adu.clear();
-        // A frame that began without one is followed to its end all the same.
         if self.filling.is_none() {
             self.filling = Some(adu);
+            // A frame that began without one is followed to its end all the same.
+            if self.state & (DEAF | IDLE) != 0 {
+                self.state &= !UNKEPT;
+            }
         } else if self.spare.is_none() {
             self.spare = Some(adu);
         }
@@ -119,13 +122,11 @@ impl<'a> Receiver<'a> {
     /// A character has arrived.
     #[inline]
     pub fn character(&mut self, byte: u8, faults: Faults) {
-        if (self.state | faults.bits()) != 0 {
-            if self.state != IDLE || faults != Faults::NONE || self.filling.is_none() {
-                self.special(byte, faults);
-                return;
-            }
+        match self.state | u16::from(faults.bits()) {
+            0 => {}
             // The first of a frame: all is ready for it.
-            self.state = 0;
+            IDLE => self.state = 0,
+            _ => return self.special(byte, faults),
         }
         self.check = crc::step(self.check, byte);
         self.keep(byte);
@@ -175,14 +176,15 @@ impl<'a> Receiver<'a> {
         if self.filling.is_none() {
             self.filling = self.spare.take();
         }
-        if let Some(adu) = &mut self.filling {
-            adu.clear();
+        match &mut self.filling {
+            Some(adu) => adu.clear(),
+            None => self.state |= UNKEPT,
         }
     }
 
     /// What becomes of what has been received.
     #[inline]
-    fn judge(&mut self, state: u8) -> Option<Closed<'a>> {
+    fn judge(&mut self, state: u16) -> Option<Closed<'a>> {
         if state & (DEAF | IDLE) != 0 {
             return None;
         }
@@ -281,12 +283,9 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// Starts a frame; all is ready for it but, perhaps, a buffer.
+    /// Starts a frame: all is ready for it.
     fn begin(&mut self) {
-        self.state &= ASCII;
-        if self.filling.is_none() {
-            self.state |= UNKEPT;
-        }
+        self.state &= ASCII | UNKEPT;
     }
 
     fn note(&mut self, faults: Faults) {
