@@ -98,16 +98,23 @@ fn first<const N: usize>(fields: &[u8]) -> Result<[u8; N], Exception> {
 }
 
 /// What a mask makes of a word: (current AND and) OR (or AND NOT and), V1.1b3 6.16.
+///
+/// # Errors
+/// As for a write of that; where the word cannot be read now, the reason for it.
 fn masked(address: u16, and: u16, or: u16, model: &impl DataModel) -> Result<u16, Exception> {
     let span = Span::single(address);
-    let readable = model.check_read_words(span);
     let mut bytes = [0; 2];
-    if readable.is_ok() {
-        model.read_words(span, &mut WordsOut::new(&mut bytes));
+    if let Err(unreadable) = model.check_read_words(span) {
+        // What would be written is not known, so that only the address can be worse.
+        let write = model.check_write_words(span, Words::new(&bytes));
+        return Err(match write {
+            Err(Exception::IllegalDataAddress) => Exception::IllegalDataAddress,
+            _ => unreadable,
+        });
     }
+    model.read_words(span, &mut WordsOut::new(&mut bytes));
     let value = (u16::from_be_bytes(bytes) & and) | (or & !and);
-    bytes = value.to_be_bytes();
-    first_of(model.check_write_words(span, Words::new(&bytes)), readable)?;
+    model.check_write_words(span, Words::new(&value.to_be_bytes()))?;
     Ok(value)
 }
 

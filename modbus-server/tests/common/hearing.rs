@@ -33,7 +33,7 @@ impl Ear {
 
     /// A character, with faults as in `Faults`. The reply to an ASCII frame that it ended.
     pub fn character(&mut self, byte: u8, faults: u8) -> Option<Vec<u8>> {
-        let reply = match self.server.framing {
+        match self.server.framing {
             Framing::Ascii { delimiter } => {
                 if byte == b':' && (!self.inside || faults == 0) {
                     self.finish();
@@ -58,8 +58,7 @@ impl Ear {
                 self.note(faults);
                 None
             }
-        };
-        reply
+        }
     }
 
     fn note(&mut self, faults: u8) {

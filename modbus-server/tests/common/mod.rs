@@ -10,7 +10,8 @@ mod serving;
 
 use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter, Width};
 use modbus_server::{Counters, Outcome, Server};
-pub use points::{MAX_WORD, Points};
+#[allow(unused_imports)] // as above
+pub use points::{MAX_WORD, Points, object};
 
 /// The unit address of the tests.
 pub const UNIT: u8 = 17;

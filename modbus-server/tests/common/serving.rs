@@ -24,13 +24,14 @@ pub fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
             if at >= there {
                 return Err(2);
             }
+            // What cannot be read cannot be masked.
+            points.state.map_or(Ok(()), |state| Err(state.code()))?;
             let now = usize::from(points.words[at]);
             let [and, or] = [3, 5].map(|from| field(pdu, from));
             let value = (now & and) | (or & (0xFFFF - and));
             if !allowed(value) {
                 return Err(3);
             }
-            points.state.map_or(Ok(()), |state| Err(state.code()))?;
             points.words[at] = value as u16;
             Ok(pdu.to_vec())
         }
