@@ -259,6 +259,17 @@ mod tests {
         let decode = |fields: &[u8]| Request::decode(0x10, fields, Framing::Rtu).map(|_| ());
         assert_eq!(decode(&fields(124)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(123)[..5 + 246]), Ok(()));
+
+        let fields = |count: u8| {
+            let mut fields = [0; 9 + 244];
+            fields[3] = 1;
+            fields[7] = count;
+            fields[8] = count * 2;
+            fields
+        };
+        let decode = |fields: &[u8]| Request::decode(0x17, fields, Framing::Rtu).map(|_| ());
+        assert_eq!(decode(&fields(122)), Err(Exception::IllegalDataValue));
+        assert_eq!(decode(&fields(121)[..9 + 242]), Ok(()));
     }
 
     #[test]

@@ -219,6 +219,7 @@ fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
             pdu(0x03, &[0, 1]),
             write_words(0, &[1]),
             vec![0x63],
+            pdu(0x06, &[1, 0xFF00]), // what follows 06 is what would follow 08 for a restart
             vec![0x0B],
             diagnose(0x04, 0),
             diagnose(0x0A, 0),
@@ -240,7 +241,7 @@ fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
             counters.unit_messages,
             counters.no_response
         ),
-        (20, 19, 18),
+        (22, 21, 20),
         "it goes on counting"
     );
     assert_eq!(counters.exceptions, 0);
