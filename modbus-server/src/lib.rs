@@ -25,7 +25,7 @@
 //! bytes are already on the wire. The buffers ([`Adu`]) move by ownership from hand to hand;
 //! nothing is copied.
 //!
-//! RTU and ASCII mode differ in the [`line`] alone: one [`line::Receiver`] and one
+//! RTU and ASCII mode differ in the [line](mod@line) alone: one [`line::Receiver`] and one
 //! [`line::Transmitter`] speak both.
 //!
 //! What a broadcast may do: write, by functions 05, 06, 0F, 10 and 16. All else has no effect, also

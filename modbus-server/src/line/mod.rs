@@ -11,6 +11,7 @@ mod faults;
 mod framing;
 mod gaps;
 mod receiver;
+mod state;
 mod transmitter;
 
 pub use ascii::Width;

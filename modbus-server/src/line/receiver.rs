@@ -1,6 +1,9 @@
 //! Characters and silences in, good requests for this unit out.
 
 use super::ascii::{self, Part, Reader, Width};
+use super::state::{
+    ASCII, ASCII_ENDED, DEAF, IDLE, NOT_ENDED, OVERRUN, PAUSED, RTU, SPOILED, TORN, UNKEPT,
+};
 use super::{Faults, Framing};
 use crate::counters::count;
 use crate::server::BROADCAST;
@@ -41,33 +44,6 @@ pub struct Receiver<'a> {
     counters: LineCounters,
     reader: Reader,
 }
-
-// `state`: 0 while all is well in the middle of an RTU frame, so that a character needs a single
-// test. The four bits below are those of `Faults`.
-/// Everything is ignored up to the next t3.5.
-const DEAF: u16 = 1 << 4;
-/// No frame yet: the next character, or colon, starts one.
-const IDLE: u16 = 1 << 5;
-/// t1.5 has passed since the last character.
-const PAUSED: u16 = 1 << 6;
-/// Always set in ASCII mode, never in RTU mode.
-const ASCII: u16 = 1 << 7;
-/// A gap above t1.5 was in the frame, and that is not tolerated.
-const TORN: u16 = 1 << 8;
-/// A character that is faulty, or wrong where it stands, or too many of them.
-const SPOILED: u16 = 1 << 9;
-/// One of the faults was an overrun.
-const OVERRUN: u16 = 1 << 10;
-/// There was no buffer when the frame started: it is only followed. While idle: there is none.
-const UNKEPT: u16 = 1 << 11;
-
-// The shortest and the longest frame in bytes, and how many of them are the check.
-/// Unit address, function code and CRC; 253 bytes of PDU at the most.
-const RTU: (usize, usize, usize) = (4, 256, 2);
-/// Unit address, function code and LRC; 253 bytes of PDU at the most.
-const ASCII_ENDED: (usize, usize, usize) = (3, 255, 1);
-/// No length is right for a frame without its end.
-const NOT_ENDED: (usize, usize, usize) = (1, 0, 0);
 
 impl<'a> Receiver<'a> {
     /// A receiver of an RTU line, without buffers, for unit address `unit`. `strict_t15`: drop a
@@ -122,12 +98,11 @@ impl<'a> Receiver<'a> {
     /// A character has arrived.
     #[inline]
     pub fn character(&mut self, byte: u8, faults: Faults) {
-        match self.state | u16::from(faults.bits()) {
-            0 => {}
-            // The first of a frame: all is ready for it.
-            IDLE => self.state = 0,
-            _ => return self.special(byte, faults),
+        // The first of an RTU frame is as good as any other: all is ready for it.
+        if (self.state | u16::from(faults.bits())) & !IDLE != 0 {
+            return self.special(byte, faults);
         }
+        self.state = 0;
         self.check = crc::step(self.check, byte);
         self.keep(byte);
     }
