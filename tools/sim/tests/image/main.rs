@@ -8,6 +8,7 @@ mod boot;
 mod configuration;
 mod dip;
 mod framing;
+mod functions;
 mod modules;
 mod noise;
 mod points;
