@@ -2,10 +2,10 @@
 //! reply.
 
 /// One application data unit of up to 256 bytes (V1.02 2.5.1: the largest RTU frame, address and
-/// CRC included).
+/// CRC included; an ASCII frame holds at most 255).
 ///
-/// As a request it holds the unit address and the PDU; the CRC is cut off once it has been found
-/// good. As a reply it holds what follows the [`Head`](crate::Head).
+/// As a request it holds the unit address and the PDU; the CRC or LRC is cut off once it has been
+/// found good. As a reply it holds what follows the [`Head`](crate::Head).
 #[derive(Debug)]
 pub struct Adu {
     bytes: [u8; Adu::CAPACITY],
@@ -36,6 +36,24 @@ impl Adu {
                 true
             }
             None => false,
+        }
+    }
+
+    /// Appends bytes, as many of them as there is room for.
+    pub(crate) fn extend(&mut self, bytes: &[u8]) {
+        // A full buffer takes no more: `push` says so, and there is nothing to be done.
+        bytes.iter().for_each(|byte| {
+            self.push(*byte);
+        });
+    }
+
+    /// Overwrites the byte at `index`, if it is in use.
+    pub(crate) fn set(&mut self, index: u8, byte: u8) {
+        let index = usize::from(index);
+        if index < self.len
+            && let Some(slot) = self.bytes.get_mut(index)
+        {
+            *slot = byte;
         }
     }
 
@@ -83,12 +101,6 @@ impl Adu {
         self.len = self.len.saturating_sub(count);
     }
 
-    /// Takes back [`cut`](Self::cut): the bytes are still there.
-    #[inline]
-    pub(crate) fn uncut(&mut self, count: usize) {
-        self.len = (self.len + count).min(Self::CAPACITY);
-    }
-
     /// Makes the buffer `len` bytes long (at most [`CAPACITY`](Self::CAPACITY)), whatever they
     /// hold, and lends them for writing.
     pub(crate) fn resize(&mut self, len: usize) -> &mut [u8] {
@@ -119,18 +131,26 @@ mod tests {
     }
 
     #[test]
-    fn what_was_cut_off_comes_back() {
+    fn more_cannot_be_cut_off_than_there_is() {
         let mut adu = Adu::new();
-        assert!([1, 2, 3].into_iter().all(|byte| adu.push(byte)));
+        adu.extend(&[1, 2, 3]);
         adu.cut(2);
         assert_eq!(adu.as_slice(), [1]);
-        adu.uncut(2);
-        assert_eq!(adu.as_slice(), [1, 2, 3]);
         adu.cut(4);
         assert!(adu.is_empty());
-        adu.resize(255);
-        adu.uncut(2);
-        assert_eq!(adu.len(), Adu::CAPACITY);
+    }
+
+    #[test]
+    fn only_bytes_in_use_are_overwritten_and_no_more_kept_than_fit() {
+        let mut adu = Adu::new();
+        adu.extend(&[1, 2]);
+        adu.set(1, 9);
+        adu.set(2, 9);
+        assert_eq!(adu.as_slice(), [1, 9]);
+        adu.push(3);
+        assert_eq!(adu.as_slice(), [1, 9, 3]);
+        adu.extend(&[7; 300]);
+        assert_eq!((adu.len(), adu.get(255)), (Adu::CAPACITY, 7));
     }
 
     #[test]

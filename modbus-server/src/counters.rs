@@ -3,21 +3,51 @@
 /// What the receiver of a line has counted since it was made. Only ever counts up, so that a reader
 /// that keeps an older copy can always tell the difference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+// Whole words: a copy is made of them with every request, without a call of memcpy.
+#[repr(align(4))]
 pub struct LineCounters {
-    /// Frames with a good CRC, for whatever unit (sub-function 0B).
+    /// Frames with a good CRC or LRC, for whatever unit (sub-function 0B).
     pub bus_messages: u16,
-    /// Frames with a bad CRC, with a faulty character, shorter than 4 or longer than 256 bytes
-    /// (0C).
+    /// Frames with a bad CRC or LRC, with a faulty character, of an impossible length, and, in
+    /// ASCII mode, without an end (0C).
     pub communication_errors: u16,
     /// Frames spoiled because a character was overwritten before it was read (12).
     pub overruns: u16,
-    /// Silences above t1.5 inside a frame.
+    /// Silences above t1.5 inside an RTU frame.
     pub gaps: u16,
     /// Good frames for this unit that found no free buffer.
     pub dropped: u16,
 }
 
-/// All counters of a line and its server, in the order of their sub-functions of function 08.
+impl LineCounters {
+    /// All zero.
+    pub const ZERO: Self = Self {
+        bus_messages: 0,
+        communication_errors: 0,
+        overruns: 0,
+        gaps: 0,
+        dropped: 0,
+    };
+
+    /// What has been counted since these stood at `then`, less than once around.
+    #[must_use]
+    pub(crate) const fn since(&self, then: &Self) -> Self {
+        Self {
+            bus_messages: self.bus_messages.wrapping_sub(then.bus_messages),
+            communication_errors: (self.communication_errors)
+                .wrapping_sub(then.communication_errors),
+            overruns: self.overruns.wrapping_sub(then.overruns),
+            gaps: self.gaps.wrapping_sub(then.gaps),
+            dropped: self.dropped.wrapping_sub(then.dropped),
+        }
+    }
+}
+
+/// All counters of a line and its server since the start, or since function 08 last cleared them, in
+/// the order of its sub-functions.
+///
+/// A request is counted before it is served: the one that asks for 0B or 0E is among those it is
+/// told of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// 0B: frames with a good CRC, for whatever unit.

@@ -1,6 +1,8 @@
 //! What the server has decided about a request.
 
-use crate::{Exception, Function, Span};
+use crate::diagnostic::Diagnostic;
+use crate::identification::ReadCode;
+use crate::{Exception, Head, Span};
 
 /// The answer to a request, settled but not yet carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,93 +13,8 @@ pub struct Decision {
     pub work: Work,
     /// How the request fared, for the counters.
     pub outcome: Outcome,
-}
-
-impl Decision {
-    /// Neither reply nor work.
-    pub(crate) const fn silence(outcome: Outcome) -> Self {
-        Self {
-            reply: None,
-            work: Work::None,
-            outcome,
-        }
-    }
-}
-
-/// The start of a reply: all of it for an exception or the echo of a write, unit, function and byte
-/// count for a read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Head {
-    bytes: [u8; Head::CAPACITY],
-    len: u8,
-    body: u8,
-}
-
-impl Head {
-    /// The longest reply that needs no body: unit and PDU of a mask write (V1.1b3 6.16).
-    const CAPACITY: usize = 8;
-
-    /// No reply.
-    pub(crate) const EMPTY: Self = Self {
-        bytes: [0; Self::CAPACITY],
-        len: 0,
-        body: 0,
-    };
-
-    /// How many bytes, without CRC.
-    #[inline]
-    pub(crate) const fn len(&self) -> u8 {
-        self.len
-    }
-
-    /// One byte; 0 beyond the end.
-    #[inline]
-    pub(crate) fn get(&self, index: u16) -> u8 {
-        self.bytes.get(usize::from(index)).copied().unwrap_or(0)
-    }
-
-    /// The bytes of the head, without CRC.
-    #[inline]
-    pub fn as_slice(&self) -> &[u8] {
-        self.bytes.get(..usize::from(self.len)).unwrap_or_default()
-    }
-
-    /// How many bytes the transmitter must be handed as the body; 0: the head is the whole reply.
-    #[inline]
-    pub const fn body_len(&self) -> u8 {
-        self.body
-    }
-
-    /// The reply to a read of `body` bytes.
-    #[inline]
-    pub(crate) const fn read(unit: u8, function: u8, body: u8) -> Self {
-        Self {
-            bytes: [unit, function, body, 0, 0, 0, 0, 0],
-            len: 3,
-            body,
-        }
-    }
-
-    /// The reply to a write: address and value, or address and quantity, as they came.
-    #[inline]
-    pub(crate) const fn echo(unit: u8, function: u8, [a, b, c, d]: [u8; 4]) -> Self {
-        Self {
-            bytes: [unit, function, a, b, c, d, 0, 0],
-            len: 6,
-            body: 0,
-        }
-    }
-
-    /// The reply to a refused request.
-    #[inline]
-    pub(crate) const fn exception(unit: u8, function: u8, exception: Exception) -> Self {
-        let function = function | Function::EXCEPTION;
-        Self {
-            bytes: [unit, function, exception.code(), 0, 0, 0, 0, 0],
-            len: 3,
-            body: 0,
-        }
-    }
+    /// The request was to all units.
+    pub broadcast: bool,
 }
 
 /// The second step of serving a request.
@@ -123,16 +40,60 @@ pub enum Work {
         /// Where they are in the request, counted from the unit address.
         from: u8,
     },
+    /// Write the word that a mask has made of the one before.
+    WriteMasked {
+        /// Where to.
+        address: u16,
+        /// The word.
+        value: u16,
+    },
+    /// Write words as [`WriteWords`](Self::WriteWords) does, then read some into the body.
+    WriteThenRead {
+        /// Where to write.
+        write: Span,
+        /// Where the words are in the request, counted from the unit address.
+        from: u8,
+        /// What to read then.
+        read: Span,
+    },
+    /// Put the exception status into the body.
+    ExceptionStatus,
+    /// Do what function 08 asks for.
+    Diagnose(Diagnostic),
+    /// Put the event counter into the body.
+    EventCounter,
+    /// Put the event log into the body.
+    EventLog,
+    /// Put identity and run indicator into the body.
+    ServerId,
+    /// Put identification objects into the body.
+    Identify {
+        /// Which.
+        code: ReadCode,
+        /// The first of them, if it is known.
+        object: u8,
+    },
 }
 
 impl Work {
-    /// What is left of it when nobody is answered.
+    /// Whether it writes points or registers.
     #[inline]
-    pub(crate) const fn writes_only(self) -> Self {
-        match self {
-            Self::ReadBits(_) | Self::ReadWords(_) => Self::None,
-            other => other,
-        }
+    #[must_use]
+    pub const fn writes(self) -> bool {
+        matches!(
+            self,
+            Self::WriteBits { .. }
+                | Self::WriteWords { .. }
+                | Self::WriteMasked { .. }
+                | Self::WriteThenRead { .. }
+        )
+    }
+
+    /// Whether it may be ordered by a broadcast: "necessarily writing commands" (V1.02 2.1). A
+    /// request for data is none, even if it writes as well (17), and one unit's diagnostics are no
+    /// business of all.
+    pub(crate) const fn can_be_broadcast(self) -> bool {
+        self.writes() && !matches!(self, Self::WriteThenRead { .. })
     }
 }
 
@@ -143,7 +104,11 @@ pub enum Outcome {
     NotForUs,
     /// A function code no request can have (00, 80 and above): silence, counted as unanswered.
     NoRequest,
-    /// Accepted, or a broadcast that has no effect.
+    /// The unit only listens (function 08, sub-function 04): silence, counted as unanswered.
+    NotObeyed,
+    /// A broadcast of what only a single unit can be asked for: no effect.
+    NoEffect,
+    /// Accepted.
     Accepted,
     /// Refused; on a broadcast without saying so.
     Refused(Exception),

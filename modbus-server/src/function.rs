@@ -16,10 +16,26 @@ pub enum Function {
     WriteSingleCoil = 0x05,
     /// 06 (6.6)
     WriteSingleRegister = 0x06,
+    /// 07 (6.7)
+    ReadExceptionStatus = 0x07,
+    /// 08 (6.8)
+    Diagnostics = 0x08,
+    /// 0B (6.9)
+    GetCommEventCounter = 0x0B,
+    /// 0C (6.10)
+    GetCommEventLog = 0x0C,
     /// 0F (6.11)
     WriteMultipleCoils = 0x0F,
     /// 10 (6.12)
     WriteMultipleRegisters = 0x10,
+    /// 11 (6.13)
+    ReportServerId = 0x11,
+    /// 16 (6.16)
+    MaskWriteRegister = 0x16,
+    /// 17 (6.17)
+    ReadWriteMultipleRegisters = 0x17,
+    /// 2B (6.19): of it, 0E, read device identification (6.21)
+    EncapsulatedInterface = 0x2B,
 }
 
 impl Function {
@@ -36,8 +52,16 @@ impl Function {
             0x04 => Self::ReadInputRegisters,
             0x05 => Self::WriteSingleCoil,
             0x06 => Self::WriteSingleRegister,
+            0x07 => Self::ReadExceptionStatus,
+            0x08 => Self::Diagnostics,
+            0x0B => Self::GetCommEventCounter,
+            0x0C => Self::GetCommEventLog,
             0x0F => Self::WriteMultipleCoils,
             0x10 => Self::WriteMultipleRegisters,
+            0x11 => Self::ReportServerId,
+            0x16 => Self::MaskWriteRegister,
+            0x17 => Self::ReadWriteMultipleRegisters,
+            0x2B => Self::EncapsulatedInterface,
             _ => return None,
         })
     }

@@ -8,24 +8,32 @@
 //! A request passes through four hands, each usable and tested by itself:
 //!
 //! ```text
-//!  characters   +---------------+   Adu   +----------------+   Head   +------------------+
-//!  ------------>| rtu::Receiver |-------->| Server::decide |--------->| rtu::Transmitter |--->
-//!  t1.5, t3.5   +---------------+         +----------------+          +------------------+
-//!                       ^                         | Decision                ^
-//!                       |                         v                         |
-//!                       |               +-------------------+   Adu (body)  |
-//!                       +---------------| Server::carry_out |---------------+
-//!                          give_back    +-------------------+
+//!  characters   +----------------+   Adu   +----------------+   Head   +-------------------+
+//!  ------------>| line::Receiver |-------->| Server::decide |--------->| line::Transmitter |--->
+//!  silences     +----------------+         +----------------+          +-------------------+
+//!                        ^                         | Decision                ^
+//!                        |                         v                         |
+//!                        |               +-------------------+   Adu (body)  |
+//!                        +---------------| Server::carry_out |---------------+
+//!                           give_back    +-------------------+
 //! ```
 //!
-//! Serving has two steps so that the reply can start at once: [`Server::decide`] settles *which*
-//! reply it will be and its first bytes, without touching anything; [`Server::carry_out`] then does
-//! the work while those bytes are already on the wire. What takes long to check can be decided
-//! sooner still, in the silence before t3.5 ([`rtu::Receiver::t15`]). The buffers ([`Adu`]) move by
-//! ownership from hand to hand; nothing is copied.
+//! Serving has three steps so that the reply starts at once, however long the request.
+//! [`Server::answers`] looks at a few bytes and tells whether there will be a reply: its first byte,
+//! the unit address, may go. [`Server::decide`] then settles *which* reply it will be and how it
+//! begins, without touching anything, and [`Server::carry_out`] does the work, both while those
+//! bytes are already on the wire. The buffers ([`Adu`]) move by ownership from hand to hand;
+//! nothing is copied.
+//!
+//! RTU and ASCII mode differ in the [line](mod@line) alone: one [`line::Receiver`] and one
+//! [`line::Transmitter`] speak both.
+//!
+//! What a broadcast may do: write, by functions 05, 06, 0F, 10 and 16. All else has no effect, also
+//! 17, for which a broadcast's silence would lose the read, and 08, lest one frame silences all
+//! units of a line.
 //!
 //! ```
-//! use modbus_server::rtu::{Faults, Next, Receiver, Transmitter};
+//! use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter};
 //! use modbus_server::{Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Words, WordsOut};
 //!
 //! /// Ten registers, no bit points.
@@ -59,22 +67,24 @@
 //! }
 //!
 //! let mut registers = Registers([0x1111; 10]);
-//! let mut server = Server::new(17);
+//! let mut server = Server::new(17, Framing::Rtu);
 //! let (mut one, mut two) = (Adu::new(), Adu::new());
-//! let mut receiver = Receiver::new(17, false);
+//! let mut receiver = Receiver::rtu(17, false);
 //! receiver.give_back(&mut one);
 //! receiver.give_back(&mut two);
 //!
-//! receiver.t35(); // the line has been silent: the receiver listens from here on
+//! receiver.close(); // the line has been silent: the receiver listens from here on
 //! for byte in [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B] {
 //!     receiver.character(byte, Faults::NONE);
 //! }
-//! let closed = receiver.t35().expect("a good frame for this unit");
+//! let closed = receiver.close().expect("a good frame for this unit");
 //!
+//! assert!(server.answers(closed.adu));
+//! let mut transmitter = Transmitter::open(server.unit(), server.framing());
+//! assert_eq!(transmitter.next(), Next::Byte(0x11)); // goes before anything is decided
 //! let decision = server.decide(closed.adu, &registers);
-//! let mut transmitter = Transmitter::new(decision.reply.expect("not a broadcast"));
-//! assert_eq!(transmitter.next(), Next::Byte(0x11)); // the first byte goes before the work is done
-//! server.commit(&decision);
+//! transmitter.head(decision.reply.expect("it is answered"));
+//! server.commit(&decision, &closed.line);
 //! server.carry_out(&decision, closed.adu, &mut registers);
 //! if let Some(adu) = transmitter.body(closed.adu) {
 //!     receiver.give_back(adu); // an exception or an echo has no body
@@ -102,11 +112,15 @@ mod bits;
 mod counters;
 mod crc;
 mod decision;
+mod diagnostic;
+mod events;
 mod exception;
 mod function;
+mod head;
+mod identification;
+pub mod line;
 mod model;
 mod pdu;
-pub mod rtu;
 mod server;
 mod span;
 mod words;
@@ -114,9 +128,12 @@ mod words;
 pub use adu::Adu;
 pub use bits::{Bits, BitsOut};
 pub use counters::{Counters, LineCounters};
-pub use decision::{Decision, Head, Outcome, Work};
+pub use decision::{Decision, Outcome, Work};
+pub use diagnostic::Diagnostic;
 pub use exception::Exception;
 pub use function::Function;
+pub use head::Head;
+pub use identification::ReadCode;
 pub use model::DataModel;
 pub use server::Server;
 pub use span::Span;

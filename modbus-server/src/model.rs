@@ -4,7 +4,8 @@ use crate::{Bits, BitsOut, Exception, Span, Words, WordsOut};
 
 /// The points and registers of the device.
 ///
-/// Bits are read alike by functions 01 and 02, words by 03 and 04. The server has checked quantity,
+/// Bits are read alike by functions 01 and 02, words by 03 and 04; function 16 reads a word to write
+/// it, and 17 reads words after writing some. The server has checked quantity,
 /// byte count and the form of values before it asks; a [`Span`] never wraps. The `check_` methods
 /// settle the rest, in the order of V1.1b3: address (02), then value range (03), then the state of
 /// the device (04, 06). They change nothing and may be called for a request that is then not
@@ -21,7 +22,7 @@ pub trait DataModel {
     /// The exception to answer with.
     fn check_read_bits(&self, span: Span) -> Result<(), Exception>;
 
-    /// May these words be read (functions 03 and 04; up to 125)?
+    /// May these words be read (functions 03, 04 and 17; up to 125)?
     ///
     /// # Errors
     /// The exception to answer with.
@@ -33,7 +34,7 @@ pub trait DataModel {
     /// The exception to answer with; then nothing is written.
     fn check_write_bits(&self, span: Span, bits: Bits<'_>) -> Result<(), Exception>;
 
-    /// May these words be written (functions 06 and 10; up to 123)? `words` holds as many as
+    /// May these words be written (functions 06, 10, 16 and 17; up to 123)? `words` holds as many as
     /// `span`.
     ///
     /// # Errors
@@ -51,4 +52,38 @@ pub trait DataModel {
 
     /// Writes every word of `span`.
     fn write_words(&mut self, span: Span, words: Words<'_>);
+
+    /// The eight bits of function 07 (V1.1b3 6.7), which are the device's own to name.
+    fn exception_status(&self) -> u8 {
+        0
+    }
+
+    /// The diagnostic register, function 08 sub-function 02 (V1.1b3 6.8): the device's own as well.
+    /// It tells a state, not past events: clearing counters does not change it.
+    fn diagnostic_register(&self) -> u16 {
+        0
+    }
+
+    /// The identity of function 11 (V1.1b3 6.13), up to 250 bytes; what is beyond is cut off. The
+    /// standard leaves its length to the device, and many masters look for the run indicator in
+    /// the second byte of the reply's data: one byte serves them all.
+    fn server_id(&self) -> &[u8] {
+        &[]
+    }
+
+    /// The run indicator of function 11: FF, or 00 for a device that is not doing its work.
+    fn is_running(&self) -> bool {
+        true
+    }
+
+    /// An object of the device identification, function 2B/0E (V1.1b3 6.21): 00 vendor, 01 product
+    /// code, 02 revision, all or none of them; 03 URL, 04 product, 05 model, 06 application, if
+    /// there are; from 80 on the device's own, without a gap. Never asked for 07 to 7F. Up to 244
+    /// bytes of text; what is beyond is cut off.
+    ///
+    /// Without object 00 the device has no such function.
+    fn identification(&self, object: u8) -> Option<&[u8]> {
+        let _ = object;
+        None
+    }
 }

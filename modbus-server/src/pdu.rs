@@ -1,6 +1,9 @@
 //! Decoding of request PDUs: quantities, byte counts, lengths and value forms, all of them
 //! exception 03, then the wrap at 16 bits (02). What the addresses mean is the model's business.
 
+use crate::diagnostic::Diagnostic;
+use crate::identification;
+use crate::line::Framing;
 use crate::{Bits, Exception, Function, Span, Words};
 
 /// The most bits one read may ask for (V1.1b3 6.1).
@@ -11,11 +14,15 @@ const MAX_READ_WORDS: u16 = 125;
 const MAX_WRITE_BITS: u16 = 1968;
 /// The most words one write may hold (V1.1b3 6.12).
 const MAX_WRITE_WORDS: u16 = 123;
+/// The most words one write with a read may hold (V1.1b3 6.17).
+const MAX_WRITE_WORDS_AND_READ: u16 = 121;
 
 /// Where the value of a single write lies, counted from the unit address.
 pub(crate) const SINGLE_FROM: u8 = 4;
 /// Where the values of a multiple write lie, counted from the unit address.
 pub(crate) const MULTIPLE_FROM: u8 = 7;
+/// Where the values of a write with a read lie, counted from the unit address.
+pub(crate) const WITH_READ_FROM: u8 = 11;
 
 /// A request whose form is right.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +39,24 @@ pub(crate) enum Request<'a> {
         words: Words<'a>,
         from: u8,
     },
+    MaskWord {
+        address: u16,
+        and: u16,
+        or: u16,
+    },
+    WriteThenRead {
+        write: Span,
+        words: Words<'a>,
+        from: u8,
+        read: Span,
+    },
+    ExceptionStatus,
+    Diagnose(Diagnostic),
+    EventCounter,
+    EventLog,
+    ServerId,
+    /// What follows the MEI type: the rest depends on what objects there are.
+    Identify(&'a [u8]),
 }
 
 impl<'a> Request<'a> {
@@ -39,7 +64,11 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// The exception to answer with.
-    pub(crate) fn decode(function: u8, fields: &'a [u8]) -> Result<Self, Exception> {
+    pub(crate) fn decode(
+        function: u8,
+        fields: &'a [u8],
+        framing: Framing,
+    ) -> Result<Self, Exception> {
         match Function::from_code(function).ok_or(Exception::IllegalFunction)? {
             Function::ReadCoils | Function::ReadDiscreteInputs => {
                 read(fields, MAX_READ_BITS).map(Self::ReadBits)
@@ -51,6 +80,18 @@ impl<'a> Request<'a> {
             Function::WriteSingleRegister => write_single_word(fields),
             Function::WriteMultipleCoils => write_bits(fields),
             Function::WriteMultipleRegisters => write_words(fields),
+            Function::MaskWriteRegister => mask_word(fields),
+            Function::ReadWriteMultipleRegisters => write_then_read(fields),
+            Function::Diagnostics => Diagnostic::decode(fields, framing).map(Self::Diagnose),
+            Function::ReadExceptionStatus => alone(fields, Self::ExceptionStatus),
+            Function::GetCommEventCounter => alone(fields, Self::EventCounter),
+            Function::GetCommEventLog => alone(fields, Self::EventLog),
+            Function::ReportServerId => alone(fields, Self::ServerId),
+            Function::EncapsulatedInterface => match fields {
+                [identification::MEI_TYPE, fields @ ..] => Ok(Self::Identify(fields)),
+                [] => Err(Exception::IllegalDataValue),
+                _ => Err(Exception::IllegalFunction),
+            },
         }
     }
 }
@@ -128,6 +169,49 @@ fn write_words(fields: &[u8]) -> Result<Request<'_>, Exception> {
     })
 }
 
+/// Address, AND mask, OR mask.
+fn mask_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
+    match *fields {
+        [a, b, c, d, e, f] => Ok(Request::MaskWord {
+            address: u16::from_be_bytes([a, b]),
+            and: u16::from_be_bytes([c, d]),
+            or: u16::from_be_bytes([e, f]),
+        }),
+        _ => Err(Exception::IllegalDataValue),
+    }
+}
+
+/// Address and quantity to read, then as [`write_words`]. Both quantities come before the end of
+/// either range.
+fn write_then_read(fields: &[u8]) -> Result<Request<'_>, Exception> {
+    let (to_read, to_write) = fields
+        .split_first_chunk::<4>()
+        .ok_or(Exception::IllegalDataValue)?;
+    let (start, quantity, data) = multiple(to_write)?;
+    if data.len() != usize::from(quantity) * 2 {
+        return Err(Exception::IllegalDataValue);
+    }
+    let read = read(to_read, MAX_READ_WORDS);
+    if read == Err(Exception::IllegalDataValue) {
+        return Err(Exception::IllegalDataValue);
+    }
+    Ok(Request::WriteThenRead {
+        write: span(start, quantity, MAX_WRITE_WORDS_AND_READ)?,
+        words: Words::new(data),
+        from: WITH_READ_FROM,
+        read: read?,
+    })
+}
+
+/// A function without fields.
+fn alone<'a>(fields: &[u8], request: Request<'a>) -> Result<Request<'a>, Exception> {
+    if fields.is_empty() {
+        Ok(request)
+    } else {
+        Err(Exception::IllegalDataValue)
+    }
+}
+
 /// Address, quantity and data of a multiple write whose byte count is true.
 fn multiple(fields: &[u8]) -> Result<(u16, u16, &[u8]), Exception> {
     let &[
@@ -172,9 +256,20 @@ mod tests {
             fields[4] = count * 2;
             fields
         };
-        let decode = |fields: &[u8]| Request::decode(0x10, fields).map(|_| ());
+        let decode = |fields: &[u8]| Request::decode(0x10, fields, Framing::Rtu).map(|_| ());
         assert_eq!(decode(&fields(124)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(123)[..5 + 246]), Ok(()));
+
+        let fields = |count: u8| {
+            let mut fields = [0; 9 + 244];
+            fields[3] = 1;
+            fields[7] = count;
+            fields[8] = count * 2;
+            fields
+        };
+        let decode = |fields: &[u8]| Request::decode(0x17, fields, Framing::Rtu).map(|_| ());
+        assert_eq!(decode(&fields(122)), Err(Exception::IllegalDataValue));
+        assert_eq!(decode(&fields(121)[..9 + 242]), Ok(()));
     }
 
     #[test]
@@ -182,16 +277,28 @@ mod tests {
         // Without the unit address and the function code.
         let [single, multiple] = [SINGLE_FROM, MULTIPLE_FROM].map(|from| usize::from(from) - 2);
         let fields = [0, 9, 0xFF, 0x00];
-        let Ok(Request::WriteWords { span, words, from }) = Request::decode(0x06, &fields) else {
+        let Ok(Request::WriteWords { span, words, from }) =
+            Request::decode(0x06, &fields, Framing::Rtu)
+        else {
             panic!("function 06");
         };
         assert_eq!((span, usize::from(from) - 2), (Span::single(9), single));
         assert!(words.iter().eq(Words::new(&fields[single..]).iter()));
         let fields = [0, 9, 0, 2, 1, 0b10];
-        let Ok(Request::WriteBits { bits, from, .. }) = Request::decode(0x0F, &fields) else {
+        let Ok(Request::WriteBits { bits, from, .. }) =
+            Request::decode(0x0F, &fields, Framing::Rtu)
+        else {
             panic!("function 0F");
         };
         assert_eq!(usize::from(from) - 2, multiple);
         assert!(bits.iter().eq([false, true]));
+        let fields = [0, 9, 0, 2, 0, 7, 0, 1, 2, 0x12, 0x34];
+        let Ok(Request::WriteThenRead { words, from, .. }) =
+            Request::decode(0x17, &fields, Framing::Rtu)
+        else {
+            panic!("function 17");
+        };
+        assert!(words.iter().eq([0x1234]));
+        assert_eq!(fields[usize::from(from) - 2..], [0x12, 0x34]);
     }
 }

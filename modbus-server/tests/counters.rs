@@ -3,8 +3,8 @@
 mod common;
 
 use common::{Points, UNIT, Unit, frame, pdu};
-use modbus_server::rtu::{Faults, Receiver};
-use modbus_server::{Adu, Counters, Exception};
+use modbus_server::line::{Faults, Framing, Receiver};
+use modbus_server::{Adu, Counters, Exception, Server};
 
 fn unit() -> Unit {
     Unit::new(Points::new(4, 4))
@@ -78,9 +78,9 @@ fn each_request_moves_the_counters_it_should() {
 fn counters_wrap() {
     let mut unit = unit();
     for _ in 0..0x1_0002 {
-        unit.receiver.character(0, Faults::OVERRUN);
-        unit.receiver.t15();
-        unit.receiver.character(0, Faults::NONE);
+        unit.character(0, Faults::OVERRUN);
+        unit.receiver.pause();
+        unit.character(0, Faults::NONE);
         assert_eq!(unit.silence(), None);
         unit.must_answer();
     }
@@ -90,8 +90,8 @@ fn counters_wrap() {
 
 /// A receiver that has heard its first silence, and has no buffer.
 fn receiver() -> Receiver<'static> {
-    let mut receiver = Receiver::new(UNIT, false);
-    receiver.t35();
+    let mut receiver = Receiver::rtu(UNIT, false);
+    receiver.close();
     receiver
 }
 
@@ -111,23 +111,23 @@ fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     receiver.give_back(buffer());
     hear(&mut receiver, &ours);
-    let first = receiver.t35().expect("it had a buffer").adu;
+    let first = receiver.close().expect("it had a buffer").adu;
 
     hear(&mut receiver, &ours);
-    assert!(receiver.t15().is_none());
-    assert!(receiver.t35().is_none());
+    receiver.pause();
+    assert!(receiver.close().is_none());
     assert_eq!(receiver.counters().dropped, 1);
     // What would not have been served anyway is not counted as dropped.
     hear(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
-    assert!(receiver.t35().is_none());
+    assert!(receiver.close().is_none());
     hear(&mut receiver, &ours[..7]);
-    assert!(receiver.t35().is_none());
+    assert!(receiver.close().is_none());
     hear(&mut receiver, &frame(UNIT, &[]));
-    assert!(receiver.t35().is_none());
+    assert!(receiver.close().is_none());
     hear(&mut receiver, &frame(UNIT, &[0x63; 300]));
-    assert!(receiver.t35().is_none());
+    assert!(receiver.close().is_none());
     receiver.character(UNIT, Faults::PARITY);
-    assert!(receiver.t35().is_none());
+    assert!(receiver.close().is_none());
     let line = *receiver.counters();
     assert_eq!(
         (line.dropped, line.bus_messages, line.communication_errors),
@@ -136,13 +136,17 @@ fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
 
     receiver.give_back(first);
     hear(&mut receiver, &ours);
-    assert_eq!(
-        receiver.t35().expect("a buffer again").adu.as_slice(),
-        &ours[..6]
-    );
+    let closed = receiver.close().expect("a buffer again");
+    assert_eq!(closed.adu.as_slice(), &ours[..6]);
 
-    let counters = modbus_server::Server::new(UNIT).counters(&line);
-    assert_eq!((counters.busy, counters.no_response), (1, 1));
+    let mut server = Server::new(UNIT, Framing::Rtu);
+    let decision = server.decide(closed.adu, &Points::new(4, 4));
+    server.commit(&decision, &closed.line);
+    let counters = server.counters();
+    assert_eq!(
+        (counters.busy, counters.no_response, counters.unit_messages),
+        (1, 1, 2)
+    );
 }
 
 #[test]
@@ -154,12 +158,15 @@ fn buffers_that_come_back_in_the_middle_of_a_frame_wait_for_the_next() {
         receiver.give_back(buffer());
         receiver.give_back(buffer());
         hear(&mut receiver, &ours[at..]);
-        assert!(receiver.t15().is_none());
-        assert!(receiver.t35().is_none());
+        receiver.pause();
+        assert!(receiver.close().is_none());
         assert_eq!(receiver.counters().dropped, 1);
         for _ in 0..2 {
             hear(&mut receiver, &ours);
-            assert_eq!(receiver.t35().expect("a buffer").adu.as_slice(), &ours[..6]);
+            assert_eq!(
+                receiver.close().expect("a buffer").adu.as_slice(),
+                &ours[..6]
+            );
         }
     }
 }
@@ -171,9 +178,9 @@ fn two_requests_can_be_held_at_once() {
     receiver.give_back(buffer());
     let [one, two] = [1, 2].map(|count| frame(UNIT, &pdu(0x03, &[0, count])));
     hear(&mut receiver, &one);
-    let first = receiver.t35().expect("the first");
+    let first = receiver.close().expect("the first");
     hear(&mut receiver, &two);
-    let second = receiver.t35().expect("the second");
+    let second = receiver.close().expect("the second");
     assert_eq!(first.adu.as_slice(), &one[..6]);
     assert_eq!(second.adu.as_slice(), &two[..6]);
 }
@@ -184,10 +191,10 @@ fn frames_for_others_cost_no_buffer() {
     receiver.give_back(buffer());
     for _ in 0..5 {
         hear(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
-        assert!(receiver.t35().is_none());
+        assert!(receiver.close().is_none());
     }
     hear(&mut receiver, &frame(UNIT, &pdu(0x03, &[0, 1])));
-    assert!(receiver.t35().is_some());
+    assert!(receiver.close().is_some());
 }
 
 #[test]
@@ -197,10 +204,10 @@ fn a_third_buffer_does_not_disturb_a_frame() {
     receiver.give_back(buffer());
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     hear(&mut receiver, &ours);
-    let first = receiver.t35().expect("the first").adu;
+    let first = receiver.close().expect("the first").adu;
     hear(&mut receiver, &ours[..3]);
     receiver.give_back(first);
     receiver.give_back(buffer());
     hear(&mut receiver, &ours[3..]);
-    assert_eq!(receiver.t35().expect("whole").adu.as_slice(), &ours[..6]);
+    assert_eq!(receiver.close().expect("whole").adu.as_slice(), &ours[..6]);
 }

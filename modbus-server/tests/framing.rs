@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Points, UNIT, Unit, crc, frame, pdu};
-use modbus_server::rtu::{Faults, Receiver};
+use modbus_server::line::{Faults, Receiver};
 
 fn unit() -> Unit {
     Unit::new(Points::new(64, 64))
@@ -65,7 +65,7 @@ fn one_to_three_bytes_are_noise_even_with_a_good_crc() {
 
 #[test]
 fn four_bytes_are_a_frame() {
-    assert_eq!(unit().request(&[0x07]).unwrap(), [0x87, 0x01]);
+    assert_eq!(unit().request(&[0x07]).unwrap(), [0x07, 0x6D]);
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
             let mut unit = unit();
             for (index, byte) in request().into_iter().enumerate() {
                 let faults = if index == at { faults } else { Faults::NONE };
-                unit.receiver.character(byte, faults);
+                unit.character(byte, faults);
             }
             assert_eq!(unit.silence(), None);
             let counters = unit.counters();
@@ -142,19 +142,19 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
 
 #[test]
 fn power_up_in_the_middle_of_traffic_waits_for_silence() {
-    let mut receiver = Receiver::new(UNIT, false);
+    let mut receiver = Receiver::rtu(UNIT, false);
     receiver.give_back(Box::leak(Box::default()));
     let mut hear = |bytes: &[u8]| {
         bytes
             .iter()
-            .for_each(|b| receiver.character(*b, Faults::NONE))
+            .for_each(|byte| receiver.character(*byte, Faults::NONE));
     };
     hear(&request());
     hear(&[0x00; 300]);
     hear(&request());
-    assert!(receiver.t15().is_none());
+    receiver.pause();
     receiver.character(0, Faults::FRAMING);
-    assert!(receiver.t35().is_none(), "this silence is the first");
+    assert!(receiver.close().is_none(), "this silence is the first");
     assert_eq!(
         *receiver.counters(),
         Default::default(),
@@ -163,15 +163,15 @@ fn power_up_in_the_middle_of_traffic_waits_for_silence() {
     request()
         .iter()
         .for_each(|byte| receiver.character(*byte, Faults::NONE));
-    assert!(receiver.t35().is_some());
+    assert!(receiver.close().is_some());
 }
 
 #[test]
 fn silence_without_a_frame_is_nothing() {
     let mut unit = unit();
     for _ in 0..3 {
-        assert!(unit.receiver.t15().is_none());
-        assert!(unit.receiver.t35().is_none());
+        unit.receiver.pause();
+        assert!(unit.receiver.close().is_none());
     }
     assert_eq!(*unit.receiver.counters(), Default::default());
     unit.must_answer();
@@ -182,9 +182,9 @@ fn a_gap_above_t15_is_counted_and_tolerated() {
     let mut unit = unit();
     for (index, byte) in request().into_iter().enumerate() {
         if index > 0 {
-            assert!(unit.receiver.t15().is_none());
+            unit.receiver.pause();
         }
-        unit.receiver.character(byte, Faults::NONE);
+        unit.character(byte, Faults::NONE);
     }
     assert!(unit.silence().is_some());
     assert_eq!(unit.counters().gaps, 7);
@@ -196,7 +196,7 @@ fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
     for at in 1..request().len() {
         let mut unit = Unit::with(UNIT, true, Points::new(64, 64));
         unit.characters(&request()[..at]);
-        assert!(unit.receiver.t15().is_none());
+        unit.receiver.pause();
         unit.characters(&request()[at..]);
         assert_eq!(unit.silence(), None);
         let counters = unit.counters();
@@ -216,20 +216,12 @@ fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
     let mut unit = unit();
     let first = frame(UNIT, &pdu(0x06, &[1, 0x0BAD]));
     unit.characters(&first);
-    let ahead = unit.receiver.t15().expect("complete as it stands");
-    assert_eq!(
-        ahead.as_slice(),
-        &first[..first.len() - 2],
-        "without its CRC"
-    );
-    assert_eq!(
-        unit.receiver.t15().expect("still").as_slice(),
-        &first[..first.len() - 2]
-    );
+    unit.receiver.pause();
+    unit.receiver.pause();
     let whole = [&first[..], &[0x99]].concat();
     let end = crc(&whole);
     unit.characters(&[0x99]);
-    assert!(unit.receiver.t15().is_none());
+    unit.receiver.pause();
     unit.characters(&end);
     let reply = unit.silence().expect("a good CRC");
     assert_eq!(
@@ -237,15 +229,15 @@ fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
         [0x86, 0x03],
         "the PDU is longer than function 06 has it"
     );
-    assert_eq!(unit.points.words[1], 0, "what was seen at t1.5 is void");
+    assert_eq!(unit.points.words[1], 0);
     assert_eq!(unit.counters().gaps, 2);
 }
 
 #[test]
-fn a_frame_of_256_bytes_can_be_seen_at_t15_and_go_on() {
+fn a_frame_of_256_bytes_that_goes_on_is_too_long() {
     let mut unit = unit();
     unit.characters(&frame(UNIT, &[&[0x63][..], &[0x55; 252]].concat()));
-    assert_eq!(unit.receiver.t15().unwrap().len(), 254);
+    unit.receiver.pause();
     unit.characters(&[0]);
     assert_eq!(unit.silence(), None);
     assert_eq!(unit.counters().communication_errors, 1);
@@ -256,7 +248,7 @@ fn a_frame_of_256_bytes_can_be_seen_at_t15_and_go_on() {
 fn t35_alone_closes_a_frame() {
     let mut unit = unit();
     unit.characters(&request());
-    let closed = unit.receiver.t35().expect("closed");
+    let closed = unit.receiver.close().expect("closed");
     assert_eq!(closed.adu.as_slice(), &request()[..6]);
     assert_eq!(closed.line.bus_messages, 1);
 }
@@ -268,24 +260,4 @@ fn after_its_own_reply_the_unit_listens_at_once() {
     unit.receiver.resume();
     unit.must_answer();
     assert_eq!(unit.counters().communication_errors, 0);
-}
-
-#[test]
-fn nothing_is_lent_at_t15_that_would_not_be_served_at_t35() {
-    let mut strict = Unit::with(UNIT, true, Points::new(64, 64));
-    strict.characters(&request()[..4]);
-    strict.receiver.t15();
-    strict.characters(&request()[4..]);
-    assert!(strict.receiver.t15().is_none(), "torn");
-    assert!(strict.receiver.t35().is_none());
-
-    let mut unit = unit();
-    unit.receiver.character(UNIT, Faults::PARITY);
-    unit.characters(&request()[1..]);
-    assert!(unit.receiver.t15().is_none(), "spoiled");
-    assert!(unit.receiver.t35().is_none());
-
-    unit.characters(&frame(UNIT + 1, &pdu(0x03, &[0, 1])));
-    assert!(unit.receiver.t15().is_none(), "another unit's");
-    assert!(unit.receiver.t35().is_none());
 }

@@ -3,9 +3,11 @@
 
 mod common;
 
-use common::reference::{Reference, serve};
-use common::{Points, UNIT, Unit, frame, pack, pdu, write_bits, write_words};
-use modbus_server::rtu::Faults;
+use common::hearing::Ear;
+use common::reference::Reference;
+use common::{Points, UNIT, Unit, framed, pack, pdu, write_bits, write_then_read, write_words};
+use modbus_server::Exception;
+use modbus_server::line::{Faults, Framing, Width};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -14,17 +16,27 @@ use proptest::prelude::*;
 const BITS: usize = 2010;
 const WORDS: usize = 130;
 
+/// What may keep the device from doing what is right otherwise.
+const STATES: &[Exception] = &[
+    Exception::ServerDeviceFailure,
+    Exception::Acknowledge,
+    Exception::ServerDeviceBusy,
+    Exception::NegativeAcknowledge,
+];
+
 fn points() -> impl Strategy<Value = Points> {
     (
         vec(any::<bool>(), BITS),
         vec(any::<u16>(), WORDS),
         100_u32..140,
+        prop::option::weighted(0.2, prop::sample::select(STATES)),
     )
-        .prop_map(|(bits, words, read_only_from)| Points {
+        .prop_map(|(bits, words, read_only_from, state)| Points {
             bits,
             words,
             read_only_from,
-            state: None,
+            state,
+            ..Points::new(0, 0)
         })
 }
 
@@ -58,7 +70,20 @@ fn request() -> BoxedStrategy<Vec<u8>> {
     let bits = (address(), vec(any::<bool>(), 0..40)).prop_map(|(a, b)| write_bits(a, &b));
     let words = (address(), vec(0_u16..0xFFF8, 0..124)).prop_map(|(a, w)| write_words(a, &w));
     let many = (0_u16..30, vec(any::<bool>(), 1950..1968)).prop_map(|(a, b)| write_bits(a, &b));
-    let shaped = prop_oneof![3 => read, 2 => write, 2 => bits, 2 => words, 1 => many].boxed();
+    let mask = (address(), any::<u16>(), any::<u16>()).prop_map(|(a, b, c)| pdu(0x16, &[a, b, c]));
+    let both = (address(), quantity(), address(), vec(0_u16..0xFFF8, 0..122))
+        .prop_map(|(a, q, b, w)| write_then_read(a, q, b, &w));
+    let alone = prop::sample::select(&[0x07, 0x0B, 0x0C, 0x11][..]).prop_map(|f| vec![f]);
+    let data = prop_oneof![4 => Just(0_u16), 1 => Just(0xFF00), 1 => 0x2000_u16..0x4000, 1 => any::<u16>()];
+    let diagnose = (0_u16..0x17, data).prop_map(|(sub, data)| pdu(0x08, &[sub, data]));
+    let echo = vec(any::<u8>(), 0..250).prop_map(|data| [&[0x08, 0, 0][..], &data].concat());
+    let object = prop_oneof![0_u8..9, 0x7E_u8..0x88];
+    let identify = (0_u8..6, object).prop_map(|(code, id)| vec![0x2B, 0x0E, code, id]);
+    let shaped = prop_oneof![
+        3 => read, 2 => write, 2 => bits, 2 => words, 1 => many, 1 => mask, 2 => both,
+        2 => alone, 4 => diagnose, 1 => echo, 2 => identify,
+    ]
+    .boxed();
     let bent = (shaped.clone(), any::<prop::sample::Index>(), any::<u8>());
     let bent = bent.prop_map(|(mut pdu, at, byte)| {
         let at = at.index(pdu.len());
@@ -87,17 +112,18 @@ enum Event {
 }
 
 /// Stretches of traffic: good frames, spoiled ones, noise.
-fn traffic() -> BoxedStrategy<Vec<Event>> {
+fn traffic(framing: Framing) -> BoxedStrategy<Vec<Event>> {
     let unit = prop_oneof![6 => Just(UNIT), 2 => Just(0), 1 => any::<u8>()];
     let whole = (unit, request())
-        .prop_map(|(unit, pdu)| frame(unit, &pdu))
+        .prop_map(move |(unit, pdu)| framed(framing, unit, &pdu))
         .boxed();
     let flipped = (whole.clone(), any::<prop::sample::Index>()).prop_map(|(mut bytes, bit)| {
         let bit = bit.index(bytes.len() * 8);
         bytes[bit / 8] ^= 1 << (bit % 8);
         bytes
     });
-    let noise = vec(any::<u8>(), 0..300);
+    let likely = prop::sample::select(&b":0123456789ABCDEF\r\n#af"[..]);
+    let noise = vec(prop_oneof![1 => any::<u8>(), 2 => likely], 0..600);
     let stretch = prop_oneof![
         5 => whole.clone().prop_map(|bytes| vec![Event::Bytes(bytes)]),
         1 => flipped.prop_map(|bytes| vec![Event::Bytes(bytes)]),
@@ -117,6 +143,18 @@ fn traffic() -> BoxedStrategy<Vec<Event>> {
         .boxed()
 }
 
+fn unit_and_framing(ascii: bool, strict: bool, points: Points) -> (Unit, Framing) {
+    if ascii {
+        (Unit::ascii(Width::Eight, points), Framing::ASCII)
+    } else {
+        (Unit::with(UNIT, strict, points), Framing::Rtu)
+    }
+}
+
+fn counters(reference: &Reference) -> [u16; 9] {
+    reference.counters
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 2000,
@@ -127,13 +165,21 @@ proptest! {
     #[test]
     fn requests_are_served_as_by_the_reference(
         start in points(),
-        requests in vec(request(), 1..6),
+        ascii in any::<bool>(),
+        requests in vec((prop::bool::weighted(0.1), request()), 1..12),
     ) {
-        let mut unit = Unit::new(start.clone());
-        let mut reference = start;
-        for pdu in requests {
-            prop_assert_eq!(unit.request(&pdu), serve(&mut reference, &pdu), "{:02X?}", pdu);
-            prop_assert_eq!(&unit.points, &reference, "{:02X?}", pdu);
+        let (mut unit, framing) = unit_and_framing(ascii, false, start.clone());
+        let mut reference = Reference::new(framing, start);
+        for (broadcast, pdu) in requests {
+            let to = if broadcast { 0 } else { UNIT };
+            let reply = unit.raw(&framed(reference.framing, to, &pdu));
+            prop_assert_eq!(reply, reference.good(to, &pdu, false), "{:02X?}", pdu);
+            prop_assert_eq!(&unit.points, &reference.points, "{:02X?}", pdu);
+            prop_assert_eq!(unit.server.framing(), reference.framing);
+            prop_assert_eq!(unit.server.is_listen_only(), reference.listening);
+            if !reference.listening {
+                prop_assert_eq!(unit.counters().as_words(), counters(&reference));
+            }
         }
     }
 
@@ -141,45 +187,68 @@ proptest! {
     fn traffic_is_met_as_by_the_reference(
         start in points(),
         strict in any::<bool>(),
-        traffic in traffic(),
+        (ascii, traffic) in any::<bool>().prop_flat_map(|ascii| {
+            let framing = if ascii { Framing::ASCII } else { Framing::Rtu };
+            (Just(ascii), traffic(framing))
+        }),
     ) {
-        let mut unit = Unit::with(UNIT, strict, start.clone());
-        let mut reference = Reference::new(start, strict);
+        let (mut unit, framing) = unit_and_framing(ascii, strict, start.clone());
+        let mut ear = Ear::new(framing, start, strict);
+        let mut replies = (Vec::new(), Vec::new());
         for event in traffic {
             match event {
                 Event::Bytes(bytes) => {
-                    unit.characters(&bytes);
-                    bytes.iter().for_each(|byte| reference.character(*byte, false));
+                    for byte in bytes {
+                        unit.character(byte, Faults::NONE);
+                        replies.0.extend(unit.take_said());
+                        replies.1.extend(ear.character(byte, 0));
+                    }
                 }
                 Event::Faulty(byte, faults) => {
-                    unit.receiver.character(byte, Faults::from_bits(faults));
-                    reference.character(byte, faults != 0);
+                    unit.character(byte, Faults::from_bits(faults));
+                    replies.0.extend(unit.take_said());
+                    replies.1.extend(ear.character(byte, faults));
                 }
                 Event::Pause => {
-                    unit.receiver.t15();
-                    reference.pause();
+                    unit.receiver.pause();
+                    ear.pause();
                 }
-                Event::Silence => prop_assert_eq!(unit.silence(), reference.silence()),
+                Event::Silence => {
+                    replies.0.extend(unit.silence());
+                    replies.1.extend(ear.silence());
+                }
             }
+            prop_assert_eq!(&replies.0, &replies.1);
         }
-        prop_assert_eq!(unit.silence(), reference.silence());
-        prop_assert_eq!(&unit.points, &reference.points);
-        let counters = unit.counters();
-        prop_assert_eq!(counters.bus_messages, reference.bus_messages);
-        prop_assert_eq!(counters.communication_errors, reference.communication_errors);
-        prop_assert_eq!(counters.gaps, reference.gaps);
-        prop_assert_eq!(counters.busy, 0);
+        prop_assert_eq!(unit.silence(), ear.silence());
+        prop_assert_eq!(&unit.points, &ear.server.points);
+        // One request more, for the counters are told with requests; a restart, if nothing else is
+        // obeyed. The log tells of all that went before.
+        let mut last = vec![vec![0x0C]];
+        if ear.server.listening {
+            last.insert(0, vec![0x08, 0x00, 0x01, 0x00, 0x00]);
+        }
+        for pdu in last {
+            let reply = unit.raw(&framed(ear.server.framing, UNIT, &pdu));
+            prop_assert_eq!(reply, ear.server.good(UNIT, &pdu, false));
+            prop_assert_eq!(unit.counters().as_words(), counters(&ear.server));
+        }
+        unit.points.state = None;
         unit.must_answer();
     }
 
     #[test]
-    fn noise_is_not_answered(noise in vec(vec(any::<u8>(), 0..300), 0..20)) {
+    fn noise_is_not_answered(
+        ascii in any::<bool>(),
+        noise in vec(vec(any::<u8>(), 0..300), 0..20),
+    ) {
         // A chance of 2^-16 apiece is left that noise has a good CRC; the reference would agree.
-        let mut unit = Unit::new(Points::new(BITS, WORDS));
-        let mut reference = Reference::new(unit.points.clone(), false);
+        let (mut unit, framing) = unit_and_framing(ascii, false, Points::new(BITS, WORDS));
+        let mut ear = Ear::new(framing, unit.points.clone(), false);
         for bytes in noise {
-            bytes.iter().for_each(|byte| reference.character(*byte, false));
-            prop_assert_eq!(unit.raw(&bytes), reference.silence());
+            let mut reply = bytes.iter().find_map(|byte| ear.character(*byte, 0));
+            reply = reply.or(ear.silence());
+            prop_assert_eq!(unit.raw(&bytes), reply);
         }
         unit.must_answer();
     }

@@ -24,7 +24,7 @@ block! {
     FAULT_ADDRESS "fault address": 0x0268 x 2, "", READ, &[];
     /// Uptime at the fault, high word first
     UPTIME "uptime at the fault": 0x026A x 2, "s", READ, &[];
-    /// The tasks that had left no mark when the watchdog bit. Bit 0 line, 1 serve, 2 scan, 3 background
+    /// The tasks that had not begun, or not ended, when the watchdog bit: those that hung or were kept from running. 0 = only idle. Bit 0 line, 1 serve, 2 scan, 3 background
     MISSING_TASKS "missing tasks": 0x026C x 1, "", READ, &[];
     /// Reserved, reads 0
     RESERVED "reserved": 0x026D x 3, "", READ, &[];

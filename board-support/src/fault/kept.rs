@@ -82,8 +82,8 @@ pub fn keep_uptime(seconds: u32) {
     unsafe { ptr::write_volatile(&raw mut (*place()).uptime, seconds) };
 }
 
-/// The marks of the tasks, each 0 or not, all 0 after [`take_at_start`]. Once the watchdog has bitten,
-/// the next start reports the tasks whose mark is 0 as missing. A task leaves its mark by a store of
+/// The marks of the tasks, all 0 after [`take_at_start`]. Once the watchdog has bitten, the next start
+/// reports the tasks whose mark is not 1, "has run to its end", as missing. A task leaves its mark by a store of
 /// its own; whoever feeds the watchdog takes them all back.
 #[must_use]
 pub fn marks() -> &'static [AtomicU8; TASKS] {

@@ -133,12 +133,12 @@ impl Noted {
     }
 }
 
-/// A bit for each mark that is not there.
+/// A bit for each mark that does not say that the task has come to its end.
 fn missing(marks: [u8; TASKS]) -> u16 {
     marks
         .iter()
         .enumerate()
-        .filter(|(_, mark)| **mark == 0)
+        .filter(|(_, mark)| **mark != 1)
         .fold(0, |missing, (task, _)| missing | 1 << task)
 }
 
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_bite_tells_the_uptime_and_the_missing_marks() {
         let words = Noted::default().to_words();
-        let start = Noted::at_start(&words, WATCHDOG, 42, [1, 0, 7, 0]);
+        let start = Noted::at_start(&words, WATCHDOG, 42, [1, 0, 1, 2]);
         assert_eq!(start.record.fault.kind, Kind::Watchdog);
         assert_eq!(start.record.uptime, 42);
         assert_eq!(start.record.missing, 0b1010);

@@ -3,7 +3,7 @@
 use board_support::{GapTimer, Rs485};
 use modbus_server::{
     Adu, Head, LineCounters,
-    rtu::{Closed, Faults, Next, Receiver, Transmitter},
+    line::{Closed, Faults, Framing, Next, Receiver, Transmitter},
 };
 
 /// The line in use.
@@ -14,6 +14,8 @@ pub struct Line {
     transmitter: Transmitter<'static>,
     request: Option<Closed<'static>>,
     reply: Reply,
+    /// Replies are not to begin yet.
+    hold: bool,
 }
 
 /// How far the reply is.
@@ -21,6 +23,8 @@ pub struct Line {
 enum Reply {
     /// There is none.
     None,
+    /// It waits to be released, and then for the response delay to pass.
+    Held { delay_ms: u16 },
     /// It waits for the response delay to pass.
     Delayed { ms: u16 },
     /// It is being sent.
@@ -28,15 +32,14 @@ enum Reply {
 }
 
 impl Line {
-    /// Listens as `unit`. The first frame is taken after the first t3.5 of silence.
+    /// Listens with this receiver. The gap timer's t1.5 and t3.5 are, on an ASCII line, t3.5 and the
+    /// time-out.
     pub fn new(
         uart: Rs485,
         mut gap: GapTimer,
-        unit: u8,
-        strict_t15: bool,
+        mut receiver: Receiver<'static>,
         adus: &'static mut [Adu; 2],
     ) -> Self {
-        let mut receiver = Receiver::new(unit, strict_t15);
         adus.iter_mut().for_each(|adu| receiver.give_back(adu));
         gap.restart();
         Self {
@@ -46,6 +49,7 @@ impl Line {
             transmitter: Transmitter::idle(),
             request: None,
             reply: Reply::None,
+            hold: false,
         }
     }
 
@@ -77,14 +81,31 @@ impl Line {
         sent
     }
 
-    /// t1.5 of silence.
-    pub fn on_t15(&mut self) {
-        self.receiver.t15();
+    /// t1.5 of silence; on an ASCII line t3.5, after which a frame that is over is taken: its sender
+    /// has left the line by then. `Some` when a request waits to be taken.
+    pub fn on_t15(&mut self) -> Option<()> {
+        self.receiver.pause();
+        if self.receiver.is_over() {
+            return self.take();
+        }
+        None
     }
 
-    /// t3.5 of silence: `Some` when a request waits to be taken.
+    /// t3.5 of silence; on an ASCII line the time-out, which spoils what there is of a frame. `Some`
+    /// when a request waits to be taken.
     pub fn on_t35(&mut self) -> Option<()> {
-        let closed = self.receiver.t35()?;
+        // A frame that was over long ago has found no silence for its reply: it is too late.
+        let late = self.receiver.is_over();
+        self.take()?;
+        if late && let Some(closed) = self.request.take() {
+            self.receiver.give_back(closed.adu);
+            return None;
+        }
+        Some(())
+    }
+
+    fn take(&mut self) -> Option<()> {
+        let closed = self.receiver.close()?;
         // One that has not been taken by now will never be answered in time.
         if let Some(late) = self.request.replace(closed) {
             self.receiver.give_back(late.adu);
@@ -97,30 +118,57 @@ impl Line {
         match self.reply {
             Reply::Delayed { ms: 0 } => self.send(),
             Reply::Delayed { ms } => self.reply = Reply::Delayed { ms: ms - 1 },
-            Reply::None | Reply::Sending => {}
+            Reply::None | Reply::Held { .. } | Reply::Sending => {}
         }
     }
 
-    /// Whether a reply is on its way, or waits for its delay.
+    /// From now on replies wait for [`release_replies`](Self::release_replies).
+    pub const fn hold_replies(&mut self) {
+        self.hold = true;
+    }
+
+    /// Whether a reply waits for [`release_replies`](Self::release_replies): its master is silent.
+    pub fn is_held(&self) -> bool {
+        matches!(self.reply, Reply::Held { .. })
+    }
+
+    /// Replies begin at once again, the one that is held first.
+    pub fn release_replies(&mut self) {
+        self.hold = false;
+        if let Reply::Held { delay_ms } = self.reply {
+            self.begin(delay_ms);
+        }
+    }
+
+    /// Whether a reply is on its way, or waits to be.
     pub fn is_replying(&self) -> bool {
         self.reply != Reply::None
     }
 
     /// The request that waits, if any, and what the line has counted. Its buffer comes back by
-    /// [`finish_reply`](Self::finish_reply). A reply that still waits for its delay is given up: the
-    /// master has.
+    /// [`finish_reply`](Self::finish_reply). A reply that has not begun yet is given up: the master has.
     pub fn take_request(&mut self) -> Option<(&'static mut Adu, LineCounters)> {
         let closed = self.request.take()?;
-        if matches!(self.reply, Reply::Delayed { .. }) {
+        if matches!(self.reply, Reply::Held { .. } | Reply::Delayed { .. }) {
             self.reply = Reply::None;
             self.take_back();
         }
         Some((closed.adu, closed.line))
     }
 
-    /// A reply that begins with `head`: its first byte leaves now, or after a delay in milliseconds.
-    pub fn start_reply(&mut self, head: Head, delay_ms: u16) {
-        self.transmitter = Transmitter::new(head);
+    /// A reply of `unit` will come: its first byte leaves now, or after a delay in milliseconds.
+    #[inline]
+    pub fn open_reply(&mut self, unit: u8, framing: Framing, delay_ms: u16) {
+        self.transmitter = Transmitter::open(unit, framing);
+        if self.hold {
+            self.reply = Reply::Held { delay_ms };
+        } else {
+            self.begin(delay_ms);
+        }
+    }
+
+    #[inline]
+    fn begin(&mut self, delay_ms: u16) {
         if delay_ms == 0 {
             self.send();
         } else {
@@ -128,7 +176,21 @@ impl Line {
         }
     }
 
+    /// The reply is settled: this is how it begins.
+    pub fn continue_reply(&mut self, head: Head) {
+        self.transmitter.head(head);
+        if self.reply == Reply::Sending {
+            self.uart.resume_sending();
+        }
+    }
+
+    /// How frames end from the next one on.
+    pub fn set_framing(&mut self, framing: Framing) {
+        self.receiver.set_framing(framing);
+    }
+
     /// Takes the bus and sends the first byte.
+    #[inline]
     fn send(&mut self) {
         self.gap.stop();
         self.reply = Reply::Sending;

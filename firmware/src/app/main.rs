@@ -35,7 +35,7 @@ mod app {
         lamps::{Lamps, TICK_MS, Trouble},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
-    use modbus_server::{Adu, Outcome, Server, Work};
+    use modbus_server::{Adu, Outcome, Server};
     use modio_drivers::{ChannelSettings, IoModule};
     use register_map::codes::Command;
 
@@ -147,6 +147,7 @@ mod app {
 
     #[task(binds = USART1, priority = 4, shared = [line])]
     fn uart(mut cx: uart::Context) {
+        alive::begin(fault::marks(), Task::Line);
         let sent = cx
             .shared
             .line
@@ -155,15 +156,15 @@ mod app {
             // An order may have waited for this.
             rtic::pend(Interrupt::EXTI3);
         }
-        alive::mark(fault::marks(), Task::Line);
     }
 
     #[task(binds = TIM2, priority = 4, shared = [line])]
     fn gap(mut cx: gap::Context) {
+        alive::begin(fault::marks(), Task::Line);
         let request = cx.shared.line.lock(|line| {
             let line = line.as_mut()?;
             match line.gap.take_event() {
-                GapEvent::T15 => line.on_t15(),
+                GapEvent::T15 => return line.on_t15(),
                 GapEvent::T35 => return line.on_t35(),
                 GapEvent::Nothing => {}
             }
@@ -176,7 +177,7 @@ mod app {
 
     #[task(binds = EXTI3, priority = 3, local = [server, frame_gap_ms], shared = [line, device, activity, order])]
     fn serve(cx: serve::Context) {
-        alive::mark(fault::marks(), Task::Serve);
+        alive::begin(fault::marks(), Task::Serve);
         let serve::SharedResources {
             mut line,
             mut device,
@@ -191,9 +192,26 @@ mod app {
         } = cx.local;
         let mut on_line = |f: &mut dyn FnMut(&mut Line)| line.lock(|line| line.as_mut().map(f));
 
-        // An order of the last request, whose reply is out or never comes.
+        let delay_ms = device.lock(|device| device.config.response_delay_ms());
+        let mut request = None;
         let mut silent = true;
-        on_line(&mut |line| silent = !line.is_replying());
+        let mut held = false;
+        on_line(&mut |line| {
+            request = line.take_request();
+            silent = !line.is_replying();
+            // The unit address leaves while all that follows is being done.
+            if let Some((adu, _)) = &request
+                && server.answers(adu)
+            {
+                line.open_reply(server.unit(), server.framing(), delay_ms);
+            }
+            held = line.is_held();
+        });
+
+        if held {
+            rtic::pend(Interrupt::EXTI0);
+        }
+        // An order of the last request, whose reply is out or never comes.
         if silent {
             let left = device.lock(|device| {
                 let order = device.take_order()?;
@@ -205,37 +223,31 @@ mod app {
             }
         }
 
-        let mut request = None;
-        on_line(&mut |line| request = line.take_request());
         let Some((adu, line_counters)) = request else {
+            alive::end(fault::marks(), Task::Serve);
             return;
         };
-        let (decision, delay_ms) = device.lock(|device| {
-            let decision = server.decide(adu, device);
-            (decision, device.config.response_delay_ms())
-        });
-        // The head leaves while the rest is being done.
+        let decision = device.lock(|device| server.decide(adu, device));
         if let Some(head) = decision.reply {
-            on_line(&mut |line| line.start_reply(head, delay_ms));
+            on_line(&mut |line| line.continue_reply(head));
         }
-        server.commit(&decision);
+        server.commit(&decision, &line_counters);
         device.lock(|device| {
-            device.state.counters = server.counters(&line_counters);
-            if matches!(decision.outcome, Outcome::Accepted | Outcome::Refused(_)) {
+            device.state.counters = server.counters();
+            // In listen-only mode the outputs are to fall to SAFE.
+            if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
                 device.request_seen(*frame_gap_ms);
             }
             server.carry_out(&decision, adu, device);
         });
         let mut adu = Some(adu);
         on_line(&mut |line| {
+            line.set_framing(server.framing());
             if let Some(adu) = adu.take() {
                 line.finish_reply(adu, decision.reply.is_some());
             }
         });
-        if matches!(
-            decision.work,
-            Work::WriteBits { .. } | Work::WriteWords { .. }
-        ) {
+        if decision.work.writes() {
             rtic::pend(Interrupt::TIM4);
             if decision.reply.is_none() {
                 // No reply to wait for: an order is carried out now.
@@ -243,6 +255,7 @@ mod app {
             }
         }
         activity.lock(|activity| *activity = true);
+        alive::end(fault::marks(), Task::Serve);
     }
 
     #[task(
@@ -251,6 +264,9 @@ mod app {
         shared = [line, device],
     )]
     fn scan(cx: scan::Context) {
+        let mark = alive::look(fault::marks(), Task::Scan);
+        alive::begin(fault::marks(), Task::Scan);
+        alive::end_line(fault::marks());
         let scan::LocalResources {
             module,
             settings,
@@ -301,7 +317,6 @@ mod app {
             let _ = events.enqueue(Event::CommunicationLost);
         }
         if beat {
-            alive::mark(fault::marks(), Task::Scan);
             fault::keep_uptime(uptime_s);
             line.lock(|line| line.as_mut().map(Line::on_millisecond));
             if every(until_proof, SCANS_PER_PROOF) {
@@ -314,6 +329,12 @@ mod app {
         // At once when outputs may have changed: they may be the DAC's.
         if every(until_background, SCANS_PER_BACKGROUND) || !beat || tripped {
             rtic::pend(Interrupt::EXTI0);
+        }
+        if beat {
+            alive::end(fault::marks(), Task::Scan);
+        } else {
+            // Only the timer's beats show that it is alive.
+            alive::put_back(fault::marks(), Task::Scan, mark);
         }
     }
 
@@ -330,7 +351,9 @@ mod app {
         shared = [line, device, activity, order],
     )]
     fn background(cx: background::Context) {
+        alive::begin(fault::marks(), Task::Background);
         let background::SharedResources {
+            mut line,
             mut device,
             mut activity,
             mut order,
@@ -360,6 +383,20 @@ mod app {
         if let Some(event) = persistence.work(&mut device) {
             log.event(event);
         }
+        if persistence.wants_erase() {
+            // While a master waits for this unit's reply nobody sends: then the flash may stall
+            // everything for an erase, and nothing that comes in is lost.
+            let held = line.lock(|line| {
+                line.as_mut().is_some_and(|line| {
+                    line.hold_replies();
+                    line.is_held()
+                })
+            });
+            if held {
+                persistence.erase();
+                line.lock(|line| line.as_mut().map(Line::release_replies));
+            }
+        }
 
         let free = stack::free_low_water();
         let (failing, millis) = device.lock(|device| {
@@ -378,6 +415,6 @@ mod app {
         while let Some(event) = logged.dequeue() {
             log.event(event);
         }
-        alive::mark(fault::marks(), Task::Background);
+        alive::end(fault::marks(), Task::Background);
     }
 }

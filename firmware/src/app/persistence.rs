@@ -13,6 +13,8 @@ pub struct Persistence {
     store: Store,
     pages: Pages,
     saving: Option<Saving>,
+    /// The page that is no longer needed waits to be erased.
+    erase: bool,
     restart: bool,
 }
 
@@ -22,6 +24,7 @@ impl Persistence {
             store,
             pages,
             saving: None,
+            erase: false,
             restart: false,
         }
     }
@@ -53,6 +56,18 @@ impl Persistence {
         event
     }
 
+    /// Whether there is a page to erase, so that the next save that needs it does not have to.
+    pub const fn wants_erase(&self) -> bool {
+        self.erase
+    }
+
+    /// Erases it. The program stands still for up to 40 ms.
+    pub fn erase(&mut self) {
+        self.erase = false;
+        // When the flash fails, the next save that needs the page tries again.
+        let _ = self.store.make_spare(&mut self.pages);
+    }
+
     fn save(&mut self, mut saving: Saving, device: &mut impl Mutex<T = Device>) -> Event {
         let mut good = true;
         while let Some(operation) = device.lock(|device| saving.next(device.config.to_save())) {
@@ -62,6 +77,7 @@ impl Persistence {
             }
         }
         good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
+        self.erase = !self.store.has_spare();
         if good {
             device.lock(|device| device.config.end_save());
             Event::Saved

@@ -8,9 +8,12 @@ use firmware::{
     start_up::{self, Address},
     store::Store,
 };
-use modbus_server::{Adu, Server, rtu};
+use modbus_server::{
+    Adu, Server,
+    line::{Framing, Gaps, Receiver, Width},
+};
 use modio_drivers::IoModule;
-use register_map::codes::{Format, GapRule};
+use register_map::codes::{Format, GapRule, Mode};
 
 use crate::{
     installed::{AnalogOutputs, Installed},
@@ -80,21 +83,37 @@ pub fn up(device: pac::Peripherals, adus: &'static mut [Adu; 2]) -> Started {
         log.event(log::Event::SaveFailed);
     }
 
-    let strict = settings.gap_rule == GapRule::Drop;
+    let framing = match settings.mode {
+        Mode::Rtu => Framing::Rtu,
+        Mode::Ascii => Framing::ASCII,
+    };
     let on_wire = wire_settings(settings);
-    let gaps = rtu::Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
+    let gaps = Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
     let t35 = settings
         .frame_gap
         .map_or(gaps.t35, |tenths| u32::from(tenths) * 100_000);
+    // The silence that ends a frame; in ASCII mode its last character does.
+    let frame_gap = match framing {
+        Framing::Rtu => t35,
+        Framing::Ascii { .. } => 0,
+    };
     let line = address.unit().and_then(|unit| {
-        let (uart, gap) = board.line.start(on_wire, gaps.t15.min(t35), t35)?;
-        Some(Line::new(uart, gap, unit, strict, adus))
+        let strict = settings.gap_rule == GapRule::Drop;
+        let (receiver, silences) = match framing {
+            Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
+            Framing::Ascii { .. } => (
+                Receiver::ascii(unit, Width::Eight),
+                (t35, Gaps::ASCII_TIMEOUT),
+            ),
+        };
+        let (uart, gap) = board.line.start(on_wire, silences.0, silences.1)?;
+        Some(Line::new(uart, gap, receiver, adus))
     });
 
     Started {
         line,
-        frame_gap_ms: t35.div_ceil(1_000_000),
-        server: Server::new(identity.unit),
+        frame_gap_ms: frame_gap.div_ceil(1_000_000),
+        server: Server::new(identity.unit, framing),
         device,
         module,
         analog_outputs,

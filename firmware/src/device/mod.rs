@@ -16,6 +16,7 @@
 //! consistent state.
 
 mod comm_watchdog;
+mod identification;
 mod points;
 mod state;
 
@@ -250,20 +251,39 @@ impl DataModel for Device {
             Block::State | Block::Fault => {}
         }
     }
+
+    /// The low byte of the status register.
+    fn exception_status(&self) -> u8 {
+        self.status().to_le_bytes()[0]
+    }
+
+    /// The status register.
+    fn diagnostic_register(&self) -> u16 {
+        self.status()
+    }
+
+    fn server_id(&self) -> &[u8] {
+        &identification::SERVER_ID
+    }
+
+    /// Not while the communication watchdog has taken the outputs.
+    fn is_running(&self) -> bool {
+        !self.comm_watchdog.has_tripped()
+    }
+
+    fn identification(&self, object: u8) -> Option<&[u8]> {
+        identification::object(object, self.state.serial(), self.config.slot().module)
+    }
 }
 
-/// Refuses what this firmware cannot do yet, as a value that is not allowed: ASCII mode would leave a
-/// unit that nobody can talk to, and there is no loader to enter.
+/// Refuses what this firmware cannot do yet, as a value that is not allowed: there is no loader to
+/// enter, and no LoRa line.
 fn check_ready(span: Span, words: Words<'_>) -> Result<(), Exception> {
     let wants = |address: u16, value: u16| {
         let index = address.wrapping_sub(span.start());
         words.get(index) == Some(value)
     };
-    let ascii = register_map::codes::Mode::Ascii.code();
-    if wants(configuration::MODE, ascii)
-        || wants(configuration::COMMAND, Command::EnterLoader.code())
-        || wants(configuration::LORA, 1)
-    {
+    if wants(configuration::COMMAND, Command::EnterLoader.code()) || wants(configuration::LORA, 1) {
         Err(Exception::IllegalDataValue)
     } else {
         Ok(())

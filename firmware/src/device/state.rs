@@ -9,6 +9,7 @@ use register_map::{
     state as at,
 };
 
+use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
 
 /// What is known of the device when it starts, and never changes.
@@ -46,6 +47,8 @@ const fn number(text: &str) -> u16 {
 #[derive(Debug)]
 pub struct State {
     identity: Identity,
+    /// The unique identity as text.
+    serial: [u8; SERIAL_LEN],
     /// Milliseconds since the start, wrapping.
     millis: u32,
     until_second: u16,
@@ -61,6 +64,7 @@ impl State {
     #[must_use]
     pub fn new(identity: Identity) -> Self {
         Self {
+            serial: identification::serial(identity.unique_id),
             identity,
             millis: 0,
             until_second: 1000,
@@ -78,6 +82,11 @@ impl State {
             self.until_second = 1000;
             self.uptime_s = self.uptime_s.wrapping_add(1);
         }
+    }
+
+    /// The unique identity as text.
+    pub(super) const fn serial(&self) -> &[u8; SERIAL_LEN] {
+        &self.serial
     }
 
     /// Milliseconds since the start, wrapping after 49 days.

@@ -1,7 +1,8 @@
 extern crate std;
 use std::vec::Vec;
 
-use modbus_server::{Adu, Server};
+use modbus_server::line::Framing;
+use modbus_server::{Adu, LineCounters, Server};
 use modio_drivers::ChannelStatus;
 use register_map::{Module, configuration as at};
 
@@ -41,7 +42,7 @@ impl Bench {
         };
         Self {
             device: Device::new(kinds(module), Config::new(settings, false), identity),
-            server: Server::new(1),
+            server: Server::new(1, Framing::Rtu),
         }
     }
 
@@ -51,17 +52,13 @@ impl Bench {
         adu.push(1);
         pdu.iter().for_each(|byte| assert!(adu.push(*byte)));
         let decision = self.server.decide(&adu, &self.device);
-        self.server.commit(&decision);
+        self.server.commit(&decision, &LineCounters::ZERO);
         self.server.carry_out(&decision, &mut adu, &mut self.device);
         if let Some(order) = self.device.take_order() {
             self.device.carry_out(order);
         }
         let head = decision.reply.expect("it was asked");
-        let body = match head.body_len() {
-            0 => &[],
-            len => &adu.as_slice()[..len.into()],
-        };
-        [&head.as_slice()[1..], body].concat()
+        [&head.as_slice()[1..], head.body_in(&adu)].concat()
     }
 
     fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>, u8> {
@@ -296,10 +293,56 @@ fn identity_and_state_are_read_and_never_written() {
 fn what_cannot_be_done_yet_is_refused() {
     let mut bench = Bench::new(Module::Di4, &[]);
     bench.unlock();
-    assert_eq!(bench.write(at::MODE, &[1]), Err(3));
-    assert_eq!(bench.write(at::BAUD, &[192, 0, 1]), Err(3));
+    assert_eq!(bench.write(at::MODE, &[2]), Err(3));
     assert_eq!(bench.write(at::COMMAND, &[0xB007]), Err(3));
     assert_eq!(bench.write(at::LORA, &[1]), Err(3));
     assert_eq!(bench.read(at::BAUD, 3), Ok(std::vec![96, 0, 0]));
-    bench.write(at::BAUD, &[192, 1, 0]).unwrap();
+    bench.write(at::BAUD, &[192, 1, 1]).unwrap();
+}
+
+#[test]
+fn the_device_says_who_it_is_and_how_it_fares() {
+    let mut bench = Bench::new(Module::Ai4, &[(at::COMM_TIMEOUT, 1)]);
+    assert_eq!(bench.ask(&[0x07]), [0x07, 0]);
+    assert_eq!(bench.ask(&[0x11]), [0x11, 2, 1, 0xFF]);
+    let name = bench.ask(&[0x2B, 0x0E, 4, 0x81]);
+    assert_eq!(name[7..], [&[0x81, 3][..], b"4ai"].concat());
+    let serial = bench.ask(&[0x2B, 0x0E, 4, 0x80]);
+    assert_eq!(serial[9..], *b"000100020003000400050006");
+    let regular = bench.ask(&[0x2B, 0x0E, 2, 0]);
+    assert_eq!((regular[3], regular[6]), (0x83, 7));
+
+    (0..101).for_each(|_| {
+        bench.device.tick();
+    });
+    bench.unlock();
+    let status = bench.read(0x020A, 1).unwrap();
+    assert_eq!(status, [0b10_0001], "communication lost, unlocked");
+    assert_eq!(bench.ask(&[0x07]), [0x07, 0b10_0001]);
+    assert_eq!(bench.ask(&[0x08, 0, 2, 0, 0]), [0x08, 0, 2, 0, 0b10_0001]);
+    assert_eq!(
+        bench.ask(&[0x11]),
+        [0x11, 2, 1, 0x00],
+        "SAFE has the outputs"
+    );
+}
+
+#[test]
+fn a_masked_setting_is_a_write_like_any_other() {
+    let mut bench = Bench::new(Module::Di4, &[]);
+    assert_eq!(
+        bench.ask(&[0x16, 1, 5, 0xFF, 0, 0, 0x64]),
+        [0x96, 6],
+        "locked"
+    );
+    bench.unlock();
+    assert_eq!(bench.ask(&[0x16, 1, 5, 0xFF, 0, 0, 0x64])[0], 0x16);
+    assert_eq!(bench.read(at::RESPONSE_DELAY, 1), Ok(std::vec![100]));
+    assert_eq!(bench.ask(&[0x16, 1, 5, 0xFF, 0xFF, 0, 0])[0], 0x16);
+    assert_eq!(
+        bench.ask(&[0x16, 1, 5, 0, 0xFF, 0x10, 0]),
+        [0x96, 3],
+        "4196 ms"
+    );
+    assert_eq!(bench.ask(&[0x16, 2, 0, 0, 0, 0, 0]), [0x96, 2], "read-only");
 }

@@ -1,9 +1,10 @@
 //! The configuration store: two flash pages, so that the last good configuration is never at risk.
 //!
 //! [`register_map::record`] has the layout. Records go one behind the other onto the *active* page; the
-//! newest good one counts. When the page is full the next record goes to the other, which
-//! [`Store::prepare`] has erased at the start, before the line is served: in normal use a save never
-//! erases, so it never holds up the line for longer than a half-word takes.
+//! newest good one counts. When the page is full the next record goes to the other, which is kept
+//! erased: by [`Store::prepare`] at the start, before the line is served, and by [`Store::make_spare`]
+//! after every change of pages, when the caller can stand still. So a save never erases in normal use,
+//! and never holds up the line for longer than a half-word takes.
 //!
 //! ```text
 //!   active page                       other page
@@ -12,7 +13,7 @@
 //!   +------+---+---+-----+--------+   +------+---------------------------+
 //!   | mark | 1 | 2 | 3   | 4 |    |   | mark | erased                    |   a save that fits
 //!   | mark | 1 | 2 | 3   | 4 |    |   | mark | 5 |                       |   one that does not
-//!   | mark | erased               |   | mark | 5 |                       |   after the next start
+//!   | mark | erased               |   | mark | 5 |                       |   `make_spare`, or a start
 //!   +------+----------------------+   +------+---+-----------------------+
 //! ```
 //!
@@ -115,6 +116,29 @@ impl Store {
             Some(newest) => self.make_room(newest, flash),
             None if self.first.written || self.second.written => self.make_one_ready(flash),
             None => self.begin(flash),
+        };
+        self.look_again(flash);
+        result
+    }
+
+    /// Whether the page without the newest record is erased, so that a save finds room there. True as
+    /// well while nothing good is stored: then no page may be given up.
+    #[must_use]
+    pub fn has_spare(&self) -> bool {
+        self.newest()
+            .is_none_or(|newest| self.survey(newest.page.other()).is_ready())
+    }
+
+    /// Erases the page without the newest record, unless [`Self::has_spare`]. The erase holds the
+    /// program up for up to 40 ms.
+    ///
+    /// # Errors
+    ///
+    /// When the flash fails. What is stored is still good.
+    pub fn make_spare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+        let result = match self.newest() {
+            Some(newest) => self.make_ready(newest.page.other(), flash),
+            None => Ok(()),
         };
         self.look_again(flash);
         result

@@ -10,9 +10,10 @@ use crate::running::{fullest_settings, random_settings, save, settings, start, s
 
 enum Event {
     Save(Box<Settings>),
+    Spare,
     Restart,
 }
-use Event::{Restart, Save};
+use Event::{Restart, Save, Spare};
 
 /// A place for a cut: the flash before an operation, the operation, and the configurations that a
 /// start may find after a cut in it.
@@ -58,6 +59,11 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
                 save(&mut store, &mut flash, settings).unwrap();
                 note(&mut flash, &stored, settings);
                 stored = Settings::clone(settings);
+            }
+            Spare => {
+                store.make_spare(&mut flash).unwrap();
+                assert!(store.has_spare());
+                note(&mut flash, &stored, &stored);
             }
             Restart => {
                 let loaded;
@@ -147,6 +153,35 @@ fn in_saves_that_fill_both_pages_without_a_start_between() {
         let erase = matches!(place.operation, Operation::Erase(_));
         let messes = some_messes(index).chain(MESSES.into_iter().filter(|_| erase));
         messes.for_each(|mess| cut_and_recover(place, mess));
+    }
+}
+
+/// As a device does that never stops: the other page is erased after every change of pages.
+#[test]
+fn in_the_erases_between_saves_which_then_never_have_to() {
+    let mut life = Vec::new();
+    for save in saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2)) {
+        life.extend([save, Spare]);
+    }
+    let places = live(MockFlash::erased(), &Settings::defaults(), &life);
+    let is_erase = |place: &&Place| matches!(place.operation, Operation::Erase(_));
+    let (idle, saving): (Vec<_>, Vec<_>) = places
+        .iter()
+        .filter(is_erase)
+        .partition(|place| place.old == place.new);
+    // The first start erases one page.
+    assert!(
+        idle.len() > 3 && saving.is_empty(),
+        "{} {}",
+        idle.len(),
+        saving.len()
+    );
+    for (index, place) in places.iter().enumerate() {
+        if place.old == place.new {
+            MESSES.iter().for_each(|mess| cut_and_recover(place, *mess));
+        } else if index % 7 == 0 {
+            some_messes(index).for_each(|mess| cut_and_recover(place, mess));
+        }
     }
 }
 

@@ -3,12 +3,15 @@
 
 #![allow(dead_code)] // each test file uses its own part of it
 
+pub mod hearing;
+mod points;
 pub mod reference;
+mod serving;
 
-use modbus_server::rtu::{Faults, Next, Receiver, Transmitter};
-use modbus_server::{
-    Adu, Bits, BitsOut, Counters, DataModel, Exception, Outcome, Server, Span, Words, WordsOut,
-};
+use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter, Width};
+use modbus_server::{Counters, Outcome, Server};
+#[allow(unused_imports)] // as above
+pub use points::{MAX_WORD, Points, object};
 
 /// The unit address of the tests.
 pub const UNIT: u8 = 17;
@@ -37,6 +40,60 @@ pub fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
     frame
 }
 
+/// The LRC as V1.02 6.2.1 describes it.
+pub fn lrc(bytes: &[u8]) -> u8 {
+    let sum: u32 = bytes.iter().map(|byte| u32::from(*byte)).sum();
+    (0x100 - sum % 0x100) as u8
+}
+
+/// An ASCII frame: colon, unit, PDU and LRC in hexadecimal, carriage return, end mark.
+pub fn ascii_frame(unit: u8, pdu: &[u8], delimiter: u8) -> Vec<u8> {
+    let mut bytes = vec![unit];
+    bytes.extend(pdu);
+    bytes.push(lrc(&bytes));
+    let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    [b":", digits.as_bytes(), b"\r", &[delimiter]].concat()
+}
+
+/// A frame in either mode.
+pub fn framed(framing: Framing, unit: u8, pdu: &[u8]) -> Vec<u8> {
+    match framing {
+        Framing::Rtu => frame(unit, pdu),
+        Framing::Ascii { delimiter } => ascii_frame(unit, pdu, delimiter),
+    }
+}
+
+/// Unit and PDU of a good frame.
+pub fn unframed(framing: Framing, frame: &[u8]) -> Vec<u8> {
+    let bytes = match framing {
+        Framing::Rtu => {
+            let (body, check) = frame.split_at(frame.len() - 2);
+            assert_eq!(crc(body), check, "CRC of the reply");
+            body.to_vec()
+        }
+        Framing::Ascii { delimiter } => {
+            let text = frame
+                .strip_prefix(b":")
+                .and_then(|rest| rest.strip_suffix(&[b'\r', delimiter]))
+                .expect("colon and end");
+            let digit = |c: &u8| match c {
+                b'0'..=b'9' => c - b'0',
+                b'A'..=b'F' => c - b'A' + 10,
+                _ => panic!("{c:02X} is no digit"),
+            };
+            let bytes = text
+                .chunks(2)
+                .map(|pair| digit(&pair[0]) * 16 + digit(&pair[1]));
+            let mut bytes: Vec<u8> = bytes.collect();
+            let check = bytes.pop();
+            assert_eq!(check, Some(lrc(&bytes)), "LRC of the reply");
+            bytes
+        }
+    };
+    assert_eq!(framed(framing, bytes[0], &bytes[1..]), frame);
+    bytes
+}
+
 /// Function code and 16-bit fields.
 pub fn pdu(function: u8, fields: &[u16]) -> Vec<u8> {
     let mut pdu = vec![function];
@@ -63,6 +120,13 @@ pub fn write_words(start: u16, words: &[u16]) -> Vec<u8> {
     pdu
 }
 
+/// The PDU of function 17.
+pub fn write_then_read(read: u16, count: u16, write: u16, words: &[u16]) -> Vec<u8> {
+    let mut request = pdu(0x17, &[read, count]);
+    request.extend(&write_words(write, words)[1..]);
+    request
+}
+
 /// Eight bits to a byte, the first lowest.
 pub fn pack(bits: &[bool]) -> Vec<u8> {
     let packed = |bits: &[bool]| {
@@ -73,146 +137,109 @@ pub fn pack(bits: &[bool]) -> Vec<u8> {
     bits.chunks(8).map(packed).collect()
 }
 
-/// Bits and words from address 0 on, some of them read-only; words above `MAX_WORD` are refused.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Points {
-    pub bits: Vec<bool>,
-    pub words: Vec<u16>,
-    /// Points from here on cannot be written.
-    pub read_only_from: u32,
-    /// If set, everything that has a right address and value is refused with it.
-    pub state: Option<Exception>,
-}
-
-/// The largest word [`Points`] takes.
-pub const MAX_WORD: u16 = 0xFFF0;
-
-impl Points {
-    pub fn new(bits: usize, words: usize) -> Self {
-        Self {
-            bits: vec![false; bits],
-            words: vec![0; words],
-            read_only_from: u32::MAX,
-            state: None,
-        }
-    }
-
-    fn check(&self, end: u32, points: usize, value_is_good: bool) -> Result<(), Exception> {
-        if end as usize > points {
-            return Err(Exception::IllegalDataAddress);
-        }
-        if !value_is_good {
-            return Err(Exception::IllegalDataValue);
-        }
-        self.state.map_or(Ok(()), Err)
-    }
-
-    fn writable(&self, points: usize) -> usize {
-        points.min(self.read_only_from as usize)
-    }
-}
-
-impl DataModel for Points {
-    fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
-        self.check(span.end(), self.bits.len(), true)
-    }
-
-    fn check_read_words(&self, span: Span) -> Result<(), Exception> {
-        self.check(span.end(), self.words.len(), true)
-    }
-
-    fn check_write_bits(&self, span: Span, bits: Bits<'_>) -> Result<(), Exception> {
-        assert_eq!(span.count(), bits.count());
-        self.check(span.end(), self.writable(self.bits.len()), true)
-    }
-
-    fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
-        assert_eq!(usize::from(span.count()), words.count());
-        let good = words.iter().all(|word| word <= MAX_WORD);
-        self.check(span.end(), self.writable(self.words.len()), good)
-    }
-
-    fn read_bits(&self, span: Span, out: &mut BitsOut<'_>) {
-        for address in span.addresses() {
-            out.push(self.bits[usize::from(address)]);
-        }
-    }
-
-    fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
-        for address in span.addresses() {
-            out.push(self.words[usize::from(address)]);
-        }
-    }
-
-    fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
-        assert_eq!(span.count(), bits.count());
-        for (address, bit) in span.addresses().zip(bits.iter()) {
-            self.bits[usize::from(address)] = bit;
-        }
-    }
-
-    fn write_words(&mut self, span: Span, words: Words<'_>) {
-        assert_eq!(usize::from(span.count()), words.count());
-        for (address, word) in span.addresses().zip(words.iter()) {
-            self.words[usize::from(address)] = word;
-        }
-    }
-}
-
 /// A unit on a line: receiver, server, transmitter and points.
 pub struct Unit {
     pub receiver: Receiver<'static>,
     pub server: Server,
     pub points: Points,
+    /// The reply to an ASCII frame that has ended.
+    said: Option<Vec<u8>>,
 }
 
 impl Unit {
-    /// A unit that has heard its first silence already.
+    /// An RTU unit that has heard its first silence already.
     pub fn new(points: Points) -> Self {
         Self::with(UNIT, false, points)
     }
 
     pub fn with(unit: u8, strict_t15: bool, points: Points) -> Self {
-        let mut receiver = Receiver::new(unit, strict_t15);
+        Self::of(
+            Receiver::rtu(unit, strict_t15),
+            Server::new(unit, Framing::Rtu),
+            points,
+        )
+    }
+
+    pub fn ascii(width: Width, points: Points) -> Self {
+        Self::of(
+            Receiver::ascii(UNIT, width),
+            Server::new(UNIT, Framing::ASCII),
+            points,
+        )
+    }
+
+    fn of(mut receiver: Receiver<'static>, server: Server, points: Points) -> Self {
         receiver.give_back(Box::leak(Box::default()));
         receiver.give_back(Box::leak(Box::default()));
-        assert!(receiver.t35().is_none());
+        assert!(receiver.close().is_none());
         Self {
             receiver,
-            server: Server::new(unit),
+            server,
             points,
+            said: None,
+        }
+    }
+
+    /// One character.
+    pub fn character(&mut self, byte: u8, faults: Faults) {
+        self.receiver.character(byte, faults);
+        if self.receiver.is_over() {
+            assert_ne!(self.server.framing(), Framing::Rtu);
+            self.said = self.close();
         }
     }
 
     /// Good characters.
     pub fn characters(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.receiver.character(*byte, Faults::NONE);
+        bytes
+            .iter()
+            .for_each(|byte| self.character(*byte, Faults::NONE));
+    }
+
+    /// Silence of 3.5 characters, in ASCII mode of a second, and the reply to what came before it,
+    /// as it goes over the line.
+    pub fn silence(&mut self) -> Option<Vec<u8>> {
+        self.receiver.pause();
+        match self.said.take() {
+            Some(said) => Some(said),
+            None => self.close(),
         }
     }
 
-    /// Silence of 3.5 characters, and the reply to what came before it, as it goes over the line.
-    pub fn silence(&mut self) -> Option<Vec<u8>> {
-        let ahead = self
-            .receiver
-            .t15()
-            .map(|request| self.server.decide(request, &self.points));
-        let closed = self.receiver.t35()?;
-        let decision = self.server.decide(closed.adu, &self.points);
-        assert_eq!(ahead, Some(decision), "decided ahead as at the end");
-        assert_ne!(decision.outcome, Outcome::NotForUs);
+    /// The reply to an ASCII frame, whose end was the last character.
+    pub fn take_said(&mut self) -> Option<Vec<u8>> {
+        self.said.take()
+    }
 
+    fn close(&mut self) -> Option<Vec<u8>> {
+        let closed = self.receiver.close()?;
+        let answers = self.server.answers(closed.adu);
+        let mut transmitter = Transmitter::idle();
         let mut reply = Vec::new();
-        let mut transmitter = match decision.reply {
-            Some(head) => Transmitter::new(head),
-            None => Transmitter::idle(),
-        };
-        while let Next::Byte(byte) = transmitter.next() {
-            reply.push(byte);
+        if answers {
+            transmitter = Transmitter::open(self.server.unit(), self.server.framing());
+            while let Next::Byte(byte) = transmitter.next() {
+                reply.push(byte);
+            }
+            assert_eq!(
+                transmitter.next(),
+                Next::Wait,
+                "the unit address goes at once"
+            );
         }
-        self.server.commit(&decision);
+        let decision = self.server.decide(closed.adu, &self.points);
+        assert_ne!(decision.outcome, Outcome::NotForUs);
+        assert_eq!(decision.reply.is_some(), answers);
+        if let Some(head) = decision.reply {
+            transmitter.head(head);
+            while let Next::Byte(byte) = transmitter.next() {
+                reply.push(byte);
+            }
+        }
+        self.server.commit(&decision, &closed.line);
         self.server
             .carry_out(&decision, closed.adu, &mut self.points);
+        self.receiver.set_framing(self.server.framing());
         let spare = match transmitter.next() {
             Next::Wait => {
                 assert!(transmitter.body(closed.adu).is_none());
@@ -229,7 +256,7 @@ impl Unit {
         (!reply.is_empty()).then_some(reply)
     }
 
-    /// A whole frame with a good CRC; the reply, if any.
+    /// A whole frame with a good CRC or LRC; the reply, if any.
     pub fn raw(&mut self, bytes: &[u8]) -> Option<Vec<u8>> {
         self.characters(bytes);
         self.silence()
@@ -237,12 +264,14 @@ impl Unit {
 
     /// A request to this unit; the PDU of its reply, whose frame is checked.
     pub fn request(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
-        let reply = self.raw(&frame(UNIT, pdu))?;
-        let (body, check) = reply.split_at(reply.len() - 2);
-        assert_eq!(crc(body), check, "CRC of the reply");
-        assert_eq!(body[0], UNIT);
-        assert!(reply.len() <= Adu::CAPACITY);
-        Some(body[1..].to_vec())
+        let framing = self.server.framing();
+        let reply = self.raw(&framed(framing, UNIT, pdu))?;
+        let [unit, pdu @ ..] = &unframed(framing, &reply)[..] else {
+            panic!("an empty reply");
+        };
+        assert_eq!(*unit, UNIT);
+        assert!(pdu.len() <= 253);
+        Some(pdu.to_vec())
     }
 
     /// A request that must be refused.
@@ -255,8 +284,9 @@ impl Unit {
         reply[1]
     }
 
-    pub fn counters(&self) -> Counters {
-        self.server.counters(self.receiver.counters())
+    pub fn counters(&mut self) -> Counters {
+        self.server.note_line(self.receiver.counters());
+        self.server.counters()
     }
 
     /// The next good request must be answered.

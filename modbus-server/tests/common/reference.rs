@@ -1,186 +1,273 @@
-//! A second server, as plain as can be: what a unit should do, told independently of the crate.
+//! A second unit, as plain as can be: what one should do, told independently of the crate.
 
-use super::{MAX_WORD, Points, UNIT, crc};
+use super::{MAX_WORD, Points, UNIT, framed, lrc};
+use modbus_server::line::Framing;
 
-/// Serves the PDU of a request to this unit. `None`: silence.
-pub fn serve(points: &mut Points, pdu: &[u8]) -> Option<Vec<u8>> {
-    let function = pdu[0];
-    if function == 0 || function > 127 {
-        return None;
-    }
-    Some(answer(points, pdu).unwrap_or_else(|code| vec![function + 128, code]))
-}
-
-fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
-    let field = |at: usize| pdu[at] as usize * 256 + pdu[at + 1] as usize;
-    let function = pdu[0];
-    match function {
-        1..=4 => {
-            let (bits, limit) = (function <= 2, if function <= 2 { 2000 } else { 125 });
-            if pdu.len() != 5 || field(3) == 0 || field(3) > limit {
-                return Err(3);
-            }
-            let there = if bits {
-                points.bits.len()
-            } else {
-                points.words.len()
-            };
-            if field(1) + field(3) > there {
-                return Err(2);
-            }
-            let mut data = vec![
-                0;
-                if bits {
-                    field(3).div_ceil(8)
-                } else {
-                    field(3) * 2
-                }
-            ];
-            for n in 0..field(3) {
-                if bits && points.bits[field(1) + n] {
-                    data[n / 8] += 1 << (n % 8);
-                }
-                if !bits {
-                    data[2 * n] = (points.words[field(1) + n] / 256) as u8;
-                    data[2 * n + 1] = (points.words[field(1) + n] % 256) as u8;
-                }
-            }
-            Ok([vec![function, data.len() as u8], data].concat())
-        }
-        5 | 6 => {
-            if pdu.len() != 5 || (function == 5 && field(3) != 0 && field(3) != 0xFF00) {
-                return Err(3);
-            }
-            let there = if function == 5 {
-                points.bits.len()
-            } else {
-                points.words.len()
-            };
-            if field(1) >= there.min(points.read_only_from as usize) {
-                return Err(2);
-            }
-            if function == 6 && field(3) > MAX_WORD as usize {
-                return Err(3);
-            }
-            if function == 5 {
-                points.bits[field(1)] = field(3) != 0;
-            } else {
-                points.words[field(1)] = field(3) as u16;
-            }
-            Ok(pdu.to_vec())
-        }
-        15 | 16 => {
-            if pdu.len() < 6 {
-                return Err(3);
-            }
-            let (count, limit) = (field(3), if function == 15 { 1968 } else { 123 });
-            let bytes = if function == 15 {
-                count.div_ceil(8)
-            } else {
-                count * 2
-            };
-            if count == 0 || count > limit || pdu[5] as usize != bytes || pdu.len() != 6 + bytes {
-                return Err(3);
-            }
-            let there = if function == 15 {
-                points.bits.len()
-            } else {
-                points.words.len()
-            };
-            if field(1) + count > there.min(points.read_only_from as usize) {
-                return Err(2);
-            }
-            if function == 16 && (0..count).any(|n| field(6 + 2 * n) > MAX_WORD as usize) {
-                return Err(3);
-            }
-            for n in 0..count {
-                if function == 15 {
-                    points.bits[field(1) + n] = pdu[6 + n / 8] & (1 << (n % 8)) != 0;
-                } else {
-                    points.words[field(1) + n] = field(6 + 2 * n) as u16;
-                }
-            }
-            Ok(pdu[..5].to_vec())
-        }
-        _ => Err(1),
-    }
-}
-
-/// A whole unit on a line: collects what it hears, judges it at the end.
+/// A server and its counters.
 pub struct Reference {
     pub points: Points,
-    pub strict: bool,
-    pub heard: Vec<u8>,
-    pub faulty: bool,
-    pub paused: bool,
-    pub torn: bool,
-    pub bus_messages: u16,
-    pub communication_errors: u16,
-    pub gaps: u16,
+    pub framing: Framing,
+    pub listening: bool,
+    /// In the order of their sub-functions, from 0B on; the gaps last.
+    pub counters: [u16; 9],
+    pub events: u16,
+    /// The newest last.
+    pub log: Vec<u8>,
+    /// Bad frames, and overruns, that the log does not know of yet.
+    pub unlogged: (u16, u16),
 }
 
+const BUS: usize = 0;
+pub const ERRORS: usize = 1;
+const EXCEPTIONS: usize = 2;
+const UNIT_MESSAGES: usize = 3;
+const NO_RESPONSE: usize = 4;
+const NAK: usize = 5;
+const BUSY: usize = 6;
+pub const OVERRUNS: usize = 7;
+pub const GAPS: usize = 8;
+
 impl Reference {
-    pub fn new(points: Points, strict: bool) -> Self {
+    pub fn new(framing: Framing, points: Points) -> Self {
         Self {
             points,
-            strict,
-            heard: Vec::new(),
-            faulty: false,
-            paused: false,
-            torn: false,
-            bus_messages: 0,
-            communication_errors: 0,
-            gaps: 0,
+            framing,
+            listening: false,
+            counters: [0; 9],
+            events: 0,
+            log: Vec::new(),
+            unlogged: (0, 0),
         }
     }
 
-    pub fn character(&mut self, byte: u8, faulty: bool) {
-        if self.paused {
-            self.gaps += 1;
-            self.torn = true;
-        }
-        self.paused = false;
-        self.heard.push(byte);
-        self.faulty |= faulty;
+    /// A bad frame was heard.
+    pub fn bad(&mut self, overrun: bool) {
+        self.counters[ERRORS] += 1;
+        self.counters[OVERRUNS] += u16::from(overrun);
+        self.unlogged.0 += 1;
+        self.unlogged.1 += u16::from(overrun);
     }
 
-    pub fn pause(&mut self) {
-        self.paused = !self.heard.is_empty();
-    }
-
-    /// The reply to what was heard before this silence.
-    pub fn silence(&mut self) -> Option<Vec<u8>> {
-        let frame = std::mem::take(&mut self.heard);
-        let faulty = std::mem::take(&mut self.faulty);
-        let torn = std::mem::take(&mut self.torn);
-        self.paused = false;
-        if frame.is_empty() {
+    /// A good frame was heard; `torn`: it must not be obeyed. The frame of the reply.
+    pub fn good(&mut self, unit: u8, pdu: &[u8], torn: bool) -> Option<Vec<u8>> {
+        self.counters[BUS] += 1;
+        if torn || (unit != UNIT && unit != 0) {
             return None;
         }
-        let good = (4..=256).contains(&frame.len()) && {
-            let (body, check) = frame.split_at(frame.len() - 2);
-            crc(body) == check
+        let framing = self.framing;
+        let reply = self.request(unit == 0, pdu)?;
+        Some(framed(framing, UNIT, &reply))
+    }
+
+    /// A request to this unit or to all.
+    fn request(&mut self, broadcast: bool, pdu: &[u8]) -> Option<Vec<u8>> {
+        let listening = |me: &Self| if me.listening { 0x20 } else { 0 };
+        let (bad, overruns) = std::mem::take(&mut self.unlogged);
+        for n in 0..bad {
+            let overrun = if n < overruns { 0x10 } else { 0 };
+            self.log.push(0x82 + overrun + listening(self));
+        }
+        let to_all = if broadcast { 0x40 } else { 0 };
+        self.log.push(0x80 + to_all + listening(self));
+        self.counters[UNIT_MESSAGES] += 1;
+
+        let restarts = !broadcast
+            && [[8, 0, 1, 0, 0], [8, 0, 1, 0xFF, 0]]
+                .iter()
+                .any(|r| r == pdu);
+        let hushes = !broadcast && pdu == [8, 0, 4, 0, 0] && !self.listening;
+        let obeyed = (1..=127).contains(&pdu[0]) && (!self.listening || restarts);
+        let silent = broadcast || hushes || self.listening || !obeyed;
+        self.counters[NO_RESPONSE] += u16::from(silent);
+
+        let can_be_broadcast = [5, 6, 15, 16, 22].contains(&pdu[0]);
+        let mut refused = None;
+        let mut reply = None;
+        if obeyed {
+            let before = self.points.clone();
+            // What is asked for is read after the request has been counted.
+            self.events += u16::from(pdu[0] != 11);
+            match self.answer(pdu) {
+                Ok(pdu) => reply = Some(pdu),
+                Err(code) => {
+                    refused = Some(code);
+                    reply = Some(vec![pdu[0] + 128, code]);
+                    assert_eq!(self.points, before);
+                }
+            }
+            let counts = refused.is_none() && (!broadcast || can_be_broadcast);
+            if !counts {
+                self.events -= u16::from(pdu[0] != 11);
+            }
+            if broadcast && !can_be_broadcast {
+                self.points = before;
+            }
+        }
+        if let Some(code) = refused {
+            self.counters[EXCEPTIONS] += 1;
+            if !silent {
+                self.counters[NAK] += u16::from(code == 7);
+                self.counters[BUSY] += u16::from(code == 6);
+            }
+        }
+        let exception = match refused {
+            Some(1..=3) if !silent => 1,
+            Some(4) if !silent => 2,
+            Some(5 | 6) if !silent => 4,
+            Some(7) if !silent => 8,
+            _ => 0,
         };
-        if faulty || !good {
-            self.communication_errors += 1;
-            return None;
+        self.log.push(0x40 + exception + listening(self));
+        if !broadcast && obeyed && refused.is_none() && pdu[0] == 8 {
+            self.afterwards(pdu);
         }
-        self.bus_messages += 1;
-        if torn && self.strict {
-            return None;
-        }
-        let pdu = &frame[1..frame.len() - 2];
-        let reads = (1..=4).contains(&pdu[0]);
-        match frame[0] {
-            UNIT => {
-                let reply = serve(&mut self.points, pdu)?;
-                Some(super::frame(UNIT, &reply))
+        reply.filter(|_| !silent)
+    }
+
+    /// What function 08 does once its reply is out.
+    fn afterwards(&mut self, pdu: &[u8]) {
+        let gone = |me: &mut Self| {
+            me.counters = [0; 9];
+            me.events = 0;
+        };
+        match pdu[2] {
+            0x01 => {
+                self.listening = false;
+                if self.framing != Framing::Rtu {
+                    self.framing = Framing::ASCII;
+                }
+                gone(self);
+                if pdu[3] == 0xFF {
+                    self.log.clear();
+                }
+                self.log.push(0);
             }
-            0 if !reads => {
-                serve(&mut self.points, pdu);
-                None
+            0x03 => self.framing = Framing::Ascii { delimiter: pdu[3] },
+            0x04 => {
+                self.listening = true;
+                self.log.push(4);
             }
-            _ => None,
+            0x0A => gone(self),
+            0x14 => self.counters[OVERRUNS] = 0,
+            _ => {}
         }
     }
+
+    fn answer(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+        let (events, bus) = (self.events.to_be_bytes(), self.counters[BUS].to_be_bytes());
+        let alone = if pdu.len() == 1 { Ok(()) } else { Err(3) };
+        match pdu[0] {
+            7 => alone.map(|()| vec![7, self.points.status]),
+            8 => self.diagnose(pdu),
+            11 => alone.map(|()| vec![11, 0, 0, events[0], events[1]]),
+            12 => {
+                alone?;
+                let log = self.log.iter().rev().take(64).copied();
+                let body: Vec<u8> = [0, 0]
+                    .into_iter()
+                    .chain(events)
+                    .chain(bus)
+                    .chain(log)
+                    .collect();
+                Ok([vec![12, body.len() as u8], body].concat())
+            }
+            17 => {
+                alone?;
+                let mut body = self.points.server_id.clone();
+                body.push(if self.points.running { 255 } else { 0 });
+                Ok([vec![17, body.len() as u8], body].concat())
+            }
+            _ => super::serving::answer(&mut self.points, pdu),
+        }
+    }
+
+    fn diagnose(&self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+        if pdu.len() < 3 {
+            return Err(3);
+        }
+        let ascii = self.framing != Framing::Rtu;
+        let data = &pdu[3..];
+        let allowed = match (pdu[1], pdu[2]) {
+            (0, 0) => true,
+            (0, 1) => data == [0, 0] || data == [255, 0],
+            (0, 3) if ascii => {
+                let taken = b":\r0123456789ABCDEF";
+                data.len() == 2 && data[1] == 0 && data[0] < 128 && !taken.contains(&data[0])
+            }
+            (0, 2 | 4 | 10..=18 | 20) => data == [0, 0],
+            _ => return Err(1),
+        };
+        if !allowed {
+            return Err(3);
+        }
+        let [high, low] = match pdu[2] {
+            2 => [0xAB, self.points.status],
+            sub @ 11..=18 => self.counters[usize::from(sub) - 11].to_be_bytes(),
+            _ => return Ok(pdu.to_vec()),
+        };
+        Ok(vec![8, 0, pdu[2], high, low])
+    }
+}
+
+/// The longest value that fits a reply by itself.
+const LONGEST: usize = 253 - 7 - 2;
+
+/// Function 2B/0E: whole objects, as many as fit.
+pub fn identify(points: &Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+    match pdu {
+        [_] => return Err(3),
+        [_, mei, ..] if *mei != 14 => return Err(1),
+        _ => {}
+    }
+    if pdu.len() != 4 || !(1..=4).contains(&pdu[2]) {
+        return Err(3);
+    }
+    let (code, first) = (pdu[2], pdu[3]);
+    let last = [2, 6, 255, 255][usize::from(code) - 1];
+    let there: Vec<(u8, &[u8])> = (0..=last)
+        .filter_map(|id| Some((id, points.objects[usize::from(id)].as_deref()?)))
+        .map(|(id, value)| (id, &value[..value.len().min(LONGEST)]))
+        .collect();
+    let start = there.iter().position(|(id, _)| *id == first);
+    let mut reply = vec![0x2B, 14, code, 0x83, 0, 0, 0];
+    if code == 4 {
+        let (id, value) = there[start.ok_or(2)?];
+        reply.extend([id, value.len() as u8]);
+        reply.extend(value);
+        reply[6] = 1;
+        return Ok(reply);
+    }
+    for (id, value) in &there[start.unwrap_or(0)..] {
+        if reply.len() + 2 + value.len() > 253 {
+            reply[4] = 255;
+            reply[5] = *id;
+            break;
+        }
+        reply.extend([*id, value.len() as u8]);
+        reply.extend(*value);
+        reply[6] += 1;
+    }
+    Ok(reply)
+}
+
+/// The bytes of an ASCII frame's inside, if they are a good frame.
+pub fn judge_ascii(inside: &[u8]) -> Option<Vec<u8>> {
+    let text = std::str::from_utf8(inside).ok()?;
+    let fits = text.len() % 2 == 0 && (6..=510).contains(&text.len());
+    let digits = text.chars().all(|c| "0123456789ABCDEF".contains(c));
+    if !fits || !digits {
+        return None;
+    }
+    let pair = |at: usize| u8::from_str_radix(&text[at..at + 2], 16).ok();
+    let mut bytes = (0..text.len())
+        .step_by(2)
+        .map(pair)
+        .collect::<Option<Vec<u8>>>()?;
+    let check = bytes.pop()?;
+    (check == lrc(&bytes)).then_some(bytes)
+}
+
+/// Whether a word may be written.
+pub fn allowed(word: usize) -> bool {
+    word <= usize::from(MAX_WORD)
 }

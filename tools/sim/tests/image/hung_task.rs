@@ -13,6 +13,7 @@ const WITHIN: Time = Time::from_ms(602);
 
 const LINE: u16 = 1 << 0;
 const SERVE: u16 = 1 << 1;
+const SCAN: u16 = 1 << 2;
 const BACKGROUND: u16 = 1 << 3;
 
 /// A branch to itself.
@@ -87,6 +88,40 @@ fn every_task_that_spins_is_bitten_out_of_it() {
     for handler in ["USART1", "TIM2", "EXTI3", "TIM4", "EXTI0"] {
         let address = bench.board.symbol(handler).expect("the task's handler");
         break_at(&mut bench, handler, address, SPIN);
+    }
+}
+
+/// An address that a handler comes by, some way behind its entry.
+fn within(bench: &mut Bench, handler: &str) -> u32 {
+    let entry = bench.board.symbol(handler).expect("the task's handler") & !1;
+    let now = bench.board.now();
+    bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    assert!(bench.board.run_until_pc(entry, now + Time::from_ms(50)));
+    // The number of the exception, the rest are flags (PM0056 2.1.3).
+    let exception = |bench: &Bench| bench.board.register(16).map(|xpsr| xpsr & 0x1FF);
+    let entered = exception(bench);
+    bench.board.step(40);
+    assert_eq!(exception(bench), entered, "still in {handler}");
+    let address = bench.board.pc();
+    bench.board.run_for(Time::from_ms(30));
+    bench.board.line().take_received();
+    address
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_task_that_hangs_on_its_way_is_named() {
+    let mut bench = bench();
+    for (handler, own) in [
+        ("USART1", LINE),
+        ("TIM2", LINE),
+        ("EXTI3", SERVE),
+        ("TIM4", SCAN),
+        ("EXTI0", BACKGROUND),
+    ] {
+        let address = within(&mut bench, handler);
+        let marks = break_at(&mut bench, handler, address, SPIN);
+        assert_eq!(marks & own, own, "{handler}: {marks:#06b}");
     }
 }
 

@@ -6,7 +6,7 @@
 //! | what | where |
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
-//! | the line | `framing`, `noise`, `refusals`, `timing`, `dip` |
+//! | the line | `standard_functions`, `framing`, `noise`, `refusals`, `timing`, `dip` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `power_cut` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults` |
@@ -35,5 +35,6 @@ mod ranges;
 mod refusals;
 mod registers;
 mod saving;
+mod standard_functions;
 mod storing;
 mod timing;

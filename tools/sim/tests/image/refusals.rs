@@ -19,7 +19,7 @@ fn each_fault_has_its_exception_and_the_first_check_that_fails_decides() {
     let cases: &[(&[u8], u8)] = &[
         // 01: no such function.
         (&[0x41], 1),
-        (&[0x07], 1),
+        (&[0x09], 1),
         (&[0x7F, 0, 0, 0, 0], 1),
         // 03: quantity, before the address is looked at.
         (&[0x01, 0, 0x10, 0, 0], 3),

@@ -30,6 +30,9 @@ impl Gaps {
     /// t3.5 above 19200 bit/s, in ns.
     const FIXED_T35: u32 = 1_750_000;
 
+    /// The longest silence within an ASCII frame, in ns (V1.02 2.5.2.1).
+    pub const ASCII_TIMEOUT: u32 = 1_000_000_000;
+
     /// The times of the standard in nanoseconds, for `baud` in bit/s and characters of `bits` bits
     /// in all (11, or 10 for 8N1). The length of a bit is rounded up, so that no silence is too
     /// short.

@@ -1,0 +1,137 @@
+//! Read device identification: function 2B, MEI type 0E (V1.1b3 6.21).
+//!
+//! ```text
+//!  head            body
+//!  +----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
+//!  | 2B | 0E |code| conformity | more follows| next object | count | id | len | value  |...
+//!  +----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
+//! ```
+
+use crate::{Adu, DataModel, Exception};
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ReadCode {
+    /// 01: objects 00 to 02.
+    Basic = 1,
+    /// 02: objects 00 to 06.
+    Regular = 2,
+    /// 03: objects 00 to 06, and from 80 on.
+    Extended = 3,
+    /// 04: one object.
+    One = 4,
+}
+
+/// The MEI type of read device identification.
+pub(crate) const MEI_TYPE: u8 = 0x0E;
+
+/// Objects 07 to 7F are reserved: those of the device begin here.
+const FIRST_EXTENDED: u8 = 0x80;
+/// The last of the standard's own objects.
+const LAST_REGULAR: u8 = 0x06;
+
+/// The most bytes of a body: 253 of the PDU, less function code, MEI type and read code.
+const MAX_BODY: usize = 253 - 3;
+/// Conformity, more follows, next object, count.
+const FIXED: usize = 4;
+/// Object and length.
+const OBJECT: usize = 2;
+/// The longest value that fits a reply; what is beyond is cut off.
+const MAX_VALUE: usize = MAX_BODY - FIXED - OBJECT;
+
+/// Where in the body they are.
+const MORE_FOLLOWS: u8 = 1;
+const NEXT_OBJECT: u8 = 2;
+const COUNT: u8 = 3;
+
+impl ReadCode {
+    const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            1 => Self::Basic,
+            2 => Self::Regular,
+            3 => Self::Extended,
+            4 => Self::One,
+            _ => return None,
+        })
+    }
+
+    /// The last object that may be among those asked for.
+    const fn last(self) -> u8 {
+        match self {
+            Self::Basic => 0x02,
+            Self::Regular => LAST_REGULAR,
+            Self::Extended | Self::One => 0xFF,
+        }
+    }
+}
+
+/// Decodes what follows the MEI type.
+///
+/// # Errors
+/// 03 for another length or a code that is not 01 to 04; 02 for one object that is not there.
+pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode, u8), Exception> {
+    let &[code, object] = fields else {
+        return Err(Exception::IllegalDataValue);
+    };
+    let code = ReadCode::from_code(code).ok_or(Exception::IllegalDataValue)?;
+    let known = object <= code.last() && value(object, model).is_some();
+    match code {
+        ReadCode::One if !known => Err(Exception::IllegalDataAddress),
+        // A stream that cannot begin there begins at the beginning.
+        _ => Ok((code, if known { object } else { 0 })),
+    }
+}
+
+/// Puts the body together.
+pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut Adu) {
+    adu.clear();
+    adu.extend(&[conformity(model), 0x00, 0x00, 0]);
+    let mut count = 0;
+    let mut next = Some(first);
+    while let Some(object) = next
+        && object <= code.last()
+    {
+        if let Some(value) = value(object, model) {
+            if adu.len() + OBJECT + value.len() > MAX_BODY {
+                adu.set(MORE_FOLLOWS, 0xFF);
+                adu.set(NEXT_OBJECT, object);
+                break;
+            }
+            // It fits 250 bytes.
+            adu.extend(&[object, value.len() as u8]);
+            adu.extend(value);
+            count += 1;
+        } else if object >= FIRST_EXTENDED {
+            break;
+        }
+        next = match object {
+            _ if code == ReadCode::One => None,
+            LAST_REGULAR => Some(FIRST_EXTENDED),
+            object => object.checked_add(1),
+        };
+    }
+    adu.set(COUNT, count);
+}
+
+/// The value of an object, as far as it fits a reply.
+fn value(object: u8, model: &impl DataModel) -> Option<&[u8]> {
+    if (LAST_REGULAR + 1..FIRST_EXTENDED).contains(&object) {
+        return None;
+    }
+    let value = model.identification(object)?;
+    Some(value.get(..MAX_VALUE).unwrap_or(value))
+}
+
+/// Which objects there are at all, and that each can be asked for by itself (bit 7).
+fn conformity(model: &impl DataModel) -> u8 {
+    let there = |object| model.identification(object).is_some();
+    let level = if there(FIRST_EXTENDED) {
+        ReadCode::Extended
+    } else if (ReadCode::Basic.last() + 1..=LAST_REGULAR).any(there) {
+        ReadCode::Regular
+    } else {
+        ReadCode::Basic
+    };
+    0x80 | level as u8
+}

@@ -1,0 +1,180 @@
+//! ASCII mode, character by character (V1.02 2.5.2).
+//!
+//! ```text
+//!  +---+-----------+------------+---------------+-----------+--------------+
+//!  | : | unit, 2   | function,2 | data, 0 - 504 | LRC, 2    | CR delimiter |
+//!  +---+-----------+------------+---------------+-----------+--------------+
+//! ```
+//!
+//! Each byte is two hexadecimal digits, the high one first, `0`-`9` and `A`-`F`; small letters are
+//! no digits of the standard and spoil a frame. The LRC is the two's complement of the sum of the
+//! bytes (6.2.1), so that the sum over a whole good frame is zero.
+
+use super::Framing;
+
+/// Data bits of a character on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// Seven, the standard's own; what a UART delivers above them, such as a parity bit, is
+    /// ignored.
+    Seven,
+    /// Eight; a character above 7F spoils its frame.
+    Eight,
+}
+
+/// The start of every frame, wherever it comes.
+pub(super) const START: u8 = b':';
+/// The character before the delimiter.
+pub(super) const CR: u8 = b'\r';
+
+/// Where in a frame the next character stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    /// Before the first digit of a byte, or the carriage return.
+    Byte,
+    /// Before the second digit.
+    Second { high: u8 },
+    /// After the carriage return.
+    Delimiter,
+    /// After the delimiter.
+    Over,
+}
+
+/// What a character of a frame amounts to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// A byte is complete.
+    Byte(u8),
+    /// Nothing yet, or the end.
+    Nothing,
+    /// It does not belong there.
+    Wrong,
+}
+
+/// Reads the inside of a frame, between the colon and the end.
+#[derive(Debug)]
+pub(super) struct Reader {
+    delimiter: u8,
+    mask: u8,
+    place: Place,
+}
+
+impl Reader {
+    pub(super) const fn new(width: Width) -> Self {
+        Self {
+            delimiter: Framing::LINE_FEED,
+            mask: match width {
+                Width::Seven => 0x7F,
+                Width::Eight => 0xFF,
+            },
+            place: Place::Byte,
+        }
+    }
+
+    pub(super) const fn set_delimiter(&mut self, delimiter: u8) {
+        self.delimiter = delimiter;
+    }
+
+    /// The character without what is not data.
+    pub(super) const fn masked(&self, character: u8) -> u8 {
+        character & self.mask
+    }
+
+    /// A frame begins.
+    pub(super) const fn begin(&mut self) {
+        self.place = Place::Byte;
+    }
+
+    /// Whether the frame has come to its end.
+    #[inline]
+    pub(super) const fn is_over(&self) -> bool {
+        matches!(self.place, Place::Over)
+    }
+
+    /// The next character of the frame, masked.
+    pub(super) fn take(&mut self, character: u8) -> Part {
+        let (place, part) = match (self.place, character) {
+            (Place::Delimiter, end) if end == self.delimiter => (Place::Over, Part::Nothing),
+            (Place::Byte, CR) => (Place::Delimiter, Part::Nothing),
+            // Of a spoiled frame, too, these two are the end.
+            (_, CR) => (Place::Delimiter, Part::Wrong),
+            (place, character) => match (place, digit(character)) {
+                (Place::Byte, Some(high)) => (Place::Second { high }, Part::Nothing),
+                (Place::Second { high }, Some(low)) => (Place::Byte, Part::Byte(high << 4 | low)),
+                _ => (Place::Byte, Part::Wrong),
+            },
+        };
+        self.place = place;
+        part
+    }
+}
+
+/// The value of a hexadecimal digit.
+const fn digit(character: u8) -> Option<u8> {
+    match character {
+        b'0'..=b'9' => Some(character - b'0'),
+        b'A'..=b'F' => Some(character - b'A' + 10),
+        _ => None,
+    }
+}
+
+/// The hexadecimal digits of a byte, the high one first.
+pub(super) const fn digits(byte: u8) -> [u8; 2] {
+    const fn digit(value: u8) -> u8 {
+        if value < 10 {
+            b'0' + value
+        } else {
+            b'A' - 10 + value
+        }
+    }
+    [digit(byte >> 4), digit(byte & 0xF)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_comes_back_from_its_digits() {
+        let mut reader = Reader::new(Width::Seven);
+        for byte in 0..=255 {
+            let [high, low] = digits(byte);
+            assert_eq!(reader.take(high), Part::Nothing);
+            assert_eq!(reader.take(low), Part::Byte(byte));
+        }
+        assert_eq!(digits(0x1F), *b"1F");
+        assert_eq!(digits(0xA9), *b"A9");
+    }
+
+    #[test]
+    fn only_the_standard_s_digits_are_digits() {
+        for character in 0..=255_u8 {
+            let standard = char::from(character)
+                .to_digit(16)
+                .filter(|_| !character.is_ascii_lowercase());
+            assert_eq!(digit(character).map(u32::from), standard);
+        }
+    }
+
+    #[test]
+    fn a_frame_ends_with_both_characters() {
+        let mut reader = Reader::new(Width::Eight);
+        assert_eq!(reader.take(b'\n'), Part::Wrong);
+        assert_eq!(reader.take(b'1'), Part::Nothing);
+        assert_eq!(reader.take(b'\r'), Part::Wrong, "half a byte");
+        assert_eq!(reader.take(b'\r'), Part::Wrong);
+        assert_eq!(reader.take(b'3'), Part::Wrong);
+        assert_eq!(reader.take(b'\n'), Part::Wrong);
+        assert_eq!(reader.take(b'1'), Part::Nothing);
+        assert_eq!(reader.take(b'2'), Part::Byte(0x12));
+        assert_eq!(reader.take(b'\r'), Part::Nothing);
+        assert!(!reader.is_over());
+        assert_eq!(reader.take(b'\n'), Part::Nothing);
+        assert!(reader.is_over());
+        assert_eq!(reader.take(b'\n'), Part::Wrong);
+        assert!(!reader.is_over());
+        reader.take(b'\r');
+        reader.begin();
+        assert_eq!(reader.take(b'\n'), Part::Wrong);
+    }
+}

@@ -1,0 +1,22 @@
+//! The two transmission modes: between the characters on the line and requests and replies
+//! (V1.02 2.5).
+//!
+//! RTU frames are bytes, set apart by silence and closed by a CRC. ASCII frames are pairs of
+//! hexadecimal digits between a colon and an end mark, closed by an LRC. [`Receiver`] and
+//! [`Transmitter`] speak either, as they are told at the start; all that comes after them is the
+//! same.
+
+mod ascii;
+mod faults;
+mod framing;
+mod gaps;
+mod receiver;
+mod state;
+mod transmitter;
+
+pub use ascii::Width;
+pub use faults::Faults;
+pub use framing::Framing;
+pub use gaps::Gaps;
+pub use receiver::{Closed, Receiver};
+pub use transmitter::{Next, Transmitter};

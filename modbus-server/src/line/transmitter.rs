@@ -1,0 +1,277 @@
+//! The reply on its way out: head, body, and the CRC or LRC made as they leave.
+
+use super::{Framing, ascii};
+use crate::{Adu, Head, crc};
+
+/// What the line driver has to do next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// Send this character.
+    Byte(u8),
+    /// The rest is not here yet: ask again once it has been handed over ([`Transmitter::head`],
+    /// [`Transmitter::body`]).
+    Wait,
+    /// The frame is complete: release the line after the last stop bit.
+    Done,
+}
+
+/// Gives out one reply character by character.
+#[derive(Debug)]
+pub struct Transmitter<'a> {
+    framing: Framing,
+    stage: Stage,
+    /// In RTU mode: how many bytes of the head have gone. In ASCII mode: `ELSEWHERE`.
+    sent: u8,
+    /// In ASCII mode: the second digit of a byte whose first has gone, else 0.
+    second: u8,
+    head: Head,
+    body: Option<&'a mut Adu>,
+    /// In RTU mode: how many bytes of the body are left. In ASCII mode: 0.
+    left: u16,
+    /// In RTU mode: the next byte of the body. In ASCII mode: the next of head and body.
+    at: u16,
+    /// The CRC of the bytes sent; in ASCII mode their sum.
+    check: u16,
+}
+
+/// More than a head is long.
+const ELSEWHERE: u8 = u8::MAX;
+
+/// What of a frame comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// In ASCII mode, the colon.
+    Start,
+    /// Head and body, and after them the LRC or the first byte of the CRC.
+    Bytes,
+    /// The second byte of the CRC, or the carriage return.
+    End,
+    /// In ASCII mode, the delimiter.
+    Delimiter,
+    /// Nothing.
+    Over,
+}
+
+impl<'a> Transmitter<'a> {
+    /// Nothing to send.
+    pub const fn idle() -> Self {
+        Self {
+            stage: Stage::Over,
+            sent: ELSEWHERE,
+            ..Self::open(0, Framing::Rtu)
+        }
+    }
+
+    /// A reply of `unit`, of which no more is known yet. Its first byte, the unit address, is ready
+    /// at once.
+    #[inline]
+    pub const fn open(unit: u8, framing: Framing) -> Self {
+        let (stage, sent, check) = match framing {
+            Framing::Rtu => (Stage::Bytes, 0, crc::START),
+            Framing::Ascii { .. } => (Stage::Start, ELSEWHERE, 0),
+        };
+        Self {
+            framing,
+            stage,
+            sent,
+            second: 0,
+            head: Head::opening(unit),
+            body: None,
+            left: 0,
+            at: 0,
+            check,
+        }
+    }
+
+    /// Hands over what [`Server::decide`](crate::Server::decide) says the reply is, once.
+    #[inline]
+    pub const fn head(&mut self, head: Head) {
+        self.head = head;
+    }
+
+    /// Hands over the body, after the head: what [`Server::carry_out`](crate::Server::carry_out)
+    /// has left in the buffer. A buffer that is not needed, because the head is the whole reply or
+    /// the body is here already, comes straight back, for the receiver.
+    #[inline]
+    #[must_use = "a buffer that is not needed belongs back in the receiver"]
+    pub fn body(&mut self, adu: &'a mut Adu) -> Option<&'a mut Adu> {
+        if !self.head.has_body() || self.body.is_some() || self.stage == Stage::Over {
+            return Some(adu);
+        }
+        if self.framing == Framing::Rtu {
+            self.at = u16::from(self.head.body_from());
+            // At most 256.
+            self.left = self.head.body_in(adu).len() as u16;
+        }
+        self.body = Some(adu);
+        None
+    }
+
+    /// The next thing to do. Called at each "transmit register empty"; in the end it is
+    /// [`Next::Done`] as often as asked.
+    #[inline(always)]
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "not an iterator: it may have to wait"
+    )]
+    pub fn next(&mut self) -> Next {
+        let byte = if self.sent < self.head.len() {
+            let byte = self.head.get(self.sent);
+            self.sent += 1;
+            byte
+        } else if self.left > 0
+            && let Some(adu) = &self.body
+        {
+            let byte = adu.get(self.at);
+            self.at += 1;
+            self.left -= 1;
+            byte
+        } else {
+            return self.rest();
+        };
+        self.check = crc::step(self.check, byte);
+        Next::Byte(byte)
+    }
+
+    /// What is not the next byte of an RTU reply.
+    #[inline(never)]
+    fn rest(&mut self) -> Next {
+        if let Framing::Ascii { delimiter } = self.framing {
+            return self.ascii(delimiter);
+        }
+        self.stage = match self.stage {
+            Stage::Bytes if self.must_wait() => return Next::Wait,
+            Stage::Bytes => Stage::End,
+            Stage::End => Stage::Over,
+            _ => return Next::Done,
+        };
+        // Low byte first; a CRC fed with its own low byte moves its high byte down to be the next.
+        let [low, _] = self.check.to_le_bytes();
+        self.check = crc::step(self.check, low);
+        Next::Byte(low)
+    }
+
+    /// The next character in ASCII mode.
+    fn ascii(&mut self, delimiter: u8) -> Next {
+        if self.second != 0 {
+            let second = self.second;
+            self.second = 0;
+            return Next::Byte(second);
+        }
+        let (stage, character) = match self.stage {
+            Stage::Start => (Stage::Bytes, ascii::START),
+            Stage::Bytes => {
+                let [sum, _] = self.check.to_le_bytes();
+                let (stage, byte) = match self.byte_at(self.at) {
+                    Some(byte) => (Stage::Bytes, byte),
+                    None if self.must_wait() => return Next::Wait,
+                    None => (Stage::End, sum.wrapping_neg()),
+                };
+                self.at += 1;
+                self.check = self.check.wrapping_add(u16::from(byte));
+                let [first, second] = ascii::digits(byte);
+                self.second = second;
+                (stage, first)
+            }
+            Stage::End => (Stage::Delimiter, ascii::CR),
+            Stage::Delimiter => (Stage::Over, delimiter),
+            Stage::Over => return Next::Done,
+        };
+        self.stage = stage;
+        Next::Byte(character)
+    }
+
+    /// The byte at this place of head and body, if it is here and not beyond the end.
+    fn byte_at(&self, at: u16) -> Option<u8> {
+        let at = usize::from(at);
+        let head = self.head.as_slice();
+        match (head.get(at), &self.body) {
+            (Some(byte), _) => Some(*byte),
+            (None, Some(adu)) => self.head.body_in(adu).get(at - head.len()).copied(),
+            (None, None) => None,
+        }
+    }
+
+    /// Whether there is more to come than is here.
+    fn must_wait(&self) -> bool {
+        self.head.has_body() && self.body.is_none()
+    }
+
+    /// Takes the buffer of the body back, for the receiver. Before [`Next::Done`] this cuts the
+    /// reply short.
+    #[inline]
+    pub fn take_buffer(&mut self) -> Option<&'a mut Adu> {
+        self.body.take()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Exception;
+
+    fn is_next(transmitter: &mut Transmitter<'_>, characters: &[u8]) {
+        for character in characters {
+            assert_eq!(transmitter.next(), Next::Byte(*character));
+        }
+    }
+
+    #[test]
+    fn nothing_to_send_is_done() {
+        assert_eq!(Transmitter::idle().next(), Next::Done);
+    }
+
+    #[test]
+    fn the_unit_address_goes_before_anything_else_is_known() {
+        let head = Head::exception(1, 3, Exception::ServerDeviceFailure);
+        let mut transmitter = Transmitter::open(1, Framing::Rtu);
+        is_next(&mut transmitter, &[0x01]);
+        assert_eq!(transmitter.next(), Next::Wait);
+        transmitter.head(head);
+        is_next(&mut transmitter, &[0x83, 0x04, 0x40, 0xF3]);
+        assert_eq!(transmitter.next(), Next::Done);
+        assert_eq!(transmitter.next(), Next::Done);
+        let mut adu = Adu::new();
+        assert!(transmitter.body(&mut adu).is_some(), "not needed");
+        assert!(transmitter.take_buffer().is_none());
+    }
+
+    #[test]
+    fn it_waits_for_the_body_as_long_as_it_takes() {
+        let mut adu = Adu::new();
+        adu.extend(&[0x03, 0xE8]);
+        let mut transmitter = Transmitter::open(1, Framing::Rtu);
+        transmitter.head(Head::read(1, 3, 2));
+        is_next(&mut transmitter, &[0x01, 0x03, 0x02]);
+        assert_eq!(transmitter.next(), Next::Wait);
+        assert_eq!(transmitter.next(), Next::Wait);
+        assert!(transmitter.body(&mut adu).is_none());
+        let mut other = Adu::new();
+        assert!(transmitter.body(&mut other).is_some());
+        is_next(&mut transmitter, &[0x03, 0xE8, 0xB8, 0xFA]);
+        assert_eq!(transmitter.next(), Next::Done);
+        assert!(transmitter.take_buffer().is_some());
+    }
+
+    #[test]
+    fn an_ascii_reply_has_its_own_clothes() {
+        let mut adu = Adu::new();
+        adu.extend(&[0x03, 0xE8]);
+        let mut transmitter = Transmitter::open(1, Framing::ASCII);
+        is_next(&mut transmitter, b":01");
+        assert_eq!(transmitter.next(), Next::Wait);
+        transmitter.head(Head::read(1, 3, 2));
+        is_next(&mut transmitter, b"0302");
+        assert_eq!(transmitter.next(), Next::Wait);
+        assert!(transmitter.body(&mut adu).is_none());
+        // 01 + 03 + 02 + 03 + E8 = F1, and 0F makes it 100.
+        is_next(&mut transmitter, b"03E80F\r\n");
+        assert_eq!(transmitter.next(), Next::Done);
+        assert_eq!(transmitter.next(), Next::Done);
+
+        let mut transmitter = Transmitter::open(1, Framing::Ascii { delimiter: b'#' });
+        transmitter.head(Head::exception(1, 3, Exception::ServerDeviceFailure));
+        is_next(&mut transmitter, b":01830478\r#");
+        assert_eq!(transmitter.next(), Next::Done);
+    }
+}

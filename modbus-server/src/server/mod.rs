@@ -1,0 +1,167 @@
+//! Requests in, decisions and replies out.
+
+mod settle;
+mod tally;
+mod work;
+
+use crate::diagnostic::Diagnostic;
+use crate::events::EventLog;
+use crate::line::Framing;
+use crate::{Adu, Counters, DataModel, Decision, Function, Head, LineCounters, Outcome, Work};
+use tally::Tally;
+
+/// The unit address of a broadcast (V1.02 2.2).
+pub(crate) const BROADCAST: u8 = 0;
+
+/// The server of one unit address on one line.
+///
+/// For each request: [`decide`](Self::decide), then [`commit`](Self::commit) and
+/// [`carry_out`](Self::carry_out), once each; before them, where every instruction counts until
+/// the reply starts, [`answers`](Self::answers).
+#[derive(Debug)]
+pub struct Server {
+    unit: u8,
+    framing: Framing,
+    /// Function 08, sub-function 04, was obeyed, and 01 not since then.
+    listen_only: bool,
+    /// The line's counters as last seen, and as they were when they were last cleared.
+    line: LineCounters,
+    cleared: LineCounters,
+    tally: Tally,
+    log: EventLog,
+}
+
+/// What becomes of a request, by its first bytes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Hearing {
+    /// Nothing.
+    Dismissed(Outcome),
+    /// It is decided upon and answered.
+    Answered,
+    /// It is to all units.
+    Broadcast,
+    /// It is carried out in silence.
+    Silent,
+}
+
+impl Server {
+    /// A server for unit address `unit`: 1-247, or one of 248-255, which the standard leaves to the
+    /// device; on a line that starts with `framing`.
+    pub const fn new(unit: u8, framing: Framing) -> Self {
+        Self {
+            unit,
+            framing,
+            listen_only: false,
+            line: LineCounters::ZERO,
+            cleared: LineCounters::ZERO,
+            tally: Tally::ZERO,
+            log: EventLog::new(),
+        }
+    }
+
+    /// The unit address.
+    pub const fn unit(&self) -> u8 {
+        self.unit
+    }
+
+    /// How the next reply is to be framed, and how the request after it will be. It changes when a
+    /// request that changes it is carried out, whose own reply is under way by then.
+    pub const fn framing(&self) -> Framing {
+        self.framing
+    }
+
+    /// Whether the unit is in listen-only mode (V1.1b3 6.8, sub-function 04).
+    pub const fn is_listen_only(&self) -> bool {
+        self.listen_only
+    }
+
+    /// Whether `request` (unit address and PDU, without CRC) will be answered at all, be it with an
+    /// exception. Takes the same few instructions for every request, where
+    /// [`decide`](Self::decide) takes longer the more values there are to check: so the first byte
+    /// of the reply, the unit address, can go out before the rest is decided
+    /// ([`Transmitter::open`](crate::line::Transmitter::open)).
+    pub fn answers(&self, request: &Adu) -> bool {
+        self.hear(request.as_slice()) == Hearing::Answered
+    }
+
+    fn hear(&self, request: &[u8]) -> Hearing {
+        let &[unit, function, ref fields @ ..] = request else {
+            return Hearing::Dismissed(Outcome::NotForUs);
+        };
+        let broadcast = unit == BROADCAST;
+        if !broadcast && unit != self.unit {
+            return Hearing::Dismissed(Outcome::NotForUs);
+        }
+        if function == 0 || function & Function::EXCEPTION != 0 {
+            return Hearing::Dismissed(Outcome::NoRequest);
+        }
+        let diagnostics = !broadcast && function == Function::Diagnostics.code();
+        if self.listen_only {
+            return if diagnostics && Diagnostic::is_restart(fields) {
+                Hearing::Silent
+            } else {
+                Hearing::Dismissed(Outcome::NotObeyed)
+            };
+        }
+        if broadcast {
+            Hearing::Broadcast
+        } else if diagnostics && Diagnostic::is_listen_only(fields) {
+            Hearing::Silent
+        } else {
+            Hearing::Answered
+        }
+    }
+
+    /// Settles the reply to `request` (unit address and PDU, without CRC): everything that can be
+    /// refused is refused here. Changes nothing.
+    pub fn decide(&self, request: &Adu, model: &impl DataModel) -> Decision {
+        let hearing = self.hear(request.as_slice());
+        let mut decision = Decision {
+            reply: None,
+            work: Work::None,
+            outcome: Outcome::NotForUs,
+            broadcast: request.get(0) == BROADCAST,
+        };
+        if let Hearing::Dismissed(outcome) = hearing {
+            decision.outcome = outcome;
+            return decision;
+        }
+        let (unit, function) = (request.get(0), request.get(1));
+        let head = match settle::settle(unit, function, request.from(2), self.framing, model) {
+            Ok((_, work)) if decision.broadcast && !work.can_be_broadcast() => {
+                decision.outcome = Outcome::NoEffect;
+                return decision;
+            }
+            Ok((head, work)) => {
+                decision.outcome = Outcome::Accepted;
+                decision.work = work;
+                head
+            }
+            Err(exception) => {
+                decision.outcome = Outcome::Refused(exception);
+                Head::exception(unit, function, exception)
+            }
+        };
+        decision.reply = (hearing == Hearing::Answered).then_some(head);
+        decision
+    }
+
+    /// All counters as they stood at the last [`commit`](Self::commit) or
+    /// [`note_line`](Self::note_line), less what function 08 has cleared.
+    pub const fn counters(&self) -> Counters {
+        let line = self.line.since(&self.cleared);
+        let tally = &self.tally;
+        Counters {
+            bus_messages: line.bus_messages,
+            communication_errors: line.communication_errors,
+            exceptions: tally.exceptions,
+            // What found no buffer was for this unit all the same, and without a reply.
+            unit_messages: tally.unit_messages.wrapping_add(line.dropped),
+            no_response: tally.no_response.wrapping_add(line.dropped),
+            nak: tally.nak,
+            busy: tally.busy.wrapping_add(line.dropped),
+            overruns: line.overruns,
+            gaps: line.gaps,
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! The decision: is the request right, does the model agree, how does the reply begin.
+
+use crate::diagnostic::Diagnostic;
+use crate::line::Framing;
+use crate::pdu::Request;
+use crate::{DataModel, Exception, Head, Span, Words, WordsOut, Work, identification};
+
+/// The start of the reply, and the work, of a request that is accepted. `fields` are what follows
+/// the function code.
+///
+/// # Errors
+/// The exception to answer with.
+pub(super) fn settle(
+    unit: u8,
+    function: u8,
+    fields: &[u8],
+    framing: Framing,
+    model: &impl DataModel,
+) -> Result<(Head, Work), Exception> {
+    let plain = Head::plain(unit, function);
+    Ok(match Request::decode(function, fields, framing)? {
+        Request::ReadBits(span) => {
+            model.check_read_bits(span)?;
+            // At most 2000 / 8.
+            let head = Head::read(unit, function, span.count().div_ceil(8) as u8);
+            (head, Work::ReadBits(span))
+        }
+        Request::ReadWords(span) => {
+            model.check_read_words(span)?;
+            (read_words(unit, function, span), Work::ReadWords(span))
+        }
+        Request::WriteBits { span, bits, from } => {
+            model.check_write_bits(span, bits)?;
+            let head = Head::echo(unit, function, first(fields)?);
+            (head, Work::WriteBits { span, from })
+        }
+        Request::WriteWords { span, words, from } => {
+            model.check_write_words(span, words)?;
+            let head = Head::echo(unit, function, first(fields)?);
+            (head, Work::WriteWords { span, from })
+        }
+        Request::MaskWord { address, and, or } => {
+            let value = masked(address, and, or, model)?;
+            let head = Head::masks(unit, function, first(fields)?);
+            (head, Work::WriteMasked { address, value })
+        }
+        Request::WriteThenRead {
+            write,
+            words,
+            from,
+            read,
+        } => {
+            first_of(
+                model.check_write_words(write, words),
+                model.check_read_words(read),
+            )?;
+            let head = read_words(unit, function, read);
+            (head, Work::WriteThenRead { write, from, read })
+        }
+        Request::ExceptionStatus => (plain, Work::ExceptionStatus),
+        Request::Diagnose(diagnostic) => diagnose(unit, function, fields, diagnostic)?,
+        Request::EventCounter => (plain, Work::EventCounter),
+        Request::EventLog => (plain, Work::EventLog),
+        Request::ServerId => (plain, Work::ServerId),
+        Request::Identify(fields) => {
+            if model.identification(0).is_none() {
+                return Err(Exception::IllegalFunction);
+            }
+            let (code, object) = identification::decode(fields, model)?;
+            let head = Head::before(unit, function, [identification::MEI_TYPE, code as u8]);
+            (head, Work::Identify { code, object })
+        }
+    })
+}
+
+/// The reply begins as the request does; what follows is the request's, or is put in its place.
+fn diagnose(
+    unit: u8,
+    function: u8,
+    fields: &[u8],
+    diagnostic: Diagnostic,
+) -> Result<(Head, Work), Exception> {
+    let head = Head::in_place(unit, function, first(fields)?);
+    Ok((head, Work::Diagnose(diagnostic)))
+}
+
+fn read_words(unit: u8, function: u8, span: Span) -> Head {
+    // At most 125 * 2.
+    Head::read(unit, function, (span.count() * 2) as u8)
+}
+
+/// The first bytes after the function code, as they came.
+fn first<const N: usize>(fields: &[u8]) -> Result<[u8; N], Exception> {
+    fields
+        .first_chunk()
+        .copied()
+        .ok_or(Exception::IllegalDataValue)
+}
+
+/// What a mask makes of a word: (current AND and) OR (or AND NOT and), V1.1b3 6.16.
+///
+/// # Errors
+/// As for a write of that; where the word cannot be read now, the reason for it.
+fn masked(address: u16, and: u16, or: u16, model: &impl DataModel) -> Result<u16, Exception> {
+    let span = Span::single(address);
+    let mut bytes = [0; 2];
+    if let Err(unreadable) = model.check_read_words(span) {
+        // What would be written is not known, so that only the address can be worse.
+        let write = model.check_write_words(span, Words::new(&bytes));
+        return Err(match write {
+            Err(Exception::IllegalDataAddress) => Exception::IllegalDataAddress,
+            _ => unreadable,
+        });
+    }
+    model.read_words(span, &mut WordsOut::new(&mut bytes));
+    let value = (u16::from_be_bytes(bytes) & and) | (or & !and);
+    model.check_write_words(span, Words::new(&value.to_be_bytes()))?;
+    Ok(value)
+}
+
+/// Of two verdicts the exception that comes first in the order of checks: address 02, value 03,
+/// then state, 04 and above. That is the order of the codes.
+fn first_of(one: Result<(), Exception>, other: Result<(), Exception>) -> Result<(), Exception> {
+    match (one, other) {
+        (Err(one), Err(other)) if other.code() < one.code() => Err(other),
+        (Ok(()), other) => other,
+        (one, _) => one,
+    }
+}

@@ -1,0 +1,116 @@
+//! What is counted and logged of each request (V1.1b3 6.8 to 6.10).
+
+use super::Server;
+use crate::counters::count;
+use crate::diagnostic::Diagnostic;
+use crate::events::{Event, EventLog};
+use crate::{Decision, Exception, LineCounters, Outcome, Work};
+
+/// The server's own counters.
+#[derive(Debug)]
+pub(super) struct Tally {
+    pub(super) exceptions: u16,
+    pub(super) unit_messages: u16,
+    pub(super) no_response: u16,
+    pub(super) nak: u16,
+    pub(super) busy: u16,
+    /// The event counter of function 0B.
+    pub(super) events: u16,
+}
+
+impl Tally {
+    pub(super) const ZERO: Self = Self {
+        exceptions: 0,
+        unit_messages: 0,
+        no_response: 0,
+        nak: 0,
+        busy: 0,
+        events: 0,
+    };
+}
+
+impl Server {
+    /// Takes note of a decision that is now being acted upon, and of the line's counters as they
+    /// came with its request: counters and event log include it from here on.
+    pub fn commit(&mut self, decision: &Decision, line: &LineCounters) {
+        self.note_line(line);
+        if decision.outcome == Outcome::NotForUs {
+            return;
+        }
+        self.log
+            .push(Event::received(decision.broadcast, self.listen_only));
+        let tally = &mut self.tally;
+        count(&mut tally.unit_messages);
+        if decision.reply.is_none() {
+            count(&mut tally.no_response);
+        }
+        match decision.outcome {
+            // "Not incremented for exception responses, poll commands, or fetch event counter
+            // commands" (6.9).
+            Outcome::Accepted if decision.work != Work::EventCounter => count(&mut tally.events),
+            Outcome::Refused(exception) => {
+                count(&mut tally.exceptions);
+                match exception {
+                    _ if decision.reply.is_none() => {}
+                    Exception::NegativeAcknowledge => count(&mut tally.nak),
+                    Exception::ServerDeviceBusy => count(&mut tally.busy),
+                    _ => {}
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes note of what the line has counted, and logs its bad frames. [`commit`](Self::commit)
+    /// does it with each request; without one it may be done at any time.
+    pub fn note_line(&mut self, line: &LineCounters) {
+        let new = line.since(&self.line);
+        let most = EventLog::CAPACITY as u16;
+        for n in 0..new.communication_errors.min(most) {
+            self.log
+                .push(Event::faulty(n < new.overruns, self.listen_only));
+        }
+        self.line = *line;
+    }
+
+    /// The request has been dealt with: its reply is as good as sent, and what is to happen after
+    /// it happens.
+    pub(super) fn conclude(&mut self, decision: &Decision) {
+        if decision.outcome == Outcome::NotForUs {
+            return;
+        }
+        let exception = match decision.outcome {
+            Outcome::Refused(exception) if decision.reply.is_some() => Some(exception),
+            _ => None,
+        };
+        self.log.push(Event::sent(exception, self.listen_only));
+        let Work::Diagnose(diagnostic) = decision.work else {
+            return;
+        };
+        match diagnostic {
+            Diagnostic::Restart { clear_log } => {
+                self.listen_only = false;
+                self.framing = self.framing.restarted();
+                self.clear();
+                if clear_log {
+                    self.log.clear();
+                }
+                self.log.push(Event::RESTARTED);
+            }
+            Diagnostic::Delimiter(delimiter) => self.framing = self.framing.ending_with(delimiter),
+            Diagnostic::ListenOnly => {
+                self.listen_only = true;
+                self.log.push(Event::LISTEN_ONLY);
+            }
+            Diagnostic::Clear => self.clear(),
+            Diagnostic::ClearOverruns => self.cleared.overruns = self.line.overruns,
+            Diagnostic::Echo | Diagnostic::Register | Diagnostic::Counter(_) => {}
+        }
+    }
+
+    /// All counters to zero.
+    fn clear(&mut self) {
+        self.tally = Tally::ZERO;
+        self.cleared = self.line;
+    }
+}

@@ -1,0 +1,99 @@
+//! The work: points and registers written, the body of the reply put together.
+
+use super::Server;
+use crate::diagnostic::Diagnostic;
+use crate::{Adu, Bits, BitsOut, DataModel, Decision, Span, Words, WordsOut, Work, identification};
+
+/// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
+const NOT_BUSY: [u8; 2] = [0x00, 0x00];
+/// The longest identity of function 11 in a PDU of 253 bytes, beside function code, byte count and
+/// run indicator.
+const MAX_SERVER_ID: usize = 250;
+/// Where the data of function 08 begin in its request, counted from the unit address.
+const DIAGNOSTIC_DATA: u8 = 4;
+
+impl Server {
+    /// Does the work of a decision. `adu` is the request it was made on; afterwards, if the reply
+    /// has a body ([`Head::has_body`](crate::Head::has_body)), `adu` holds it
+    /// ([`Head::body_in`](crate::Head::body_in)).
+    pub fn carry_out(&mut self, decision: &Decision, adu: &mut Adu, model: &mut impl DataModel) {
+        match decision.work {
+            Work::None => {}
+            Work::ReadBits(span) => {
+                let bytes = adu.resize(usize::from(span.count().div_ceil(8)));
+                model.read_bits(span, &mut BitsOut::new(bytes, span.count()));
+            }
+            Work::ReadWords(span) => read_words(span, adu, model),
+            Work::WriteBits { span, from } => {
+                model.write_bits(span, Bits::new(adu.from(from), span.count()));
+            }
+            Work::WriteWords { span, from } => {
+                model.write_words(span, words(adu, span, from));
+            }
+            Work::WriteMasked { address, value } => {
+                let value = value.to_be_bytes();
+                model.write_words(Span::single(address), Words::new(&value));
+            }
+            Work::WriteThenRead { write, from, read } => {
+                model.write_words(write, words(adu, write, from));
+                read_words(read, adu, model);
+            }
+            Work::ExceptionStatus => body(adu, &[model.exception_status()]),
+            Work::Diagnose(Diagnostic::Register) => {
+                diagnostic_data(adu, model.diagnostic_register());
+            }
+            Work::Diagnose(Diagnostic::Counter(index)) => {
+                let counter = self.counters().as_words().get(usize::from(index)).copied();
+                diagnostic_data(adu, counter.unwrap_or_default());
+            }
+            // The reply is the request as it is; the rest comes after it.
+            Work::Diagnose(_) => {}
+            Work::EventCounter => {
+                body(adu, &NOT_BUSY);
+                adu.extend(&self.tally.events.to_be_bytes());
+            }
+            Work::EventLog => {
+                // Up to 6 + 64.
+                body(adu, &[6 + self.log.count()]);
+                adu.extend(&NOT_BUSY);
+                adu.extend(&self.tally.events.to_be_bytes());
+                adu.extend(&self.counters().bus_messages.to_be_bytes());
+                self.log.append_to(adu);
+            }
+            Work::ServerId => {
+                let id = model.server_id();
+                let id = id.get(..MAX_SERVER_ID).unwrap_or(id);
+                // Up to 251.
+                body(adu, &[id.len() as u8 + 1]);
+                adu.extend(id);
+                adu.extend(&[if model.is_running() { 0xFF } else { 0x00 }]);
+            }
+            Work::Identify { code, object } => identification::fill(code, object, model, adu),
+        }
+        self.conclude(decision);
+    }
+}
+
+/// The words of a request.
+fn words(adu: &Adu, span: Span, from: u8) -> Words<'_> {
+    Words::new(adu.from(from)).slice(0, span.count())
+}
+
+/// Begins a body with these bytes.
+fn body(adu: &mut Adu, bytes: &[u8]) {
+    adu.clear();
+    adu.extend(bytes);
+}
+
+fn read_words(span: Span, adu: &mut Adu, model: &impl DataModel) {
+    let mut out = WordsOut::new(adu.resize(usize::from(span.count()) * 2));
+    model.read_words(span, &mut out);
+    out.finish();
+}
+
+/// Puts a value where function 08 has its data.
+fn diagnostic_data(adu: &mut Adu, value: u16) {
+    let [high, low] = value.to_be_bytes();
+    adu.set(DIAGNOSTIC_DATA, high);
+    adu.set(DIAGNOSTIC_DATA + 1, low);
+}

@@ -1,0 +1,276 @@
+//! ASCII mode (V1.02 2.5.2): what makes a frame, and what spoils one. What comes after the framing
+//! is the same as in RTU mode; the property tests run in both.
+
+mod common;
+
+use common::{Points, UNIT, Unit, ascii_frame, framed, pdu, write_words};
+use modbus_server::line::{Faults, Framing, Width};
+
+fn unit() -> Unit {
+    Unit::ascii(Width::Eight, Points::new(0x100, 0x100))
+}
+
+/// A read of one word.
+fn request() -> Vec<u8> {
+    ascii_frame(UNIT, &pdu(0x03, &[0, 1]), b'\n')
+}
+
+/// Sends nothing but a frame that must be ignored and counted as an error, by the next at last.
+fn is_an_error(unit: &mut Unit, characters: &[u8]) {
+    let before = unit.counters().communication_errors;
+    assert_eq!(unit.raw(characters), None, "{characters:02X?}");
+    unit.must_answer();
+    assert_eq!(
+        unit.counters().communication_errors,
+        before + 1,
+        "{characters:02X?}"
+    );
+}
+
+#[test]
+fn a_request_is_answered_in_kind() {
+    let mut unit = unit();
+    unit.points.words[0x6B..0x6E].copy_from_slice(&[0x022B, 0x0000, 0x0063]);
+    // The classic example of the protocol's first description, for unit 17 here: read 006B, 3.
+    let reply = unit.raw(b":1103006B00037E\r\n");
+    assert_eq!(reply.as_deref(), Some(&b":110306022B0000006356\r\n"[..]));
+    // And refused: 11 + 83 + 03 = 97, and 69 makes it 100.
+    let reply = unit.raw(b":110300000000EC\r\n");
+    assert_eq!(reply.as_deref(), Some(&b":11830369\r\n"[..]));
+}
+
+#[test]
+fn the_lrc_example_of_the_standard() {
+    // V1.02 6.2.1 has none with numbers; this is the sum it describes.
+    assert_eq!(common::lrc(&[0x02, 0x07]), 0xF7);
+    let framing = Framing::ASCII;
+    assert_eq!(framed(framing, 2, &[7]), b":0207F7\r\n");
+}
+
+#[test]
+fn small_letters_and_other_characters_spoil_a_frame() {
+    let good = request();
+    for at in 1..good.len() - 2 {
+        for character in (0..=255_u8).filter(|c| !c.is_ascii_hexdigit() || c.is_ascii_lowercase()) {
+            if character == b':' || character == b'\r' {
+                continue;
+            }
+            let mut bad = good.clone();
+            bad[at] = character;
+            let mut unit = unit();
+            assert_eq!(unit.raw(&bad), None);
+            assert_eq!(unit.counters().communication_errors, 1, "{character:02X}");
+            assert_eq!(unit.raw(&good).map(|reply| reply.len()), Some(15));
+        }
+    }
+}
+
+#[test]
+fn a_wrong_lrc_is_bad() {
+    let mut unit = unit();
+    let good = request();
+    for at in 1..good.len() - 2 {
+        for digit in b"0123456789ABCDEF" {
+            if good[at] != *digit {
+                let mut bad = good.clone();
+                bad[at] = *digit;
+                is_an_error(&mut unit, &bad);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_colon_in_the_middle_starts_anew() {
+    for at in 1..request().len() {
+        let mut unit = unit();
+        let joined = [&request()[..at], &request()].concat();
+        assert!(unit.raw(&joined).is_some(), "{at}");
+        let counters = unit.counters();
+        assert_eq!(
+            (counters.communication_errors, counters.unit_messages),
+            (1, 1)
+        );
+    }
+}
+
+#[test]
+fn what_comes_before_a_colon_is_nothing() {
+    let mut unit = unit();
+    for noise in [
+        &b"0123456789"[..],
+        b"\r\n\r\n",
+        &[0x00, 0xFF, 0x3B],
+        b"11030000",
+    ] {
+        assert!(unit.raw(&[noise, &request()].concat()).is_some());
+    }
+    assert_eq!(unit.counters().communication_errors, 0);
+}
+
+#[test]
+fn at_power_up_no_silence_is_needed() {
+    // Even in the middle of another's traffic the next colon is the start of a frame.
+    let mut unit = unit();
+    unit.characters(&request()[7..]);
+    assert!(unit.raw(&request()).is_some());
+}
+
+#[test]
+fn half_bytes_and_too_few_or_too_many_of_them_are_errors() {
+    let mut unit = unit();
+    is_an_error(&mut unit, b":\r\n");
+    is_an_error(&mut unit, b":1\r\n");
+    is_an_error(&mut unit, b":00\r\n");
+    is_an_error(&mut unit, b":11EF\r\n");
+    is_an_error(&mut unit, b":110300000001E\r\n");
+    assert_eq!(unit.raw(b":1107E8\r\n"), Some(b":11076D7B\r\n".to_vec()));
+    for len in [254, 255, 256, 300, 1000] {
+        let pdu = [&[0x63][..], &vec![0; len - 1]].concat();
+        is_an_error(&mut unit, &ascii_frame(UNIT, &pdu, b'\n'));
+    }
+    let longest = [&[0x63][..], &[0; 252]].concat();
+    let frame = ascii_frame(UNIT, &longest, b'\n');
+    assert_eq!(frame.len(), 513);
+    assert_eq!(unit.raw(&frame), Some(b":11E3010B\r\n".to_vec()));
+}
+
+#[test]
+fn the_longest_request_and_reply_get_through() {
+    let mut unit = unit();
+    let words: Vec<u16> = (0..123).map(|n| n * 0x0111).collect();
+    let echo = unit.request(&write_words(0, &words));
+    assert_eq!(echo, Some(pdu(0x10, &[0, 123])));
+    let reply = unit.request(&pdu(0x03, &[0, 125])).unwrap();
+    assert_eq!(reply.len(), 252);
+    assert_eq!(reply[2..248], write_words(0, &words)[6..]);
+    let echo: Vec<u8> = [0x08, 0, 0].into_iter().chain(0..250).collect();
+    assert_eq!(unit.request(&echo), Some(echo));
+}
+
+#[test]
+fn a_second_of_silence_ends_a_frame_badly() {
+    for len in 1..request().len() {
+        let mut unit = unit();
+        assert_eq!(unit.raw(&request()[..len]), None);
+        assert_eq!(unit.counters().communication_errors, 1);
+        assert_eq!(unit.raw(&request()[len..]), None, "the rest has no start");
+        assert_eq!(unit.counters().communication_errors, 1);
+        unit.must_answer();
+    }
+}
+
+#[test]
+fn short_silences_mean_nothing() {
+    let mut unit = unit();
+    for character in request() {
+        unit.receiver.pause();
+        unit.character(character, Faults::NONE);
+    }
+    assert!(unit.silence().is_some());
+    assert_eq!(unit.counters().gaps, 0);
+}
+
+#[test]
+fn a_faulty_character_anywhere_spoils_its_frame() {
+    for at in 0..request().len() {
+        let mut unit = unit();
+        for (index, character) in request().into_iter().enumerate() {
+            let faults = match index == at {
+                true => Faults::PARITY | Faults::OVERRUN,
+                false => Faults::NONE,
+            };
+            unit.character(character, faults);
+        }
+        assert_eq!(unit.silence(), None);
+        let counters = unit.counters();
+        assert_eq!((counters.communication_errors, counters.overruns), (1, 1));
+        unit.must_answer();
+    }
+}
+
+#[test]
+fn in_seven_bits_what_is_above_them_does_not_matter() {
+    let with_parity = |characters: Vec<u8>| -> Vec<u8> {
+        let even = |c: u8| c | (c.count_ones() as u8 & 1) << 7;
+        characters.into_iter().map(even).collect()
+    };
+    let mut seven = Unit::ascii(Width::Seven, Points::new(4, 4));
+    let reply = seven.raw(&with_parity(request())).expect("a reply");
+    assert!(reply.is_ascii(), "its parity is the UART's");
+    assert_eq!(unit().raw(&with_parity(request())), None);
+}
+
+#[test]
+fn the_delimiter_can_be_changed() {
+    let mut unit = unit();
+    let change = [0x08, 0x00, 0x03, b'#', 0x00];
+    let reply = unit.raw(&ascii_frame(UNIT, &change, b'\n'));
+    assert_eq!(
+        reply,
+        Some(ascii_frame(UNIT, &change, b'\n')),
+        "the old one"
+    );
+    assert_eq!(unit.server.framing(), Framing::Ascii { delimiter: b'#' });
+    unit.must_answer();
+    assert_eq!(unit.raw(&request()), None, "a line feed is no end any more");
+    unit.must_answer();
+
+    for (character, low) in [
+        (b':', 0),
+        (b'\r', 0),
+        (b'7', 0),
+        (b'C', 0),
+        (0x80, 0),
+        (b'!', 1),
+    ] {
+        assert_eq!(unit.refused(&[0x08, 0x00, 0x03, character, low]), 3);
+    }
+    assert_eq!(unit.refused(&[0x08, 0x00, 0x03, b'!']), 3);
+
+    // A restart brings the line feed back, after its own reply.
+    let restart = [0x08, 0x00, 0x01, 0x00, 0x00];
+    let reply = unit.raw(&ascii_frame(UNIT, &restart, b'#'));
+    assert_eq!(reply, Some(ascii_frame(UNIT, &restart, b'#')));
+    assert!(unit.raw(&request()).is_some());
+}
+
+#[test]
+fn others_frames_and_broadcasts_are_as_in_rtu_mode() {
+    let mut unit = unit();
+    let write = write_words(3, &[7]);
+    assert_eq!(unit.raw(&ascii_frame(UNIT + 1, &write, b'\n')), None);
+    assert_eq!(unit.points.words[3], 0);
+    assert_eq!(unit.raw(&ascii_frame(0, &write, b'\n')), None);
+    assert_eq!(unit.points.words[3], 7);
+    let counters = unit.counters();
+    assert_eq!(
+        (
+            counters.bus_messages,
+            counters.unit_messages,
+            counters.no_response
+        ),
+        (2, 1, 1)
+    );
+}
+
+#[test]
+fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_character() {
+    let mut unit = unit();
+    let characters = |unit: &mut Unit, characters: &[u8]| {
+        characters
+            .iter()
+            .for_each(|c| unit.receiver.character(*c, Faults::NONE));
+    };
+    characters(&mut unit, &request());
+    assert!(unit.receiver.is_over());
+    characters(&mut unit, b"\n");
+    assert!(!unit.receiver.is_over());
+    assert!(unit.receiver.close().is_none());
+    // A colon takes its place, and no buffer is lost.
+    for _ in 0..5 {
+        characters(&mut unit, &request());
+    }
+    assert!(unit.receiver.is_over());
+    assert!(unit.receiver.close().is_some());
+}

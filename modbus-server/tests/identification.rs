@@ -1,0 +1,172 @@
+//! Function 2B/0E, read device identification (V1.1b3 6.21).
+
+mod common;
+
+use common::{Points, Unit};
+
+fn unit() -> Unit {
+    Unit::new(Points::new(4, 4))
+}
+
+/// Objects by their numbers, as a reply lists them; and whether and where more follow.
+fn stream(unit: &mut Unit, code: u8, first: u8) -> (Vec<(u8, Vec<u8>)>, Option<u8>) {
+    let reply = unit.request(&[0x2B, 0x0E, code, first]).expect("a reply");
+    assert_eq!(reply[..4], [0x2B, 0x0E, code, 0x83]);
+    let more = match (reply[4], reply[5]) {
+        (0xFF, next) => Some(next),
+        (0x00, 0) => None,
+        other => panic!("{other:02X?}"),
+    };
+    let mut rest = &reply[7..];
+    let mut objects = Vec::new();
+    while let [id, len, tail @ ..] = rest {
+        let (value, tail) = tail.split_at((*len).into());
+        objects.push((*id, value.to_vec()));
+        rest = tail;
+    }
+    assert!(rest.is_empty());
+    assert_eq!(objects.len(), usize::from(reply[6]));
+    (objects, more)
+}
+
+fn numbers(objects: &[(u8, Vec<u8>)]) -> Vec<u8> {
+    objects.iter().map(|(id, _)| *id).collect()
+}
+
+#[test]
+fn the_standard_s_example_but_for_the_conformity() {
+    let reply = unit().request(&[0x2B, 0x0E, 0x01, 0x00]).unwrap();
+    let expected = [
+        &[0x2B, 0x0E, 0x01, 0x83, 0x00, 0x00, 0x03][..],
+        &[0x00, 0x16],
+        b"Company identification",
+        &[0x01, 0x0F],
+        b"Product code XX",
+        &[0x02, 0x05],
+        b"V2.11",
+    ];
+    assert_eq!(reply, expected.concat());
+}
+
+#[test]
+fn each_stream_has_its_objects() {
+    let mut unit = unit();
+    let (basic, more) = stream(&mut unit, 1, 0);
+    assert_eq!((numbers(&basic), more), (vec![0, 1, 2], None));
+    let (regular, more) = stream(&mut unit, 2, 0);
+    assert_eq!((numbers(&regular), more), ((0..=6).collect(), None));
+    assert_eq!(regular[6], (6, vec![]), "an empty value is one as well");
+    for first in 0..=6 {
+        let (objects, _) = stream(&mut unit, 2, first);
+        assert_eq!(objects, regular[usize::from(first)..]);
+    }
+}
+
+#[test]
+fn a_long_stream_is_split_between_objects() {
+    let mut unit = unit();
+    let (mut all, mut first, mut replies) = (Vec::new(), 0, 0);
+    loop {
+        let (objects, more) = stream(&mut unit, 3, first);
+        assert!(!objects.is_empty());
+        all.extend(objects);
+        replies += 1;
+        match more {
+            Some(next) => first = next,
+            None => break,
+        }
+    }
+    let ids: Vec<u8> = (0..=6).chain(0x80..=0x84).collect();
+    assert_eq!(numbers(&all), ids);
+    for (id, value) in all {
+        let whole = common::object(id).unwrap();
+        assert_eq!(value, whole[..whole.len().min(244)], "{id:02X}");
+    }
+    assert_eq!(replies, 5);
+}
+
+#[test]
+fn a_reply_may_be_just_full() {
+    let mut unit = unit();
+    // 83 and 84 are 120 and 122 bytes: with what is around them, 253.
+    let reply = unit.request(&[0x2B, 0x0E, 0x03, 0x83]).unwrap();
+    assert_eq!((reply.len(), reply[4], reply[6]), (253, 0, 2));
+    unit.points.objects[0x84].as_mut().unwrap().push(b'!');
+    let reply = unit.request(&[0x2B, 0x0E, 0x03, 0x83]).unwrap();
+    assert_eq!(reply[4..7], [0xFF, 0x84, 1]);
+}
+
+#[test]
+fn a_stream_that_cannot_begin_there_begins_at_the_beginning() {
+    let mut unit = unit();
+    for (code, first) in [
+        (1, 3),
+        (1, 0x80),
+        (2, 7),
+        (2, 0x7F),
+        (2, 0x80),
+        (3, 7),
+        (3, 0x85),
+        (3, 0xFF),
+    ] {
+        let restarted = stream(&mut unit, code, first);
+        assert_eq!(restarted, stream(&mut unit, code, 0), "{code} {first:02X}");
+    }
+}
+
+#[test]
+fn one_object_can_be_asked_for() {
+    let mut unit = unit();
+    for id in 0..=255 {
+        let request = [0x2B, 0x0E, 0x04, id];
+        match common::object(id) {
+            Some(value) => {
+                let value = &value[..value.len().min(244)];
+                let head = [0x2B, 0x0E, 0x04, 0x83, 0, 0, 1, id, value.len() as u8];
+                assert_eq!(unit.request(&request), Some([&head, value].concat()));
+            }
+            None => assert_eq!(unit.refused(&request), 2, "{id:02X}"),
+        }
+    }
+}
+
+#[test]
+fn what_is_not_there_is_refused() {
+    let mut unit = unit();
+    for mei in (0..=255).filter(|mei| *mei != 0x0E) {
+        assert_eq!(unit.refused(&[0x2B, mei, 0x01, 0x00]), 1);
+        assert_eq!(unit.refused(&[0x2B, mei]), 1);
+    }
+    for code in (0..=255).filter(|code| !(1..=4).contains(code)) {
+        assert_eq!(unit.refused(&[0x2B, 0x0E, code, 0x00]), 3);
+        assert_eq!(unit.refused(&[0x2B, 0x0E, code, 0x20]), 3);
+    }
+    for request in [
+        &[0x2B][..],
+        &[0x2B, 0x0E],
+        &[0x2B, 0x0E, 1],
+        &[0x2B, 0x0E, 1, 0, 0],
+    ] {
+        assert_eq!(unit.refused(request), 3);
+    }
+}
+
+#[test]
+fn the_conformity_is_that_of_the_objects_there_are() {
+    let mut unit = unit();
+    let mut conformity = |without: std::ops::Range<usize>| {
+        unit.points.objects[without].fill(None);
+        unit.request(&[0x2B, 0x0E, 0x03, 0x00])
+            .map(|reply| reply[3])
+    };
+    assert_eq!(conformity(0x81..256), Some(0x83));
+    assert_eq!(conformity(0x80..256), Some(0x82));
+    assert_eq!(conformity(4..256), Some(0x82));
+    assert_eq!(conformity(3..256), Some(0x81));
+    unit.points.objects[..3].fill(None);
+    assert_eq!(
+        unit.refused(&[0x2B, 0x0E, 0x01, 0x00]),
+        1,
+        "no such function"
+    );
+}

@@ -1,0 +1,135 @@
+//! The functions beside reading and writing points, and ASCII mode, on the image as it is flashed.
+
+use sim::{Channel, Module, Time};
+
+use crate::bench::Bench;
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_device_tells_of_itself() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    let mut ask = |pdu: &[u8]| bench.ask(1, pdu).expect("a reply");
+    assert_eq!(ask(&[0x07]), [0x07, 0]);
+    assert_eq!(
+        ask(&[0x08, 0, 0, 0xA5, 0x37, 1]),
+        [0x08, 0, 0, 0xA5, 0x37, 1]
+    );
+    assert_eq!(ask(&[0x08, 0, 0x0B, 0, 0]), [0x08, 0, 0x0B, 0, 3]);
+    assert_eq!(ask(&[0x0B]), [0x0B, 0, 0, 0, 3]);
+    let log = ask(&[0x0C]);
+    assert_eq!((log[1], &log[2..8]), (6 + 9, &[0, 0, 0, 4, 0, 5][..]));
+    assert_eq!(
+        log[8..],
+        [0x80, 0x40, 0x80, 0x40, 0x80, 0x40, 0x80, 0x40, 0x80]
+    );
+    assert_eq!(ask(&[0x11]), [0x11, 2, 1, 0xFF]);
+    let objects = ask(&[0x2B, 0x0E, 3, 0]);
+    assert_eq!(objects[..7], [0x2B, 0x0E, 3, 0x83, 0, 0, 9]);
+    let has = |text: &[u8]| objects.windows(text.len()).any(|part| part == text);
+    assert!(has(b"modio-02") && has(b"23835860") && has(b"4di"));
+    bench.assert_sound();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn registers_are_masked_and_written_and_read_at_once() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    bench.unlock();
+    let mask = [0x16, 1, 4, 0xFF, 0xF0, 0, 0x0A];
+    assert_eq!(bench.ask(1, &mask).as_deref(), Some(&mask[..]));
+    assert_eq!(bench.register(0x0104), 10);
+    // COMM_TIMEOUT back to 0, and BAUD to STRICT_T15 read with it.
+    let both = [0x17, 1, 1, 0, 7, 1, 4, 0, 1, 2, 0, 0];
+    let reply = bench.ask(1, &both).expect("a reply");
+    assert_eq!(reply, [0x17, 14, 0, 96, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+    bench.assert_sound();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn while_it_only_listens_its_outputs_fall_to_safe() {
+    let mut bench = Bench::new(Module::Do4, 1);
+    bench.unlock();
+    bench.write(0x0104, &[2]).unwrap();
+    bench.ask(1, &[0x05, 0, 0x10, 0xFF, 0]).expect("a reply");
+    assert_eq!(bench.ask(1, &[0x08, 0, 4, 0, 0]), None);
+    assert_eq!(bench.board.channel(1), Channel::Do { on: true });
+    for _ in 0..10 {
+        assert_eq!(bench.ask(1, &[0x05, 0, 0x11, 0xFF, 0]), None);
+        bench.board.run_for(Time::from_ms(30));
+    }
+    assert_eq!(bench.board.channel(1), Channel::Do { on: false });
+    assert_eq!(bench.board.channel(2), Channel::Do { on: false });
+    assert_eq!(
+        bench.ask(1, &[0x08, 0, 1, 0, 0]),
+        None,
+        "the restart, in silence"
+    );
+    // Communication lost, not saved, unlocked.
+    assert_eq!(bench.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
+    bench.assert_sound();
+}
+
+/// An ASCII frame of unit 1.
+fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
+    let sum = pdu.iter().fold(1u8, |sum, byte| sum.wrapping_add(*byte));
+    let mut text = String::from(":01");
+    for byte in pdu.iter().chain(&[sum.wrapping_neg()]) {
+        text += &format!("{byte:02X}");
+    }
+    (text + end).into_bytes()
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn in_ascii_mode_the_same_is_said_in_other_words() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    bench.unlock();
+    bench.write(0x0103, &[1]).unwrap();
+    bench.save();
+    bench.power_cycle();
+    assert_eq!(bench.ask(1, &[0x07]), None, "no RTU any more");
+    bench.board.set_energised(2, true).unwrap();
+    bench.board.run_for(Time::from_ms(50));
+
+    let read = [0x01, 0, 0x10, 0, 4];
+    let start = bench.board.now();
+    let end = bench.board.line().send(start, &ascii(&read, "\r\n"));
+    bench.board.run_until(end + bench.t35());
+    assert!(
+        !bench.board.driver_enable(),
+        "the line is left to the master for t3.5"
+    );
+    assert_eq!(bench.answer_after(end), ascii(&[0x01, 1, 0b0010], "\r\n"));
+
+    // The end mark is changed, by a reply with the old one, and comes back with a restart.
+    let change = [0x08, 0, 3, b'#', 0];
+    assert_eq!(
+        bench.exchange(&ascii(&change, "\r\n")),
+        ascii(&change, "\r\n")
+    );
+    assert_eq!(
+        bench.exchange(&ascii(&read, "\r#")),
+        ascii(&[0x01, 1, 0b0010], "\r#")
+    );
+    let restart = [0x08, 0, 1, 0, 0];
+    assert_eq!(
+        bench.exchange(&ascii(&restart, "\r#")),
+        ascii(&restart, "\r#")
+    );
+
+    // A pause of less than a second does not matter, one of more spoils the frame.
+    let whole = ascii(&read, "\r\n");
+    for (ms, answered) in [(900, true), (1100, false)] {
+        let now = bench.board.now();
+        bench.board.line().send(now, &whole[..7]);
+        bench.board.run_for(Time::from_ms(ms));
+        let reply = bench.exchange(&whole[7..]);
+        assert_eq!(!reply.is_empty(), answered, "{ms} ms");
+        bench.board.run_for(Time::from_ms(10));
+    }
+    assert_eq!(bench.exchange(&whole), ascii(&[0x01, 1, 0b0010], "\r\n"));
+    let errors = bench.exchange(&ascii(&[0x08, 0, 0x0C, 0, 0], "\r\n"));
+    assert_eq!(errors, ascii(&[0x08, 0, 0x0C, 0, 1], "\r\n"));
+    bench.assert_sound();
+}
