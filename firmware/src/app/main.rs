@@ -28,6 +28,8 @@ mod trap;
 
 #[rtic::app(device = board_support::pac, peripherals = true)]
 mod app {
+    use core::mem::MaybeUninit;
+
     use board_support::{GapEvent, Leds, ScanTimer, Watchdog, fault, pac::Interrupt, stack};
     use firmware::{
         alive::{self, Task},
@@ -55,7 +57,8 @@ mod app {
     struct Shared {
         /// `None` while SW01 shows no unit address: the line is not served.
         line: Option<Line>,
-        device: Device,
+        /// Built where it stays: it is too large to be moved over the stack.
+        device: &'static mut Device,
         /// A request for this unit has been served since the LEDs were last set.
         activity: bool,
         /// What a request has ordered of the background.
@@ -85,6 +88,7 @@ mod app {
 
     #[init(local = [
         adus: [Adu; 2] = [const { Adu::new() }; 2],
+        device: MaybeUninit<Device> = MaybeUninit::uninit(),
         queue: Queue<Event, 8> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
@@ -101,7 +105,7 @@ mod app {
             leds,
             log,
             trouble,
-        } = start::up(cx.device, cx.local.adus);
+        } = start::up(cx.device, cx.local.adus, cx.local.device);
         let (events, logged) = cx.local.queue.split();
         scan_timer.start();
         watchdog.start();
@@ -227,7 +231,7 @@ mod app {
             alive::end(fault::marks(), Task::Serve);
             return;
         };
-        let decision = device.lock(|device| server.decide(adu, device));
+        let decision = device.lock(|device| server.decide(adu, &**device));
         if let Some(head) = decision.reply {
             on_line(&mut |line| line.continue_reply(head));
         }
@@ -238,7 +242,7 @@ mod app {
             if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
                 device.request_seen(*frame_gap_ms);
             }
-            server.carry_out(&decision, adu, device);
+            server.carry_out(&decision, adu, &mut **device);
         });
         let mut adu = Some(adu);
         on_line(&mut |line| {

@@ -30,7 +30,7 @@ impl Persistence {
     }
 
     /// Begins to save what the configuration has set aside for it.
-    pub fn begin(&mut self, device: &mut impl Mutex<T = Device>) {
+    pub fn begin(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
         self.saving = device.lock(|device| {
             let saving = Saving::new(&self.store, &self.pages, device.config.to_save());
             if saving.is_none() {
@@ -48,7 +48,7 @@ impl Persistence {
 
     /// Goes on with a save to its end, one flash operation at a time with interrupts in between; then
     /// restarts, if that was ordered.
-    pub fn work(&mut self, device: &mut impl Mutex<T = Device>) -> Option<Event> {
+    pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         let event = self.saving.take().map(|saving| self.save(saving, device));
         if self.restart {
             board_support::restart();
@@ -68,7 +68,7 @@ impl Persistence {
         let _ = self.store.make_spare(&mut self.pages);
     }
 
-    fn save(&mut self, mut saving: Saving, device: &mut impl Mutex<T = Device>) -> Event {
+    fn save(&mut self, mut saving: Saving, device: &mut impl Mutex<T = &'static mut Device>) -> Event {
         let mut good = true;
         while let Some(operation) = device.lock(|device| saving.next(device.config.to_save())) {
             good = operation.perform(&mut self.pages).is_ok();

@@ -1,5 +1,7 @@
 //! Start-up: from the board and what is stored to everything the tasks need.
 
+use core::mem::MaybeUninit;
+
 use board_support::{Leds, ScanTimer, Watchdog, board, fault, pac, uart};
 use firmware::{
     config::{self, Config},
@@ -29,7 +31,7 @@ pub struct Started {
     /// The silence that ends a frame, in ms, rounded up.
     pub frame_gap_ms: u32,
     pub server: Server,
-    pub device: Device,
+    pub device: &'static mut Device,
     pub module: Installed,
     pub analog_outputs: Option<AnalogOutputs>,
     pub persistence: Persistence,
@@ -42,7 +44,11 @@ pub struct Started {
 
 /// Brings everything up, outputs first: they are driven by START as soon as the configuration is
 /// known, and the line is served last, when there is something to serve.
-pub fn up(device: pac::Peripherals, adus: &'static mut [Adu; 2]) -> Started {
+pub fn up(
+    device: pac::Peripherals,
+    adus: &'static mut [Adu; 2],
+    place: &'static mut MaybeUninit<Device>,
+) -> Started {
     let mut log = Log::new();
     let board = board::setup(device);
     let record = fault::take_at_start(board.reset_cause);
@@ -63,7 +69,7 @@ pub fn up(device: pac::Peripherals, adus: &'static mut [Adu; 2]) -> Started {
         unique_id: half_words(board.unique_id),
         fault: log::fault_words(&record),
     };
-    let device = Device::new(module.kinds(), config, identity);
+    let device = place.write(Device::new(module.kinds(), config, identity));
     module.configure(device.points.settings());
     // A module that cannot be driven is told by the first scan.
     let _ = module.drive_outputs(device.points.channels());

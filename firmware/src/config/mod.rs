@@ -60,6 +60,7 @@ impl Config {
     /// The configuration at the start. `invalid`: what was stored is not good, or a part of it, and has
     /// defaults in its place.
     #[must_use]
+    #[inline(never)]
     pub fn new(stored: Settings, invalid: bool) -> Self {
         let mut started = [0; RESTARTS];
         for (place, value) in started.iter_mut().zip(stored.restart_values()) {

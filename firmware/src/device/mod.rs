@@ -74,6 +74,7 @@ impl Device {
     /// A device with these settings whose slot has channels of these kinds; its outputs stand at
     /// START.
     #[must_use]
+    #[inline(never)]
     pub fn new(kinds: [Kind; CHANNELS], config: Config, identity: Identity) -> Self {
         let start = config.slot().start;
         let mut device = Self {

@@ -150,8 +150,14 @@ impl Bench {
 
     /// What the unit says within a moment after `end`, the end of what it was sent.
     pub fn answer_after(&mut self, end: Time) -> Vec<u8> {
-        self.board
-            .run_until(end + self.t35() + self.characters(2) + self.patience);
+        self.board.run_until(end + self.t35() + self.characters(2));
+        let last = end + self.t35() + self.patience;
+        while !self.board.driver_enable()
+            && self.board.line().received().next().is_none()
+            && self.board.now() < last
+        {
+            self.board.run_for(self.characters(1));
+        }
         while self.board.driver_enable() {
             self.board.run_for(self.characters(1));
         }

@@ -8,7 +8,7 @@
 //! | a board and its master | `bench`, `registers` |
 //! | the line | `standard_functions`, `framing`, `noise`, `refusals`, `timing`, `dip` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
-//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `power_cut` |
+//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `power_cut`, `erase_cut` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults` |
 
 mod analog_inputs;
@@ -20,6 +20,7 @@ mod comm_watchdog;
 mod counters;
 mod dac_faults;
 mod dip;
+mod erase_cut;
 mod faults;
 mod framing;
 mod functions;

@@ -7,26 +7,26 @@ use sim::{Channel, Module, Time, periph::flash::Torn};
 
 use crate::bench::{Bench, adu};
 
-const FILTER: u16 = 0x0130;
+pub const FILTER: u16 = 0x0130;
 const INVALID: u16 = 2;
 /// How far an operation is when the power goes.
-const FRACTIONS: [f64; 3] = [0.0, 0.5, 1.0];
+pub const FRACTIONS: [f64; 3] = [0.0, 0.5, 1.0];
 /// The half-words of the record these tests save: head, six pairs, CRC.
-const HALF_WORDS: u64 = 19;
+pub const HALF_WORDS: u64 = 19;
 
-fn bench() -> Bench {
+pub fn bench() -> Bench {
     let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 1152)]);
     bench.tolerant = true;
     bench
 }
 
 /// Four settings that no other round has.
-fn set(round: u16) -> [u16; 4] {
+pub fn set(round: u16) -> [u16; 4] {
     [0, 1, 2, 3].map(|n| 10 + (round * 4 + n) % 900)
 }
 
 /// Saves these settings; the lock is open. A save takes 2 ms, one that has to erase 30 more.
-fn save(bench: &mut Bench, values: [u16; 4]) {
+pub fn save(bench: &mut Bench, values: [u16; 4]) {
     bench.write(FILTER, &values).unwrap();
     bench.write(0x0108, &[1]).unwrap();
     while bench.status(8) {
@@ -35,7 +35,7 @@ fn save(bench: &mut Bench, values: [u16; 4]) {
 }
 
 /// Erased bytes at the end of each of the store's pages.
-fn rooms(bench: &Bench) -> [usize; 2] {
+pub fn rooms(bench: &Bench) -> [usize; 2] {
     let flash = bench.board.flash();
     [0xF800, 0xFC00].map(|page| {
         let bytes = flash[page..page + PAGE_SIZE].iter().rev();
@@ -44,7 +44,7 @@ fn rooms(bench: &Bench) -> [usize; 2] {
 }
 
 /// Which of two sets is stored after a cut, and that all else is as it should be.
-fn after_cut(bench: &mut Bench, sets: [[u16; 4]; 2], what: &str) -> usize {
+pub fn after_cut(bench: &mut Bench, sets: [[u16; 4]; 2], what: &str) -> usize {
     bench.board.power_on();
     bench.started();
     let values = bench.registers(FILTER, 4).unwrap();
@@ -108,19 +108,6 @@ fn at_any_operation_of_a_save_that_changes_pages() {
     };
     let operations = every_cut_of_a_save(fill, "onto the other page");
     assert_eq!(operations, HALF_WORDS, "it finds the other page erased");
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn at_any_operation_of_a_save_that_has_to_erase() {
-    let fill = |bench: &mut Bench, round: &mut u16| {
-        while rooms(bench).iter().max() >= Some(&(HALF_WORDS as usize * 2)) {
-            *round += 1;
-            save(bench, set(*round));
-        }
-    };
-    let operations = every_cut_of_a_save(fill, "with an erase");
-    assert_eq!(operations, HALF_WORDS + 3, "mark destroyed, erase, mark");
 }
 
 #[test]

@@ -5,15 +5,15 @@
 
 use register_map::{
     Module, Rule, Values,
-    configuration::{COMMAND, KEY, LORA, MODE, MODULE_SLOT, RESPONSE_DELAY, RULES, point_of},
+    configuration::{COMMAND, KEY, LORA, MODULE_SLOT, RESPONSE_DELAY, RULES, point_of},
     points::{PointKind, SLOT_FIRST},
 };
 use sim::Time;
 
 use crate::bench::Bench;
 
-/// Allowed by the map, but refused as a value until the firmware can do it: ASCII mode, the LoRa line.
-const NOT_YET: [(u16, u16); 2] = [(MODE, 1), (LORA, 1)];
+/// Allowed by the map, but refused as a value until the firmware can do it: the LoRa line.
+const NOT_YET: [(u16, u16); 1] = [(LORA, 1)];
 
 /// The values at the ends of a set, and those just outside.
 fn ends(values: Values) -> (Vec<u16>, Vec<u16>) {

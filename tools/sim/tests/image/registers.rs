@@ -1,11 +1,17 @@
 //! Bits and registers of unit 1 as a master reads and writes them.
 
+use sim::Time;
+
 use crate::bench::Bench;
 
 impl Bench {
     /// What is behind the function code of the reply to a PDU, or the exception's code.
     pub fn request(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+        // The first reply after a save may wait for an erase.
+        let patience = self.patience;
+        self.patience = patience.max(Time::from_ms(60));
         let reply = self.ask(1, pdu);
+        self.patience = patience;
         match reply.as_deref() {
             Some(&[function, code]) if function == pdu[0] | 0x80 => Err(code),
             Some([function, rest @ ..]) if *function == pdu[0] => Ok(rest.to_vec()),
