@@ -68,7 +68,11 @@ impl Persistence {
         let _ = self.store.make_spare(&mut self.pages);
     }
 
-    fn save(&mut self, mut saving: Saving, device: &mut impl Mutex<T = &'static mut Device>) -> Event {
+    fn save(
+        &mut self,
+        mut saving: Saving,
+        device: &mut impl Mutex<T = &'static mut Device>,
+    ) -> Event {
         let mut good = true;
         while let Some(operation) = device.lock(|device| saving.next(device.config.to_save())) {
             good = operation.perform(&mut self.pages).is_ok();

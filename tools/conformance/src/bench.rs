@@ -1,0 +1,323 @@
+//! What a case works with: the endpoint, what is known of the unit, and the words to ask and judge in.
+
+use std::fmt::Display;
+use std::time::Duration;
+
+use crate::case::{Check, Failure, Stop};
+use crate::endpoint::{Broken, Endpoint, Heard, Piece};
+use crate::frame::{Reply, hex};
+use crate::target::Target;
+
+/// How long to wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// For the first character of a reply where there should be one.
+    pub reply: Duration,
+    /// For the first character where there should be none: what stays silent so long is silent.
+    pub silence: Duration,
+    /// Silence after which a reply is over.
+    pub quiet: Duration,
+}
+
+/// A case's tools.
+pub struct Bench<'a> {
+    /// The line.
+    pub endpoint: &'a mut dyn Endpoint,
+    /// The unit.
+    pub target: &'a Target,
+    /// How long to wait.
+    pub patience: Patience,
+    /// Whether a modio's configuration may be written.
+    pub allow_config: bool,
+    /// What was sent last, and the answer to it, for people.
+    sent: String,
+    came: String,
+    /// The end of the last request, and what was heard after it.
+    pub sent_end: Duration,
+    /// The characters of the last reply.
+    pub heard: Vec<Heard>,
+}
+
+impl<'a> Bench<'a> {
+    /// Tools for this line and unit.
+    pub fn new(
+        endpoint: &'a mut dyn Endpoint,
+        target: &'a Target,
+        patience: Patience,
+        allow_config: bool,
+    ) -> Self {
+        Self {
+            endpoint,
+            target,
+            patience,
+            allow_config,
+            sent: String::new(),
+            came: String::new(),
+            sent_end: Duration::ZERO,
+            heard: Vec::new(),
+        }
+    }
+
+    /// The unit's address.
+    #[must_use]
+    pub fn unit(&self) -> u8 {
+        self.target.unit
+    }
+
+    /// Another unit's address, an ordinary one.
+    #[must_use]
+    pub fn other(&self) -> u8 {
+        if self.target.unit == 42 { 43 } else { 42 }
+    }
+
+    /// The frame of a request to this unit.
+    #[must_use]
+    pub fn frame(&self, pdu: &[u8]) -> Vec<u8> {
+        self.target.mode.frame(self.target.unit, pdu)
+    }
+
+    /// A case has gone wrong with the last exchange; `wanted` is what should have been.
+    pub fn fail<T>(&self, wanted: impl Display) -> Check<T> {
+        Err(Stop::Fail(Failure {
+            sent: self.sent.clone(),
+            came: self.came.clone(),
+            wanted: wanted.to_string(),
+        }))
+    }
+
+    /// Passes on when something holds, else fails as [`Bench::fail`] does.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`].
+    pub fn ensure(&self, holds: bool, wanted: impl Display) -> Check {
+        if holds { Ok(()) } else { self.fail(wanted) }
+    }
+
+    /// Puts pieces on the line and hears what comes of it.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn exchange(&mut self, pieces: &[Piece]) -> Check<Reply> {
+        self.exchange_until(pieces, usize::MAX)
+    }
+
+    /// The same, but as soon as `enough` characters have come it goes on.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn exchange_until(&mut self, pieces: &[Piece], enough: usize) -> Check<Reply> {
+        self.sent = shown(pieces);
+        self.sent_end = self.endpoint.send(pieces)?;
+        self.listen_until(enough)
+    }
+
+    /// Hears what comes now, without sending.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn listen_until(&mut self, enough: usize) -> Check<Reply> {
+        self.heard = self
+            .endpoint
+            .hear(self.patience.reply, self.patience.quiet, enough)?;
+        let mut bytes: Vec<u8> = self.heard.iter().map(|heard| heard.byte).collect();
+        // An operating system may deliver a frame in pieces: what is none yet may become one.
+        let whole = |bytes: &[u8]| bytes.is_empty() || self.target.mode.decode(bytes).is_ok();
+        while !self.endpoint.abilities().exact && bytes.len() < enough && !whole(&bytes) {
+            let more = self.endpoint.hear(
+                self.patience.quiet * 5,
+                self.patience.quiet,
+                enough - bytes.len(),
+            )?;
+            if more.is_empty() {
+                break;
+            }
+            bytes.extend(more.iter().map(|heard| heard.byte));
+            self.heard.extend(more);
+        }
+        let reply = if bytes.is_empty() {
+            Reply::Silence
+        } else if self.heard.iter().any(|heard| !heard.good) {
+            Reply::Wrong(bytes, "damaged characters".to_owned())
+        } else {
+            match self.target.mode.decode(&bytes) {
+                Ok((unit, pdu)) if unit == self.target.unit => Reply::Pdu(pdu),
+                Ok((unit, _)) => Reply::Wrong(bytes, format!("from unit {unit}")),
+                Err(why) => Reply::Wrong(bytes, why),
+            }
+        };
+        self.came = reply.to_string();
+        Ok(reply)
+    }
+
+    /// Sends bytes as they are.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn raw(&mut self, bytes: &[u8]) -> Check<Reply> {
+        self.exchange(&[Piece::Bytes(bytes.to_vec())])
+    }
+
+    /// Sends a PDU in a good frame to a unit, whichever it is.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn ask_unit(&mut self, unit: u8, pdu: &[u8]) -> Check<Reply> {
+        let frame = self.target.mode.frame(unit, pdu);
+        self.raw(&frame)
+    }
+
+    /// Sends a PDU to the unit under test.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn ask(&mut self, pdu: &[u8]) -> Check<Reply> {
+        self.ask_unit(self.target.unit, pdu)
+    }
+
+    /// Asks, and wants an ordinary reply: a PDU that begins with the function code.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    pub fn reply(&mut self, pdu: &[u8]) -> Check<Vec<u8>> {
+        match self.ask(pdu)? {
+            Reply::Pdu(reply) if reply[0] == pdu[0] => Ok(reply),
+            _ => self.fail(format!("a reply to function {:02X}", pdu[0])),
+        }
+    }
+
+    /// Asks, and wants exactly this PDU.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    pub fn reply_is(&mut self, pdu: &[u8], wanted: &[u8]) -> Check {
+        let reply = self.ask(pdu)?;
+        self.ensure(
+            reply == Reply::Pdu(wanted.to_vec()),
+            format!("the PDU {}", hex(wanted)),
+        )
+    }
+
+    /// Asks, and wants this exception.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    pub fn exception(&mut self, pdu: &[u8], code: u8) -> Check {
+        let reply = self.ask(pdu)?;
+        let wanted = format!("exception {code:02X} to function {:02X}", pdu[0]);
+        self.ensure(reply.exception(pdu[0]) == Some(code), wanted)
+    }
+
+    /// Asks with a PDU of the wrong length: exception 03 or silence.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    pub fn exception_03_or_silence(&mut self, pdu: &[u8]) -> Check {
+        let reply = self.ask(pdu)?;
+        let right = reply == Reply::Silence || reply.exception(pdu[0]) == Some(3);
+        self.ensure(
+            right,
+            format!("exception 03 to function {:02X}, or silence", pdu[0]),
+        )
+    }
+
+    /// Puts pieces on the line, and wants silence.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything comes, [`Stop::Broken`].
+    pub fn silence(&mut self, pieces: &[Piece], why: impl Display) -> Check {
+        let patience = self.patience;
+        self.patience.reply = patience.silence;
+        let reply = self.exchange(pieces);
+        self.patience = patience;
+        self.ensure(reply? == Reply::Silence, format!("silence: {why}"))
+    }
+
+    /// Sends bytes as they are, and wants silence.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything comes, [`Stop::Broken`].
+    pub fn silence_to(&mut self, bytes: &[u8], why: impl Display) -> Check {
+        self.silence(&[Piece::Bytes(bytes.to_vec())], why)
+    }
+
+    /// The unit answers its ordinary request.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when it does not, [`Stop::Broken`].
+    pub fn alive(&mut self, after: impl Display) -> Check {
+        let ping = self.target.ping.clone();
+        let before = self.sent.clone();
+        match self.ask(&ping)? {
+            Reply::Pdu(reply) if reply[0] == ping[0] => Ok(()),
+            _ => {
+                self.sent = format!("{before}; then {}", self.sent);
+                self.fail(format!("a good request is answered after {after}"))
+            }
+        }
+    }
+
+    /// The request that [`Bench::alive`] asks with, as a frame.
+    #[must_use]
+    pub fn ping(&self) -> Vec<u8> {
+        self.frame(&self.target.ping)
+    }
+
+    /// Whether a reply is a good one to that request.
+    #[must_use]
+    pub fn is_pong(&self, reply: &Reply) -> bool {
+        matches!(reply, Reply::Pdu(pdu) if pdu[0] == self.target.ping[0])
+    }
+
+    /// Asks something and then says that the case does not apply when the answer is exception 01.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Skip`] then, [`Stop::Fail`] when it is no ordinary reply, [`Stop::Broken`].
+    pub fn reply_unless_lacking(&mut self, pdu: &[u8], what: &str) -> Check<Vec<u8>> {
+        match self.ask(pdu)? {
+            reply if reply.exception(pdu[0]) == Some(1) => {
+                Err(Stop::Skip(format!("the unit answers 01: it has no {what}")))
+            }
+            Reply::Pdu(reply) if reply[0] == pdu[0] => Ok(reply),
+            _ => self.fail(format!("a reply, or exception 01: {what}")),
+        }
+    }
+
+    /// Lets time pass.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn rest(&mut self, time: Duration) -> Result<(), Broken> {
+        self.endpoint.rest(time)
+    }
+}
+
+fn shown(pieces: &[Piece]) -> String {
+    let texts: Vec<String> = pieces
+        .iter()
+        .map(|piece| match piece {
+            Piece::Bytes(bytes) => hex(bytes),
+            Piece::Gap(gap) => format!("({} us of silence)", gap.as_micros()),
+            Piece::BadParity(byte) => format!("{byte:02X} (wrong parity)"),
+            Piece::BadStop(byte) => format!("{byte:02X} (stop bit low)"),
+            Piece::Break(bits) => format!("(break of {bits} bits)"),
+            Piece::Glitch(width) => format!("(glitch of {} us)", width.as_micros()),
+        })
+        .collect();
+    texts.join(" ")
+}

@@ -1,0 +1,103 @@
+//! A case: its name, the section it comes from, what it needs, and how it is judged.
+
+use crate::bench::Bench;
+use crate::endpoint::Broken;
+
+/// Something without which a case is skipped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// The unit has this function.
+    Function(u8),
+    /// There is something that this function (1 to 4) can read.
+    Readable(u8),
+    /// There are coils to write to.
+    Bits,
+    /// There are registers to write to.
+    Words,
+    /// The endpoint's time is exact.
+    Exact,
+    /// The endpoint can send damaged characters.
+    Faults,
+    /// The line has a parity bit.
+    Parity,
+    /// The endpoint can switch the unit's power.
+    Power,
+    /// The endpoint sees the driver.
+    Driver,
+    /// The endpoint can let the unit hear itself.
+    Echo,
+    /// The endpoint can change rate and format.
+    SetLine,
+    /// The configuration may be written (`--allow-config`).
+    Config,
+    /// The unit is a modio.
+    Modio,
+    /// The unit speaks RTU.
+    Rtu,
+    /// The unit speaks ASCII.
+    Ascii,
+}
+
+/// What was sent, what came of it, and what the standard wants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// What was sent.
+    pub sent: String,
+    /// What came.
+    pub came: String,
+    /// What should have come.
+    pub wanted: String,
+}
+
+/// Why a case stops before its end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The unit did wrong.
+    Fail(Failure),
+    /// The case does not apply, as was found on the way: why.
+    Skip(String),
+    /// The endpoint is gone.
+    Broken(Broken),
+}
+
+impl From<Broken> for Stop {
+    fn from(broken: Broken) -> Self {
+        Self::Broken(broken)
+    }
+}
+
+/// What a step of a case results in.
+pub type Check<T = ()> = Result<T, Stop>;
+
+/// A named case.
+#[derive(Clone, Copy)]
+pub struct Case {
+    /// Its name: what it is about, a slash, what is tried. Never used twice.
+    pub name: &'static str,
+    /// Where it is written that it must be so.
+    pub section: &'static str,
+    /// What must be so, in one line.
+    pub about: &'static str,
+    /// What it needs.
+    pub needs: &'static [Need],
+    /// Tries it.
+    pub run: fn(&mut Bench<'_>) -> Check,
+}
+
+/// A case, written in one go.
+#[must_use]
+pub const fn case(
+    name: &'static str,
+    section: &'static str,
+    about: &'static str,
+    needs: &'static [Need],
+    run: fn(&mut Bench<'_>) -> Check,
+) -> Case {
+    Case {
+        name,
+        section,
+        about,
+        needs,
+        run,
+    }
+}

@@ -1,0 +1,264 @@
+//! Whom a frame is for: other units, reserved addresses, broadcasts.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::points::{pdu, write_bits, write_words};
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "address/other-units",
+        "V1.02 2.2",
+        "requests for other units get silence",
+        &[],
+        other_units,
+    ),
+    case(
+        "address/reserved",
+        "V1.02 2.2",
+        "addresses 248 to 255 get silence",
+        &[],
+        reserved,
+    ),
+    case(
+        "address/other-units-write",
+        "V1.02 2.2",
+        "writes to other units and reserved addresses do nothing here",
+        &[Need::Bits, Need::Function(1)],
+        other_units_write,
+    ),
+    case(
+        "address/other-units-write-words",
+        "V1.02 2.2",
+        "register writes to other units and reserved addresses do nothing here",
+        &[Need::Words, Need::Function(3)],
+        other_units_write_words,
+    ),
+    case(
+        "broadcast/coils",
+        "V1.02 2.1",
+        "a broadcast 05 or 0F is done, in silence",
+        &[Need::Bits, Need::Function(1)],
+        broadcast_bits,
+    ),
+    case(
+        "broadcast/registers",
+        "V1.02 2.1",
+        "a broadcast 06 or 10 is done, in silence",
+        &[Need::Words, Need::Function(3)],
+        broadcast_words,
+    ),
+    case(
+        "broadcast/read",
+        "V1.02 2.1",
+        "a broadcast read gets silence",
+        &[],
+        broadcast_read,
+    ),
+    case(
+        "broadcast/nonsense",
+        "V1.02 2.1",
+        "a broadcast that is refused gets silence and writes nothing",
+        &[],
+        nonsense,
+    ),
+    case(
+        "broadcast/refused-writes-nothing",
+        "V1.02 2.1",
+        "a broadcast write that is partly wrong writes nothing",
+        &[Need::Bits, Need::Function(1)],
+        refused_writes,
+    ),
+];
+
+/// Addresses that are not this unit's: all of them where that is quick, else those that one wrong bit or
+/// digit would confuse with it.
+fn others(bench: &Bench<'_>) -> Vec<u8> {
+    let unit = bench.unit();
+    let all = bench.endpoint.abilities().exact;
+    (1..=247)
+        .filter(|address| *address != unit)
+        .filter(|address| {
+            all || (address ^ unit).count_ones() == 1 || [1, 2, 247].contains(address)
+        })
+        .collect()
+}
+
+fn reserved_addresses(bench: &Bench<'_>) -> Vec<u8> {
+    (248..=255).filter(|a| *a != bench.unit()).collect()
+}
+
+fn silent_to(bench: &mut Bench<'_>, unit: u8, pdu: &[u8]) -> Check {
+    let frame = bench.target.mode.frame(unit, pdu);
+    bench.silence_to(
+        &frame,
+        format!("it is for {unit}, not for {}", bench.unit()),
+    )
+}
+
+fn other_units(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.target.ping.clone();
+    for unit in others(bench) {
+        silent_to(bench, unit, &ping)?;
+    }
+    bench.alive("requests for all other units")
+}
+
+fn reserved(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.target.ping.clone();
+    for unit in reserved_addresses(bench) {
+        silent_to(bench, unit, &ping)?;
+    }
+    bench.alive("requests for reserved addresses")
+}
+
+fn few_others(bench: &Bench<'_>) -> Vec<u8> {
+    let near = [
+        bench.unit() ^ 1,
+        bench.unit() ^ 2,
+        bench.other(),
+        248,
+        254,
+        255,
+    ];
+    near.into_iter()
+        .filter(|address| ![0, bench.unit()].contains(address))
+        .collect()
+}
+
+fn other_units_write(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?.up_to(1);
+    bench.set_bits(span.first, &[false])?;
+    for unit in few_others(bench) {
+        silent_to(bench, unit, &pdu(5, span.first, 0xFF00))?;
+        silent_to(bench, unit, &write_bits(span.first, &[true], false))?;
+        let now = bench.read_bits(span)?;
+        bench.ensure(now == [false], "the coil is still off")?;
+    }
+    Ok(())
+}
+
+fn other_units_write_words(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let at = words.span.first;
+    bench.set_words(at, &[words.low])?;
+    for unit in few_others(bench) {
+        silent_to(bench, unit, &pdu(6, at, words.high))?;
+        silent_to(bench, unit, &write_words(at, &[words.high]))?;
+        let now = bench.read_word(at)?;
+        bench.ensure(now == words.low, "the register is as it was")?;
+    }
+    Ok(())
+}
+
+fn broadcast_bits(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?.up_to(1);
+    for state in [true, false, true] {
+        let value = if state { 0xFF00 } else { 0 };
+        for (function, request) in [
+            (5, pdu(5, span.first, value)),
+            (0x0F, write_bits(span.first, &[state], false)),
+        ] {
+            if !bench.target.has(function) {
+                continue;
+            }
+            bench.set_bits(span.first, &[!state])?;
+            silent_to(bench, 0, &request)?;
+            let now = bench.read_bits(span)?;
+            bench.ensure(
+                now == [state],
+                format!("the broadcast has made the coil {state}"),
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn broadcast_words(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let at = words.span.first;
+    for value in [words.high, words.low] {
+        let other = if value == words.low {
+            words.high
+        } else {
+            words.low
+        };
+        for (function, request) in [
+            (6, pdu(6, at, value)),
+            (0x10, write_words(at, &[value])),
+            (
+                0x16,
+                [pdu(0x16, at, 0), value.to_be_bytes().to_vec()].concat(),
+            ),
+        ] {
+            if !bench.target.has(function) {
+                continue;
+            }
+            bench.set_words(at, &[other])?;
+            silent_to(bench, 0, &request)?;
+            let now = bench.read_word(at)?;
+            bench.ensure(
+                now == value,
+                format!("the broadcast has made the register {value:04X}"),
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn broadcast_read(bench: &mut Bench<'_>) -> Check {
+    for function in 1..=4 {
+        let first = bench
+            .target
+            .readable(function)
+            .first()
+            .map_or(0, |s| s.first);
+        silent_to(bench, 0, &pdu(function, first, 1))?;
+    }
+    for request in [
+        vec![7],
+        vec![0x0B],
+        vec![0x11],
+        vec![8, 0, 0, 1, 2],
+        vec![0x2B, 0x0E, 1, 0],
+    ] {
+        silent_to(bench, 0, &request)?;
+    }
+    bench.alive("broadcasts that only read")
+}
+
+fn nonsense(bench: &mut Bench<'_>) -> Check {
+    for request in [
+        vec![0x66],
+        vec![0],
+        vec![0x80],
+        vec![0xFF, 1, 2],
+        vec![3, 0, 0, 0, 0],
+        vec![5, 0xFF, 0xFF, 0x12, 0x34],
+        vec![0x0F, 0, 0, 0, 0, 0],
+        vec![0x10, 0, 0, 0, 1, 3, 0, 0, 0],
+    ] {
+        silent_to(bench, 0, &request)?;
+    }
+    bench.alive("broadcasts that make no sense")
+}
+
+fn refused_writes(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?.up_to(1);
+    bench.set_bits(span.first, &[false])?;
+    let mut wrong = write_bits(span.first, &[true], false);
+    wrong[5] = 2;
+    for request in [
+        pdu(5, span.first, 0x1234),
+        wrong,
+        write_bits(span.first, &[true; 1968], true),
+    ] {
+        let beyond = request.len() > 200;
+        if beyond && bench.bits()?.len() >= 1968 {
+            continue;
+        }
+        silent_to(bench, 0, &request)?;
+        let now = bench.read_bits(span)?;
+        bench.ensure(now == [false], "the coil is still off")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,235 @@
+//! ASCII framing (Modbus over Serial Line V1.02, 2.5.2).
+
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::cases::diagnostics::diagnose;
+use crate::endpoint::Piece;
+use crate::frame::{Reply, ascii, lrc, rtu};
+
+const N: &[Need] = &[Need::Ascii];
+const S: &str = "V1.02 2.5.2.1";
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "ascii/bad-lrc",
+        "V1.02 2.5.2.2",
+        "a wrong LRC gets silence",
+        N,
+        bad_lrc,
+    ),
+    case(
+        "ascii/before-the-colon",
+        S,
+        "whatever stands before the colon is ignored",
+        N,
+        before_colon,
+    ),
+    case(
+        "ascii/colon-restarts",
+        S,
+        "a colon starts a new frame, whatever was open",
+        N,
+        colon_restarts,
+    ),
+    case(
+        "ascii/not-a-digit",
+        S,
+        "characters that are no digits, and odd numbers of digits, spoil the frame",
+        N,
+        not_digits,
+    ),
+    case(
+        "ascii/truncated",
+        S,
+        "a frame without its end gets silence, and the next one is answered",
+        N,
+        truncated,
+    ),
+    case(
+        "ascii/gap-below-1-s",
+        S,
+        "gaps of up to a second inside a frame are no harm",
+        N,
+        short_gap,
+    ),
+    case(
+        "ascii/gap-above-1-s",
+        S,
+        "a gap of more than a second ends the frame",
+        N,
+        long_gap,
+    ),
+    case(
+        "ascii/longest",
+        S,
+        "a frame of 513 characters is processed",
+        N,
+        longest,
+    ),
+    case(
+        "ascii/too-long",
+        S,
+        "longer frames are dropped",
+        N,
+        too_long,
+    ),
+    case("ascii/rtu-frame", S, "RTU frames get silence", N, rtu_frame),
+    case(
+        "ascii/delimiter",
+        "V1.1b3 6.8.1, 03",
+        "08/03 changes the character that ends a frame after CR",
+        &[Need::Ascii, Need::Function(8)],
+        delimiter,
+    ),
+];
+
+fn body(bench: &Bench<'_>) -> Vec<u8> {
+    [&[bench.unit()], &bench.target.ping[..]].concat()
+}
+
+fn bad_lrc(bench: &mut Bench<'_>) -> Check {
+    let body = body(bench);
+    for bit in 0..8 {
+        let bad = ascii(&body, lrc(&body) ^ 1 << bit);
+        bench.silence_to(&bad, "its LRC is wrong")?;
+    }
+    bench.alive("frames with a wrong LRC")
+}
+
+fn before_colon(bench: &mut Bench<'_>) -> Check {
+    for noise in [&b"0"[..], b"\r\n", b"0103", b"\x00\xFF", b"hello"] {
+        let frame = [noise, &bench.ping()].concat();
+        let reply = bench.raw(&frame)?;
+        bench.ensure(bench.is_pong(&reply), "a reply to what follows the colon")?;
+    }
+    Ok(())
+}
+
+fn colon_restarts(bench: &mut Bench<'_>) -> Check {
+    for open in [&b":"[..], b":0", b":0103", b":010300000001"] {
+        let frame = [open, &bench.ping()].concat();
+        let reply = bench.raw(&frame)?;
+        bench.ensure(
+            bench.is_pong(&reply),
+            "a reply to what follows the last colon",
+        )?;
+    }
+    Ok(())
+}
+
+fn not_digits(bench: &mut Bench<'_>) -> Check {
+    let good = bench.ping();
+    for wrong in [b'G', b' ', b'/', b'@', 0x00] {
+        let mut bad = good.clone();
+        bad[3] = wrong;
+        bench.silence_to(&bad, "something in it is no digit")?;
+    }
+    let mut odd = good.clone();
+    odd.remove(3);
+    bench.silence_to(&odd, "an odd number of digits")?;
+    bench.silence_to(b":\r\n", "nothing in it")?;
+    bench.silence_to(b":01FF\r\n", "an address alone")?;
+    bench.alive("frames that are none")
+}
+
+fn truncated(bench: &mut Bench<'_>) -> Check {
+    let good = bench.ping();
+    for cut in 1..good.len() {
+        bench.silence_to(&good[..cut], "it has no end")?;
+        bench.alive("a truncated frame")?;
+    }
+    Ok(())
+}
+
+fn with_gap(bench: &mut Bench<'_>, gap: Duration) -> Check<Reply> {
+    let frame = bench.ping();
+    let (first, rest) = frame.split_at(5);
+    bench.exchange(&[
+        Piece::Bytes(first.to_vec()),
+        Piece::Gap(gap),
+        Piece::Bytes(rest.to_vec()),
+    ])
+}
+
+fn short_gap(bench: &mut Bench<'_>) -> Check {
+    let exact = bench.endpoint.abilities().exact;
+    let longest = if exact { 980 } else { 500 };
+    for ms in [10, 100, longest] {
+        let reply = with_gap(bench, Duration::from_millis(ms))?;
+        bench.ensure(
+            bench.is_pong(&reply),
+            format!("a reply: a gap of {ms} ms is allowed"),
+        )?;
+    }
+    Ok(())
+}
+
+fn long_gap(bench: &mut Bench<'_>) -> Check {
+    for ms in [1050, 1500] {
+        let reply = with_gap(bench, Duration::from_millis(ms))?;
+        bench.ensure(
+            reply == Reply::Silence,
+            format!("silence: a gap of {ms} ms is too long"),
+        )?;
+        bench.alive("a gap above a second")?;
+    }
+    Ok(())
+}
+
+fn of_length(bench: &Bench<'_>, data: usize) -> (u8, Vec<u8>) {
+    let unknown = super::dispatch::unknown_functions(bench).pop();
+    let function = unknown.unwrap_or(0x6F);
+    let body = [vec![bench.unit(), function], vec![0x33; data]].concat();
+    (function, ascii(&body, lrc(&body)))
+}
+
+fn longest(bench: &mut Bench<'_>) -> Check {
+    // Unit, 253 bytes of PDU, LRC: 255 bytes as 510 digits, colon, CR and LF.
+    let (function, frame) = of_length(bench, 252);
+    let reply = bench.raw(&frame)?;
+    bench.ensure(
+        frame.len() == 513 && reply.exception(function) == Some(1),
+        "exception 01: a frame of 513 characters is one",
+    )
+}
+
+fn too_long(bench: &mut Bench<'_>) -> Check {
+    for data in [253, 254, 300, 600] {
+        let (_, frame) = of_length(bench, data);
+        bench.silence_to(&frame, "it is too long")?;
+        bench.alive("a frame that is too long")?;
+    }
+    Ok(())
+}
+
+fn rtu_frame(bench: &mut Bench<'_>) -> Check {
+    let frame = rtu(&body(bench));
+    for _ in 0..3 {
+        bench.silence_to(&frame, "it is an RTU frame")?;
+    }
+    bench.alive("RTU frames")
+}
+
+fn delimiter(bench: &mut Bench<'_>) -> Check {
+    let change = |to: u8| diagnose(3, &[to, 0]);
+    bench.reply_unless_lacking(&change(b'!'), "08/03")?;
+    let with = |bench: &Bench<'_>, pdu: &[u8], end: u8| {
+        let mut frame = bench.frame(pdu);
+        frame.pop();
+        frame.push(end);
+        frame
+    };
+    let ping = bench.target.ping.clone();
+    let new = with(bench, &ping, b'!');
+    // The reply may end in either: what counts is that there is one.
+    let answered = bench.raw(&new)? != Reply::Silence;
+    let back = with(bench, &change(b'\n'), b'!');
+    bench.raw(&back)?;
+    bench.ensure(
+        answered,
+        "a reply to a frame that ends in CR and the new character",
+    )?;
+    bench.alive("the delimiter is LF again")
+}

@@ -1,0 +1,214 @@
+//! Life on a line with other units on it.
+
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::endpoint::Piece;
+use crate::frame::{Reply, rtu};
+use crate::points::pdu;
+
+const N: &[Need] = &[Need::Rtu];
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "bus/others-traffic",
+        "V1.02 2.4.1",
+        "requests, replies and exceptions of other units make this one neither deaf nor talkative",
+        N,
+        others_traffic,
+    ),
+    case(
+        "bus/others-truncated-traffic",
+        "V1.02 2.4.1",
+        "nor do truncated and damaged ones",
+        N,
+        others_truncated,
+    ),
+    case(
+        "bus/others-long-replies",
+        "V1.02 2.4.1",
+        "nor do replies of every length, up to 255 bytes",
+        N,
+        others_long,
+    ),
+    case(
+        "bus/request-right-after-others-reply",
+        "V1.02 2.5.1.1",
+        "a request t3.5 after another unit's reply is answered",
+        &[Need::Rtu, Need::Exact],
+        right_after,
+    ),
+    case(
+        "bus/others-reply-is-no-request",
+        "V1.02 2.2",
+        "a reply that would be a write if it were for this unit is not taken for one",
+        &[Need::Rtu, Need::Bits, Need::Function(1)],
+        reply_is_no_request,
+    ),
+    case(
+        "bus/stray-zero",
+        "V1.02 2.5.1.1",
+        "a stray 00 before a request costs that request at most",
+        N,
+        stray_zero,
+    ),
+    case(
+        "bus/own-echo",
+        "V1.02 3.3",
+        "with DE and RE tied, the unit does not take its own reply for a request",
+        &[Need::Rtu, Need::Echo],
+        own_echo,
+    ),
+];
+
+/// What other units and their master say to each other.
+fn traffic(bench: &Bench<'_>) -> Vec<Vec<u8>> {
+    let other = bench.other();
+    [
+        &[other, 1, 0, 0, 0, 8][..],
+        &[other, 1, 1, 0x5A],
+        &[other, 3, 0, 0, 0, 2],
+        &[other, 3, 4, 1, 1, 0, 0x10],
+        &[other, 0x83, 2],
+        &[other, 5, 0, 0, 0xFF, 0],
+        &[other, 6, 0, 1, 0, 3],
+        &[other, 0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2],
+        &[other, 0x10, 0, 1, 0, 2],
+        &[other, 0x41, 9, 9],
+        &[other, 0x11],
+        &[200, 0x2B, 0x0E, 1, 0],
+    ]
+    .map(rtu)
+    .to_vec()
+}
+
+fn others_traffic(bench: &mut Bench<'_>) -> Check {
+    for frame in traffic(bench) {
+        bench.silence_to(&frame, "it is another unit's")?;
+        bench.alive("other units' traffic")?;
+    }
+    for frame in traffic(bench) {
+        bench.silence_to(&frame, "it is another unit's")?;
+    }
+    bench.alive("a lot of other units' traffic")
+}
+
+fn others_truncated(bench: &mut Bench<'_>) -> Check {
+    for frame in traffic(bench) {
+        let cuts = [1, 2, 3, frame.len() - 1];
+        for cut in cuts.into_iter().filter(|cut| *cut < frame.len()) {
+            bench.silence_to(&frame[..cut], "it is another unit's, and cut")?;
+        }
+        bench.alive("other units' truncated traffic")?;
+        let mut bad = frame.clone();
+        bad[1] ^= 4;
+        bench.silence_to(&bad, "it is another unit's, and damaged")?;
+        bench.alive("other units' damaged traffic")?;
+    }
+    Ok(())
+}
+
+fn others_long(bench: &mut Bench<'_>) -> Check {
+    let other = bench.other();
+    for words in [1, 2, 60, 123, 124, 125] {
+        let body = [
+            vec![other, 3, words * 2],
+            vec![0x5A; usize::from(words) * 2],
+        ]
+        .concat();
+        bench.silence_to(&rtu(&body), "it is another unit's reply")?;
+        bench.alive(format!("another unit's reply of {words} registers"))?;
+    }
+    Ok(())
+}
+
+fn right_after(bench: &mut Bench<'_>) -> Check {
+    let line = bench.endpoint.line();
+    let gap = line.t35() + line.bits(3).max(Duration::from_micros(20));
+    for frame in traffic(bench) {
+        let reply = bench.exchange(&[
+            Piece::Bytes(frame.clone()),
+            Piece::Gap(gap),
+            Piece::Bytes(frame),
+            Piece::Gap(gap),
+            Piece::Bytes(bench.ping()),
+        ])?;
+        bench.ensure(
+            bench.is_pong(&reply),
+            format!("a reply, {gap:?} after other traffic"),
+        )?;
+    }
+    Ok(())
+}
+
+fn reply_is_no_request(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?.up_to(1);
+    bench.set_bits(span.first, &[false])?;
+    let other = bench.other();
+    // The echo of a write by another unit, twice: as request and as reply.
+    let frame = rtu(&[&[other], &pdu(5, span.first, 0xFF00)[..]].concat());
+    // And a read reply whose data is a good request for this unit, CRC and all.
+    let inner = bench.frame(&pdu(5, span.first, 0xFF00));
+    let body = [&[other, 3, inner.len() as u8], &inner[..]].concat();
+    for frame in [frame.clone(), frame, rtu(&body)] {
+        bench.silence_to(&frame, "it is another unit's")?;
+    }
+    let now = bench.read_bits(span)?;
+    bench.ensure(now == [false], "the coil is still off")
+}
+
+fn stray_zero(bench: &mut Bench<'_>) -> Check {
+    for stray in [&[0][..], &[0, 0], &[0xFF]] {
+        let frame = [stray, &bench.ping()].concat();
+        let reply = bench.raw(&frame)?;
+        let right = reply == Reply::Silence || bench.is_pong(&reply);
+        bench.ensure(right, "silence, or the reply")?;
+        bench.alive("a stray byte in front of a request")?;
+        let apart = [
+            Piece::Bytes(stray.to_vec()),
+            Piece::Gap(bench.endpoint.line().t35() * 2),
+            Piece::Bytes(bench.ping()),
+        ];
+        let reply = bench.exchange(&apart)?;
+        bench.ensure(
+            bench.is_pong(&reply),
+            "a reply: the stray byte was a frame of its own",
+        )?;
+    }
+    Ok(())
+}
+
+fn own_echo(bench: &mut Bench<'_>) -> Check {
+    bench.endpoint.set_echo(true)?;
+    let result = echoed(bench);
+    bench.endpoint.set_echo(false)?;
+    result?;
+    bench.alive("its own echo")
+}
+
+fn echoed(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.target.ping.clone();
+    for _ in 0..10 {
+        bench.reply(&ping)?;
+    }
+    // Replies that are the requests themselves: taken for one, each would be answered for ever.
+    let mut echoes = Vec::new();
+    if bench.target.has(8) {
+        echoes.push(vec![8, 0, 0, 1, 2]);
+    }
+    if let Some(span) = bench
+        .target
+        .bits
+        .filter(|_| bench.target.has(5) && bench.target.has(1))
+    {
+        let now = bench.read_bits(span.up_to(1))?[0];
+        echoes.push(pdu(5, span.first, if now { 0xFF00 } else { 0 }));
+    }
+    for request in echoes {
+        for _ in 0..5 {
+            bench.reply_is(&request, &request)?;
+        }
+    }
+    Ok(())
+}

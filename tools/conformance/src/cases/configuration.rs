@@ -1,0 +1,165 @@
+//! A modio's configuration: its lock, its checks, what is in force.
+
+use std::time::Duration;
+
+use register_map::{configuration, state};
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::points::{pdu, write_words};
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "config/locked",
+        "map, 0x0100",
+        "while the lock is closed a configuration write is exception 06 and changes nothing",
+        &[Need::Modio, Need::Function(6)],
+        locked,
+    ),
+    case(
+        "config/wrong-key",
+        "map, 0x0100",
+        "KEY takes 5A17 only, anything else is exception 03",
+        &[Need::Modio, Need::Function(6)],
+        wrong_key,
+    ),
+    case(
+        "config/value-before-lock",
+        "map, access rules",
+        "a value out of range is exception 03 even while the lock is closed",
+        &[Need::Modio, Need::Function(6)],
+        value_first,
+    ),
+    case(
+        "config/read-only",
+        "map, access rules",
+        "writing identity and state is exception 02, by 06 and 10",
+        &[Need::Modio, Need::Function(6), Need::Function(0x10)],
+        read_only,
+    ),
+    case(
+        "config/command-reads-0",
+        "map, 0x0108",
+        "COMMAND reads 0, and takes no command that does not exist",
+        &[Need::Modio, Need::Function(6)],
+        command,
+    ),
+    case(
+        "config/all-or-nothing",
+        "map, access rules",
+        "a write of several registers with one bad value changes none of them",
+        &[Need::Modio, Need::Config, Need::Function(0x10)],
+        all_or_nothing,
+    ),
+    case(
+        "config/response-delay",
+        "map, 0x0105",
+        "RESPONSE_DELAY is in force at once: replies come that much later",
+        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)],
+        response_delay,
+    ),
+];
+
+fn locked(bench: &mut Bench<'_>) -> Check {
+    if bench.read_word(configuration::KEY)? != 0 {
+        return Err(Stop::Skip("the lock is open".to_owned()));
+    }
+    let before = bench.read_word(configuration::RESPONSE_DELAY)?;
+    for value in [before, before ^ 1] {
+        bench.exception(&pdu(6, configuration::RESPONSE_DELAY, value), 6)?;
+        bench.exception(&write_words(configuration::RESPONSE_DELAY, &[value]), 6)?;
+    }
+    let now = bench.read_word(configuration::RESPONSE_DELAY)?;
+    bench.ensure(now == before, format!("RESPONSE_DELAY still is {before}"))
+}
+
+fn wrong_key(bench: &mut Bench<'_>) -> Check {
+    let before = bench.read_word(configuration::KEY)?;
+    for key in [0, 1, 0x5A16, 0x175A, 0xFFFF] {
+        bench.exception(&pdu(6, configuration::KEY, key), 3)?;
+    }
+    let now = bench.read_word(configuration::KEY)?;
+    bench.ensure(now == before, "the lock as it was")
+}
+
+fn value_first(bench: &mut Bench<'_>) -> Check {
+    for (register, value) in [
+        (configuration::RESPONSE_DELAY, 1001),
+        (configuration::FRAME_GAP, 4),
+        (configuration::COMM_TIMEOUT, 36_001),
+        (configuration::MODULE, 1),
+        (configuration::BETA, 1999),
+    ] {
+        let before = bench.read_word(register)?;
+        bench.exception(&pdu(6, register, value), 3)?;
+        let now = bench.read_word(register)?;
+        bench.ensure(
+            now == before,
+            format!("register {register:04X} still is {before}"),
+        )?;
+    }
+    Ok(())
+}
+
+fn read_only(bench: &mut Bench<'_>) -> Check {
+    for register in [
+        state::PRODUCT_CODE,
+        state::UNIT_ADDRESS,
+        state::UPTIME,
+        state::STATUS,
+        state::MODULE_IN_FORCE,
+        state::BUS_MESSAGES,
+    ] {
+        bench.exception(&pdu(6, register, 0), 2)?;
+        bench.exception(&write_words(register, &[0]), 2)?;
+    }
+    Ok(())
+}
+
+fn command(bench: &mut Bench<'_>) -> Check {
+    let now = bench.read_word(configuration::COMMAND)?;
+    bench.ensure(now == 0, "0")?;
+    for value in [0, 6, 0xB006, 0xFFFF] {
+        bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
+    }
+    Ok(())
+}
+
+fn all_or_nothing(bench: &mut Bench<'_>) -> Check {
+    bench.unlock()?;
+    let at = configuration::COMM_TIMEOUT;
+    let before = bench.reply(&pdu(3, at, 4))?;
+    bench.exception(&write_words(at, &[700, 1, 4, 0]), 3)?;
+    bench.exception(&write_words(at, &[700, 1, 0, 2]), 3)?;
+    let now = bench.reply(&pdu(3, at, 4))?;
+    bench.ensure(now == before, "the four registers as they were")
+}
+
+fn response_delay(bench: &mut Bench<'_>) -> Check {
+    bench.unlock()?;
+    let before = bench.read_word(configuration::RESPONSE_DELAY)?;
+    let patience = bench.patience;
+    bench.patience.reply += Duration::from_millis(200);
+    let mut result = Ok(());
+    for ms in [1, 20, 100] {
+        let request = pdu(6, configuration::RESPONSE_DELAY, ms);
+        result = result.and_then(|()| bench.reply_is(&request, &request));
+        result = result.and_then(|()| bench.alive("a new RESPONSE_DELAY"));
+        let least = bench.endpoint.line().t35() + Duration::from_millis(u64::from(ms));
+        let first = bench
+            .heard
+            .first()
+            .map_or(Duration::ZERO, |heard| heard.start);
+        let took = first.saturating_sub(bench.sent_end);
+        result = result.and_then(|()| {
+            let right = took >= least && took < least + Duration::from_millis(3);
+            bench.ensure(
+                right,
+                format!("a reply {least:?} after the request, not {took:?}"),
+            )
+        });
+    }
+    bench.reply(&pdu(6, configuration::RESPONSE_DELAY, before))?;
+    bench.patience = patience;
+    result
+}

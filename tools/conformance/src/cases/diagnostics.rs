@@ -1,0 +1,263 @@
+//! Diagnostics, function 08: echo, restart, listen-only and the rest.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::frame::Reply;
+
+const N: &[Need] = &[Need::Function(8)];
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "fc08/echo",
+        "V1.1b3 6.8.1, 00",
+        "sub-function 00 returns any number of data bytes",
+        N,
+        echo,
+    ),
+    case(
+        "fc08/unknown-sub-function",
+        "V1.1b3 6.8",
+        "a sub-function that the unit does not have is exception 01",
+        N,
+        unknown,
+    ),
+    case(
+        "fc08/data",
+        "V1.1b3 6.8.1",
+        "data other than 0000 where 0000 is required is exception 03",
+        N,
+        data,
+    ),
+    case(
+        "fc08/length",
+        "V1.1b3 6.8",
+        "a request without a whole sub-function is 03 or silence",
+        N,
+        length,
+    ),
+    case(
+        "fc08/register",
+        "V1.1b3 6.8.1, 02",
+        "sub-function 02 gives the diagnostic register",
+        N,
+        register,
+    ),
+    case(
+        "fc08/restart",
+        "V1.1b3 6.8.1, 01",
+        "sub-function 01 echoes 0000 and FF00 and goes on, anything else is 03",
+        N,
+        restart,
+    ),
+    case(
+        "fc08/listen-only",
+        "V1.1b3 6.8.1, 04",
+        "04 is not answered; then nothing is, nor done, but 01, which ends it, itself without reply",
+        N,
+        listen_only,
+    ),
+    case(
+        "fc08/listen-only-writes",
+        "V1.1b3 6.8.1, 04",
+        "in listen-only mode nothing is written, not by broadcast either",
+        &[Need::Function(8), Need::Function(1), Need::Bits],
+        listen_only_writes,
+    ),
+    case(
+        "fc08/clear-counters",
+        "V1.1b3 6.8.1, 0A",
+        "0A sets every counter and the diagnostic register to 0",
+        N,
+        clear,
+    ),
+    case(
+        "fc08/clear-overruns",
+        "V1.1b3 6.8.1, 14",
+        "14 clears the overrun counter and is echoed",
+        N,
+        clear_overruns,
+    ),
+];
+
+/// A request of function 08.
+pub(super) fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
+    [&[8], &sub.to_be_bytes()[..], data].concat()
+}
+
+fn echo(bench: &mut Bench<'_>) -> Check {
+    for length in [2, 0, 1, 3, 4, 17, 128, 249, 250] {
+        let data: Vec<u8> = (0..length).map(|n| (n as u8).wrapping_mul(37)).collect();
+        let request = diagnose(0, &data);
+        bench.reply_is(&request, &request)?;
+    }
+    Ok(())
+}
+
+fn unknown(bench: &mut Bench<'_>) -> Check {
+    for sub in [0x05, 0x09, 0x13, 0x15, 0x16, 0xFF, 0x0100, 0x0A00, 0xFFFF] {
+        bench.exception(&diagnose(sub, &[0, 0]), 1)?;
+    }
+    Ok(())
+}
+
+fn data(bench: &mut Bench<'_>) -> Check {
+    for sub in [
+        0x02, 0x04, 0x0A, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x10, 0x11, 0x12, 0x14,
+    ] {
+        for bad in [[0, 1], [1, 0], [0xFF, 0]] {
+            let reply = bench.ask(&diagnose(sub, &bad))?;
+            if reply.exception(8) == Some(1) {
+                break;
+            }
+            bench.ensure(
+                reply.exception(8) == Some(3),
+                format!("exception 03: 08/{sub:02X} takes 0000 only"),
+            )?;
+        }
+        for short in [&[][..], &[0], &[0, 0, 0]] {
+            let reply = bench.ask(&diagnose(sub, short))?;
+            let right = reply == Reply::Silence || matches!(reply.exception(8), Some(1 | 3));
+            bench.ensure(
+                right,
+                format!("exception 03 or silence: 08/{sub:02X} takes two bytes"),
+            )?;
+        }
+    }
+    bench.alive("diagnostics with bad data")
+}
+
+fn length(bench: &mut Bench<'_>) -> Check {
+    bench.exception_03_or_silence(&[8])?;
+    bench.exception_03_or_silence(&[8, 0])
+}
+
+fn register(bench: &mut Bench<'_>) -> Check {
+    let reply = bench.reply_unless_lacking(&diagnose(2, &[0, 0]), "08/02")?;
+    bench.ensure(
+        reply.len() == 5 && reply[..3] == [8, 0, 2],
+        "08 00 02 and two bytes",
+    )
+}
+
+fn restart(bench: &mut Bench<'_>) -> Check {
+    bench.reply_unless_lacking(&diagnose(1, &[0, 0]), "08/01")?;
+    for data in [[0, 0], [0xFF, 0]] {
+        let request = diagnose(1, &data);
+        bench.reply_is(&request, &request)?;
+        bench.alive("a restart of the communication")?;
+    }
+    for bad in [[0, 1], [0xFF, 1], [0xFE, 0], [0xFF, 0xFF]] {
+        bench.exception(&diagnose(1, &bad), 3)?;
+    }
+    bench.exception_03_or_silence(&diagnose(1, &[]))?;
+    bench.exception_03_or_silence(&diagnose(1, &[0, 0, 0]))
+}
+
+/// Puts the unit into listen-only mode, or skips the case.
+fn enter(bench: &mut Bench<'_>) -> Check {
+    // Data that is refused tells whether it has the sub-function, without entering.
+    let reply = bench.ask(&diagnose(4, &[0, 1]))?;
+    if reply.exception(8) == Some(1) {
+        return Err(crate::case::Stop::Skip(
+            "the unit answers 01: it has no 08/04".to_owned(),
+        ));
+    }
+    let enter = bench.frame(&diagnose(4, &[0, 0]));
+    bench.silence_to(&enter, "08/04 is not answered")
+}
+
+/// Gets it out again, whatever has gone wrong, and passes on what has.
+fn leave(bench: &mut Bench<'_>, so_far: Check) -> Check {
+    let reply = bench.ask(&diagnose(1, &[0, 0]))?;
+    let out = match so_far {
+        Ok(()) => bench.ensure(
+            reply == Reply::Silence,
+            "silence: 08/01 in listen-only mode is obeyed without reply",
+        ),
+        failed => failed,
+    };
+    // A second one is a restart of a unit that listens and talks, and cannot hurt.
+    bench.ask(&diagnose(1, &[0, 0]))?;
+    out.and(bench.alive("08/01 has ended the listen-only mode"))
+}
+
+fn listen_only(bench: &mut Bench<'_>) -> Check {
+    enter(bench)?;
+    let ping = bench.ping();
+    let mut silent = bench.silence_to(&ping, "in listen-only mode nothing is answered");
+    for pdu in [
+        diagnose(0, &[1, 2]),
+        diagnose(4, &[0, 0]),
+        diagnose(0x0A, &[0, 0]),
+        vec![0x66],
+        vec![3, 0, 0, 0, 0],
+    ] {
+        let frame = bench.frame(&pdu);
+        silent = silent.and_then(|()| bench.silence_to(&frame, "listen-only mode"));
+    }
+    leave(bench, silent)
+}
+
+fn listen_only_writes(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?.up_to(1);
+    bench.set_bits(span.first, &[false])?;
+    enter(bench)?;
+    let [high, low] = span.first.to_be_bytes();
+    let mut tried = Ok(());
+    for unit in [bench.unit(), 0] {
+        for pdu in [
+            vec![5, high, low, 0xFF, 0],
+            vec![0x0F, high, low, 0, 1, 1, 1],
+        ] {
+            let frame = bench.target.mode.frame(unit, &pdu);
+            tried = tried.and_then(|()| bench.silence_to(&frame, "listen-only mode"));
+        }
+    }
+    leave(bench, tried)?;
+    let now = bench.read_bits(span)?;
+    bench.ensure(now == [false], "the coil is still off")
+}
+
+fn clear(bench: &mut Bench<'_>) -> Check {
+    for _ in 0..4 {
+        bench.alive("nothing")?;
+    }
+    let request = diagnose(0x0A, &[0, 0]);
+    let reply = bench.reply_unless_lacking(&request, "08/0A")?;
+    bench.ensure(reply == request, "the request echoed")?;
+    // Those that this request and its kind move themselves may have moved again.
+    for (sub, moved) in [
+        (0x0B, 1),
+        (0x0C, 0),
+        (0x0D, 0),
+        (0x0F, 0),
+        (0x10, 0),
+        (0x11, 0),
+        (0x12, 0),
+        (0x02, 0),
+    ] {
+        let again = diagnose(0x0A, &[0, 0]);
+        bench.reply_is(&again, &again)?;
+        let reply = bench.ask(&diagnose(sub, &[0, 0]))?;
+        if reply.exception(8) == Some(1) {
+            continue;
+        }
+        let Reply::Pdu(pdu) = reply else {
+            return bench.fail(format!("a reply to 08/{sub:02X}"));
+        };
+        let value = pdu
+            .get(3..5)
+            .map_or(u16::MAX, |word| u16::from_be_bytes([word[0], word[1]]));
+        bench.ensure(
+            value <= moved,
+            format!("08/{sub:02X} is {moved} at most after 08/0A"),
+        )?;
+    }
+    Ok(())
+}
+
+fn clear_overruns(bench: &mut Bench<'_>) -> Check {
+    let request = diagnose(0x14, &[0, 0]);
+    let reply = bench.reply_unless_lacking(&request, "08/14")?;
+    bench.ensure(reply == request, "the request echoed")
+}

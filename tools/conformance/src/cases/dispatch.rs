@@ -1,0 +1,89 @@
+//! Function codes that a unit does not have.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, case};
+use crate::frame::Reply;
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "dispatch/unknown-function",
+        "V1.1b3 7",
+        "a function that the unit does not have is exception 01",
+        &[],
+        unknown,
+    ),
+    case(
+        "dispatch/unknown-function-longest",
+        "V1.1b3 7",
+        "the same with the longest PDU, 253 bytes",
+        &[],
+        longest,
+    ),
+    case(
+        "dispatch/function-00-and-80-up",
+        "V1.1b3 4.1",
+        "function 00 and those from 80 on get silence or exception 01, never what looks like a reply",
+        &[],
+        not_functions,
+    ),
+    case(
+        "dispatch/unknown-function-elsewhere",
+        "V1.02 2.2",
+        "an unknown function for another unit gets silence",
+        &[],
+        elsewhere,
+    ),
+];
+
+/// Functions that the unit does not have. Those that some maker may use are left alone on any device but
+/// a modio: nobody knows what they would do.
+pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
+    let lacking = |function: &u8| !bench.target.has(*function);
+    if bench.target.modio.is_some() {
+        (1..=0x7F).filter(lacking).collect()
+    } else {
+        let unassigned = [0x19, 0x2C, 0x30, 0x3F, 0x4A, 0x6F];
+        unassigned.into_iter().filter(lacking).collect()
+    }
+}
+
+fn unknown(bench: &mut Bench<'_>) -> Check {
+    for function in unknown_functions(bench) {
+        bench.exception(&[function], 1)?;
+    }
+    for function in unknown_functions(bench).into_iter().step_by(9) {
+        bench.exception(&[function, 0, 0, 0, 1], 1)?;
+    }
+    Ok(())
+}
+
+fn longest(bench: &mut Bench<'_>) -> Check {
+    let Some(function) = unknown_functions(bench).pop() else {
+        return Ok(());
+    };
+    let pdu = [vec![function], vec![0x33; 252]].concat();
+    bench.exception(&pdu, 1)
+}
+
+fn not_functions(bench: &mut Bench<'_>) -> Check {
+    for function in [0, 0x80, 0x81, 0x83, 0x86, 0x90, 0xAB, 0xC1, 0xFE, 0xFF] {
+        for data in [&[][..], &[0, 0, 0, 1], &[2]] {
+            let reply = bench.ask(&[&[function], data].concat())?;
+            let refused = Reply::Pdu(vec![function | 0x80, 1]);
+            bench.ensure(
+                reply == Reply::Silence || reply == refused,
+                "silence, or exception 01",
+            )?;
+        }
+    }
+    bench.alive("functions that are none")
+}
+
+fn elsewhere(bench: &mut Bench<'_>) -> Check {
+    let other = bench.other();
+    for function in [0x41, 0x65, 0x00, 0x80] {
+        let reply = bench.ask_unit(other, &[function, 1, 2, 3])?;
+        bench.ensure(reply == Reply::Silence, "silence: it is another unit's")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,273 @@
+//! What is a frame in RTU and what is not, as far as any endpoint can try it.
+
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::endpoint::Piece;
+use crate::frame::{Reply, rtu};
+
+const N: &[Need] = &[Need::Rtu];
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "framing/bad-crc",
+        "V1.02 2.5.1.2",
+        "a frame with a wrong bit anywhere gets silence",
+        N,
+        bad_crc,
+    ),
+    case(
+        "framing/swapped-crc",
+        "V1.02 2.5.1.2",
+        "a CRC with its bytes exchanged gets silence",
+        N,
+        swapped_crc,
+    ),
+    case(
+        "framing/unknown-function-bad-crc",
+        "V1.02 2.5.1.2",
+        "an unknown function with a wrong CRC gets silence, not exception 01",
+        N,
+        unknown_bad_crc,
+    ),
+    case(
+        "framing/bad-crc-writes-nothing",
+        "V1.02 2.5.1.2",
+        "a write with a wrong CRC is not done",
+        &[Need::Rtu, Need::Bits, Need::Function(1), Need::Function(5)],
+        bad_crc_write,
+    ),
+    case(
+        "framing/short-noise",
+        "V1.02 2.5.1.1",
+        "1 to 3 bytes get silence, with a CRC of nothing too",
+        N,
+        short_noise,
+    ),
+    case(
+        "framing/longest",
+        "V1.02 2.5.1",
+        "a frame of 256 bytes is processed",
+        N,
+        longest,
+    ),
+    case(
+        "framing/too-long",
+        "V1.02 2.5.1",
+        "frames of 257 bytes and more are dropped up to the next silence",
+        N,
+        too_long,
+    ),
+    case(
+        "framing/good-request-at-the-end-of-noise",
+        "V1.02 2.5.1.1",
+        "a good request that follows other bytes without a silence is part of their frame",
+        N,
+        joined,
+    ),
+    case(
+        "framing/truncated",
+        "V1.02 2.5.1.1",
+        "a request cut anywhere gets silence and is forgotten",
+        N,
+        truncated,
+    ),
+    case(
+        "framing/two-at-once",
+        "V1.02 2.5.1.1",
+        "two requests without a silence between them are both lost",
+        N,
+        two_at_once,
+    ),
+    case(
+        "framing/no-byte-around-the-reply",
+        "V1.02 2.5.1",
+        "nothing but the reply's own bytes leaves the unit, first and last included",
+        N,
+        nothing_else,
+    ),
+    case(
+        "framing/trailing-byte",
+        "V1.02 2.5.1.1",
+        "a byte after a good frame, without a silence, belongs to it and is never ignored",
+        N,
+        trailing,
+    ),
+];
+
+/// Bits to turn over, one at a time: all of them where that is quick, else one of each byte.
+fn bits(bench: &Bench<'_>, frame: &[u8]) -> Vec<usize> {
+    let step = if bench.endpoint.abilities().exact {
+        1
+    } else {
+        9
+    };
+    (0..frame.len() * 8).step_by(step).collect()
+}
+
+fn bad_crc(bench: &mut Bench<'_>) -> Check {
+    let good = bench.ping();
+    for bit in bits(bench, &good) {
+        let mut bad = good.clone();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        bench.silence_to(&bad, format!("bit {bit} is wrong"))?;
+    }
+    bench.alive("frames with a wrong CRC")
+}
+
+fn swapped_crc(bench: &mut Bench<'_>) -> Check {
+    let mut bad = bench.ping();
+    let length = bad.len();
+    bad.swap(length - 1, length - 2);
+    bench.silence_to(&bad, "the CRC's bytes are exchanged")?;
+    bench.alive("it")
+}
+
+fn unknown_bad_crc(bench: &mut Bench<'_>) -> Check {
+    for function in [0x66, 0x41, 0x00, 0x80] {
+        let mut bad = bench.frame(&[function, 0, 0, 0, 1]);
+        bad[6] ^= 0x10;
+        bench.silence_to(&bad, "its CRC is wrong")?;
+    }
+    bench.alive("it")
+}
+
+fn bad_crc_write(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?.up_to(1);
+    bench.set_bits(span.first, &[false])?;
+    let [high, low] = span.first.to_be_bytes();
+    for unit in [bench.unit(), 0] {
+        for bit in 0..16 {
+            let mut bad = rtu(&[unit, 5, high, low, 0xFF, 0]);
+            bad[6 + bit / 8] ^= 1 << (bit % 8);
+            bench.silence_to(&bad, "its CRC is wrong")?;
+        }
+    }
+    let now = bench.read_bits(span)?;
+    bench.ensure(now == [false], "the coil is still off")
+}
+
+fn short_noise(bench: &mut Bench<'_>) -> Check {
+    let unit = bench.unit();
+    for noise in [
+        &[0x00][..],
+        &[0xFF],
+        &[unit],
+        &[unit, 3],
+        &[0, 0],
+        &[0xFF, 0xFF],
+        &[unit, 1, 0],
+        &[0xFF, 0xFF, 0xFF],
+        &rtu(&[unit]),
+        &rtu(&[]),
+    ] {
+        bench.silence_to(noise, "too short for a frame")?;
+        bench.alive("short noise")?;
+    }
+    Ok(())
+}
+
+/// A request for a function that the unit does not have, in a frame of this length with a good CRC.
+fn of_length(bench: &Bench<'_>, length: usize) -> (u8, Vec<u8>) {
+    let unknown = super::dispatch::unknown_functions(bench).pop();
+    let function = unknown.unwrap_or(0x6F);
+    let body = [vec![bench.unit(), function], vec![0x33; length - 4]].concat();
+    (function, rtu(&body))
+}
+
+fn longest(bench: &mut Bench<'_>) -> Check {
+    for length in [255, 256] {
+        let (function, frame) = of_length(bench, length);
+        let reply = bench.raw(&frame)?;
+        bench.ensure(
+            reply.exception(function) == Some(1),
+            format!("exception 01: a frame of {length} bytes is one"),
+        )?;
+    }
+    Ok(())
+}
+
+fn too_long(bench: &mut Bench<'_>) -> Check {
+    for length in [257, 258, 259, 300, 512, 513, 1000] {
+        let (_, frame) = of_length(bench, length);
+        bench.silence_to(&frame, format!("{length} bytes are no frame"))?;
+        bench.alive(format!("{length} bytes"))?;
+    }
+    Ok(())
+}
+
+fn joined(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.ping();
+    for length in [1, 2, 7, 248, 249, 256, 257, 300, 512] {
+        let bytes = [vec![0x33; length], ping.clone()].concat();
+        bench.silence_to(
+            &bytes,
+            format!("it follows {length} bytes without a silence"),
+        )?;
+        bench.alive(format!("{length} bytes and a request"))?;
+    }
+    Ok(())
+}
+
+fn truncated(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.ping();
+    for length in 1..ping.len() {
+        bench.silence_to(&ping[..length], "it is cut short")?;
+        bench.alive("a truncated request")?;
+    }
+    // The other half does not complete it.
+    let half = ping.len() / 2;
+    let pieces = [
+        Piece::Bytes(ping[..half].to_vec()),
+        Piece::Gap(bench.endpoint.line().t35() * 2 + Duration::from_millis(20)),
+        Piece::Bytes(ping[half..].to_vec()),
+    ];
+    bench.silence(&pieces, "a silence in the middle makes two frames of it")?;
+    bench.alive("two halves")
+}
+
+fn two_at_once(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.ping();
+    bench.silence_to(&ping.repeat(2), "they are one frame, with a wrong CRC")?;
+    let other = bench.target.mode.frame(bench.other(), &bench.target.ping);
+    bench.silence_to(&[other, ping].concat(), "they are one frame")?;
+    bench.alive("joined requests")
+}
+
+fn nothing_else(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.target.ping.clone();
+    // A read of one bit, of one register, or an echo.
+    let length = match ping[0] {
+        1 | 2 => 3,
+        3 | 4 => 4,
+        _ => ping.len(),
+    };
+    for _ in 0..10 {
+        // Another byte would show in the check, but a 00 behind the CRC leaves that right.
+        let reply = bench.reply(&ping)?;
+        bench.ensure(
+            reply.len() == length,
+            format!("a PDU of {length} bytes and nothing behind its CRC"),
+        )?;
+        let late = bench.listen_until(usize::MAX)?;
+        bench.ensure(late == Reply::Silence, "silence after the reply")?;
+    }
+    Ok(())
+}
+
+fn trailing(bench: &mut Bench<'_>) -> Check {
+    for byte in [0xFF, 0x55, 0x01] {
+        let frame = [bench.ping(), vec![byte]].concat();
+        bench.silence_to(&frame, "a byte too many")?;
+        bench.alive("a byte too many")?;
+    }
+    // The CRC of a frame and its CRC is 0, and stays 0 with a 00 behind it: the frame is good, its PDU a
+    // byte too long.
+    let frame = [bench.ping(), vec![0]].concat();
+    let function = bench.target.ping[0];
+    let reply = bench.raw(&frame)?;
+    let right = reply == Reply::Silence || reply.exception(function) == Some(3);
+    bench.ensure(right, "silence, or exception 03 for a PDU a byte too long")?;
+    bench.alive("a 00 too many")
+}

@@ -1,0 +1,191 @@
+//! Silences inside frames and between them, to the microsecond.
+
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::endpoint::Piece;
+use crate::frame::Reply;
+
+const N: &[Need] = &[Need::Rtu, Need::Exact];
+const S: &str = "V1.02 2.5.1.1";
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "gaps/below-t1.5",
+        S,
+        "gaps up to t1.5 inside a frame are no harm",
+        N,
+        below_t15,
+    ),
+    case(
+        "gaps/t1.5-to-t3.5",
+        S,
+        "a gap between t1.5 and t3.5 drops the frame, or not, as STRICT_T15 says: always alike",
+        N,
+        between,
+    ),
+    case(
+        "gaps/above-t3.5",
+        S,
+        "a gap above t3.5 ends the frame: neither half is one",
+        N,
+        above_t35,
+    ),
+    case(
+        "gaps/too-soon",
+        S,
+        "a request less than t3.5 after another joins it, and both are lost",
+        N,
+        too_soon,
+    ),
+    case(
+        "gaps/t3.5-is-enough",
+        S,
+        "a request t3.5 after another unit's is answered",
+        N,
+        soon_enough,
+    ),
+    case(
+        "gaps/after-noise",
+        S,
+        "noise, t3.5 of silence, and a request is answered",
+        N,
+        after_noise,
+    ),
+];
+
+/// How far from its limit a gap is tried: a fifth of a character, but what the bits of a character
+/// itself leave open at least.
+fn margin(bench: &Bench<'_>) -> Duration {
+    let line = bench.endpoint.line();
+    // A receiver may take the stop bits for silence already, and needs one bit to see a start bit.
+    line.bits(3).max(Duration::from_micros(20))
+}
+
+/// The request with a gap before the byte at `index`.
+fn with_gap(bench: &mut Bench<'_>, index: usize, gap: Duration) -> Check<Reply> {
+    let frame = bench.ping();
+    let (first, rest) = frame.split_at(index);
+    bench.exchange(&[
+        Piece::Bytes(first.to_vec()),
+        Piece::Gap(gap),
+        Piece::Bytes(rest.to_vec()),
+    ])
+}
+
+fn places(bench: &Bench<'_>) -> [usize; 4] {
+    let length = bench.ping().len();
+    [1, 2, length / 2, length - 1]
+}
+
+fn below_t15(bench: &mut Bench<'_>) -> Check {
+    let t15 = bench.endpoint.line().t15();
+    for index in places(bench) {
+        for gap in [t15 / 4, t15 / 2, t15 - margin(bench)] {
+            let reply = with_gap(bench, index, gap)?;
+            bench.ensure(
+                bench.is_pong(&reply),
+                format!("a reply: a gap of {gap:?} is below t1.5, {t15:?}"),
+            )?;
+        }
+    }
+    // Every byte on its own.
+    let mut pieces = Vec::new();
+    for byte in bench.ping() {
+        pieces.extend([Piece::Bytes(vec![byte]), Piece::Gap(t15 / 2)]);
+    }
+    pieces.pop();
+    let reply = bench.exchange(&pieces)?;
+    bench.ensure(bench.is_pong(&reply), "a reply: all gaps are below t1.5")
+}
+
+fn between(bench: &mut Bench<'_>) -> Check {
+    let line = bench.endpoint.line();
+    let (t15, t35) = (line.t15(), line.t35());
+    let margin = margin(bench);
+    let mut dropped = bench.target.strict_t15;
+    for index in places(bench) {
+        for gap in [t15 + margin, (t15 + t35) / 2, t35 - margin] {
+            let reply = with_gap(bench, index, gap)?;
+            let answered = bench.is_pong(&reply);
+            let right = answered || reply == Reply::Silence;
+            bench.ensure(right, "a reply or silence")?;
+            let strict = *dropped.get_or_insert(!answered);
+            let wanted = if strict {
+                "silence: frames with a gap above t1.5 are dropped"
+            } else {
+                "a reply: frames with a gap above t1.5 are kept"
+            };
+            bench.ensure(strict != answered, format!("{wanted}; the gap is {gap:?}"))?;
+        }
+    }
+    bench.alive("frames with gaps")
+}
+
+fn above_t35(bench: &mut Bench<'_>) -> Check {
+    let line = bench.endpoint.line();
+    for index in places(bench) {
+        for gap in [line.t35() + margin(bench), line.t35() * 2, line.t35() * 10] {
+            let reply = with_gap(bench, index, gap)?;
+            bench.ensure(
+                reply == Reply::Silence,
+                format!("silence: a gap of {gap:?} is above t3.5, {:?}", line.t35()),
+            )?;
+        }
+    }
+    bench.alive("frames with gaps")
+}
+
+fn too_soon(bench: &mut Bench<'_>) -> Check {
+    let t35 = bench.endpoint.line().t35();
+    let mine = bench.ping();
+    let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
+    for first in [mine.clone(), others] {
+        for gap in [t35 / 4, t35 / 2, t35 - margin(bench)] {
+            let pieces = [
+                Piece::Bytes(first.clone()),
+                Piece::Gap(gap),
+                Piece::Bytes(mine.clone()),
+            ];
+            bench.silence(&pieces, format!("{gap:?} is less than t3.5"))?;
+            bench.alive("joined requests")?;
+        }
+    }
+    Ok(())
+}
+
+fn soon_enough(bench: &mut Bench<'_>) -> Check {
+    let t35 = bench.endpoint.line().t35();
+    let mine = bench.ping();
+    let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
+    for gap in [t35 + margin(bench), t35 * 2] {
+        let reply = bench.exchange(&[
+            Piece::Bytes(others.clone()),
+            Piece::Gap(gap),
+            Piece::Bytes(mine.clone()),
+        ])?;
+        bench.ensure(
+            bench.is_pong(&reply),
+            format!("a reply: {gap:?} is above t3.5"),
+        )?;
+    }
+    Ok(())
+}
+
+fn after_noise(bench: &mut Bench<'_>) -> Check {
+    let gap = bench.endpoint.line().t35() + margin(bench);
+    let mine = bench.ping();
+    for length in [1, 2, 3, 8, 100, 255, 256, 257, 600] {
+        let reply = bench.exchange(&[
+            Piece::Bytes(vec![0xA7; length]),
+            Piece::Gap(gap),
+            Piece::Bytes(mine.clone()),
+        ])?;
+        bench.ensure(
+            bench.is_pong(&reply),
+            format!("a reply, {gap:?} after {length} bytes of noise"),
+        )?;
+    }
+    Ok(())
+}

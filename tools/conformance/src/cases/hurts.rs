@@ -1,0 +1,261 @@
+//! What hurts the users of such devices, where it can be seen from the line.
+
+use std::time::Duration;
+
+use fastrand::Rng;
+use register_map::{configuration, state};
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::endpoint::Piece;
+use crate::frame::{Reply, rtu};
+use crate::points::{pdu, words_of};
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "hurts/odd-frames",
+        "V1.02 2.4.2",
+        "random frames, with good checks too, never upset the unit: the next good request is answered",
+        &[],
+        odd_frames,
+    ),
+    case(
+        "hurts/noise",
+        "V1.02 2.5.1.1",
+        "random bytes never get a reply, and the next good request is answered",
+        &[],
+        noise,
+    ),
+    case(
+        "hurts/restarts",
+        "map, 0x0208",
+        "nothing on the line restarts the unit: its uptime goes on, its reset cause stays",
+        &[Need::Modio],
+        restarts,
+    ),
+    case(
+        "hurts/masters-without-gaps",
+        "map, line",
+        "a master that asks again at once after a reply is answered every time",
+        &[Need::Modio, Need::Rtu],
+        no_gaps,
+    ),
+    case(
+        "hurts/wrong-baud-and-format",
+        "map, 0x0101",
+        "a rate or format that does not exist is exception 03 and changes nothing",
+        &[Need::Modio, Need::Function(6)],
+        wrong_settings,
+    ),
+    case(
+        "hurts/torn-values",
+        "map, 0x0200",
+        "values of two registers are read as one: the uptime never falls, the product code stands",
+        &[Need::Modio, Need::Function(4)],
+        torn,
+    ),
+    case(
+        "hurts/half-written",
+        "map, 0x0300",
+        "one half of a counter cannot be written: exception 03, and the counter stays",
+        &[Need::Modio, Need::Function(0x10)],
+        half_written,
+    ),
+    case(
+        "hurts/flash-wear",
+        "map, 0x020A",
+        "writing outputs over and over leaves nothing to be saved",
+        &[Need::Modio, Need::Bits, Need::Function(5)],
+        flash_wear,
+    ),
+];
+
+/// How many random frames: many where they cost no wall-clock time to wait for.
+fn many(bench: &Bench<'_>) -> usize {
+    if bench.endpoint.abilities().exact {
+        1500
+    } else {
+        60
+    }
+}
+
+/// A PDU that changes nothing on any device: reads of every kind, good and bad; writes that are cut short.
+fn harmless(rng: &mut Rng, unknown: &[u8]) -> Vec<u8> {
+    let function = match rng.u8(0..12) {
+        0..6 => rng.u8(1..=4),
+        6 => *rng.choice(&[5, 6, 0x0F, 0x10, 0x16, 0x17]).unwrap_or(&5),
+        7 => *rng.choice(&[7, 0x0B, 0x0C, 0x11, 0x2B]).unwrap_or(&7),
+        8 => 0,
+        9 => rng.u8(0x80..=0xFF),
+        _ => *rng.choice(unknown).unwrap_or(&0x6F),
+    };
+    let longest = match function {
+        5 | 6 | 0x0F | 0x10 | 0x16 | 0x17 => 3,
+        1..=4 => 12,
+        _ => 252,
+    };
+    let length = rng.usize(0..=longest);
+    let mut pdu = vec![function];
+    pdu.extend((0..length).map(|_| rng.u8(..)));
+    pdu
+}
+
+fn odd_frames(bench: &mut Bench<'_>) -> Check {
+    let mut rng = Rng::with_seed(0x6D6F_6464);
+    let unknown = super::dispatch::unknown_functions(bench);
+    for n in 0..many(bench) {
+        let pdu = harmless(&mut rng, &unknown);
+        let unit = if rng.u8(0..8) == 0 { 0 } else { bench.unit() };
+        let reply = bench.ask_unit(unit, &pdu)?;
+        let right = match &reply {
+            Reply::Silence => true,
+            Reply::Wrong(..) => false,
+            Reply::Pdu(answer) => unit != 0 && answer[0] & 0x7F == pdu[0] & 0x7F,
+        };
+        bench.ensure(
+            right,
+            format!("silence, or a reply in good form: frame {n}"),
+        )?;
+        if n % 20 == 19 {
+            bench.alive("odd frames")?;
+        }
+    }
+    bench.alive("odd frames")
+}
+
+fn noise(bench: &mut Bench<'_>) -> Check {
+    let mut rng = Rng::with_seed(0x6D6F_6465);
+    for n in 0..many(bench) {
+        let length = if rng.u8(0..10) == 0 {
+            rng.usize(200..600)
+        } else {
+            rng.usize(1..24)
+        };
+        let mut bytes: Vec<u8> = (0..length).map(|_| rng.u8(..)).collect();
+        if rng.bool() {
+            bytes[0] = bench.unit();
+        }
+        let split = bytes.len().saturating_sub(2);
+        if bytes.len() >= 4 && rtu(&bytes[..split]) == bytes {
+            continue;
+        }
+        bench.silence_to(&bytes, format!("it is noise, burst {n}"))?;
+        if n % 20 == 19 {
+            bench.alive("noise")?;
+        }
+    }
+    bench.alive("noise")
+}
+
+/// Uptime in seconds, and the reset cause.
+fn age(bench: &mut Bench<'_>) -> Check<(u32, u16)> {
+    let reply = bench.reply(&pdu(3, state::RESET_CAUSE, 3))?;
+    let [cause, high, low] = words_of(&reply)[..] else {
+        return bench.fail("three registers");
+    };
+    Ok((u32::from(high) << 16 | u32::from(low), cause))
+}
+
+fn restarts(bench: &mut Bench<'_>) -> Check {
+    let before = age(bench)?;
+    let begin = bench.endpoint.now();
+    bench.rest(Duration::from_secs(1))?;
+    odd_frames(bench)?;
+    let after = age(bench)?;
+    let passed = (bench.endpoint.now() - begin).as_secs_f64();
+    let counted = f64::from(after.0.saturating_sub(before.0));
+    bench.ensure(after.1 == before.1, "the reset cause as before")?;
+    // What is not exact may be a simulator that does not keep up with the clock.
+    let right = after.0 >= before.0
+        && (!bench.endpoint.abilities().exact || (counted - passed).abs() <= 1.5);
+    bench.ensure(right, format!("an uptime {passed:.1} s further"))
+}
+
+fn no_gaps(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.ping();
+    let reply = bench.raw(&ping)?;
+    bench.ensure(bench.is_pong(&reply), "a reply")?;
+    let length = bench.heard.len();
+    let bit = bench.endpoint.line().bits(1);
+    for n in 0..100 {
+        let pieces = [Piece::Gap(bit), Piece::Bytes(ping.clone())];
+        let reply = bench.exchange_until(&pieces, length)?;
+        bench.ensure(bench.is_pong(&reply), format!("a reply to request {n}"))?;
+    }
+    let late = bench.listen_until(usize::MAX)?;
+    bench.ensure(late == Reply::Silence, "silence after the last reply")
+}
+
+fn wrong_settings(bench: &mut Bench<'_>) -> Check {
+    for (register, values) in [
+        (configuration::BAUD, &[0, 1, 95, 97, 9217, 0xFFFF][..]),
+        (configuration::FORMAT, &[4, 255, 0xFFFF]),
+        (configuration::MODE, &[2, 0xFFFF]),
+    ] {
+        let before = bench.read_word(register)?;
+        for value in values {
+            bench.exception(&pdu(6, register, *value), 3)?;
+        }
+        let now = bench.read_word(register)?;
+        bench.ensure(
+            now == before,
+            format!("register {register:04X} still is {before}"),
+        )?;
+    }
+    Ok(())
+}
+
+fn torn(bench: &mut Bench<'_>) -> Check {
+    let mut last = 0;
+    for _ in 0..20 {
+        for function in [3, 4] {
+            let product = words_of(&bench.reply(&pdu(function, state::PRODUCT_CODE, 2))?);
+            bench.ensure(product == [0x2383, 0x5860], "the product code 2383 5860")?;
+            let uptime = words_of(&bench.reply(&pdu(function, state::UPTIME, 2))?);
+            let [high, low] = uptime[..] else {
+                return bench.fail("two registers");
+            };
+            let uptime = u32::from(high) << 16 | u32::from(low);
+            bench.ensure(uptime >= last, format!("an uptime of {last} s or more"))?;
+            last = uptime;
+        }
+    }
+    Ok(())
+}
+
+fn half_written(bench: &mut Bench<'_>) -> Check {
+    use register_map::{counters, points::SLOT_FIRST};
+    let at = counters::of_point(SLOT_FIRST);
+    let before = bench.reply(&pdu(3, at, 2))?;
+    for request in [
+        crate::points::write_words(at, &[0]),
+        crate::points::write_words(at + 1, &[0]),
+        crate::points::write_words(at + 1, &[0, 0]),
+        crate::points::write_words(at, &[0, 1]),
+        crate::points::write_words(at, &[0, 0, 0]),
+    ] {
+        bench.exception(&request, 3)?;
+    }
+    let now = bench.reply(&pdu(3, at, 2))?;
+    bench.ensure(now == before, "the counter as it was")
+}
+
+fn flash_wear(bench: &mut Bench<'_>) -> Check {
+    let span = bench.bits()?;
+    let pending = state::status::UNSAVED | state::status::RESTART_NEEDED;
+    let before = bench.read_word(state::STATUS)? & pending;
+    if before != 0 {
+        return Err(Stop::Skip(
+            "the configuration has changes that are not saved".to_owned(),
+        ));
+    }
+    for n in 0..50 {
+        let value = if n % 2 == 0 { 0xFF00 } else { 0 };
+        bench.reply(&pdu(5, span.first, value))?;
+    }
+    let now = bench.read_word(state::STATUS)? & pending;
+    bench.ensure(
+        now == 0,
+        "status bits 3 and 4 stay 0: nothing waits to be saved",
+    )
+}

@@ -1,0 +1,250 @@
+//! Device identification: function 2B, MEI type 0E.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+
+const N: &[Need] = &[Need::Function(0x2B)];
+const S: &str = "V1.1b3 6.21";
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "fc2b/basic-stream",
+        S,
+        "read code 01 from object 0 gives objects 00 to 02",
+        N,
+        basic,
+    ),
+    case(
+        "fc2b/regular-stream",
+        S,
+        "read code 02 from object 0 gives objects 00 to 06 and more follow in order",
+        N,
+        regular,
+    ),
+    case(
+        "fc2b/extended-stream",
+        S,
+        "read code 03 gives at least what its conformity level promises, split within 253 bytes",
+        N,
+        extended,
+    ),
+    case(
+        "fc2b/individual",
+        S,
+        "read code 04 gives the one object asked for, as the stream has it",
+        N,
+        individual,
+    ),
+    case(
+        "fc2b/individual-unknown",
+        S,
+        "read code 04 with an object that is not there is exception 02",
+        N,
+        individual_unknown,
+    ),
+    case(
+        "fc2b/stream-restarts",
+        S,
+        "a stream from an object that is not there starts at object 0",
+        N,
+        restarts,
+    ),
+    case(
+        "fc2b/read-code",
+        S,
+        "read code 00 and those above 04 are exception 03",
+        N,
+        read_code,
+    ),
+    case(
+        "fc2b/mei-type",
+        "V1.1b3 6.19",
+        "another MEI type is exception 01",
+        N,
+        mei_type,
+    ),
+    case(
+        "fc2b/length",
+        S,
+        "a request cut short or too long is 03 or silence",
+        N,
+        length,
+    ),
+];
+
+/// One reply.
+struct Page {
+    conformity: u8,
+    /// The object to go on with.
+    next: Option<u8>,
+    objects: Vec<(u8, Vec<u8>)>,
+}
+
+fn request(code: u8, object: u8) -> Vec<u8> {
+    vec![0x2B, 0x0E, code, object]
+}
+
+/// Asks, and takes the reply apart; what is not as 6.21 has it fails the case.
+fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
+    let reply = bench.reply(&request(code, object))?;
+    let [
+        0x2B,
+        0x0E,
+        echoed,
+        conformity,
+        more,
+        next,
+        count,
+        ref rest @ ..,
+    ] = reply[..]
+    else {
+        return bench.fail("2B 0E, read code, conformity level, more follows, next object, count");
+    };
+    bench.ensure(echoed == code, format!("the read code {code:02X} again"))?;
+    let levels = [1, 2, 3, 0x81, 0x82, 0x83];
+    bench.ensure(
+        levels.contains(&conformity),
+        "a conformity level 01-03 or 81-83",
+    )?;
+    bench.ensure(reply.len() <= 253, "a PDU of at most 253 bytes")?;
+    let (mut objects, mut rest) = (Vec::new(), rest);
+    while let [id, length, tail @ ..] = rest {
+        let Some((value, tail)) = tail.split_at_checked(usize::from(*length)) else {
+            return bench.fail("each object as long as its length says");
+        };
+        objects.push((*id, value.to_vec()));
+        rest = tail;
+    }
+    bench.ensure(
+        rest.is_empty() && objects.len() == usize::from(count),
+        format!("{count} objects and nothing after them"),
+    )?;
+    let next = match (more, next) {
+        (0, 0) => None,
+        (0xFF, next) if code != 4 => Some(next),
+        _ => {
+            return bench
+                .fail("more follows 00 and next object 00, or FF and the object to go on with");
+        }
+    };
+    Ok(Page {
+        conformity,
+        next,
+        objects,
+    })
+}
+
+/// The whole stream from an object on, over as many replies as it takes.
+fn stream(bench: &mut Bench<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)>> {
+    let (mut all, mut from) = (Vec::new(), first);
+    loop {
+        let page = page(bench, code, from)?;
+        bench.ensure(
+            !page.objects.is_empty(),
+            "at least one object in each reply of a stream",
+        )?;
+        all.extend(page.objects);
+        let in_order = all.is_sorted_by(|a: &(u8, Vec<u8>), b| a.0 < b.0);
+        bench.ensure(in_order, "objects in ascending order, none twice")?;
+        let Some(next) = page.next else {
+            return Ok(all);
+        };
+        let ahead = all.last().is_some_and(|last| next > last.0);
+        bench.ensure(ahead, "a next object beyond those that have come")?;
+        from = next;
+    }
+}
+
+fn ids(objects: &[(u8, Vec<u8>)]) -> Vec<u8> {
+    objects.iter().map(|object| object.0).collect()
+}
+
+fn basic(bench: &mut Bench<'_>) -> Check {
+    let objects = stream(bench, 1, 0)?;
+    bench.ensure(ids(&objects) == [0, 1, 2], "the objects 00, 01 and 02")?;
+    bench.ensure(
+        objects.iter().all(|object| object.1.is_ascii()),
+        "vendor, product code and revision as ASCII",
+    )
+}
+
+fn regular(bench: &mut Bench<'_>) -> Check {
+    let level = page(bench, 1, 0)?.conformity & 0x7F;
+    let objects = ids(&stream(bench, 2, 0)?);
+    if level == 1 {
+        // A device of the basic level answers with what it has.
+        return bench.ensure(objects == [0, 1, 2], "the objects 00, 01 and 02");
+    }
+    bench.ensure(objects == [0, 1, 2, 3, 4, 5, 6], "the objects 00 to 06")
+}
+
+fn extended(bench: &mut Bench<'_>) -> Check {
+    let level = page(bench, 1, 0)?.conformity & 0x7F;
+    let objects = ids(&stream(bench, 3, 0)?);
+    bench.ensure(objects.starts_with(&[0, 1, 2]), "the basic objects first")?;
+    let has = objects.iter().any(|id| *id >= 0x80);
+    bench.ensure(
+        has || level < 3,
+        "objects from 80 on, as a device of the extended level has them",
+    )
+}
+
+fn individual(bench: &mut Bench<'_>) -> Check {
+    let page_one = page(bench, 1, 0)?;
+    if page_one.conformity & 0x80 == 0 {
+        return Err(crate::case::Stop::Skip(
+            "its conformity level has no individual access".to_owned(),
+        ));
+    }
+    for (id, value) in stream(bench, 3, 0)? {
+        let one = page(bench, 4, id)?;
+        bench.ensure(
+            one.objects == [(id, value)],
+            format!("object {id:02X} alone, as the stream has it"),
+        )?;
+    }
+    Ok(())
+}
+
+fn individual_unknown(bench: &mut Bench<'_>) -> Check {
+    let known = ids(&stream(bench, 3, 0)?);
+    for id in [0x07, 0x40, 0x7F, 0xFE, 0xFF] {
+        if !known.contains(&id) {
+            bench.exception(&request(4, id), 2)?;
+        }
+    }
+    Ok(())
+}
+
+fn restarts(bench: &mut Bench<'_>) -> Check {
+    for code in 1..=3 {
+        let known = stream(bench, code, 0)?;
+        for id in [0x50, 0xFF] {
+            if !known.iter().any(|object| object.0 == id) {
+                let again = stream(bench, code, id)?;
+                bench.ensure(again == known, "the whole stream, from object 0 on")?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn read_code(bench: &mut Bench<'_>) -> Check {
+    for code in [0, 5, 6, 0x7F, 0x80, 0xFF] {
+        bench.exception(&request(code, 0), 3)?;
+    }
+    Ok(())
+}
+
+fn mei_type(bench: &mut Bench<'_>) -> Check {
+    for mei in [0x00, 0x0D, 0x0F, 0xFF] {
+        bench.exception(&[0x2B, mei, 1, 0], 1)?;
+    }
+    Ok(())
+}
+
+fn length(bench: &mut Bench<'_>) -> Check {
+    bench.exception_03_or_silence(&[0x2B, 0x0E])?;
+    bench.exception_03_or_silence(&[0x2B, 0x0E, 1])?;
+    bench.exception_03_or_silence(&[0x2B, 0x0E, 1, 0, 0])
+}

@@ -1,0 +1,277 @@
+//! The counters of the serial line: sub-functions 0B to 12 of 08, and on a modio its registers for them.
+
+use register_map::state;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::cases::diagnostics::diagnose;
+use crate::endpoint::Piece;
+use crate::frame::Reply;
+use crate::points::pdu;
+
+const S: &str = "V1.02 appendix A";
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "counters/bus-messages",
+        S,
+        "0B counts every good message on the bus, whoever it is for",
+        &[],
+        bus_messages,
+    ),
+    case(
+        "counters/bus-errors",
+        S,
+        "0C counts frames with a bad check, nothing else",
+        &[],
+        bus_errors,
+    ),
+    case(
+        "counters/bus-errors-short",
+        S,
+        "0C counts frames of fewer than 3 bytes",
+        &[Need::Rtu],
+        short_frames,
+    ),
+    case(
+        "counters/bus-errors-characters",
+        S,
+        "0C counts a frame with a damaged character once",
+        &[Need::Faults, Need::Rtu],
+        damaged_characters,
+    ),
+    case(
+        "counters/exceptions",
+        S,
+        "0D counts exceptions, those to broadcasts too",
+        &[],
+        exceptions,
+    ),
+    case(
+        "counters/unit-messages",
+        S,
+        "0E counts messages for this unit, and broadcasts",
+        &[],
+        unit_messages,
+    ),
+    case(
+        "counters/no-response",
+        S,
+        "0F counts messages without a response, broadcasts included",
+        &[],
+        no_response,
+    ),
+    case(
+        "counters/nak-busy-overrun",
+        S,
+        "10, 11 and 12 do not move by ordinary traffic",
+        &[],
+        others,
+    ),
+    case(
+        "counters/registers",
+        "map, 0x0230",
+        "a modio's registers are the counters of 08",
+        &[Need::Modio, Need::Function(8)],
+        registers,
+    ),
+];
+
+/// A counter as it stands, reading it included; by 08, or by a modio's register.
+fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
+    if bench.target.has(8) {
+        let reply = bench.reply_unless_lacking(&diagnose(sub, &[0, 0]), "such a counter")?;
+        let [8, _, echoed, high, low] = reply[..] else {
+            return bench.fail("08, the sub-function, two bytes");
+        };
+        bench.ensure(u16::from(echoed) == sub, "the sub-function again")?;
+        return Ok(u16::from_be_bytes([high, low]));
+    }
+    if bench.target.modio.is_some() {
+        return bench.read_word(state::BUS_MESSAGES + (sub - 0x0B));
+    }
+    Err(Stop::Skip("the unit has no line counters".to_owned()))
+}
+
+/// By how much a counter moves while something is done; reading it once is in it where that counts.
+fn moves(
+    bench: &mut Bench<'_>,
+    sub: u16,
+    wanted: u16,
+    what: &str,
+    mut done: impl FnMut(&mut Bench<'_>) -> Check,
+) -> Check {
+    let before = count(bench, sub)?;
+    done(bench)?;
+    let after = count(bench, sub)?;
+    let moved = after.wrapping_sub(before);
+    bench.ensure(
+        moved == wanted,
+        format!("counter {sub:02X} has moved by {wanted} ({what}), not by {moved}"),
+    )
+}
+
+fn ping_other(bench: &mut Bench<'_>) -> Check {
+    let (other, ping) = (bench.other(), bench.target.ping.clone());
+    let frame = bench.target.mode.frame(other, &ping);
+    bench.silence_to(&frame, "another unit's request")
+}
+
+/// A broadcast that is refused, in silence: nothing is written by it.
+fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
+    let function = [6, 5, 0x10].into_iter().find(|f| bench.target.has(*f));
+    let Some(function) = function else {
+        return Err(Stop::Skip(
+            "the unit has no function to broadcast".to_owned(),
+        ));
+    };
+    let Some(nowhere) = bench.target.nowhere_to_write(function) else {
+        return Err(Stop::Skip("every address exists".to_owned()));
+    };
+    let mut request = pdu(function, nowhere, 0);
+    if function == 0x10 {
+        request = crate::points::write_words(nowhere, &[0]);
+    }
+    let frame = bench.target.mode.frame(0, &request);
+    bench.silence_to(&frame, "a broadcast")
+}
+
+fn bad(bench: &Bench<'_>) -> Vec<u8> {
+    let mut frame = bench.ping();
+    let digit = frame.len() - 3;
+    // In ASCII the LRC's last digit, in RTU the last data byte.
+    frame[digit] = if frame[digit] == b'0' { b'1' } else { b'0' };
+    frame
+}
+
+fn bus_messages(bench: &mut Bench<'_>) -> Check {
+    moves(
+        bench,
+        0x0B,
+        6,
+        "2 for this unit, 3 for another, 1 to read it",
+        |bench| {
+            for _ in 0..3 {
+                ping_other(bench)?;
+            }
+            bench.alive("others' requests")?;
+            let frame = bad(bench);
+            bench.silence_to(&frame, "its check is wrong")?;
+            bench.alive("a frame with a wrong check")
+        },
+    )
+}
+
+fn bus_errors(bench: &mut Bench<'_>) -> Check {
+    moves(bench, 0x0C, 3, "3 frames with a bad check", |bench| {
+        let frame = bad(bench);
+        for _ in 0..3 {
+            bench.silence_to(&frame, "its check is wrong")?;
+        }
+        ping_other(bench)?;
+        bench.alive("frames with a wrong check")
+    })
+}
+
+fn short_frames(bench: &mut Bench<'_>) -> Check {
+    moves(bench, 0x0C, 2, "frames of 1 and 2 bytes", |bench| {
+        bench.silence_to(&[0x55], "noise")?;
+        bench.silence_to(&[bench.unit(), 3], "noise")
+    })
+}
+
+fn damaged_characters(bench: &mut Bench<'_>) -> Check {
+    moves(
+        bench,
+        0x0C,
+        1,
+        "1 frame with a damaged character",
+        |bench| {
+            let frame = bench.ping();
+            let pieces = [
+                Piece::Bytes(frame[..2].to_vec()),
+                Piece::BadStop(frame[2]),
+                Piece::Bytes(frame[3..].to_vec()),
+            ];
+            bench.silence(&pieces, "a stop bit is low")
+        },
+    )
+}
+
+fn exceptions(bench: &mut Bench<'_>) -> Check {
+    let Some(function) = super::dispatch::unknown_functions(bench).pop() else {
+        return Err(Stop::Skip("every function exists".to_owned()));
+    };
+    moves(bench, 0x0D, 2, "2 exceptions", |bench| {
+        bench.exception(&[function], 1)?;
+        bench.exception(&[function, 1, 2], 1)?;
+        ping_other(bench)?;
+        bench.alive("exceptions")
+    })?;
+    moves(
+        bench,
+        0x0D,
+        1,
+        "1 broadcast that is refused",
+        refused_broadcast,
+    )
+}
+
+fn unit_messages(bench: &mut Bench<'_>) -> Check {
+    moves(bench, 0x0E, 3, "2 and 1 to read it", |bench| {
+        ping_other(bench)?;
+        bench.alive("another's request")?;
+        bench.alive("a request")?;
+        let frame = bad(bench);
+        bench.silence_to(&frame, "its check is wrong")
+    })?;
+    moves(
+        bench,
+        0x0E,
+        2,
+        "1 broadcast and 1 to read it",
+        refused_broadcast,
+    )
+}
+
+fn no_response(bench: &mut Bench<'_>) -> Check {
+    moves(bench, 0x0F, 0, "everything for it was answered", |bench| {
+        ping_other(bench)?;
+        bench.alive("another's request")
+    })?;
+    moves(bench, 0x0F, 2, "2 broadcasts", |bench| {
+        refused_broadcast(bench)?;
+        refused_broadcast(bench)
+    })
+}
+
+fn others(bench: &mut Bench<'_>) -> Check {
+    for sub in [0x10, 0x11, 0x12] {
+        moves(bench, sub, 0, "ordinary traffic", |bench| {
+            for _ in 0..3 {
+                ping_other(bench)?;
+                bench.alive("another's request")?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+fn registers(bench: &mut Bench<'_>) -> Check {
+    for sub in 0x0B..=0x12_u16 {
+        let by_function = count(bench, sub)?;
+        let register = state::BUS_MESSAGES + (sub - 0x0B);
+        let by_register = bench.read_word(register)?;
+        // Reading moves two of them by one message.
+        let moved = u16::from(matches!(sub, 0x0B | 0x0E));
+        bench.ensure(
+            by_register == by_function.wrapping_add(moved),
+            format!(
+                "register {register:04X} is the counter 08/{sub:02X}: {by_function} and {moved}"
+            ),
+        )?;
+    }
+    let reply = bench.ask(&pdu(3, state::BUS_MESSAGES, 8))?;
+    bench.ensure(matches!(reply, Reply::Pdu(_)), "eight registers")
+}

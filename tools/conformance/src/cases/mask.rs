@@ -1,0 +1,277 @@
+//! Mask write, 16, and read/write multiple registers, 17.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::points::{pdu, words_of};
+use crate::target::Span;
+
+const W16: &[Need] = &[Need::Function(0x16), Need::Function(3), Need::Words];
+const W17: &[Need] = &[Need::Function(0x17), Need::Function(3), Need::Words];
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "fc16/formula",
+        "V1.1b3 6.16",
+        "the register becomes (current AND and) OR (or AND NOT and), and the request is echoed",
+        W16,
+        formula,
+    ),
+    case(
+        "fc16/refused-value",
+        "V1.1b3 6.16",
+        "a result out of range is exception 03 and the register stays",
+        W16,
+        mask_refused,
+    ),
+    case(
+        "fc16/address",
+        "V1.1b3 6.16",
+        "a register that is not there is exception 02",
+        &[Need::Function(0x16)],
+        mask_address,
+    ),
+    case(
+        "fc16/length",
+        "V1.1b3 6.16",
+        "a request of another length is 03 or silence, and the register stays",
+        W16,
+        mask_length,
+    ),
+    case(
+        "fc17/write-before-read",
+        "V1.1b3 6.17",
+        "what is written is what is read in the same request",
+        W17,
+        write_first,
+    ),
+    case(
+        "fc17/two-places",
+        "V1.1b3 6.17",
+        "reading and writing may be at different places",
+        W17,
+        two_places,
+    ),
+    case(
+        "fc17/quantities",
+        "V1.1b3 6.17",
+        "reading 0 or more than 125, writing 0 or more than 121 is exception 03 and writes nothing",
+        &[Need::Function(0x17)],
+        quantities,
+    ),
+    case(
+        "fc17/byte-count",
+        "V1.1b3 6.17",
+        "a byte count that is not twice the quantity is exception 03 and writes nothing",
+        W17,
+        byte_count,
+    ),
+    case(
+        "fc17/truncated",
+        "V1.1b3 6.17",
+        "a request cut short or too long is 03 or silence, never a success, and writes nothing",
+        W17,
+        truncated,
+    ),
+    case(
+        "fc17/address",
+        "V1.1b3 6.17",
+        "a bad address to read or to write is exception 02 and writes nothing",
+        W17,
+        address,
+    ),
+];
+
+fn mask(address: u16, and: u16, or: u16) -> Vec<u8> {
+    [pdu(0x16, address, and), or.to_be_bytes().to_vec()].concat()
+}
+
+fn formula(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let at = words.span.first;
+    for (from, to) in [(words.low, words.high), (words.high, words.low)] {
+        // Three ways from one value that is taken to another.
+        let masks = [(0, to), (from & to, to), (!(from ^ to), to)];
+        for (and, or) in masks {
+            bench.set_words(at, &[from])?;
+            let request = mask(at, and, or);
+            bench.reply_is(&request, &request)?;
+            let wanted = (from & and) | (or & !and);
+            let now = bench.read_word(at)?;
+            bench.ensure(
+                now == wanted,
+                format!("{from:04X} with AND {and:04X}, OR {or:04X} becomes {wanted:04X}"),
+            )?;
+        }
+        bench.set_words(at, &[from])?;
+        let keep = mask(at, 0xFFFF, 0xFFFF);
+        bench.reply_is(&keep, &keep)?;
+        let now = bench.read_word(at)?;
+        bench.ensure(
+            now == from,
+            format!("AND FFFF keeps {from:04X}, whatever OR is"),
+        )?;
+    }
+    Ok(())
+}
+
+fn mask_refused(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let Some(bad) = words.refused else {
+        return Err(Stop::Skip("no value is known that is refused".to_owned()));
+    };
+    let at = words.span.first;
+    bench.set_words(at, &[words.low])?;
+    bench.exception(&mask(at, 0, bad), 3)?;
+    let now = bench.read_word(at)?;
+    bench.ensure(
+        now == words.low,
+        format!("the register still is {:04X}", words.low),
+    )
+}
+
+fn mask_address(bench: &mut Bench<'_>) -> Check {
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
+    };
+    bench.exception(&mask(nowhere, 0xFFFF, 0), 2)
+}
+
+fn mask_length(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let at = words.span.first;
+    bench.set_words(at, &[words.low])?;
+    let request = mask(at, 0, words.high);
+    for cut in 1..request.len() {
+        bench.exception_03_or_silence(&request[..cut])?;
+    }
+    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    let now = bench.read_word(at)?;
+    bench.ensure(
+        now == words.low,
+        format!("the register still is {:04X}", words.low),
+    )
+}
+
+/// Read a span, write values.
+fn both(read: Span, write: u16, values: &[u16]) -> Vec<u8> {
+    let mut request = pdu(0x17, read.first, read.len() as u16);
+    request.extend(write.to_be_bytes());
+    request.extend((values.len() as u16).to_be_bytes());
+    request.push((values.len() * 2) as u8);
+    request.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+    request
+}
+
+fn write_first(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let longest = words.span.len().min(121) as u16;
+    for quantity in (1..=longest.min(4)).chain([longest]) {
+        let span = words.span.up_to(quantity);
+        for value in [words.high, words.low] {
+            let values = vec![value; usize::from(quantity)];
+            let reply = bench.reply(&both(span, span.first, &values))?;
+            bench.ensure(
+                usize::from(reply[1]) == values.len() * 2 && words_of(&reply) == values,
+                format!("reads back what it has written: {values:04X?}"),
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn two_places(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    if words.span.len() < 2 {
+        return Err(Stop::Skip("one register alone".to_owned()));
+    }
+    let (first, second) = (words.span.first, words.span.first + 1);
+    bench.set_words(first, &[words.low, words.low])?;
+    let at = |address| Span {
+        first: address,
+        last: address,
+    };
+    let reply = bench.reply(&both(at(first), second, &[words.high]))?;
+    bench.ensure(
+        words_of(&reply) == [words.low],
+        "the first register as it was",
+    )?;
+    let now = bench.read_words(words.span.up_to(2))?;
+    bench.ensure(
+        now == [words.low, words.high],
+        "only the second has been written",
+    )
+}
+
+fn quantities(bench: &mut Bench<'_>) -> Check {
+    let read = bench.target.longest(3).map_or(0, |span| span.first);
+    let write = bench.target.words.map_or(0, |words| words.span.first);
+    let shape = |reads: u16, writes: u16, bytes: u8| {
+        let head = pdu(0x17, read, reads);
+        let data = vec![0; usize::from(bytes).min(242)];
+        let middle = [write.to_be_bytes(), writes.to_be_bytes()].concat();
+        [head, middle, vec![bytes], data].concat()
+    };
+    for (reads, writes, bytes) in [
+        (0, 1, 2),
+        (126, 1, 2),
+        (0xFFFF, 1, 2),
+        (1, 0, 0),
+        (1, 122, 244),
+        (1, 0x8001, 2),
+    ] {
+        bench.exception(&shape(reads, writes, bytes), 3)?;
+    }
+    Ok(())
+}
+
+fn still_low(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let now = bench.read_word(words.span.first)?;
+    bench.ensure(
+        now == words.low,
+        format!("the register still is {:04X}", words.low),
+    )
+}
+
+fn byte_count(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let one = words.span.up_to(1);
+    bench.set_words(one.first, &[words.low])?;
+    let good = both(one, one.first, &[words.high]);
+    for count in [0_u8, 1, 3, 4, 255] {
+        let mut request = good.clone();
+        request[9] = count;
+        let data = vec![1; usize::from(count).min(240)];
+        request.splice(10.., data);
+        bench.exception(&request, 3)?;
+    }
+    still_low(bench)
+}
+
+fn truncated(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let one = words.span.up_to(1);
+    bench.set_words(one.first, &[words.low])?;
+    let request = both(one, one.first, &[words.high]);
+    for cut in 1..request.len() {
+        bench.exception_03_or_silence(&request[..cut])?;
+    }
+    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    still_low(bench)
+}
+
+fn address(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
+    };
+    let one = words.span.up_to(1);
+    let out = Span {
+        first: nowhere,
+        last: nowhere,
+    };
+    bench.set_words(one.first, &[words.low])?;
+    bench.exception(&both(out, one.first, &[words.high]), 2)?;
+    bench.exception(&both(one, nowhere, &[words.high]), 2)?;
+    still_low(bench)
+}

@@ -1,0 +1,80 @@
+//! The cases, by what they are about.
+
+mod addressing;
+mod ascii;
+mod bus;
+mod configuration;
+mod damage;
+mod diagnostics;
+mod dispatch;
+mod events;
+mod framing;
+mod gaps;
+mod hurts;
+mod identification;
+mod line_counters;
+mod mask;
+mod outputs;
+mod power;
+mod read;
+mod settings;
+mod timing;
+mod worked;
+mod write_bits;
+mod write_words;
+
+use crate::case::Case;
+
+/// Every case, in the order in which they run: those that reset counters and the like come late, those
+/// that restart the unit last.
+#[must_use]
+pub fn all() -> Vec<Case> {
+    [
+        read::CASES,
+        write_bits::CASES,
+        write_words::CASES,
+        mask::CASES,
+        dispatch::CASES,
+        identification::CASES,
+        events::CASES,
+        diagnostics::CASES,
+        line_counters::CASES,
+        addressing::CASES,
+        framing::CASES,
+        gaps::CASES,
+        damage::CASES,
+        bus::CASES,
+        timing::CASES,
+        ascii::CASES,
+        worked::CASES,
+        hurts::CASES,
+        outputs::CASES,
+        configuration::CASES,
+        power::CASES,
+        settings::CASES,
+    ]
+    .concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_are_unique_and_everything_is_told() {
+        let mut names = BTreeSet::new();
+        for case in all() {
+            assert!(names.insert(case.name), "{} twice", case.name);
+            assert!(case.name.contains('/') && !case.name.contains(' '));
+            let known = ["V1.02 ", "V1.1b3 ", "map", "manual"];
+            assert!(
+                known.iter().any(|source| case.section.starts_with(source)),
+                "{}: {}",
+                case.name,
+                case.section
+            );
+            assert!(!case.about.is_empty() && !case.about.contains('|'));
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! A modio's outputs when the line dies, and at power-on.
+
+use std::time::Duration;
+
+use register_map::configuration::{self, HOLD};
+use register_map::state;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::points::pdu;
+use crate::target::Span;
+
+const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "outputs/safe-when-the-line-dies",
+        "map, communication watchdog",
+        "without requests for COMM_TIMEOUT every output goes to SAFE, the flag stays until it is cleared",
+        N,
+        line_dies,
+    ),
+    case(
+        "outputs/stay-while-the-line-lives",
+        "map, communication watchdog",
+        "requests and broadcasts within COMM_TIMEOUT keep outputs as they are",
+        N,
+        line_lives,
+    ),
+    case(
+        "outputs/start-value",
+        "map, 0x01E0",
+        "at power-on outputs are at START",
+        &[Need::Modio, Need::Power],
+        start_value,
+    ),
+];
+
+/// A module's first output: its function to read, its address, and values to tell two states by.
+fn output(bench: &Bench<'_>) -> Check<(u8, u16, u16)> {
+    if let Some(span) = bench.target.bits {
+        return Ok((1, span.first, 1));
+    }
+    match bench.target.words.filter(|words| !words.locked) {
+        Some(words) => Ok((3, words.span.first, words.high)),
+        None => Err(Stop::Skip("the module has no outputs".to_owned())),
+    }
+}
+
+fn read(bench: &mut Bench<'_>, function: u8, address: u16) -> Check<u16> {
+    if function == 3 {
+        return bench.read_word(address);
+    }
+    let one = Span {
+        first: address,
+        last: address,
+    };
+    Ok(u16::from(bench.read_bits(one)?[0]))
+}
+
+fn write(bench: &mut Bench<'_>, function: u8, address: u16, value: u16) -> Check {
+    if function == 3 {
+        bench.set_words(address, &[value])
+    } else {
+        bench.set_bits(address, &[value != 0])
+    }
+}
+
+fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {
+    bench.unlock()?;
+    let request = pdu(6, register, value);
+    bench.reply_is(&request, &request)
+}
+
+/// Does something with COMM_TIMEOUT set and SAFE of the output at 0; both go back to what they were.
+fn with_timeout(
+    bench: &mut Bench<'_>,
+    tenths: u16,
+    address: u16,
+    done: fn(&mut Bench<'_>, Duration) -> Check,
+) -> Check {
+    let safe = configuration::SAFE + address;
+    let before = bench.read_word(configuration::COMM_TIMEOUT)?;
+    let safe_before = bench.read_word(safe)?;
+    set(bench, safe, 0)?;
+    set(bench, configuration::COMM_TIMEOUT, tenths)?;
+    let result = done(bench, Duration::from_millis(100) * u32::from(tenths));
+    set(bench, configuration::COMM_TIMEOUT, before)?;
+    set(bench, safe, safe_before)?;
+    set(bench, configuration::COMMAND, 5)?;
+    result
+}
+
+fn line_dies(bench: &mut Bench<'_>) -> Check {
+    let (function, address, high) = output(bench)?;
+    let before = read(bench, function, address)?;
+    let result = with_timeout(bench, 5, address, |bench, timeout| {
+        let (function, address, high) = output(bench)?;
+        write(bench, function, address, high)?;
+        let now = read(bench, function, address)?;
+        bench.ensure(now == high, "the output as written")?;
+        bench.rest(timeout * 2)?;
+        let now = read(bench, function, address)?;
+        bench.ensure(now == 0, "the output at SAFE, 0")?;
+        let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
+        bench.ensure(tripped != 0, "status bit 0 set: the watchdog has tripped")?;
+        // Requests bring the line back, not the outputs.
+        let now = read(bench, function, address)?;
+        bench.ensure(now == 0, "the output at SAFE until it is written")?;
+        write(bench, function, address, high)?;
+        let now = read(bench, function, address)?;
+        bench.ensure(now == high, "the output as written again")?;
+        set(bench, configuration::COMMAND, 5)?;
+        let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
+        bench.ensure(tripped == 0, "status bit 0 clear after COMMAND 5")
+    });
+    write(bench, function, address, before.min(high))?;
+    result
+}
+
+fn line_lives(bench: &mut Bench<'_>) -> Check {
+    let (function, address, high) = output(bench)?;
+    let before = read(bench, function, address)?;
+    let result = with_timeout(bench, 10, address, |bench, timeout| {
+        let (function, address, high) = output(bench)?;
+        write(bench, function, address, high)?;
+        for _ in 0..10 {
+            bench.rest(timeout / 4)?;
+            let now = read(bench, function, address)?;
+            bench.ensure(now == high, "the output as written")?;
+        }
+        Ok(())
+    });
+    write(bench, function, address, before.min(high))?;
+    result
+}
+
+fn start_value(bench: &mut Bench<'_>) -> Check {
+    let (function, address, high) = output(bench)?;
+    let start = bench.read_word(configuration::START + address)?;
+    if start == HOLD || bench.read_word(configuration::SCALE + address)? != 0 {
+        return Err(Stop::Skip(
+            "START is not in the output's own units".to_owned(),
+        ));
+    }
+    let before = read(bench, function, address)?;
+    write(bench, function, address, if start == 0 { high } else { 0 })?;
+    bench.endpoint.set_power(false)?;
+    bench.rest(Duration::from_millis(200))?;
+    bench.endpoint.set_power(true)?;
+    bench.rest(Duration::from_secs(1))?;
+    let now = read(bench, function, address)?;
+    bench.ensure(now == start, format!("the output at START, {start}"))?;
+    write(bench, function, address, before)
+}

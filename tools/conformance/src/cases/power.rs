@@ -1,0 +1,75 @@
+//! Switching on.
+
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::endpoint::Piece;
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "power/answers",
+        "V1.02 2.4.2",
+        "switched off and on, the unit answers within a second",
+        &[Need::Power],
+        answers,
+    ),
+    case(
+        "power/in-the-middle-of-traffic",
+        "V1.02 2.4.2",
+        "switched on in the middle of traffic, it ignores all of it up to the first silence",
+        &[Need::Power, Need::Exact, Need::Rtu],
+        mid_traffic,
+    ),
+    case(
+        "power/no-byte-by-itself",
+        "V1.02 3.3",
+        "nothing leaves a unit that starts",
+        &[Need::Power],
+        no_byte,
+    ),
+];
+
+const OFF: Duration = Duration::from_millis(200);
+const START: Duration = Duration::from_secs(1);
+
+fn cycle(bench: &mut Bench<'_>) -> Check {
+    bench.endpoint.set_power(false)?;
+    bench.rest(OFF)?;
+    bench.endpoint.set_power(true)?;
+    Ok(())
+}
+
+fn answers(bench: &mut Bench<'_>) -> Check {
+    for _ in 0..3 {
+        cycle(bench)?;
+        bench.rest(START)?;
+        bench.alive("power on")?;
+    }
+    Ok(())
+}
+
+fn mid_traffic(bench: &mut Bench<'_>) -> Check {
+    let line = bench.endpoint.line();
+    // From before the unit has started to well after it.
+    let length = (START.as_nanos() / line.characters(1).as_nanos()) as usize;
+    for byte in [0x55, 0x00, 0xFF] {
+        cycle(bench)?;
+        let bytes = [vec![byte; length], bench.ping()].concat();
+        bench.silence(
+            &[Piece::Bytes(bytes)],
+            "no silence has come before the request",
+        )?;
+        bench.alive("the first silence")?;
+    }
+    Ok(())
+}
+
+fn no_byte(bench: &mut Bench<'_>) -> Check {
+    cycle(bench)?;
+    let heard = bench.endpoint.hear(START, START, usize::MAX)?;
+    bench.ensure(
+        heard.is_empty(),
+        format!("silence while the unit starts: {heard:?}"),
+    )
+}

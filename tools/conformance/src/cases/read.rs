@@ -1,0 +1,242 @@
+//! Reading bits and words: functions 01 to 04.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::points::pdu;
+
+/// The most that one request may ask for (V1.1b3, 6.1 to 6.4).
+const fn most(function: u8) -> u16 {
+    if function <= 2 { 2000 } else { 125 }
+}
+
+/// Data bytes of a reply.
+fn data_bytes(function: u8, quantity: u16) -> usize {
+    if function <= 2 {
+        usize::from(quantity).div_ceil(8)
+    } else {
+        usize::from(quantity) * 2
+    }
+}
+
+macro_rules! reading {
+    ($f:literal, $name:literal, $section:literal) => {
+        [
+            case(
+                concat!($name, "/quantity-0"),
+                $section,
+                "a quantity of 0 is exception 03",
+                &[Need::Function($f)],
+                quantity_0::<$f>,
+            ),
+            case(
+                concat!($name, "/quantity-above-most"),
+                $section,
+                "a quantity above 2000 bits or 125 words is exception 03, up to FFFF",
+                &[Need::Function($f)],
+                quantity_above::<$f>,
+            ),
+            case(
+                concat!($name, "/quantity-most"),
+                $section,
+                "2000 bits or 125 words are in range: 250 data bytes, or 02 where there are not so many",
+                &[Need::Function($f)],
+                quantity_most::<$f>,
+            ),
+            case(
+                concat!($name, "/byte-count"),
+                $section,
+                "every quantity gives its number of bytes, the bits beyond it zero",
+                &[Need::Function($f), Need::Readable($f)],
+                byte_count::<$f>,
+            ),
+            case(
+                concat!($name, "/one-past-the-end"),
+                $section,
+                "a range that reaches one address past the end of a run is exception 02",
+                &[Need::Function($f), Need::Readable($f)],
+                one_past::<$f>,
+            ),
+            case(
+                concat!($name, "/no-wrap"),
+                $section,
+                "address FFFF with quantity 2 is exception 02: addresses do not wrap",
+                &[Need::Function($f)],
+                no_wrap::<$f>,
+            ),
+            case(
+                concat!($name, "/quantity-before-address"),
+                $section,
+                "a bad quantity at a bad address is exception 03, not 02",
+                &[Need::Function($f)],
+                quantity_first::<$f>,
+            ),
+            case(
+                concat!($name, "/length"),
+                $section,
+                "a request a byte short or long under a good check is 03 or silence, never data",
+                &[Need::Function($f), Need::Readable($f)],
+                length::<$f>,
+            ),
+        ]
+    };
+}
+
+const FC01: &[Case] = &reading!(1, "fc01", "V1.1b3 6.1");
+const FC02: &[Case] = &reading!(2, "fc02", "V1.1b3 6.2");
+const FC03: &[Case] = &reading!(3, "fc03", "V1.1b3 6.3");
+const FC04: &[Case] = &reading!(4, "fc04", "V1.1b3 6.4");
+
+const ALIKE: [Case; 2] = [
+    case(
+        "fc02/same-as-01",
+        "map, access rules",
+        "every bit point reads through 01 and 02 alike",
+        &[
+            Need::Modio,
+            Need::Function(1),
+            Need::Function(2),
+            Need::Readable(1),
+        ],
+        alike::<1, 2>,
+    ),
+    case(
+        "fc04/same-as-03",
+        "map, access rules",
+        "every word point reads through 03 and 04 alike",
+        &[Need::Modio, Need::Function(3), Need::Function(4)],
+        alike::<3, 4>,
+    ),
+];
+
+pub(super) const CASES: &[Case] = &{
+    let mut all = [FC01[0]; 34];
+    let mut at = 0;
+    while at < 34 {
+        all[at] = match at {
+            0..8 => FC01[at],
+            8..16 => FC02[at - 8],
+            16..24 => FC03[at - 16],
+            24..32 => FC04[at - 24],
+            _ => ALIKE[at - 32],
+        };
+        at += 1;
+    }
+    all
+};
+
+/// A place to ask at: a readable one, or 0.
+fn somewhere(bench: &Bench<'_>, function: u8) -> u16 {
+    let first = bench.target.readable(function).first();
+    first.map_or(0, |span| span.first)
+}
+
+fn quantity_0<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    bench.exception(&pdu(F, somewhere(bench, F), 0), 3)
+}
+
+fn quantity_above<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    let at = somewhere(bench, F);
+    for quantity in [most(F) + 1, most(F) + 2, 0x0800, 0x8000, 0xFFFF] {
+        bench.exception(&pdu(F, at, quantity), 3)?;
+    }
+    Ok(())
+}
+
+fn quantity_most<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    let quantity = most(F);
+    let span = bench.target.longest(F);
+    let request = pdu(F, span.map_or(0, |span| span.first), quantity);
+    if span.is_some_and(|span| span.len() >= u32::from(quantity)) {
+        let reply = bench.reply(&request)?;
+        return bench.ensure(
+            reply.len() == 252 && reply[1] == 250,
+            "250 data bytes and the byte count 250",
+        );
+    }
+    bench.exception(&request, 2)
+}
+
+fn byte_count<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    let span = bench.readable(F)?;
+    let longest = span.len().min(u32::from(most(F))) as u16;
+    // The short ones, where padding differs, and the longest.
+    for quantity in (1..=longest.min(17)).chain([longest]) {
+        let reply = bench.reply(&pdu(F, span.first, quantity))?;
+        let bytes = data_bytes(F, quantity);
+        bench.ensure(
+            reply.len() == 2 + bytes && usize::from(reply[1]) == bytes,
+            format!("{bytes} data bytes and their count"),
+        )?;
+        if F <= 2 && quantity % 8 != 0 {
+            let unused = reply[1 + bytes] >> (quantity % 8);
+            bench.ensure(unused == 0, "unused high bits of the last byte are zero")?;
+        }
+    }
+    Ok(())
+}
+
+fn one_past<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    for span in bench.target.readable(F).to_vec() {
+        let Some(beyond) = span.last.checked_add(1) else {
+            continue;
+        };
+        bench.exception(&pdu(F, span.last, 2), 2)?;
+        let whole = span.len().min(u32::from(most(F)) - 1) as u16;
+        bench.exception(&pdu(F, span.last - (whole - 1), whole + 1), 2)?;
+        let elsewhere = bench.target.readable(F).iter().any(|s| s.has(beyond));
+        if !elsewhere {
+            bench.exception(&pdu(F, beyond, 1), 2)?;
+        }
+        if let Some(before) = span.first.checked_sub(1) {
+            bench.exception(&pdu(F, before, 2), 2)?;
+        }
+    }
+    Ok(())
+}
+
+fn no_wrap<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    bench.exception(&pdu(F, 0xFFFF, 2), 2)?;
+    bench.exception(&pdu(F, 0xFFF0, most(F)), 2)
+}
+
+fn quantity_first<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    let Some(nowhere) = bench.target.nowhere(F) else {
+        return Err(crate::case::Stop::Skip("every address exists".to_owned()));
+    };
+    bench.exception(&pdu(F, nowhere, 0), 3)?;
+    bench.exception(&pdu(F, nowhere, most(F) + 1), 3)?;
+    bench.exception(&pdu(F, nowhere, 1), 2)
+}
+
+fn length<const F: u8>(bench: &mut Bench<'_>) -> Check {
+    let request = pdu(F, bench.readable(F)?.first, 1);
+    for shorter in 1..request.len() {
+        bench.exception_03_or_silence(&request[..shorter])?;
+    }
+    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    bench.exception_03_or_silence(&[&request[..], &[0, 1]].concat())
+}
+
+fn alike<const A: u8, const B: u8>(bench: &mut Bench<'_>) -> Check {
+    for span in bench.target.readable(A).to_vec() {
+        let quantity = span.len().min(u32::from(most(A))) as u16;
+        let before = bench.reply(&pdu(A, span.first, quantity))?;
+        let other = bench.reply(&pdu(B, span.first, quantity))?;
+        bench.ensure(
+            other.len() == before.len(),
+            format!("as long as by function {A:02X}"),
+        )?;
+        // Inputs and counters may move while they are read: what stands still must be the same.
+        let after = bench.reply(&pdu(A, span.first, quantity))?;
+        for at in (1..before.len()).filter(|at| before[*at] == after[*at]) {
+            bench.ensure(
+                other[at] == before[at],
+                format!(
+                    "{:02X} in byte {at} by function {B:02X}, as by {A:02X}, not {:02X}",
+                    before[at], other[at]
+                ),
+            )?;
+        }
+    }
+    Ok(())
+}

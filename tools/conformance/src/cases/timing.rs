@@ -1,0 +1,205 @@
+//! When the unit speaks, and how it handles its driver.
+
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::endpoint::Piece;
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "timing/reply-after-t3.5",
+        "V1.02 2.5.1.1",
+        "a reply starts t3.5 after its request or later",
+        &[Need::Rtu, Need::Exact],
+        after_t35,
+    ),
+    case(
+        "timing/exceptions-after-t3.5",
+        "V1.02 2.5.1.1",
+        "so do exceptions, and replies to the longest requests",
+        &[Need::Rtu, Need::Exact],
+        exceptions_after_t35,
+    ),
+    case(
+        "timing/no-gap-in-the-reply",
+        "V1.02 2.5.1.1",
+        "between a reply's characters there is less than t1.5",
+        &[Need::Rtu, Need::Exact],
+        no_gap,
+    ),
+    case(
+        "timing/driver-held",
+        "V1.02 3.3",
+        "the driver is on before the first start bit and up to the end of the last stop bit",
+        &[Need::Exact, Need::Driver],
+        driver,
+    ),
+    case(
+        "timing/driver-stays-off",
+        "V1.02 3.3",
+        "what gets silence does not touch the driver",
+        &[Need::Exact, Need::Driver],
+        driver_off,
+    ),
+    case(
+        "timing/back-to-back",
+        "V1.02 2.5.1.1",
+        "a hundred requests, each t3.5 after the reply before it, are all answered",
+        &[Need::Rtu, Need::Exact],
+        back_to_back,
+    ),
+];
+
+/// t3.5, or what a modio has been told to wait for instead.
+fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
+    if bench.target.modio.is_some() {
+        let gap = bench.read_word(register_map::configuration::FRAME_GAP)?;
+        if gap != 0 {
+            return Ok(Duration::from_micros(100) * u32::from(gap));
+        }
+    }
+    Ok(bench.endpoint.line().t35())
+}
+
+/// From the end of the last request to the first start bit of the reply.
+fn turnaround(bench: &Bench<'_>) -> Duration {
+    let first = bench.heard.first().map_or(Duration::ZERO, |h| h.start);
+    first.saturating_sub(bench.sent_end)
+}
+
+/// Times are cut to nanoseconds on their way here.
+const ROUNDING: Duration = Duration::from_nanos(10);
+
+fn not_before(bench: &Bench<'_>, least: Duration) -> Check {
+    let took = turnaround(bench);
+    bench.ensure(
+        took + ROUNDING >= least,
+        format!("a reply {least:?} after the request or later, not {took:?}"),
+    )
+}
+
+fn after_t35(bench: &mut Bench<'_>) -> Check {
+    let least = silence(bench)?;
+    let ping = bench.target.ping.clone();
+    for n in 0..20 {
+        bench.reply(&ping)?;
+        not_before(bench, least)?;
+        // Another phase of whatever else the unit does.
+        bench.rest(Duration::from_micros(137 * n))?;
+    }
+    Ok(())
+}
+
+fn exceptions_after_t35(bench: &mut Bench<'_>) -> Check {
+    let least = silence(bench)?;
+    let Some(function) = super::dispatch::unknown_functions(bench).pop() else {
+        return Ok(());
+    };
+    for length in [0, 1, 10, 252] {
+        bench.exception(&[vec![function], vec![0x33; length]].concat(), 1)?;
+        not_before(bench, least)?;
+    }
+    Ok(())
+}
+
+fn no_gap(bench: &mut Bench<'_>) -> Check {
+    let t15 = bench.endpoint.line().t15();
+    for function in 1..=4 {
+        let Some(span) = bench
+            .target
+            .longest(function)
+            .filter(|_| bench.target.has(function))
+        else {
+            continue;
+        };
+        let most = if function <= 2 { 2000 } else { 125 };
+        let request = crate::points::pdu(function, span.first, span.len().min(most) as u16);
+        bench.reply(&request)?;
+        let gaps = bench
+            .heard
+            .windows(2)
+            .map(|two| two[1].start.saturating_sub(two[0].end));
+        let longest = gaps.max().unwrap_or_default();
+        bench.ensure(
+            longest < t15,
+            format!("gaps below t1.5, {t15:?}, in the reply, not {longest:?}"),
+        )?;
+    }
+    Ok(())
+}
+
+fn driver(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.target.ping.clone();
+    let line = bench.endpoint.line();
+    bench.endpoint.take_driver_edges()?;
+    for _ in 0..10 {
+        bench.reply(&ping)?;
+        let edges = bench.endpoint.take_driver_edges()?;
+        let [(on, true), (off, false)] = edges[..] else {
+            return bench.fail(format!(
+                "the driver goes on once and off once, not {edges:?}"
+            ));
+        };
+        let (Some(first), Some(last)) = (bench.heard.first(), bench.heard.last()) else {
+            return bench.fail("a reply");
+        };
+        bench.ensure(
+            on <= first.start + ROUNDING,
+            "the driver on before the first start bit",
+        )?;
+        bench.ensure(
+            off + ROUNDING >= last.end,
+            format!(
+                "the driver on to the end of the last stop bit, {:?}, not {off:?}",
+                last.end
+            ),
+        )?;
+        // Then the line is the master's: the next request may come after t3.5.
+        bench.ensure(
+            off <= last.end + line.t15(),
+            "the driver off well before the next request may come",
+        )?;
+        bench.ensure(
+            first.start <= on + line.t35(),
+            "the first start bit soon after the driver is on",
+        )?;
+    }
+    Ok(())
+}
+
+fn driver_off(bench: &mut Bench<'_>) -> Check {
+    bench.endpoint.take_driver_edges()?;
+    let (other, ping) = (bench.other(), bench.target.ping.clone());
+    let mode = bench.target.mode;
+    for frame in [
+        mode.frame(other, &ping),
+        mode.frame(0, &ping),
+        vec![0x55; 5],
+    ] {
+        bench.silence_to(&frame, "it is nothing for this unit")?;
+    }
+    let edges = bench.endpoint.take_driver_edges()?;
+    bench.ensure(edges.is_empty(), format!("the driver stays off: {edges:?}"))
+}
+
+fn back_to_back(bench: &mut Bench<'_>) -> Check {
+    let ping = bench.ping();
+    let reply = bench.raw(&ping)?;
+    bench.ensure(bench.is_pong(&reply), "a reply")?;
+    let length = bench.heard.len();
+    let t35 = bench.endpoint.line().t35();
+    for n in 0..100 {
+        let end = bench.heard.last().map_or(Duration::ZERO, |heard| heard.end);
+        let now = bench.endpoint.now();
+        let gap = (end + t35).saturating_sub(now);
+        let pieces = [Piece::Gap(gap), Piece::Bytes(ping.clone())];
+        let reply = bench.exchange_until(&pieces, length)?;
+        bench.ensure(bench.is_pong(&reply), format!("a reply to request {n}"))?;
+    }
+    let late = bench.listen_until(usize::MAX)?;
+    bench.ensure(
+        late == crate::frame::Reply::Silence,
+        "silence after the last reply",
+    )
+}

@@ -1,0 +1,110 @@
+//! The worked frames of manuals, played against the unit.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::frame::{Reply, rtu};
+use crate::vectors::{Worked, frames};
+
+const S: &str = "manuals, see docs/conformance.md";
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "worked/for-other-units",
+        S,
+        "worked frames for other units get silence",
+        &[Need::Rtu],
+        for_others,
+    ),
+    case(
+        "worked/for-this-unit",
+        S,
+        "worked requests for this unit get a reply or an exception, worked replies are no requests",
+        &[Need::Rtu, Need::Modio],
+        for_this,
+    ),
+    case(
+        "worked/requests-readdressed",
+        S,
+        "worked requests with this unit's address get a reply or an exception in good form",
+        &[Need::Rtu, Need::Modio],
+        readdressed,
+    ),
+    case(
+        "worked/errata",
+        S,
+        "worked frames whose CRC is wrong get silence",
+        &[Need::Rtu],
+        errata,
+    ),
+];
+
+fn for_others(bench: &mut Bench<'_>) -> Check {
+    let unit = bench.unit();
+    for worked in frames().filter(|w| w.crc_ok() && w.bytes[0] != unit) {
+        bench.silence_to(&worked.bytes, format!("it is for unit {}", worked.bytes[0]))?;
+        bench.alive(format!("{} {}", worked.source, worked.place))?;
+    }
+    Ok(())
+}
+
+/// Plays a request for this unit. What it would write there is not: on a modio no such address exists.
+fn play(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
+    let function = frame[1];
+    if let [_, 6 | 0x10, high, low, ..] = *frame {
+        let address = u16::from_be_bytes([high, low]);
+        let there = bench
+            .target
+            .readable(3)
+            .iter()
+            .any(|span| span.has(address));
+        if worked.request && there {
+            return Ok(());
+        }
+    }
+    let reply = bench.raw(frame)?;
+    let place = format!("{} {}", worked.source, worked.place);
+    let right = match &reply {
+        Reply::Silence => !worked.request,
+        Reply::Wrong(..) => false,
+        Reply::Pdu(pdu) => {
+            let ordinary = pdu[0] == function && worked.request;
+            ordinary || (pdu.len() == 2 && pdu[0] == function | 0x80)
+        }
+    };
+    bench.ensure(
+        right,
+        format!("a reply or an exception in good form: {place}"),
+    )
+}
+
+fn for_this(bench: &mut Bench<'_>) -> Check {
+    let unit = bench.unit();
+    let mine: Vec<_> = frames()
+        .filter(|w| w.crc_ok() && w.bytes[0] == unit)
+        .collect();
+    if mine.is_empty() {
+        return Err(Stop::Skip(format!("no worked frame is for unit {unit}")));
+    }
+    for worked in mine {
+        // An echo is request and reply at once.
+        play(bench, &worked, &worked.bytes)?;
+    }
+    bench.alive("the worked frames")
+}
+
+fn readdressed(bench: &mut Bench<'_>) -> Check {
+    for worked in frames().filter(|worked| worked.request) {
+        let body = &worked.bytes[1..worked.bytes.len() - 2];
+        let frame = rtu(&[&[bench.unit()], body].concat());
+        play(bench, &worked, &frame)?;
+    }
+    bench.alive("the worked requests")
+}
+
+fn errata(bench: &mut Bench<'_>) -> Check {
+    for worked in frames().filter(|worked| !worked.crc_ok()) {
+        bench.silence_to(&worked.bytes, "its CRC is wrong")?;
+        bench.alive(format!("{} {}", worked.source, worked.place))?;
+    }
+    Ok(())
+}

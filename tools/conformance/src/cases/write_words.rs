@@ -1,0 +1,316 @@
+//! Writing registers: functions 06 and 10.
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::points::{pdu, write_words};
+
+const W06: &[Need] = &[Need::Function(6), Need::Function(3), Need::Words];
+const W10: &[Need] = &[Need::Function(0x10), Need::Function(3), Need::Words];
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "fc06/echo",
+        "V1.1b3 6.6",
+        "a value is written and echoed, and no other register changes",
+        W06,
+        echo,
+    ),
+    case(
+        "fc06/refused-value",
+        "V1.1b3 6.6",
+        "a value out of range is exception 03 and the register stays",
+        W06,
+        refused,
+    ),
+    case(
+        "fc06/address",
+        "V1.1b3 6.6",
+        "a register that is not there is exception 02",
+        &[Need::Function(6)],
+        address,
+    ),
+    case(
+        "fc06/length",
+        "V1.1b3 6.6",
+        "a request a byte short or long is 03 or silence, and the register stays",
+        W06,
+        length,
+    ),
+    case(
+        "fc10/every-quantity",
+        "V1.1b3 6.12",
+        "every quantity is written, and echoed with address and quantity",
+        W10,
+        every_quantity,
+    ),
+    case(
+        "fc10/quantity-0-and-124",
+        "V1.1b3 6.12",
+        "quantities of 0 and above 123 are exception 03",
+        &[Need::Function(0x10)],
+        quantity_out_of_range,
+    ),
+    case(
+        "fc10/quantity-123",
+        "V1.1b3 6.12",
+        "123 registers fit a frame: written, or 02 where there are not so many",
+        &[Need::Function(0x10)],
+        quantity_most,
+    ),
+    case(
+        "fc10/byte-count",
+        "V1.1b3 6.12",
+        "a byte count that is not twice the quantity, odd or 255, is exception 03 and writes nothing",
+        W10,
+        byte_count,
+    ),
+    case(
+        "fc10/data-length",
+        "V1.1b3 6.12",
+        "data cut short or with bytes to spare is 03 or silence and writes nothing",
+        W10,
+        data_length,
+    ),
+    case(
+        "fc10/partly-out-of-range",
+        "V1.1b3 6.12",
+        "a range that is partly not there is exception 02 and writes nothing",
+        W10,
+        partly_out,
+    ),
+    case(
+        "fc10/one-bad-value",
+        "V1.1b3 6.12",
+        "one value out of range refuses all of them",
+        W10,
+        one_bad_value,
+    ),
+];
+
+fn echo(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let span = words.span.up_to(16);
+    for address in span.first..=span.last {
+        for value in [words.low, words.high, words.low] {
+            let mut wanted = bench.read_words(span)?;
+            let request = pdu(6, address, value);
+            bench.reply_is(&request, &request)?;
+            wanted[usize::from(address - span.first)] = value;
+            let now = bench.read_words(span)?;
+            bench.ensure(
+                now == wanted,
+                format!("register {address:04X} is {value:04X}, no other has changed"),
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn refused(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let Some(value) = words.refused else {
+        return Err(Stop::Skip("no value is known that is refused".to_owned()));
+    };
+    bench.set_words(words.span.first, &[words.low])?;
+    bench.exception(&pdu(6, words.span.first, value), 3)?;
+    let now = bench.read_word(words.span.first)?;
+    bench.ensure(
+        now == words.low,
+        format!("the register still is {}", words.low),
+    )
+}
+
+fn address(bench: &mut Bench<'_>) -> Check {
+    let spans = bench.target.readable(3).to_vec();
+    let mut outside = vec![0xFFFF];
+    for span in &spans {
+        outside.extend(span.last.checked_add(1));
+        outside.extend(span.first.checked_sub(1));
+    }
+    outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
+    for address in outside {
+        bench.exception(&pdu(6, address, 0), 2)?;
+    }
+    Ok(())
+}
+
+fn length(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    bench.set_words(words.span.first, &[words.low])?;
+    let request = pdu(6, words.span.first, words.high);
+    for cut in 1..request.len() {
+        bench.exception_03_or_silence(&request[..cut])?;
+    }
+    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    let now = bench.read_word(words.span.first)?;
+    bench.ensure(
+        now == words.low,
+        format!("the register still is {}", words.low),
+    )
+}
+
+fn every_quantity(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let longest = words.span.len().min(123) as u16;
+    for quantity in (1..=longest.min(9)).chain([longest]) {
+        let here = words.span.up_to(quantity);
+        for odd in [0, 1] {
+            let values: Vec<u16> = (0..quantity)
+                .map(|n| if n % 2 == odd { words.low } else { words.high })
+                .collect();
+            let request = write_words(here.first, &values);
+            bench.reply_is(&request, &request[..5])?;
+            let now = bench.read_words(here)?;
+            bench.ensure(now == values, format!("the registers are {values:04X?}"))?;
+        }
+    }
+    Ok(())
+}
+
+fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
+    let at = bench.target.words.map_or(0, |words| words.span.first);
+    bench.exception(&[pdu(0x10, at, 0), vec![0]].concat(), 3)?;
+    bench.exception(&[pdu(0x10, at, 0), vec![2, 0, 1]].concat(), 3)?;
+    // 124 registers would make a frame of 257 bytes: their data is left out.
+    for (quantity, count) in [
+        (124, 248_u8),
+        (125, 250),
+        (128, 0),
+        (0x8001, 2),
+        (0xFFFF, 254),
+    ] {
+        let data = vec![0; usize::from(count.min(246))];
+        bench.exception(&[pdu(0x10, at, quantity), vec![count], data].concat(), 3)?;
+    }
+    Ok(())
+}
+
+fn quantity_most(bench: &mut Bench<'_>) -> Check {
+    // On a modio whose configuration may be written there is a run of so many, whose values go back to
+    // where they came from.
+    let config = bench.target.modio.is_some() && bench.allow_config && bench.target.has(3);
+    let known = bench.target.words.map(|words| words.span);
+    let wide = if config {
+        bench.unlock()?;
+        Some(crate::target::Span {
+            first: register_map::configuration::BETA,
+            last: register_map::configuration::BETA + 122,
+        })
+    } else {
+        known.filter(|span| span.len() >= 123)
+    };
+    if let Some(span) = wide {
+        let values = bench.read_words(span)?;
+        let request = write_words(span.first, &values);
+        bench.reply_is(&request, &request[..5])?;
+        let now = bench.read_words(span)?;
+        return bench.ensure(now == values, "the registers hold what was written");
+    }
+    // Off the end of what there is, wherever that is.
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
+    };
+    let first = nowhere.saturating_sub(122);
+    bench.exception(&write_words(first, &[0; 123]), 2)
+}
+
+fn unchanged(bench: &mut Bench<'_>, at: u16, value: u16, count: usize) -> Check {
+    let span = crate::target::Span {
+        first: at,
+        last: at + count as u16 - 1,
+    };
+    let now = bench.read_words(span)?;
+    bench.ensure(
+        now.iter().all(|word| *word == value),
+        format!("every register still is {value:04X}"),
+    )
+}
+
+fn byte_count(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let span = words.span.up_to(4);
+    let (at, quantity) = (span.first, span.len() as u16);
+    bench.set_words(at, &vec![words.low; usize::from(quantity)])?;
+    let right = (quantity * 2) as u8;
+    for count in [0, 1, right - 1, right + 1, right + 2, 246, 255] {
+        let high = words
+            .high
+            .to_be_bytes()
+            .repeat(usize::from(count).div_ceil(2));
+        let data = high[..usize::from(count).min(246)].to_vec();
+        bench.exception(&[pdu(0x10, at, quantity), vec![count], data].concat(), 3)?;
+    }
+    unchanged(bench, at, words.low, usize::from(quantity))
+}
+
+fn data_length(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let span = words.span.up_to(3);
+    let count = span.len() as usize;
+    bench.set_words(span.first, &vec![words.low; count])?;
+    let request = write_words(span.first, &vec![words.high; count]);
+    for cut in 1..request.len() {
+        bench.exception_03_or_silence(&request[..cut])?;
+    }
+    for spare in [1, 2, 100] {
+        let spare = words.high.to_be_bytes().repeat(spare)[..spare].to_vec();
+        bench.exception_03_or_silence(&[request.clone(), spare].concat())?;
+    }
+    unchanged(bench, span.first, words.low, count)
+}
+
+fn partly_out(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let readable = bench.target.readable(3).to_vec();
+    let Some(run) = readable.iter().find(|run| run.has(words.span.last)) else {
+        return bench.fail("the registers to write to can be read");
+    };
+    // The last registers of the run, and the one after them that is not there.
+    for count in 1..=run.len().min(8) as u16 {
+        let tail = crate::target::Span {
+            first: run.last - (count - 1),
+            last: run.last,
+        };
+        let before = bench.read_words(tail)?;
+        let mut values: Vec<u16> = before
+            .iter()
+            .map(|word| {
+                if *word == words.high {
+                    words.low
+                } else {
+                    words.high
+                }
+            })
+            .collect();
+        values.push(words.low);
+        bench.exception(&write_words(tail.first, &values), 2)?;
+        let now = bench.read_words(tail)?;
+        let stands = bench.ensure(
+            now == before,
+            format!("the registers still are {before:04X?}"),
+        );
+        if stands.is_err() {
+            bench.set_words(tail.first, &before)?;
+        }
+        stands?;
+    }
+    bench.exception(&write_words(0xFFFF, &[words.high; 2]), 2)
+}
+
+fn one_bad_value(bench: &mut Bench<'_>) -> Check {
+    let words = bench.words()?;
+    let (Some(bad), count @ 2..) = (words.refused, words.span.up_to(4).len() as usize) else {
+        return Err(Stop::Skip(
+            "no value is known that is refused, or one register alone".to_owned(),
+        ));
+    };
+    let at = words.span.first;
+    bench.set_words(at, &vec![words.low; count])?;
+    for place in 0..count {
+        let mut values = vec![words.high; count];
+        values[place] = bad;
+        bench.exception(&write_words(at, &values), 3)?;
+        unchanged(bench, at, words.low, count)?;
+    }
+    Ok(())
+}

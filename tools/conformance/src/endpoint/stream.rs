@@ -1,0 +1,299 @@
+//! A serial port, a pseudo-terminal or a TCP socket: bytes there and back, times only as good as the
+//! operating system's.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serial2::{CharSize, FlowControl, Parity as SerialParity, SerialPort, Settings, StopBits};
+
+use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use crate::line::{LineFormat, Parity};
+
+/// So long a read may wait before the clock is looked at again.
+const SLICE: Duration = Duration::from_millis(5);
+
+/// What carries the bytes.
+enum Carrier {
+    Serial(SerialPort),
+    Tcp(TcpStream),
+}
+
+/// Raw bytes through the operating system.
+pub struct Stream {
+    carrier: Carrier,
+    name: String,
+    line: LineFormat,
+    begin: Instant,
+}
+
+impl Stream {
+    /// A serial port, or something that looks like one.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be opened, or does not take the format; why and what to do, in one line.
+    pub fn serial(path: &Path, line: LineFormat) -> Result<Self, Broken> {
+        let port = SerialPort::open(path, |settings: Settings| configured(settings, line)).map_err(
+            |error| {
+                let path = path.display();
+                Broken(match error.kind() {
+                    ErrorKind::NotFound => {
+                        format!("{path} is not there: is the adapter plugged in, the simulator running?")
+                    }
+                    ErrorKind::PermissionDenied => format!(
+                        "{path} may not be opened: on Linux, join the group that owns it (often dialout)"
+                    ),
+                    _ => format!(
+                        "{path} cannot be opened at {line}: {error}; a pseudo-terminal takes no parity, use --format 8N1 or 8N2"
+                    ),
+                })
+            },
+        )?;
+        let name = format!("{} at {line}", path.display());
+        Ok(Self::over(Carrier::Serial(port), name, line))
+    }
+
+    /// A socket that carries the line's bytes; `line` is what the line behind it is known to be.
+    ///
+    /// # Errors
+    ///
+    /// When nobody answers there; why, in one line.
+    pub fn tcp(address: &str, line: LineFormat) -> Result<Self, Broken> {
+        let cannot = |why: String| Broken(format!("cannot connect to {address}: {why}"));
+        let found: Vec<_> = address
+            .to_socket_addrs()
+            .map_err(|error| cannot(format!("no address such as 127.0.0.1:5020: {error}")))?
+            .collect();
+        let mut last = "the name has no address".to_owned();
+        for one in found {
+            match TcpStream::connect_timeout(&one, Duration::from_secs(5)) {
+                Ok(socket) => {
+                    // A request must leave as it is written.
+                    socket
+                        .set_nodelay(true)
+                        .map_err(|error| cannot(error.to_string()))?;
+                    let name = format!("{address} (a line at {line})");
+                    return Ok(Self::over(Carrier::Tcp(socket), name, line));
+                }
+                Err(error) => last = error.to_string(),
+            }
+        }
+        Err(cannot(last))
+    }
+
+    fn over(carrier: Carrier, name: String, line: LineFormat) -> Self {
+        Self {
+            carrier,
+            name,
+            line,
+            begin: Instant::now(),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Broken> {
+        let written = match &mut self.carrier {
+            Carrier::Serial(port) => port.write_all(bytes),
+            Carrier::Tcp(socket) => socket.write_all(bytes),
+        };
+        written.map_err(|error| Broken(format!("{}: cannot send: {error}", self.name)))
+    }
+
+    /// What comes within `wait`; nothing is no error.
+    fn read(&mut self, wait: Duration) -> Result<Vec<u8>, Broken> {
+        let wait = wait.max(Duration::from_millis(1));
+        let mut buffer = [0; 512];
+        let read = match &mut self.carrier {
+            Carrier::Serial(port) => port
+                .set_read_timeout(wait)
+                .and_then(|()| port.read(&mut buffer)),
+            Carrier::Tcp(socket) => socket
+                .set_read_timeout(Some(wait))
+                .and_then(|()| socket.read(&mut buffer)),
+        };
+        match read {
+            Ok(0) => Err(Broken(format!("{}: the other end is gone", self.name))),
+            Ok(length) => Ok(buffer[..length].to_vec()),
+            Err(error) => match error.kind() {
+                ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => {
+                    Ok(Vec::new())
+                }
+                _ => Err(Broken(format!("{}: cannot receive: {error}", self.name))),
+            },
+        }
+    }
+}
+
+fn configured(mut settings: Settings, line: LineFormat) -> std::io::Result<Settings> {
+    settings.set_raw();
+    settings.set_baud_rate(line.baud)?;
+    settings.set_char_size(match line.data_bits {
+        7 => CharSize::Bits7,
+        _ => CharSize::Bits8,
+    });
+    settings.set_parity(match line.parity {
+        Parity::None => SerialParity::None,
+        Parity::Even => SerialParity::Even,
+        Parity::Odd => SerialParity::Odd,
+    });
+    settings.set_stop_bits(match line.stop_bits {
+        1 => StopBits::One,
+        _ => StopBits::Two,
+    });
+    settings.set_flow_control(FlowControl::None);
+    Ok(settings)
+}
+
+impl Endpoint for Stream {
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities {
+            set_line: matches!(self.carrier, Carrier::Serial(_)),
+            ..Abilities::default()
+        }
+    }
+
+    fn line(&self) -> LineFormat {
+        self.line
+    }
+
+    fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
+        let Carrier::Serial(port) = &mut self.carrier else {
+            return Err(Broken("a socket has no rate and format".to_owned()));
+        };
+        let set = port
+            .get_configuration()
+            .and_then(|settings| configured(settings, line))
+            .and_then(|settings| port.set_configuration(&settings));
+        set.map_err(|error| Broken(format!("{} does not take {line}: {error}", self.name)))?;
+        self.line = line;
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.begin.elapsed()
+    }
+
+    fn rest(&mut self, time: Duration) -> Result<(), Broken> {
+        thread::sleep(time);
+        Ok(())
+    }
+
+    fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
+        let mut waiting = Vec::new();
+        for piece in pieces {
+            match piece {
+                Piece::Bytes(bytes) => waiting.extend_from_slice(bytes),
+                Piece::Gap(gap) => {
+                    self.write(&waiting)?;
+                    // Bytes are on the line some time after they are written.
+                    thread::sleep(self.line.characters(waiting.len()) + *gap);
+                    waiting.clear();
+                }
+                Piece::BadParity(_) | Piece::BadStop(_) | Piece::Break(_) | Piece::Glitch(_) => {
+                    return Err(Broken(
+                        "this endpoint cannot send damaged characters".to_owned(),
+                    ));
+                }
+            }
+        }
+        self.write(&waiting)?;
+        thread::sleep(self.line.characters(waiting.len()));
+        Ok(self.now())
+    }
+
+    fn hear(
+        &mut self,
+        patience: Duration,
+        quiet: Duration,
+        enough: usize,
+    ) -> Result<Vec<Heard>, Broken> {
+        let mut heard: Vec<Heard> = Vec::new();
+        let mut until = Instant::now() + patience;
+        while heard.len() < enough {
+            let left = until.saturating_duration_since(Instant::now());
+            let bytes = self.read(left.min(SLICE))?;
+            if bytes.is_empty() {
+                if left.is_zero() {
+                    break;
+                }
+                continue;
+            }
+            let end = self.now();
+            heard.extend(bytes.into_iter().map(|byte| Heard {
+                byte,
+                start: end.saturating_sub(self.line.characters(1)),
+                end,
+                good: true,
+            }));
+            until = Instant::now() + quiet;
+        }
+        Ok(heard)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+
+    #[test]
+    fn a_socket_carries_bytes_and_notices_silence_and_the_end() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
+        let (mut peer, _) = listener.accept().unwrap();
+        stream
+            .send(&[
+                Piece::Bytes(vec![1, 2]),
+                Piece::Gap(Duration::from_millis(1)),
+                Piece::Bytes(vec![3]),
+            ])
+            .unwrap();
+        let mut got = [0; 3];
+        peer.read_exact(&mut got).unwrap();
+        assert_eq!(got, [1, 2, 3]);
+
+        let short = Duration::from_millis(10);
+        assert_eq!(stream.hear(short, short, usize::MAX).unwrap(), []);
+        peer.write_all(&[9, 8]).unwrap();
+        let heard = stream
+            .hear(Duration::from_secs(5), short, usize::MAX)
+            .unwrap();
+        let bytes: Vec<u8> = heard.iter().map(|h| h.byte).collect();
+        assert_eq!(bytes, [9, 8]);
+        drop(peer);
+        let gone = stream.hear(Duration::from_secs(5), short, usize::MAX);
+        assert!(gone.unwrap_err().0.contains("gone"));
+    }
+
+    #[test]
+    fn damaged_characters_are_refused() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
+        assert!(stream.send(&[Piece::BadStop(1)]).is_err());
+        assert!(stream.set_line(LineFormat::default()).is_err());
+    }
+
+    #[test]
+    fn nobody_there_is_one_clear_line() {
+        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap().to_string();
+        drop(taken);
+        for text in [
+            Stream::tcp(&address, LineFormat::default()),
+            Stream::tcp("nowhere", LineFormat::default()),
+            Stream::serial(Path::new("/dev/no-such-port"), LineFormat::default()),
+        ]
+        .map(|opened| opened.err().unwrap().0)
+        {
+            assert!(!text.contains('\n') && text.len() > 10, "{text}");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! How characters stand on a serial line, and the silences of Modbus that follow from it.
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+/// Parity of a character.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parity {
+    /// No parity bit.
+    None,
+    /// The ones, parity bit included, are even in number.
+    Even,
+    /// The ones, parity bit included, are odd in number.
+    Odd,
+}
+
+/// Rate and character format of one end of a serial line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineFormat {
+    /// Bits a second.
+    pub baud: u32,
+    /// Data bits, 7 (ASCII only) or 8.
+    pub data_bits: u8,
+    /// The parity bit.
+    pub parity: Parity,
+    /// Stop bits, 1 or 2.
+    pub stop_bits: u8,
+}
+
+/// The frame format alone, as in `8N2`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CharacterFormat {
+    /// Data bits, 7 or 8.
+    pub data_bits: u8,
+    /// The parity bit.
+    pub parity: Parity,
+    /// Stop bits, 1 or 2.
+    pub stop_bits: u8,
+}
+
+impl LineFormat {
+    /// Rate and format put together.
+    #[must_use]
+    pub const fn new(baud: u32, format: CharacterFormat) -> Self {
+        Self {
+            baud,
+            data_bits: format.data_bits,
+            parity: format.parity,
+            stop_bits: format.stop_bits,
+        }
+    }
+
+    /// The time of `n` bits.
+    #[must_use]
+    pub fn bits(self, n: u64) -> Duration {
+        Duration::from_nanos(n * 1_000_000_000 / u64::from(self.baud))
+    }
+
+    /// The time of `n` characters without a gap, start, parity and stop bits included.
+    #[must_use]
+    pub fn characters(self, n: usize) -> Duration {
+        let parity = u64::from(self.parity != Parity::None);
+        let bits = 1 + u64::from(self.data_bits) + parity + u64::from(self.stop_bits);
+        self.bits(bits * n as u64)
+    }
+
+    /// t1.5: the longest silence inside a frame. 16.5 bits, above 19200 bit/s 750 us (V1.02, 2.5.1.1).
+    #[must_use]
+    pub fn t15(self) -> Duration {
+        if self.baud > 19_200 {
+            Duration::from_micros(750)
+        } else {
+            self.bits(33) / 2
+        }
+    }
+
+    /// t3.5: the silence that ends a frame. 38.5 bits, above 19200 bit/s 1750 us (V1.02, 2.5.1.1).
+    #[must_use]
+    pub fn t35(self) -> Duration {
+        if self.baud > 19_200 {
+            Duration::from_micros(1750)
+        } else {
+            self.bits(77) / 2
+        }
+    }
+}
+
+impl Default for LineFormat {
+    /// 9600 8N2.
+    fn default() -> Self {
+        Self {
+            baud: 9600,
+            data_bits: 8,
+            parity: Parity::None,
+            stop_bits: 2,
+        }
+    }
+}
+
+impl fmt::Display for LineFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parity = match self.parity {
+            Parity::None => 'N',
+            Parity::Even => 'E',
+            Parity::Odd => 'O',
+        };
+        write!(
+            f,
+            "{} {}{parity}{}",
+            self.baud, self.data_bits, self.stop_bits
+        )
+    }
+}
+
+impl FromStr for CharacterFormat {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text:?} is no format such as 8N2, 8E1, 8O1, 8N1 or 7E1");
+        let [data, parity, stop] = text.as_bytes() else {
+            return Err(wrong());
+        };
+        Ok(Self {
+            data_bits: match data {
+                b'7' => 7,
+                b'8' => 8,
+                _ => return Err(wrong()),
+            },
+            parity: match parity.to_ascii_uppercase() {
+                b'N' => Parity::None,
+                b'E' => Parity::Even,
+                b'O' => Parity::Odd,
+                _ => return Err(wrong()),
+            },
+            stop_bits: match stop {
+                b'1' => 1,
+                b'2' => 2,
+                _ => return Err(wrong()),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silences_follow_the_rate_and_are_fixed_above_19200() {
+        let at = |baud| LineFormat {
+            baud,
+            ..LineFormat::default()
+        };
+        assert_eq!(at(9600).t35().as_micros(), 4010);
+        assert_eq!(at(9600).t15().as_micros(), 1718);
+        assert_eq!(at(19_200).t35().as_micros(), 2005);
+        assert_eq!(at(38_400).t35(), Duration::from_micros(1750));
+        assert_eq!(at(115_200).t15(), Duration::from_micros(750));
+    }
+
+    #[test]
+    fn formats_are_read_and_written() {
+        for (text, bits) in [("8N1", 10), ("8N2", 11), ("8e1", 11), ("7O1", 10)] {
+            let line = LineFormat::new(1000, text.parse().unwrap());
+            assert_eq!(line.characters(1), Duration::from_millis(bits), "{text}");
+            assert_eq!(line.to_string(), format!("1000 {}", text.to_uppercase()));
+        }
+        for text in ["", "8", "9N1", "8X1", "8N3", "8N22"] {
+            assert!(text.parse::<CharacterFormat>().is_err(), "{text}");
+        }
+    }
+}

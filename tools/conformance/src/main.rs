@@ -1,0 +1,98 @@
+//! `modio-conformance`: runs the suite against a unit and tells what it found.
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Parser;
+use conformance::cli::Cli;
+use conformance::probe::{Given, probe};
+use conformance::report::{Totals, json, junit, table};
+use conformance::run::{self, Options};
+use conformance::target::{Support, Target};
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if error.use_stderr() => {
+            let text = error.render().to_string();
+            let lines: Vec<&str> = text
+                .lines()
+                .map_while(|l| (!l.is_empty()).then(|| l.trim()))
+                .collect();
+            return refused(lines.join(" ").trim_start_matches("error: "));
+        }
+        Err(help) => help.exit(),
+    };
+    match test(&cli) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(what) => refused(&what),
+    }
+}
+
+/// Nothing could be tested: a line on stderr, exit status 2.
+fn refused(what: &str) -> ExitCode {
+    eprintln!("modio-conformance: {what}");
+    ExitCode::from(2)
+}
+
+/// Whether no case failed.
+fn test(cli: &Cli) -> Result<bool, String> {
+    let cases = cli.cases()?;
+    if cli.list {
+        print!("{}", table::list(&cases));
+        return Ok(true);
+    }
+    let profile = cli.read_profile()?;
+    let mode = cli.mode(profile.as_ref())?;
+    let mut endpoint = cli.open(mode).map_err(|broken| broken.to_string())?;
+    let given = Given {
+        unit: cli.unit(profile.as_ref()),
+        mode,
+        patience: cli.waits(endpoint.as_ref()),
+        profile: profile.as_ref(),
+        allow_config: cli.allow_config,
+    };
+    let (target, patience) = probe(endpoint.as_mut(), &given)?;
+    println!("{}: {}", endpoint.name(), found(&target));
+    let options = Options {
+        patience,
+        allow_config: cli.allow_config,
+    };
+    let tell = |outcome: &run::Outcome| println!("{}", table::row(outcome));
+    let outcomes = run::run(endpoint.as_mut(), &target, options, &cases, tell)
+        .map_err(|broken| broken.to_string())?;
+    println!("{}", table::summary(&outcomes));
+    let name = endpoint.name();
+    if let Some(path) = &cli.junit {
+        write(path, &junit::document(&name, &outcomes))?;
+    }
+    if let Some(path) = &cli.json {
+        write(path, &format!("{:#}\n", json::value(&name, &outcomes)))?;
+    }
+    Ok(Totals::of(&outcomes).failed == 0)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
+}
+
+/// What the probe has found, in one line.
+fn found(target: &Target) -> String {
+    let functions: Vec<String> = target
+        .functions
+        .iter()
+        .filter(|(_, support)| **support == Support::Yes)
+        .map(|(function, _)| format!("{function:02X}"))
+        .collect();
+    let what = match target.modio {
+        Some(modio) => format!("a modio with {}", modio.module),
+        None => "a unit".to_owned(),
+    };
+    format!(
+        "{what} at address {}, functions {}",
+        target.unit,
+        functions.join(" ")
+    )
+}

@@ -1,0 +1,225 @@
+//! Reading and writing the unit's points for a case, by whatever function it has for that; and putting
+//! them back.
+
+use register_map::configuration::{KEY, OPENING_KEY};
+
+use crate::bench::Bench;
+use crate::case::{Check, Stop};
+use crate::target::{Span, Words};
+
+/// A request's function, address and one more word.
+#[must_use]
+pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
+    let ([ah, al], [wh, wl]) = (address.to_be_bytes(), word.to_be_bytes());
+    vec![function, ah, al, wh, wl]
+}
+
+/// A write of several registers, 0x10.
+#[must_use]
+pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {
+    let mut request = pdu(0x10, address, values.len() as u16);
+    request.push((values.len() * 2) as u8);
+    request.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+    request
+}
+
+/// A write of several coils, 0x0F; the padding bits of the last byte are `padding`.
+#[must_use]
+pub fn write_bits(address: u16, values: &[bool], padding: bool) -> Vec<u8> {
+    let mut request = pdu(0x0F, address, values.len() as u16);
+    request.push(values.len().div_ceil(8) as u8);
+    request.extend(values.chunks(8).map(|chunk| {
+        (0..8).fold(0_u8, |byte, n| {
+            let bit = chunk.get(n).copied().unwrap_or(padding);
+            byte | u8::from(bit) << n
+        })
+    }));
+    request
+}
+
+/// The words of a reply to 03, 04 or 17.
+#[must_use]
+pub fn words_of(reply: &[u8]) -> Vec<u16> {
+    let (pairs, _) = reply.get(2..).unwrap_or_default().as_chunks::<2>();
+    pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+}
+
+/// What the points that cases write to held before.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Snapshot {
+    bits: Option<Vec<bool>>,
+    words: Option<Vec<u16>>,
+}
+
+impl Bench<'_> {
+    /// Coils to write to.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Skip`] when there are none.
+    pub fn bits(&self) -> Check<Span> {
+        let lacking = || Stop::Skip("no coil to write to".to_owned());
+        self.target.bits.ok_or_else(lacking)
+    }
+
+    /// Registers to write to.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Skip`] when there are none.
+    pub fn words(&self) -> Check<Words> {
+        let lacking = || Stop::Skip("no register to write to".to_owned());
+        self.target.words.ok_or_else(lacking)
+    }
+
+    /// The longest run that a function (1 to 4) reads.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Skip`] when there is none.
+    pub fn readable(&self, function: u8) -> Check<Span> {
+        let lacking = || Stop::Skip(format!("nothing to read by function {function:02X}"));
+        self.target.longest(function).ok_or_else(lacking)
+    }
+
+    /// Reads coils by function 01, at most 2000.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit does not give them, [`Stop::Broken`].
+    pub fn read_bits(&mut self, span: Span) -> Check<Vec<bool>> {
+        let count = span.len() as usize;
+        let reply = self.reply(&pdu(1, span.first, count as u16))?;
+        let right = reply.len() == 2 + count.div_ceil(8);
+        self.ensure(right, format!("the reply holds {count} coils"))?;
+        let bit = |n: usize| reply[2 + n / 8] >> (n % 8) & 1 == 1;
+        Ok((0..count).map(bit).collect())
+    }
+
+    /// Reads registers by function 03, at most 125.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit does not give them, [`Stop::Broken`].
+    pub fn read_words(&mut self, span: Span) -> Check<Vec<u16>> {
+        let count = span.len() as usize;
+        let reply = self.reply(&pdu(3, span.first, count as u16))?;
+        let right = reply.len() == 2 + count * 2 && reply[1] as usize == count * 2;
+        self.ensure(right, format!("the reply holds {count} registers"))?;
+        Ok(words_of(&reply))
+    }
+
+    /// Reads one register by function 03.
+    ///
+    /// # Errors
+    ///
+    /// As [`Bench::read_words`].
+    pub fn read_word(&mut self, address: u16) -> Check<u16> {
+        let one = Span {
+            first: address,
+            last: address,
+        };
+        Ok(self.read_words(one)?[0])
+    }
+
+    /// Sets coils from `first` on, by 0F or 05.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit does not do it, [`Stop::Broken`].
+    pub fn set_bits(&mut self, first: u16, values: &[bool]) -> Check {
+        if self.target.has(0x0F) {
+            return self.reply(&write_bits(first, values, false)).map(drop);
+        }
+        for (address, value) in (first..).zip(values) {
+            let value = if *value { 0xFF00 } else { 0 };
+            self.reply(&pdu(5, address, value))?;
+        }
+        Ok(())
+    }
+
+    /// Sets registers from `first` on, by 10 or 06.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit does not do it, [`Stop::Broken`].
+    pub fn set_words(&mut self, first: u16, values: &[u16]) -> Check {
+        if self.target.has(0x10) {
+            return self.reply(&write_words(first, values)).map(drop);
+        }
+        for (address, value) in (first..).zip(values) {
+            self.reply(&pdu(6, address, *value))?;
+        }
+        Ok(())
+    }
+
+    /// Opens a modio's configuration lock.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when it does not open, [`Stop::Broken`].
+    pub fn unlock(&mut self) -> Check {
+        self.reply(&pdu(6, KEY, OPENING_KEY)).map(drop)
+    }
+
+    /// What the points that cases write to hold.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when they cannot be read, [`Stop::Broken`].
+    pub fn snapshot(&mut self) -> Check<Snapshot> {
+        let mut snapshot = Snapshot::default();
+        if let Some(span) = self.target.bits.filter(|_| self.target.has(1)) {
+            snapshot.bits = Some(self.read_bits(span)?);
+        }
+        if let Some(words) = self.target.words.filter(|_| self.target.has(3)) {
+            snapshot.words = Some(self.read_words(words.span)?);
+        }
+        Ok(snapshot)
+    }
+
+    /// Puts the points back to what they held, where they do not hold it any more.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit does not let it, [`Stop::Broken`].
+    pub fn restore(&mut self, before: &Snapshot) -> Check {
+        let now = self.snapshot()?;
+        if let (Some(bits), Some(span)) = (&before.bits, self.target.bits)
+            && now.bits != before.bits
+        {
+            self.set_bits(span.first, bits)?;
+        }
+        if let (Some(values), Some(words)) = (&before.words, self.target.words)
+            && now.words != before.words
+        {
+            if words.locked {
+                self.unlock()?;
+            }
+            self.set_words(words.span.first, values)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_are_those_of_the_standard() {
+        // V1.1b3, 6.11 and 6.12: the worked examples.
+        let coils = [1, 0, 1, 1, 0, 0, 1, 1, 1, 0].map(|bit| bit == 1);
+        assert_eq!(
+            write_bits(0x13, &coils, false),
+            [0x0F, 0, 0x13, 0, 0x0A, 2, 0xCD, 1]
+        );
+        assert_eq!(write_bits(0x13, &coils, true)[7], 0xFD);
+        assert_eq!(
+            write_words(1, &[0x0A, 0x0102]),
+            [0x10, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2]
+        );
+        assert_eq!(words_of(&[3, 4, 1, 2, 3, 4]), [0x0102, 0x0304]);
+        assert!(words_of(&[3]).is_empty());
+    }
+}

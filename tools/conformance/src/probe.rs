@@ -1,0 +1,270 @@
+//! Finds out what the unit under test has: that it answers, its functions, where its points are.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use register_map::points::{self, PointKind, output_values};
+use register_map::{BLOCKS, Module, Values, codes, configuration, state};
+
+use crate::bench::{Bench, Patience};
+use crate::case::{Check, Stop};
+use crate::endpoint::Endpoint;
+use crate::frame::{Mode, Reply};
+use crate::points::pdu;
+use crate::profile::Profile;
+use crate::target::{Modio, Span, Support, Target, Words};
+
+/// What is known before the unit is asked.
+#[derive(Clone, Debug)]
+pub struct Given<'a> {
+    /// The unit's address.
+    pub unit: u8,
+    /// RTU or ASCII.
+    pub mode: Mode,
+    /// How long to wait.
+    pub patience: Patience,
+    /// What it has, when it is no modio.
+    pub profile: Option<&'a Profile>,
+    /// Whether its configuration may be written.
+    pub allow_config: bool,
+}
+
+/// How often a unit is asked before it counts as silent.
+const ATTEMPTS: u32 = 4;
+
+/// Every function that cases are about.
+pub const FUNCTIONS: [u8; 16] = [
+    1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x2B,
+];
+
+/// Asks the unit.
+///
+/// # Errors
+///
+/// Why it cannot be tested and what to do, in one line.
+pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, Patience), String> {
+    let mut target = Target {
+        unit: given.unit,
+        mode: given.mode,
+        functions: BTreeMap::new(),
+        readable: Default::default(),
+        bits: None,
+        words: None,
+        strict_t15: given.profile.and_then(|profile| profile.strict_t15),
+        modio: None,
+        ping: vec![8, 0, 0, 0xA5, 0x37],
+    };
+    let mut patience = given.patience;
+    let line = endpoint.line();
+    let told = |stop: Stop| match stop {
+        Stop::Broken(broken) => broken.to_string(),
+        Stop::Skip(why) => why,
+        Stop::Fail(failure) => format!(
+            "the unit cannot be made out: to {} came {}; wanted: {}",
+            failure.sent, failure.came, failure.wanted
+        ),
+    };
+    if let Some(profile) = given.profile {
+        let known = profile.known()?;
+        target.readable = known.readable;
+        (target.bits, target.words) = (known.bits, known.words);
+    } else {
+        let reply = first_answer(endpoint, &target, patience, &pdu(3, state::PRODUCT_CODE, 2))
+            .map_err(told)?;
+        let product = state::PRODUCT.to_be_bytes();
+        match reply {
+            Reply::Pdu(reply) if reply.get(2..) == Some(&product) => {}
+            Reply::Silence => {
+                let unit = given.unit;
+                return Err(format!(
+                    "unit {unit} does not answer at {line}: check its address, rate, format, mode and wiring"
+                ));
+            }
+            Reply::Wrong(..) => {
+                return Err(format!(
+                    "what comes at {line} is no Modbus frame ({reply}): check rate, format and mode"
+                ));
+            }
+            Reply::Pdu(_) => {
+                return Err(format!(
+                    "unit {} answers but is no modio: tell what it has with --profile FILE",
+                    given.unit
+                ));
+            }
+        }
+        let mut bench = Bench::new(endpoint, &target, patience, false);
+        let (found, slower) = modio(&mut bench, given.allow_config).map_err(told)?;
+        target = found;
+        patience.reply += slower;
+        patience.silence += slower;
+    }
+    for function in FUNCTIONS {
+        let listed = given.profile.and_then(|profile| profile.functions.as_ref());
+        let support = match listed {
+            Some(listed) if listed.contains(&function) => Support::Yes,
+            Some(_) => Support::Refused,
+            None => {
+                let request = harmless(&target, function)?;
+                match ask(endpoint, &target, patience, &request).map_err(told)? {
+                    Reply::Silence => Support::Silent,
+                    reply if reply.exception(function) == Some(1) => Support::Refused,
+                    _ => Support::Yes,
+                }
+            }
+        };
+        target.functions.insert(function, support);
+    }
+    target.ping = ping(&target).ok_or_else(|| {
+        "nothing is known that the unit could be asked for: let the profile name something to read"
+            .to_owned()
+    })?;
+    let reply = ask(endpoint, &target, patience, &target.ping).map_err(told)?;
+    if !matches!(&reply, Reply::Pdu(pdu) if pdu[0] == target.ping[0]) {
+        return Err(format!(
+            "unit {} at {line} does not answer an ordinary request: it gives {reply}",
+            given.unit
+        ));
+    }
+    Ok((target, patience))
+}
+
+fn ask(
+    endpoint: &mut dyn Endpoint,
+    target: &Target,
+    patience: Patience,
+    pdu: &[u8],
+) -> Check<Reply> {
+    Bench::new(endpoint, target, patience, false).ask(pdu)
+}
+
+/// Asks a unit that may be starting, or have something in its receiver from before.
+fn first_answer(
+    endpoint: &mut dyn Endpoint,
+    target: &Target,
+    patience: Patience,
+    pdu: &[u8],
+) -> Check<Reply> {
+    for _ in 0..ATTEMPTS - 1 {
+        if let reply @ Reply::Pdu(_) = ask(endpoint, target, patience, pdu)? {
+            return Ok(reply);
+        }
+    }
+    ask(endpoint, target, patience, pdu)
+}
+
+/// A request that shows whether the unit has a function, and changes nothing.
+fn harmless(target: &Target, function: u8) -> Result<Vec<u8>, String> {
+    let nowhere = || {
+        target.nowhere_to_write(function).ok_or_else(|| {
+            "every address exists: let the profile list the unit's functions".to_owned()
+        })
+    };
+    let first = |function| target.readable(function).first().map_or(0, |s| s.first);
+    Ok(match function {
+        1..=4 => pdu(function, first(function), 1),
+        5 | 6 => pdu(function, nowhere()?, 0),
+        7 | 0x0B | 0x0C | 0x11 => vec![function],
+        8 => vec![8, 0, 0, 0xA5, 0x37],
+        0x0F | 0x10 => vec![function, 0, 0, 0, 0, 0],
+        0x16 => [pdu(function, nowhere()?, 0xFFFF), vec![0, 0]].concat(),
+        0x17 => vec![function, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+        _ => vec![0x2B, 0x0E, 1, 0],
+    })
+}
+
+/// An ordinary request: a short read, else an echo.
+fn ping(target: &Target) -> Option<Vec<u8>> {
+    let read = (1..=4)
+        .filter(|function| target.has(*function))
+        .find_map(|function| Some(pdu(function, target.readable(function).first()?.first, 1)));
+    read.or_else(|| target.has(8).then(|| vec![8, 0, 0, 0xA5, 0x37]))
+}
+
+/// What a modio has, by its own registers; and how much longer than by the standard it may take to answer.
+fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)> {
+    let code = bench.read_word(state::MODULE_IN_FORCE + points::SLOT_PORT - 1)?;
+    let module = Module::from_code(code).unwrap_or(Module::None);
+    let delay = bench.read_word(configuration::RESPONSE_DELAY)?;
+    let gap = bench.read_word(configuration::FRAME_GAP)?;
+    let strict = bench.read_word(configuration::STRICT_T15)?;
+    let slower =
+        Duration::from_millis(u64::from(delay)) + Duration::from_micros(100) * u32::from(gap);
+
+    let mut target = bench.target.clone();
+    target.modio = Some(Modio { module });
+    target.strict_t15 = Some(strict == 1);
+    let kinds = module.points();
+    let run = |wanted: &[PointKind]| {
+        let mut channels = (0_u16..)
+            .zip(kinds)
+            .filter(|(_, kind)| wanted.contains(kind));
+        let first = channels.next()?.0;
+        let last = channels.last().map_or(first, |(channel, _)| channel);
+        Some(Span {
+            first: points::SLOT_FIRST + first,
+            last: points::SLOT_FIRST + last,
+        })
+    };
+    let bits: Vec<Span> = run(&[PointKind::BitInput, PointKind::BitOutput])
+        .into_iter()
+        .collect();
+    let mut registers: Vec<Span> = run(&[PointKind::WordInput, PointKind::WordOutput])
+        .into_iter()
+        .collect();
+    for block in BLOCKS.into_iter().skip(1) {
+        let mut open: Option<Span> = None;
+        for (rule, _) in block.registers() {
+            let last = rule.first + (rule.count - 1);
+            match &mut open {
+                Some(span) if span.last + 1 == rule.first => span.last = last,
+                _ => {
+                    registers.extend(open);
+                    open = Some(Span {
+                        first: rule.first,
+                        last,
+                    });
+                }
+            }
+        }
+        registers.extend(open);
+    }
+    target.readable = [bits.clone(), bits, registers.clone(), registers];
+    target.bits = run(&[PointKind::BitOutput]);
+    target.words = match run(&[PointKind::WordOutput]) {
+        Some(span) => Some(outputs(bench, span)?),
+        // A setting that touches no output: the NTC constants.
+        None if allow_config => Some(Words {
+            span: Span {
+                first: configuration::BETA,
+                last: configuration::BETA + points::COUNT - 1,
+            },
+            low: 2001,
+            high: 5000,
+            refused: Some(5001),
+            locked: true,
+        }),
+        None => None,
+    };
+    Ok((target, slower))
+}
+
+/// What analog outputs take, by their scale and signal.
+fn outputs(bench: &mut Bench<'_>, span: Span) -> Check<Words> {
+    let scale = bench.read_word(configuration::SCALE + span.first)?;
+    let signal = bench.read_word(configuration::RANGE + span.first)?;
+    let values = output_values(
+        codes::Signal::from_code(signal).unwrap_or(codes::Signal::Voltage),
+        codes::Scale::from_code(scale).unwrap_or(codes::Scale::Raw),
+    );
+    let (low, high) = match values {
+        Values::Range { min, max } => (min + 1, max),
+        _ => (1, 4095),
+    };
+    Ok(Words {
+        span,
+        low,
+        high,
+        refused: Some(high + 1),
+        locked: false,
+    })
+}

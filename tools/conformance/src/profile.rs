@@ -1,0 +1,217 @@
+//! A profile: what a device other than a modio has, in TOML, so that any Modbus server can be tested.
+//!
+//! ```toml
+//! unit = 17
+//! mode = "rtu"                      # or "ascii"; "rtu" when left out
+//! functions = [1, 3, 5, 6, 15, 16]  # probed when left out
+//! strict_t15 = true                 # frames with a gap above t1.5 are dropped; either way when left out
+//!
+//! [coils]
+//! read = ["0-99"]
+//! write = ["0-15"]                  # these are written to, and restored
+//!
+//! [holding_registers]
+//! read = ["0x0000-0x00FF"]
+//! write = ["0x0010-0x0013"]
+//! values = [1, 4000]                # two values that they take
+//! refused = 5000                    # one that they refuse with exception 03, if any
+//!
+//! [discrete_inputs]
+//! read = ["0-7"]
+//!
+//! [input_registers]
+//! read = ["0-9"]
+//! ```
+//!
+//! Each run is one that a single request may span; the addresses before and after it do not exist.
+
+use serde::Deserialize;
+
+use crate::frame::Mode;
+use crate::target::{Span, Words};
+
+/// The profile as it stands in its file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// The unit's address.
+    pub unit: Option<u8>,
+    /// `rtu` or `ascii`.
+    mode: Option<String>,
+    /// The functions that it has.
+    pub functions: Option<Vec<u8>>,
+    /// What becomes of a frame with a gap above t1.5.
+    pub strict_t15: Option<bool>,
+    #[serde(default)]
+    coils: Table,
+    #[serde(default)]
+    discrete_inputs: Table,
+    #[serde(default)]
+    holding_registers: Table,
+    #[serde(default)]
+    input_registers: Table,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    #[serde(default)]
+    read: Vec<String>,
+    #[serde(default)]
+    write: Vec<String>,
+    values: Option<[u16; 2]>,
+    refused: Option<u16>,
+}
+
+/// A profile, understood.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Known {
+    /// The mode it tells.
+    pub mode: Option<Mode>,
+    /// What can be read, by function 1 to 4.
+    pub readable: [Vec<Span>; 4],
+    /// Coils to write to.
+    pub bits: Option<Span>,
+    /// Registers to write to.
+    pub words: Option<Words>,
+}
+
+impl Profile {
+    /// Reads a profile.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with it, in one line.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        toml::from_str(text).map_err(|error| error.to_string().trim().replace('\n', " "))
+    }
+
+    /// What it says about the unit's points.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with it, in one line.
+    pub fn known(&self) -> Result<Known, String> {
+        let mode = match self.mode.as_deref() {
+            None => None,
+            Some("rtu") => Some(Mode::Rtu),
+            Some("ascii") => Some(Mode::Ascii),
+            Some(other) => return Err(format!("mode {other:?} is neither \"rtu\" nor \"ascii\"")),
+        };
+        for (table, name) in [
+            (&self.discrete_inputs, "discrete_inputs"),
+            (&self.input_registers, "input_registers"),
+        ] {
+            if !table.write.is_empty() {
+                return Err(format!("{name} cannot be written"));
+            }
+        }
+        let bits = spans(&self.coils.write)?.first().copied();
+        let holding = &self.holding_registers;
+        let words = match (spans(&holding.write)?.first(), holding.values) {
+            (None, _) => None,
+            (Some(_), None) => {
+                return Err(
+                    "holding_registers need `values`: two values that those in `write` take"
+                        .to_owned(),
+                );
+            }
+            (Some(_), Some([low, high])) if low == high => {
+                return Err("the two `values` of holding_registers must differ".to_owned());
+            }
+            (Some(span), Some([low, high])) => Some(Words {
+                span: span.up_to(123),
+                low,
+                high,
+                refused: holding.refused,
+                locked: false,
+            }),
+        };
+        Ok(Known {
+            mode,
+            readable: [
+                spans(&self.coils.read)?,
+                spans(&self.discrete_inputs.read)?,
+                spans(&holding.read)?,
+                spans(&self.input_registers.read)?,
+            ],
+            bits: bits.map(|span| span.up_to(1968)),
+            words,
+        })
+    }
+}
+
+fn spans(texts: &[String]) -> Result<Vec<Span>, String> {
+    texts.iter().map(|text| span(text)).collect()
+}
+
+/// `0x0010-0x0013`, `16-19` or `16`.
+fn span(text: &str) -> Result<Span, String> {
+    let wrong = || format!("{text:?} is no run of addresses such as \"0x0010-0x0013\"");
+    let number = |text: &str| {
+        let text = text.trim();
+        match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+            Some(digits) => u16::from_str_radix(digits, 16),
+            None => text.parse(),
+        }
+        .map_err(|_| wrong())
+    };
+    let (first, last) = match text.split_once('-') {
+        Some((first, last)) => (number(first)?, number(last)?),
+        None => (number(text)?, number(text)?),
+    };
+    if first > last {
+        return Err(wrong());
+    }
+    Ok(Span { first, last })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_in_the_documentation_is_understood() {
+        let text: String = include_str!("profile.rs")
+            .lines()
+            .skip_while(|line| *line != "//! ```toml")
+            .skip(1)
+            .take_while(|line| *line != "//! ```")
+            .map(|line| format!("{}\n", line.trim_start_matches("//!")))
+            .collect();
+        let profile = Profile::parse(&text).unwrap();
+        let known = profile.known().unwrap();
+        assert_eq!((profile.unit, known.mode), (Some(17), Some(Mode::Rtu)));
+        assert_eq!(
+            known.readable[2],
+            [Span {
+                first: 0,
+                last: 255
+            }]
+        );
+        assert_eq!(known.bits, Some(Span { first: 0, last: 15 }));
+        let words = known.words.unwrap();
+        assert_eq!((words.span.first, words.high), (16, 4000));
+        assert_eq!(words.refused, Some(5000));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        for (text, part) in [
+            ("unit = 300", "unit"),
+            ("colour = 1", "colour"),
+            ("mode = \"tcp\"", "neither"),
+            ("[coils]\nread = [\"5-3\"]", "5-3"),
+            ("[coils]\nread = [\"0-70000\"]", "70000"),
+            ("[holding_registers]\nwrite = [\"1\"]", "values"),
+            (
+                "[holding_registers]\nwrite = [\"1\"]\nvalues = [3, 3]",
+                "differ",
+            ),
+            ("[input_registers]\nwrite = [\"1\"]", "cannot be written"),
+        ] {
+            let told = Profile::parse(text).and_then(|p| p.known()).unwrap_err();
+            assert!(told.contains(part) && !told.contains('\n'), "{told}");
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! What a run tells: a table for people, JUnit XML and JSON for machines.
+
+pub mod json;
+pub mod junit;
+pub mod table;
+
+use crate::run::{Outcome, Verdict};
+
+/// How many cases ended how.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Totals {
+    /// Cases that passed.
+    pub passed: usize,
+    /// Cases that failed.
+    pub failed: usize,
+    /// Cases that did not apply.
+    pub skipped: usize,
+}
+
+impl Totals {
+    /// Counts outcomes.
+    #[must_use]
+    pub fn of(outcomes: &[Outcome]) -> Self {
+        let mut totals = Self::default();
+        for outcome in outcomes {
+            match outcome.verdict {
+                Verdict::Passed => totals.passed += 1,
+                Verdict::Failed(_) => totals.failed += 1,
+                Verdict::Skipped(_) => totals.skipped += 1,
+            }
+        }
+        totals
+    }
+}
+
+/// Outcomes to try the reports on.
+#[cfg(test)]
+fn some_outcomes() -> Vec<Outcome> {
+    use crate::case::Failure;
+    use std::time::Duration;
+    let verdicts = [
+        Verdict::Passed,
+        Verdict::Skipped("the unit answers 01 to function 07".to_owned()),
+        Verdict::Failed(Failure {
+            sent: "01 03 <&> \"x\"".to_owned(),
+            came: "silence".to_owned(),
+            wanted: "a reply".to_owned(),
+        }),
+    ];
+    crate::cases::all()
+        .into_iter()
+        .zip(verdicts)
+        .map(|(case, verdict)| Outcome {
+            case,
+            verdict,
+            time: Duration::from_millis(1250),
+        })
+        .collect()
+}

@@ -1,0 +1,69 @@
+//! The table on the terminal, and the list of cases.
+
+use crate::case::Case;
+use crate::report::Totals;
+use crate::run::{Outcome, Verdict};
+
+/// One row, and below it what went wrong.
+#[must_use]
+pub fn row(outcome: &Outcome) -> String {
+    let (result, reason) = match &outcome.verdict {
+        Verdict::Passed => ("ok", String::new()),
+        Verdict::Skipped(why) => ("skipped", why.clone()),
+        Verdict::Failed(_) => ("FAILED", String::new()),
+    };
+    let case = outcome.case;
+    let seconds = outcome.time.as_secs_f64();
+    let line = format!(
+        "{:<38} {:<28} {:<8} {:>7.2} s  {reason}",
+        case.name, case.section, result, seconds
+    );
+    let line = line.trim_end().to_owned();
+    match &outcome.verdict {
+        Verdict::Failed(failure) => format!(
+            "{line}\n    must be: {}\n    sent:    {}\n    came:    {}\n    wanted:  {}",
+            case.about, failure.sent, failure.came, failure.wanted
+        ),
+        _ => line,
+    }
+}
+
+/// The line below the table.
+#[must_use]
+pub fn summary(outcomes: &[Outcome]) -> String {
+    let totals = Totals::of(outcomes);
+    format!(
+        "{} cases: {} passed, {} failed, {} skipped",
+        outcomes.len(),
+        totals.passed,
+        totals.failed,
+        totals.skipped
+    )
+}
+
+/// Every case as a table in Markdown: the output of `--list`.
+#[must_use]
+pub fn list(cases: &[Case]) -> String {
+    let mut text = "| case | section | what must be so |\n|---|---|---|\n".to_owned();
+    for case in cases {
+        text += &format!("| `{}` | {} | {} |\n", case.name, case.section, case.about);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_tells_all_there_is() {
+        let outcomes = crate::report::some_outcomes();
+        let rows: Vec<String> = outcomes.iter().map(row).collect();
+        assert!(rows[0].contains(" ok ") && !rows[0].contains('\n'));
+        assert!(rows[1].contains("skipped") && rows[1].ends_with("function 07"));
+        for part in ["FAILED", "01 03 <&>", "silence", "a reply"] {
+            assert!(rows[2].contains(part), "{}", rows[2]);
+        }
+        assert_eq!(summary(&outcomes), "3 cases: 1 passed, 1 failed, 1 skipped");
+    }
+}

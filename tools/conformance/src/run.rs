@@ -1,0 +1,174 @@
+//! Runs cases one after another, skips those that do not apply, and leaves the unit as it was.
+
+use std::time::Duration;
+
+use register_map::codes::Command;
+use register_map::configuration::COMMAND;
+
+use crate::bench::{Bench, Patience};
+use crate::case::{Case, Failure, Need, Stop};
+use crate::endpoint::{Broken, Endpoint};
+use crate::frame::Mode;
+use crate::line::Parity;
+use crate::points::pdu;
+use crate::target::{Support, Target};
+
+/// How a case ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// As it should.
+    Passed,
+    /// It does not apply here: why.
+    Skipped(String),
+    /// The unit did wrong.
+    Failed(Failure),
+}
+
+/// A case that has been run, or skipped.
+#[derive(Clone)]
+pub struct Outcome {
+    /// The case.
+    pub case: Case,
+    /// How it ended.
+    pub verdict: Verdict,
+    /// How long it took by the endpoint's clock.
+    pub time: Duration,
+}
+
+/// What runs need to know beside the cases.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// How long to wait.
+    pub patience: Patience,
+    /// Whether a modio's configuration may be written.
+    pub allow_config: bool,
+}
+
+/// Runs these cases; `tell` hears of each as it ends.
+///
+/// # Errors
+///
+/// When the endpoint breaks; the outcomes told up to then stand.
+pub fn run(
+    endpoint: &mut dyn Endpoint,
+    target: &Target,
+    options: Options,
+    cases: &[Case],
+    mut tell: impl FnMut(&Outcome),
+) -> Result<Vec<Outcome>, Broken> {
+    let mut outcomes = Vec::new();
+    for case in cases {
+        let begin = endpoint.now();
+        let lacking = case
+            .needs
+            .iter()
+            .find_map(|need| lacking(*need, endpoint, target, options.allow_config));
+        let verdict = match lacking {
+            Some(why) => Verdict::Skipped(why),
+            None => one(endpoint, target, options, case)?,
+        };
+        let outcome = Outcome {
+            case: *case,
+            verdict,
+            time: endpoint.now().saturating_sub(begin),
+        };
+        tell(&outcome);
+        outcomes.push(outcome);
+    }
+    if options.allow_config && target.modio.is_some() {
+        // What cases have changed and put back still counts as changed: drop it.
+        let mut bench = Bench::new(endpoint, target, options.patience, true);
+        if bench.unlock().is_ok() {
+            let drop_changes = pdu(6, COMMAND, Command::DropChanges.code());
+            // It is an unclean end at worst: every case has put back what it changed.
+            let _ = bench.ask(&drop_changes);
+        }
+    }
+    Ok(outcomes)
+}
+
+fn one(
+    endpoint: &mut dyn Endpoint,
+    target: &Target,
+    options: Options,
+    case: &Case,
+) -> Result<Verdict, Broken> {
+    let mut bench = Bench::new(endpoint, target, options.patience, options.allow_config);
+    let writes = case
+        .needs
+        .iter()
+        .any(|need| matches!(need, Need::Bits | Need::Words));
+    let locked = case.needs.contains(&Need::Words) && target.words.is_some_and(|w| w.locked);
+    let mut before = None;
+    let result = (|| {
+        if locked {
+            bench.unlock()?;
+        }
+        if writes {
+            before = Some(bench.snapshot()?);
+        }
+        (case.run)(&mut bench)
+    })();
+    let restored = match &before {
+        Some(before) => bench.restore(before),
+        None => Ok(()),
+    };
+    let complaints = bench.endpoint.take_complaints();
+    match result.and(restored) {
+        Ok(()) if complaints.is_empty() => Ok(Verdict::Passed),
+        Ok(()) => Ok(Verdict::Failed(Failure {
+            sent: case.about.to_owned(),
+            came: complaints.join("; "),
+            wanted: "nothing on the board that a real part would not take well".to_owned(),
+        })),
+        Err(Stop::Skip(why)) => Ok(Verdict::Skipped(why)),
+        Err(Stop::Fail(failure)) => Ok(Verdict::Failed(failure)),
+        Err(Stop::Broken(broken)) => Err(broken),
+    }
+}
+
+/// Why a need is not met, if it is not.
+fn lacking(
+    need: Need,
+    endpoint: &dyn Endpoint,
+    target: &Target,
+    allow_config: bool,
+) -> Option<String> {
+    let able = endpoint.abilities();
+    let (met, why) = match need {
+        Need::Function(function) => {
+            let how = match target.functions.get(&function) {
+                Some(Support::Yes) => return None,
+                Some(Support::Silent) => "is silent to",
+                _ => "answers 01 to",
+            };
+            return Some(format!("the unit {how} function {function:02X}"));
+        }
+        Need::Readable(function) => {
+            if target.longest(function).is_some() {
+                return None;
+            }
+            return Some(format!("nothing to read by function {function:02X}"));
+        }
+        Need::Bits => (target.bits.is_some(), "no coil to write to"),
+        Need::Words => (
+            target.words.is_some(),
+            "no register to write to (on a modio, --allow-config gives some)",
+        ),
+        Need::Exact => (able.exact, "the endpoint's time is not exact"),
+        Need::Faults => (able.faults, "the endpoint cannot send damaged characters"),
+        Need::Parity => (
+            endpoint.line().parity != Parity::None,
+            "the line has no parity",
+        ),
+        Need::Power => (able.power, "the endpoint cannot switch the power"),
+        Need::Driver => (able.driver, "the endpoint does not see the driver"),
+        Need::Echo => (able.echo, "the endpoint has no echo to switch"),
+        Need::SetLine => (able.set_line, "the endpoint cannot change rate and format"),
+        Need::Config => (allow_config, "writes the configuration: --allow-config"),
+        Need::Modio => (target.modio.is_some(), "about the modio only"),
+        Need::Rtu => (target.mode == Mode::Rtu, "about RTU framing"),
+        Need::Ascii => (target.mode == Mode::Ascii, "about ASCII framing: --ascii"),
+    };
+    (!met).then(|| why.to_owned())
+}

@@ -1,0 +1,185 @@
+//! What the unit under test has, as far as the cases need to know: found by the probe, told by a profile.
+
+use std::collections::BTreeMap;
+
+use register_map::Module;
+
+use crate::frame::Mode;
+
+/// A run of addresses that one request may ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// The first address.
+    pub first: u16,
+    /// The last address, not below `first`.
+    pub last: u16,
+}
+
+impl Span {
+    /// How many addresses it has, 1 to 65536.
+    #[must_use]
+    pub fn len(self) -> u32 {
+        u32::from(self.last - self.first) + 1
+    }
+
+    /// Never: a span has at least one address.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        false
+    }
+
+    /// Its first `most` addresses at most.
+    #[must_use]
+    pub fn up_to(self, most: u16) -> Self {
+        let last = self.first.saturating_add(most.saturating_sub(1));
+        Self {
+            first: self.first,
+            last: self.last.min(last),
+        }
+    }
+
+    /// Whether the address is in it.
+    #[must_use]
+    pub const fn has(self, address: u16) -> bool {
+        self.first <= address && address <= self.last
+    }
+}
+
+/// Words that may be written, and what they take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Words {
+    /// Their addresses, at most 123.
+    pub span: Span,
+    /// A value they take.
+    pub low: u16,
+    /// Another.
+    pub high: u16,
+    /// A value they refuse with exception 03, if there is one.
+    pub refused: Option<u16>,
+    /// They are the device's configuration: its lock is to be opened first.
+    pub locked: bool,
+}
+
+/// How a unit took the probe's harmless request for a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Support {
+    /// It did something else than refuse the function.
+    Yes,
+    /// Exception 01.
+    Refused,
+    /// Silence.
+    Silent,
+}
+
+/// What is known of a modio beyond its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Modio {
+    /// The module in force in its slot.
+    pub module: Module,
+}
+
+/// The unit under test.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// Its address, 1 to 247 (255 for a modio in loader mode).
+    pub unit: u8,
+    /// RTU or ASCII.
+    pub mode: Mode,
+    /// The functions that were probed.
+    pub functions: BTreeMap<u8, Support>,
+    /// What can be read, by function 1 to 4; the runs in ascending order, none touching another unless a
+    /// request may not span both.
+    pub readable: [Vec<Span>; 4],
+    /// Coils to write to: at most 1968.
+    pub bits: Option<Span>,
+    /// Registers to write to.
+    pub words: Option<Words>,
+    /// Whether a frame with a gap between t1.5 and t3.5 is dropped; `None`: either way is right.
+    pub strict_t15: Option<bool>,
+    /// What is known of a modio.
+    pub modio: Option<Modio>,
+    /// A request that is answered without effect: its PDU.
+    pub ping: Vec<u8>,
+}
+
+impl Target {
+    /// The runs that this function (1 to 4) reads.
+    #[must_use]
+    pub fn readable(&self, function: u8) -> &[Span] {
+        match function {
+            1..=4 => &self.readable[usize::from(function) - 1],
+            _ => &[],
+        }
+    }
+
+    /// The longest run that this function reads.
+    #[must_use]
+    pub fn longest(&self, function: u8) -> Option<Span> {
+        let spans = self.readable(function).iter().copied();
+        spans.max_by_key(|span| (span.len(), u16::MAX - span.first))
+    }
+
+    /// Whether the unit has this function.
+    #[must_use]
+    pub fn has(&self, function: u8) -> bool {
+        self.functions.get(&function) == Some(&Support::Yes)
+    }
+
+    /// An address of which this function (1 to 4) knows nothing; the highest there is.
+    #[must_use]
+    pub fn nowhere(&self, function: u8) -> Option<u16> {
+        let spans = self.readable(function);
+        (0..=u16::MAX)
+            .rev()
+            .find(|address| !spans.iter().any(|span| span.has(*address)))
+    }
+
+    /// An address where nothing can be read or written as a coil, or as a register: the highest.
+    #[must_use]
+    pub fn nowhere_to_write(&self, function: u8) -> Option<u16> {
+        match function {
+            5 | 15 => self.nowhere(1),
+            _ => self.nowhere(3),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn span(first: u16, last: u16) -> Span {
+        Span { first, last }
+    }
+
+    fn target(holding: Vec<Span>) -> Target {
+        Target {
+            unit: 1,
+            mode: Mode::Rtu,
+            functions: BTreeMap::from([(3, Support::Yes), (4, Support::Refused)]),
+            readable: [vec![], vec![], holding, vec![]],
+            bits: None,
+            words: None,
+            strict_t15: None,
+            modio: None,
+            ping: vec![],
+        }
+    }
+
+    #[test]
+    fn spans_are_counted_and_cut() {
+        assert_eq!(span(0, u16::MAX).len(), 65_536);
+        assert_eq!(span(10, 19).up_to(4), span(10, 13));
+        assert_eq!(span(10, 12).up_to(4), span(10, 12));
+        assert_eq!(span(0xFFFE, 0xFFFF).up_to(123), span(0xFFFE, 0xFFFF));
+    }
+
+    #[test]
+    fn the_longest_run_and_an_address_outside_are_found() {
+        let target = target(vec![span(0, 3), span(10, 20), span(0xFFF0, 0xFFFF)]);
+        assert_eq!(target.longest(3), Some(span(0xFFF0, 0xFFFF)));
+        assert_eq!(target.nowhere(3), Some(0xFFEF));
+        assert_eq!(target.longest(4), None);
+        assert!(target.has(3) && !target.has(4) && !target.has(5));
+    }
+}

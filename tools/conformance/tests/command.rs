@@ -1,0 +1,210 @@
+//! The command itself: its exit status, its lines, its files, over a socket with the reference server
+//! behind it.
+
+#[path = "reference/fault.rs"]
+#[allow(dead_code, reason = "the list of faults is for the test of the cases")]
+mod fault;
+#[path = "reference/ident.rs"]
+mod ident;
+#[path = "reference/log.rs"]
+mod log;
+#[path = "reference/server.rs"]
+mod server;
+#[path = "reference/unit.rs"]
+#[allow(
+    dead_code,
+    reason = "an endpoint without exact time needs a part of it"
+)]
+mod unit;
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Command, Output};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use conformance::frame::Mode;
+use conformance::line::LineFormat;
+use fault::Fault;
+use unit::{Sign, Unit};
+
+const PROFILE: &str = r#"
+unit = 9
+functions = [1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 15, 16, 17, 22, 23, 43]
+
+[coils]
+read = ["100-2199"]
+write = ["100-107"]
+
+[holding_registers]
+read = ["1000-1199"]
+write = ["1000-1003"]
+values = [1, 4000]
+refused = 5000
+"#;
+
+fn command(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_modio-conformance"))
+        .args(arguments)
+        .output()
+        .expect("the command runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Serves one master on a socket until it goes: a silence of some milliseconds ends a frame.
+fn serve(mut stream: TcpStream, fault: Option<Fault>) {
+    let line = LineFormat::default();
+    let mut unit = Unit::new(fault, Mode::Rtu, line);
+    let begin = Instant::now();
+    stream
+        .set_read_timeout(Some(Duration::from_millis(8)))
+        .expect("a socket takes a time-out");
+    let mut buffer = [0; 1024];
+    loop {
+        match stream.read(&mut buffer) {
+            Ok(0) => return,
+            Ok(length) => {
+                for byte in &buffer[..length] {
+                    let at = begin.elapsed();
+                    unit.hear(Sign {
+                        byte: *byte,
+                        start: at,
+                        end: at,
+                        parity_error: false,
+                        stop_error: false,
+                    });
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                unit.close(begin.elapsed());
+                let reply: Vec<u8> = unit.said.drain(..).map(|heard| heard.byte).collect();
+                if stream.write_all(&reply).is_err() {
+                    return;
+                }
+            }
+            Err(_) => return,
+        }
+    }
+}
+
+/// A server with this fault; its address.
+fn server(fault: Option<Fault>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("bound").to_string();
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            thread::spawn(move || serve(stream, fault));
+        }
+    });
+    address
+}
+
+#[test]
+fn a_good_server_passes_and_the_reports_are_written() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = |name: &str| directory.path().join(name).display().to_string();
+    std::fs::write(path("profile.toml"), PROFILE).expect("written");
+    let output = command(&[
+        "--tcp",
+        &server(None),
+        "--profile",
+        &path("profile.toml"),
+        "--patience",
+        "60",
+        "--only",
+        "fc05/",
+        "--only",
+        "timing/",
+        "--junit",
+        &path("junit.xml"),
+        "--json",
+        &path("result.json"),
+    ]);
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{out}{err}");
+    assert!(
+        out.contains("fc05/value") && out.contains("0 failed"),
+        "{out}"
+    );
+    assert!(out.contains("the endpoint's time is not exact"), "{out}");
+    let xml = std::fs::read_to_string(path("junit.xml")).expect("there");
+    assert!(xml.contains("failures=\"0\"") && xml.contains("classname=\"fc05\""));
+    let json = std::fs::read_to_string(path("result.json")).expect("there");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["failed"], 0);
+    assert!(json["passed"].as_u64() > Some(4));
+}
+
+#[test]
+fn a_faulty_server_gives_status_1_and_the_failure_is_shown() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let profile = directory.path().join("profile.toml");
+    std::fs::write(&profile, PROFILE).expect("written");
+    let output = command(&[
+        "--tcp",
+        &server(Some(Fault::Answers126)),
+        "--profile",
+        &profile.display().to_string(),
+        "--patience",
+        "60",
+        "--only",
+        "fc03/quantity-above-most",
+    ]);
+    let out = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{out}");
+    for part in [
+        "FAILED",
+        "09 03 03 E8 00 7E",
+        "exception 03 to function 03",
+        "1 failed",
+    ] {
+        assert!(out.contains(part), "{part}: {out}");
+    }
+}
+
+#[test]
+fn what_cannot_be_tested_is_status_2_and_one_line() {
+    let nobody = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let nowhere = nobody.local_addr().expect("bound").to_string();
+    drop(nobody);
+    let silent = server(Some(Fault::SilentToUnknown));
+    for (arguments, part) in [
+        (&[][..], "--serial PORT"),
+        (&["--tcp", &nowhere], "cannot connect"),
+        (&["--serial", "/dev/no-such-port"], "not there"),
+        (
+            &["--tcp", &silent, "--unit", "77", "--patience", "50"],
+            "does not answer",
+        ),
+        (
+            &["--tcp", &silent, "--unit", "9", "--patience", "50"],
+            "--profile",
+        ),
+        (
+            &["--tcp", &silent, "--profile", "/no/profile"],
+            "/no/profile",
+        ),
+        (&["--only", "no such case"], "--list"),
+        (&["--format", "9N1"], "8N2"),
+        (&["--no-such-option"], "unexpected argument"),
+    ] {
+        let output = command(arguments);
+        let err = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
+        assert!(err.contains(part), "{arguments:?}: {err}");
+        assert_eq!(err.trim_end().lines().count(), 1, "{err}");
+    }
+}
+
+#[test]
+fn the_list_names_every_case() {
+    let output = command(&["--list"]);
+    assert_eq!(output.status.code(), Some(0));
+    let list = text(&output.stdout);
+    for case in conformance::cases::all() {
+        assert!(list.contains(&format!("`{}`", case.name)), "{}", case.name);
+    }
+}

@@ -1,0 +1,184 @@
+//! A line in virtual time with the reference unit on it.
+
+use std::time::Duration;
+
+use conformance::endpoint::{Abilities, Broken, Endpoint, Heard, Piece};
+use conformance::frame::Mode;
+use conformance::line::LineFormat;
+
+use super::fault::Fault;
+use super::unit::{Sign, Unit};
+
+/// For the unit to start in.
+const START: Duration = Duration::from_millis(100);
+
+pub struct Reference {
+    unit: Unit,
+    now: Duration,
+    powered: bool,
+    starts: Option<Duration>,
+}
+
+impl Reference {
+    pub fn new(fault: Option<Fault>, mode: Mode, line: LineFormat) -> Self {
+        Self {
+            unit: Unit::new(fault, mode, line),
+            now: Duration::from_secs(1),
+            powered: true,
+            starts: None,
+        }
+    }
+
+    /// Everything due up to `to` happens.
+    fn advance(&mut self, to: Duration) {
+        if let Some(at) = self.starts.filter(|at| *at <= to) {
+            self.unit.start(at);
+            self.starts = None;
+        }
+        if let Some(at) = self.unit.closes().filter(|at| *at <= to) {
+            self.unit.close(at);
+        }
+        self.now = self.now.max(to);
+    }
+
+    fn character(&mut self, sign: Sign) {
+        self.advance(sign.start);
+        if self.powered && self.starts.is_none() {
+            self.unit.hear(sign);
+        }
+        self.now = sign.end;
+    }
+}
+
+impl Endpoint for Reference {
+    fn name(&self) -> String {
+        "the reference server".to_owned()
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities {
+            exact: true,
+            faults: true,
+            power: true,
+            driver: true,
+            echo: true,
+            set_line: false,
+        }
+    }
+
+    fn line(&self) -> LineFormat {
+        self.unit.line
+    }
+
+    fn set_line(&mut self, _line: LineFormat) -> Result<(), Broken> {
+        Err(Broken("its line is as it is".to_owned()))
+    }
+
+    fn now(&self) -> Duration {
+        self.now
+    }
+
+    fn rest(&mut self, time: Duration) -> Result<(), Broken> {
+        self.advance(self.now + time);
+        Ok(())
+    }
+
+    fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
+        let length = self.unit.line.characters(1);
+        let bit = self.unit.line.bits(1);
+        for piece in pieces {
+            let start = self.now;
+            let sign = |byte| Sign {
+                byte,
+                start,
+                end: start + length,
+                parity_error: false,
+                stop_error: false,
+            };
+            match piece {
+                Piece::Bytes(bytes) => {
+                    for byte in bytes {
+                        let start = self.now;
+                        let sign = Sign {
+                            start,
+                            end: start + length,
+                            ..sign(*byte)
+                        };
+                        self.character(sign);
+                    }
+                }
+                Piece::Gap(gap) => self.advance(start + *gap),
+                Piece::BadParity(byte) => self.character(Sign {
+                    parity_error: true,
+                    ..sign(*byte)
+                }),
+                Piece::BadStop(byte) => self.character(Sign {
+                    stop_error: true,
+                    ..sign(*byte)
+                }),
+                Piece::Break(bits) => self.character(Sign {
+                    stop_error: true,
+                    end: start + bit * u32::from(*bits + 1),
+                    ..sign(0)
+                }),
+                Piece::Glitch(width) => self.advance(start + *width),
+            }
+        }
+        Ok(self.now)
+    }
+
+    fn hear(
+        &mut self,
+        patience: Duration,
+        quiet: Duration,
+        enough: usize,
+    ) -> Result<Vec<Heard>, Broken> {
+        let mut heard: Vec<Heard> = Vec::new();
+        let mut until = self.now + patience;
+        while heard.len() < enough {
+            if let Some(next) = self
+                .unit
+                .said
+                .front()
+                .copied()
+                .filter(|next| next.end <= until)
+            {
+                self.unit.said.pop_front();
+                self.now = self.now.max(next.end);
+                until = next.end + quiet;
+                heard.push(next);
+                continue;
+            }
+            match self.unit.closes().filter(|at| *at <= until) {
+                Some(at) => self.advance(at),
+                None if self.starts.is_some_and(|at| at <= until) => {
+                    let at = self.starts.unwrap_or_default();
+                    self.advance(at);
+                }
+                None => {
+                    self.advance(until);
+                    break;
+                }
+            }
+        }
+        Ok(heard)
+    }
+
+    fn set_power(&mut self, on: bool) -> Result<(), Broken> {
+        self.powered = on;
+        self.starts = on.then_some(self.now + START);
+        if !on {
+            self.unit.said.clear();
+        }
+        Ok(())
+    }
+
+    fn set_echo(&mut self, echo: bool) -> Result<(), Broken> {
+        self.unit.echo = echo;
+        Ok(())
+    }
+
+    fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
+        Ok(std::mem::take(&mut self.unit.edges))
+    }
+}

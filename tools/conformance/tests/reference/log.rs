@@ -1,0 +1,97 @@
+//! Counters, event log and listen-only mode (V1.02 appendix A, V1.1b3 6.8 to 6.10).
+
+use std::collections::VecDeque;
+
+/// Counters by sub-function, 0B to 12.
+const COUNTERS: usize = 8;
+
+/// What the line has seen.
+#[derive(Default)]
+pub struct Log {
+    counters: [u16; COUNTERS],
+    pub listen_only: bool,
+    pub events: u16,
+    log: VecDeque<u8>,
+}
+
+impl Log {
+    /// Counts one more; `sub` is 0B to 12.
+    pub fn count(&mut self, sub: usize) {
+        self.counters[sub - 0x0B] = self.counters[sub - 0x0B].wrapping_add(1);
+    }
+
+    /// A new event, the newest first.
+    pub fn event(&mut self, event: u8) {
+        self.log.push_front(event);
+        self.log.truncate(64);
+    }
+
+    pub fn event_counter(&self) -> Vec<u8> {
+        [[0, 0], self.events.to_be_bytes()].concat()
+    }
+
+    pub fn read(&self, backwards: bool) -> Vec<u8> {
+        let mut log: Vec<u8> = self.log.iter().copied().collect();
+        if backwards {
+            log.reverse();
+        }
+        let head = [
+            [0, 0],
+            self.events.to_be_bytes(),
+            self.counters[0].to_be_bytes(),
+        ]
+        .concat();
+        [vec![(6 + log.len()) as u8], head, log].concat()
+    }
+
+    /// A sub-function other than 00 and 03: the data of its reply.
+    pub fn diagnose(
+        &mut self,
+        sub: u16,
+        data: &[u8],
+        clears: bool,
+        keeps: bool,
+    ) -> Result<Vec<u8>, u8> {
+        let zero = if data == [0, 0] { Ok(()) } else { Err(3) };
+        match sub {
+            1 => {
+                match data {
+                    [0, 0] => {}
+                    [0xFF, 0] if keeps => {}
+                    [0xFF, 0] => self.log.clear(),
+                    _ => return Err(3),
+                }
+                self.listen_only = false;
+                self.event(0);
+                self.clear(clears);
+                Ok(data.to_vec())
+            }
+            2 => zero.map(|()| vec![0, 0]),
+            4 => zero.map(|()| {
+                self.listen_only = true;
+                Vec::new()
+            }),
+            0x0A => zero.map(|()| {
+                self.clear(clears);
+                vec![0, 0]
+            }),
+            0x0B..=0x12 => zero.map(|()| {
+                self.counters[usize::from(sub) - 0x0B]
+                    .to_be_bytes()
+                    .to_vec()
+            }),
+            0x14 => zero.map(|()| {
+                self.counters[7] = 0;
+                vec![0, 0]
+            }),
+            _ => Err(1),
+        }
+    }
+
+    fn clear(&mut self, clears: bool) {
+        if clears {
+            self.counters = [0; COUNTERS];
+            self.events = 0;
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The suite against a reference server, written for this test alone: a faultless one passes every case,
+//! and each of its faults makes the case fail that is there to find it.
+
+mod endpoint;
+mod fault;
+mod ident;
+mod log;
+mod server;
+mod unit;
+
+use conformance::cases::all;
+use conformance::cli::waits;
+use conformance::frame::Mode;
+use conformance::line::LineFormat;
+use conformance::probe::{Given, probe};
+use conformance::profile::Profile;
+use conformance::run::{Options, Outcome, Verdict, run};
+
+use endpoint::Reference;
+use fault::{ASCII_FAULTS, FAULTS, Fault};
+
+const PROFILE: &str = r#"
+unit = 9
+
+[coils]
+read = ["100-2199"]
+write = ["100-2199"]
+
+[discrete_inputs]
+read = ["0-18"]
+
+[holding_registers]
+read = ["1000-1199"]
+write = ["1000-1199"]
+values = [1, 4000]
+refused = 4096
+
+[input_registers]
+read = ["50-59"]
+"#;
+
+/// Runs the cases whose names are `only`, or all.
+fn outcomes(fault: Option<Fault>, mode: Mode, format: &str, only: Option<&str>) -> Vec<Outcome> {
+    let line = LineFormat::new(9600, format.parse().unwrap());
+    let mut endpoint = Reference::new(fault, mode, line);
+    // The probe would stumble over some faults: it is given what a faultless one has.
+    let mut profile = Profile::parse(PROFILE).unwrap();
+    if fault.is_some() {
+        profile.functions = Some(conformance::probe::FUNCTIONS.to_vec());
+    }
+    let given = Given {
+        unit: 9,
+        mode,
+        patience: waits(&endpoint, None),
+        profile: Some(&profile),
+        allow_config: false,
+    };
+    let (target, patience) = probe(&mut endpoint, &given).unwrap();
+    let mut cases = all();
+    cases.retain(|case| only.is_none_or(|name| case.name == name));
+    let options = Options {
+        patience,
+        allow_config: false,
+    };
+    run(&mut endpoint, &target, options, &cases, |_| {}).unwrap()
+}
+
+fn assert_faultless(mode: Mode, format: &str) -> Vec<&'static str> {
+    let outcomes = outcomes(None, mode, format, None);
+    let mut passed = Vec::new();
+    for outcome in &outcomes {
+        match &outcome.verdict {
+            Verdict::Passed => passed.push(outcome.case.name),
+            Verdict::Skipped(_) => {}
+            Verdict::Failed(_) => panic!("{}", conformance::report::table::row(outcome)),
+        }
+    }
+    passed
+}
+
+#[test]
+fn a_faultless_server_passes_and_only_what_is_about_others_is_skipped() {
+    let passed: Vec<&str> = [
+        assert_faultless(Mode::Rtu, "8E1"),
+        assert_faultless(Mode::Ascii, "7E1"),
+    ]
+    .concat();
+    for case in all() {
+        let about_modio = case.needs.contains(&conformance::case::Need::Modio);
+        assert_eq!(
+            passed.contains(&case.name),
+            !about_modio,
+            "{} runs against the reference",
+            case.name
+        );
+    }
+}
+
+#[test]
+fn every_fault_is_found_by_its_case() {
+    let mut missed = Vec::new();
+    for (mode, faults) in [(Mode::Rtu, FAULTS), (Mode::Ascii, ASCII_FAULTS)] {
+        for (fault, case) in faults {
+            let outcomes = outcomes(Some(*fault), mode, "8E1", Some(case));
+            let [outcome] = &outcomes[..] else {
+                panic!("no case {case}");
+            };
+            if !matches!(outcome.verdict, Verdict::Failed(_)) {
+                missed.push((fault, case, outcome.verdict.clone()));
+            }
+        }
+    }
+    assert!(missed.is_empty(), "not found: {missed:#?}");
+}
+
+#[test]
+fn what_a_case_writes_is_put_back() {
+    let line = LineFormat::default();
+    let mut endpoint = Reference::new(None, Mode::Rtu, line);
+    let profile = Profile::parse(PROFILE).unwrap();
+    let given = Given {
+        unit: 9,
+        mode: Mode::Rtu,
+        patience: waits(&endpoint, None),
+        profile: Some(&profile),
+        allow_config: false,
+    };
+    let (target, patience) = probe(&mut endpoint, &given).unwrap();
+    let snapshot = |endpoint: &mut Reference| {
+        let mut bench = conformance::bench::Bench::new(endpoint, &target, patience, false);
+        bench.snapshot().unwrap()
+    };
+    {
+        let mut bench = conformance::bench::Bench::new(&mut endpoint, &target, patience, false);
+        bench.set_bits(100, &[true, false, true]).unwrap();
+        bench.set_words(1000, &[17, 18, 19]).unwrap();
+    }
+    let before = snapshot(&mut endpoint);
+    let mut cases = all();
+    cases.retain(|case| !case.name.starts_with("power/"));
+    let options = Options {
+        patience,
+        allow_config: false,
+    };
+    run(&mut endpoint, &target, options, &cases, |_| {}).unwrap();
+    assert_eq!(snapshot(&mut endpoint), before);
+}

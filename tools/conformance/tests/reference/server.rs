@@ -1,0 +1,298 @@
+//! A Modbus server small enough to be seen to be right, from V1.1b3 alone; wrong where it is told to be.
+
+use super::fault::Fault;
+use super::log::Log;
+
+/// Coils and registers, and where they are.
+pub const COILS: (u16, usize) = (100, 2100);
+pub const INPUTS: (u16, usize) = (0, 19);
+pub const HOLDING: (u16, usize) = (1000, 200);
+pub const INPUT_REGISTERS: (u16, usize) = (50, 10);
+/// Holding registers take values up to this.
+pub const MOST: u16 = 4095;
+
+type Answer = Result<Vec<u8>, u8>;
+
+/// The server.
+pub struct Server {
+    pub fault: Option<Fault>,
+    pub coils: Vec<bool>,
+    pub holding: Vec<u16>,
+    pub log: Log,
+    pub delimiter: u8,
+}
+
+impl Server {
+    pub fn new(fault: Option<Fault>) -> Self {
+        Self {
+            fault,
+            coils: vec![false; COILS.1],
+            holding: vec![1; HOLDING.1],
+            log: Log::default(),
+            delimiter: b'\n',
+        }
+    }
+
+    pub fn has(&self, fault: Fault) -> bool {
+        self.fault == Some(fault)
+    }
+
+    /// Does what a PDU asks for: the reply's data, or an exception code.
+    pub fn answer(&mut self, pdu: &[u8]) -> Answer {
+        let word = |at: usize| {
+            pdu.get(at..at + 2)
+                .map(|w| u16::from_be_bytes([w[0], w[1]]))
+        };
+        let two = || Ok::<_, u8>((word(1).ok_or(3)?, word(3).ok_or(3)?));
+        let exactly = |length: usize| if pdu.len() == length { Ok(()) } else { Err(3) };
+        match pdu[0] {
+            function @ 1..=4 => {
+                if !self.has(Fault::IgnoresLength) || pdu.len() < 5 {
+                    exactly(5)?;
+                }
+                let (at, quantity) = two()?;
+                self.read(function, at, quantity)
+            }
+            5 => {
+                exactly(5)?;
+                let (at, value) = two()?;
+                let on = match value {
+                    0xFF00 => true,
+                    0 => false,
+                    0x1234 if self.has(Fault::TakesCoil1234) => true,
+                    _ => return Err(3),
+                };
+                let at = place(COILS, at, 1)?;
+                self.coils[at] = on;
+                Ok(pdu[1..].to_vec())
+            }
+            6 => {
+                exactly(5)?;
+                let (at, value) = two()?;
+                let at = place(HOLDING, at, 1)?;
+                if value <= MOST || self.has(Fault::StoresRefused) {
+                    self.holding[at] = value;
+                }
+                if value > MOST {
+                    Err(3)
+                } else {
+                    Ok(pdu[1..].to_vec())
+                }
+            }
+            7 => exactly(1).map(|()| vec![0x6D]),
+            8 => self.diagnose(pdu),
+            0x0B => exactly(1).map(|()| self.log.event_counter()),
+            0x0C => exactly(1).map(|()| self.log.read(self.has(Fault::LogBackwards))),
+            0x0F => self.write_coils(pdu),
+            0x10 => self.write_registers(pdu),
+            0x11 => exactly(1).map(|()| vec![2, 0x42, 0xFF]),
+            0x16 => {
+                exactly(7)?;
+                let (at, and) = two()?;
+                let or = word(5).ok_or(3)?;
+                let at = place(HOLDING, at, 1)?;
+                let or = if self.has(Fault::PlainOr) {
+                    or
+                } else {
+                    or & !and
+                };
+                let value = (self.holding[at] & and) | or;
+                if value > MOST {
+                    return Err(3);
+                }
+                self.holding[at] = value;
+                Ok(pdu[1..].to_vec())
+            }
+            0x17 => self.read_write(pdu),
+            0x2B => super::ident::answer(pdu, self.fault),
+            _ => Err(1),
+        }
+    }
+
+    fn read(&self, function: u8, at: u16, quantity: u16) -> Answer {
+        let bits = function <= 2;
+        let most = match bits {
+            true => 2000,
+            false if self.has(Fault::Answers126) => 126,
+            false => 125,
+        };
+        let table = [COILS, INPUTS, HOLDING, INPUT_REGISTERS][usize::from(function) - 1];
+        if self.has(Fault::AddressFirst) {
+            place(table, at, quantity.max(1))?;
+        }
+        if quantity > most || (quantity == 0 && !self.has(Fault::AnswersQuantity0)) {
+            return Err(3);
+        }
+        let start = match place(table, at, quantity) {
+            Err(_) if self.has(Fault::Wraps) && at.checked_add(quantity).is_none() => 0,
+            found => found?,
+        };
+        let range = start..start + usize::from(quantity);
+        let mut data = Vec::new();
+        if bits {
+            let bit = |n: usize| {
+                if function == 1 {
+                    self.coils[n]
+                } else {
+                    n.is_multiple_of(3)
+                }
+            };
+            data = vec![0_u8; usize::from(quantity).div_ceil(8)];
+            for (n, source) in range.enumerate() {
+                data[n / 8] |= u8::from(bit(source)) << (n % 8);
+            }
+            if self.has(Fault::DirtyPadding) && !quantity.is_multiple_of(8) {
+                *data.last_mut().unwrap() |= 0x80;
+            }
+        } else {
+            for n in range {
+                let word = if function == 3 {
+                    self.holding[n]
+                } else {
+                    n as u16 * 7
+                };
+                data.extend(word.to_be_bytes());
+            }
+        }
+        Ok([vec![data.len() as u8], data].concat())
+    }
+
+    fn write_coils(&mut self, pdu: &[u8]) -> Answer {
+        let (at, quantity, data) = many(pdu)?;
+        if !(1..=1968).contains(&quantity) || data.len() != usize::from(quantity).div_ceil(8) {
+            return Err(3);
+        }
+        let start = place(COILS, at, quantity)?;
+        let written = if self.has(Fault::WritesPadding) {
+            data.len() * 8
+        } else {
+            usize::from(quantity)
+        };
+        for n in 0..written {
+            if let Some(coil) = self.coils.get_mut(start + n) {
+                *coil = data[n / 8] >> (n % 8) & 1 == 1;
+            }
+        }
+        Ok(pdu[1..5].to_vec())
+    }
+
+    fn write_registers(&mut self, pdu: &[u8]) -> Answer {
+        let quantity = pdu.get(3..5).map(|w| u16::from_be_bytes([w[0], w[1]]));
+        if self.has(Fault::IgnoresByteCount)
+            && let (Some(quantity @ 1..=123), Some(data)) = (quantity, pdu.get(6..))
+        {
+            let at = u16::from_be_bytes([pdu[1], pdu[2]]);
+            let start = place(HOLDING, at, quantity)?;
+            for (n, word) in data.chunks(2).take(usize::from(quantity)).enumerate() {
+                self.holding[start + n] = u16::from_be_bytes([word[0], *word.get(1).unwrap_or(&0)]);
+            }
+            return Ok(pdu[1..5].to_vec());
+        }
+        let (at, quantity, data) = many(pdu)?;
+        if !(1..=123).contains(&quantity) || data.len() != usize::from(quantity) * 2 {
+            return Err(3);
+        }
+        self.store(at, data)?;
+        Ok(pdu[1..5].to_vec())
+    }
+
+    /// All of it or nothing.
+    fn store(&mut self, at: u16, data: &[u8]) -> Result<(), u8> {
+        let words: Vec<u16> = data
+            .chunks(2)
+            .map(|w| u16::from_be_bytes([w[0], w[1]]))
+            .collect();
+        if self.has(Fault::WritesPartly) {
+            for (address, word) in (at..=u16::MAX).zip(&words) {
+                let at = place(HOLDING, address, 1)?;
+                self.holding[at] = *word;
+            }
+            return Ok(());
+        }
+        let start = place(HOLDING, at, words.len() as u16)?;
+        if words.iter().any(|word| *word > MOST) {
+            return Err(3);
+        }
+        self.holding[start..start + words.len()].copy_from_slice(&words);
+        Ok(())
+    }
+
+    fn read_write(&mut self, pdu: &[u8]) -> Answer {
+        let mut pdu = pdu.to_vec();
+        if self.has(Fault::FillsTruncated) && pdu.len() > 10 {
+            let whole = 10 + usize::from(pdu[9]);
+            pdu.resize(whole, 0);
+        }
+        let [_, r1, r0, q1, q0, rest @ ..] = &pdu[..] else {
+            return Err(3);
+        };
+        let (read, quantity) = (
+            u16::from_be_bytes([*r1, *r0]),
+            u16::from_be_bytes([*q1, *q0]),
+        );
+        let (at, written, data) =
+            many(&[&[0], rest].concat()).map(|(a, q, d)| (a, q, d.to_vec()))?;
+        let wrong = !(1..=125).contains(&quantity)
+            || !(1..=121).contains(&written)
+            || data.len() != usize::from(written) * 2;
+        if wrong {
+            return Err(3);
+        }
+        place(HOLDING, read, quantity)?;
+        if self.has(Fault::ReadsFirst) {
+            let reply = self.read(3, read, quantity);
+            return self.store(at, &data).and(reply);
+        }
+        self.store(at, &data)?;
+        self.read(3, read, quantity)
+    }
+
+    fn diagnose(&mut self, pdu: &[u8]) -> Answer {
+        let [_, high, low, ref data @ ..] = *pdu else {
+            return Err(3);
+        };
+        let sub = u16::from_be_bytes([high, low]);
+        if sub == 0 {
+            let shown = if self.has(Fault::ShortEcho) {
+                pdu.len().min(5)
+            } else {
+                pdu.len()
+            };
+            return Ok(pdu[1..shown].to_vec());
+        }
+        if sub == 3 {
+            let [delimiter, 0] = *data else { return Err(3) };
+            self.delimiter = delimiter;
+            return Ok(pdu[1..].to_vec());
+        }
+        let clears = !self.has(Fault::NeverClears);
+        self.log
+            .diagnose(sub, data, clears, self.has(Fault::KeepsLog))
+            .map(|value| [vec![high, low], value].concat())
+    }
+}
+
+/// Where `quantity` points from address `at` on are in a table.
+fn place((first, count): (u16, usize), at: u16, quantity: u16) -> Result<usize, u8> {
+    let start = at.checked_sub(first).map(usize::from).ok_or(2)?;
+    if start + usize::from(quantity) <= count {
+        Ok(start)
+    } else {
+        Err(2)
+    }
+}
+
+/// Address, quantity and as many data bytes as the byte count says, which must be all there are.
+fn many(pdu: &[u8]) -> Result<(u16, u16, &[u8]), u8> {
+    let [_, a1, a0, q1, q0, count, ref data @ ..] = *pdu else {
+        return Err(3);
+    };
+    if usize::from(count) != data.len() {
+        return Err(3);
+    }
+    Ok((
+        u16::from_be_bytes([a1, a0]),
+        u16::from_be_bytes([q1, q0]),
+        data,
+    ))
+}
