@@ -7,6 +7,7 @@
 
 use clap::{Parser, Subcommand};
 
+pub mod bench;
 pub mod build;
 pub mod ci;
 pub mod command;
@@ -49,6 +50,8 @@ enum Command {
     Flash(flash::Options),
     /// Show flash and RAM by crate and section, with what is left of the parts and budgets
     Size(size::Options),
+    /// Count what the image costs: instructions of every request, load, flash and RAM
+    Bench(bench::Options),
     /// Build the image and run it on the virtual board
     Sim(sim_options::Options),
     /// Renew docs/register-map.md
@@ -70,6 +73,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Build(options) => build::run(&mut workspace, &options),
         Command::Flash(options) => flash::run(&mut workspace, &options),
         Command::Size(options) => size::run(&mut workspace, &options),
+        Command::Bench(options) => bench::run(&mut workspace, &options),
         Command::Sim(options) => sim::run(&mut workspace, &options, std::env::args_os().skip(2)),
         Command::Docs => docs::run(&workspace),
         Command::Test => test::run(&mut workspace),

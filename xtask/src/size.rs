@@ -88,6 +88,15 @@ pub fn check(elf: &Path) -> Result<()> {
     within_limits(&of(elf)?)
 }
 
+/// The figures of an image as JSON.
+///
+/// # Errors
+///
+/// When it is no image.
+pub fn report(elf: &Path) -> Result<Value> {
+    of(elf).map(|sizes| as_json(&sizes))
+}
+
 fn of(elf: &Path) -> Result<Sizes> {
     measure(&image::read(elf)?).map_err(|why| Failure::asked(format!("{}: {why}", elf.display())))
 }

@@ -34,6 +34,8 @@ pub struct Row {
     pub byte_in: u32,
     /// The longest handler for a byte sent.
     pub byte_out: u32,
+    /// The handler at the end of the reply, which switches the driver off.
+    pub reply_end: u32,
     /// The rivals', from complete frame to complete response; `None` where one does not answer.
     pub rivals: BTreeMap<String, Option<u32>>,
 }
@@ -85,6 +87,7 @@ pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, Stri
             transaction: cost.transaction,
             byte_in: cost.byte_in,
             byte_out: cost.byte_out,
+            reply_end: cost.reply_end,
             rivals: others,
         });
     }

@@ -30,6 +30,8 @@ pub struct Cost {
     pub byte_in: u32,
     /// The longest handler for a byte sent.
     pub byte_out: u32,
+    /// The handler at the end of the reply, which switches the driver off.
+    pub reply_end: u32,
 }
 
 /// A board with the image on it.
@@ -123,9 +125,15 @@ impl Unit {
         {
             return Err("the lock does not open".to_owned());
         }
-        // Twice: the first time the code may behave otherwise, as for a value that changes.
+        // The first is not like the others, as for a value that changes. Of the others the one in the
+        // middle: another task's doings may fall into any.
         self.count(&request.pdu)?;
-        self.count(&request.pdu)
+        let mut costs = [Cost::default(); 3];
+        for cost in &mut costs {
+            *cost = self.count(&request.pdu)?;
+        }
+        costs.sort_by_key(|cost| (cost.to_first_byte, cost.transaction));
+        Ok(costs[1])
     }
 
     /// Counts every instruction of a transaction by the handler it is of.
@@ -140,6 +148,7 @@ impl Unit {
         let mut replied = false;
         loop {
             let before = self.board.line_bytes_written();
+            let driving = self.board.driver_enable();
             let retired = self.board.instructions();
             let exception = self.exception();
             self.board.step(1);
@@ -159,14 +168,16 @@ impl Unit {
             if matches!(exception, BYTE | GAP | SERVE) {
                 cost.transaction += retired;
             }
+            let on = self.board.driver_enable();
             if exception == BYTE {
-                handler.count(retired, wrote || self.board.line_bytes_written() > written);
-            }
-            if exception != BYTE || self.exception() != BYTE {
-                handler.end(&mut cost);
+                handler.driving |= handler.instructions == 0 && driving;
+                handler.instructions += retired;
+                handler.out |= self.board.line_bytes_written() > written;
+                if self.exception() != BYTE {
+                    handler.end(on, &mut cost);
+                }
             }
 
-            let on = self.board.driver_enable();
             replied |= on;
             if replied && !on && self.exception() != BYTE {
                 break;
@@ -205,20 +216,19 @@ enum Expiry {
 #[derive(Default)]
 struct Handler {
     instructions: u32,
+    /// The reply has begun: nothing comes in any more.
     out: bool,
+    /// The driver was on when it began.
+    driving: bool,
 }
 
 impl Handler {
-    fn count(&mut self, instructions: u32, out: bool) {
-        self.instructions += instructions;
-        self.out |= out;
-    }
-
-    fn end(&mut self, cost: &mut Cost) {
-        let longest = if self.out {
-            &mut cost.byte_out
-        } else {
-            &mut cost.byte_in
+    /// The handler has ended, with the driver on or off.
+    fn end(&mut self, driving: bool, cost: &mut Cost) {
+        let longest = match self {
+            Self { driving: true, .. } if !driving => &mut cost.reply_end,
+            Self { out: true, .. } => &mut cost.byte_out,
+            Self { .. } => &mut cost.byte_in,
         };
         *longest = self.instructions.max(*longest);
         *self = Self::default();

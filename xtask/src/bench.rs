@@ -1,0 +1,102 @@
+//! `cargo xtask bench`: what the release image costs, in instructions and bytes, which repeat: every
+//! request, the processor under load, flash and RAM by crate; beside it servers on other crates.
+//!
+//! `tools/bench` measures, this builds what it needs, shows it and holds it against the baseline.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::toolchain::{Need, TARGET};
+use crate::workspace::Workspace;
+use crate::{Failure, Result, build, command, size};
+
+mod baseline;
+mod table;
+
+/// The figures of the last release, relative to the root.
+const BASELINE: &str = "tools/bench/baseline.json";
+
+/// The servers on other crates: a workspace of its own.
+const RIVALS: &str = "tools/bench/rivals/Cargo.toml";
+const RIVAL_NAMES: [&str; 2] = ["rmodbus", "modbus-core"];
+
+/// How to tell.
+#[derive(clap::Args, Clone, Debug)]
+#[group(skip)]
+pub struct Options {
+    /// Print JSON instead of tables
+    #[arg(long)]
+    json: bool,
+
+    /// Make these figures the baseline
+    #[arg(long)]
+    bless: bool,
+}
+
+/// `cargo xtask bench`.
+///
+/// # Errors
+///
+/// When something does not build, the image does not serve a request, or a figure is worse than the
+/// baseline by more than its tolerance.
+pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    let elf = build::image(workspace, &build::Options::release())?.elf;
+    let report = measure(workspace, &elf)?;
+    if options.json {
+        println!("{report:#}");
+    } else {
+        print!("{}", table::of(&report));
+    }
+    let file = workspace.root().join(BASELINE);
+    if options.bless {
+        return baseline::write(&file, &report);
+    }
+    baseline::hold(&file, &report)
+}
+
+/// The step of `cargo xtask ci`: the tables, and the baseline held.
+///
+/// # Errors
+///
+/// As [`run`].
+pub fn check(workspace: &mut Workspace, elf: &Path) -> Result<()> {
+    let report = measure(workspace, elf)?;
+    print!("{}", table::of(&report));
+    baseline::hold(&workspace.root().join(BASELINE), &report)
+}
+
+fn measure(workspace: &mut Workspace, elf: &Path) -> Result<Value> {
+    let rivals = rivals(workspace)?;
+    let mut cargo = workspace.cargo("run");
+    // The simulator's core, crate rigless, declares a newer rustc than it needs.
+    cargo.args([
+        "--quiet",
+        "--ignore-rust-version",
+        "--package",
+        "bench",
+        "--",
+    ]);
+    cargo.arg(elf).arg("--rivals").args(rivals);
+    let text = command::read(&mut cargo)?;
+    let mut report: Value = serde_json::from_str(&text)
+        .map_err(|error| Failure::new(format!("the bench's report is broken: {error}")))?;
+    report["image"] = size::report(elf)?;
+    Ok(report)
+}
+
+/// Builds the rivals and tells where they are.
+fn rivals(workspace: &mut Workspace) -> Result<Vec<PathBuf>> {
+    let target = workspace.target().join("rivals");
+    let mut cargo = workspace.target_cargo(Need::Build, "build")?;
+    cargo.args([
+        "--quiet",
+        "--release",
+        "--manifest-path",
+        RIVALS,
+        "--target-dir",
+    ]);
+    command::run(cargo.arg(&target))?;
+    let directory = target.join(TARGET).join("release");
+    Ok(RIVAL_NAMES.map(|name| directory.join(name)).to_vec())
+}

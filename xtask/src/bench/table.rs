@@ -1,0 +1,160 @@
+//! The figures as tables for a terminal.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+/// What the design allows: instructions from t3.5 to the first byte, and for a byte's interrupt.
+const TO_FIRST_BYTE: u64 = 400;
+const BYTE: u64 = 80;
+
+/// The tables of a report.
+pub fn of(report: &Value) -> String {
+    let mut text = String::new();
+    requests(report, &mut text);
+    load(report, &mut text);
+    image(report, &mut text);
+    text
+}
+
+fn rows<'a>(report: &'a Value, name: &str) -> impl Iterator<Item = &'a Value> {
+    report[name].as_array().into_iter().flatten()
+}
+
+fn line(text: &mut String, cells: &str) {
+    // A String takes everything.
+    let _ = writeln!(text, "{}", cells.trim_end());
+}
+
+/// The columns of a request: key, heading, budget.
+const COLUMNS: [(&str, &str, Option<u64>); 5] = [
+    ("to_first_byte", "first byte", Some(TO_FIRST_BYTE)),
+    ("byte_in", "byte in", Some(BYTE)),
+    ("byte_out", "byte out", Some(BYTE)),
+    ("reply_end", "end", Some(BYTE)),
+    ("transaction", "in all", None),
+];
+
+fn requests(report: &Value, text: &mut String) {
+    let rivals: Vec<&String> = rows(report, "requests")
+        .next()
+        .and_then(|row| row["rivals"].as_object())
+        .map(|rivals| rivals.keys().collect())
+        .unwrap_or_default();
+    let mut head = format!("{:<42}", "instructions");
+    let headings = COLUMNS.iter().map(|(_, heading, _)| *heading);
+    for heading in headings.chain(rivals.iter().map(|rival| rival.as_str())) {
+        let _ = write!(head, " {heading:>11}");
+    }
+    line(text, &head);
+    let mut over = Vec::new();
+    for row in rows(report, "requests") {
+        let name = row["request"].as_str().unwrap_or_default();
+        let mut cells = format!("{name:<42}");
+        for (key, heading, budget) in COLUMNS {
+            let taken = row[key].as_u64();
+            let _ = write!(cells, " {:>11}", number(taken));
+            if let (Some(taken), Some(budget)) = (taken, budget)
+                && taken > budget
+            {
+                over.push(format!("{name}: {heading} {taken} of {budget}"));
+            }
+        }
+        for rival in &rivals {
+            let taken = row["rivals"][rival.as_str()].as_u64();
+            let _ = write!(cells, " {:>11}", number(taken));
+        }
+        line(text, &cells);
+    }
+    line(
+        text,
+        "first byte: from t3.5's expiry until it is in the data register. end: the driver's switching off.\n\
+         in all: the line's interrupts, from the request's first byte to the end. Rivals: from complete frame\n\
+         to complete response in memory; -: no answer, or no such function.",
+    );
+    line(
+        text,
+        &format!("budgets: {TO_FIRST_BYTE} to the first byte, {BYTE} for a byte's interrupt"),
+    );
+    for over in over {
+        line(text, &format!("over budget: {over}"));
+    }
+    line(text, "");
+}
+
+fn number(value: Option<u64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+}
+
+fn load(report: &Value, text: &mut String) {
+    line(
+        text,
+        "requests back to back for a second      answered  awake   longest wait of an interrupt, us",
+    );
+    for row in rows(report, "load") {
+        let name = format!(
+            "{} bit/s, {}",
+            row["baud"],
+            row["request"].as_str().unwrap_or_default()
+        );
+        let awake = row["awake_percent"].as_f64().unwrap_or_default();
+        let answered = number(row["answered"].as_u64());
+        let mut cells = format!("{name:<40} {answered:>7} {awake:>5.1} %  ");
+        for wait in rows(row, "longest_waits_us") {
+            let task = wait[0].as_str().unwrap_or_default();
+            let _ = write!(cells, " {task} {:.1}", wait[1].as_f64().unwrap_or_default());
+        }
+        line(text, &cells);
+    }
+    line(text, "");
+}
+
+fn image(report: &Value, text: &mut String) {
+    let image = &report["image"];
+    line(
+        text,
+        "crate                                      flash     RAM",
+    );
+    for row in rows(image, "crates") {
+        let name = row["name"].as_str().unwrap_or_default();
+        line(text, &memory(name, row));
+    }
+    line(text, &memory("image", image));
+}
+
+fn memory(name: &str, row: &Value) -> String {
+    let (flash, ram) = (number(row["flash"].as_u64()), number(row["ram"].as_u64()));
+    format!("{name:<40} {flash:>7} {ram:>7}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn figures_budgets_and_rivals_are_shown() {
+        let report = json!({
+            "requests": [
+                { "request": "03 one", "to_first_byte": 326, "transaction": 2000, "byte_in": 80, "byte_out": 81, "reply_end": 70,
+                  "rivals": { "rmodbus": 664, "modbus-core": null } },
+            ],
+            "load": [{ "baud": 9600, "request": "03 one", "answered": 40, "awake_percent": 2.04,
+                       "longest_waits_us": [["byte", 0.04]] }],
+            "image": { "flash": 30_000, "ram": 3_000, "crates": [{ "name": "core", "flash": 500, "ram": 0 }] },
+        });
+        let text = of(&report);
+        assert!(
+            text.contains("over budget: 03 one: byte out 81 of 80"),
+            "{text}"
+        );
+        assert!(!text.contains("byte in 80 of"), "{text}");
+        let row = text
+            .lines()
+            .find(|line| line.starts_with("03 one"))
+            .unwrap();
+        let cells: Vec<_> = row.split_whitespace().collect();
+        assert_eq!(cells[2..], ["326", "80", "81", "70", "2000", "-", "664"]);
+        assert!(text.contains("2.0 %") && text.contains("30000"), "{text}");
+    }
+}
