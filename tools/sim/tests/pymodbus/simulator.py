@@ -11,6 +11,7 @@ import urllib.error
 import urllib.request
 
 import serial
+from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusIOException
 
@@ -18,18 +19,24 @@ from pymodbus.exceptions import ModbusIOException
 PROGRAM: pathlib.Path
 IMAGE: pathlib.Path
 
-# Seconds in which a unit answers: a long request and its response take 0.6 s at 9600 baud.
-ANSWER = 3.0
-# Seconds after which no answer is taken to mean silence: many times t3.5 and a short response.
-SILENCE = 0.5
-# Seconds for the simulator to start on a busy machine.
-START = 60.0
+# Virtual time stays behind the wall clock where the machine is busy, so what the unit does, or does not
+# do, is judged by virtual time, and the wall clock only says when the simulator is taken to be dead.
+
+# Seconds of the wall clock for anything that has to happen.
+PATIENCE = 60.0
+# Virtual milliseconds after which no answer is taken to mean silence: many times t3.5 and the longest
+# response.
+SILENCE_MS = 500
+# Seconds after which a master that gets no answer gives up, where it gets none.
+GIVE_UP = 0.5
 
 
 class Simulator:
     """A running modio-sim, with `--pty` and an HTTP port of its own."""
 
     def __init__(self, *, dip: int = 1, module: str = "4di"):
+        # What masters speak from now on.
+        self.framer = FramerType.RTU
         self._directory = tempfile.TemporaryDirectory(prefix="modio-")
         self.port = str(pathlib.Path(self._directory.name, "line"))
         self._process = subprocess.Popen(
@@ -56,7 +63,7 @@ class Simulator:
             lines.append(line.rstrip("\n"))
 
     def _endpoint(self, prefix: str) -> str:
-        end = time.monotonic() + START
+        end = time.monotonic() + PATIENCE
         while time.monotonic() < end and self._process.poll() is None:
             for line in list(self.lines):
                 if line.startswith(prefix):
@@ -69,7 +76,7 @@ class Simulator:
         if self._process.poll() is None:
             self._process.terminate()
         try:
-            status = self._process.wait(timeout=10)
+            status = self._process.wait(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             status = self._process.wait()
@@ -85,7 +92,7 @@ class Simulator:
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self.url + path, data=data, method=method)
         try:
-            with urllib.request.urlopen(request, timeout=10) as answer:
+            with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
                 return answer.status, json.load(answer)
         except urllib.error.HTTPError as refusal:
             with refusal:
@@ -107,17 +114,57 @@ class Simulator:
         """The four digital outputs, as they stand."""
         return [channel["on"] for channel in self.state()["channels"]]
 
-    def master(self, timeout: float = ANSWER, baudrate: int = 9600,
+    def until(self, is_so, what: str):
+        """Waits until something is so."""
+        end = time.monotonic() + PATIENCE
+        while not is_so():
+            if time.monotonic() > end:
+                raise AssertionError(f"{what} did not happen in {PATIENCE} s")
+            time.sleep(0.005)
+
+    def virtual_ms(self) -> int:
+        """The unit's time."""
+        return self.state()["virtual_ms"]
+
+    def wait(self, milliseconds: int):
+        """Lets so much of the unit's time pass."""
+        end = self.virtual_ms() + milliseconds
+        self.until(lambda: self.virtual_ms() >= end, f"{milliseconds} ms of virtual time")
+
+    def frames(self, since: int = 0) -> list[dict]:
+        """The complete frames on the line with numbers above `since`."""
+        status, answer = self.http("GET", f"/api/frames?since={since}")
+        assert status == 200, answer
+        return answer["frames"]
+
+    def last_frame(self) -> int:
+        """The number of the last frame, once the line has been silent for many times t3.5."""
+        self.wait(60)
+        return max((frame["number"] for frame in self.frames()), default=0)
+
+    def answer_to(self, since: int) -> bytes:
+        """What the unit answers to the first frame after number `since`; empty for silence."""
+        requests = lambda: [f for f in self.frames(since) if f["direction"] == "rx"]
+        self.until(requests, "the request")
+        request = requests()[0]
+        over = lambda: self.virtual_ms() * 1000 >= request["end_us"] + SILENCE_MS * 1000
+        answers = lambda: [f for f in self.frames(request["number"]) if f["direction"] == "tx"]
+        self.until(lambda: over() or answers(), "an answer, or silence")
+        answer = answers()
+        return bytes.fromhex(answer[0]["bytes"]) if answer else b""
+
+    def master(self, timeout: float = PATIENCE, baudrate: int = 9600,
                stopbits: int = 2) -> ModbusSerialClient:
         """pymodbus on the line, which asks once. Without parity: a pseudo-terminal has none."""
         client = ModbusSerialClient(
-            self.port, baudrate=baudrate, stopbits=stopbits, timeout=timeout, retries=0)
+            self.port, framer=self.framer, baudrate=baudrate, stopbits=stopbits, timeout=timeout,
+            retries=0)
         assert client.connect()
         return client
 
     def wire(self) -> serial.Serial:
         """The line for bytes of one's own."""
-        return serial.Serial(self.port, 9600, stopbits=2, timeout=SILENCE)
+        return serial.Serial(self.port, 9600, stopbits=2, timeout=PATIENCE)
 
 
 class OnSimulator(unittest.TestCase):
@@ -156,20 +203,20 @@ class OnSimulator(unittest.TestCase):
         """`ask(master)` gets no answer."""
         # pymodbus wants the port for itself.
         self.master.close()
-        master = self.simulator.master(timeout=SILENCE)
+        master = self.simulator.master(timeout=GIVE_UP)
         try:
-            before = self.simulator.state()["line"]["tx_frames"]
+            before = self.simulator.last_frame()
             with self.assertRaises(ModbusIOException):
                 ask(master)
-            self.assertEqual(self.simulator.state()["line"]["tx_frames"], before)
+            self.assertEqual(self.simulator.answer_to(before), b"")
         finally:
             master.close()
             assert self.master.connect()
 
-    def eventually(self, what, wanted):
+    def eventually(self, what, wanted, within_ms: int = 1000):
         """`what()` becomes `wanted` within a second: an input is debounced, an output is scanned."""
-        end = time.monotonic() + 1
-        while (seen := what()) != wanted and time.monotonic() < end:
+        end = self.simulator.virtual_ms() + within_ms
+        while (seen := what()) != wanted and self.simulator.virtual_ms() < end:
             time.sleep(0.005)
         self.assertEqual(seen, wanted)
 

@@ -1,7 +1,5 @@
 """Setting the device up over the line: lock, refusals, save, restart, another rate, the watchdog."""
 
-import time
-
 from simulator import OnSimulator
 
 FIRST = 0x0010
@@ -28,10 +26,10 @@ class Configuration(OnSimulator):
         for address, value in ((KEY, 0x5A17), (COMMAND, 3), (MODULE, 2), (COMMAND, SAVE)):
             answer = master.write_register(address, value)
             assert not answer.isError(), answer
-        time.sleep(0.2)
+        cls.simulator.wait(200)
         master.close()
         cls.simulator.post("/api/power", {"cycle": True})
-        time.sleep(0.5)
+        cls.simulator.wait(200)
 
     def written(self, address, *values):
         answer = self.master.write_registers(address, list(values))
@@ -51,7 +49,7 @@ class Configuration(OnSimulator):
 
     def reconnect(self, **settings):
         self.master.close()
-        time.sleep(0.5)
+        self.simulator.wait(300)
         self.master = self.simulator.master(**settings)
         self.addCleanup(self.master.close)
 
@@ -146,14 +144,14 @@ class Configuration(OnSimulator):
     def test_a_silent_line_sends_outputs_to_safe_until_they_are_written(self):
         self.unlock()
         self.written(SAFE, 0, 1, 0xFFFF, 0)
-        self.written(COMM_TIMEOUT, 5)
+        self.written(COMM_TIMEOUT, 30)
         self.bits(self.master.write_coils(FIRST, [True, False, True, True]), 0)
         # As long as it is asked it stays.
-        for _ in range(10):
-            time.sleep(0.1)
+        for _ in range(20):
+            self.simulator.wait(200)
             coils = self.bits(self.master.read_coils(FIRST, count=4), 4)
             self.assertEqual(coils, [True, False, True, True])
-        self.eventually(self.simulator.outputs, [False, True, True, False])
+        self.eventually(self.simulator.outputs, [False, True, True, False], within_ms=3500)
         self.assertTrue(self.register(STATUS) & TRIPPED)
         self.written(COMM_TIMEOUT, 0)
         self.assertEqual(self.simulator.outputs(), [False, True, True, False])

@@ -1,13 +1,9 @@
 """Frames that no decent master sends, byte by byte on the line."""
 
-import time
-
-from simulator import SILENCE, OnSimulator, crc
+from simulator import OnSimulator, crc
 
 # Reads the four points of the slot of unit 1.
 GOOD = crc(bytes([1, 1, 0x00, 0x10, 0, 4]))
-# Far more than t3.5 at 9600 baud, 4 ms, and than a busy machine delays a thread.
-APART = 0.1
 
 
 class Frames(OnSimulator):
@@ -19,14 +15,12 @@ class Frames(OnSimulator):
 
     def ask(self, frame: bytes) -> bytes:
         """The answer to a frame; empty for silence."""
-        time.sleep(APART)
+        since = self.simulator.last_frame()
         self.line.write(frame)
-        # The timeout runs from the write: the frame's own time on the line comes on top.
-        self.line.timeout = SILENCE + len(frame) * 11 / 9600
-        answer = self.line.read(1)
-        if answer:
-            time.sleep(APART)
-            answer += self.line.read(self.line.in_waiting)
+        answer = self.simulator.answer_to(since)
+        # What was on the line is what the master gets, and no more.
+        self.assertEqual(self.line.read(len(answer)), answer)
+        self.assertEqual(self.line.in_waiting, 0)
         return answer
 
     def answers(self):
@@ -77,14 +71,15 @@ class Frames(OnSimulator):
         self.ignored(GOOD + GOOD)
 
     def test_a_request_with_a_long_gap_inside_is_lost(self):
-        time.sleep(APART)
+        since = self.simulator.last_frame()
         self.line.write(GOOD[:4])
+        self.assertEqual(self.simulator.answer_to(since), b"")
         self.ignored(GOOD[4:])
 
     def test_the_bytes_on_the_line_are_recorded(self):
-        since = max((frame["number"] for frame in self.frames(0)), default=0)
+        since = self.simulator.last_frame()
         self.answers()
-        request, response = self.frames(since)
+        request, response = self.simulator.frames(since)
         self.assertEqual((request["direction"], response["direction"]), ("rx", "tx"))
         self.assertEqual(request["bytes"], GOOD.hex())
         self.assertTrue(request["crc_ok"] and response["crc_ok"])
@@ -92,11 +87,6 @@ class Frames(OnSimulator):
         gap = response["start_us"] - request["end_us"]
         self.assertGreaterEqual(gap, 4010)
         self.assertLess(gap, 6000)
-
-    def frames(self, since: int) -> list[dict]:
-        status, answer = self.simulator.http("GET", f"/api/frames?since={since}")
-        self.assertEqual(status, 200)
-        return answer["frames"]
 
 
 class Http(OnSimulator):

@@ -1,9 +1,8 @@
 """Module 4do: four outputs, written one by one and together, and read back."""
 
 import itertools
-import time
 
-from simulator import SILENCE, OnSimulator
+from simulator import SILENCE_MS, OnSimulator
 
 FIRST = 0x0010
 
@@ -57,7 +56,7 @@ class Outputs(OnSimulator):
         sent = self.simulator.state()["line"]["tx_frames"]
         self.master.write_coils(FIRST, [True, False, True, True], device_id=0, no_response_expected=True)
         self.eventually(self.simulator.outputs, [True, False, True, True])
-        time.sleep(SILENCE)
+        self.simulator.wait(SILENCE_MS)
         self.assertEqual(self.simulator.state()["line"]["tx_frames"], sent)
         self.assertEqual(self.read(), [True, False, True, True])
 
@@ -69,6 +68,6 @@ class Outputs(OnSimulator):
         self.bits(self.master.write_coils(FIRST, [True] * 4), 0)
         self.eventually(self.simulator.outputs, [True] * 4)
         self.simulator.post("/api/power", {"cycle": True})
-        time.sleep(0.2)
+        self.simulator.wait(200)
         self.assertEqual(self.simulator.outputs(), [False] * 4)
         self.assertEqual(self.read(), [False] * 4)

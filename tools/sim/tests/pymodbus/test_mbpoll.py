@@ -1,0 +1,218 @@
+"""mbpoll, a second master that nobody here wrote, on libmodbus: a module of each kind by every function it has."""
+
+import re
+import shutil
+import subprocess
+import unittest
+
+from simulator import PATIENCE, OnSimulator
+
+MBPOLL = shutil.which("mbpoll")
+FIRST = 0x0010
+# Its names for the tables: functions 01, 02, 04 and 03; 05 and 0F write coils, 06 and 10 registers.
+COILS, DISCRETE_INPUTS, INPUT_REGISTERS, HOLDING_REGISTERS = "0", "1", "3", "4"
+BITS, WORDS = (COILS, DISCRETE_INPUTS), (INPUT_REGISTERS, HOLDING_REGISTERS)
+ADDRESS, VALUE, FAILURE, BUSY = (
+    "Illegal data address", "Illegal data value", "Slave device or server failure",
+    "Slave device or server is busy")
+# Seconds it waits for an answer, the most it can; and for silence.
+ANSWER, SILENCE = "10.00", "0.50"
+
+
+@unittest.skipUnless(MBPOLL, "mbpoll is not installed (Debian has it as a package)")
+class Mbpoll(OnSimulator):
+    MODULE = "none"
+
+    def setUp(self):
+        # The line is mbpoll's.
+        pass
+
+    def call(self, *arguments, unit=1, baudrate=9600, wait=ANSWER):
+        """Asks once; what it prints, and why it failed, if it did."""
+        command = [MBPOLL, "-m", "rtu", "-b", str(baudrate), "-P", "none", "-s", "2", "-0", "-1",
+                   "-a", str(unit), "-o", wait, *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        complaint = done.stderr.strip()
+        self.assertEqual(done.returncode != 0, bool(complaint), done)
+        return done.stdout, complaint.rpartition(": ")[2]
+
+    def read(self, table, address, count=1, **settings):
+        """The values, or why there are none."""
+        output, refusal = self.call(
+            "-t", table, "-r", str(address), "-c", str(count), self.simulator.port, **settings)
+        values = [int(value) for value in re.findall(r"^\[\d+\]:\s+(-?\d+)", output, re.MULTILINE)]
+        self.assertEqual(len(values), 0 if refusal else count, output)
+        return refusal or values
+
+    def write(self, table, address, *values, **settings):
+        """None, or why it was refused."""
+        output, refusal = self.call(
+            "-t", table, "-r", str(address), self.simulator.port, *map(str, values), **settings)
+        self.assertEqual(f"Written {len(values)} references." in output, not refusal, output)
+        return refusal or None
+
+    def assert_nothing_is_written(self, table, first=FIRST, count=4):
+        """Neither one by one nor together."""
+        before = self.simulator.state()["channels"]
+        for address in range(first, first + count):
+            self.assertEqual(self.write(table, address, 1), ADDRESS)
+        self.assertEqual(self.write(table, first, *[1] * count), ADDRESS)
+        self.assertEqual(self.simulator.state()["channels"], before)
+
+
+class Empty(Mbpoll):
+    def test_there_are_no_points(self):
+        for table in (*BITS, *WORDS):
+            self.assertEqual(self.read(table, FIRST), ADDRESS)
+        self.assert_nothing_is_written(COILS)
+        self.assert_nothing_is_written(HOLDING_REGISTERS)
+
+    def test_another_unit_is_silent(self):
+        sent = self.simulator.state()["line"]["tx_frames"]
+        self.assertEqual(self.read(COILS, FIRST, unit=2, wait=SILENCE), "Connection timed out")
+        self.simulator.wait(500)
+        self.assertEqual(self.simulator.state()["line"]["tx_frames"], sent)
+
+    def test_it_says_what_it_is(self):
+        """Function 11, read as libmodbus reads it: an identity of one byte, and the run indicator."""
+        output, refusal = self.call("-u", self.simulator.port)
+        self.assertEqual(refusal, "")
+        self.assertRegex(output, r"Length: 2\nId    : 0x01\nStatus: On\n")
+
+    def test_words_of_state_and_a_long_read(self):
+        words = self.read(HOLDING_REGISTERS, 0x0200, 7)
+        self.assertEqual((words[0], words[1], words[4:]), (0x2383, 0x5860, [1, 1, 1]))
+        self.assertEqual(len(self.read(HOLDING_REGISTERS, 0x0160, 125)), 125)
+        self.assertEqual(self.read(INPUT_REGISTERS, 0x0160, 64), self.read(HOLDING_REGISTERS, 0x0160, 64))
+
+
+class DigitalInputs(Mbpoll):
+    MODULE = "4di"
+
+    def test_inputs_are_read_and_counted(self):
+        for number, pattern in enumerate(([1, 0, 0, 1], [0, 0, 0, 0], [1, 1, 0, 0])):
+            for channel, energised in enumerate(pattern, 1):
+                self.simulator.post(f"/api/channels/{channel}", {"energised": bool(energised)})
+            self.simulator.wait(20)
+            for table in BITS:
+                self.assertEqual(self.read(table, FIRST, 4), pattern, number)
+        # Pairs of registers, high word first.
+        self.assertEqual(self.counters(), [2, 1, 0, 1])
+        self.assert_nothing_is_written(COILS)
+        self.assertEqual(self.read(HOLDING_REGISTERS, FIRST), ADDRESS)
+
+    def counters(self):
+        output, refusal = self.call(
+            "-B", "-t", "3:int", "-r", str(0x0320), "-c", "4", self.simulator.port)
+        self.assertEqual(refusal, "")
+        return [int(value) for value in re.findall(r"^\[\d+\]:\s+(\d+)", output, re.MULTILINE)]
+
+
+class DigitalOutputs(Mbpoll):
+    MODULE = "4do"
+
+    def test_outputs_are_written_one_by_one_and_together(self):
+        for pattern in ([1, 0, 1, 1], [0, 1, 0, 0]):
+            self.assertIsNone(self.write(COILS, FIRST, *pattern))
+            self.eventually(self.simulator.outputs, [bool(on) for on in pattern])
+            for table in BITS:
+                self.assertEqual(self.read(table, FIRST, 4), pattern)
+        for offset in range(4):
+            pattern[offset] ^= 1
+            self.assertIsNone(self.write(COILS, FIRST + offset, pattern[offset]))
+            self.eventually(self.simulator.outputs, [bool(on) for on in pattern])
+        self.assertEqual(self.write(COILS, FIRST + 2, 0, 0, 0), ADDRESS)
+        self.assertEqual(self.read(COILS, FIRST, 4), pattern)
+        self.assertEqual(self.write(HOLDING_REGISTERS, FIRST, 1), ADDRESS)
+
+    def test_the_rate_is_changed(self):
+        self.assertEqual(self.write(HOLDING_REGISTERS, 0x0101, 192), BUSY)
+        self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0100, "0x5A17"))
+        self.assertEqual(self.write(HOLDING_REGISTERS, 0x0101, 97), VALUE)
+        self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0101, 1152, 0))
+        self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0108, 1))
+        self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0108, 2))
+        self.simulator.wait(300)
+        self.assertEqual(self.simulator.state()["line"]["baud"], 115200)
+        self.assertEqual(self.read(HOLDING_REGISTERS, 0x0101, 2, baudrate=115200), [1152, 0])
+
+
+class Relays(Mbpoll):
+    MODULE = "2relay"
+
+    def test_coils_are_written_and_jumpers_read(self):
+        coils = lambda: [channel["energised"] for channel in self.simulator.state()["channels"][:2]]
+        self.simulator.post("/api/channels/2", {"manual": True})
+        self.assertIsNone(self.write(COILS, FIRST + 2, 1, 0))
+        self.eventually(coils, [True, False])
+        self.assertIsNone(self.write(COILS, FIRST + 3, 1))
+        self.eventually(coils, [True, True])
+        for table in BITS:
+            self.assertEqual(self.read(table, FIRST, 4), [0, 1, 1, 1])
+        self.assert_nothing_is_written(COILS, FIRST, 2)
+        self.assertEqual(self.write(COILS, FIRST + 1, 0, 0), ADDRESS)
+
+
+class AnalogInputs(Mbpoll):
+    MODULE = "4ai"
+
+    def test_inputs_are_read(self):
+        for channel, millivolts in enumerate((3300, 0, 1650, 825), 1):
+            self.simulator.post(f"/api/channels/{channel}", {"millivolts": millivolts})
+        self.simulator.wait(500)
+        for table in WORDS:
+            for value, wanted in zip(self.read(table, FIRST, 4), (4095, 0, 2048, 1024), strict=True):
+                self.assertLessEqual(abs(value - wanted), 1)
+        self.assert_nothing_is_written(HOLDING_REGISTERS)
+        self.assertEqual(self.read(COILS, FIRST), ADDRESS)
+
+
+class AnalogOutputs(Mbpoll):
+    MODULE = "4ao"
+    FIRST_OUTPUT, OUTPUTS = FIRST, 4
+
+    def codes(self):
+        return [channel["code"] for channel in self.simulator.state()["channels"] if "code" in channel]
+
+    def test_outputs_are_written_one_by_one_and_together(self):
+        values = [4095, 0, 2048, 1][:self.OUTPUTS]
+        self.assertIsNone(self.write(HOLDING_REGISTERS, self.FIRST_OUTPUT, *values))
+        self.eventually(self.codes, values)
+        for offset in range(self.OUTPUTS):
+            values[offset] = 100 * (offset + 1)
+            self.assertIsNone(self.write(HOLDING_REGISTERS, self.FIRST_OUTPUT + offset, values[offset]))
+            self.eventually(self.codes, values)
+        for table in WORDS:
+            self.assertEqual(self.read(table, self.FIRST_OUTPUT, self.OUTPUTS), values)
+        self.assertEqual(self.write(HOLDING_REGISTERS, self.FIRST_OUTPUT, 4096), VALUE)
+        self.assertEqual(self.write(HOLDING_REGISTERS, self.FIRST_OUTPUT, 1, 4096), VALUE)
+        self.assertEqual(self.write(HOLDING_REGISTERS, FIRST + 3, 1, 1), ADDRESS)
+        self.assertEqual(self.codes(), values)
+        self.assertEqual(self.write(COILS, FIRST + 3, 1), ADDRESS)
+
+
+class AnalogInputsAndOutputs(AnalogOutputs):
+    MODULE = "2ai2ao"
+    FIRST_OUTPUT, OUTPUTS = FIRST + 2, 2
+
+    def test_inputs_are_only_read(self):
+        self.simulator.post("/api/channels/1", {"millivolts": 3300})
+        self.simulator.wait(500)
+        self.assertEqual(self.read(INPUT_REGISTERS, FIRST, 2), [4095, 0])
+        self.assert_nothing_is_written(HOLDING_REGISTERS, FIRST, 2)
+
+
+class NoModule(Mbpoll):
+    """The setting says 4ao, and there is none."""
+
+    MODULE = "4ao"
+
+    def test_its_points_fail(self):
+        self.simulator.post("/api/power", {"on": False})
+        self.simulator.post("/api/module", {"name": "none"})
+        self.simulator.post("/api/power", {"on": True})
+        self.simulator.wait(500)
+        for table in WORDS:
+            self.assertEqual(self.read(table, FIRST, 4), FAILURE)
+        self.assertEqual(self.write(HOLDING_REGISTERS, FIRST, 1), FAILURE)
+        self.assertEqual(self.write(HOLDING_REGISTERS, FIRST, 1, 2, 3, 4), FAILURE)
