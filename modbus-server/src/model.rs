@@ -59,7 +59,8 @@ pub trait DataModel {
     }
 
     /// The diagnostic register, function 08 sub-function 02 (V1.1b3 6.8): the device's own as well.
-    /// It tells a state, not past events: clearing counters does not change it.
+    /// A bit that sub-function 0A finds set reads 0 from then on, until it has been 0 here, too, at
+    /// a reading.
     fn diagnostic_register(&self) -> u16 {
         0
     }

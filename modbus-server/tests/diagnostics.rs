@@ -96,6 +96,23 @@ fn the_diagnostic_register_is_the_device_s() {
 }
 
 #[test]
+fn a_cleared_bit_of_the_diagnostic_register_stays_so_until_it_is_set_anew() {
+    let mut unit = unit();
+    let clear = diagnose(0x0A, 0);
+    assert_eq!(unit.request(&clear), Some(clear));
+    assert_eq!(value(&mut unit, 0x02), 0, "all that was set");
+    unit.points.status = 0x6F;
+    assert_eq!(value(&mut unit, 0x02), 0x0002, "a new one");
+    unit.points.status = 0x00;
+    assert_eq!(value(&mut unit, 0x02), 0);
+    unit.points.status = 0x6F;
+    assert_eq!(value(&mut unit, 0x02), 0x006F, "those that had gone");
+    // A restart of communication clears counters alone.
+    unit.request(&diagnose(0x01, 0)).expect("an echo");
+    assert_eq!(value(&mut unit, 0x02), 0x006F);
+}
+
+#[test]
 fn every_counter_can_be_asked_for() {
     let mut unit = unit();
     for _ in 0..3 {
@@ -161,13 +178,14 @@ fn the_event_counter_counts_what_succeeds() {
     unit.raw(&frame(0, &pdu(0x03, &[0, 1])));
     unit.raw(&frame(0, &write_words(64, &[1])));
     assert_eq!(events(&mut unit), 2, "one without effect does not");
-    assert_eq!(log(&mut unit).1, 3, "0C does");
+    assert_eq!(log(&mut unit).1, 2, "0C tells what 0B does");
+    assert_eq!(events(&mut unit), 2, "and does not count either");
 }
 
 #[test]
 fn the_log_tells_what_happened_the_newest_first() {
     let mut unit = unit();
-    assert_eq!(log(&mut unit), (0, 1, 1, vec![0x80]), "its own reception");
+    assert_eq!(log(&mut unit), (0, 0, 1, vec![0x80]), "its own reception");
     unit.must_answer();
     unit.refused(&[0x63]);
     unit.points.state = Some(Exception::ServerDeviceFailure);
@@ -188,7 +206,7 @@ fn the_log_tells_what_happened_the_newest_first() {
     ];
     let (_, count, messages, events) = log(&mut unit);
     assert!(events.iter().rev().eq(newest_last.iter()), "{events:02X?}");
-    assert_eq!((count, messages), (4, 6));
+    assert_eq!((count, messages), (2, 6));
 }
 
 #[test]
@@ -249,7 +267,7 @@ fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
     assert_eq!(unit.request(&diagnose(0x01, 0)), None, "no reply to this");
     assert_eq!(unit.counters().as_words(), [0; 9]);
     let (status, count, messages, events) = log(&mut unit);
-    assert_eq!((status, count, messages), (0, 1, 1));
+    assert_eq!((status, count, messages), (0, 0, 1));
     // This, the restart, its end and its reception, and so on back to where it began.
     assert_eq!(events[..6], [0x80, 0x00, 0x60, 0xA0, 0x60, 0xE0]);
     assert_eq!(events[events.len() - 5..], [0x04, 0x40, 0x80, 0x40, 0x80]);

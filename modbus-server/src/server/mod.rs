@@ -27,6 +27,8 @@ pub struct Server {
     /// The line's counters as last seen, and as they were when they were last cleared.
     line: LineCounters,
     cleared: LineCounters,
+    /// Bits of the diagnostic register that were set when it was cleared and have stayed so.
+    cleared_bits: u16,
     tally: Tally,
     log: EventLog,
 }
@@ -54,6 +56,7 @@ impl Server {
             listen_only: false,
             line: LineCounters::ZERO,
             cleared: LineCounters::ZERO,
+            cleared_bits: 0,
             tally: Tally::ZERO,
             log: EventLog::new(),
         }

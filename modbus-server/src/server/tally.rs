@@ -46,8 +46,9 @@ impl Server {
         }
         match decision.outcome {
             // "Not incremented for exception responses, poll commands, or fetch event counter
-            // commands" (6.9).
-            Outcome::Accepted if decision.work != Work::EventCounter => count(&mut tally.events),
+            // commands" (6.9), of which the log is one: its count is that of function 0B (6.10).
+            Outcome::Accepted if matches!(decision.work, Work::EventCounter | Work::EventLog) => {}
+            Outcome::Accepted => count(&mut tally.events),
             Outcome::Refused(exception) => {
                 count(&mut tally.exceptions);
                 match exception {

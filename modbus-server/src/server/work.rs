@@ -40,7 +40,12 @@ impl Server {
             }
             Work::ExceptionStatus => body(adu, &[model.exception_status()]),
             Work::Diagnose(Diagnostic::Register) => {
-                diagnostic_data(adu, model.diagnostic_register());
+                let register = model.diagnostic_register();
+                self.cleared_bits &= register;
+                diagnostic_data(adu, register & !self.cleared_bits);
+            }
+            Work::Diagnose(Diagnostic::Clear) => {
+                self.cleared_bits = model.diagnostic_register();
             }
             Work::Diagnose(Diagnostic::Counter(index)) => {
                 let counter = self.counters().as_words().get(usize::from(index)).copied();

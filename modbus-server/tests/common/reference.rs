@@ -63,7 +63,8 @@ impl Reference {
     fn request(&mut self, broadcast: bool, pdu: &[u8]) -> Option<Vec<u8>> {
         let listening = |me: &Self| if me.listening { 0x20 } else { 0 };
         let (bad, overruns) = std::mem::take(&mut self.unlogged);
-        for n in 0..bad {
+        // Of more than the log holds nobody knows which were the last: overruns are told first.
+        for n in 0..bad.min(64) {
             let overrun = if n < overruns { 0x10 } else { 0 };
             self.log.push(0x82 + overrun + listening(self));
         }
@@ -86,7 +87,7 @@ impl Reference {
         if obeyed {
             let before = self.points.clone();
             // What is asked for is read after the request has been counted.
-            self.events += u16::from(pdu[0] != 11);
+            self.events += u16::from(!matches!(pdu[0], 11 | 12));
             match self.answer(pdu) {
                 Ok(pdu) => reply = Some(pdu),
                 Err(code) => {
@@ -97,7 +98,7 @@ impl Reference {
             }
             let counts = refused.is_none() && (!broadcast || can_be_broadcast);
             if !counts {
-                self.events -= u16::from(pdu[0] != 11);
+                self.events -= u16::from(!matches!(pdu[0], 11 | 12));
             }
             if broadcast && !can_be_broadcast {
                 self.points = before;
