@@ -29,6 +29,8 @@ mod gap_timer;
 #[cfg(target_os = "none")]
 mod leds;
 #[cfg(target_os = "none")]
+mod mem;
+#[cfg(target_os = "none")]
 mod rs485;
 #[cfg(target_os = "none")]
 mod safe;
