@@ -1,12 +1,13 @@
 //! `cargo xtask ci`: formatting, lints and documentation with every warning an error, for the host and
-//! for the microcontroller, then the steps of `cargo xtask test`.
+//! for the microcontroller, then the steps of `cargo xtask test`, the figures of `cargo xtask bench` against the
+//! baseline, and every fuzz target for a short time.
 
 use std::process::Command;
 
 use crate::steps::Steps;
 use crate::toolchain::Need;
 use crate::workspace::Workspace;
-use crate::{Result, build, command, test};
+use crate::{Result, bench, build, command, fuzz, renode, test};
 
 /// What ends up in the image.
 const TARGET_PACKAGES: [&str; 5] = [
@@ -45,7 +46,16 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
             .and_then(|cargo| command::run(&mut target_documentation(cargo)))
             .into()
     });
-    test::add(workspace, &mut steps, true);
+    let image = test::add(workspace, &mut steps, true);
+    steps.run("instructions and bytes", || {
+        test::on(image.as_deref(), |elf| bench::check(workspace, elf).into())
+    });
+    steps.run("Renode's suites in simulation", || {
+        test::on(image.as_deref(), |elf| {
+            renode::checks::on_simulator(workspace, elf, true)
+        })
+    });
+    steps.run("fuzz targets, briefly", || fuzz::step(workspace, true));
     steps.finish()
 }
 

@@ -14,10 +14,13 @@ pub mod command;
 pub mod docs;
 mod failure;
 pub mod flash;
+pub mod fuzz;
 pub mod image;
 pub mod pymodbus;
+pub mod renode;
 pub mod sim;
 pub mod size;
+pub mod soak;
 pub mod steps;
 pub mod test;
 pub mod toolchain;
@@ -54,6 +57,12 @@ enum Command {
     Bench(bench::Options),
     /// Build the image and run it on the virtual board
     Sim(sim_options::Options),
+    /// Test the image on Renode: its suites and the conformance suite
+    Renode(renode::Options),
+    /// Feed the framers, the server and the configuration store what libFuzzer comes up with
+    Fuzz(fuzz::Options),
+    /// Good and damaged frames to the image in simulation, a million of them
+    Soak(soak::Options),
     /// Renew docs/register-map.md
     Docs,
     /// Everything a change must pass
@@ -75,6 +84,9 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Size(options) => size::run(&mut workspace, &options),
         Command::Bench(options) => bench::run(&mut workspace, &options),
         Command::Sim(options) => sim::run(&mut workspace, &options, std::env::args_os().skip(2)),
+        Command::Fuzz(options) => fuzz::run(&workspace, &options),
+        Command::Soak(options) => soak::run(&mut workspace, &options),
+        Command::Renode(options) => renode::run(&mut workspace, &options),
         Command::Docs => docs::run(&workspace),
         Command::Test => test::run(&mut workspace),
         Command::Ci => ci::run(&mut workspace),

@@ -1,5 +1,5 @@
-//! pymodbus, a Modbus master that nobody here wrote, against the image in simulation: a virtual
-//! environment for it under target/, and the script that drives it.
+//! pymodbus and mbpoll, Modbus masters that nobody here wrote, against the image in simulation: a virtual
+//! environment for the first under target/, and the script that drives them. mbpoll is the machine's own.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,14 +12,41 @@ use crate::{Failure, Result, command, sim};
 /// The script and its requirements, which pin the versions.
 const SCRIPTS: &str = "tools/sim/tests/pymodbus";
 
-/// The step: skipped with the reason where pymodbus cannot be had, but failed when `strict`, as in CI.
+/// The second master, on libmodbus.
+const MBPOLL: &str = "mbpoll";
+
+/// The step: skipped with the reason where one of the masters cannot be had, but failed when `strict`, as
+/// in CI. Without mbpoll the script leaves its tests out, and the others have to pass all the same.
 pub fn step(workspace: &Workspace, elf: &Path, strict: bool) -> Outcome {
     let scripts = workspace.root().join(SCRIPTS);
     let environment = workspace.target().join("pymodbus-venv");
     match prepare("python3", &environment, &scripts.join("requirements.txt")) {
-        Ok(python) => drive(workspace, &python, &scripts, elf).into(),
-        Err(missing) if strict => Outcome::Failed(missing.to_string()),
-        Err(missing) => Outcome::Skipped(missing.to_string()),
+        Ok(python) => match drive(workspace, &python, &scripts, elf) {
+            Ok(()) => {
+                find(MBPOLL).map_or_else(|missing| lacking(&missing, strict), |()| Outcome::Passed)
+            }
+            Err(failure) => Outcome::Failed(failure.to_string()),
+        },
+        Err(missing) => lacking(&missing, strict),
+    }
+}
+
+/// What becomes of the step where a master is missing.
+fn lacking(missing: &Failure, strict: bool) -> Outcome {
+    if strict {
+        Outcome::Failed(missing.to_string())
+    } else {
+        Outcome::Skipped(missing.to_string())
+    }
+}
+
+/// Whether mbpoll is there.
+fn find(mbpoll: &str) -> Result<()> {
+    match command::read(Command::new(mbpoll).arg("-V")) {
+        Ok(_) => Ok(()),
+        Err(why) => Err(Failure::new(format!(
+            "all is well with pymodbus, but mbpoll was not tried (on Debian: apt-get install mbpoll): {why}"
+        ))),
     }
 }
 
@@ -94,14 +121,15 @@ mod tests {
 
     use super::*;
 
-    /// A python3 whose `-m venv` makes an interpreter that writes down how it is called.
-    fn fake_python(directory: &Path, script: &str) -> PathBuf {
-        let program = directory.join("python3");
+    /// A program of that name made of a script.
+    fn program(directory: &Path, name: &str, script: &str) -> PathBuf {
+        let program = directory.join(name);
         fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         program
     }
 
+    /// A python3 whose `-m venv` makes an interpreter that writes down how it is called.
     const MAKES_VENV: &str = r#"
         [ "$2" = venv ] || exit 0
         mkdir -p "$4/bin"
@@ -116,7 +144,7 @@ mod tests {
     impl Case {
         fn new(script: &str) -> Self {
             let directory = tempfile::tempdir().unwrap();
-            let python = fake_python(directory.path(), script);
+            let python = program(directory.path(), "python3", script);
             fs::write(directory.path().join("requirements.txt"), "pymodbus==3.0\n").unwrap();
             Self { directory, python }
         }
@@ -164,6 +192,23 @@ mod tests {
             &requirements,
         );
         assert!(nowhere.unwrap_err().to_string().contains("Python 3.10"));
+    }
+
+    #[test]
+    fn without_mbpoll_the_step_is_skipped_with_the_package_to_install_but_failed_in_ci() {
+        let missing = find("no-mbpoll-here").unwrap_err();
+        assert!(missing.to_string().contains("apt-get install mbpoll"));
+        assert_eq!(
+            lacking(&missing, false),
+            Outcome::Skipped(missing.to_string())
+        );
+        assert_eq!(
+            lacking(&missing, true),
+            Outcome::Failed(missing.to_string())
+        );
+        let directory = tempfile::tempdir().unwrap();
+        let there = program(directory.path(), MBPOLL, "[ \"$1\" = -V ]");
+        assert_eq!(find(&there.to_string_lossy()), Ok(()));
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! `cargo xtask test`: everything a change must pass, run to the end and summed up.
 
 use std::env;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::steps::{Outcome, Steps};
 use crate::workspace::Workspace;
-use crate::{Result, build, command, pymodbus, size};
+use crate::{Result, build, command, pymodbus, renode, size};
 
 /// `cargo xtask test`.
 ///
@@ -14,12 +14,13 @@ use crate::{Result, build, command, pymodbus, size};
 /// When a step failed; all have been run and the summary printed.
 pub fn run(workspace: &mut Workspace) -> Result<()> {
     let mut steps = Steps::default();
-    add(workspace, &mut steps, is_ci(env::var("CI").ok().as_deref()));
+    let _image = add(workspace, &mut steps, is_ci(env::var("CI").ok().as_deref()));
     steps.finish()
 }
 
-/// Adds the steps of `cargo xtask test`; when `strict` none may be skipped for want of a tool.
-pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) {
+/// Adds the steps of `cargo xtask test`; when `strict` none may be skipped for want of a tool. Gives
+/// the image that was tested, if it could be built.
+pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) -> Option<PathBuf> {
     steps.run("host tests", || {
         command::run(workspace.cargo("test").args([
             "--workspace",
@@ -33,31 +34,37 @@ pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) {
         let built = build::image(workspace, &build::Options::release());
         built.map(|image| elf = Some(image.elf)).into()
     });
-    let elf = elf.as_deref();
+    let image = elf.as_deref();
     steps.run("size of the image", || {
-        on(elf, |elf| size::check(elf).into())
+        on(image, |elf| size::check(elf).into())
     });
     steps.run("image in simulation", || {
-        on(elf, |elf| {
-            let mut cargo = workspace.cargo("test");
-            cargo.args([
-                "--ignore-rust-version",
-                "--no-fail-fast",
-                "--package",
-                "sim",
-                "--",
-                "--include-ignored",
-            ]);
-            command::run(cargo.env("MODIO_ELF", elf)).into()
+        on(image, |elf| in_simulation(workspace, elf, &["sim"]))
+    });
+    steps.run("conformance of the image", || {
+        on(image, |elf| {
+            in_simulation(workspace, elf, &["conformance", "--features", "sim"])
         })
     });
     steps.run("pymodbus as master", || {
-        on(elf, |elf| pymodbus::step(workspace, elf, strict))
+        on(image, |elf| pymodbus::step(workspace, elf, strict))
     });
+    steps.run("files for Renode", || {
+        renode::checks::step(workspace, strict)
+    });
+    elf
+}
+
+/// The tests of a package, and how it is built, that run the image in the simulator.
+fn in_simulation(workspace: &Workspace, elf: &Path, package: &[&str]) -> Outcome {
+    let mut cargo = workspace.cargo("test");
+    cargo.args(["--ignore-rust-version", "--no-fail-fast", "--package"]);
+    cargo.args(package).args(["--", "--include-ignored"]);
+    command::run(cargo.env("MODIO_ELF", elf)).into()
 }
 
 /// A step on the image, which is skipped when there is none: that it is missing has failed already.
-fn on(elf: Option<&Path>, step: impl FnOnce(&Path) -> Outcome) -> Outcome {
+pub fn on(elf: Option<&Path>, step: impl FnOnce(&Path) -> Outcome) -> Outcome {
     elf.map_or_else(|| Outcome::Skipped("there is no image".to_owned()), step)
 }
 

@@ -188,14 +188,16 @@ impl Store {
 
     /// Nothing was ever stored: from now on there is always a good record, so that a cut in the very
     /// first save finds one, too. It goes where nothing need be erased for it, so that a cut meanwhile
-    /// leaves nothing that looks like a damaged configuration.
+    /// leaves nothing that looks like a damaged configuration. But the first page, when it alone is
+    /// blank, may be so from an erase that was cut short here, and must not be programmed then.
     fn begin<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let page = if self.first.blank || self.first.is_ready() || !self.second.blank {
             Page::First
         } else {
             Page::Second
         };
-        if self.survey(page).blank {
+        let as_delivered = self.survey(page).blank && (page == Page::Second || self.second.blank);
+        if as_delivered {
             let mut marking = Readying::Mark(page);
             while let Some(operation) = marking.next() {
                 operation.perform(flash)?;

@@ -203,6 +203,22 @@ fn in_the_compaction_and_the_erases_of_a_start() {
     }
 }
 
+/// The first start was cut short on either page, so that one has to be erased; the flash takes no
+/// programming after an erase that was cut short, and that page alone now reads as it was delivered.
+#[test]
+fn in_the_erase_before_the_very_first_record() {
+    let half_marked = MockFlash::with(&[0x6F], &[0x6F]);
+    let places = live(half_marked, &Settings::defaults(), &[]);
+    assert!(matches!(places[0].operation, Operation::Erase(_)));
+    for place in places {
+        let mut flash = place.before;
+        flash.cut_in(place.operation, Mess::Complete);
+        flash.power_on();
+        let (loaded, _) = start_well(&mut flash);
+        assert!(loaded.settings == Settings::defaults() && !loaded.invalid);
+    }
+}
+
 /// A second cut while the first is being mended.
 #[test]
 fn in_the_start_after_a_cut() {

@@ -15,6 +15,8 @@ pub struct Reference {
     pub log: Vec<u8>,
     /// Bad frames, and overruns, that the log does not know of yet.
     pub unlogged: (u16, u16),
+    /// Bits of the diagnostic register that have not gone since they were cleared.
+    cleared: [u8; 2],
 }
 
 const BUS: usize = 0;
@@ -37,6 +39,7 @@ impl Reference {
             events: 0,
             log: Vec::new(),
             unlogged: (0, 0),
+            cleared: [0; 2],
         }
     }
 
@@ -148,7 +151,10 @@ impl Reference {
                 self.listening = true;
                 self.log.push(4);
             }
-            0x0A => gone(self),
+            0x0A => {
+                gone(self);
+                self.cleared = self.register();
+            }
             0x14 => self.counters[OVERRUNS] = 0,
             _ => {}
         }
@@ -182,7 +188,12 @@ impl Reference {
         }
     }
 
-    fn diagnose(&self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
+    /// The diagnostic register of the points, all of it.
+    fn register(&self) -> [u8; 2] {
+        [0xAB, self.points.status]
+    }
+
+    fn diagnose(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
         if pdu.len() < 3 {
             return Err(3);
         }
@@ -202,7 +213,11 @@ impl Reference {
             return Err(3);
         }
         let [high, low] = match pdu[2] {
-            2 => [0xAB, self.points.status],
+            2 => {
+                let register = self.register();
+                self.cleared = [0, 1].map(|at| self.cleared[at] & register[at]);
+                [0, 1].map(|at| register[at] & !self.cleared[at])
+            }
             sub @ 11..=18 => self.counters[usize::from(sub) - 11].to_be_bytes(),
             _ => return Ok(pdu.to_vec()),
         };

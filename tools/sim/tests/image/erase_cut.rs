@@ -39,7 +39,7 @@ fn at_any_operation_of_the_erase_after_a_change_of_pages() {
         for fraction in FRACTIONS {
             bench.unlock();
             // The page in use is full.
-            while rooms(&mut bench).into_iter().min() >= Some(ROOM) {
+            while rooms(&bench).into_iter().min() >= Some(ROOM) {
                 round += 1;
                 save(&mut bench, set(round));
             }
@@ -55,7 +55,7 @@ fn at_any_operation_of_the_erase_after_a_change_of_pages() {
             if operation > ERASE {
                 assert_eq!(bench.board.flash_operations() - operations, ERASE);
                 assert!(
-                    rooms(&mut bench).into_iter().max() >= Some(1022),
+                    rooms(&bench).into_iter().max() >= Some(1022),
                     "it is erased"
                 );
                 return;
@@ -76,7 +76,7 @@ fn at_any_operation_of_a_save_that_has_to_erase() {
     for operation in 1..=HALF_WORDS + ERASE + 1 {
         for fraction in FRACTIONS {
             bench.unlock();
-            while rooms(&mut bench).into_iter().max() >= Some(ROOM) {
+            while rooms(&bench).into_iter().max() >= Some(ROOM) {
                 round += 1;
                 save_unheard(&mut bench, set(round));
             }

@@ -1,0 +1,175 @@
+//! Targets `receiver_rtu` and `receiver_ascii`: characters with and without faults, silences in any
+//! order, replies and buffers that come back late.
+//!
+//! After every event the receiver has heard what [`Heard`] has, to the counter. At the end both buffers
+//! are still there, and good requests after a silence are answered.
+//!
+//! ```text
+//!   script: settings, delimiter (ASCII), events
+//!   event:  0 characters          length, characters
+//!           1 a good frame        unit (0: this one, 1: all), length, PDU
+//!           2 a faulty character  character, faults
+//!           3 t1.5                4 t3.5, the buffer stays away
+//!           5 a buffer comes back 6 the unit has been sending
+//!           7 t3.5, the buffer comes back at once
+//! ```
+
+use modbus_server::line::{Faults, Framing, Receiver, Width};
+use modbus_server::{Adu, LineCounters, Server};
+
+use crate::common::{Points, UNIT, framed};
+use crate::heard::{Heard, Mode};
+use crate::script::Script;
+use crate::serving::serve;
+
+/// Target `receiver_rtu`.
+pub fn rtu(input: &[u8]) {
+    let mut script = Script::new(input);
+    let strict = script.byte() & 1 != 0;
+    let receiver = Receiver::rtu(UNIT, strict);
+    play(script, receiver, Mode::Rtu { strict }, Framing::Rtu);
+}
+
+/// Target `receiver_ascii`.
+pub fn ascii(input: &[u8]) {
+    let mut script = Script::new(input);
+    let seven_bits = script.byte() & 1 != 0;
+    let width = if seven_bits {
+        Width::Seven
+    } else {
+        Width::Eight
+    };
+    let mut receiver = Receiver::ascii(UNIT, width);
+    // Function 08 sub-function 03 sets no other (V1.1b3 6.8).
+    let delimiter = match script.byte() {
+        0 => b'\n',
+        other if other > 127 || b":\r0123456789ABCDEF".contains(&other) => b'\n',
+        other => other,
+    };
+    let framing = Framing::Ascii { delimiter };
+    receiver.set_framing(framing);
+    let mode = Mode::Ascii {
+        seven_bits,
+        delimiter,
+    };
+    play(script, receiver, mode, framing);
+}
+
+/// Receiver and model, side by side.
+struct Pair<'a> {
+    receiver: Receiver<'a>,
+    heard: Heard,
+    framing: Framing,
+    away: Vec<&'a mut Adu>,
+}
+
+fn play(mut script: Script<'_>, receiver: Receiver<'_>, mode: Mode, framing: Framing) {
+    let (mut one, mut two) = (Adu::new(), Adu::new());
+    let mut pair = Pair {
+        receiver,
+        heard: Heard::new(mode),
+        framing,
+        away: Vec::new(),
+    };
+    pair.receiver.give_back(&mut one);
+    pair.receiver.give_back(&mut two);
+    while let Some(tag) = script.tag() {
+        pair.event(tag & 7, &mut script);
+        assert_eq!(*pair.receiver.counters(), pair.heard.counters);
+        assert_eq!(pair.receiver.is_over(), pair.heard.is_over());
+    }
+    pair.must_be_whole();
+}
+
+impl Pair<'_> {
+    fn event(&mut self, event: u8, script: &mut Script<'_>) {
+        match event {
+            0 => self.characters(script.string()),
+            1 => {
+                let unit = match script.byte() {
+                    0 => UNIT,
+                    1 => 0,
+                    unit => unit,
+                };
+                let pdu = script.string();
+                self.characters(&framed(self.framing, unit, &pdu[..pdu.len().min(253)]));
+            }
+            2 => {
+                let (byte, faults) = (script.byte(), script.byte() & 15);
+                self.receiver.character(byte, Faults::from_bits(faults));
+                self.heard.character(byte, faults);
+            }
+            3 => {
+                self.receiver.pause();
+                self.heard.pause();
+            }
+            4 => self.close(),
+            5 => self.give_back(),
+            6 => {
+                self.receiver.resume();
+                self.heard.resume();
+            }
+            _ => {
+                let before = self.away.len();
+                self.close();
+                if self.away.len() > before {
+                    self.give_back();
+                }
+            }
+        }
+    }
+
+    fn characters(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.receiver.character(*byte, Faults::NONE);
+            self.heard.character(*byte, 0);
+        }
+    }
+
+    fn close(&mut self) {
+        let closed = self.receiver.close();
+        let expected = self.heard.close();
+        let delivered = closed.as_ref().map(|closed| closed.adu.as_slice());
+        assert_eq!(delivered, expected.as_deref());
+        if let Some(closed) = closed {
+            assert_eq!(closed.line, self.heard.counters);
+            self.away.push(closed.adu);
+        }
+    }
+
+    fn give_back(&mut self) {
+        if let Some(adu) = self.away.pop() {
+            self.receiver.give_back(adu);
+            self.heard.free += 1;
+        }
+    }
+
+    /// Whatever has been: there are two buffers, and after a silence two requests are taken and then
+    /// answered. A third finds no buffer, and is counted.
+    fn must_be_whole(&mut self) {
+        self.close();
+        while !self.away.is_empty() {
+            self.give_back();
+        }
+        assert_eq!(self.heard.free, 2);
+        let request = [0x03, 0, 1, 0, 1];
+        for (taken, dropped) in [(1, 0), (2, 0), (2, 1)] {
+            let before: LineCounters = *self.receiver.counters();
+            self.characters(&framed(self.framing, UNIT, &request));
+            self.close();
+            assert_eq!(self.away.len(), taken, "requests taken");
+            let counters = self.receiver.counters();
+            assert_eq!(counters.dropped.wrapping_sub(before.dropped), dropped);
+            assert_eq!(counters.bus_messages, before.bus_messages.wrapping_add(1));
+        }
+        let mut points = Points::new(0, 2);
+        points.words[1] = 0xBEEF;
+        let mut server = Server::new(UNIT, self.framing);
+        let answer = framed(self.framing, UNIT, &[0x03, 2, 0xBE, 0xEF]);
+        for adu in &mut self.away {
+            let line = self.receiver.counters();
+            let reply = serve(&mut server, &mut points, line, adu);
+            assert_eq!(reply.as_ref(), Some(&answer));
+        }
+    }
+}

@@ -1,0 +1,220 @@
+"""Renode's keywords, as far as the suites use them, played on the project's own simulator.
+
+So the suites are run where there is no Renode: what they ask of the unit, and expect of it, is right
+when the image gives it here. What only Renode can do is in tests with the tags `renode-only` (its
+models) and `exact-time` (gaps to the millisecond), which are left out then. Names and arguments of the
+keywords are those of Renode's sources; a dry run checks the suites against them.
+
+The simulator's program and the image come from the variables SIMULATOR and ELF.
+"""
+
+import json
+import re
+import socket
+import subprocess
+import threading
+import time
+import urllib.request
+
+from robot.libraries.BuiltIn import BuiltIn
+
+ROBOT_LIBRARY_SCOPE = "GLOBAL"
+
+# Where the log is read from: a control block of RTT made up of the simulator's output.
+_BLOCK = 0x20002000
+_BUFFER = 0x20003000
+
+
+class _Board:
+    """The simulator with a board in it."""
+
+    def __init__(self, program, elf, dip, module):
+        tcp, http = _free_port(), _free_port()
+        self.api = f"http://127.0.0.1:{http}/api/"
+        command = [program, "--elf", elf, "--dip", str(dip), "--module", module]
+        command += ["--tcp", f"127.0.0.1:{tcp}", "--http", f"127.0.0.1:{http}"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.log = []
+        self.came = bytearray()
+        threading.Thread(target=self._read_log, daemon=True).start()
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                self.line = socket.create_connection(("127.0.0.1", tcp))
+                break
+            except OSError:
+                if self.process.poll() is not None or time.monotonic() > deadline:
+                    raise AssertionError(f"no simulator: {self.process.stderr.read()}")
+                time.sleep(0.02)
+        self.line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        threading.Thread(target=self._read_line, daemon=True).start()
+
+    def _read_log(self):
+        for line in self.process.stdout:
+            if not re.match(r"(pty|http|tcp|gdb): ", line):
+                self.log.append(line)
+
+    def _read_line(self):
+        try:
+            while data := self.line.recv(4096):
+                self.came += data
+        except OSError:
+            pass
+
+    def state(self):
+        return json.load(urllib.request.urlopen(self.api + "state"))
+
+    def post(self, path, **what):
+        request = urllib.request.Request(self.api + path, json.dumps(what).encode(), method="POST")
+        urllib.request.urlopen(request).read()
+
+    def run_for(self, seconds):
+        end = self.state()["virtual_ms"] + seconds * 1000
+        while (left := end - self.state()["virtual_ms"]) > 0:
+            time.sleep(max(left / 1000, 0.001))
+        # What has left the unit by then is on its way through the socket.
+        time.sleep(0.02)
+
+    def end(self):
+        self.line.close()
+        self.process.terminate()
+        self.process.wait()
+
+
+def _free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class RenodeOnSimulator:
+    """The library. Where Renode's server tells a type, so do the arguments here."""
+
+    ROBOT_LIBRARY_SCOPE = "GLOBAL"
+
+    def __init__(self):
+        self._board = None
+        self._variables = {}
+        self._delay = 0.0
+        self._keys = bytearray()
+
+    # Fixtures of renode-keywords.robot.
+
+    def setup(self):
+        """The suite's default setup."""
+
+    def teardown(self):
+        """The suite's default teardown."""
+        self.reset_emulation()
+
+    def test_teardown(self):
+        """The tests' default teardown."""
+        self.reset_emulation()
+
+    def reset_emulation(self):
+        if self._board:
+            self._board.end()
+        self._board = None
+        self._variables = {}
+        self._delay = 0.0
+        self._keys.clear()
+
+    # Keywords of Renode's server.
+
+    def create_terminal_tester(self, uart, timeout: float = None, machine=None, endLineOption=None,
+                               defaultPauseEmulation: bool = None, defaultWaitForEcho: bool = None,
+                               defaultMatchNextLine: bool = None, binaryMode: bool = False):
+        assert uart == "sysbus.usart1" and binaryMode
+
+    def send_key_to_uart(self, c, testerId: int = None):
+        self._keys.append(int(c, 0))
+
+    def write_char_delay(self, delay: float, testerId: int = None):
+        self._delay = delay
+
+    def wait_for_bytes_on_uart(self, content, timeout: float = None, testerId: int = None,
+                               treatAsRegex: bool = False, pauseEmulation: bool = None,
+                               matchStart: bool = False):
+        assert timeout == 0, "the suites let time go by themselves"
+        came = self._board.came
+        pattern = content.encode() if treatAsRegex else re.escape(bytes.fromhex(content))
+        find = re.match if matchStart else re.search
+        found = find(pattern, came, re.DOTALL)
+        if not found:
+            raise AssertionError(f"Terminal tester failed! There is: {came.hex(' ')}")
+        del came[: found.end()]
+
+    def execute_command(self, command, machine=None):
+        for pattern, act in self._commands():
+            if match := re.fullmatch(pattern, command):
+                return act(*match.groups())
+        raise AssertionError(f"a command that is not known here: {command}")
+
+    def _commands(self):
+        number = r"(0x[0-9A-Fa-f]+|\d+)"
+        return [
+            (r'\$(\w+)="?([^"]*)"?', self._set),
+            (r"include @.*/board\.resc", self._start),
+            (r"emulation SetGlobalAdvanceImmediately true", lambda: ""),
+            (r'emulation RunFor "([\d.]+)"', self._run_for),
+            (r'sysbus GetSymbolAddress "_SEGGER_RTT"', lambda: f"{_BLOCK:#010X}\n"),
+            (rf"sysbus ReadDoubleWord {number}", lambda at: f"{self._read(int(at, 0)):#010X}\n"),
+            (rf"sysbus WriteDoubleWord {number} {number}", lambda at, to: self._write(int(at, 0), int(to, 0))),
+            (r"sysbus\.gpioPortA OnGPIO ([0-3]) (true|false)", self._drive),
+            (r"sysbus\.sram ZeroAll", lambda: ""),
+            (r"machine Reset", lambda: self._board.post("power", cycle=True)),
+        ]
+
+    def _set(self, name, value):
+        self._variables[name] = value
+        return ""
+
+    def _start(self):
+        program = BuiltIn().get_variable_value("${SIMULATOR}")
+        elf = BuiltIn().get_variable_value("${ELF}")
+        self._board = _Board(program, elf, self._variables["dip"], self._variables["module"])
+        return ""
+
+    def _run_for(self, seconds):
+        # Together, so that there is no gap between them, as in Renode while the emulation stands still.
+        step = 1 if self._delay else len(self._keys) or 1
+        for at in range(0, len(self._keys), step):
+            time.sleep(self._delay)
+            self._board.line.sendall(self._keys[at : at + step])
+        self._keys.clear()
+        self._board.run_for(float(seconds))
+        return ""
+
+    def _drive(self, pin, level):
+        high = level == "true"
+        channel = self._board.state()["channels"][int(pin)]
+        what = {"di": "energised", "relay": "manual"}[channel["kind"]]
+        self._board.post(f"channels/{int(pin) + 1}", **{what: not high})
+        return ""
+
+    def _read(self, address):
+        if _BLOCK <= address < _BLOCK + 0x100:
+            length = len("".join(self._board.log).encode())
+            return {28: _BUFFER, 36: length}[address - _BLOCK]
+        if _BUFFER <= address < _BUFFER + 0x1000:
+            at = address - _BUFFER
+            text = "".join(self._board.log).encode()[at : at + 4]
+            return int.from_bytes(text.ljust(4, b"\0"), "little")
+        state = self._board.state()
+        channels = state["channels"]
+        if address == 0x4001080C:
+            on = [c.get("on", False) for c in channels]
+            # The coils of relays 1 and 2 are on lines 3 and 4.
+            coils = [c.get("energised", False) and c["kind"] == "relay" for c in channels[:2]]
+            return sum(bit << n for n, bit in enumerate(on)) | sum(bit << n + 2 for n, bit in enumerate(coils))
+        if address == 0x40010C0C:
+            return state["leds"]["activity"] << 8 | state["leds"]["fault"] << 9
+        return channels[(address - 0x40005500) // 4]["code"]
+
+    def _write(self, address, value):
+        if 0x40012500 <= address < 0x40012510:
+            channel = (address - 0x40012500) // 4 + 1
+            self._board.post(f"channels/{channel}", millivolts=round(value * 3300 / 4095))
+        else:
+            assert address == 0x400213F0, "the flags of the next reset; power is cut here anyway"
+        return ""

@@ -1,0 +1,98 @@
+"""What Renode's IronPython gives to a Python peripheral and to the monitor's commands, for Python 3.
+
+Renode runs the whole script at every access, in a scope that stays: so does this.
+"""
+
+import types
+from pathlib import Path
+
+RENODE = Path(__file__).resolve().parent.parent
+
+
+class Request:
+    """The access under way, with the names of Renode 1.16.1 and later."""
+
+    def __init__(self):
+        self.IsInit = self.IsRead = self.IsWrite = self.IsUser = False
+        self.Offset = 0
+        self._value = 0
+
+    @property
+    def Value(self):
+        return self._value
+
+    @Value.setter
+    def Value(self, value):
+        # An unsigned number in Renode: anything else ends the emulation there.
+        assert isinstance(value, int) and 0 <= value < 1 << 64, value
+        self._value = value
+
+
+class Memory:
+    """A Memory.MappedMemory."""
+
+    def __init__(self, size):
+        self.data = bytearray(b"\xff" * size)
+
+    def SetRange(self, start, count, value):
+        assert 0 <= start and start + count <= len(self.data)
+        self.data[start : start + count] = bytes([value]) * count
+
+
+class Machine(dict):
+    """The machine: its peripherals by name."""
+
+
+class Peripheral:
+    """A Python.PythonPeripheral that runs a file of renode/peripherals."""
+
+    def __init__(self, name, machine=None):
+        path = RENODE / "peripherals" / name
+        self.code = compile(path.read_text(encoding="utf-8"), str(path), "exec")
+        self.request = Request()
+        self.warnings = []
+        peripheral = types.SimpleNamespace(
+            GetMachine=lambda: machine,
+            WarningLog=self.warnings.append,
+        )
+        self.scope = {"request": self.request, "self": peripheral, "size": 0x400}
+        self.inited = False
+
+    def _run(self, kind, offset=0, value=0):
+        request = self.request
+        request.IsInit, request.IsRead, request.IsWrite = kind == "init", kind == "read", kind == "write"
+        request.Offset, request.Value = offset, value
+        exec(self.code, self.scope)
+        self._check_saved()
+        return request.Value
+
+    def _check_saved(self):
+        """Renode saves these with the emulation, and can save nothing else."""
+        given = {"request", "self", "size", "__builtins__"}
+        for name, value in self.scope.items():
+            assert name in given or isinstance(value, (int, dict)), f"{name} cannot be saved"
+
+    def reset(self):
+        self._run("init")
+        self.inited = True
+
+    def read(self, offset):
+        if not self.inited:
+            self.reset()
+        return self._run("read", offset)
+
+    def write(self, offset, value):
+        if not self.inited:
+            self.reset()
+        self._run("write", offset, value)
+
+    def modify(self, offset, set_bits=0, clear_bits=0):
+        self.write(offset, self.read(offset) & ~clear_bits | set_bits)
+
+
+def commands(machine, printed):
+    """The functions of commands.py, on a machine; what they print is added to `printed`."""
+    path = RENODE / "commands.py"
+    scope = {"monitor": types.SimpleNamespace(Machine=machine), "print": printed.append}
+    exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), scope)
+    return types.SimpleNamespace(**{name: value for name, value in scope.items() if name.startswith("mc_")})

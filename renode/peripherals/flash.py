@@ -1,0 +1,79 @@
+# The flash controller (PM0075): the keys and the lock, and the erase of a page. The memory itself is
+# Renode's, which takes a write whatever PG says: what is written over programmed cells is not refused
+# here, and nothing takes any time.
+#
+# Beside the part's registers, for scripts and tests:
+#   0x3F0  pages erased since power-on, mass erases among them
+#
+# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
+# emulation, and can save numbers and dictionaries only.
+
+if request.IsInit:
+    try:
+        erased = erased
+    except NameError:
+        erased = 0
+    acr = 0x30
+    cr = 0x80
+    sr = 0
+    address = 0
+    # How many of the two keys have come; -1 after a wrong one, until the next reset.
+    keys = 0
+elif request.IsRead:
+    offset = int(request.Offset)
+    if offset == 0x00:
+        request.Value = acr
+    elif offset == 0x0C:
+        request.Value = sr
+    elif offset == 0x10:
+        request.Value = cr
+    elif offset == 0x1C:
+        # No read protection; the option bytes as they come from the factory.
+        request.Value = 0x03FFFFFC
+    elif offset == 0x20:
+        # No page is write-protected.
+        request.Value = 0xFFFFFFFF
+    elif offset == 0x3F0:
+        request.Value = erased
+    else:
+        request.Value = 0
+elif request.IsWrite:
+    offset = int(request.Offset)
+    value = int(request.Value) & 0xFFFFFFFF
+    if offset == 0x00:
+        # The prefetch buffer's status follows its enable.
+        acr = value & 0x1F | (value & 0x10) << 1
+    elif offset == 0x04:
+        if keys == 0 and value == 0x45670123:
+            keys = 1
+        elif keys == 1 and value == 0xCDEF89AB:
+            keys = 2
+            cr &= ~0x80
+        else:
+            keys = -1
+            cr |= 0x80
+    elif offset == 0x0C:
+        # EOP, WRPRTERR and PGERR are taken back by writing 1.
+        sr &= ~(value & 0x34)
+    elif offset == 0x14:
+        address = value
+    elif offset == 0x10 and cr & 0x80:
+        self.WarningLog("FLASH_CR is locked: 0x%X is not taken" % value)
+    elif offset == 0x10:
+        # PG, PER, MER, OPTPG, OPTER, OPTWRE and the interrupt enables are kept.
+        cr = value & 0x1637
+        if value & 0x40 and value & 0x06:
+            page = (address - 0x08000000) & ~0x3FF
+            if value & 0x04:
+                self.GetMachine()["sysbus.flash"].SetRange(0, 0x20000, 0xFF)
+                erased += 1
+                sr |= 0x20
+            elif 0 <= page < 0x20000:
+                self.GetMachine()["sysbus.flash"].SetRange(page, 0x400, 0xFF)
+                erased += 1
+                sr |= 0x20
+            else:
+                self.WarningLog("no page of flash is at 0x%08X" % address)
+        if value & 0x80:
+            cr |= 0x80
+            keys = 0

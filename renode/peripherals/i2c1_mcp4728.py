@@ -1,0 +1,115 @@
+# I2C1 as a master (RM0008 26.6), with the DAC of the analog-output modules on it: an MCP4728 at
+# address 0x60 (Microchip DS22187E). Every byte takes no time. Its outputs follow Multi-Write and Fast
+# Write; writes to the EEPROM are not modelled, and a read is not acknowledged.
+#
+# Beside the part's registers, for scripts and tests:
+#   0x100 + 4 n  the code at output n, 0 = A to 3 = D
+#   0x110        whether the module is plugged: 0 and nobody acknowledges; 1 from the start
+#   0x114        transfers to the DAC that a stop condition or a repeated start has ended
+# All three stay across resets, as the DAC does.
+#
+# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
+# emulation, and can save numbers and dictionaries only.
+
+if request.IsInit:
+    try:
+        outputs = outputs
+    except NameError:
+        outputs = {0: 0, 1: 0, 2: 0, 3: 0}
+        plugged = 1
+        transfers = 0
+    registers = {}
+    cr1 = 0
+    sr1 = 0
+    sr2 = 0
+    # 0 idle, 1 the address is to come, 2 data for the DAC is to come.
+    state = 0
+    # Of the transfer under way: bytes so far, the command, and the first byte of a pair.
+    count = 0
+    command = 0
+    first = 0
+elif request.IsRead:
+    offset = int(request.Offset)
+    if offset == 0x00:
+        request.Value = cr1
+    elif offset == 0x10:
+        request.Value = 0
+    elif offset == 0x14:
+        request.Value = sr1
+    elif offset == 0x18:
+        request.Value = sr2
+        # ADDR goes with a read of SR2 after one of SR1.
+        sr1 &= ~0x02
+    elif 0x100 <= offset <= 0x10C:
+        request.Value = outputs[(offset - 0x100) // 4]
+    elif offset == 0x110:
+        request.Value = plugged
+    elif offset == 0x114:
+        request.Value = transfers
+    else:
+        request.Value = registers.get(offset, 0)
+elif request.IsWrite:
+    offset = int(request.Offset)
+    value = int(request.Value) & 0xFFFF
+    if offset == 0x00:
+        # STOP and START are over at once; SWRST and PE = 0 take the peripheral off the bus.
+        cr1 = value & ~0x0300
+        if value & 0x8000 or not value & 0x0001:
+            sr1 = 0
+            sr2 = 0
+            state = 0
+            if value & 0x8000:
+                registers = {}
+        elif value & 0x0300:
+            if state == 2:
+                transfers += 1
+            sr1 &= ~0x87
+            sr2 = 0
+            state = 0
+            if value & 0x0100:
+                # SB; MSL and BUSY.
+                sr1 |= 0x01
+                sr2 = 0x03
+                state = 1
+    elif offset == 0x10 and state == 1:
+        sr1 &= ~0x01
+        if value & 0xFF == 0xC0 and plugged:
+            # ADDR and TXE; TRA.
+            sr1 |= 0x82
+            sr2 |= 0x04
+            state = 2
+            count = 0
+            command = 0
+        else:
+            # AF. The bus stays the master's until its stop condition.
+            sr1 |= 0x0400
+            state = 0
+    elif offset == 0x10 and state == 2:
+        value &= 0xFF
+        # TXE and BTF: the byte has left already.
+        sr1 |= 0x84
+        if command & 0xC0 == 0x00 and count:
+            # Fast Write: two bytes a channel, from A on.
+            if count & 1:
+                outputs[count // 2 & 3] = (first & 0x0F) << 8 | value
+            first = value
+        elif count % 3 == 0:
+            # The command byte of Multi-Write, which comes before every channel; of others the only.
+            if not count or command & 0xF8 == 0x40:
+                command = value
+            first = value
+        elif command & 0xF8 == 0x40:
+            # UDAC = 0: the output follows at the last byte.
+            if count % 3 == 2 and not command & 0x01:
+                outputs[command >> 1 & 3] = (first & 0x0F) << 8 | value
+            first = value
+        count += 1
+    elif offset == 0x14:
+        # rc_w0: a 0 takes an error back.
+        sr1 &= value | ~0xDF00
+    elif 0x100 <= offset <= 0x10C:
+        outputs[(offset - 0x100) // 4] = value & 0xFFF
+    elif offset == 0x110:
+        plugged = value & 1
+    else:
+        registers[offset] = value

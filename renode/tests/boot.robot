@@ -1,0 +1,47 @@
+*** Settings ***
+Documentation       What the unit does when it is switched on.
+Resource            modio.resource
+Test Setup          Start Board
+
+
+*** Test Cases ***
+Answers Half A Second After Power-On
+    Unit Answers
+
+Tells What It Is
+    # Product code, and board 1.
+    Request Gives    03 0200 0002    03 04 2383 5860
+    Request Gives    03 0205 0001    03 02 0001
+
+Knows Its Own Number
+    [Tags]    renode-only
+    # Six half-words of 0x1FFFF7E8, as modio-02.repl has them.
+    Request Gives    03 0220 0006    03 0C 1100 3322 5544 7766 1908 3B2A
+
+Tells A Power-On By The Reset Flags
+    # Power-on and the pin; nothing is wrong.
+    Request Gives    03 0207 0001    03 02 0030
+    Request Gives    03 020A 0001    03 02 0000
+
+Counts Its Seconds
+    Run For    2
+    # 2.5 s, and the time of a request.
+    Request Gives    03 0208 0002    03 04 0000 0002
+
+Keeps Quiet While It Starts
+    Nothing Has Come
+
+Writes A Log
+    ${log}=    Read Log
+    Should Contain    ${log}    on modio-02, 9600 8N2
+    Should Contain    ${log}    reset: power-on
+    Should Contain    ${log}    unit address 1
+    Should Contain    ${log}    slot 5: 4di
+
+Starts Without A Crystal
+    [Tags]    renode-only
+    Execute Command    sysbus WriteDoubleWord ${CRYSTAL} 0
+    Cut The Power
+    Unit Answers
+    ${log}=    Read Log
+    Should Contain    ${log}    the crystal did not start

@@ -1,0 +1,186 @@
+//! What can be checked of Renode's files without Renode: the Python models do what the firmware needs,
+//! every suite names keywords that Renode has and calls them right, and, played on the project's own
+//! simulator, the suites expect of the unit what it does.
+//!
+//! The platform and the scripts are checked by tests of this package (`platform`).
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use register_map::Module;
+use register_map::record;
+use serde_json::{Map, Value};
+
+use super::DIRECTORY;
+use crate::steps::Outcome;
+use crate::workspace::Workspace;
+use crate::{Failure, Result, command, sim};
+
+/// The step of `cargo xtask test`: the models, and a dry run of the suites. Skipped with the reason where
+/// there is no Python or no Robot Framework, but failed when `strict`, as in CI.
+pub fn step(workspace: &Workspace, strict: bool) -> Outcome {
+    with_robot(workspace, strict, |python, checks, output| {
+        models(python, checks)?;
+        robot(python, checks, output, &["--dryrun"])
+    })
+}
+
+/// The step of `cargo xtask ci`: the suites against the image in the simulator, which takes minutes.
+pub fn on_simulator(workspace: &Workspace, elf: &Path, strict: bool) -> Outcome {
+    with_robot(workspace, strict, |python, checks, output| {
+        let simulator = sim::simulator(workspace)?;
+        let options = [
+            "--exclude",
+            "renode-only",
+            "--exclude",
+            "exact-time",
+            "--variable",
+            &format!("SIMULATOR:{}", simulator.display()),
+            "--variable",
+            &format!("ELF:{}", elf.display()),
+        ];
+        robot(python, checks, output, &options)
+    })
+}
+
+fn with_robot(
+    workspace: &Workspace,
+    strict: bool,
+    check: impl FnOnce(&Path, &Path, &Path) -> Result<()>,
+) -> Outcome {
+    let checks = workspace.root().join(DIRECTORY).join("checks");
+    let environment = workspace.target().join("renode-venv");
+    match prepare("python3", &environment, &checks.join("requirements.txt")) {
+        Ok(python) => check(&python, &checks, &workspace.target().join("renode-checks")).into(),
+        Err(missing) if strict => Outcome::Failed(missing.to_string()),
+        Err(missing) => Outcome::Skipped(missing.to_string()),
+    }
+}
+
+/// The unit tests of the models and of the monitor's commands.
+fn models(python: &Path, checks: &Path) -> Result<()> {
+    for (test, argument) in [
+        ("test_models.py", presets()),
+        ("test_syntax.py", String::new()),
+    ] {
+        let mut python = Command::new(python);
+        // Leaves no __pycache__ in the tree.
+        python.arg("-B").arg(checks.join(test));
+        if !argument.is_empty() {
+            python.arg(argument);
+        }
+        command::run(&mut python)?;
+    }
+    Ok(())
+}
+
+/// What the register map has a new device store for every module, in JSON.
+fn presets() -> String {
+    let hex = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect::<String>()
+    };
+    let presets: Map<String, Value> = Module::ALL
+        .iter()
+        .map(|&module| {
+            let stored = hex(&record::module_in_slot(module));
+            (module.name().to_owned(), Value::String(stored))
+        })
+        .collect();
+    Value::Object(presets).to_string()
+}
+
+/// Runs Robot Framework on the suites as renode-test does, with our keywords in place of Renode's.
+fn robot(python: &Path, checks: &Path, output: &Path, options: &[&str]) -> Result<()> {
+    let mut robot = Command::new(python);
+    robot.args([
+        "-B",
+        "-m",
+        "robot",
+        "--console",
+        "quiet",
+        "--prerunmodifier",
+    ]);
+    robot.arg(checks.join("AsRenodeTest.py"));
+    robot.arg("--outputdir").arg(output).args(options);
+    robot.args(super::suites::all(checks.parent().unwrap_or(checks))?);
+    command::run(&mut robot).map_err(|failure| {
+        let log = output.join("log.html");
+        Failure::new(format!("{failure}, see {}", log.display()))
+    })
+}
+
+/// Makes the virtual environment, or takes the one made earlier from the same requirements, and tells
+/// its interpreter.
+fn prepare(python: &str, environment: &Path, requirements: &Path) -> Result<PathBuf> {
+    let wanted = fs::read_to_string(requirements)
+        .map_err(|error| Failure::new(format!("{}: {error}", requirements.display())))?;
+    let interpreter = environment.join(if cfg!(windows) {
+        "Scripts/python.exe"
+    } else {
+        "bin/python"
+    });
+    // Written last, so that an installation cut short is not taken for a whole one.
+    let stamp = environment.join("installed.txt");
+    let works = || command::read(Command::new(&interpreter).args(["-c", "import robot"]));
+    if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && works().is_ok() {
+        return Ok(interpreter);
+    }
+    command::read(
+        Command::new(python).args(["-c", "import sys; sys.exit(sys.version_info < (3, 8))"]),
+    )
+    .map_err(|_| {
+        Failure::new("Robot Framework needs Python 3.8 or newer as python3 on the PATH")
+    })?;
+    eprintln!("making {}", environment.display());
+    let mut venv = Command::new(python);
+    venv.args(["-m", "venv", "--clear"]).arg(environment);
+    command::read(&mut venv).map_err(|why| {
+        Failure::new(format!(
+            "no virtual environment (on Debian: python3-venv): {why}"
+        ))
+    })?;
+    let mut pip = Command::new(&interpreter);
+    pip.args([
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    ]);
+    pip.arg("--requirement").arg(requirements);
+    command::read(&mut pip).map_err(|why| {
+        Failure::new(format!(
+            "Robot Framework cannot be installed from PyPI: {why}"
+        ))
+    })?;
+    fs::write(&stamp, wanted)
+        .map_err(|error| Failure::new(format!("cannot write {}: {error}", stamp.display())))?;
+    Ok(interpreter)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_module_has_a_preset() {
+        let presets: Value = serde_json::from_str(&presets()).unwrap();
+        assert_eq!(presets.as_object().unwrap().len(), Module::ALL.len());
+        let stored = presets["4di"].as_str().unwrap();
+        assert!(stored.starts_with("6f6b6d6f0101"), "{stored}");
+    }
+
+    #[test]
+    fn without_python_the_step_says_so() {
+        let directory = tempfile::tempdir().unwrap();
+        let requirements = directory.path().join("requirements.txt");
+        fs::write(&requirements, "robotframework==6.1\n").unwrap();
+        let environment = directory.path().join("venv");
+        let failure = prepare("no-python-here", &environment, &requirements).unwrap_err();
+        assert!(failure.to_string().contains("Python 3.8"), "{failure}");
+    }
+}
