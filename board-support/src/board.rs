@@ -8,7 +8,7 @@ use stm32f1xx_hal::{
 
 use crate::{
     ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
-    design::DIP_SETTLE_CYCLES, dip, i2c::BusPins, rs485, uart::LineSettings, unique_id,
+    design::DIP_SETTLE_CYCLES, dip, i2c::BusPins, port, rs485, uart::LineSettings, unique_id,
 };
 
 /// The board's devices.
@@ -20,8 +20,8 @@ pub struct Board {
     pub reset_cause: u8,
     /// SW01 as a number 0 to 255.
     pub dip: u8,
-    /// The chip's unique number, in the order of its addresses (RM0008 30.2).
-    pub unique_id: [u8; 12],
+    /// The chip's unique number, half-words in the order of their addresses (RM0008 30.2).
+    pub unique_id: [u16; 6],
     /// The lines of the slot.
     pub slot: Slot,
     /// The bus to the DAC of the analog-output modules, its pins floating until it is used.
@@ -84,20 +84,18 @@ pub fn setup(device: pac::Peripherals) -> Board {
         .into_push_pull_output_with_state(&mut a.crh, PinState::Low);
     let rx = a.pa10.into_pull_up_input(&mut a.crh);
 
-    let mut sw = (
-        a.pa4.into_pull_up_input(&mut a.crl),
-        a.pa5.into_pull_up_input(&mut a.crl),
-        a.pa6.into_pull_up_input(&mut a.crl),
-        a.pa7.into_pull_up_input(&mut a.crl),
-        b.pb12.into_pull_up_input(&mut b.crh),
-        b.pb13.into_pull_up_input(&mut b.crh),
-        b.pb14.into_pull_up_input(&mut b.crh),
-        b.pb15.into_pull_up_input(&mut b.crh),
-    );
+    // SW01: one side of each switch is on ground.
+    a.pa4.into_pull_up_input(&mut a.crl);
+    a.pa5.into_pull_up_input(&mut a.crl);
+    a.pa6.into_pull_up_input(&mut a.crl);
+    a.pa7.into_pull_up_input(&mut a.crl);
+    b.pb12.into_pull_up_input(&mut b.crh);
+    b.pb13.into_pull_up_input(&mut b.crh);
+    b.pb14.into_pull_up_input(&mut b.crh);
+    b.pb15.into_pull_up_input(&mut b.crh);
     cortex_m::asm::delay(DIP_SETTLE_CYCLES);
-    let dip = dip::read([
-        &mut sw.0, &mut sw.1, &mut sw.2, &mut sw.3, &mut sw.4, &mut sw.5, &mut sw.6, &mut sw.7,
-    ]);
+    let (levels_a, levels_b) = (port::a().idr().read(), port::b().idr().read());
+    let dip = dip::number(levels_a.bits(), levels_b.bits());
 
     let leds = Leds::new(
         b.pb8
@@ -120,14 +118,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
         reset_cause,
         dip,
         unique_id: unique_id::read(),
-        slot: Slot {
-            line1: a.pa0,
-            line2: a.pa1,
-            line3: a.pa2,
-            line4: a.pa3,
-            cr: a.crl,
-            adc: device.ADC1,
-        },
+        slot: Slot::new((a.pa0, a.pa1, a.pa2, a.pa3), a.crl, device.ADC1),
         dac: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
         flash: Flash::new(device.FLASH),
         leds,
@@ -151,18 +142,8 @@ pub fn setup(device: pac::Peripherals) -> Board {
 
 /// Reads the reset flags and takes them back, so that the next start sees only its own.
 fn take_reset_cause(rcc: &pac::RCC) -> u8 {
-    let csr = rcc.csr().read();
-    let flags = [
-        csr.lpwrrstf().bit_is_set(),
-        csr.wwdgrstf().bit_is_set(),
-        csr.iwdgrstf().bit_is_set(),
-        csr.sftrstf().bit_is_set(),
-        csr.porrstf().bit_is_set(),
-        csr.pinrstf().bit_is_set(),
-    ];
+    // The uppermost six bits, from LPWRRSTF down to PINRSTF (RM0008 7.3.10).
+    let flags = rcc.csr().read().bits().reverse_bits();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    flags
-        .into_iter()
-        .enumerate()
-        .fold(0, |cause, (bit, set)| cause | u8::from(set) << bit)
+    flags as u8 & 0b11_1111
 }

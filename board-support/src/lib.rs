@@ -20,7 +20,7 @@ mod adc;
 pub mod board;
 #[cfg(target_os = "none")]
 mod clock;
-#[cfg(target_os = "none")]
+#[cfg(any(target_os = "none", test))]
 mod dip;
 #[cfg(target_os = "none")]
 pub mod flash;
@@ -30,6 +30,8 @@ mod gap_timer;
 mod leds;
 #[cfg(target_os = "none")]
 mod mem;
+#[cfg(target_os = "none")]
+mod port;
 #[cfg(target_os = "none")]
 mod rs485;
 #[cfg(target_os = "none")]

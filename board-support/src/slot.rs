@@ -4,21 +4,19 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use stm32f1xx_hal::{
-    gpio::{Cr, Floating, Input, PA0, PA1, PA2, PA3, PinState},
+    gpio::{Cr, PA0, PA1, PA2, PA3},
     pac,
 };
 
-use crate::AnalogInputs;
+use crate::{AnalogInputs, port};
 
 /// The four lines, floating as after a reset until one of the methods is called. A module that needs
 /// none of them, or one that is not there, leaves them so.
 pub struct Slot {
-    pub(crate) line1: PA0<Input<Floating>>,
-    pub(crate) line2: PA1<Input<Floating>>,
-    pub(crate) line3: PA2<Input<Floating>>,
-    pub(crate) line4: PA3<Input<Floating>>,
-    pub(crate) cr: Cr<'A', false>,
-    pub(crate) adc: pac::ADC1,
+    _lines: (PA0, PA1, PA2, PA3),
+    /// The register is shared with other pins; who has this may change it.
+    _cr: Cr<'A', false>,
+    adc: pac::ADC1,
 }
 
 /// How many of the slot's lines are analog inputs.
@@ -30,38 +28,52 @@ pub enum AnalogLines {
     Four,
 }
 
-/// A slot line as an input with pull-up. The HAL's own type of one type for all four looks its pin up
-/// in an array, with a panic for a pin that is not there.
+/// A slot line as an input with pull-up. The HAL's type for any pin of a port looks it up in an array,
+/// with a panic for one that is not there.
 pub struct SlotInput(Line);
 
 /// A slot line as a push-pull output.
 pub struct SlotOutput(Line);
 
 /// A line's bit in the registers of port A. Only [`Slot`] makes them, one of each.
-struct Line(u32);
+struct Line(u8);
 
 const LINES: [Line; 4] = [Line(1 << 0), Line(1 << 1), Line(1 << 2), Line(1 << 3)];
 
+/// All four lines' bits.
+const ALL: u32 = 0b1111;
+
+/// What the lines can be: four bits of CRL for each, line 1 lowest (RM0008 9.2.1). An input is pulled
+/// up or down by its output bit.
+mod modes {
+    pub const ALL_PULLED: u32 = 0x8888;
+    pub const ALL_OUTPUTS: u32 = 0x3333;
+    pub const TWO_PULLED_TWO_OUTPUTS: u32 = 0x3388;
+    pub const ALL_ANALOG: u32 = 0x0000;
+    pub const TWO_ANALOG: u32 = 0x4400;
+    pub const MASK: u32 = 0xFFFF;
+}
+
 impl Slot {
+    pub(crate) fn new(lines: (PA0, PA1, PA2, PA3), cr: Cr<'A', false>, adc: pac::ADC1) -> Self {
+        Self {
+            _lines: lines,
+            _cr: cr,
+            adc,
+        }
+    }
+
     /// Four inputs with pull-ups.
     #[must_use]
     pub fn into_inputs(mut self) -> [SlotInput; 4] {
-        let cr = &mut self.cr;
-        self.line1.into_pull_up_input(cr);
-        self.line2.into_pull_up_input(cr);
-        self.line3.into_pull_up_input(cr);
-        self.line4.into_pull_up_input(cr);
+        self.configure(modes::ALL_PULLED, ALL);
         LINES.map(SlotInput)
     }
 
     /// Four outputs that drive low from their first instant.
     #[must_use]
     pub fn into_outputs_low(mut self) -> [SlotOutput; 4] {
-        let (cr, low) = (&mut self.cr, PinState::Low);
-        self.line1.into_push_pull_output_with_state(cr, low);
-        self.line2.into_push_pull_output_with_state(cr, low);
-        self.line3.into_push_pull_output_with_state(cr, low);
-        self.line4.into_push_pull_output_with_state(cr, low);
+        self.configure(modes::ALL_OUTPUTS, 0);
         LINES.map(SlotOutput)
     }
 
@@ -69,11 +81,7 @@ impl Slot {
     /// instant.
     #[must_use]
     pub fn into_relay(mut self) -> ([SlotInput; 2], [SlotOutput; 2]) {
-        let (cr, low) = (&mut self.cr, PinState::Low);
-        self.line1.into_pull_up_input(cr);
-        self.line2.into_pull_up_input(cr);
-        self.line3.into_push_pull_output_with_state(cr, low);
-        self.line4.into_push_pull_output_with_state(cr, low);
+        self.configure(modes::TWO_PULLED_TWO_OUTPUTS, 0b0011);
         let [line1, line2, line3, line4] = LINES;
         (
             [SlotInput(line1), SlotInput(line2)],
@@ -85,15 +93,30 @@ impl Slot {
     /// 15 us; should that fail, every reading will say so.
     #[must_use]
     pub fn into_analog(mut self, lines: AnalogLines) -> AnalogInputs {
-        let cr = &mut self.cr;
-        self.line1.into_analog(cr);
-        self.line2.into_analog(cr);
-        if lines == AnalogLines::Four {
-            self.line3.into_analog(cr);
-            self.line4.into_analog(cr);
-        }
+        let modes = match lines {
+            AnalogLines::Two => modes::TWO_ANALOG,
+            AnalogLines::Four => modes::ALL_ANALOG,
+        };
+        self.configure(modes, 0);
         AnalogInputs::new(self.adc, lines)
     }
+
+    /// Makes the lines what `modes` says, those in `high` pulled high, the others pulled or driven low.
+    fn configure(&mut self, modes: u32, high: u32) {
+        drive(high, ALL & !high);
+        // SAFETY: the lines' own bits, which are one of the above; the others stay.
+        port::a()
+            .crl()
+            .modify(|r, w| unsafe { w.bits(r.bits() & !modes::MASK | modes) });
+    }
+}
+
+/// Takes the output bits of some lines high and of others low, and of no other pin, in one store.
+fn drive(high: u32, low: u32) {
+    // SAFETY: the set/reset register takes any value (RM0008 9.2.5). Callers own their lines.
+    port::a()
+        .bsrr()
+        .write(|w| unsafe { w.bits(high | low << 16) });
 }
 
 impl ErrorType for SlotInput {
@@ -102,9 +125,8 @@ impl ErrorType for SlotInput {
 
 impl InputPin for SlotInput {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        // SAFETY: reading a port's input register has no side effect.
-        let levels = unsafe { (*pac::GPIOA::ptr()).idr().read().bits() };
-        Ok(levels & self.0.0 != 0)
+        let levels = port::a().idr().read().bits();
+        Ok(levels & u32::from(self.0.0) != 0)
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
@@ -118,19 +140,12 @@ impl ErrorType for SlotOutput {
 
 impl OutputPin for SlotOutput {
     fn set_high(&mut self) -> Result<(), Infallible> {
-        // SAFETY: a write to the set/reset register changes the pins whose bits are set and no other,
-        // in one store; the bit is that of this line, which this value alone owns.
-        unsafe { (*pac::GPIOA::ptr()).bsrr().write(|w| w.bits(self.0.0)) };
+        drive(self.0.0.into(), 0);
         Ok(())
     }
 
     fn set_low(&mut self) -> Result<(), Infallible> {
-        // SAFETY: as above; the upper half takes pins low.
-        unsafe {
-            (*pac::GPIOA::ptr())
-                .bsrr()
-                .write(|w| w.bits(self.0.0 << 16))
-        };
+        drive(0, self.0.0.into());
         Ok(())
     }
 }

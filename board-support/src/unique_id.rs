@@ -3,10 +3,10 @@
 use core::ptr;
 
 /// Where it stands (RM0008 30.2). It may be read in any width.
-const ADDRESS: *const [u8; 12] = 0x1FFF_F7E8 as *const [u8; 12];
+const ADDRESS: *const [u16; 6] = 0x1FFF_F7E8 as *const [u16; 6];
 
-/// The 96 bits in the order of their addresses.
-pub(crate) fn read() -> [u8; 12] {
-    // SAFETY: the factory's bytes are readable at any time and never change.
+/// The 96 bits as half-words, in the order of their addresses.
+pub(crate) fn read() -> [u16; 6] {
+    // SAFETY: the factory's half-words are aligned, readable at any time and never change.
     unsafe { ptr::read_volatile(ADDRESS) }
 }

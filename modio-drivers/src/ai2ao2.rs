@@ -10,7 +10,7 @@ use crate::{
 /// Two filtered analog inputs and two analog outputs.
 #[derive(Debug)]
 pub struct Ai2Ao2<'a, S> {
-    inputs: AnalogInputs<S, 2>,
+    inputs: AnalogInputs<S>,
     link: &'a DacLink,
     /// Those of the channels 3 and 4.
     outputs: [ChannelSettings; 2],
@@ -21,7 +21,7 @@ impl<'a, S: AnalogSource> Ai2Ao2<'a, S> {
     /// DAC.
     pub const fn new(source: S, link: &'a DacLink) -> Self {
         Self {
-            inputs: AnalogInputs::new(source),
+            inputs: AnalogInputs::new(source, 2),
             link,
             outputs: [ChannelSettings::default_for(Kind::WordOutput); 2],
         }

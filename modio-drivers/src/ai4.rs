@@ -11,7 +11,7 @@ use crate::{AnalogSource, CHANNELS, ChannelSettings, Channels, IoModule, Kind, M
 /// and [`input_status`](crate::input_status) for the status.
 #[derive(Debug)]
 pub struct Ai4<S> {
-    inputs: AnalogInputs<S, CHANNELS>,
+    inputs: AnalogInputs<S>,
 }
 
 impl<S: AnalogSource> Ai4<S> {
@@ -19,7 +19,7 @@ impl<S: AnalogSource> Ai4<S> {
     /// shows at once.
     pub const fn new(source: S) -> Self {
         Self {
-            inputs: AnalogInputs::new(source),
+            inputs: AnalogInputs::new(source, CHANNELS),
         }
     }
 }

@@ -14,21 +14,25 @@ pub const POLLS_PER_SCAN: u8 = 64;
 /// failed.
 pub const STALLED_SCANS: u8 = 10;
 
-/// `N` inputs, at most four, on the slot's first lines.
+/// Inputs on the slot's first lines.
 #[derive(Debug)]
-pub(crate) struct AnalogInputs<S, const N: usize> {
+pub(crate) struct AnalogInputs<S> {
     source: S,
-    inputs: [Input; N],
+    inputs: [Input; CHANNELS],
+    /// How many of them there are.
+    count: usize,
     /// The line to ask for next, or being asked for.
     line: usize,
     stalled: u8,
 }
 
-impl<S: AnalogSource, const N: usize> AnalogInputs<S, N> {
-    pub(crate) const fn new(source: S) -> Self {
+impl<S: AnalogSource> AnalogInputs<S> {
+    /// One input for each of the first `count` lines, at most four.
+    pub(crate) const fn new(source: S, count: usize) -> Self {
         Self {
             source,
-            inputs: [Input::NEW; N],
+            inputs: [Input::NEW; CHANNELS],
+            count,
             line: 0,
             stalled: 0,
         }
@@ -49,7 +53,7 @@ impl<S: AnalogSource, const N: usize> AnalogInputs<S, N> {
     pub(crate) fn scan(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
         self.sample();
         let mut result = Ok(());
-        for (channel, input) in self.inputs.iter_mut().enumerate() {
+        for (channel, input) in self.inputs.iter_mut().take(self.count).enumerate() {
             input.show(channels, channel);
             if input.failed {
                 result = result.and(Err(ModuleError::Line { channel }));
@@ -71,9 +75,13 @@ impl<S: AnalogSource, const N: usize> AnalogInputs<S, N> {
                 Err(nb::Error::Other(_)) => input.fail(),
                 Err(nb::Error::WouldBlock) => continue,
             }
-            self.line = if self.line + 1 < N { self.line + 1 } else { 0 };
+            self.line = if self.line + 1 < self.count {
+                self.line + 1
+            } else {
+                0
+            };
             answers += 1;
-            if answers == N {
+            if answers == self.count {
                 break;
             }
         }

@@ -61,7 +61,7 @@ block! {
     MAP_VERSION "register-map version": 0x0204 x 1, "", READ, &[];
     /// Board: 1 = modio-02
     BOARD "board": 0x0205 x 1, "", READ, &[];
-    /// Unit address in force, as the DIP switch was at power-on
+    /// Unit address in force, as the DIP switch was at the start
     UNIT_ADDRESS "unit address": 0x0206 x 1, "", READ, &[];
     /// Why the device last started. Bit 0 low power, 1 window watchdog, 2 independent watchdog, 3 software, 4 power-on, 5 pin
     RESET_CAUSE "reset cause": 0x0207 x 1, "", READ, &[];

@@ -1,6 +1,6 @@
 //! Where the record is kept.
 
-use core::{cell::UnsafeCell, mem::MaybeUninit, ptr, sync::atomic::AtomicU8};
+use core::{array, cell::UnsafeCell, mem::MaybeUninit, ptr, sync::atomic::AtomicU8};
 
 use super::{
     Fault, FaultRecord, TASKS,
@@ -29,15 +29,17 @@ fn place() -> *mut Kept {
     PLACE.0.get().cast()
 }
 
-fn read() -> [u32; WORDS] {
-    // SAFETY: the pointer is to a static. It is RAM, so it holds some words, whatever they are; volatile,
-    // so that the compiler does not reason from nobody having initialised them.
-    unsafe { ptr::read_volatile(&raw const (*place()).record) }
+fn read() -> Option<Noted> {
+    // SAFETY: the pointers are to the words of a static. It is RAM, so it holds some words, whatever they
+    // are; volatile, so that the compiler does not reason from nobody having initialised them.
+    let words =
+        array::from_fn(|at| unsafe { ptr::read_volatile(&raw const (*place()).record[at]) });
+    Noted::from_words(&words)
 }
 
-fn write(noted: Noted) {
+fn write(noted: &Noted) {
     // SAFETY: the pointer is to a static; see `Place` for why nobody else looks.
-    unsafe { ptr::write_volatile(&raw mut (*place()).record, noted.to_words()) };
+    unsafe { ptr::write_volatile(&raw mut (*place()).record, noted.words()) };
 }
 
 /// Takes the record of what went wrong before this start, and starts a new account: a power-on clears
@@ -53,7 +55,8 @@ pub fn take_at_start(reset_cause: u8) -> FaultRecord {
             ptr::read_volatile((&raw const (*place()).marks).cast::<[u8; TASKS]>()),
         )
     };
-    let noted = Noted::at_start(&read(), reset_cause, uptime, marks);
+    let mut kept = read();
+    let noted = Noted::at_start(&mut kept, reset_cause, uptime, marks);
     write(noted);
     keep_uptime(0);
     // SAFETY: as in `write`; volatile, for the same reason as in `read`.
@@ -70,10 +73,12 @@ pub fn take_at_start(reset_cause: u8) -> FaultRecord {
 /// since the start is noted.
 pub fn note(fault: Fault) {
     // Words that are no record: the fault came before `take_at_start`, or wrote over them.
-    let noted = Noted::from_words(&read()).unwrap_or_default();
+    let mut kept = read();
+    let noted = kept.get_or_insert_default();
     // SAFETY: as in `read`.
     let uptime = unsafe { ptr::read_volatile(&raw const (*place()).uptime) };
-    write(noted.with(fault, uptime, 0));
+    noted.add(fault, uptime, 0);
+    write(noted);
 }
 
 /// Keeps for how long the firmware has run, in seconds: once a second.

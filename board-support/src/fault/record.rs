@@ -42,7 +42,7 @@ fn checksum(words: &[u32; WORDS]) -> u32 {
 }
 
 impl Noted {
-    pub(super) fn to_words(self) -> [u32; WORDS] {
+    pub(super) fn words(&self) -> [u32; WORDS] {
         let FaultRecord {
             fault,
             count,
@@ -88,48 +88,46 @@ impl Noted {
         })
     }
 
-    /// With another fault. The first since the start counts: one in its handler is its consequence.
-    pub(super) fn with(self, fault: Fault, uptime: u32, missing: u16) -> Self {
-        if self.fresh {
-            return self;
-        }
-        Self {
-            record: FaultRecord {
+    /// Adds a fault. The first since the start counts: one in its handler is its consequence.
+    pub(super) fn add(&mut self, fault: Fault, uptime: u32, missing: u16) {
+        if !self.fresh {
+            self.fresh = true;
+            self.record = FaultRecord {
                 fault,
                 count: self.record.count.saturating_add(1),
                 uptime,
                 missing,
-            },
-            fresh: true,
+            };
         }
     }
 
-    /// What a start for `reset_cause` makes of the words it finds, with the uptime and the marks the
-    /// firmware had left.
+    /// What a start for `reset_cause` makes of the record it finds, if any, with the uptime and the marks
+    /// the firmware had left.
     pub(super) fn at_start(
-        words: &[u32; WORDS],
+        kept: &mut Option<Self>,
         reset_cause: u8,
         uptime: u32,
         marks: [u8; TASKS],
-    ) -> Self {
-        if reset_cause & BY_POWER_ON != 0 {
-            return Self::default();
+    ) -> &Self {
+        let power_on = reset_cause & BY_POWER_ON != 0;
+        if power_on {
+            *kept = None;
         }
         // Words that are no record say nothing about what lies beside them either.
-        let kept = Self::from_words(words);
-        let (uptime, missing) = kept.map_or((0, 0), |_| (uptime, missing(marks)));
-        let mut noted = kept.unwrap_or_default();
-        if reset_cause & BY_WATCHDOG != 0 {
+        let (uptime, missing) = match kept {
+            Some(_) => (uptime, missing(marks)),
+            None => (0, 0),
+        };
+        let noted = kept.get_or_insert_default();
+        if reset_cause & BY_WATCHDOG != 0 && !power_on {
             let bite = Fault {
                 kind: Kind::Watchdog,
                 ..Fault::default()
             };
-            noted = noted.with(bite, uptime, missing);
+            noted.add(bite, uptime, missing);
         }
-        Self {
-            fresh: false,
-            ..noted
-        }
+        noted.fresh = false;
+        noted
     }
 }
 
@@ -159,8 +157,17 @@ mod tests {
         }
     }
 
+    fn with(mut noted: Noted, fault: Fault, uptime: u32) -> Noted {
+        noted.add(fault, uptime, 0);
+        noted
+    }
+
     fn noted() -> Noted {
-        Noted::default().with(fault(), 77, 0)
+        with(Noted::default(), fault(), 77)
+    }
+
+    fn at_start(words: &[u32; WORDS], cause: u8, uptime: u32, marks: [u8; TASKS]) -> Noted {
+        *Noted::at_start(&mut Noted::from_words(words), cause, uptime, marks)
     }
 
     #[test]
@@ -173,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_record_comes_back_from_its_words_and_no_flipped_bit_goes_unnoticed() {
-        let words = noted().to_words();
+        let words = noted().words();
         assert_eq!(Noted::from_words(&words), Some(noted()));
         for word in 0..WORDS {
             for bit in 0..32 {
@@ -189,44 +196,44 @@ mod tests {
 
     #[test]
     fn a_fault_outlives_a_reset_and_then_others_without_counting_again() {
-        let mut words = noted().to_words();
+        let mut words = noted().words();
         for cause in [BY_SOFTWARE, 1 << 5, BY_SOFTWARE] {
-            let start = Noted::at_start(&words, cause, 1_000, [1; TASKS]);
+            let start = at_start(&words, cause, 1_000, [1; TASKS]);
             assert_eq!(start.record.fault, fault());
             assert_eq!((start.record.count, start.record.uptime), (1, 77));
-            words = start.to_words();
+            words = start.words();
         }
     }
 
     #[test]
     fn a_power_on_forgets_even_what_is_whole() {
         let cause = BY_POWER_ON | 1 << 5;
-        let start = Noted::at_start(&noted().to_words(), cause, 5, [0; TASKS]);
+        let start = at_start(&noted().words(), cause, 5, [0; TASKS]);
         assert_eq!(start, Noted::default());
     }
 
     #[test]
     fn a_bite_tells_the_uptime_and_the_missing_marks() {
-        let words = Noted::default().to_words();
-        let start = Noted::at_start(&words, WATCHDOG, 42, [1, 0, 1, 2]);
+        let words = Noted::default().words();
+        let start = at_start(&words, WATCHDOG, 42, [1, 0, 1, 2]);
         assert_eq!(start.record.fault.kind, Kind::Watchdog);
         assert_eq!(start.record.uptime, 42);
         assert_eq!(start.record.missing, 0b1010);
         assert_eq!(start.record.count, 1);
-        let again = Noted::at_start(&start.to_words(), WATCHDOG, 3, [0, 1, 1, 1]);
+        let again = at_start(&start.words(), WATCHDOG, 3, [0, 1, 1, 1]);
         assert_eq!((again.record.count, again.record.missing), (2, 1));
     }
 
     #[test]
     fn a_bite_after_a_fault_was_noted_is_that_faults() {
-        let start = Noted::at_start(&noted().to_words(), WATCHDOG, 42, [0; TASKS]);
+        let start = at_start(&noted().words(), WATCHDOG, 42, [0; TASKS]);
         assert_eq!(start.record.fault, fault());
         assert_eq!((start.record.count, start.record.missing), (1, 0));
     }
 
     #[test]
     fn a_bite_with_nothing_to_trust_in_ram_is_still_one() {
-        let start = Noted::at_start(&[0xA5A5_A5A5; WORDS], WATCHDOG, 0xA5A5_A5A5, [0xA5; TASKS]);
+        let start = at_start(&[0xA5A5_A5A5; WORDS], WATCHDOG, 0xA5A5_A5A5, [0xA5; TASKS]);
         assert_eq!(start.record.fault.kind, Kind::Watchdog);
         assert_eq!((start.record.uptime, start.record.missing), (0, 0));
     }
@@ -237,9 +244,9 @@ mod tests {
             kind: Kind::Panic,
             ..Fault::default()
         };
-        assert_eq!(noted().with(second, 78, 0), noted());
-        let after = Noted::at_start(&noted().to_words(), BY_SOFTWARE, 0, [1; TASKS]);
-        let then = after.with(second, 5, 0);
+        assert_eq!(with(noted(), second, 78), noted());
+        let after = at_start(&noted().words(), BY_SOFTWARE, 0, [1; TASKS]);
+        let then = with(after, second, 5);
         assert_eq!((then.record.fault, then.record.count), (second, 2));
     }
 
@@ -248,6 +255,6 @@ mod tests {
         let mut noted = noted();
         noted.record.count = u16::MAX;
         noted.fresh = false;
-        assert_eq!(noted.with(fault(), 0, 0).record.count, u16::MAX);
+        assert_eq!(with(noted, fault(), 0).record.count, u16::MAX);
     }
 }

@@ -32,11 +32,33 @@ enum End {
     Restart,
 }
 
+/// What the peripheral is to be told of its clock.
+#[derive(Clone, Copy)]
+struct Timing {
+    mhz: u8,
+    /// A third of a period of SCL, rounded up: fast mode is low for two and high for one (26.6.8).
+    third: u8,
+    /// The longest rise, 0.3 us, and one (26.6.9).
+    rise: u8,
+}
+
+impl Timing {
+    const fn on(clock: ClockSource) -> Self {
+        let hz = clock.apb1_hz();
+        let mhz = (hz / 1_000_000) as u8;
+        Self {
+            mhz,
+            third: hz.div_ceil(3 * I2C_HZ) as u8,
+            rise: mhz * 3 / 10 + 1,
+        }
+    }
+}
+
 /// The DAC's bus. Its pins stay floating until the first transfer.
 pub struct DacBus {
     i2c: pac::I2C1,
     pins: BusPins,
-    apb1_hz: u32,
+    timing: Timing,
     /// The peripheral is on the bus and nothing is known to be wrong.
     ready: bool,
 }
@@ -47,7 +69,10 @@ impl DacBus {
         Self {
             i2c,
             pins,
-            apb1_hz: clock.apb1_hz(),
+            timing: match clock {
+                ClockSource::Crystal => const { Timing::on(ClockSource::Crystal) },
+                ClockSource::Internal => const { Timing::on(ClockSource::Internal) },
+            },
             ready: false,
         }
     }
@@ -65,20 +90,14 @@ impl DacBus {
         self.pins.by_peripheral();
         // Out of the reset that `leave` put it into.
         self.i2c.cr1().write(|w| w.swrst().clear_bit());
-        let mhz = self.apb1_hz / 1_000_000;
+        let Timing { mhz, third, rise } = self.timing;
         // SAFETY: FREQ takes 2 to 36, and the clock is 30 or 36 MHz.
-        self.i2c
-            .cr2()
-            .write(|w| unsafe { w.freq().bits(mhz as u8) });
-        // A third of a period, rounded up: fast mode is low for two and high for one (26.6.8). The
-        // longest rise is 0.3 us (26.6.9).
-        let third = self.apb1_hz.div_ceil(3 * I2C_HZ);
+        self.i2c.cr2().write(|w| unsafe { w.freq().bits(mhz) });
         // SAFETY: at most 40 in a field of twelve bits whose least is 1.
         self.i2c
             .ccr()
-            .write(|w| unsafe { w.f_s().fast().ccr().bits(third as u16) });
-        let rise = mhz * 3 / 10 + 1;
-        self.i2c.trise().write(|w| w.trise().set(rise as u8));
+            .write(|w| unsafe { w.f_s().fast().ccr().bits(third.into()) });
+        self.i2c.trise().write(|w| w.trise().set(rise));
         self.i2c.cr1().write(|w| w.pe().enabled());
         self.ready = true;
         Ok(())
@@ -88,6 +107,27 @@ impl DacBus {
     fn leave(&mut self) {
         self.i2c.cr1().write(|w| w.swrst().set_bit());
         self.ready = false;
+    }
+
+    /// Does a transfer on a bus that is ready, and leaves one that is clean, whatever comes of it.
+    fn on_bus(
+        &mut self,
+        transfer: impl FnOnce(&mut Self) -> Result<(), DacBusError>,
+    ) -> Result<(), DacBusError> {
+        self.make_ready()?;
+        let result = transfer(self);
+        let clean = match result {
+            Ok(()) => true,
+            Err(DacBusError::NoAcknowledge(source)) => {
+                // After a data byte the next may wait in DR, and would begin the next transfer.
+                self.stop_after_no_acknowledge().is_ok() && source == NoAcknowledgeSource::Address
+            }
+            Err(_) => false,
+        };
+        if !clean {
+            self.leave();
+        }
+        result
     }
 
     fn transfer(
@@ -109,23 +149,32 @@ impl DacBus {
             } else {
                 End::Restart
             };
-            self.wait_for(flag::SB, NoAcknowledgeSource::Unknown)?;
-            self.put(address << 1 | u8::from(reads));
-            self.wait_for(flag::ADDR, NoAcknowledgeSource::Address)?;
+            self.call(address, reads)?;
             if reads {
                 self.read_group(group, end)?;
             } else {
-                self.write_group(group, end)?;
+                self.write_bytes(group.iter().flat_map(written), end)?;
             }
             rest = after;
         }
         self.wait_for_stop()
     }
 
-    fn write_group(&mut self, group: &[Operation<'_>], end: End) -> Result<(), DacBusError> {
+    /// Once the start condition is made, calls a slave, which is to acknowledge.
+    fn call(&self, address: SevenBitAddress, reads: bool) -> Result<(), DacBusError> {
+        self.wait_for(flag::SB, NoAcknowledgeSource::Unknown)?;
+        self.put(address << 1 | u8::from(reads));
+        self.wait_for(flag::ADDR, NoAcknowledgeSource::Address)
+    }
+
+    fn write_bytes<'a>(
+        &self,
+        bytes: impl Iterator<Item = &'a u8>,
+        end: End,
+    ) -> Result<(), DacBusError> {
         self.clear_addr();
         let mut sent = false;
-        for byte in group.iter().flat_map(written) {
+        for byte in bytes {
             self.wait_for(flag::TXE, NoAcknowledgeSource::Data)?;
             self.put(*byte);
             sent = true;
@@ -270,20 +319,18 @@ impl I2c for DacBus {
         if operations.is_empty() {
             return Ok(());
         }
-        self.make_ready()?;
-        let result = self.transfer(address, operations);
-        let clean = match result {
-            Ok(()) => true,
-            Err(DacBusError::NoAcknowledge(source)) => {
-                // After a data byte the next may wait in DR, and would begin the next transfer.
-                self.stop_after_no_acknowledge().is_ok() && source == NoAcknowledgeSource::Address
-            }
-            Err(_) => false,
-        };
-        if !clean {
-            self.leave();
-        }
-        result
+        self.on_bus(|bus| bus.transfer(address, operations))
+    }
+
+    /// As a transaction of this one write, by a shorter way: it is all that the DAC's driver needs, and
+    /// whoever never reads is to have no code for that.
+    fn write(&mut self, address: SevenBitAddress, bytes: &[u8]) -> Result<(), DacBusError> {
+        self.on_bus(|bus| {
+            bus.i2c.cr1().modify(|_, w| w.start().set_bit());
+            bus.call(address, false)?;
+            bus.write_bytes(bytes.iter(), End::Stop)?;
+            bus.wait_for_stop()
+        })
     }
 }
 

@@ -1,12 +1,9 @@
 //! PB6 and PB7 as the peripheral's, or moved by hand.
 
-use stm32f1xx_hal::{
-    gpio::{Cr, PB6, PB7},
-    pac,
-};
+use stm32f1xx_hal::gpio::{Cr, PB6, PB7};
 
 use super::freeing::Wires;
-use crate::{design::I2C_HALF_PERIOD_US, wait::delay_us};
+use crate::{design::I2C_HALF_PERIOD_US, port, wait::delay_us};
 
 const SCL: u16 = 1 << 6;
 const SDA: u16 = 1 << 7;
@@ -43,7 +40,7 @@ impl BusPins {
 
     /// The slowest slopes, 2 MHz: SCL is far below that.
     fn configure(&mut self, peripheral: bool) {
-        port().crl().modify(|_, w| {
+        port::b().crl().modify(|_, w| {
             w.mode6().output2().mode7().output2();
             if peripheral {
                 w.cnf6().alt_open_drain().cnf7().alt_open_drain()
@@ -61,7 +58,7 @@ impl BusPins {
         };
         // SAFETY: changes the pins whose bits are set and no other, in one store, and this value alone
         // owns them.
-        port().bsrr().write(|w| unsafe { w.bits(bits) });
+        port::b().bsrr().write(|w| unsafe { w.bits(bits) });
     }
 }
 
@@ -75,20 +72,14 @@ impl Wires for BusPins {
     }
 
     fn scl(&self) -> bool {
-        port().idr().read().bits() & u32::from(SCL) != 0
+        port::b().idr().read().bits() & u32::from(SCL) != 0
     }
 
     fn sda(&self) -> bool {
-        port().idr().read().bits() & u32::from(SDA) != 0
+        port::b().idr().read().bits() & u32::from(SDA) != 0
     }
 
     fn wait(&mut self) {
         delay_us(I2C_HALF_PERIOD_US);
     }
-}
-
-fn port() -> &'static pac::gpioa::RegisterBlock {
-    // SAFETY: the port's registers are there for ever. Reads have no side effect, and what is written is
-    // said at each write.
-    unsafe { &*pac::GPIOB::ptr() }
 }

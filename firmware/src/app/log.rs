@@ -2,11 +2,14 @@
 //! fits is left out; nothing ever waits.
 
 use board_support::{ClockSource, fault};
-use firmware::{config::Line, start_up::Address};
+use firmware::{config, start_up::Address};
+use heapless::Vec;
 use modio_drivers::ModuleError;
-use register_map::{Module, codes::Format};
+use register_map::{
+    Module,
+    codes::{Format, Mode},
+};
 use rtt_target::UpChannel;
-use ufmt::uwriteln;
 
 use crate::rtt;
 
@@ -29,16 +32,13 @@ pub enum Event {
 pub struct Start {
     pub address: Address,
     pub dip: u8,
-    pub line: Line,
+    pub line: config::Line,
     pub module: Module,
     pub clock: ClockSource,
     pub reset_cause: u8,
     pub fault: fault::Kind,
     pub config_invalid: bool,
 }
-
-/// The log's writer.
-pub struct Log(Option<UpChannel>);
 
 /// The names of the reset flags, from bit 0.
 const CAUSES: [&str; 6] = [
@@ -50,6 +50,49 @@ const CAUSES: [&str; 6] = [
     "pin",
 ];
 
+/// Bytes of the longest line, its end included; what is longer is cut.
+const LINE: usize = 80;
+
+/// A line in the making. Pieced together by hand: `core::fmt` is large and can panic, and what takes its
+/// place in other firmware expands into code of its own at every line.
+struct Line(Vec<u8, LINE>);
+
+impl Line {
+    fn of(text: &str) -> Self {
+        let mut line = Self(Vec::new());
+        line.text(text);
+        line
+    }
+
+    fn text(&mut self, text: &str) -> &mut Self {
+        for byte in text.bytes() {
+            self.byte(byte);
+        }
+        self
+    }
+
+    /// A number in decimal.
+    fn number(&mut self, number: u32) -> &mut Self {
+        let mut place = 1;
+        while place <= number / 10 {
+            place *= 10;
+        }
+        // The last digit's place is 1, and a tenth of that is 0.
+        while let Some(leading) = number.checked_div(place) {
+            self.byte(b'0' + (leading % 10) as u8);
+            place /= 10;
+        }
+        self
+    }
+
+    fn byte(&mut self, byte: u8) {
+        let _ = self.0.push(byte);
+    }
+}
+
+/// The log's writer.
+pub struct Log(Option<UpChannel>);
+
 impl Log {
     /// Opens the channel.
     pub fn new() -> Self {
@@ -58,18 +101,23 @@ impl Log {
 
     /// How the device starts.
     pub fn start(&mut self, start: &Start) {
-        let baud = start.line.baud.bits_per_second();
         let format = match start.line.format {
             Format::F8N2 => "8N2",
             Format::F8E1 => "8E1",
             Format::F8O1 => "8O1",
             Format::F8N1 => "8N1",
         };
-        let version = env!("CARGO_PKG_VERSION");
-        self.line(|out| uwriteln!(out, "modio {} on modio-02, {} {}", version, baud, format));
+        let baud = start.line.baud.bits_per_second();
+        let version = concat!("modio ", env!("CARGO_PKG_VERSION"), " on modio-02, ");
+        let mode = match start.line.mode {
+            Mode::Rtu => "",
+            Mode::Ascii => " ASCII",
+        };
+        let mut line = Line::of(version);
+        self.write(line.number(baud).text(" ").text(format).text(mode));
         for (bit, cause) in CAUSES.iter().enumerate() {
             if start.reset_cause & (1 << bit) != 0 {
-                self.line(|out| uwriteln!(out, "reset: {}", *cause));
+                self.write(Line::of("reset: ").text(cause));
             }
         }
         let fault = match start.fault {
@@ -81,32 +129,34 @@ impl Log {
             fault::Kind::StackOverflow => Some("stack overflow"),
         };
         if let Some(fault) = fault {
-            self.line(|out| uwriteln!(out, "last fault: {}, see the registers from 0x0260", fault));
+            let mut line = Line::of("last fault: ");
+            self.write(line.text(fault).text(", see the registers from 0x0260"));
         }
         if start.clock == ClockSource::Internal {
             let text = "clock: the crystal did not start, running on the internal oscillator";
-            self.line(|out| uwriteln!(out, "{}", text));
+            self.write(&mut Line::of(text));
         }
         match start.address {
-            Address::Unit(unit) => self.line(|out| uwriteln!(out, "unit address {}", unit)),
-            Address::Loader => self.line(|out| uwriteln!(out, "unit address 255 (loader mode)")),
+            Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
+            Address::Loader => self.write(&mut Line::of("unit address 255 (loader mode)")),
             Address::Invalid => {
-                let text = "which is no unit address: the line stays silent";
-                self.line(|out| uwriteln!(out, "SW01 shows {}, {}", start.dip, text));
+                let text = ", which is no unit address: the line stays silent";
+                self.write(Line::of("SW01 shows ").number(start.dip.into()).text(text));
             }
         }
         if start.config_invalid {
             let text = "configuration: what was stored is damaged, defaults are in force";
-            self.line(|out| uwriteln!(out, "{}", text));
+            self.write(&mut Line::of(text));
         }
-        self.line(|out| uwriteln!(out, "slot 5: {}", start.module.name()));
+        self.write(Line::of("slot 5: ").text(start.module.name()));
     }
 
     /// Something happened.
     pub fn event(&mut self, event: Event) {
         let text = match event {
             Event::ModuleFails(ModuleError::Line { channel }) => {
-                return self.line(|out| uwriteln!(out, "slot 5: channel {} fails", channel + 1));
+                let mut line = Line::of("slot 5: channel ");
+                return self.write(line.number(channel as u32 + 1).text(" fails"));
             }
             Event::ModuleFails(_) => "slot 5: the module does not answer",
             Event::ModuleGood => "slot 5: the module works again",
@@ -114,13 +164,13 @@ impl Log {
             Event::Saved => "configuration saved",
             Event::SaveFailed => "configuration: the flash does not take it",
         };
-        self.line(|out| uwriteln!(out, "{}", text));
+        self.write(&mut Line::of(text));
     }
 
-    /// Writes a line. RTT's writer cannot fail: it leaves out what does not fit.
-    fn line<E>(&mut self, write: impl FnOnce(&mut rtt_target::uWriter<'_>) -> Result<(), E>) {
+    /// Ends a line and writes it whole, or leaves it out when it does not fit.
+    fn write(&mut self, line: &mut Line) {
         if let Some(channel) = &mut self.0 {
-            let _ = write(&mut channel.u());
+            channel.write(&line.text("\n").0);
         }
     }
 }

@@ -66,7 +66,7 @@ pub fn up(
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
-        unique_id: half_words(board.unique_id),
+        unique_id: board.unique_id,
         fault: log::fault_words(&record),
     };
     let device = place.write(Device::new(module.kinds(), config, identity));
@@ -142,14 +142,4 @@ fn wire_settings(line: config::Line) -> uart::LineSettings {
             Format::F8N1 => uart::Format::N1,
         },
     }
-}
-
-/// The identity as it stands in memory: six half-words, low byte first.
-fn half_words(bytes: [u8; 12]) -> [u16; 6] {
-    let (pairs, _) = bytes.as_chunks();
-    let mut words = [0; 6];
-    for (word, pair) in words.iter_mut().zip(pairs) {
-        *word = u16::from_le_bytes(*pair);
-    }
-    words
 }

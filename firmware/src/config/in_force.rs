@@ -1,9 +1,9 @@
 //! The settings as the rest of the device takes them: typed, and those in force.
 
+use register_map::Module;
 use register_map::codes::{AirRate, Baud, Format, GapRule, Mode, Power, Scale, Signal};
 use register_map::configuration as at;
 use register_map::points::{CHANNELS, PointKind, SLOT_FIRST, SLOT_PORT};
-use register_map::{Module, rule_at};
 
 use super::Settings;
 
@@ -61,7 +61,8 @@ pub struct Lora {
 
 impl Lora {
     /// `None`: the line is off.
-    pub(super) fn of(settings: &Settings) -> Option<Self> {
+    #[must_use]
+    pub fn of(settings: &Settings) -> Option<Self> {
         let get = |address| settings.get(address);
         (get(at::LORA) != 0).then(|| Self {
             address: get(at::LORA_ADDRESS),
@@ -91,16 +92,11 @@ pub struct Point {
 }
 
 impl Point {
-    /// A setting made for another module, which is to come with the restart, may not suit: it counts
-    /// as its default then.
-    pub(super) fn of(settings: &Settings, module: Module, channel: u16) -> Self {
-        let channel = channel % CHANNELS;
-        let kinds = module.points();
-        let kind = kinds.get(usize::from(channel)).copied();
-        let kind = kind.unwrap_or(PointKind::None);
-        let get = |first: u16| suiting(settings, first, channel, kind);
+    pub(super) fn of(settings: &Settings, channel: u16) -> Self {
+        let point = SLOT_FIRST.wrapping_add(channel);
+        let get = |first: u16| settings.get(first.wrapping_add(point));
         Self {
-            kind,
+            kind: settings.kind(point),
             filter: get(at::FILTER),
             beta: get(at::BETA),
             signal: Signal::from_code(get(at::RANGE)).unwrap_or(Signal::Voltage),
@@ -123,19 +119,9 @@ impl Slot {
     pub(super) fn of(settings: &Settings) -> Self {
         let module = settings.module(SLOT_PORT);
         let mut start = [0; CHANNELS as usize];
-        for ((channel, kind), start) in (0..).zip(module.points()).zip(&mut start) {
-            *start = suiting(settings, at::START, channel, kind);
+        for (point, start) in (SLOT_FIRST..).zip(&mut start) {
+            *start = settings.get(at::START.wrapping_add(point));
         }
         Self { module, start }
-    }
-}
-
-/// The value of a setting by point if a point of this kind allows it, else its default.
-fn suiting(settings: &Settings, first: u16, channel: u16, kind: PointKind) -> u16 {
-    let address = first.wrapping_add(SLOT_FIRST).wrapping_add(channel);
-    let value = settings.get(address);
-    match rule_at(at::RULES, address) {
-        Some((rule, _)) if !rule.values_for(kind).allow(value) => rule.default_for(kind),
-        _ => value,
     }
 }

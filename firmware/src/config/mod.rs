@@ -45,7 +45,6 @@ pub struct Config {
     saving: bool,
     lock: Lock,
     line: Line,
-    lora: Option<Lora>,
     slot: Slot,
     /// The settings that need a restart, as they were at the start.
     started: [u16; RESTARTS],
@@ -68,7 +67,6 @@ impl Config {
         }
         Self {
             line: Line::of(&stored),
-            lora: Lora::of(&stored),
             slot: Slot::of(&stored),
             edited: stored.clone(),
             saved: stored,
@@ -256,22 +254,19 @@ impl Config {
         self.line
     }
 
-    /// The LoRa line in force; `None`: it is off.
-    #[must_use]
-    pub const fn lora(&self) -> Option<Lora> {
-        self.lora
-    }
-
     /// The slot's module in force and its outputs at power-on.
     #[must_use]
     pub const fn slot(&self) -> Slot {
         self.slot
     }
 
-    /// The settings in force of a channel of the slot, 0 to 3.
+    /// The settings of the slot's points in force, by channel. `None` while MODULE is to become another
+    /// with the restart: the settings by point are made for that one then, and for what runs those
+    /// hold that were given here last.
     #[must_use]
-    pub fn point(&self, channel: u16) -> Point {
-        Point::of(&self.edited, self.slot.module, channel)
+    pub fn points(&self) -> Option<impl Iterator<Item = Point>> {
+        let same = self.edited.module(SLOT_PORT) == self.slot.module;
+        same.then(|| (0..CHANNELS).map(|channel| Point::of(&self.edited, channel)))
     }
 
     /// COMM_TIMEOUT in milliseconds, up to an hour; `None`: the communication watchdog is off.

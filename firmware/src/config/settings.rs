@@ -57,7 +57,7 @@ impl Settings {
     }
 
     /// The value of a setting; 0 for an address that holds none.
-    #[inline]
+    #[inline(never)]
     #[must_use]
     pub fn get(&self, address: u16) -> u16 {
         let [page, place] = address.to_be_bytes();

@@ -233,7 +233,8 @@ fn now_is_now_and_restart_is_after_the_restart() {
         (config.comm_timeout_ms(), config.response_delay_ms()),
         (Some(3_600_000), 7)
     );
-    let [first, second, third] = [0, 1, 2].map(|channel| config.point(channel));
+    let points: Vec<_> = config.points().unwrap().collect();
+    let [first, second, third, fourth] = points[..].try_into().unwrap();
     assert_eq!(
         (first.signal, first.scale, first.filter),
         (Signal::Current, Scale::Raw, 4)
@@ -243,8 +244,8 @@ fn now_is_now_and_restart_is_after_the_restart() {
         (Signal::Voltage, Scale::Engineering)
     );
     assert_eq!((third.signal, third.safe), (Signal::Current, None));
-    assert_eq!(config.point(3).safe, Some(7));
-    assert_eq!((config.line(), config.lora()), (Line::FACTORY, None));
+    assert_eq!(fourth.safe, Some(7));
+    assert_eq!(config.line(), Line::FACTORY);
     assert_eq!(config.slot().start, [0; 4]);
 
     save(&mut config);
@@ -254,19 +255,33 @@ fn now_is_now_and_restart_is_after_the_restart() {
         (line.baud, line.format, line.frame_gap),
         (Baud::B115200, Format::F8E1, Some(5))
     );
-    let lora = restarted.lora().unwrap();
+    let lora = Lora::of(restarted.to_save()).unwrap();
     assert_eq!((lora.address, lora.channel, lora.frame_gap_ms), (2, 3, 50));
     assert_eq!(restarted.slot().start, [0, 0, 8, 0]);
     assert_eq!(all(&restarted), all(&config));
 }
 
+/// FILTER in force of the first point, if the settings by point are.
+fn filter(config: &Config) -> Option<u16> {
+    let mut points = config.points()?;
+    points.next().map(|point| point.filter)
+}
+
 #[test]
-fn what_does_not_suit_the_module_in_force_counts_as_its_default() {
+fn settings_by_point_wait_with_the_module_they_are_made_for() {
     let mut config = unlocked(&[(MODULE_SLOT, 4), (FILTER + SLOT, 7)]);
-    assert_eq!(config.point(0).filter, 7);
+    assert_eq!(filter(&config).unwrap(), 7);
     assert_eq!(write(&mut config, MODULE_SLOT, &[1]), DONE);
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
-    assert_eq!(config.point(0).filter, 4);
+    assert_eq!(filter(&config), None);
+    assert_eq!(write(&mut config, MODULE_SLOT, &[4]), DONE);
+    assert_eq!(filter(&config).unwrap(), 4, "defaults by now");
+    assert_eq!(write(&mut config, MODULE_SLOT, &[1]), DONE);
+    assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
+    save(&mut config);
+    assert_eq!(filter(&config), None, "not before the restart");
+    let restarted = Config::new(config.to_save().clone(), false);
+    assert_eq!(filter(&restarted).unwrap(), 1000);
 }
 
 #[test]

@@ -13,14 +13,12 @@ pub const SERIAL_LEN: usize = 24;
 #[must_use]
 pub fn serial(unique_id: [u16; 6]) -> [u8; SERIAL_LEN] {
     let mut text = [b'0'; SERIAL_LEN];
-    let nibbles = unique_id
-        .into_iter()
-        .flat_map(|word| [12, 8, 4, 0].map(|shift| (word >> shift & 0xF) as u8));
-    for (character, nibble) in text.iter_mut().zip(nibbles) {
-        *character = match nibble {
-            0..=9 => b'0' + nibble,
-            _ => b'A' - 10 + nibble,
-        };
+    for (digits, mut word) in text.chunks_exact_mut(4).zip(unique_id) {
+        for digit in digits.iter_mut().rev() {
+            let nibble = (word & 0xF) as u8;
+            *digit = nibble + if nibble < 10 { b'0' } else { b'A' - 10 };
+            word >>= 4;
+        }
     }
     text
 }

@@ -43,6 +43,8 @@ pub struct Device {
     /// Identity and health.
     pub state: State,
     comm_watchdog: CommWatchdog,
+    /// SAFE in force, by channel; `None`: hold.
+    safe: [Option<u16>; CHANNELS],
     /// What a request has ordered, to be carried out when its reply is out.
     ordered: Option<Command>,
     /// Of the configuration, when the points' settings were last taken from it.
@@ -81,6 +83,7 @@ impl Device {
             points: Points::new(kinds),
             state: State::new(identity),
             comm_watchdog: CommWatchdog::new(),
+            safe: [None; CHANNELS],
             ordered: None,
             revision: config.revision(),
             config,
@@ -90,24 +93,23 @@ impl Device {
         device
     }
 
-    /// The settings of the slot's channels in force.
-    #[must_use]
-    pub fn channel_settings(&self) -> [ChannelSettings; CHANNELS] {
-        [0, 1, 2, 3].map(|channel| {
-            let point = self.config.point(channel);
-            ChannelSettings {
+    /// Brings the points to the settings in force, after these may have changed.
+    fn configure_points(&mut self) {
+        self.revision = self.config.revision();
+        let Some(points) = self.config.points() else {
+            return;
+        };
+        let mut settings = *self.points.settings();
+        for ((settings, safe), point) in settings.iter_mut().zip(&mut self.safe).zip(points) {
+            *settings = ChannelSettings {
                 filter: point.filter,
                 beta: point.beta,
                 range: Range::from_code(point.signal.code()).unwrap_or_default(),
                 scale: Scale::from_code(point.scale.code()).unwrap_or_default(),
-            }
-        })
-    }
-
-    /// Brings the points to the settings in force, after these may have changed.
-    fn configure_points(&mut self) {
-        self.revision = self.config.revision();
-        self.points.configure(self.channel_settings());
+            };
+            *safe = point.safe;
+        }
+        self.points.configure(settings);
     }
 
     /// A millisecond has passed. Returns whether outputs went to SAFE.
@@ -116,8 +118,7 @@ impl Device {
         self.config.tick(1);
         let tripped = self.comm_watchdog.tick(self.config.comm_timeout_ms());
         if tripped {
-            let safe = [0, 1, 2, 3].map(|channel| self.config.point(channel).safe);
-            self.points.command_raw(safe);
+            self.points.command_raw(self.safe);
         }
         tripped
     }

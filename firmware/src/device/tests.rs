@@ -95,6 +95,36 @@ impl Bench {
 }
 
 #[test]
+fn what_runs_keeps_its_settings_until_the_module_changes() {
+    let settings = [
+        (at::SCALE + 0x12, 1),
+        (at::SAFE + 0x12, 1000),
+        (at::COMM_TIMEOUT, 1),
+    ];
+    let mut bench = Bench::new(Module::Ai2Ao2, &settings);
+    bench.unlock();
+    assert_eq!(bench.write(0x12, &[10_000]), Ok(()), "millivolts");
+    assert_eq!(bench.write(at::MODULE + 4, &[Module::Ao4.code()]), Ok(()));
+    assert_eq!(bench.read(at::SCALE + 0x12, 1), Ok(std::vec![0]));
+    assert_eq!(bench.read(0x12, 1), Ok(std::vec![10_000]));
+    assert_eq!(bench.write(0x12, &[2000]), Ok(()));
+    let before = *bench.device.points.settings();
+    assert_eq!(before[2].scale, Scale::Engineering);
+
+    // SAFE is raw, 1000 of 4095 is 2.442 V.
+    bench.device.request_seen(0);
+    while !bench.device.tick() {}
+    assert_eq!(bench.read(0x12, 1), Ok(std::vec![2442]));
+
+    assert_eq!(
+        bench.write(at::MODULE + 4, &[Module::Ai2Ao2.code()]),
+        Ok(())
+    );
+    assert_eq!(bench.device.points.settings()[2].scale, Scale::Raw);
+    assert_eq!(bench.read(0x12, 1), Ok(std::vec![1000]), "the same 2.442 V");
+}
+
+#[test]
 fn points_exist_as_their_module_has_them() {
     for module in Module::ALL {
         let mut bench = Bench::new(module, &[]);

@@ -17,7 +17,7 @@ fn the_device_tells_of_itself() {
     assert_eq!(ask(&[0x08, 0, 0x0B, 0, 0]), [0x08, 0, 0x0B, 0, 3]);
     assert_eq!(ask(&[0x0B]), [0x0B, 0, 0, 0, 3]);
     let log = ask(&[0x0C]);
-    assert_eq!((log[1], &log[2..8]), (6 + 9, &[0, 0, 0, 4, 0, 5][..]));
+    assert_eq!((log[1], &log[2..8]), (6 + 9, &[0, 0, 0, 3, 0, 5][..]));
     assert_eq!(
         log[8..],
         [0x80, 0x40, 0x80, 0x40, 0x80, 0x40, 0x80, 0x40, 0x80]

@@ -221,6 +221,23 @@ class OnSimulator(unittest.TestCase):
         self.assertEqual(seen, wanted)
 
 
+class AsciiLine:
+    """Put before a class of tests: the same in ASCII mode, at 115200 bit/s."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        master = cls.simulator.master()
+        # KEY; BAUD; MODE; COMMAND: save, restart.
+        for address, value in ((0x0100, 0x5A17), (0x0101, 1152), (0x0103, 1), (0x0108, 1), (0x0108, 2)):
+            answer = master.write_register(address, value)
+            assert not answer.isError(), answer
+        master.close()
+        cls.simulator.wait(300)
+        assert cls.simulator.state()["line"]["baud"] == 115200
+        cls.simulator.framer = FramerType.ASCII
+
+
 def crc(frame: bytes) -> bytes:
     """A frame with its CRC (Modbus over Serial Line V1.02, 6.2.2)."""
     value = 0xFFFF

@@ -2,14 +2,15 @@
 
 from pymodbus import FramerType
 from pymodbus.pdu.device import ModbusControlBlock
+from pymodbus.pdu.file_message import FileRecord
 
-from simulator import OnSimulator
+from simulator import AsciiLine, OnSimulator
 
 FIRST = 0x0010
-KEY, MODE, COMM_TIMEOUT, COMMAND, FILTER = 0x0100, 0x0103, 0x0104, 0x0108, 0x0130
+KEY, COMM_TIMEOUT, COMMAND, FILTER = 0x0100, 0x0104, 0x0108, 0x0130
 VERSION, STATUS, UNIQUE_ID = 0x0202, 0x020A, 0x0220
-SAVE, RESTART, CLEAR_FLAG = 1, 2, 5
-TRIPPED, UNLOCKED = 1, 32
+CLEAR_FLAG = 5
+TRIPPED, UNSAVED, UNLOCKED = 1, 8, 32
 
 
 class Rtu(OnSimulator):
@@ -33,6 +34,16 @@ class Rtu(OnSimulator):
         self.assertTrue(status & UNLOCKED)
         self.assertEqual(self.good(self.master.read_exception_status()).status, status)
         self.assertEqual(self.good(self.master.diag_read_diagnostic_register()).message, status)
+
+    def test_08_0a_clears_the_diagnostic_register_but_no_state(self):
+        self.good(self.master.diag_clear_counters())
+        self.assertEqual(self.good(self.master.diag_read_diagnostic_register()).message, 0)
+        self.assertTrue(self.good(self.master.read_exception_status()).status & UNLOCKED)
+        # What comes up anew is told again.
+        self.good(self.master.write_register(FILTER, 6))
+        status, = self.registers(STATUS, 1)
+        self.assertTrue(status & UNSAVED)
+        self.assertEqual(self.good(self.master.diag_read_diagnostic_register()).message, UNSAVED)
 
     def test_08_00_sends_the_data_back(self):
         # pymodbus takes an echo over RTU for two bytes, whatever was sent.
@@ -96,6 +107,9 @@ class Rtu(OnSimulator):
         self.refused(self.master.diag_read_iop_overrun_count(), 1)
         self.refused(self.master.diag_getclear_modbus_response(), 1)
         self.refused(self.master.read_fifo_queue(address=FIRST), 1)
+        record = FileRecord(file_number=1, record_data=b"\x00\x01")
+        self.refused(self.master.read_file_record([record]), 1)
+        self.refused(self.master.write_file_record([record]), 1)
 
     def test_0b_counts_what_went_well(self):
         before = self.good(self.master.diag_get_comm_event_counter())
@@ -110,12 +124,16 @@ class Rtu(OnSimulator):
         log = self.good(self.master.diag_get_comm_event_log())
         # Restarted, then this request. setUp has cleared what was before.
         self.assertEqual((log.status, log.events), (True, [0x80, 0x00]))
-        self.assertEqual((log.event_count, log.message_count), (1, 1))
+        # As function 0B has it, which counts neither itself nor this.
+        self.assertEqual((log.event_count, log.message_count), (0, 1))
         for _ in range(40):
             self.refused(self.master.read_coils(0, count=1), 2)
         log = self.good(self.master.diag_get_comm_event_log())
         self.assertEqual(log.events, [0x80] + [0x41, 0x80] * 31 + [0x41])
-        self.assertEqual((log.event_count, log.message_count), (2, 42))
+        self.assertEqual((log.event_count, log.message_count), (0, 42))
+        self.registers(STATUS, 1)
+        log = self.good(self.master.diag_get_comm_event_log())
+        self.assertEqual(log.event_count, self.good(self.master.diag_get_comm_event_counter()).count)
 
     def test_listening_it_says_and_does_nothing_until_communication_restarts(self):
         self.good(self.master.diag_query_data(b"\x00\x00"))
@@ -192,21 +210,10 @@ class Rtu(OnSimulator):
         self.refused(self.master.read_device_information(read_code=5), 3)
 
 
-class Ascii(Rtu):
+class Ascii(AsciiLine, Rtu):
     """The same functions in ASCII mode, and points and settings too."""
 
     DAMAGED = b":0107FF\r\n"
-
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        master = cls.simulator.master()
-        for address, value in ((KEY, 0x5A17), (MODE, 1), (COMMAND, SAVE), (COMMAND, RESTART)):
-            answer = master.write_register(address, value)
-            assert not answer.isError(), answer
-        master.close()
-        cls.simulator.wait(300)
-        cls.simulator.framer = FramerType.ASCII
 
     def test_rtu_is_not_understood(self):
         self.simulator.framer = FramerType.RTU
@@ -274,3 +281,7 @@ class AnalogPoints(OnSimulator):
         self.eventually(self.codes, [4095, 1, 0x0F05, 0])
         self.refused(self.master.mask_write_register(address=FIRST, and_mask=0x0FFF, or_mask=0x1000), 3)
         self.assertEqual(self.codes(), [4095, 1, 0x0F05, 0])
+
+
+class AnalogPointsInAscii(AsciiLine, AnalogPoints):
+    """The same in ASCII mode."""

@@ -79,11 +79,49 @@ class Empty(Mbpoll):
         self.assertEqual(refusal, "")
         self.assertRegex(output, r"Length: 2\nId    : 0x01\nStatus: On\n")
 
+    def test_it_polls_several_units_and_goes_on_where_one_is_silent(self):
+        # Long enough for the one that answers, on a busy machine too.
+        output, refusal = self.call(
+            "-t", HOLDING_REGISTERS, "-r", "518", self.simulator.port, unit="2,1,3", wait="3.00")
+        self.assertEqual(refusal, "Connection timed out")
+        self.assertRegex(output, r"slave 2\.\.\.\n-- Polling slave 1\.\.\.\n\[518\]:\s+1\n")
+
     def test_words_of_state_and_a_long_read(self):
         words = self.read(HOLDING_REGISTERS, 0x0200, 7)
         self.assertEqual((words[0], words[1], words[4:]), (0x2383, 0x5860, [1, 1, 1]))
         self.assertEqual(len(self.read(HOLDING_REGISTERS, 0x0160, 125)), 125)
         self.assertEqual(self.read(INPUT_REGISTERS, 0x0160, 64), self.read(HOLDING_REGISTERS, 0x0160, 64))
+
+
+class Numbers(Mbpoll):
+    def test_pairs_of_registers_are_numbers_too(self):
+        """Integers and floating-point numbers of 32 bits, either word first: LORA_ADDRESS takes any
+        word, LORA_CHANNEL behind it 0 to 31."""
+        first = ("-r", str(0x0141))
+
+        def pair(kind, value, *options):
+            output, refusal = self.call(
+                *options, "-t", f"4:{kind}", *first, self.simulator.port, "--", value)
+            self.assertEqual("Written 1 references." in output, not refusal, output)
+            if refusal:
+                return refusal
+            outputs = [self.call(*options, "-t", f"{table}:{kind}", *first, self.simulator.port)[0]
+                       for table in WORDS]
+            values = [re.search(r"^\[321\]:\s+(\S+)$", text, re.MULTILINE)[1] for text in outputs]
+            self.assertEqual(values[0], values[1], "functions 03 and 04 read the same")
+            return values[0], self.read(HOLDING_REGISTERS, 0x0141, 2)
+
+        self.assertEqual(pair("int", "65536", "-B"), BUSY)
+        self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0100, "0x5A17"))
+        self.assertEqual(pair("int", str(0x1234_001F), "-B"), (str(0x1234_001F), [0x1234, 0x1F]))
+        self.assertEqual(pair("int", str(0x001E_4321)), (str(0x001E_4321), [0x4321, 0x1E]))
+        self.assertEqual(pair("float", "100", "-B"), ("100", [0x42C8, 0]))
+        self.assertEqual(pair("float", "-2.5", "-B"), ("-2.5", [0xC020, 0]))
+        self.assertEqual(pair("int", "32", "-B"), VALUE)
+        self.assertEqual(self.read(HOLDING_REGISTERS, 0x0141, 2), [0xC020, 0], "all or nothing")
+        for table in WORDS:
+            output, _ = self.call("-t", f"{table}:hex", *first, "-c", "2", self.simulator.port)
+            self.assertRegex(output, r"\[321\]:\s+0xC020\n\[322\]:\s+0x0000\n")
 
 
 class DigitalInputs(Mbpoll):

@@ -1,6 +1,6 @@
 """Every module through every function that pymodbus has for its points."""
 
-from simulator import OnSimulator
+from simulator import AsciiLine, OnSimulator
 
 FIRST = 0x0010
 POINTS = range(4)
@@ -169,3 +169,11 @@ class AnalogInputsAndOutputs(Module, OnSimulator):
         self.refused(self.master.write_registers(FIRST + 1, [0, 0, 0]), 2)
         self.refused(self.master.write_register(FIRST + 2, 4096), 3)
         self.assertEqual(self.codes(), [None, None, 1234, 4095])
+
+
+class RelaysInAscii(AsciiLine, Relays):
+    """Bits to read and bits to write in ASCII mode."""
+
+
+class AnalogInputsAndOutputsInAscii(AsciiLine, AnalogInputsAndOutputs):
+    """Words to read and words to write in ASCII mode."""

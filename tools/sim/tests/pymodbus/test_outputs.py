@@ -2,7 +2,7 @@
 
 import itertools
 
-from simulator import SILENCE_MS, OnSimulator
+from simulator import SILENCE_MS, AsciiLine, OnSimulator
 
 FIRST = 0x0010
 
@@ -71,3 +71,7 @@ class Outputs(OnSimulator):
         self.simulator.wait(200)
         self.assertEqual(self.simulator.outputs(), [False] * 4)
         self.assertEqual(self.read(), [False] * 4)
+
+
+class OutputsInAscii(AsciiLine, Outputs):
+    """The same in ASCII mode."""
