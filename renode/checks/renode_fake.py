@@ -46,16 +46,16 @@ class Machine(dict):
 class Peripheral:
     """A Python.PythonPeripheral that runs a file of renode/peripherals."""
 
-    def __init__(self, name, machine=None):
+    def __init__(self, name, machine=None, has_get_machine=True):
         path = RENODE / "peripherals" / name
         self.code = compile(path.read_text(encoding="utf-8"), str(path), "exec")
         self.request = Request()
         self.warnings = []
-        peripheral = types.SimpleNamespace(
-            GetMachine=lambda: machine,
-            WarningLog=self.warnings.append,
-        )
-        self.scope = {"request": self.request, "self": peripheral, "size": 0x400}
+        peripheral = types.SimpleNamespace(WarningLog=self.warnings.append)
+        if has_get_machine:
+            peripheral.GetMachine = lambda: machine
+        monitor = types.SimpleNamespace(Machine=machine)
+        self.scope = {"request": self.request, "self": peripheral, "monitor": monitor, "size": 0x400}
         self.inited = False
 
     def _run(self, kind, offset=0, value=0):
@@ -68,7 +68,7 @@ class Peripheral:
 
     def _check_saved(self):
         """Renode saves these with the emulation, and can save nothing else."""
-        given = {"request", "self", "size", "__builtins__"}
+        given = {"request", "self", "monitor", "size", "__builtins__"}
         for name, value in self.scope.items():
             assert name in given or isinstance(value, (int, dict)), f"{name} cannot be saved"
 

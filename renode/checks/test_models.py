@@ -156,6 +156,13 @@ class Flash(unittest.TestCase):
         self.flash.modify(self.CR, self.STRT)
         self.assertEqual(len(self.erased()), 128)
 
+    def test_an_erase_finds_the_memory_by_the_monitor_too(self):
+        machine = Machine({"sysbus.flash": self.memory})
+        self.flash = Peripheral("flash.py", machine, has_get_machine=False)
+        self.unlock()
+        self.erase(self.PAGE)
+        self.assertEqual(self.erased(), [62])
+
     def test_wait_states_are_kept(self):
         self.assertEqual(self.flash.read(0), 0x30)
         self.flash.modify(0, 2 | 1 << 4, 7)
@@ -309,11 +316,14 @@ class Watchdog(unittest.TestCase):
             def ReadDoubleWord(self, offset):
                 return {12: 0}[offset]
 
-        iwdg = Peripheral("iwdg.py", Machine({"sysbus.iwdgCounter": Counter()}))
-        for offset, value in ((0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)):
-            iwdg.write(offset, value)
-        self.assertEqual(told, [(0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)])
-        self.assertEqual(iwdg.read(12), 0)
+        for has_get_machine in (True, False):
+            machine = Machine({"sysbus.iwdgCounter": Counter()})
+            iwdg = Peripheral("iwdg.py", machine, has_get_machine)
+            for offset, value in ((0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)):
+                iwdg.write(offset, value)
+            self.assertEqual(told, [(0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)])
+            self.assertEqual(iwdg.read(12), 0)
+            told.clear()
 
 
 class Commands(unittest.TestCase):

@@ -64,12 +64,19 @@ elif request.IsWrite:
         cr = value & 0x1637
         if value & 0x40 and value & 0x06:
             page = (address - 0x08000000) & ~0x3FF
+            count = 0x400
             if value & 0x04:
-                self.GetMachine()["sysbus.flash"].SetRange(0, 0x20000, 0xFF)
-                erased += 1
-                sr |= 0x20
-            elif 0 <= page < 0x20000:
-                self.GetMachine()["sysbus.flash"].SetRange(page, 0x400, 0xFF)
+                page = 0
+                count = 0x20000
+            if 0 <= page < 0x20000:
+                try:
+                    memory = self.GetMachine()["sysbus.flash"]
+                except AttributeError:
+                    # Not every version gives a model this way to the machine; all give the monitor's.
+                    memory = monitor.Machine["sysbus.flash"]
+                memory.SetRange(page, count, 0xFF)
+                # An object that cannot be saved.
+                del memory
                 erased += 1
                 sr |= 0x20
             else:

@@ -50,7 +50,7 @@ pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) -> Option
         on(image, |elf| pymodbus::step(workspace, elf, strict))
     });
     steps.run("files for Renode", || {
-        renode::checks::step(workspace, strict)
+        on(image, |elf| renode::checks::step(workspace, elf, strict))
     });
     elf
 }

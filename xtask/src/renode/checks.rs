@@ -1,9 +1,10 @@
 //! What can be checked of Renode's files without Renode: the Python models do what the firmware needs,
-//! every suite names keywords that Renode has and calls them right, and, played on the project's own
+//! the image starts on them, every suite names keywords that Renode has and calls them right, and, played on the project's own
 //! simulator, the suites expect of the unit what it does.
 //!
 //! The platform and the scripts are checked by tests of this package (`platform`).
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,11 +18,11 @@ use crate::steps::Outcome;
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command, sim};
 
-/// The step of `cargo xtask test`: the models, and a dry run of the suites. Skipped with the reason where
-/// there is no Python or no Robot Framework, but failed when `strict`, as in CI.
-pub fn step(workspace: &Workspace, strict: bool) -> Outcome {
+/// The step of `cargo xtask test`: the models, the image on them, and a dry run of the suites. Skipped with
+/// the reason where there is no Python or nothing from PyPI, but failed when `strict`, as in CI.
+pub fn step(workspace: &Workspace, elf: &Path, strict: bool) -> Outcome {
     with_robot(workspace, strict, |python, checks, output| {
-        models(python, checks)?;
+        models(python, checks, elf)?;
         robot(python, checks, output, &["--dryrun"])
     })
 }
@@ -58,18 +59,18 @@ fn with_robot(
     }
 }
 
-/// The unit tests of the models and of the monitor's commands.
-fn models(python: &Path, checks: &Path) -> Result<()> {
-    for (test, argument) in [
-        ("test_models.py", presets()),
-        ("test_syntax.py", String::new()),
-    ] {
+/// The unit tests of the models and of the monitor's commands, and the start of the image on them.
+fn models(python: &Path, checks: &Path, elf: &Path) -> Result<()> {
+    let presets = presets();
+    let tests: [(&str, &[&OsStr]); 3] = [
+        ("test_syntax.py", &[]),
+        ("test_models.py", &[presets.as_ref()]),
+        ("test_boot.py", &[elf.as_os_str()]),
+    ];
+    for (test, arguments) in tests {
         let mut python = Command::new(python);
         // Leaves no __pycache__ in the tree.
-        python.arg("-B").arg(checks.join(test));
-        if !argument.is_empty() {
-            python.arg(argument);
-        }
+        python.arg("-B").arg(checks.join(test)).args(arguments);
         command::run(&mut python)?;
     }
     Ok(())
@@ -125,7 +126,7 @@ fn prepare(python: &str, environment: &Path, requirements: &Path) -> Result<Path
     });
     // Written last, so that an installation cut short is not taken for a whole one.
     let stamp = environment.join("installed.txt");
-    let works = || command::read(Command::new(&interpreter).args(["-c", "import robot"]));
+    let works = || command::read(Command::new(&interpreter).args(["-c", "import robot, unicorn"]));
     if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && works().is_ok() {
         return Ok(interpreter);
     }
@@ -154,7 +155,7 @@ fn prepare(python: &str, environment: &Path, requirements: &Path) -> Result<Path
     pip.arg("--requirement").arg(requirements);
     command::read(&mut pip).map_err(|why| {
         Failure::new(format!(
-            "Robot Framework cannot be installed from PyPI: {why}"
+            "Robot Framework and Unicorn cannot be installed from PyPI: {why}"
         ))
     })?;
     fs::write(&stamp, wanted)

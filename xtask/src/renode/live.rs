@@ -2,6 +2,7 @@
 //! person.
 
 use std::fs::{self, File};
+use std::io::Write as _;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -51,10 +52,10 @@ pub(super) fn suite(workspace: &Workspace) -> Result<PathBuf> {
 ///
 /// When Renode does not start, or a case failed.
 pub(super) fn conformance(bench: &Bench, suite: &Path) -> Result<()> {
-    let port = free_port()?;
+    let (port, monitor) = (free_port()?, free_port()?);
     let script = write_script(bench, Module::Do4, 1, port)?;
     let log = bench.output.join("renode.log");
-    let mut renode = start(bench, &script, &log)?;
+    let mut renode = start(bench, &script, monitor, &log)?;
     await_line(&mut renode, port, &log)?;
     let mut command = Command::new(suite);
     command.args(["--tcp", &format!("127.0.0.1:{port}")]);
@@ -67,6 +68,7 @@ pub(super) fn conformance(bench: &Bench, suite: &Path) -> Result<()> {
     }
     let status = Group::start(&mut command)?.wait()?;
     let died = renode.has_ended();
+    quit(monitor);
     drop(renode);
     match status.code() {
         _ if died => Err(Failure::new(format!(
@@ -100,20 +102,27 @@ pub(super) fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Res
     command::run(&mut command)
 }
 
-fn start(bench: &Bench, script: &Path, log: &Path) -> Result<Group> {
+fn start(bench: &Bench, script: &Path, monitor: u16, log: &Path) -> Result<Group> {
     let failed = |error: std::io::Error| Failure::new(format!("{}: {error}", log.display()));
     let output = File::create(log).map_err(failed)?;
     let errors = output.try_clone().map_err(failed)?;
     let mut command = bench.renode.command();
-    // The monitor on its input, so that it can be told to end.
-    command
-        .args(["--disable-gui", "--console", "--plain"])
-        .arg(script);
+    // The monitor on a socket: it needs no terminal, of which there may be none.
+    command.args(["--disable-gui", "--plain", "--port", &monitor.to_string()]);
+    command.arg(script);
     Group::start(
         command
             .stdout(Stdio::from(output))
             .stderr(Stdio::from(errors)),
     )
+}
+
+/// Tells Renode to end. One that does not listen is ended all the same, when its group is.
+fn quit(monitor: u16) {
+    if let Ok(mut socket) = TcpStream::connect((Ipv4Addr::LOCALHOST, monitor)) {
+        // On a line of its own: what comes first after the connection may be lost.
+        let _ = socket.write_all(b"\r\nquit\r\n");
+    }
 }
 
 /// Waits until the line's socket is open.

@@ -12,20 +12,20 @@ const RENODE: &str = r#"
 if [ "$1" = --version ]; then echo 'Renode v1.16.1.32541'; exit 0; fi
 echo "renode $*" >> "$CALLS"
 for script; do :; done
-port=$(sed -n 's/^\$port=//p' "$script")
 cp "$script" "$CALLS.resc"
+export CALLS
 python3 -c "
-import socket, sys
-server = socket.create_server(('127.0.0.1', $port))
-while True:
-    server.accept()
-" &
-listener=$!
-while read -r line; do
-    echo "told $line" >> "$CALLS"
-    [ "$line" = quit ] && break
-done
-kill $listener
+import os, re, socket, sys, threading
+line = int(re.search(r'^.port=(\d+)', open(sys.argv[-1]).read(), re.M).group(1))
+monitor = socket.create_server(('127.0.0.1', int(sys.argv[sys.argv.index('--port') + 1])))
+def serve(server):
+    while True:
+        server.accept()
+threading.Thread(target=serve, args=[socket.create_server(('127.0.0.1', line))], daemon=True).start()
+told = monitor.accept()[0].makefile().read().lstrip()
+open(os.environ['CALLS'], 'a').write('told ' + told)
+" "$@" &
+wait $!
 "#;
 
 /// Leaves results as the real one does.
@@ -195,7 +195,7 @@ fn suites_run_first_and_then_conformance_against_the_board() {
         "{suites}"
     );
     assert!(
-        renode.starts_with("renode --disable-gui --console --plain "),
+        renode.starts_with("renode --disable-gui --plain --port "),
         "{renode}"
     );
     assert!(

@@ -1,0 +1,233 @@
+"""The image itself starts on the Python models: from the reset vector to the first `wfi`, on Unicorn's
+Cortex-M3, with renode/peripherals where board.resc puts them, ports that behave as Renode's
+(STM32F1GPIOPort.cs), and registers that just keep what is written for the timers and the UART.
+
+There are no interrupts, so this ends where the tasks begin: clocks, switch, flash store, module and
+watchdog are set up by then. To be called with the image's path.
+"""
+
+import struct
+import sys
+import unittest
+from pathlib import Path
+
+from renode_fake import RENODE, Machine, Peripheral, commands
+from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
+from unicorn.arm_const import UC_ARM_REG_PC, UC_ARM_REG_SP, UC_CPU_ARM_CORTEX_M3
+
+FLASH, RAM = 0x08000000, 0x20000000
+WFI = b"\x30\xbf"
+SECONDS = 60
+
+
+class Port:
+    """A port as Renode has it: no pulls, and a set or reset of a pin that is an input is dropped."""
+
+    def __init__(self):
+        self.levels = 0
+        self.registers = {0x00: 0x44444444, 0x04: 0x44444444}
+
+    def OnGPIO(self, pin, high):
+        if not self._is_output(pin):
+            self._set(pin, high)
+
+    def _is_output(self, pin):
+        return self.registers[pin // 8 * 4] >> pin % 8 * 4 & 3 != 0
+
+    def _set(self, pin, high):
+        self.levels = self.levels & ~(1 << pin) | high << pin
+
+    def read(self, offset):
+        return self.levels if offset in (0x08, 0x0C) else self.registers.get(offset, 0)
+
+    def write(self, offset, value):
+        if offset != 0x10:
+            self.registers[offset] = value
+            return
+        for pin in range(16):
+            if value >> pin & 0x10001 and self._is_output(pin):
+                self._set(pin, value >> pin & 1)
+
+
+class Registers(dict):
+    """A block that keeps what is written."""
+
+    def read(self, offset):
+        return self.get(offset, 0)
+
+    def write(self, offset, value):
+        self[offset] = value
+
+
+class Board:
+    """The part, with the image in its flash."""
+
+    def __init__(self, elf, module, dip):
+        self.core = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+        self.core.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M3)
+        self.core.mem_map(FLASH, 0x20000)
+        self.core.mem_map(RAM, 0x5000)
+        self.core.mem_map(0x1FFFF000, 0x1000)
+        self.core.mem_write(FLASH, b"\xff" * 0x20000)
+        self._load(elf)
+        self.erased, self.watchdog, self.widths, self.unknown = [], [], {}, set()
+        ports = {name: Port() for name in "ABC"}
+        machine = Machine({f"sysbus.gpioPort{name}": port for name, port in ports.items()})
+        machine.update({"sysbus": self, "sysbus.flash": self, "sysbus.iwdgCounter": self})
+        # As board.resc has them; platform.rs holds those addresses against the simulator's.
+        self.blocks = {int(address, 16): Peripheral(file, machine) for file, address in models()}
+        self.blocks.update({0x40010800: ports["A"], 0x40010C00: ports["B"], 0x40011000: ports["C"]})
+        for address in (0x40000000, 0x40000800, 0x40012C00, 0x40013800):
+            self.blocks[address] = Registers()
+        self.system = Registers()
+        self._map(0x40000000, 0x24000, self._block)
+        self._map(0x42000000, 0x2000000, self._bit)
+        self._map(0xE0000000, 0x100000, lambda offset, size: (self.system, offset))
+        run = commands(machine, [])
+        run.mc_modio_preset(module)
+        run.mc_modio_inputs(dip)
+
+    def _load(self, elf):
+        image = elf.read_bytes()
+        (start,), (count,) = struct.unpack_from("<I", image, 28), struct.unpack_from("<H", image, 44)
+        for n in range(count):
+            kind, at, _, address, size = struct.unpack_from("<5I", image, start + 32 * n)
+            if kind == 1 and size:
+                self.core.mem_write(address, image[at : at + size])
+
+    def _map(self, base, size, find):
+        def read(_core, offset, size, _data):
+            block, at = find(offset, size)
+            return block.read(at) & (1 << 8 * size) - 1
+
+        def write(_core, offset, size, value, _data):
+            block, at = find(offset, size)
+            block.write(at, value)
+
+        self.core.mmio_map(base, size, read, None, write, None)
+
+    def _block(self, offset, size):
+        base = 0x40000000 + offset & ~0x3FF
+        self.widths.setdefault(base, set()).add(size)
+        if base not in self.blocks:
+            self.unknown.add(hex(base))
+        return self.blocks.setdefault(base, Registers()), offset & 0x3FF
+
+    def _bit(self, offset, _size):
+        """One bit of a register, as Renode's BitBanding: read, changed, and written, as a word."""
+        block, at = self._block(offset >> 5 & ~3, 4)
+        bit = offset >> 2 & 31
+
+        class Bit:
+            read = staticmethod(lambda _: block.read(at) >> bit & 1)
+            write = staticmethod(lambda _, value: block.write(at, block.read(at) & ~(1 << bit) | (value & 1) << bit))
+
+        return Bit, at
+
+    # What the models and commands see of the machine.
+
+    def SetRange(self, start, count, value):
+        self.erased.append((start, count))
+        self.core.mem_write(FLASH + start, bytes([value]) * count)
+
+    def WriteDoubleWord(self, offset, value):
+        self.watchdog.append((offset, value))
+
+    def ReadDoubleWord(self, at):
+        return 0 if at < 0x400 else struct.unpack("<I", self.core.mem_read(at, 4))[0]
+
+    def WriteByte(self, address, value):
+        self.core.mem_write(address, bytes([value]))
+
+    def run(self):
+        """Runs to the first `wfi` and gives whether it was reached."""
+        reached = []
+
+        def look(core, address, _size, _data):
+            if bytes(core.mem_read(address, 2)) == WFI:
+                reached.append(address)
+                core.emu_stop()
+
+        self.core.hook_add(UC_HOOK_CODE, look, begin=FLASH, end=FLASH + 0x20000)
+        stack, entry = struct.unpack("<II", self.core.mem_read(FLASH, 8))
+        self.core.reg_write(UC_ARM_REG_SP, stack)
+        self.core.emu_start(entry, 0, timeout=SECONDS * 1_000_000)
+        return bool(reached)
+
+    def log(self):
+        ram = bytes(self.core.mem_read(RAM, 0x5000))
+        block = ram.find(b"SEGGER RTT")
+        buffer, _, written = struct.unpack_from("<3I", ram, block + 28)
+        return ram[buffer - RAM : buffer - RAM + written].decode()
+
+
+def models():
+    for line in (RENODE / "board.resc").read_text(encoding="utf-8").splitlines():
+        if line.startswith("machine PyDevFromFile $ORIGIN/peripherals/"):
+            file, address = line.split("peripherals/")[1].split()[:2]
+            yield file, address
+
+
+class Boot(unittest.TestCase):
+    ELF = None
+    _boards = {}
+
+    def board(self, module="4di", dip=1, crystal=1):
+        """A board that has started; the same for the same arguments."""
+        how = module, dip, crystal
+        if how not in self._boards:
+            self._boards[how] = self._started(*how)
+        return self._boards[how]
+
+    def _started(self, module, dip, crystal):
+        board = Board(self.ELF, module, dip)
+        board.blocks[0x40021000].write(0x3F4, crystal)
+        where = lambda: hex(board.core.reg_read(UC_ARM_REG_PC))
+        self.assertTrue(board.run(), f"it hangs at {where()}")
+        for base, block in board.blocks.items():
+            self.assertEqual(getattr(block, "warnings", []), [], hex(base))
+        self.assertEqual(board.unknown, set(), "blocks that neither a model nor Renode has")
+        return board
+
+    def test_it_runs_on_the_crystal_and_knows_why_it_started(self):
+        board = self.board()
+        rcc = board.blocks[0x40021000]
+        self.assertEqual(rcc.read(0x04) >> 2 & 3, 2, "SWS: the PLL")
+        self.assertTrue(rcc.read(0x00) & 1 << 17, "HSERDY")
+        self.assertEqual(rcc.read(0x24) >> 26, 0, "the reset flags were taken")
+        for line in ("reset: power-on", "reset: pin", "unit address 1", "slot 5: 4di"):
+            self.assertIn(line, board.log())
+        self.assertNotIn("damaged", board.log())
+
+    def test_it_runs_without_a_crystal(self):
+        self.assertIn("the crystal did not start", self.board(crystal=0).log())
+
+    def test_it_reads_the_switch(self):
+        self.assertIn("unit address 165", self.board(dip=165).log())
+        self.assertIn("SW01 shows 0", self.board(dip=0).log())
+
+    def test_every_module_is_set_up(self):
+        for module in ("none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"):
+            self.assertIn(f"slot 5: {module}\n", self.board(module).log())
+
+    def test_the_store_makes_its_spare_page_ready(self):
+        # The second page has no mark yet; the first holds the preset.
+        self.assertEqual(self.board().erased, [(0xFC00, 0x400)])
+
+    def test_the_watchdog_is_started_by_half_words(self):
+        board = self.board()
+        self.assertEqual(board.widths[0x40003000], {2})
+        keys = [value for offset, value in board.watchdog if offset == 0]
+        self.assertEqual(keys, [0xCCCC, 0x5555, 0xAAAA])
+
+    def test_uart_and_timers_are_what_the_platforms_clocks_are_for(self):
+        board = self.board()
+        # 9600 bit/s of 72 MHz; the beat of 1 kHz.
+        self.assertEqual(board.blocks[0x40013800][0x08], 7500)
+        scan = board.blocks[0x40000800]
+        self.assertEqual((scan[0x28] + 1) * (scan[0x2C] + 1), 72_000)
+
+
+if __name__ == "__main__":
+    Boot.ELF = Path(sys.argv.pop(1))
+    unittest.main()
