@@ -17,12 +17,14 @@
 #![no_main]
 
 mod converter;
+mod every;
 mod installed;
 mod line;
 mod log;
 mod pages;
 mod persistence;
 mod rtt;
+mod signals;
 mod start;
 mod trap;
 
@@ -30,11 +32,11 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{GapEvent, Leds, ScanTimer, Watchdog, fault, pac::Interrupt, stack};
+    use board_support::{GapEvent, ScanTimer, Watchdog, fault, pac::Interrupt, stack};
     use firmware::{
         alive::{self, Task},
         device::Device,
-        lamps::{Lamps, TICK_MS, Trouble},
+        lamps::TICK_MS,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::{Adu, Outcome, Server};
@@ -42,11 +44,13 @@ mod app {
     use register_map::codes::Command;
 
     use crate::{
+        every::Every,
         installed::{AnalogOutputs, Installed},
         line::Line,
         log::{Event, Log},
         persistence::Persistence,
-        start::{self, Started},
+        signals::Signals,
+        start,
     };
 
     /// Scans between two beats of the background, and between two proofs of life.
@@ -73,16 +77,13 @@ mod app {
         settings: [ChannelSettings; 4],
         scan_timer: ScanTimer,
         events: Producer<'static, Event>,
-        until_background: u8,
-        until_proof: u8,
+        background_beat: Every,
+        proof_beat: Every,
         analog_outputs: Option<AnalogOutputs>,
         persistence: Persistence,
-        lamps: Lamps,
-        lamps_at: u32,
-        leds: Leds,
+        signals: Signals,
         log: Log,
         logged: Consumer<'static, Event>,
-        standing: Trouble,
         watchdog: Watchdog,
     }
 
@@ -92,49 +93,33 @@ mod app {
         queue: Queue<Event, 8> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let Started {
-            line,
-            frame_gap_ms,
-            server,
-            device,
-            module,
-            analog_outputs,
-            persistence,
-            mut scan_timer,
-            mut watchdog,
-            leds,
-            log,
-            trouble,
-        } = start::up(cx.device, cx.local.adus, cx.local.device);
+        let mut started = start::up(cx.device, cx.local.adus, cx.local.device);
         let (events, logged) = cx.local.queue.split();
-        scan_timer.start();
-        watchdog.start();
-        let settings = *device.points.settings();
+        started.scan_timer.start();
+        started.watchdog.start();
+        let settings = *started.device.points.settings();
         (
             Shared {
-                line,
-                device,
+                line: started.line,
                 activity: false,
                 order: None,
+                device: started.device,
             },
             Local {
-                server,
-                frame_gap_ms,
-                module,
+                server: started.server,
+                frame_gap_ms: started.frame_gap_ms,
+                module: started.module,
                 settings,
-                scan_timer,
+                scan_timer: started.scan_timer,
                 events,
-                until_background: 0,
-                until_proof: 0,
-                analog_outputs,
-                persistence,
-                lamps: Lamps::new(),
-                lamps_at: 0,
-                leds,
-                log,
+                background_beat: Every::new(SCANS_PER_BACKGROUND),
+                proof_beat: Every::new(SCANS_PER_PROOF),
+                analog_outputs: started.analog_outputs,
+                persistence: started.persistence,
+                signals: Signals::new(started.leds, started.trouble),
+                log: started.log,
                 logged,
-                standing: trouble,
-                watchdog,
+                watchdog: started.watchdog,
             },
         )
     }
@@ -264,7 +249,7 @@ mod app {
 
     #[task(
         binds = TIM4, priority = 2,
-        local = [module, settings, scan_timer, events, until_background, until_proof],
+        local = [module, settings, scan_timer, events, background_beat, proof_beat],
         shared = [line, device],
     )]
     fn scan(cx: scan::Context) {
@@ -276,8 +261,8 @@ mod app {
             settings,
             scan_timer,
             events,
-            until_background,
-            until_proof,
+            background_beat,
+            proof_beat,
             ..
         } = cx.local;
         let scan::SharedResources {
@@ -323,7 +308,7 @@ mod app {
         if beat {
             fault::keep_uptime(uptime_s);
             line.lock(|line| line.as_mut().map(Line::on_millisecond));
-            if every(until_proof, SCANS_PER_PROOF) {
+            if proof_beat.is_due() {
                 // A silent line gives these two no reason to run. Called for nothing they do
                 // nothing, but show that they could.
                 rtic::pend(Interrupt::USART1);
@@ -331,7 +316,7 @@ mod app {
             }
         }
         // At once when outputs may have changed: they may be the DAC's.
-        if every(until_background, SCANS_PER_BACKGROUND) || !beat || tripped {
+        if background_beat.is_due() || !beat || tripped {
             rtic::pend(Interrupt::EXTI0);
         }
         if beat {
@@ -342,16 +327,9 @@ mod app {
         }
     }
 
-    /// True once every `period` calls.
-    fn every(left: &mut u8, period: u8) -> bool {
-        let now = *left == 0;
-        *left = if now { period - 1 } else { *left - 1 };
-        now
-    }
-
     #[task(
         binds = EXTI0, priority = 1,
-        local = [analog_outputs, persistence, lamps, lamps_at, leds, log, logged, standing],
+        local = [analog_outputs, persistence, signals, log, logged],
         shared = [line, device, activity, order],
     )]
     fn background(cx: background::Context) {
@@ -366,12 +344,9 @@ mod app {
         let background::LocalResources {
             analog_outputs,
             persistence,
-            lamps,
-            lamps_at,
-            leds,
+            signals,
             log,
             logged,
-            standing,
             ..
         } = cx.local;
 
@@ -407,15 +382,7 @@ mod app {
             device.state.stack_free = free;
             (device.points.failing(), device.state.millis())
         });
-        // It runs more often than the patterns beat: a write wakes it too.
-        if millis.wrapping_sub(*lamps_at) >= u32::from(TICK_MS) {
-            *lamps_at = millis;
-            let request = activity.lock(core::mem::take);
-            let lit = lamps.tick(request, standing.or_module(failing));
-            leds.set_activity(lit.activity);
-            leds.set_fault(lit.fault);
-            leds.set_run(lit.run);
-        }
+        signals.show(millis, failing, || activity.lock(core::mem::take));
         while let Some(event) = logged.dequeue() {
             log.event(event);
         }
