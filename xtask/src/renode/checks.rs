@@ -62,9 +62,10 @@ fn with_robot(
 /// The unit tests of the models and of the monitor's commands, and the start of the image on them.
 fn models(python: &Path, checks: &Path, elf: &Path) -> Result<()> {
     let presets = presets();
-    let tests: [(&str, &[&OsStr]); 3] = [
+    let tests: [(&str, &[&OsStr]); 4] = [
         ("test_syntax.py", &[]),
-        ("test_models.py", &[presets.as_ref()]),
+        ("test_models.py", &[]),
+        ("test_commands.py", &[presets.as_ref()]),
         ("test_boot.py", &[elf.as_os_str()]),
     ];
     for (test, arguments) in tests {

@@ -1,0 +1,93 @@
+"""The commands that the platform adds to the monitor, as people and the suites use them."""
+
+import json
+import sys
+import unittest
+
+from renode_fake import Machine, Memory, commands
+
+
+class Commands(unittest.TestCase):
+    def test_the_switch_and_what_is_pulled_up(self):
+        levels = {}
+
+        class Port:
+            def __init__(self, name):
+                self.name = name
+
+            def OnGPIO(self, pin, high):
+                levels[f"P{self.name}{pin}"] = high
+
+        machine = Machine({f"sysbus.gpioPort{name}": Port(name) for name in "AB"})
+        commands(machine, []).mc_modio_inputs(0b1001_0110)
+        switch = [levels[pin] for pin in ("PA4", "PA5", "PA6", "PA7", "PB12", "PB13", "PB14", "PB15")]
+        # ON is low.
+        self.assertEqual(switch, [True, False, False, True, False, True, True, False])
+        for pin in ("PA0", "PA1", "PA2", "PA3", "PA10", "PB5"):
+            self.assertIs(levels[pin], True, pin)
+        self.assertEqual(len(levels), 14)
+
+    class Bus(dict):
+        """Memory by address, 0xFF where nothing was written."""
+
+        def ReadByte(self, address):
+            return self.get(address, 0xFF)
+
+        def ReadDoubleWord(self, address):
+            return sum(self.ReadByte(address + n) << 8 * n for n in range(4))
+
+        def WriteByte(self, address, value):
+            self[address] = value
+
+        def GetSymbolAddress(self, name):
+            return {"_SEGGER_RTT": 0x20002000}[name]
+
+    def test_a_preset_is_stored_only_where_nothing_is(self):
+        bus = self.Bus()
+        run = commands(Machine({"sysbus": bus}), [])
+        run.mc_modio_preset("4do")
+        stored = dict(bus)
+        self.assertEqual(min(stored), 0x0800F800)
+        self.assertEqual(len(stored), 20)
+        run.mc_modio_preset("4di")
+        self.assertEqual(bus, stored)
+        bus.clear()
+        bus[0x0800FC00 + 1023] = 0
+        run.mc_modio_preset("4di")
+        self.assertEqual(len(bus), 1)
+        with self.assertRaisesRegex(ValueError, "4di, 4do"):
+            run.mc_modio_preset("5di")
+
+    def test_the_log_is_shown(self):
+        bus, printed = self.Bus(), []
+        run = commands(Machine({"sysbus": bus}), printed)
+        run.mc_modio_log()
+        self.assertEqual(printed, ["the firmware has not opened its log"])
+        for at, word in ((28, 0x20003000), (32, 512), (36, 5)):
+            for n in range(4):
+                bus[0x20002000 + at + n] = word >> 8 * n & 0xFF
+        for n, byte in enumerate(b"modio"):
+            bus[0x20003000 + n] = byte
+        run.mc_modio_log()
+        self.assertEqual(printed[1:], ["modio"])
+
+
+class Presets(unittest.TestCase):
+    def test_they_are_those_of_the_register_map(self):
+        """PRESETS is what the crate register-map makes of every module, in JSON."""
+        if PRESETS is None:
+            self.skipTest("`cargo xtask test` gives them")
+        for name, wanted in PRESETS.items():
+            bus = Commands.Bus()
+            commands(Machine({"sysbus": bus}), []).mc_modio_preset(name)
+            stored = bytes(bus.ReadByte(0x0800F800 + n) for n in range(len(wanted) // 2))
+            self.assertEqual(stored.hex(), wanted, name)
+            self.assertLessEqual(len(bus), len(stored))
+
+
+PRESETS = None
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1 and sys.argv[1].startswith("{"):
+        PRESETS = json.loads(sys.argv.pop(1))
+    unittest.main()
