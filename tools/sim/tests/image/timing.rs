@@ -1,5 +1,6 @@
 //! When the unit speaks, and how long it holds the bus.
 
+use register_map::{codes::Baud, configuration};
 use sim::{Module, Time, line::Direction};
 
 use crate::bench::{Bench, adu};
@@ -84,4 +85,45 @@ fn requests_back_to_back_at_t35_are_all_answered() {
         replies += bench.board.line().take_received().len() / 6;
     }
     assert_eq!(replies, 200);
+}
+
+/// At 921600 bit/s a bit is 1.085 us, so what the interrupt takes until the driver is off counts.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_less_than_a_bit_more() {
+    for baud in Baud::ALL {
+        for format in 0..4 {
+            let line = [
+                (configuration::BAUD, baud.code()),
+                (configuration::FORMAT, format),
+            ];
+            let mut bench = Bench::set_up(Module::Di4, &line);
+            let bit = bench.bit();
+            for _ in 0..2 {
+                bench.exchange(&adu(&[1, 3, 1, 0, 0, 9]));
+                let character = bench.characters(1);
+                let line = bench.board.line();
+                let frame = line.frames().next_back().expect("a reply").clone();
+                assert_eq!(frame.direction, Direction::FromUnit);
+                let edges: Vec<_> = line.driver_edges().collect();
+                let [.., (on, true), (off, false)] = edges[..] else {
+                    panic!("{baud:?}, format {format}: {edges:?}");
+                };
+                assert!(
+                    on <= frame.start && frame.start - on <= bit.max(Time::from_us(1)),
+                    "{baud:?}, format {format}: on {on:?}, start {:?}",
+                    frame.start
+                );
+                let held = off.as_ps().checked_sub(frame.end.as_ps());
+                assert!(
+                    held.is_some_and(|held| held <= bit.min(Time::from_us(2)).as_ps()),
+                    "{baud:?}, format {format}: off {off:?}, end {:?}",
+                    frame.end
+                );
+                // At the highest rates the values are put together while the first bytes leave.
+                let gap = frame.longest_gap;
+                assert!(gap <= character, "gap of {gap:?}");
+            }
+        }
+    }
 }
