@@ -98,6 +98,12 @@ impl Life {
     fn power_cycle(&mut self) {
         self.flash.power_on();
         self.store = None;
+        let reads_otherwise = self.flash.unsteady.contains(&true);
+        if reads_otherwise && pages::nothing_good(&self.flash.pages) {
+            // What an erase that was cut short has left looks like something stored one time and like
+            // nothing the next.
+            self.expected = vec![Found::good(&Settings::defaults()), Found::damaged()];
+        }
     }
 
     /// Starts, unless it has; again, if the power is cut meanwhile.

@@ -45,7 +45,7 @@ pub struct MockFlash {
     /// An erase was cut off: the page, whatever it reads, must not be programmed.
     weak: [bool; 2],
     /// Its bits are not even the same at every start.
-    unsteady: [bool; 2],
+    pub unsteady: [bool; 2],
     /// The power is cut in the operation after so many more.
     pub cut: Option<(usize, Mess)>,
     off: bool,
