@@ -29,30 +29,37 @@ class _Board:
     """The simulator with a board in it."""
 
     def __init__(self, program, elf, dip, module):
-        tcp, http = _free_port(), _free_port()
-        self.api = f"http://127.0.0.1:{http}/api/"
         command = [program, "--elf", elf, "--dip", str(dip), "--module", module]
-        command += ["--tcp", f"127.0.0.1:{tcp}", "--http", f"127.0.0.1:{http}"]
+        command += ["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.log = []
         self.came = bytearray()
+        self._endpoints = {}
         threading.Thread(target=self._read_log, daemon=True).start()
-        deadline = time.monotonic() + 60
-        while True:
-            try:
-                self.line = socket.create_connection(("127.0.0.1", tcp))
-                break
-            except OSError:
-                if self.process.poll() is not None or time.monotonic() > deadline:
-                    raise AssertionError(f"no simulator: {self.process.stderr.read()}")
-                time.sleep(0.02)
+        self.api = self._endpoint("http").rstrip("/") + "/api/"
+        host, port = self._endpoint("tcp").rsplit(":", 1)
+        self.line = socket.create_connection((host, int(port)))
         self.line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         threading.Thread(target=self._read_line, daemon=True).start()
 
     def _read_log(self):
         for line in self.process.stdout:
-            if not re.match(r"(pty|http|tcp|gdb): ", line):
+            endpoint = re.match(r"(pty|http|tcp|gdb): (.*)", line)
+            if endpoint:
+                self._endpoints[endpoint[1]] = endpoint[2]
+            else:
                 self.log.append(line)
+
+    def _endpoint(self, name):
+        """Where the simulator says it listens, on a port that was free."""
+        deadline = time.monotonic() + 60
+        while name not in self._endpoints:
+            if self.process.poll() is not None:
+                raise AssertionError(f"no simulator: {self.process.stderr.read()}")
+            if time.monotonic() > deadline:
+                raise AssertionError(f"the simulator opened no {name} in a minute")
+            time.sleep(0.02)
+        return self._endpoints[name]
 
     def _read_line(self):
         try:
@@ -79,12 +86,6 @@ class _Board:
         self.line.close()
         self.process.terminate()
         self.process.wait()
-
-
-def _free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class RenodeOnSimulator:

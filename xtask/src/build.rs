@@ -1,8 +1,9 @@
 //! `cargo xtask build`: the release image, as an ELF file for a debugger or the simulator and as a
 //! .bin for a programmer.
 
+use std::ffi::OsString;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::toolchain::{Need, TARGET};
 use crate::workspace::Workspace;
@@ -65,8 +66,23 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 ///
 /// When there is no toolchain for the target, the image does not build, or it could panic.
 pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
+    linked(workspace, options, None)
+}
+
+/// The same, with the linker's map in a file.
+///
+/// # Errors
+///
+/// As [`image()`].
+pub fn image_with_map(workspace: &mut Workspace, options: &Options, map: &Path) -> Result<Image> {
+    linked(workspace, options, Some(map))
+}
+
+fn linked(workspace: &mut Workspace, options: &Options, map: Option<&Path>) -> Result<Image> {
     let Board::Modio02 = options.board;
-    let mut cargo = workspace.target_cargo(Need::Build, "build")?;
+    // Only `cargo rustc` has options for the linker that the packages below are not built anew for.
+    let subcommand = if map.is_some() { "rustc" } else { "build" };
+    let mut cargo = workspace.target_cargo(Need::Build, subcommand)?;
     cargo.args([
         "--profile",
         PROFILE,
@@ -76,6 +92,9 @@ pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
         "modio",
     ]);
     cargo.args(["--features", "board"]);
+    if let Some(map) = map {
+        cargo.arg("--").arg(map_argument(map));
+    }
     command::run(&mut cargo)?;
 
     let elf = workspace.target().join(TARGET).join(PROFILE).join("modio");
@@ -86,6 +105,12 @@ pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
     fs::write(&bin, bytes)
         .map_err(|error| Failure::new(format!("cannot write {}: {error}", bin.display())))?;
     Ok(Image { elf, bin })
+}
+
+fn map_argument(map: &Path) -> OsString {
+    let mut argument = OsString::from("-Clink-arg=-Map=");
+    argument.push(map);
+    argument
 }
 
 /// Refuses an image into which something is linked that panics.

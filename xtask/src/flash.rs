@@ -25,6 +25,14 @@ pub struct Options {
     elf: Option<PathBuf>,
 }
 
+impl Options {
+    /// Whether a probe or an image is named.
+    #[must_use]
+    pub const fn is_told(&self) -> bool {
+        self.probe.is_some() || self.elf.is_some()
+    }
+}
+
 /// `cargo xtask flash`.
 ///
 /// # Errors
@@ -97,20 +105,17 @@ impl ProbeRs {
 #[cfg(all(test, unix))]
 mod tests {
     use std::fs;
-    use std::os::unix::fs::PermissionsExt;
     use std::path::Path;
 
     use super::*;
+    use crate::script::program;
 
     /// A program in probe-rs's place that writes its arguments down, a line for each call.
     fn fake(directory: &Path, script: &str) -> ProbeRs {
-        let program = directory.join("probe-rs");
         let log = directory.join("log");
-        let text = format!("#!/bin/sh\necho \"$@\" >> '{}'\n{script}\n", log.display());
-        fs::write(&program, text).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        let text = format!("echo \"$@\" >> '{}'\n{script}", log.display());
         ProbeRs {
-            program,
+            program: program(directory, "probe-rs", &text),
             probe: None,
         }
     }

@@ -43,6 +43,16 @@ pub fn parse(bytes: &[u8]) -> std::result::Result<Elf<'_>, String> {
     Elf::parse(bytes).map_err(|error| format!("the image is not a 32-bit ELF file: {error}"))
 }
 
+/// Where the program starts, as the ELF file says.
+///
+/// # Errors
+///
+/// When it is no 32-bit ELF file.
+pub fn entry(bytes: &[u8]) -> std::result::Result<u32, String> {
+    let elf = parse(bytes)?;
+    Ok(elf.elf_header().e_entry.get(elf.endian()))
+}
+
 /// The bytes of flash from its beginning to the last that the image loads, as a programmer takes them.
 /// Gaps between load segments are 0xFF, as erased.
 ///

@@ -11,13 +11,17 @@ pub mod bench;
 pub mod build;
 pub mod ci;
 pub mod command;
+pub mod dist;
 pub mod docs;
 mod failure;
 pub mod flash;
 pub mod fuzz;
+pub mod hil;
 pub mod image;
 pub mod pymodbus;
 pub mod renode;
+#[cfg(all(test, unix))]
+mod script;
 pub mod sim;
 pub mod size;
 pub mod soak;
@@ -49,6 +53,8 @@ impl Cli {
 enum Command {
     /// Build the release image: ELF and .bin
     Build(build::Options),
+    /// Build all files of a release: ELF, .bin, .hex, map, bill of materials, check sums
+    Dist(dist::Options),
     /// Write the image into a board with probe-rs, verify and start it
     Flash(flash::Options),
     /// Show flash and RAM by crate and section, with what is left of the parts and budgets
@@ -59,6 +65,8 @@ enum Command {
     Sim(sim_options::Options),
     /// Test the image on Renode: its suites and the conformance suite
     Renode(renode::Options),
+    /// Test a real board on its serial line: conformance, timing, wires
+    Hil(hil::Options),
     /// Feed the framers, the server and the configuration store what libFuzzer comes up with
     Fuzz(fuzz::Options),
     /// Good and damaged frames to the image in simulation, a million of them
@@ -80,6 +88,7 @@ pub fn run(cli: Cli) -> Result<()> {
     let mut workspace = Workspace::open()?;
     match cli.command {
         Command::Build(options) => build::run(&mut workspace, &options),
+        Command::Dist(options) => dist::run(&mut workspace, &options),
         Command::Flash(options) => flash::run(&mut workspace, &options),
         Command::Size(options) => size::run(&mut workspace, &options),
         Command::Bench(options) => bench::run(&mut workspace, &options),
@@ -87,6 +96,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Fuzz(options) => fuzz::run(&workspace, &options),
         Command::Soak(options) => soak::run(&mut workspace, &options),
         Command::Renode(options) => renode::run(&mut workspace, &options),
+        Command::Hil(options) => hil::run(&mut workspace, &options),
         Command::Docs => docs::run(&workspace),
         Command::Test => test::run(&mut workspace),
         Command::Ci => ci::run(&mut workspace),

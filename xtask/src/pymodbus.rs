@@ -117,17 +117,8 @@ fn prepare(python: &str, environment: &Path, requirements: &Path) -> Result<Path
 
 #[cfg(all(test, unix))]
 mod tests {
-    use std::os::unix::fs::PermissionsExt;
-
     use super::*;
-
-    /// A program of that name made of a script.
-    fn program(directory: &Path, name: &str, script: &str) -> PathBuf {
-        let program = directory.join(name);
-        fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        program
-    }
+    use crate::script::program;
 
     /// A python3 whose `-m venv` makes an interpreter that writes down how it is called.
     const MAKES_VENV: &str = r#"

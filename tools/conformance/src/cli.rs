@@ -205,16 +205,35 @@ impl Cli {
     ///
     /// When none is left.
     pub fn cases(&self) -> Result<Vec<Case>, String> {
-        let mut cases = crate::cases::all();
-        let wanted = |case: &Case| self.only.iter().any(|part| case.name.contains(part));
-        if !self.only.is_empty() {
-            cases.retain(wanted);
-        }
-        if cases.is_empty() {
-            return Err("no case has such a name: --list shows them".to_owned());
-        }
-        Ok(cases)
+        chosen(&self.only)
     }
+}
+
+/// The cases whose names contain one of these parts; all when there is none.
+///
+/// # Errors
+///
+/// When none is left.
+pub fn chosen(parts: &[String]) -> Result<Vec<Case>, String> {
+    let mut cases = crate::cases::all();
+    if !parts.is_empty() {
+        cases.retain(|case| parts.iter().any(|part| case.name.contains(part)));
+    }
+    if cases.is_empty() {
+        return Err("no case has such a name: modio-conformance --list shows them".to_owned());
+    }
+    Ok(cases)
+}
+
+/// What is wrong with a command line, in one line.
+#[must_use]
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let lines: Vec<&str> = text
+        .lines()
+        .map_while(|line| (!line.is_empty()).then(|| line.trim()))
+        .collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
 }
 
 /// How long to wait on an endpoint: by its line when its time is exact, else long enough for an operating

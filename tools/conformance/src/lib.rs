@@ -10,6 +10,8 @@
 //! probe, profile what the unit has: Target   bench, points  what cases ask and judge with
 //! endpoint/      what carries the bytes      run, report/   one after another; table, JUnit, JSON
 //! frame          CRC, LRC, RTU, ASCII        vectors        worked frames of manuals
+//! hil/           a board on a bench: timing,  rate           to another rate and back
+//!                wires; command modio-hil    interrupt      Ctrl-C, with the unit put back first
 //! ```
 //!
 //! Nothing here is shared with the server that it judges.
@@ -22,10 +24,13 @@ pub mod cases;
 pub mod cli;
 pub mod endpoint;
 pub mod frame;
+pub mod hil;
+pub mod interrupt;
 pub mod line;
 pub mod points;
 pub mod probe;
 pub mod profile;
+pub mod rate;
 pub mod report;
 pub mod run;
 pub mod target;

@@ -100,16 +100,23 @@ impl Default for LineFormat {
 
 impl fmt::Display for LineFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let format = CharacterFormat {
+            data_bits: self.data_bits,
+            parity: self.parity,
+            stop_bits: self.stop_bits,
+        };
+        write!(f, "{} {format}", self.baud)
+    }
+}
+
+impl fmt::Display for CharacterFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parity = match self.parity {
             Parity::None => 'N',
             Parity::Even => 'E',
             Parity::Odd => 'O',
         };
-        write!(
-            f,
-            "{} {}{parity}{}",
-            self.baud, self.data_bits, self.stop_bits
-        )
+        write!(f, "{}{parity}{}", self.data_bits, self.stop_bits)
     }
 }
 

@@ -3,9 +3,11 @@
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 
 use clap::Parser;
-use conformance::cli::Cli;
+use conformance::cli::{Cli, one_line};
+use conformance::interrupt;
 use conformance::probe::{Given, probe};
 use conformance::report::{Totals, json, junit, table};
 use conformance::run::{self, Options};
@@ -14,19 +16,11 @@ use conformance::target::{Support, Target};
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) if error.use_stderr() => {
-            let text = error.render().to_string();
-            let lines: Vec<&str> = text
-                .lines()
-                .map_while(|l| (!l.is_empty()).then(|| l.trim()))
-                .collect();
-            return refused(lines.join(" ").trim_start_matches("error: "));
-        }
+        Err(error) if error.use_stderr() => return refused(&one_line(&error)),
         Err(help) => help.exit(),
     };
     match test(&cli) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+        Ok(status) => ExitCode::from(status),
         Err(what) => refused(&what),
     }
 }
@@ -37,12 +31,12 @@ fn refused(what: &str) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Whether no case failed.
-fn test(cli: &Cli) -> Result<bool, String> {
+/// Tests, and gives the exit status.
+fn test(cli: &Cli) -> Result<u8, String> {
     let cases = cli.cases()?;
     if cli.list {
         print!("{}", table::list(&cases));
-        return Ok(true);
+        return Ok(0);
     }
     let profile = cli.read_profile()?;
     let mode = cli.mode(profile.as_ref())?;
@@ -61,7 +55,9 @@ fn test(cli: &Cli) -> Result<bool, String> {
         allow_config: cli.allow_config,
     };
     let tell = |outcome: &run::Outcome| println!("{}", table::row(outcome));
-    let outcomes = run::run(endpoint.as_mut(), &target, options, &cases, tell)
+    let stop = interrupt::catch()?;
+    let go_on = || !stop.load(Ordering::Relaxed);
+    let outcomes = run::run_while(endpoint.as_mut(), &target, options, &cases, go_on, tell)
         .map_err(|broken| broken.to_string())?;
     println!("{}", table::summary(&outcomes));
     let name = endpoint.name();
@@ -71,7 +67,10 @@ fn test(cli: &Cli) -> Result<bool, String> {
     if let Some(path) = &cli.json {
         write(path, &format!("{:#}\n", json::value(&name, &outcomes)))?;
     }
-    Ok(Totals::of(&outcomes).failed == 0)
+    if !go_on() {
+        return Ok(interrupt::STATUS);
+    }
+    Ok(u8::from(Totals::of(&outcomes).failed > 0))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), String> {

@@ -54,10 +54,29 @@ pub fn run(
     target: &Target,
     options: Options,
     cases: &[Case],
+    tell: impl FnMut(&Outcome),
+) -> Result<Vec<Outcome>, Broken> {
+    run_while(endpoint, target, options, cases, || true, tell)
+}
+
+/// The same, as long as `go_on` before a case says so: what a case has begun it ends and puts back.
+///
+/// # Errors
+///
+/// As [`run`].
+pub fn run_while(
+    endpoint: &mut dyn Endpoint,
+    target: &Target,
+    options: Options,
+    cases: &[Case],
+    mut go_on: impl FnMut() -> bool,
     mut tell: impl FnMut(&Outcome),
 ) -> Result<Vec<Outcome>, Broken> {
     let mut outcomes = Vec::new();
     for case in cases {
+        if !go_on() {
+            break;
+        }
         let begin = endpoint.now();
         let lacking = case
             .needs

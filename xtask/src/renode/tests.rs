@@ -1,11 +1,11 @@
 //! Renode played by scripts: what is found and run, in which order, and what becomes of it.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use super::find::Surroundings;
 use super::*;
+use crate::script::program;
 
 /// Prints a version, or opens the port of the script it is given and waits for `quit`.
 const RENODE: &str = r#"
@@ -59,12 +59,9 @@ impl Fake {
     }
 
     fn program(&self, name: &str, script: &str) -> PathBuf {
-        let program = self.at(name);
         let calls = self.at("calls");
-        let text = format!("#!/bin/sh\nCALLS='{}'\n{script}", calls.display());
-        fs::write(&program, text).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        program
+        let text = format!("CALLS='{}'\n{script}", calls.display());
+        program(self.directory.path(), name, &text)
     }
 
     fn version(&self, version: &str) -> PathBuf {

@@ -12,25 +12,11 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
     let cases: Vec<Value> = outcomes
         .iter()
         .map(|outcome| {
-            let mut value = json!({
-                "name": outcome.case.name,
-                "section": outcome.case.section,
-                "about": outcome.case.about,
-                "seconds": outcome.time.as_secs_f64(),
-            });
-            match &outcome.verdict {
-                Verdict::Passed => value["result"] = json!("passed"),
-                Verdict::Skipped(why) => {
-                    value["result"] = json!("skipped");
-                    value["reason"] = json!(why);
-                }
-                Verdict::Failed(failure) => {
-                    value["result"] = json!("failed");
-                    value["sent"] = json!(failure.sent);
-                    value["came"] = json!(failure.came);
-                    value["wanted"] = json!(failure.wanted);
-                }
-            }
+            let mut value = result(&outcome.verdict);
+            value["name"] = json!(outcome.case.name);
+            value["section"] = json!(outcome.case.section);
+            value["about"] = json!(outcome.case.about);
+            value["seconds"] = json!(outcome.time.as_secs_f64());
             value
         })
         .collect();
@@ -41,6 +27,21 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
         "skipped": totals.skipped,
         "cases": cases,
     })
+}
+
+/// How something ended, and why.
+#[must_use]
+pub fn result(verdict: &Verdict) -> Value {
+    match verdict {
+        Verdict::Passed => json!({ "result": "passed" }),
+        Verdict::Skipped(why) => json!({ "result": "skipped", "reason": why }),
+        Verdict::Failed(failure) => json!({
+            "result": "failed",
+            "sent": failure.sent,
+            "came": failure.came,
+            "wanted": failure.wanted,
+        }),
+    }
 }
 
 #[cfg(test)]

@@ -1,39 +1,72 @@
 //! JUnit XML, as CI services read it.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
-use crate::report::Totals;
 use crate::run::{Outcome, Verdict};
+
+/// What begins a document.
+pub const HEADER: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+
+/// Something that was tried, as JUnit has it.
+#[derive(Clone, Copy, Debug)]
+pub struct Test<'a> {
+    /// What it is about, a slash, what is tried.
+    pub name: &'a str,
+    /// Where it is written that it must be so.
+    pub section: &'a str,
+    /// How it ended.
+    pub verdict: &'a Verdict,
+    /// How long it took.
+    pub time: Duration,
+}
 
 /// The outcomes as a JUnit document; `suite` is what was tested.
 #[must_use]
 pub fn document(suite: &str, outcomes: &[Outcome]) -> String {
-    let totals = Totals::of(outcomes);
-    let seconds: f64 = outcomes.iter().map(|o| o.time.as_secs_f64()).sum();
-    let mut xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_owned();
+    format!("{HEADER}{}", element(suite, &tests(outcomes)))
+}
+
+/// The outcomes as JUnit has them.
+#[must_use]
+pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
+    outcomes
+        .iter()
+        .map(|outcome| Test {
+            name: outcome.case.name,
+            section: outcome.case.section,
+            verdict: &outcome.verdict,
+            time: outcome.time,
+        })
+        .collect()
+}
+
+/// One `testsuite` of a document.
+#[must_use]
+pub fn element(suite: &str, tests: &[Test<'_>]) -> String {
+    let count = |is: fn(&Verdict) -> bool| tests.iter().filter(|test| is(test.verdict)).count();
+    let time: Duration = tests.iter().map(|test| test.time).sum();
+    let mut xml = String::new();
     // A String takes everything.
     let _ = writeln!(
         xml,
-        "<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\" errors=\"0\" time=\"{seconds:.3}\">",
+        "<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\" errors=\"0\" time=\"{:.3}\">",
         escaped(suite),
-        outcomes.len(),
-        totals.failed,
-        totals.skipped
+        tests.len(),
+        count(|verdict| matches!(verdict, Verdict::Failed(_))),
+        count(|verdict| matches!(verdict, Verdict::Skipped(_))),
+        time.as_secs_f64()
     );
-    for outcome in outcomes {
-        let (class, name) = outcome
-            .case
-            .name
-            .split_once('/')
-            .unwrap_or(("", outcome.case.name));
+    for test in tests {
+        let (class, name) = test.name.split_once('/').unwrap_or(("", test.name));
         let _ = write!(
             xml,
             "  <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\"",
             escaped(class),
             escaped(name),
-            outcome.time.as_secs_f64()
+            test.time.as_secs_f64()
         );
-        let _ = match &outcome.verdict {
+        let _ = match test.verdict {
             Verdict::Passed => writeln!(xml, "/>"),
             Verdict::Skipped(why) => {
                 writeln!(xml, "><skipped message=\"{}\"/></testcase>", escaped(why))
@@ -42,7 +75,7 @@ pub fn document(suite: &str, outcomes: &[Outcome]) -> String {
                 xml,
                 "><failure message=\"{}\">{}: sent {}; came {}</failure></testcase>",
                 escaped(&failure.wanted),
-                escaped(outcome.case.section),
+                escaped(test.section),
                 escaped(&failure.sent),
                 escaped(&failure.came)
             ),

@@ -23,13 +23,18 @@ impl Totals {
     pub fn of(outcomes: &[Outcome]) -> Self {
         let mut totals = Self::default();
         for outcome in outcomes {
-            match outcome.verdict {
-                Verdict::Passed => totals.passed += 1,
-                Verdict::Failed(_) => totals.failed += 1,
-                Verdict::Skipped(_) => totals.skipped += 1,
-            }
+            totals.count(&outcome.verdict);
         }
         totals
+    }
+
+    /// Counts one more.
+    pub fn count(&mut self, verdict: &Verdict) {
+        match verdict {
+            Verdict::Passed => self.passed += 1,
+            Verdict::Failed(_) => self.failed += 1,
+            Verdict::Skipped(_) => self.skipped += 1,
+        }
     }
 }
 

@@ -1,0 +1,72 @@
+//! `modio-hil`: tests a modio on a bench and tells what it found.
+
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Parser;
+use conformance::cli::one_line;
+use conformance::hil::cli::Cli;
+use conformance::hil::report::Report;
+use conformance::{hil, interrupt};
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if error.use_stderr() => return refused(&one_line(&error)),
+        Err(help) => help.exit(),
+    };
+    match test(&cli) {
+        Ok(status) => ExitCode::from(status),
+        Err(what) => refused(&what),
+    }
+}
+
+/// It could not be tested: a line on stderr, exit status 2.
+fn refused(what: &str) -> ExitCode {
+    eprintln!("modio-hil: {what}");
+    ExitCode::from(2)
+}
+
+/// Tests, and gives the exit status.
+fn test(cli: &Cli) -> Result<u8, String> {
+    let mut endpoint = cli.open().map_err(|broken| broken.to_string())?;
+    let plan = cli.plan(endpoint.as_ref())?;
+    if cli.check {
+        return Ok(0);
+    }
+    let stop = interrupt::catch()?;
+    let mut report = Report::default();
+    let mut tell = |line: &str| println!("{line}");
+    let ended = hil::run(endpoint.as_mut(), &plan, stop, &mut report, &mut tell);
+    // What was found before it could not go on is worth having, too.
+    if let Some(path) = &cli.junit {
+        write(path, &report.junit())?;
+    }
+    if let Some(path) = &cli.json {
+        write(path, &format!("{:#}\n", report.json()))?;
+    }
+    ended?;
+    let totals = report.totals();
+    let early = if report.interrupted {
+        ", interrupted"
+    } else {
+        ""
+    };
+    println!(
+        "\nin all: {} passed, {} failed, {} skipped{early}",
+        totals.passed, totals.failed, totals.skipped
+    );
+    for name in report.failed() {
+        println!("failed: {name}");
+    }
+    Ok(if report.interrupted {
+        interrupt::STATUS
+    } else {
+        u8::from(totals.failed > 0)
+    })
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
+}

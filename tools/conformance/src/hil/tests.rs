@@ -1,0 +1,329 @@
+//! The bench against fake units: what it finds, and that it puts everything back.
+
+use std::sync::Arc;
+
+use super::fake::{Fate, Line, TURNAROUND};
+use super::*;
+use crate::cli::waits;
+
+const OUTPUT: u16 = 0x10;
+
+fn plan(line: &Line) -> Plan {
+    Plan {
+        unit: 1,
+        patience: waits(line, None),
+        allow_config: false,
+        cases: Vec::new(),
+        requests: 0,
+        rates: Vec::new(),
+        limit: None,
+        fixture: None,
+    }
+}
+
+fn run_plan(line: &mut Line, plan: &Plan, stop: &AtomicBool) -> (Report, Result<(), String>) {
+    let mut report = Report::default();
+    let ended = run(line, plan, stop, &mut report, &mut |_| {});
+    (report, ended)
+}
+
+fn never() -> AtomicBool {
+    AtomicBool::new(false)
+}
+
+fn is_echo(frame: &[u8]) -> bool {
+    frame[1] == 8
+}
+
+#[test]
+fn every_rate_is_measured_and_the_unit_is_back_as_it_was() {
+    let mut line = Line::new(&[1]);
+    let home = line.line();
+    let plan = Plan {
+        requests: 50,
+        rates: vec![9600, 115_200, 1200],
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended, Ok(()));
+    let rates: Vec<u32> = report.timing.iter().map(|tally| tally.line.baud).collect();
+    assert_eq!(rates, plan.rates);
+    for tally in &report.timing {
+        assert_eq!((tally.sent, tally.lost, tally.wrong), (50, 0, 0));
+        assert_eq!(tally.spread.as_ref().unwrap().percentile(50), TURNAROUND);
+    }
+    assert_eq!(report.totals().passed, 3);
+    assert_eq!((line.line(), line.units[0].line), (home, home));
+    assert_eq!(line.units[0].stored, [96, 0]);
+    assert_eq!(report.json()["timing"][1]["turnaround_us"]["p99"], 4100);
+}
+
+#[test]
+fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
+    let mut line = Line::new(&[1]);
+    let mut count = 0;
+    line.watch = Box::new(move |frame, _| {
+        count += u32::from(is_echo(frame));
+        match count {
+            10 | 20 => Fate::Lost,
+            30 => Fate::Stale,
+            _ => Fate::Good,
+        }
+    });
+    let plan = Plan {
+        requests: 100,
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended, Ok(()));
+    let tally = &report.timing[0];
+    assert_eq!(
+        (tally.sent, tally.lost, tally.wrong),
+        (100, 2, 1),
+        "{tally}"
+    );
+    let Verdict::Failed(failure) = &report.findings[0].verdict else {
+        panic!("{}", report.findings[0]);
+    };
+    assert!(
+        failure
+            .came
+            .starts_with("2 lost, 1 wrong, the first to 01 08 00 00"),
+        "{failure:?}"
+    );
+    assert!(report.failed().eq(["timing/9600 8N2"]));
+    assert!(
+        report
+            .junit()
+            .contains("name=\"bench\" tests=\"1\" failures=\"1\"")
+    );
+}
+
+#[test]
+fn a_unit_that_falls_silent_is_given_up() {
+    let mut line = Line::new(&[1]);
+    let mut echoes = 0;
+    line.watch = Box::new(move |frame, _| {
+        echoes += u32::from(is_echo(frame));
+        if echoes > 10 { Fate::Lost } else { Fate::Good }
+    });
+    let plan = Plan {
+        requests: 5000,
+        ..plan(&line)
+    };
+    let (report, _) = run_plan(&mut line, &plan, &never());
+    let tally = &report.timing[0];
+    assert!(tally.given_up && tally.sent < 40, "{tally}");
+}
+
+#[test]
+fn a_slow_unit_fails_against_a_limit_only() {
+    let mut line = Line::new(&[1]);
+    let mut plan = Plan {
+        requests: 5,
+        ..plan(&line)
+    };
+    for (limit, failed) in [(None, 0), (Some(5), 0), (Some(4), 1)] {
+        plan.limit = limit.map(Duration::from_millis);
+        let (report, _) = run_plan(&mut line, &plan, &never());
+        assert_eq!(report.totals().failed, failed, "{limit:?}");
+    }
+}
+
+#[test]
+fn an_interrupt_at_another_rate_brings_the_unit_back_first() {
+    let mut line = Line::new(&[1]);
+    let home = line.line();
+    let stop = Arc::new(never());
+    let pressed = Arc::clone(&stop);
+    let mut echoes = 0;
+    line.watch = Box::new(move |frame, line| {
+        echoes += u32::from(is_echo(frame) && line.baud == 19_200);
+        pressed.store(echoes > 10, Ordering::Relaxed);
+        Fate::Good
+    });
+    let plan = Plan {
+        requests: 100,
+        rates: vec![9600, 19_200, 38_400],
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &stop);
+    assert_eq!(ended, Ok(()));
+    assert!(report.interrupted);
+    let sent: Vec<u32> = report.timing.iter().map(|tally| tally.sent).collect();
+    assert!(
+        sent[0] == 100 && sent[1] < 100 && sent.len() == 2,
+        "{sent:?}"
+    );
+    assert_eq!((line.line(), line.units[0].line), (home, home));
+    assert_eq!(line.units[0].stored, [96, 0]);
+}
+
+#[test]
+fn a_change_of_rate_that_fails_half_way_is_undone_in_the_store_too() {
+    // The command to restart is lost: the new rate is stored, but not in force.
+    let mut line = Line::new(&[1]);
+    let mut lose = true;
+    line.watch = Box::new(move |frame, _| {
+        if frame.starts_with(&[1, 6, 1, 8, 0, 2]) && std::mem::take(&mut lose) {
+            return Fate::Lost;
+        }
+        Fate::Good
+    });
+    let plan = Plan {
+        requests: 5,
+        rates: vec![19_200],
+        ..plan(&line)
+    };
+    let (_, ended) = run_plan(&mut line, &plan, &never());
+    assert!(ended.unwrap_err().contains("01 06 01 08 00 02"));
+    assert_eq!(line.units[0].line.baud, 9600);
+    assert_eq!(line.units[0].stored, [96, 0]);
+    assert_eq!(line.units[0].saves, 2);
+}
+
+#[test]
+fn a_unit_that_cannot_be_brought_back_is_told_with_its_rate() {
+    let mut line = Line::new(&[1]);
+    line.watch = Box::new(|frame, line| {
+        // At the other rate it takes no configuration any more.
+        let refused = line.baud != 9600 && frame[1] == 6;
+        if refused { Fate::Lost } else { Fate::Good }
+    });
+    let plan = Plan {
+        requests: 5,
+        rates: vec![19_200],
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let text = ended.unwrap_err();
+    assert!(
+        text.contains("back to 9600 8N2") && text.contains("last at 19200 8N2"),
+        "{text}"
+    );
+    assert_eq!(
+        report.timing.len(),
+        1,
+        "what was measured stands in the report"
+    );
+}
+
+#[test]
+fn a_rate_that_the_port_lacks_is_told_before_the_unit_is_touched() {
+    let mut line = Line::new(&[1]);
+    line.lacks = Some(921_600);
+    let plan = Plan {
+        requests: 5,
+        rates: vec![19_200, 921_600],
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended.unwrap_err(), "a fake does not take 921600 8N2");
+    assert_eq!((report.timing.len(), line.units[0].saves), (0, 0));
+    assert_eq!(line.line().baud, 9600);
+}
+
+#[test]
+fn a_unit_with_unsaved_settings_keeps_its_rate() {
+    let mut line = Line::new(&[1]);
+    line.units[0].registers.insert(state::STATUS, 1 << 3);
+    let plan = Plan {
+        requests: 5,
+        rates: vec![19_200],
+        ..plan(&line)
+    };
+    let (_, ended) = run_plan(&mut line, &plan, &never());
+    assert!(ended.unwrap_err().contains("not saved"));
+    assert_eq!(line.units[0].saves, 0);
+}
+
+fn wired(text: &str) -> (Line, Plan) {
+    let mut line = Line::new(&[1, 2]);
+    line.wires = (0..2).map(|n| [(1, OUTPUT + n), (2, OUTPUT + n)]).collect();
+    line.units[0].bits[16] = true;
+    let plan = Plan {
+        fixture: Some(Fixture::parse(text, 1).unwrap()),
+        ..plan(&line)
+    };
+    (line, plan)
+}
+
+const WIRES: &str = "[[wire]]\nfrom = { point = 16 }\nto = { unit = 2, point = 16 }\n\
+                     [[wire]]\nfrom = { point = 17 }\nto = { unit = 2, point = 17 }\n";
+
+#[test]
+fn wires_as_described_pass_and_outputs_are_put_back() {
+    let (mut line, plan) = wired(WIRES);
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended, Ok(()));
+    assert_eq!(report.totals().passed, 2, "{:?}", report.findings);
+    assert!(report.findings[0].note.starts_with("on after "));
+    assert_eq!(line.units[0].bits[16..18], [true, false]);
+}
+
+#[test]
+fn wires_that_are_not_so_fail_each_with_its_reason() {
+    let failing = |mut line: Line, plan: Plan| {
+        let (report, ended) = run_plan(&mut line, &plan, &never());
+        assert_eq!(ended, Ok(()));
+        assert_eq!(line.units[0].bits[16..18], [true, false], "put back");
+        let failed = report
+            .findings
+            .iter()
+            .filter(|f| f.verdict != Verdict::Passed);
+        failed.map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let (mut line, plan) = wired(WIRES);
+    line.wires.pop();
+    let [broken] = &failing(line, plan)[..] else {
+        panic!("one wire is broken");
+    };
+    assert!(broken.contains("unit 2 point 0x0011 stays off"), "{broken}");
+
+    let (mut line, plan) = wired(WIRES);
+    line.wires.push([(1, 16), (2, 17)]);
+    let crossed = failing(line, plan).concat();
+    assert!(
+        crossed.contains("unit 2 point 0x0011 went on as well"),
+        "{crossed}"
+    );
+
+    let (line, plan) = wired(&WIRES.replace("unit = 2, point = 17", "unit = 3, point = 17"));
+    let silent = failing(line, plan).concat();
+    assert!(silent.contains("an answer from unit 3"), "{silent}");
+
+    let (line, plan) = wired(&WIRES.replacen("}\n[[", "}\ninverted = true\n[[", 1));
+    let inverted = failing(line, plan).concat();
+    assert!(
+        inverted.contains("unit 2 point 0x0010 stays off"),
+        "{inverted}"
+    );
+}
+
+#[test]
+fn an_interrupt_among_the_wires_puts_outputs_back() {
+    let (mut line, plan) = wired(WIRES);
+    let stop = Arc::new(never());
+    let pressed = Arc::clone(&stop);
+    line.watch = Box::new(move |frame, _| {
+        let on = frame[1] == 5 && frame[4] == 0xFF;
+        pressed.fetch_or(on, Ordering::Relaxed);
+        Fate::Good
+    });
+    let (report, ended) = run_plan(&mut line, &plan, &stop);
+    assert_eq!(ended, Ok(()));
+    assert!(report.interrupted);
+    assert_eq!(report.findings.len(), 1);
+    assert_eq!(line.units[0].bits[16..18], [true, false]);
+}
+
+#[test]
+fn a_silent_unit_is_one_clear_line() {
+    let mut line = Line::new(&[2]);
+    let (_, ended) = run_plan(&mut line, &plan(&Line::new(&[1])), &never());
+    let text = ended.unwrap_err();
+    assert!(
+        text.starts_with("unit 1 does not answer at 9600 8N2"),
+        "{text}"
+    );
+}

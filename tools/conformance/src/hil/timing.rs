@@ -1,0 +1,175 @@
+//! How soon and how surely the unit answers at one rate.
+//!
+//! Each request is an echo (08/00) with a number of its own, so that a late or doubled reply is not taken
+//! for the next one's. The *turnaround* is the line's silence between request and reply: the unit may not
+//! answer before t3.5. Where the endpoint's time is exact it is seen; elsewhere it is what remains of the
+//! whole exchange without the time of its characters, so it has the delays of adapter and operating system
+//! in it.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use crate::bench::Bench;
+use crate::case::{Check, Failure};
+use crate::endpoint::Piece;
+use crate::frame::Reply;
+use crate::hil::spread::Spread;
+use crate::line::LineFormat;
+use crate::points::pdu;
+use crate::run::Verdict;
+
+/// After so many requests in a row without a reply the rest is not tried.
+const GIVE_UP: u32 = 20;
+
+/// What came of the requests at one rate.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    /// Rate and format.
+    pub line: LineFormat,
+    /// Requests sent.
+    pub sent: u32,
+    /// Requests without a reply.
+    pub lost: u32,
+    /// Replies that are not the right one.
+    pub wrong: u32,
+    /// Whether so many were lost in a row that it was given up.
+    pub given_up: bool,
+    /// The first exchange that went wrong.
+    pub example: Option<Failure>,
+    /// The turnarounds of the others.
+    pub spread: Option<Spread>,
+}
+
+/// The least time that so many requests take at the line's rate.
+#[must_use]
+pub fn least(bench: &Bench<'_>, requests: u32) -> Duration {
+    let line = bench.endpoint.line();
+    let frame = bench.frame(&echo(0)).len();
+    (line.characters(2 * frame) + line.t35() * 2) * requests
+}
+
+fn echo(number: u16) -> Vec<u8> {
+    pdu(8, 0, number)
+}
+
+/// Sends so many requests, each as soon as the line allows; fewer when `stop` is set meanwhile.
+///
+/// # Errors
+///
+/// [`Stop::Broken`](crate::case::Stop::Broken).
+pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check<Tally> {
+    let line = bench.endpoint.line();
+    let exact = bench.endpoint.abilities().exact;
+    let mut tally = Tally {
+        line,
+        sent: 0,
+        lost: 0,
+        wrong: 0,
+        given_up: false,
+        example: None,
+        spread: None,
+    };
+    let mut times = Vec::new();
+    let mut lost_in_a_row = 0;
+    while tally.sent < requests && !stop.load(Ordering::Relaxed) {
+        let request = echo(tally.sent as u16);
+        let frame = bench.frame(&request);
+        let length = frame.len();
+        let begin = bench.endpoint.now();
+        let reply = bench.exchange_until(&[Piece::Bytes(frame)], length)?;
+        tally.sent += 1;
+        lost_in_a_row = if reply == Reply::Silence {
+            lost_in_a_row + 1
+        } else {
+            0
+        };
+        if reply == Reply::Pdu(request) {
+            if let (Some(first), Some(last)) = (bench.heard.first(), bench.heard.last()) {
+                times.push(if exact {
+                    first.start.saturating_sub(bench.sent_end)
+                } else {
+                    last.end.saturating_sub(begin + line.characters(2 * length))
+                });
+            }
+        } else {
+            if reply == Reply::Silence {
+                tally.lost += 1;
+            } else {
+                tally.wrong += 1;
+            }
+            if let (None, Err(crate::case::Stop::Fail(failure))) =
+                (&tally.example, bench.fail::<()>("the request, echoed"))
+            {
+                tally.example = Some(failure);
+            }
+        }
+        if lost_in_a_row == GIVE_UP {
+            tally.given_up = true;
+            break;
+        }
+        bench.rest(line.t35())?;
+    }
+    tally.spread = Spread::of(times);
+    Ok(tally)
+}
+
+impl Tally {
+    /// Whether all is well: nothing lost, nothing wrong, 99 of 100 within the limit if there is one.
+    #[must_use]
+    pub fn verdict(&self, limit: Option<Duration>) -> Verdict {
+        let bad = |came: String, wanted: String| {
+            Verdict::Failed(Failure {
+                sent: format!("{} requests at {}", self.sent, self.line),
+                came,
+                wanted,
+            })
+        };
+        if self.lost + self.wrong > 0 {
+            let first = self.example.as_ref();
+            let first = first.map_or_else(String::new, |first| {
+                format!(", the first to {}: {}", first.sent, first.came)
+            });
+            let came = format!("{} lost, {} wrong{first}", self.lost, self.wrong);
+            return bad(came, "a right reply to each".to_owned());
+        }
+        match (&self.spread, limit) {
+            (None, _) => Verdict::Skipped("interrupted before the first reply".to_owned()),
+            (Some(spread), Some(limit)) if spread.percentile(99) > limit => bad(
+                format!(
+                    "a turnaround of {:?} at the 99th percentile",
+                    spread.percentile(99)
+                ),
+                format!("{limit:?} at most"),
+            ),
+            (Some(_), _) => Verdict::Passed,
+        }
+    }
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            sent, lost, wrong, ..
+        } = self;
+        write!(f, "{sent} sent, {lost} lost, {wrong} wrong")?;
+        if self.given_up {
+            write!(f, "; given up after {GIVE_UP} in a row without a reply")?;
+        }
+        let Some(spread) = &self.spread else {
+            return Ok(());
+        };
+        let at = |percent| spread.percentile(percent).as_secs_f64() * 1000.0;
+        writeln!(
+            f,
+            "\nturnaround in ms: min {:.3}, median {:.3}, p95 {:.3}, p99 {:.3}, max {:.3} (t3.5 is {:.3})",
+            at(0),
+            at(50),
+            at(95),
+            at(99),
+            at(100),
+            self.line.t35().as_secs_f64() * 1000.0
+        )?;
+        f.write_str(spread.histogram().trim_end())
+    }
+}

@@ -1,0 +1,122 @@
+//! Takes a modio, and the endpoint after it, to another rate and format, and back again.
+
+use std::time::Duration;
+
+use register_map::codes::Command;
+use register_map::configuration::{BAUD, COMMAND};
+
+use crate::bench::Bench;
+use crate::case::{Check, Stop};
+use crate::line::{LineFormat, Parity};
+use crate::points::{pdu, write_words};
+
+/// For the unit to store its configuration, and to start.
+const STORING: Duration = Duration::from_millis(200);
+const START: Duration = Duration::from_millis(1500);
+
+/// How often the way back is tried: on a poor line one lost frame must not leave the unit elsewhere.
+const ATTEMPTS: u32 = 3;
+
+/// Visits each of these rates and formats, and goes back to the first whatever happens on the way. Where
+/// the unit is lost, the endpoint looks for it. Ends early when `visit` fails.
+///
+/// # Errors
+///
+/// [`Stop::Skip`] when the endpoint does not take one of them, before the unit is touched; else that of the
+/// first change or visit that failed, or of the way back: then the unit may be at another rate than
+/// before, and the endpoint is where it was heard last.
+pub fn tour(
+    bench: &mut Bench<'_>,
+    stops: impl IntoIterator<Item = LineFormat>,
+    mut visit: impl FnMut(&mut Bench<'_>) -> Check,
+) -> Check {
+    let home = bench.endpoint.line();
+    let patience = bench.patience;
+    let stops: Vec<LineFormat> = stops.into_iter().collect();
+    takes_all(bench, &stops, home)?;
+    let mut result = Ok(());
+    // Whether the unit's stored rate is the one that it is at.
+    let mut settled = true;
+    for to in stops {
+        let from = bench.endpoint.line();
+        if to != from {
+            result = move_to(bench, to);
+            if result.is_err() {
+                settled = false;
+                look_for_it(bench, [from, to, home])?;
+            }
+        }
+        if result.is_ok() {
+            result = visit(bench);
+        }
+        if result.is_err() {
+            break;
+        }
+    }
+    let mut back = Ok(());
+    for _ in 0..ATTEMPTS {
+        let from = bench.endpoint.line();
+        if settled && from == home {
+            break;
+        }
+        back = move_to(bench, home);
+        settled = back.is_ok();
+        if !settled {
+            look_for_it(bench, [from, home, from])?;
+        }
+    }
+    bench.patience = patience;
+    result.and(back)
+}
+
+/// Whether the endpoint can follow the unit everywhere: an adapter may lack a rate, a pseudo-terminal parity.
+fn takes_all(bench: &mut Bench<'_>, lines: &[LineFormat], home: LineFormat) -> Check {
+    for line in lines {
+        let taken = bench.endpoint.set_line(*line);
+        bench.endpoint.set_line(home)?;
+        if let Err(why) = taken {
+            return Err(Stop::Skip(why.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Sets the endpoint to the first of these lines at which the unit answers, else to the last.
+fn look_for_it(bench: &mut Bench<'_>, lines: [LineFormat; 3]) -> Check {
+    for line in lines {
+        bench.endpoint.set_line(line)?;
+        if bench.alive("a change that failed").is_ok() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Changes, saves and restarts the unit, and follows it.
+fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
+    bench.unlock()?;
+    let values = [(to.baud / 100) as u16, format_code(to)];
+    let request = write_words(BAUD, &values);
+    bench.reply_is(&request, &request[..5])?;
+    // The old rate is in force until the restart.
+    bench.alive("a new rate that waits for the restart")?;
+    for command in [Command::Save, Command::Restart] {
+        let request = pdu(6, COMMAND, command.code());
+        bench.reply_is(&request, &request)?;
+        bench.rest(STORING)?;
+    }
+    bench.rest(START)?;
+    bench.endpoint.set_line(to)?;
+    bench.patience.quiet = bench.patience.quiet.max(to.t35() + to.characters(2));
+    bench.patience.reply = bench.patience.reply.max(to.t35() * 2 + to.characters(4));
+    bench.alive(format!("the change to {to}"))
+}
+
+fn format_code(line: LineFormat) -> u16 {
+    match (line.parity, line.stop_bits) {
+        (Parity::None, 2) => 0,
+        (Parity::Even, _) => 1,
+        (Parity::Odd, _) => 2,
+        (Parity::None, _) => 3,
+    }
+}
