@@ -59,10 +59,9 @@ impl Event {
 #[derive(Debug)]
 pub(crate) struct EventLog {
     events: [u8; EventLog::CAPACITY],
-    /// Where the next one goes, below `CAPACITY`.
-    next: u8,
-    /// How many there are, up to `CAPACITY`.
-    count: u8,
+    /// How many there have been; once the log is full that modulo `CAPACITY`, plus `CAPACITY`. The next
+    /// one goes there, modulo `CAPACITY`.
+    added: u8,
 }
 
 impl EventLog {
@@ -72,37 +71,38 @@ impl EventLog {
     pub(crate) const fn new() -> Self {
         Self {
             events: [0; Self::CAPACITY],
-            next: 0,
-            count: 0,
+            added: 0,
         }
     }
 
     /// Adds an event; the 65th takes the place of the oldest.
     pub(crate) fn push(&mut self, Event(event): Event) {
-        if let Some(slot) = self.events.get_mut(usize::from(self.next)) {
+        // Always there: no check is left of this.
+        let at = usize::from(self.added) % Self::CAPACITY;
+        if let Some(slot) = self.events.get_mut(at) {
             *slot = event;
         }
-        self.next = (self.next + 1) % Self::CAPACITY as u8;
-        if usize::from(self.count) < Self::CAPACITY {
-            self.count += 1;
+        self.added += 1;
+        if usize::from(self.added) == 2 * Self::CAPACITY {
+            self.added = Self::CAPACITY as u8;
         }
     }
 
     /// Forgets all events.
     pub(crate) const fn clear(&mut self) {
-        self.count = 0;
+        self.added = 0;
     }
 
     /// How many events there are.
     pub(crate) const fn count(&self) -> u8 {
-        self.count
+        let full = Self::CAPACITY as u8;
+        if self.added < full { self.added } else { full }
     }
 
     /// Appends the events, the newest first.
     pub(crate) fn append_to(&self, adu: &mut Adu) {
-        for back in 1..=self.count {
-            // 64 is a power of two, so that wrapping at 256 does no harm.
-            let at = self.next.wrapping_sub(back) % Self::CAPACITY as u8;
+        for back in 1..=self.count() {
+            let at = self.added.wrapping_sub(back) % Self::CAPACITY as u8;
             let event = self.events.get(usize::from(at)).copied();
             adu.extend(&[event.unwrap_or_default()]);
         }

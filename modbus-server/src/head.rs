@@ -5,6 +5,8 @@ use crate::{Adu, Exception, Function};
 /// The start of a reply: all of it for an exception or the echo of a write; unit, function and as
 /// much as is known at once for all others, whose body follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+// Whole words: copied with every reply, without a call of memcpy.
+#[repr(align(4))]
 pub struct Head {
     bytes: [u8; Head::CAPACITY],
     len: u8,
@@ -25,10 +27,12 @@ impl Head {
         self.len
     }
 
-    /// One byte; 0 beyond the end.
+    /// One byte, below [`len`](Self::len).
     #[inline]
     pub(crate) fn get(&self, index: u8) -> u8 {
-        self.bytes.get(usize::from(index)).copied().unwrap_or(0)
+        // Of eight bytes: no check is left of this.
+        let index = usize::from(index) % Self::CAPACITY;
+        self.bytes.get(index).copied().unwrap_or_default()
     }
 
     /// The bytes of the head, without CRC.

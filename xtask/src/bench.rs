@@ -12,6 +12,7 @@ use crate::workspace::Workspace;
 use crate::{Failure, Result, build, command, size};
 
 mod baseline;
+mod share;
 mod table;
 
 /// The figures of the last release, relative to the root.
@@ -81,6 +82,7 @@ fn measure(workspace: &mut Workspace, elf: &Path) -> Result<Value> {
     let text = command::read(&mut cargo)?;
     let mut report: Value = serde_json::from_str(&text)
         .map_err(|error| Failure::new(format!("the bench's report is broken: {error}")))?;
+    share::add(&mut report, elf)?;
     report["image"] = size::report(elf)?;
     Ok(report)
 }

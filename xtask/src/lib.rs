@@ -74,7 +74,7 @@ enum Command {
     /// Renew docs/register-map.md
     Docs,
     /// Everything a change must pass
-    Test,
+    Test(test::Options),
     /// What CI runs: formatting, lints and documentation, then the same as `test`
     Ci,
 }
@@ -98,7 +98,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Renode(options) => renode::run(&mut workspace, &options),
         Command::Hil(options) => hil::run(&mut workspace, &options),
         Command::Docs => docs::run(&workspace),
-        Command::Test => test::run(&mut workspace),
+        Command::Test(options) => test::run(&mut workspace, &options),
         Command::Ci => ci::run(&mut workspace),
     }
 }

@@ -13,6 +13,7 @@ mod owner;
 mod source;
 
 pub use measure::{Bytes, Sizes, measure};
+pub use source::Source;
 
 const KIB: u32 = 1024;
 

@@ -7,37 +7,34 @@ use crate::steps::{Outcome, Steps};
 use crate::workspace::Workspace;
 use crate::{Result, build, command, pymodbus, renode, size};
 
+/// The options of `cargo xtask test`.
+#[derive(clap::Args, Debug)]
+pub struct Options {
+    /// Without the simulator, which is for Linux: host tests, image and size
+    #[arg(long)]
+    host: bool,
+}
+
 /// `cargo xtask test`.
 ///
 /// # Errors
 ///
 /// When a step failed; all have been run and the summary printed.
-pub fn run(workspace: &mut Workspace) -> Result<()> {
+pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let mut steps = Steps::default();
-    let _image = add(workspace, &mut steps, is_ci(env::var("CI").ok().as_deref()));
+    if options.host {
+        add_host(workspace, &mut steps, &[]);
+    } else {
+        add(workspace, &mut steps, is_ci(env::var("CI").ok().as_deref()));
+    }
     steps.finish()
 }
 
 /// Adds the steps of `cargo xtask test`; when `strict` none may be skipped for want of a tool. Gives
 /// the image that was tested, if it could be built.
 pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) -> Option<PathBuf> {
-    steps.run("host tests", || {
-        command::run(workspace.cargo("test").args([
-            "--workspace",
-            "--ignore-rust-version",
-            "--no-fail-fast",
-        ]))
-        .into()
-    });
-    let mut elf = None;
-    steps.run("release image", || {
-        let built = build::image(workspace, &build::Options::release());
-        built.map(|image| elf = Some(image.elf)).into()
-    });
+    let elf = add_host(workspace, steps, &["--workspace"]);
     let image = elf.as_deref();
-    steps.run("size of the image", || {
-        on(image, |elf| size::check(elf).into())
-    });
     steps.run("image in simulation", || {
         on(image, |elf| in_simulation(workspace, elf, &["sim"]))
     });
@@ -51,6 +48,26 @@ pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) -> Option
     });
     steps.run("files for Renode", || {
         on(image, |elf| renode::checks::step(workspace, elf, strict))
+    });
+    elf
+}
+
+/// Adds the steps that need no simulator. The host's tests are those of `packages`, which is cargo's
+/// choice of packages; without one, of the workspace's default members. Gives the image, if it could be
+/// built.
+fn add_host(workspace: &mut Workspace, steps: &mut Steps, packages: &[&str]) -> Option<PathBuf> {
+    steps.run("host tests", || {
+        let mut cargo = workspace.cargo("test");
+        cargo.args(packages);
+        command::run(cargo.args(["--ignore-rust-version", "--no-fail-fast"])).into()
+    });
+    let mut elf = None;
+    steps.run("release image", || {
+        let built = build::image(workspace, &build::Options::release());
+        built.map(|image| elf = Some(image.elf)).into()
+    });
+    steps.run("size of the image", || {
+        on(elf.as_deref(), |elf| size::check(elf).into())
     });
     elf
 }

@@ -58,12 +58,13 @@ impl Line {
     pub fn on_uart(&mut self) -> bool {
         let status = self.uart.status();
         // First, for the bus is another's within a bit of the last stop bit.
-        let sent = status.sent();
-        if sent {
+        if status.sent() {
             self.uart.stop_sending();
             self.reply = Reply::None;
             self.receiver.resume();
             self.take_back();
+            // Whatever else there is calls again.
+            return true;
         }
         if status.received() {
             let character = self.uart.read(status);
@@ -78,7 +79,7 @@ impl Line {
                 Next::Done => self.uart.finish_sending(),
             }
         }
-        sent
+        false
     }
 
     /// t1.5 of silence; on an ASCII line t3.5, after which a frame that is over is taken: its sender

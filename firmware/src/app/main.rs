@@ -222,7 +222,9 @@ mod app {
         }
         server.commit(&decision, &line_counters);
         device.lock(|device| {
-            device.state.counters = server.counters();
+            if Device::shows_counters(&decision.work) {
+                device.state.counters = server.counters();
+            }
             // In listen-only mode the outputs are to fall to SAFE.
             if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
                 device.request_seen(*frame_gap_ms);

@@ -23,7 +23,7 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Words, WordsOut};
+use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Words, WordsOut, Work};
 use modio_drivers::{CHANNELS, ChannelSettings, Kind, Range, Scale};
 use register_map::{codes::Command, configuration, counters, fault, state as state_map};
 
@@ -62,11 +62,15 @@ enum Block {
 
 impl Block {
     const fn of(span: Span) -> Self {
-        match span.start() {
-            0x0100..=0x01FF => Self::Config,
-            0x0200..=0x025F => Self::State,
-            0x0260..=0x026F => Self::Fault,
-            0x0300..=0x033F => Self::Pulses,
+        // Asked for most.
+        if span.start() < 0x0100 {
+            return Self::Points;
+        }
+        match span.start().to_be_bytes() {
+            [1, _] => Self::Config,
+            [2, 0x00..=0x5F] => Self::State,
+            [2, _] => Self::Fault,
+            [3, _] => Self::Pulses,
             _ => Self::Points,
         }
     }
@@ -126,6 +130,17 @@ impl Device {
     /// A valid request for this unit has come, whose end is so many milliseconds past.
     pub const fn request_seen(&mut self, passed_ms: u32) {
         self.comm_watchdog.feed(passed_ms);
+    }
+
+    /// Whether this work shows the line's counters, which are to be put into the state before then.
+    #[must_use]
+    pub const fn shows_counters(work: &Work) -> bool {
+        match work {
+            Work::ReadWords(span) | Work::WriteThenRead { read: span, .. } => {
+                matches!(Block::of(*span), Block::State)
+            }
+            _ => false,
+        }
     }
 
     /// Takes the command that a request ordered.

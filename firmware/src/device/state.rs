@@ -53,7 +53,7 @@ pub struct State {
     millis: u32,
     until_second: u16,
     uptime_s: u32,
-    /// The line's counters, as the server has them.
+    /// The line's counters, as the server had them when they were last asked for.
     pub counters: Counters,
     /// The least stack left free so far, in bytes.
     pub stack_free: u16,

@@ -98,11 +98,14 @@ impl<'a> Receiver<'a> {
     /// A character has arrived.
     #[inline]
     pub fn character(&mut self, byte: u8, faults: Faults) {
-        // The first of an RTU frame is as good as any other: all is ready for it.
-        if (self.state | u16::from(faults.bits())) & !IDLE != 0 {
-            return self.special(byte, faults);
+        let special = self.state | u16::from(faults.bits());
+        if special != 0 {
+            if special != IDLE {
+                return self.special(byte, faults);
+            }
+            // The first of an RTU frame is as good as any other: all is ready for it.
+            self.state = 0;
         }
-        self.state = 0;
         self.check = crc::step(self.check, byte);
         self.keep(byte);
     }
@@ -278,8 +281,15 @@ impl<'a> Receiver<'a> {
         if let Some(adu) = &mut self.filling
             && !adu.push(byte)
         {
-            self.state |= SPOILED;
+            self.overflow();
         }
+    }
+
+    /// There are more bytes than a frame can have.
+    #[cold]
+    #[inline(never)]
+    fn overflow(&mut self) {
+        self.state |= SPOILED;
     }
 
     /// Keeps a byte of the frame, or only counts it.
@@ -293,7 +303,7 @@ impl<'a> Receiver<'a> {
         }
         self.unkept = self.unkept.saturating_add(1);
         if usize::from(self.unkept) > Adu::CAPACITY {
-            self.state |= SPOILED;
+            self.overflow();
         }
     }
 }

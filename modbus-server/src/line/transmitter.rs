@@ -101,7 +101,7 @@ impl<'a> Transmitter<'a> {
         if self.framing == Framing::Rtu {
             self.at = u16::from(self.head.body_from());
             // At most 256.
-            self.left = self.head.body_in(adu).len() as u16;
+            self.left = (adu.len() as u16).saturating_sub(self.at);
         }
         self.body = Some(adu);
         None
@@ -122,7 +122,8 @@ impl<'a> Transmitter<'a> {
         } else if self.left > 0
             && let Some(adu) = &self.body
         {
-            let byte = adu.get(self.at);
+            // Below 256, with something left.
+            let byte = adu.get(self.at as u8);
             self.at += 1;
             self.left -= 1;
             byte
@@ -152,6 +153,7 @@ impl<'a> Transmitter<'a> {
     }
 
     /// The next character in ASCII mode.
+    #[inline(never)]
     fn ascii(&mut self, delimiter: u8) -> Next {
         if self.second != 0 {
             let second = self.second;

@@ -84,23 +84,24 @@ impl Server {
     /// of the reply, the unit address, can go out before the rest is decided
     /// ([`Transmitter::open`](crate::line::Transmitter::open)).
     pub fn answers(&self, request: &Adu) -> bool {
-        self.hear(request.as_slice()) == Hearing::Answered
+        self.hear(request) == Hearing::Answered
     }
 
-    fn hear(&self, request: &[u8]) -> Hearing {
-        let &[unit, function, ref fields @ ..] = request else {
+    fn hear(&self, request: &Adu) -> Hearing {
+        if request.len() < 2 {
             return Hearing::Dismissed(Outcome::NotForUs);
-        };
+        }
+        let (unit, function) = (request.get(0), request.get(1));
         let broadcast = unit == BROADCAST;
         if !broadcast && unit != self.unit {
             return Hearing::Dismissed(Outcome::NotForUs);
         }
-        if function == 0 || function & Function::EXCEPTION != 0 {
+        if !matches!(function, 1..Function::EXCEPTION) {
             return Hearing::Dismissed(Outcome::NoRequest);
         }
         let diagnostics = !broadcast && function == Function::Diagnostics.code();
         if self.listen_only {
-            return if diagnostics && Diagnostic::is_restart(fields) {
+            return if diagnostics && Diagnostic::is_restart(request.from(2)) {
                 Hearing::Silent
             } else {
                 Hearing::Dismissed(Outcome::NotObeyed)
@@ -108,7 +109,7 @@ impl Server {
         }
         if broadcast {
             Hearing::Broadcast
-        } else if diagnostics && Diagnostic::is_listen_only(fields) {
+        } else if diagnostics && Diagnostic::is_listen_only(request.from(2)) {
             Hearing::Silent
         } else {
             Hearing::Answered
@@ -118,35 +119,35 @@ impl Server {
     /// Settles the reply to `request` (unit address and PDU, without CRC): everything that can be
     /// refused is refused here. Changes nothing.
     pub fn decide(&self, request: &Adu, model: &impl DataModel) -> Decision {
-        let hearing = self.hear(request.as_slice());
-        let mut decision = Decision {
+        let (unit, function) = (request.get(0), request.get(1));
+        let broadcast = unit == BROADCAST;
+        let silence = |outcome| Decision {
             reply: None,
             work: Work::None,
-            outcome: Outcome::NotForUs,
-            broadcast: request.get(0) == BROADCAST,
+            outcome,
+            broadcast,
         };
-        if let Hearing::Dismissed(outcome) = hearing {
-            decision.outcome = outcome;
-            return decision;
-        }
-        let (unit, function) = (request.get(0), request.get(1));
-        let head = match settle::settle(unit, function, request.from(2), self.framing, model) {
-            Ok((_, work)) if decision.broadcast && !work.can_be_broadcast() => {
-                decision.outcome = Outcome::NoEffect;
-                return decision;
+        let hearing = match self.hear(request) {
+            Hearing::Dismissed(outcome) => return silence(outcome),
+            hearing => hearing,
+        };
+        let settled = settle::settle(unit, function, request.from(2), self.framing, model);
+        let (head, work, outcome) = match settled {
+            Ok((_, work)) if broadcast && !work.can_be_broadcast() => {
+                return silence(Outcome::NoEffect);
             }
-            Ok((head, work)) => {
-                decision.outcome = Outcome::Accepted;
-                decision.work = work;
-                head
-            }
+            Ok((head, work)) => (head, work, Outcome::Accepted),
             Err(exception) => {
-                decision.outcome = Outcome::Refused(exception);
-                Head::exception(unit, function, exception)
+                let head = Head::exception(unit, function, exception);
+                (head, Work::None, Outcome::Refused(exception))
             }
         };
-        decision.reply = (hearing == Hearing::Answered).then_some(head);
-        decision
+        Decision {
+            reply: (hearing == Hearing::Answered).then_some(head),
+            work,
+            outcome,
+            broadcast,
+        }
     }
 
     /// All counters as they stood at the last [`commit`](Self::commit) or

@@ -65,11 +65,15 @@ impl Server {
     /// Takes note of what the line has counted, and logs its bad frames. [`commit`](Self::commit)
     /// does it with each request; without one it may be done at any time.
     pub fn note_line(&mut self, line: &LineCounters) {
-        let new = line.since(&self.line);
-        let most = EventLog::CAPACITY as u16;
-        for n in 0..new.communication_errors.min(most) {
-            self.log
-                .push(Event::faulty(n < new.overruns, self.listen_only));
+        let seen = &self.line;
+        let errors = line
+            .communication_errors
+            .wrapping_sub(seen.communication_errors);
+        if errors != 0 {
+            let overruns = line.overruns.wrapping_sub(seen.overruns);
+            for n in 0..errors.min(EventLog::CAPACITY as u16) {
+                self.log.push(Event::faulty(n < overruns, self.listen_only));
+            }
         }
         self.line = *line;
     }

@@ -30,6 +30,8 @@ pub struct Row {
     pub to_first_byte: u32,
     /// The line's three interrupt handlers, from the request's first byte until the driver is off.
     pub transaction: u32,
+    /// The same, by the address of the instruction.
+    pub addresses: BTreeMap<u32, u32>,
     /// The longest handler for a byte received.
     pub byte_in: u32,
     /// The longest handler for a byte sent.
@@ -85,6 +87,7 @@ pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, Stri
             request: request.name,
             to_first_byte: cost.to_first_byte,
             transaction: cost.transaction,
+            addresses: cost.addresses,
             byte_in: cost.byte_in,
             byte_out: cost.byte_out,
             reply_end: cost.reply_end,

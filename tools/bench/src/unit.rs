@@ -1,5 +1,7 @@
 //! The image on the virtual board, and what serving a request costs there.
 
+use std::collections::BTreeMap;
+
 use register_map::{Module, configuration, record};
 use sim::line::{Format, Settings};
 use sim::machine::memory::{FLASH_BASE, FLASH_SIZE};
@@ -20,12 +22,14 @@ const LONGEST: Time = Time::from_ms(100);
 const TOO_MANY: u32 = 1_000_000;
 
 /// What one request costs, in instructions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// From the expiry of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
     /// The line's three interrupt handlers, from the request's first byte until the driver is off.
     pub transaction: u32,
+    /// The same, by the address of the instruction.
+    pub addresses: BTreeMap<u32, u32>,
     /// The longest handler for a byte received.
     pub byte_in: u32,
     /// The longest handler for a byte sent.
@@ -128,12 +132,13 @@ impl Unit {
         // The first is not like the others, as for a value that changes. Of the others the one in the
         // middle: another task's doings may fall into any.
         self.count(&request.pdu)?;
-        let mut costs = [Cost::default(); 3];
+        let mut costs: [Cost; 3] = Default::default();
         for cost in &mut costs {
             *cost = self.count(&request.pdu)?;
         }
         costs.sort_by_key(|cost| (cost.to_first_byte, cost.transaction));
-        Ok(costs[1])
+        let [_, middle, _] = costs;
+        Ok(middle)
     }
 
     /// Counts every instruction of a transaction by the handler it is of.
@@ -151,6 +156,7 @@ impl Unit {
             let driving = self.board.driver_enable();
             let retired = self.board.instructions();
             let exception = self.exception();
+            let address = self.board.pc();
             self.board.step(1);
             let retired = self.board.instructions() - retired;
             let retired = u32::try_from(retired).unwrap_or(u32::MAX);
@@ -167,6 +173,7 @@ impl Unit {
             }
             if matches!(exception, BYTE | GAP | SERVE) {
                 cost.transaction += retired;
+                *cost.addresses.entry(address).or_default() += retired;
             }
             let on = self.board.driver_enable();
             if exception == BYTE {

@@ -27,6 +27,7 @@ fn figures(report: &Value) -> Figures {
         for kind in [
             "to_first_byte",
             "transaction",
+            "server",
             "byte_in",
             "byte_out",
             "reply_end",

@@ -49,23 +49,23 @@ impl<'data> Source<'data> {
             .collect()
     }
 
-    /// The innermost crate but `core` that the instruction at `address` is of.
-    fn owner(&self, address: u32) -> Option<String> {
-        let mut frames = self
-            .context
-            .find_frames(address.into())
-            .skip_all_loads()
-            .ok()?;
-        let mut found = None;
+    /// What `of` makes of the innermost source file it knows of the instruction at `address`.
+    pub fn innermost<T>(&self, address: u32, of: impl Fn(&str) -> Option<T>) -> Option<T> {
+        let frames = self.context.find_frames(address.into()).skip_all_loads();
+        let mut frames = frames.ok()?;
         while let Ok(Some(frame)) = frames.next() {
             let file = frame.location.and_then(|location| location.file);
-            match file.and_then(crate_of) {
-                Some(name) if name != CORE => return Some(name),
-                Some(name) => found = Some(name),
-                None => {}
+            if let Some(found) = file.and_then(&of) {
+                return Some(found);
             }
         }
-        found
+        None
+    }
+
+    /// The innermost crate but `core` that the instruction at `address` is of.
+    fn owner(&self, address: u32) -> Option<String> {
+        self.innermost(address, |file| crate_of(file).filter(|name| name != CORE))
+            .or_else(|| self.innermost(address, crate_of))
     }
 }
 
