@@ -225,17 +225,6 @@ pub fn chosen(parts: &[String]) -> Result<Vec<Case>, String> {
     Ok(cases)
 }
 
-/// What is wrong with a command line, in one line.
-#[must_use]
-pub fn one_line(error: &clap::Error) -> String {
-    let text = error.render().to_string();
-    let lines: Vec<&str> = text
-        .lines()
-        .map_while(|line| (!line.is_empty()).then(|| line.trim()))
-        .collect();
-    lines.join(" ").trim_start_matches("error: ").to_owned()
-}
-
 /// How long to wait on an endpoint: by its line when its time is exact, else long enough for an operating
 /// system, or a simulator that does not keep up.
 #[must_use]

@@ -6,7 +6,8 @@
 //! the unit and of the endpoint, and is skipped with the reason where that is missing.
 //!
 //! ```text
-//! main, cli      the command                 case, cases/   what is tried
+//! main, cli,     the command                 case, cases/   what is tried
+//! program
 //! probe, profile what the unit has: Target   bench, points  what cases ask and judge with
 //! endpoint/      what carries the bytes      run, report/   one after another; table, JUnit, JSON
 //! frame          CRC, LRC, RTU, ASCII        vectors        worked frames of manuals
@@ -30,6 +31,7 @@ pub mod line;
 pub mod points;
 pub mod probe;
 pub mod profile;
+pub mod program;
 pub mod rate;
 pub mod report;
 pub mod run;

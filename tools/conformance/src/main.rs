@@ -1,34 +1,17 @@
 //! `modio-conformance`: runs the suite against a unit and tells what it found.
 
-use std::fs;
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use clap::Parser;
-use conformance::cli::{Cli, one_line};
-use conformance::interrupt;
+use conformance::cli::Cli;
 use conformance::probe::{Given, probe};
 use conformance::report::{Totals, json, junit, table};
 use conformance::run::{self, Options};
 use conformance::target::{Support, Target};
+use conformance::{interrupt, program};
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) if error.use_stderr() => return refused(&one_line(&error)),
-        Err(help) => help.exit(),
-    };
-    match test(&cli) {
-        Ok(status) => ExitCode::from(status),
-        Err(what) => refused(&what),
-    }
-}
-
-/// Nothing could be tested: a line on stderr, exit status 2.
-fn refused(what: &str) -> ExitCode {
-    eprintln!("modio-conformance: {what}");
-    ExitCode::from(2)
+    program::run("modio-conformance", test)
 }
 
 /// Tests, and gives the exit status.
@@ -62,19 +45,15 @@ fn test(cli: &Cli) -> Result<u8, String> {
     println!("{}", table::summary(&outcomes));
     let name = endpoint.name();
     if let Some(path) = &cli.junit {
-        write(path, &junit::document(&name, &outcomes))?;
+        program::write(path, &junit::document(&name, &outcomes))?;
     }
     if let Some(path) = &cli.json {
-        write(path, &format!("{:#}\n", json::value(&name, &outcomes)))?;
+        program::write(path, &format!("{:#}\n", json::value(&name, &outcomes)))?;
     }
     if !go_on() {
         return Ok(interrupt::STATUS);
     }
     Ok(u8::from(Totals::of(&outcomes).failed > 0))
-}
-
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
 }
 
 /// What the probe has found, in one line.

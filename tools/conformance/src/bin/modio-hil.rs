@@ -1,31 +1,13 @@
 //! `modio-hil`: tests a modio on a bench and tells what it found.
 
-use std::fs;
-use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser;
-use conformance::cli::one_line;
 use conformance::hil::cli::Cli;
 use conformance::hil::report::Report;
-use conformance::{hil, interrupt};
+use conformance::{hil, interrupt, program};
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) if error.use_stderr() => return refused(&one_line(&error)),
-        Err(help) => help.exit(),
-    };
-    match test(&cli) {
-        Ok(status) => ExitCode::from(status),
-        Err(what) => refused(&what),
-    }
-}
-
-/// It could not be tested: a line on stderr, exit status 2.
-fn refused(what: &str) -> ExitCode {
-    eprintln!("modio-hil: {what}");
-    ExitCode::from(2)
+    program::run("modio-hil", test)
 }
 
 /// Tests, and gives the exit status.
@@ -41,10 +23,10 @@ fn test(cli: &Cli) -> Result<u8, String> {
     let ended = hil::run(endpoint.as_mut(), &plan, stop, &mut report, &mut tell);
     // What was found before it could not go on is worth having, too.
     if let Some(path) = &cli.junit {
-        write(path, &report.junit())?;
+        program::write(path, &report.junit())?;
     }
     if let Some(path) = &cli.json {
-        write(path, &format!("{:#}\n", report.json()))?;
+        program::write(path, &format!("{:#}\n", report.json()))?;
     }
     ended?;
     let totals = report.totals();
@@ -65,8 +47,4 @@ fn test(cli: &Cli) -> Result<u8, String> {
     } else {
         u8::from(totals.failed > 0)
     })
-}
-
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
 }
