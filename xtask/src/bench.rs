@@ -19,7 +19,7 @@ mod table;
 const BASELINE: &str = "tools/bench/baseline.json";
 
 /// The servers on other crates: a workspace of its own.
-const RIVALS: &str = "tools/bench/rivals/Cargo.toml";
+pub const RIVALS: &str = "tools/bench/rivals/Cargo.toml";
 const RIVAL_NAMES: [&str; 2] = ["rmodbus", "modbus-core"];
 
 /// How to tell.

@@ -18,6 +18,9 @@ const TARGET_PACKAGES: [&str; 5] = [
     "register-map",
 ];
 
+/// The workspaces there are.
+const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, bench::RIVALS];
+
 /// `cargo xtask ci`.
 ///
 /// # Errors
@@ -26,7 +29,11 @@ const TARGET_PACKAGES: [&str; 5] = [
 pub fn run(workspace: &mut Workspace) -> Result<()> {
     let mut steps = Steps::default();
     steps.run("formatting", || {
-        command::run(workspace.cargo("fmt").args(["--all", "--check"])).into()
+        let [modio, fuzz, rivals] = WORKSPACES.map(|manifest| {
+            let mut cargo = workspace.cargo("fmt");
+            command::run(cargo.args(["--all", "--check", "--manifest-path", manifest]))
+        });
+        modio.and(fuzz).and(rivals).into()
     });
     steps.run("lints, host", || {
         command::run(&mut host_lints(workspace.cargo("clippy"))).into()
@@ -35,6 +42,22 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
         let cargo = workspace.target_cargo(Need::Lint, "clippy");
         cargo
             .and_then(|cargo| command::run(&mut target_lints(cargo)))
+            .into()
+    });
+    steps.run("lints, fuzz targets", || {
+        let mut cargo = workspace.cargo("clippy");
+        cargo.args(["--locked", "--target-dir"]);
+        cargo.arg(workspace.target().join("fuzz"));
+        command::run(&mut other_lints(cargo, fuzz::MANIFEST)).into()
+    });
+    steps.run("lints, rivals of the bench", || {
+        let cargo = workspace.target_cargo(Need::Lint, "clippy");
+        let rivals = workspace.target().join("rivals");
+        cargo
+            .and_then(|mut cargo| {
+                cargo.args(["--release", "--target-dir"]).arg(rivals);
+                command::run(&mut other_lints(cargo, bench::RIVALS))
+            })
             .into()
     });
     steps.run("documentation, host", || {
@@ -79,6 +102,12 @@ fn target_lints(mut cargo: Command) -> Command {
     cargo
 }
 
+/// Of a workspace of its own.
+fn other_lints(mut cargo: Command, manifest: &str) -> Command {
+    cargo.args(["--manifest-path", manifest, "--", "-Dwarnings"]);
+    cargo
+}
+
 fn host_documentation(mut cargo: Command) -> Command {
     cargo.args(["--workspace", "--ignore-rust-version"]);
     // Most of it exists for the target alone.
@@ -117,6 +146,7 @@ mod tests {
         for lints in [
             host_lints(Command::new("cargo")),
             target_lints(Command::new("cargo")),
+            other_lints(Command::new("cargo"), fuzz::MANIFEST),
         ] {
             assert_eq!(arguments(&lints).last().unwrap(), "-Dwarnings");
         }

@@ -16,7 +16,7 @@ use crate::{Failure, Result, command};
 mod log;
 
 /// A workspace of its own.
-const MANIFEST: &str = "fuzz/Cargo.toml";
+pub const MANIFEST: &str = "fuzz/Cargo.toml";
 
 /// The seeds, a directory for each target.
 const SEEDS: &str = "fuzz/corpus";
