@@ -12,6 +12,7 @@ use crate::workspace::Workspace;
 use crate::{Failure, Result, build, command, size};
 
 mod baseline;
+mod footprint;
 mod share;
 mod table;
 
@@ -84,6 +85,7 @@ fn measure(workspace: &mut Workspace, elf: &Path) -> Result<Value> {
         .map_err(|error| Failure::new(format!("the bench's report is broken: {error}")))?;
     share::add(&mut report, elf)?;
     report["image"] = size::report(elf)?;
+    footprint::add(&mut report, elf)?;
     Ok(report)
 }
 

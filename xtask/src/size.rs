@@ -11,6 +11,7 @@ use crate::{Failure, Result, build, image};
 mod measure;
 mod owner;
 mod source;
+pub mod types;
 
 pub use measure::{Bytes, Sizes, measure};
 pub use source::Source;

@@ -46,9 +46,11 @@ fn figures(report: &Value) -> Figures {
             );
         }
     }
-    for kind in ["flash", "ram"] {
-        if let Some(value) = report["image"][kind].as_f64() {
-            figures.insert(format!("image: {kind}"), value);
+    for part in ["image", "server"] {
+        for kind in ["flash", "ram"] {
+            if let Some(value) = report[part][kind].as_f64() {
+                figures.insert(format!("{part}: {kind}"), value);
+            }
         }
     }
     figures

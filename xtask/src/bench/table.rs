@@ -8,6 +8,9 @@ use serde_json::Value;
 const TO_FIRST_BYTE: u64 = 400;
 const BYTE: u64 = 80;
 
+/// What it allows the server with every function and two buffers, in bytes of flash and RAM.
+const SERVER: [(&str, u64); 2] = [("flash", 8192), ("ram", 800)];
+
 /// The tables of a report.
 pub fn of(report: &Value) -> String {
     let mut text = String::new();
@@ -145,6 +148,22 @@ fn image(report: &Value, text: &mut String) {
         line(text, &memory(name, row));
     }
     line(text, &memory("image", image));
+    let server = &report["server"];
+    line(
+        text,
+        &format!(
+            "{}    the server alone, with two buffers",
+            memory("modbus_server", server)
+        ),
+    );
+    for (kind, budget) in SERVER {
+        if let Some(taken) = server[kind].as_u64().filter(|taken| *taken > budget) {
+            line(
+                text,
+                &format!("over budget: {kind} of the server {taken} of {budget}"),
+            );
+        }
+    }
 }
 
 fn memory(name: &str, row: &Value) -> String {
@@ -169,8 +188,14 @@ mod tests {
             "load": [{ "baud": 9600, "request": "03 one", "answered": 40, "awake_percent": 2.04,
                        "longest_waits_us": [["byte", 0.04]] }],
             "image": { "flash": 30_000, "ram": 3_000, "crates": [{ "name": "core", "flash": 500, "ram": 0 }] },
+            "server": { "flash": 8192, "ram": 801 },
         });
         let text = of(&report);
+        assert!(
+            text.contains("over budget: ram of the server 801 of 800"),
+            "{text}"
+        );
+        assert!(!text.contains("flash of the server"), "{text}");
         assert!(
             text.contains("over budget: 03 one: byte out 81 of 80"),
             "{text}"

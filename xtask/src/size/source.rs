@@ -11,9 +11,27 @@ use crate::image::Elf;
 /// The library that everything uses: what it is used for says more.
 const CORE: &str = "core";
 
-/// The debug information of an image.
+/// What debug information is read with.
+pub type Reader<'data> = EndianSlice<'data, LittleEndian>;
+
+/// The debug information of an image; none has none.
+///
+/// # Errors
+///
+/// When it is broken.
+pub fn dwarf<'data>(elf: &Elf<'data>, bytes: &'data [u8]) -> gimli::Result<Dwarf<Reader<'data>>> {
+    let endian = elf.endian();
+    let table = elf.elf_section_table();
+    Dwarf::load(|id| {
+        let section = table.section_by_name(endian, id.name().as_bytes());
+        let data = section.and_then(|(_, section)| section.data(endian, bytes).ok());
+        Ok(EndianSlice::new(data.unwrap_or_default(), LittleEndian))
+    })
+}
+
+/// Whose an image's code is.
 pub struct Source<'data> {
-    context: addr2line::Context<EndianSlice<'data, LittleEndian>>,
+    context: addr2line::Context<Reader<'data>>,
 }
 
 impl<'data> Source<'data> {
@@ -23,14 +41,7 @@ impl<'data> Source<'data> {
     ///
     /// When it is broken.
     pub fn new(elf: &Elf<'data>, bytes: &'data [u8]) -> Result<Self, String> {
-        let endian = elf.endian();
-        let table = elf.elf_section_table();
-        let dwarf = Dwarf::load(|id| -> gimli::Result<_> {
-            let section = table.section_by_name(endian, id.name().as_bytes());
-            let data = section.and_then(|(_, section)| section.data(endian, bytes).ok());
-            Ok(EndianSlice::new(data.unwrap_or_default(), LittleEndian))
-        });
-        let context = dwarf.and_then(addr2line::Context::from_dwarf);
+        let context = dwarf(elf, bytes).and_then(addr2line::Context::from_dwarf);
         let context = context.map_err(|error| format!("broken debug information: {error}"))?;
         Ok(Self { context })
     }
