@@ -53,6 +53,9 @@ impl Bench {
         pdu.iter().for_each(|byte| assert!(adu.push(*byte)));
         let decision = self.server.decide(&adu, &self.device);
         self.server.commit(&decision, &LineCounters::ZERO);
+        if Device::shows_counters(&decision.work) {
+            self.device.state.counters = self.server.counters();
+        }
         self.server.carry_out(&decision, &mut adu, &mut self.device);
         if let Some(order) = self.device.take_order() {
             self.device.carry_out(order);
@@ -317,6 +320,20 @@ fn identity_and_state_are_read_and_never_written() {
     );
     assert_eq!(bench.write(0x0200, &[1]), Err(2));
     assert_eq!(bench.write(0x0260, &[0]), Err(2));
+}
+
+#[test]
+fn counters_are_those_of_the_request_that_reads_them() {
+    let mut bench = Bench::new(Module::Di4, &[]);
+    let requests = state_map::BUS_MESSAGES + 3;
+    assert_eq!(bench.read(requests, 1), Ok(std::vec![1]));
+    bench.ask(&[0x07]);
+    assert_eq!(bench.read(requests, 1), Ok(std::vec![3]));
+    // Read by function 17, with the lock opened by the way.
+    let [address, key, value] = [requests, at::KEY, at::OPENING_KEY].map(u16::to_be_bytes);
+    let request = [&[0x17], &address[..], &[0, 1], &key, &[0, 1, 2], &value];
+    assert_eq!(bench.ask(&request.concat()), [0x17, 2, 0, 4]);
+    assert_eq!(bench.ask(&[0x08, 0, 0x0E, 0, 0]), [0x08, 0, 0x0E, 0, 5]);
 }
 
 #[test]
