@@ -81,7 +81,9 @@ impl Life {
                 } else {
                     Page::Second
                 };
-                self.flash.worn = Some((page, usize::from(place) * 2 % PAGE_SIZE));
+                // What is worn once stays so.
+                let offset = usize::from(place) * 2 % PAGE_SIZE;
+                self.flash.worn.get_or_insert((page, offset));
             }
             6 => {
                 let [a, b] = [0; 2].map(|_| (0x0100 | u16::from(script.byte()), script.half()));
