@@ -124,6 +124,21 @@ fn not_started(command: &Command, error: &std::io::Error) -> Failure {
     })
 }
 
+/// Puts a program in this process's place, so that signals reach it and its exit status is ours.
+///
+/// # Errors
+///
+/// When it cannot be run; otherwise there is no return.
+#[cfg(unix)]
+pub fn exec(command: &mut Command) -> Result<()> {
+    use std::os::unix::process::CommandExt;
+    let error = command.exec();
+    Err(Failure::new(format!(
+        "`{}` cannot be run: {error}",
+        shown(command)
+    )))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

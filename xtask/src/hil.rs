@@ -192,16 +192,8 @@ fn shell(script: &str) -> Command {
     command
 }
 
-/// Puts the tester in this process's place.
 #[cfg(unix)]
-fn become_tester(tester: &mut Command) -> Result<()> {
-    use std::os::unix::process::CommandExt;
-    let error = tester.exec();
-    Err(Failure::new(format!(
-        "`{}` cannot be run: {error}",
-        command::shown(tester)
-    )))
-}
+use command::exec as become_tester;
 
 /// Without exec: Ctrl-C goes to the tester as well, which is waited for, and its status passed on.
 #[cfg(not(unix))]

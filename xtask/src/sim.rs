@@ -64,16 +64,8 @@ pub fn simulator(workspace: &Workspace) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Puts the simulator in this process's place, so that signals reach it and its exit status is ours.
 #[cfg(unix)]
-fn become_simulator(simulator: &mut Command) -> Result<()> {
-    use std::os::unix::process::CommandExt;
-    let error = simulator.exec();
-    Err(Failure::new(format!(
-        "`{}` cannot be run: {error}",
-        command::shown(simulator)
-    )))
-}
+use command::exec as become_simulator;
 
 /// Without exec: runs the simulator and ends as it does.
 #[cfg(not(unix))]
