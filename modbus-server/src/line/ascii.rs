@@ -93,23 +93,33 @@ impl Reader {
 
     /// The next character of the frame, masked.
     pub(super) fn take(&mut self, character: u8) -> Part {
-        let (place, part) = match (self.place, character) {
-            (Place::Delimiter, end) if end == self.delimiter => (Place::Over, Part::Nothing),
-            (Place::Byte, CR) => (Place::Delimiter, Part::Nothing),
+        self.take_good(character).unwrap_or_else(|| {
             // Of a spoiled frame, too, these two are the end.
-            (_, CR) => (Place::Delimiter, Part::Wrong),
-            (place, character) => match (place, digit(character)) {
-                (Place::Byte, Some(high)) => (Place::Second { high }, Part::Nothing),
-                (Place::Second { high }, Some(low)) => (Place::Byte, Part::Byte(high << 4 | low)),
-                _ => (Place::Byte, Part::Wrong),
-            },
+            self.place = match character {
+                CR => Place::Delimiter,
+                _ => Place::Byte,
+            };
+            Part::Wrong
+        })
+    }
+
+    /// The next character of the frame, if it is what can stand there.
+    #[inline(always)]
+    pub(super) fn take_good(&mut self, character: u8) -> Option<Part> {
+        let (place, part) = match (digit(character), self.place) {
+            (Some(high), Place::Byte) => (Place::Second { high }, Part::Nothing),
+            (Some(low), Place::Second { high }) => (Place::Byte, Part::Byte(high << 4 | low)),
+            (None, Place::Byte) if character == CR => (Place::Delimiter, Part::Nothing),
+            (None, Place::Delimiter) if character == self.delimiter => (Place::Over, Part::Nothing),
+            _ => return None,
         };
         self.place = place;
-        part
+        Some(part)
     }
 }
 
 /// The value of a hexadecimal digit.
+#[inline(always)]
 const fn digit(character: u8) -> Option<u8> {
     match character {
         b'0'..=b'9' => Some(character - b'0'),
@@ -118,16 +128,13 @@ const fn digit(character: u8) -> Option<u8> {
     }
 }
 
-/// The hexadecimal digits of a byte, the high one first.
-pub(super) const fn digits(byte: u8) -> [u8; 2] {
-    const fn digit(value: u8) -> u8 {
-        if value < 10 {
-            b'0' + value
-        } else {
-            b'A' - 10 + value
-        }
+/// The hexadecimal digit of a value, of which the low half counts.
+#[inline(always)]
+pub(super) const fn character(value: u8) -> u8 {
+    match value & 0xF {
+        value @ 0..=9 => b'0' + value,
+        value => b'A' - 10 + value,
     }
-    [digit(byte >> 4), digit(byte & 0xF)]
 }
 
 #[cfg(test)]
@@ -138,12 +145,10 @@ mod tests {
     fn every_byte_comes_back_from_its_digits() {
         let mut reader = Reader::new(Width::Seven);
         for byte in 0..=255 {
-            let [high, low] = digits(byte);
-            assert_eq!(reader.take(high), Part::Nothing);
-            assert_eq!(reader.take(low), Part::Byte(byte));
+            assert_eq!(reader.take(character(byte >> 4)), Part::Nothing);
+            assert_eq!(reader.take(character(byte)), Part::Byte(byte));
         }
-        assert_eq!(digits(0x1F), *b"1F");
-        assert_eq!(digits(0xA9), *b"A9");
+        assert!((0..16).map(character).eq(*b"0123456789ABCDEF"));
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 use super::ascii::{self, Part, Reader, Width};
 use super::state::{
-    ASCII, ASCII_ENDED, DEAF, IDLE, NOT_ENDED, OVERRUN, PAUSED, RTU, SPOILED, TORN, UNKEPT,
+    ASCII, ASCII_ENDED, ASCII_IDLE, DEAF, IDLE, NOT_ENDED, OVERRUN, PAUSED, RTU, SPOILED, TORN,
+    UNKEPT,
 };
 use super::{Faults, Framing};
 use crate::counters::count;
@@ -34,7 +35,7 @@ pub struct Receiver<'a> {
     state: u16,
     /// The first byte of a frame that is not kept: the unit address.
     address: u8,
-    /// The CRC of the frame so far; in ASCII mode the sum of its bytes.
+    /// The CRC of the frame so far; in ASCII mode the sum of its bytes, in the high byte.
     check: u16,
     /// Bytes of a frame that is not kept.
     unkept: u16,
@@ -212,9 +213,29 @@ impl<'a> Receiver<'a> {
     #[cold]
     #[inline(never)]
     fn special(&mut self, byte: u8, faults: Faults) {
+        match self.state | u16::from(faults.bits()) {
+            ASCII if self.ascii_inside(byte) => {}
+            ASCII_IDLE if byte == ascii::START => self.state = ASCII,
+            _ => self.rare(byte, faults),
+        }
+    }
+
+    /// Takes a character inside an ASCII frame that is kept and good so far, if it is good, too.
+    #[inline(always)]
+    fn ascii_inside(&mut self, character: u8) -> bool {
+        let part = self.reader.take_good(character);
+        if let Some(Part::Byte(byte)) = part {
+            self.add(byte);
+            self.keep(byte);
+        }
+        part.is_some()
+    }
+
+    /// Sees to what is not a good character of a good frame, and to frames that are not kept.
+    #[inline(never)]
+    fn rare(&mut self, byte: u8, faults: Faults) {
         if self.state & ASCII != 0 {
-            self.ascii_character(self.reader.masked(byte), faults);
-            return;
+            return self.ascii_character(self.reader.masked(byte), faults);
         }
         if self.state & DEAF != 0 {
             return;
@@ -253,12 +274,18 @@ impl<'a> Receiver<'a> {
         self.note(faults);
         match self.reader.take(character) {
             Part::Byte(byte) => {
-                self.check = (self.check + u16::from(byte)) & 0xFF;
+                self.add(byte);
                 self.keep_or_follow(byte);
             }
             Part::Nothing => {}
             Part::Wrong => self.state |= SPOILED,
         }
+    }
+
+    /// Adds a byte to the sum that the LRC makes zero.
+    #[inline]
+    const fn add(&mut self, byte: u8) {
+        self.check = self.check.wrapping_add((byte as u16) << 8);
     }
 
     /// Starts a frame: all is ready for it.
@@ -276,7 +303,7 @@ impl<'a> Receiver<'a> {
     }
 
     /// Keeps a byte of the frame.
-    #[inline]
+    #[inline(always)]
     fn keep(&mut self, byte: u8) {
         if let Some(adu) = &mut self.filling
             && !adu.push(byte)

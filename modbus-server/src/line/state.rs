@@ -11,6 +11,8 @@ pub(super) const IDLE: u16 = 1 << 5;
 pub(super) const PAUSED: u16 = 1 << 6;
 /// Always set in ASCII mode, never in RTU mode.
 pub(super) const ASCII: u16 = 1 << 7;
+/// In ASCII mode, with a buffer, nothing begun.
+pub(super) const ASCII_IDLE: u16 = ASCII | IDLE;
 /// A gap above t1.5 was in the frame, and that is not tolerated.
 pub(super) const TORN: u16 = 1 << 8;
 /// A character that is faulty, or wrong where it stands, or too many of them.

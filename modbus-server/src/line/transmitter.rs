@@ -22,8 +22,8 @@ pub struct Transmitter<'a> {
     stage: Stage,
     /// In RTU mode: how many bytes of the head have gone. In ASCII mode: `ELSEWHERE`.
     sent: u8,
-    /// In ASCII mode: the second digit of a byte whose first has gone, else 0.
-    second: u8,
+    /// In ASCII mode: the byte whose first digit has gone.
+    half: Option<u8>,
     head: Head,
     body: Option<&'a mut Adu>,
     /// In RTU mode: how many bytes of the body are left. In ASCII mode: 0.
@@ -74,7 +74,7 @@ impl<'a> Transmitter<'a> {
             framing,
             stage,
             sent,
-            second: 0,
+            half: None,
             head: Head::opening(unit),
             body: None,
             left: 0,
@@ -153,45 +153,47 @@ impl<'a> Transmitter<'a> {
     }
 
     /// The next character in ASCII mode.
-    #[inline(never)]
+    #[inline(always)]
     fn ascii(&mut self, delimiter: u8) -> Next {
-        if self.second != 0 {
-            let second = self.second;
-            self.second = 0;
-            return Next::Byte(second);
+        if let Some(byte) = self.half.take() {
+            return Next::Byte(ascii::character(byte));
         }
-        let (stage, character) = match self.stage {
-            Stage::Start => (Stage::Bytes, ascii::START),
-            Stage::Bytes => {
-                let [sum, _] = self.check.to_le_bytes();
-                let (stage, byte) = match self.byte_at(self.at) {
-                    Some(byte) => (Stage::Bytes, byte),
-                    None if self.must_wait() => return Next::Wait,
-                    None => (Stage::End, sum.wrapping_neg()),
-                };
-                self.at += 1;
-                self.check = self.check.wrapping_add(u16::from(byte));
-                let [first, second] = ascii::digits(byte);
-                self.second = second;
-                (stage, first)
-            }
-            Stage::End => (Stage::Delimiter, ascii::CR),
-            Stage::Delimiter => (Stage::Over, delimiter),
+        let byte = match self.stage {
+            Stage::Bytes => match self.byte_at(self.at) {
+                Some(byte) => byte,
+                None if self.must_wait() => return Next::Wait,
+                None => {
+                    self.stage = Stage::End;
+                    // Nothing after this counts.
+                    self.check.to_le_bytes()[0].wrapping_neg()
+                }
+            },
+            Stage::Start => return self.then(Stage::Bytes, ascii::START),
+            Stage::End => return self.then(Stage::Delimiter, ascii::CR),
+            Stage::Delimiter => return self.then(Stage::Over, delimiter),
             Stage::Over => return Next::Done,
         };
+        self.at += 1;
+        self.check = self.check.wrapping_add(u16::from(byte));
+        self.half = Some(byte);
+        Next::Byte(ascii::character(byte >> 4))
+    }
+
+    const fn then(&mut self, stage: Stage, character: u8) -> Next {
         self.stage = stage;
         Next::Byte(character)
     }
 
     /// The byte at this place of head and body, if it is here and not beyond the end.
+    #[inline(always)]
     fn byte_at(&self, at: u16) -> Option<u8> {
-        let at = usize::from(at);
-        let head = self.head.as_slice();
-        match (head.get(at), &self.body) {
-            (Some(byte), _) => Some(*byte),
-            (None, Some(adu)) => self.head.body_in(adu).get(at - head.len()).copied(),
-            (None, None) => None,
+        let head = u16::from(self.head.len());
+        if at < head {
+            return Some(self.head.get(at as u8));
         }
+        let adu = self.body.as_ref()?;
+        let at = at - head + u16::from(self.head.body_from());
+        (usize::from(at) < adu.len()).then(|| adu.get(at as u8))
     }
 
     /// Whether there is more to come than is here.

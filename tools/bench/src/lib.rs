@@ -4,6 +4,7 @@
 //! `cargo xtask bench` builds the images, runs this, adds the sizes, shows it all and holds it against the
 //! baseline; what is here only measures.
 
+mod framing;
 pub mod load;
 pub mod requests;
 pub mod rival;
@@ -11,7 +12,6 @@ pub mod unit;
 
 use std::collections::BTreeMap;
 
-use register_map::Module;
 use serde::Serialize;
 use sim::Image;
 
@@ -57,18 +57,18 @@ pub struct Report {
 ///
 /// When the image does not serve a request as it should: which, and what it did.
 pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, String> {
-    let mut units: BTreeMap<&str, Unit> = BTreeMap::new();
+    let mut units: BTreeMap<(&str, u16), Unit> = BTreeMap::new();
     let mut rivals = rivals
         .iter()
         .map(|(name, image)| Ok((name.clone(), Rival::new(image)?)))
         .collect::<Result<Vec<_>, String>>()?;
     let mut requests = Vec::new();
     for request in requests::all() {
-        let module: Module = request.module;
-        let unit = match units.entry(module.name()) {
+        let (module, mode) = (request.module, request.mode);
+        let unit = match units.entry((module.name(), mode.code())) {
             std::collections::btree_map::Entry::Occupied(unit) => unit.into_mut(),
             std::collections::btree_map::Entry::Vacant(place) => {
-                place.insert(Unit::new(image, module, 1152)?)
+                place.insert(Unit::new(image, module, 1152, mode)?)
             }
         };
         let cost = unit.measure(&request);

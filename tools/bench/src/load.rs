@@ -2,11 +2,12 @@
 //! as soon as t3.5 has passed since the last response.
 
 use register_map::Module;
+use register_map::codes::Mode;
 use register_map::configuration::BETA;
 use serde::Serialize;
 use sim::{Image, Time};
 
-use crate::requests::{adu, is_adu};
+use crate::framing::{adu, is_adu};
 use crate::unit::{BYTE, GAP, SERVE, Unit};
 
 /// How long it goes on.
@@ -42,20 +43,20 @@ pub struct Load {
 ///
 /// When it leaves a request unanswered.
 pub fn measure(image: &Image, hundreds: u16, long: bool) -> Result<Load, String> {
-    let mut unit = Unit::new(image, Module::Di4, hundreds)?;
+    let mut unit = Unit::new(image, Module::Di4, hundreds, Mode::Rtu)?;
     let (name, count) = if long {
         ("03, 125 registers", 125)
     } else {
         ("03, 1 register", 1)
     };
     let [high, low] = BETA.to_be_bytes();
-    let request = adu(&[3, high, low, 0, count]);
+    let request = adu(Mode::Rtu, &[3, high, low, 0, count]);
     unit.board.measure_waits(true);
     let before = unit.board.core_time();
     let end = unit.board.now() + SPAN;
     let mut answered = 0;
     while unit.board.now() < end {
-        if !is_adu(&unit.back_to_back(&request)) {
+        if !is_adu(Mode::Rtu, &unit.back_to_back(&request)) {
             return Err(format!(
                 "request {} of those back to back at {hundreds}00 bit/s is not answered",
                 answered + 1

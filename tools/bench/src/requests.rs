@@ -3,8 +3,8 @@
 //! The addresses are modio's. A rival has its points from address 0 on, so a request goes to it with
 //! its addresses changed and all else the same.
 
-use crc::{CRC_16_MODBUS, Crc};
 use register_map::Module;
+use register_map::codes::Mode;
 use register_map::configuration::{BETA, FILTER, KEY, OPENING_KEY};
 use register_map::points::SLOT_FIRST;
 
@@ -19,6 +19,8 @@ const LONG: u16 = BETA;
 pub struct Request {
     /// The function and what is asked for, as the table shows it.
     pub name: String,
+    /// The transmission mode of the line.
+    pub mode: Mode,
     /// The module in the slot.
     pub module: Module,
     /// What is asked first, not measured: opens the lock where the request needs it.
@@ -44,26 +46,6 @@ fn with_data(function: u8, fields: &[u16], data: &[u8]) -> Vec<u8> {
     pdu
 }
 
-/// The ADU for the unit.
-#[must_use]
-pub fn adu(pdu: &[u8]) -> Vec<u8> {
-    const MODBUS: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
-    let mut adu = vec![UNIT];
-    adu.extend(pdu);
-    let check = MODBUS.checksum(&adu);
-    adu.extend(check.to_le_bytes());
-    adu
-}
-
-/// Whether these bytes are an ADU with a good CRC.
-#[must_use]
-pub fn is_adu(bytes: &[u8]) -> bool {
-    bytes
-        .len()
-        .checked_sub(2)
-        .is_some_and(|end| end >= 2 && adu(&bytes[1..end]) == bytes)
-}
-
 /// Values that these settings take, `count` from [`LONG`] on: those of the factory.
 fn settings(count: usize) -> Vec<u8> {
     let rules = register_map::configuration::RULES;
@@ -77,6 +59,7 @@ fn settings(count: usize) -> Vec<u8> {
 pub fn all() -> Vec<Request> {
     let of = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
         name: name.to_owned(),
+        mode: Mode::Rtu,
         module,
         before: None,
         pdu: make(address),
@@ -91,6 +74,7 @@ pub fn all() -> Vec<Request> {
     };
     let alone = |name: &str, pdu: Vec<u8>| Request {
         name: name.to_owned(),
+        mode: Mode::Rtu,
         module: Module::Di4,
         before: None,
         pdu,
@@ -99,6 +83,27 @@ pub fn all() -> Vec<Request> {
     let own = |request: Request| Request {
         rival: None,
         ..request
+    };
+    let ascii = |request: Request| Request {
+        name: format!("ASCII: {}", request.name),
+        mode: Mode::Ascii,
+        rival: None,
+        ..request
+    };
+    let read_many = || {
+        of(
+            "03 read holding registers, 125",
+            Module::Di4,
+            &|a| pdu(3, &[a, 125]),
+            LONG,
+        )
+    };
+    let write_many = || {
+        setting(
+            "10 write multiple registers, 123",
+            &|a| with_data(0x10, &[a, 123], &settings(123)),
+            LONG,
+        )
     };
 
     vec![
@@ -113,12 +118,7 @@ pub fn all() -> Vec<Request> {
         bits("03 read holding registers, 1", Module::Ai4, &|a| {
             pdu(3, &[a, 1])
         }),
-        of(
-            "03 read holding registers, 125",
-            Module::Di4,
-            &|a| pdu(3, &[a, 125]),
-            LONG,
-        ),
+        read_many(),
         bits("04 read input registers, 1", Module::Ai4, &|a| {
             pdu(4, &[a, 1])
         }),
@@ -150,11 +150,7 @@ pub fn all() -> Vec<Request> {
             &|a| with_data(0x10, &[a, 1], &settings(1)),
             LONG,
         ),
-        setting(
-            "10 write multiple registers, 123",
-            &|a| with_data(0x10, &[a, 123], &settings(123)),
-            LONG,
-        ),
+        write_many(),
         own(setting(
             "16 mask write register",
             &|a| pdu(0x16, &[a, 0xFFFF, 0]),
@@ -187,22 +183,26 @@ pub fn all() -> Vec<Request> {
         ),
         alone("2B/0E device identification, all", vec![0x2B, 0x0E, 3, 0]),
         alone("an unknown function", pdu(0x41, &[])),
+        ascii(bits("03 read holding registers, 1", Module::Ai4, &|a| {
+            pdu(3, &[a, 1])
+        })),
+        ascii(read_many()),
+        ascii(write_many()),
     ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::framing::{adu, is_adu};
 
     #[test]
     fn requests_are_frames_and_settings_are_allowed() {
         for request in all() {
             assert!(request.pdu.len() <= 253, "{}", request.name);
-            assert!(is_adu(&adu(&request.pdu)), "{}", request.name);
+            let frame = adu(request.mode, &request.pdu);
+            assert!(is_adu(request.mode, &frame), "{}", request.name);
         }
         assert_eq!(settings(123).len(), 246);
-        assert!(!is_adu(&[1, 2, 3, 4]) && !is_adu(&[1]));
-        // From the standard's appendix B: 02 07 with the CRC 41 12.
-        assert_eq!(adu(&[0x07])[..2], [UNIT, 7]);
     }
 }

@@ -1,10 +1,11 @@
 //! A minimal server on another crate, and what serving a request costs there: from the complete frame
 //! in memory to the complete response in memory, CRC checked and made, nothing sent.
 
+use register_map::codes::Mode;
 use sim::machine::memory::RAM_BASE;
 use sim::{Board, Config, Image, Time};
 
-use crate::requests::{adu, is_adu};
+use crate::framing::{adu, is_adu};
 
 /// The mailbox of the rivals' `lib.rs`: lengths, then request and response.
 const RESPONSE_LEN: u32 = 4;
@@ -56,7 +57,7 @@ impl Rival {
     ///
     /// When it hangs.
     pub fn measure(&mut self, pdu: &[u8]) -> Result<Option<u32>, String> {
-        let request = adu(pdu);
+        let request = adu(Mode::Rtu, pdu);
         let too_long = |_| "a request longer than the mailbox".to_owned();
         let write = |board: &mut Board, address, bytes: &[u8]| {
             board.write_memory(address, bytes).map_err(too_long)
@@ -80,8 +81,8 @@ impl Rival {
         let word = self.board.word(self.mailbox + RESPONSE_LEN).unwrap_or(0);
         let start = (self.mailbox + RESPONSE - RAM_BASE) as usize;
         let response = self.board.ram().get(start..start + word as usize);
-        let good =
-            response.is_some_and(|response| is_adu(response) && answers(&response[1..], pdu));
+        let good = response
+            .is_some_and(|response| is_adu(Mode::Rtu, response) && answers(&response[1..], pdu));
         Ok(good.then(|| u32::try_from(taken).unwrap_or(u32::MAX)))
     }
 }

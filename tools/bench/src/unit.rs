@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use register_map::codes::Mode;
 use register_map::{Module, configuration, record};
 use sim::line::{Format, Settings};
 use sim::machine::memory::{FLASH_BASE, FLASH_SIZE};
 use sim::{Board, Config, Image, Time};
 
-use crate::requests::{Request, adu, is_adu};
+use crate::framing::{adu, is_adu};
+use crate::requests::Request;
 
 /// The exceptions that serve the line (RM0008 table 63): USART1, TIM2 (the frame gap), EXTI3 (the server).
 pub(crate) const BYTE: u32 = 16 + 37;
@@ -16,7 +18,7 @@ pub(crate) const SERVE: u32 = 16 + 9;
 
 /// Time for the image to start in.
 const START: Time = Time::from_ms(150);
-/// The longest that any transaction takes at 115200 bit/s.
+/// The longest that any response takes at 115200 bit/s.
 const LONGEST: Time = Time::from_ms(100);
 /// More instructions than anything measured needs: then it hangs.
 const TOO_MANY: u32 = 1_000_000;
@@ -42,24 +44,26 @@ pub struct Cost {
 pub struct Unit {
     pub(crate) board: Board,
     settings: Settings,
+    mode: Mode,
     /// When a master may send again.
     free: Time,
 }
 
 impl Unit {
-    /// A board with this module, at a rate in units of 100 bit/s, started.
+    /// A board with this module, at a rate in units of 100 bit/s in this mode, started.
     ///
     /// # Errors
     ///
     /// When the image does not fit the board.
-    pub fn new(image: &Image, module: Module, hundreds: u16) -> Result<Self, String> {
+    pub fn new(image: &Image, module: Module, hundreds: u16, mode: Mode) -> Result<Self, String> {
         let pairs = [
             (configuration::BAUD, hundreds),
+            (configuration::MODE, mode.code()),
             (configuration::MODULE_SLOT, module.code()),
         ];
         let mut flash = vec![0xFF; FLASH_SIZE];
         let page = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
-        // It fits: two pairs in a page of a kilobyte.
+        // It fits: three pairs in a page of a kilobyte.
         record::encode_page(1, &pairs, &mut flash[page..page + 1024]);
         let config = Config {
             module,
@@ -76,6 +80,7 @@ impl Unit {
         Ok(Self {
             board,
             settings,
+            mode,
             free: Time::ZERO,
         })
     }
@@ -83,7 +88,7 @@ impl Unit {
     /// Sends a request; the unit's response once it is complete, empty when there is none.
     pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
         let now = self.board.now();
-        let end = self.board.line().send(now, &adu(pdu));
+        let end = self.board.line().send(now, &adu(self.mode, pdu));
         self.board.run_until(end + self.silence());
         while self.board.driver_enable() {
             self.board.run_for(self.settings.characters(1));
@@ -125,7 +130,7 @@ impl Unit {
     /// When the unit does not answer, or not with a good frame, or hangs.
     pub fn measure(&mut self, request: &Request) -> Result<Cost, String> {
         if let Some(before) = &request.before
-            && !is_adu(&self.ask(before))
+            && !is_adu(self.mode, &self.ask(before))
         {
             return Err("the lock does not open".to_owned());
         }
@@ -144,7 +149,7 @@ impl Unit {
     /// Counts every instruction of a transaction by the handler it is of.
     fn count(&mut self, pdu: &[u8]) -> Result<Cost, String> {
         let now = self.board.now();
-        let end = self.board.line().send(now, &adu(pdu));
+        let end = self.board.line().send(now, &adu(self.mode, pdu));
         let expiry = end + self.settings.frame_silence();
         let mut cost = Cost::default();
         let mut handler = Handler::default();
@@ -198,7 +203,7 @@ impl Unit {
         }
         self.board.run_for(self.silence());
         let response = self.heard();
-        if is_adu(&response) {
+        if is_adu(self.mode, &response) {
             Ok(cost)
         } else {
             Err(format!("the response is no frame: {response:02X?}"))
