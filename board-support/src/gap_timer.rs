@@ -94,26 +94,22 @@ impl GapTimer {
     pub fn take_event(&mut self) -> GapEvent {
         let flags = self.timer.sr().read();
         let on_its_way = self.start_bit.sr().read().cc3if().bit_is_set();
+        if flags.uif().bit_is_clear() && flags.cc1if().bit_is_clear() {
+            return GapEvent::Nothing;
+        }
+        if on_its_way {
+            // The character restarts the silence itself; should the edge have been noise, this does.
+            self.restart();
+            return GapEvent::Nothing;
+        }
         if flags.uif().bit_is_set() {
-            if on_its_way {
-                // The character restarts the silence itself; should the edge have been noise, this does.
-                self.restart();
-                GapEvent::Nothing
-            } else {
-                self.timer
-                    .sr()
-                    .write(|w| w.uif().clear_bit().cc1if().clear_bit());
-                GapEvent::T35
-            }
-        } else if flags.cc1if().bit_is_set() {
-            self.timer.sr().modify(|_, w| w.cc1if().clear_bit());
-            if on_its_way {
-                GapEvent::Nothing
-            } else {
-                GapEvent::T15
-            }
+            self.timer
+                .sr()
+                .write(|w| w.uif().clear_bit().cc1if().clear_bit());
+            GapEvent::T35
         } else {
-            GapEvent::Nothing
+            self.timer.sr().modify(|_, w| w.cc1if().clear_bit());
+            GapEvent::T15
         }
     }
 }

@@ -81,7 +81,9 @@ impl Heard {
                     }
                     let frame = self.begin();
                     self.take(frame, None, faults);
-                } else if let Some(frame) = self.frame.take() {
+                } else if !self.is_over()
+                    && let Some(frame) = self.frame.take()
+                {
                     self.take(frame, Some(byte), faults);
                 }
             }

@@ -255,7 +255,7 @@ fn others_frames_and_broadcasts_are_as_in_rtu_mode() {
 }
 
 #[test]
-fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_character() {
+fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_colon_alone() {
     let mut unit = unit();
     let characters = |unit: &mut Unit, characters: &[u8]| {
         characters
@@ -264,8 +264,11 @@ fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_character() {
     };
     characters(&mut unit, &request());
     assert!(unit.receiver.is_over());
-    characters(&mut unit, b"\n");
-    assert!(!unit.receiver.is_over());
+    characters(&mut unit, b"\n\r\x001");
+    unit.receiver.character(0, Faults::FRAMING);
+    assert!(unit.receiver.is_over());
+    assert!(unit.receiver.close().is_some());
+    characters(&mut unit, b":0103");
     assert!(unit.receiver.close().is_none());
     // A colon takes its place, and no buffer is lost.
     for _ in 0..5 {

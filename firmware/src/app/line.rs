@@ -1,6 +1,7 @@
 //! The RS-485 line as the tasks share it: UART, frame gap, and what is being received and sent.
 
 use board_support::{GapTimer, Rs485};
+use firmware::start_up::LOADER_UNIT;
 use modbus_server::{
     Adu, Head, LineCounters,
     line::{Closed, Faults, Framing, Next, Receiver, Transmitter},
@@ -16,6 +17,8 @@ pub struct Line {
     reply: Reply,
     /// Replies are not to begin yet.
     hold: bool,
+    /// The good frames on the bus when a reply began to be delayed.
+    heard_before: u16,
 }
 
 /// How far the reply is.
@@ -25,7 +28,7 @@ enum Reply {
     None,
     /// It waits to be released, and then for the response delay to pass.
     Held { delay_ms: u16 },
-    /// It waits for the response delay to pass.
+    /// It waits for the response delay to pass, and is given up if the bus goes on without it.
     Delayed { ms: u16 },
     /// It is being sent.
     Sending,
@@ -50,6 +53,7 @@ impl Line {
             request: None,
             reply: Reply::None,
             hold: false,
+            heard_before: 0,
         }
     }
 
@@ -117,7 +121,13 @@ impl Line {
     /// A millisecond has passed: the response delay runs.
     pub fn on_millisecond(&mut self) {
         match self.reply {
-            Reply::Delayed { ms: 0 } => self.send(),
+            Reply::Delayed { ms: 0 } => {
+                if self.receiver.is_idle() && self.heard() == self.heard_before {
+                    self.send();
+                } else {
+                    self.give_up();
+                }
+            }
             Reply::Delayed { ms } => self.reply = Reply::Delayed { ms: ms - 1 },
             Reply::None | Reply::Held { .. } | Reply::Sending => {}
         }
@@ -136,8 +146,8 @@ impl Line {
     /// Replies begin at once again, the one that is held first.
     pub fn release_replies(&mut self) {
         self.hold = false;
-        if let Reply::Held { delay_ms } = self.reply {
-            self.begin(delay_ms);
+        if let Reply::Held { delay_ms: ms } = self.reply {
+            self.delay(ms);
         }
     }
 
@@ -151,16 +161,27 @@ impl Line {
     pub fn take_request(&mut self) -> Option<(&'static mut Adu, LineCounters)> {
         let closed = self.request.take()?;
         if matches!(self.reply, Reply::Held { .. } | Reply::Delayed { .. }) {
-            self.reply = Reply::None;
-            self.take_back();
+            self.give_up();
         }
         Some((closed.adu, closed.line))
+    }
+
+    /// Good frames on the bus so far.
+    fn heard(&self) -> u16 {
+        self.receiver.counters().bus_messages
+    }
+
+    fn give_up(&mut self) {
+        self.reply = Reply::None;
+        self.take_back();
     }
 
     /// A reply of `unit` will come: its first byte leaves now, or after a delay in milliseconds.
     #[inline]
     pub fn open_reply(&mut self, unit: u8, framing: Framing, delay_ms: u16) {
         self.transmitter = Transmitter::open(unit, framing);
+        // The loader mode is to be found by a master with any time-out.
+        let delay_ms = if unit == LOADER_UNIT { 0 } else { delay_ms };
         if self.hold {
             self.reply = Reply::Held { delay_ms };
         } else {
@@ -173,8 +194,13 @@ impl Line {
         if delay_ms == 0 {
             self.send();
         } else {
-            self.reply = Reply::Delayed { ms: delay_ms };
+            self.delay(delay_ms);
         }
+    }
+
+    fn delay(&mut self, ms: u16) {
+        self.heard_before = self.heard();
+        self.reply = Reply::Delayed { ms };
     }
 
     /// The reply is settled: this is how it begins.

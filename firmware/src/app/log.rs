@@ -130,10 +130,10 @@ impl Log {
         };
         if let Some(fault) = fault {
             let mut line = Line::of("last fault: ");
-            self.write(line.text(fault).text(", see the registers from 0x0260"));
+            self.write(line.text(fault));
         }
         if start.clock == ClockSource::Internal {
-            let text = "clock: the crystal did not start, running on the internal oscillator";
+            let text = "the crystal did not start: internal oscillator";
             self.write(&mut Line::of(text));
         }
         match start.address {

@@ -288,17 +288,19 @@ mod app {
         if beat {
             result = result.and(module.read_inputs(&mut channels));
         }
-        let was_failing = device.lock(|device| {
+        let changed = device.lock(|device| {
             if beat {
                 device.points.scanned(&channels, settings);
             }
             let was_failing = device.points.failing();
-            device.points.set_failing(result.is_err());
-            was_failing
+            // Only a whole scan shows that all is well.
+            let is_failing = result.is_err() || !beat && was_failing;
+            device.points.set_failing(is_failing);
+            is_failing != was_failing
         });
 
         // A full queue loses a log line, no more.
-        if result.is_err() != was_failing {
+        if changed {
             let _ = events.enqueue(match result {
                 Ok(()) => Event::ModuleGood,
                 Err(error) => Event::ModuleFails(error),

@@ -97,12 +97,7 @@ pub fn up(
     let gaps = Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
     let t35 = settings
         .frame_gap
-        .map_or(gaps.t35, |tenths| u32::from(tenths) * 100_000);
-    // The silence that ends a frame; in ASCII mode its last character does.
-    let frame_gap = match framing {
-        Framing::Rtu => t35,
-        Framing::Ascii { .. } => 0,
-    };
+        .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
     let line = address.unit().and_then(|unit| {
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, silences) = match framing {
@@ -118,7 +113,7 @@ pub fn up(
 
     Started {
         line,
-        frame_gap_ms: frame_gap.div_ceil(1_000_000),
+        frame_gap_ms: t35.div_ceil(1_000_000),
         server: Server::new(identity.unit, framing),
         device,
         module,

@@ -52,6 +52,9 @@ pub struct Config {
     invalid: bool,
     /// A saved change waits for a restart.
     waiting: bool,
+    /// The slot's MODULE has been another than the one in force since the start, or since changes were
+    /// last dropped.
+    left: bool,
     revision: u16,
 }
 
@@ -76,6 +79,7 @@ impl Config {
             started,
             invalid,
             waiting: false,
+            left: false,
             revision: 0,
         }
     }
@@ -177,6 +181,7 @@ impl Config {
     fn edited_anew(&mut self) {
         self.differences = self.edited.differences(&self.saved);
         self.revision = self.revision.wrapping_add(1);
+        self.left |= self.edited.module(SLOT_PORT) != self.slot.module;
     }
 
     /// COMMAND 3: every setting to its default. Saved are they not.
@@ -188,6 +193,7 @@ impl Config {
     /// COMMAND 4: every setting to what is saved.
     pub fn drop_changes(&mut self) {
         self.edited.clone_from(&self.saved);
+        self.left = false;
         self.edited_anew();
     }
 
@@ -209,7 +215,7 @@ impl Config {
     pub fn end_save(&mut self) {
         self.saving = false;
         let saved = self.saved.restart_values();
-        self.waiting = !saved.eq(self.started.iter().copied());
+        self.waiting = self.left || !saved.eq(self.started.iter().copied());
     }
 
     /// The save did not succeed; `stored` is what is stored, as before.
@@ -260,13 +266,12 @@ impl Config {
         self.slot
     }
 
-    /// The settings of the slot's points in force, by channel. `None` while MODULE is to become another
-    /// with the restart: the settings by point are made for that one then, and for what runs those
-    /// hold that were given here last.
+    /// The settings of the slot's points in force, by channel. `None` once MODULE has been changed, up
+    /// to the restart, even if it was changed back: the settings by point went to the new module's
+    /// defaults, and for what runs those hold that were given here last.
     #[must_use]
     pub fn points(&self) -> Option<impl Iterator<Item = Point>> {
-        let same = self.edited.module(SLOT_PORT) == self.slot.module;
-        same.then(|| (0..CHANNELS).map(|channel| Point::of(&self.edited, channel)))
+        (!self.left).then(|| (0..CHANNELS).map(|channel| Point::of(&self.edited, channel)))
     }
 
     /// COMM_TIMEOUT in milliseconds, up to an hour; `None`: the communication watchdog is off.

@@ -275,11 +275,19 @@ fn settings_by_point_wait_with_the_module_they_are_made_for() {
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
     assert_eq!(filter(&config), None);
     assert_eq!(write(&mut config, MODULE_SLOT, &[4]), DONE);
-    assert_eq!(filter(&config).unwrap(), 4, "defaults by now");
+    assert_eq!(filter(&config), None, "defaults by now, which do not run");
+    config.drop_changes();
+    assert_eq!(filter(&config).unwrap(), 7, "as saved");
+    for module in [1, 4] {
+        assert_eq!(write(&mut config, MODULE_SLOT, &[module]), DONE);
+    }
+    save(&mut config);
+    assert_eq!(filter(&config), None, "not before the restart");
+    assert_eq!(status(&config), status::RESTART_NEEDED);
     assert_eq!(write(&mut config, MODULE_SLOT, &[1]), DONE);
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
     save(&mut config);
-    assert_eq!(filter(&config), None, "not before the restart");
+    assert_eq!(filter(&config), None);
     let restarted = Config::new(config.to_save().clone(), false);
     assert_eq!(filter(&restarted).unwrap(), 1000);
 }

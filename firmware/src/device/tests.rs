@@ -98,7 +98,7 @@ impl Bench {
 }
 
 #[test]
-fn what_runs_keeps_its_settings_until_the_module_changes() {
+fn what_runs_keeps_its_settings_once_the_module_is_to_change() {
     let settings = [
         (at::SCALE + 0x12, 1),
         (at::SAFE + 0x12, 1000),
@@ -123,8 +123,8 @@ fn what_runs_keeps_its_settings_until_the_module_changes() {
         bench.write(at::MODULE + 4, &[Module::Ai2Ao2.code()]),
         Ok(())
     );
-    assert_eq!(bench.device.points.settings()[2].scale, Scale::Raw);
-    assert_eq!(bench.read(0x12, 1), Ok(std::vec![1000]), "the same 2.442 V");
+    assert_eq!(bench.device.points.settings()[2].scale, before[2].scale);
+    assert_eq!(bench.read(0x12, 1), Ok(std::vec![2442]), "nothing jumps");
 }
 
 #[test]

@@ -56,6 +56,14 @@ impl Gaps {
             character: bit.saturating_mul(bits as u32),
         }
     }
+
+    /// A silence between frames of so many tenths of a millisecond, in ns, in place of t3.5: at least
+    /// as long as a character and a tenth, for until a character has ended the line seems silent.
+    pub const fn frame_gap(&self, tenths_of_ms: u16) -> u32 {
+        let gap = (tenths_of_ms as u32).saturating_mul(100_000);
+        let shortest = self.character.saturating_add(self.character / 10);
+        if gap < shortest { shortest } else { gap }
+    }
 }
 
 /// The length of a bit in nanoseconds, rounded up.
@@ -71,6 +79,19 @@ const fn ns_per_bit(baud: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_gap_is_longer_than_a_character() {
+        let gaps = Gaps::standard(9600, 11);
+        assert_eq!(gaps.frame_gap(1000), 100_000_000);
+        assert_eq!(gaps.frame_gap(13), 1_300_000);
+        let shortest = gaps.frame_gap(5);
+        assert!(
+            shortest > gaps.character && shortest < 1_300_000,
+            "{shortest}"
+        );
+        assert_eq!(Gaps::standard(115_200, 10).frame_gap(5), 500_000);
+    }
 
     #[test]
     fn up_to_19200_they_follow_the_character() {

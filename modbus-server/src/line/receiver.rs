@@ -120,12 +120,17 @@ impl<'a> Receiver<'a> {
     }
 
     /// In ASCII mode, whether the last character was the end of a frame, which
-    /// [`close`](Self::close) takes, at once or when the line is free for a reply. Another
-    /// character before that, and the frame is lost. Always `false` in RTU mode, where silence
-    /// ends a frame.
+    /// [`close`](Self::close) takes, at once or when the line is free for a reply. Another frame's
+    /// colon before that, and it is lost; other characters are ignored. Always `false` in RTU mode,
+    /// where silence ends a frame.
     #[inline]
     pub fn is_over(&self) -> bool {
         self.state & ASCII != 0 && self.reader.is_over()
+    }
+
+    /// Whether no frame has begun.
+    pub const fn is_idle(&self) -> bool {
+        self.state & IDLE != 0
     }
 
     /// The frame is at its end. In RTU mode: 3.5 characters of silence have passed. In ASCII mode:
@@ -268,7 +273,8 @@ impl<'a> Receiver<'a> {
             self.note(faults);
             return;
         }
-        if idle {
+        // A frame that is over is complete, whatever comes before it is taken.
+        if idle || self.reader.is_over() {
             return;
         }
         self.note(faults);

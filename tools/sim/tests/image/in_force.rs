@@ -5,7 +5,10 @@ use sim::{Module, Time, line::Settings};
 
 use crate::bench::{Bench, adu, format};
 
+const KEY: u16 = 0x0100;
+const OPENING_KEY: u16 = 0x5A17;
 const BAUD: u16 = 0x0101;
+const FORMAT: u16 = 0x0102;
 const RESPONSE_DELAY: u16 = 0x0105;
 const FRAME_GAP: u16 = 0x0106;
 const STRICT_T15: u16 = 0x0107;
@@ -144,6 +147,64 @@ fn a_shorter_frame_gap_counts_after_the_restart() {
     assert_at(turnaround(&mut bench), Time::from_ms(2), Time::from_us(60));
     assert!(answered_with_gap(&mut bench, Time::from_us(1_800)));
     assert!(!answered_with_gap(&mut bench, Time::from_us(2_300)));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn no_frame_gap_is_too_short_to_be_understood() {
+    for (baud, format, gap) in [
+        (12, 0, 5),
+        (12, 3, 36),
+        (48, 0, 5),
+        (96, 1, 5),
+        (1152, 0, 5),
+    ] {
+        let settings = [(BAUD, baud), (FORMAT, format), (FRAME_GAP, gap)];
+        let mut bench = Bench::set_up(Module::Di4, &settings);
+        for _ in 0..3 {
+            bench.assert_answers(1);
+        }
+        // With and without edges in its bytes.
+        bench.write(KEY, &[OPENING_KEY]).unwrap();
+        bench.write(0x01C0, &[0; 32]).unwrap();
+        let gap = Time::from_us(100 * u64::from(gap));
+        let shortest = bench.characters(1) + bench.bit();
+        let (due, slack) = (gap.max(shortest), Time::from_us(60) + bench.bit());
+        assert_at(turnaround(&mut bench), due, slack);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_delayed_response_stays_away_when_the_bus_has_gone_on_without_it() {
+    let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 300)]);
+    let read = adu(&[1, 1, 0, 0x10, 0, 4]);
+    let others = adu(&[&[2, 3, 200], &[0x55; 200][..]].concat());
+    for (other, from_ms) in [
+        // Under way when the delay is over; long over by then.
+        (&others[..], 200),
+        (&others[..30], 20),
+        (&adu(&[2, 1, 0, 0x10, 0, 4])[..], 20),
+    ] {
+        let now = bench.board.now();
+        let end = bench.board.line().send(now, &read);
+        let start = end + Time::from_ms(from_ms);
+        let end = bench.board.line().send(start, other);
+        let is_rubbish = other.len() == 30;
+        bench.patience = Time::from_ms(400);
+        let answers = !bench.answer_after(end.max(now)).is_empty();
+        assert_eq!(answers, is_rubbish, "{} bytes", other.len());
+        bench.assert_answers(1);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_loader_mode_answers_at_once() {
+    let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 1000)]);
+    bench.board.set_dip(255);
+    bench.power_cycle();
+    bench.assert_answers(255);
 }
 
 #[test]

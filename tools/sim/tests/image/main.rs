@@ -6,13 +6,14 @@
 //! | what | where |
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
-//! | the line | `standard_functions`, `framing`, `noise`, `refusals`, `timing`, `dip` |
+//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `power_cut`, `erase_cut` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults` |
 
 mod analog_inputs;
 mod analog_outputs;
+mod ascii;
 mod bench;
 mod boot;
 mod clock;

@@ -1,4 +1,4 @@
-//! The functions beside reading and writing points, and ASCII mode, on the image as it is flashed.
+//! The functions beside reading and writing points, on the image as it is flashed.
 
 use sim::{Channel, Module, Time};
 
@@ -67,69 +67,5 @@ fn while_it_only_listens_its_outputs_fall_to_safe() {
     );
     // Communication lost, not saved, unlocked.
     assert_eq!(bench.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
-    bench.assert_sound();
-}
-
-/// An ASCII frame of unit 1.
-fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
-    let sum = pdu.iter().fold(1u8, |sum, byte| sum.wrapping_add(*byte));
-    let mut text = String::from(":01");
-    for byte in pdu.iter().chain(&[sum.wrapping_neg()]) {
-        text += &format!("{byte:02X}");
-    }
-    (text + end).into_bytes()
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn in_ascii_mode_the_same_is_said_in_other_words() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    bench.unlock();
-    bench.write(0x0103, &[1]).unwrap();
-    bench.save();
-    bench.power_cycle();
-    assert_eq!(bench.ask(1, &[0x07]), None, "no RTU any more");
-    bench.board.set_energised(2, true).unwrap();
-    bench.board.run_for(Time::from_ms(50));
-
-    let read = [0x01, 0, 0x10, 0, 4];
-    let start = bench.board.now();
-    let end = bench.board.line().send(start, &ascii(&read, "\r\n"));
-    bench.board.run_until(end + bench.t35());
-    assert!(
-        !bench.board.driver_enable(),
-        "the line is left to the master for t3.5"
-    );
-    assert_eq!(bench.answer_after(end), ascii(&[0x01, 1, 0b0010], "\r\n"));
-
-    // The end mark is changed, by a reply with the old one, and comes back with a restart.
-    let change = [0x08, 0, 3, b'#', 0];
-    assert_eq!(
-        bench.exchange(&ascii(&change, "\r\n")),
-        ascii(&change, "\r\n")
-    );
-    assert_eq!(
-        bench.exchange(&ascii(&read, "\r#")),
-        ascii(&[0x01, 1, 0b0010], "\r#")
-    );
-    let restart = [0x08, 0, 1, 0, 0];
-    assert_eq!(
-        bench.exchange(&ascii(&restart, "\r#")),
-        ascii(&restart, "\r#")
-    );
-
-    // A pause of less than a second does not matter, one of more spoils the frame.
-    let whole = ascii(&read, "\r\n");
-    for (ms, answered) in [(900, true), (1100, false)] {
-        let now = bench.board.now();
-        bench.board.line().send(now, &whole[..7]);
-        bench.board.run_for(Time::from_ms(ms));
-        let reply = bench.exchange(&whole[7..]);
-        assert_eq!(!reply.is_empty(), answered, "{ms} ms");
-        bench.board.run_for(Time::from_ms(10));
-    }
-    assert_eq!(bench.exchange(&whole), ascii(&[0x01, 1, 0b0010], "\r\n"));
-    let errors = bench.exchange(&ascii(&[0x08, 0, 0x0C, 0, 0], "\r\n"));
-    assert_eq!(errors, ascii(&[0x08, 0, 0x0C, 0, 1], "\r\n"));
     bench.assert_sound();
 }
