@@ -46,9 +46,9 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let elf = build::image(workspace, &build::Options::release())?.elf;
     let report = measure(workspace, &elf)?;
     if options.json {
-        println!("{report:#}");
+        say!("{report:#}");
     } else {
-        print!("{}", table::of(&report));
+        say!("{}", table::of(&report).trim_end());
     }
     let file = workspace.root().join(BASELINE);
     if options.bless {
@@ -64,7 +64,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// As [`run`].
 pub fn check(workspace: &mut Workspace, elf: &Path) -> Result<()> {
     let report = measure(workspace, elf)?;
-    print!("{}", table::of(&report));
+    say!("{}", table::of(&report).trim_end());
     baseline::hold(&workspace.root().join(BASELINE), &report)
 }
 

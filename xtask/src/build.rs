@@ -55,8 +55,8 @@ pub struct Image {
 /// When there is no toolchain for the target, or the image does not build.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let image = image(workspace, options)?;
-    println!("{}", image.elf.display());
-    println!("{}", image.bin.display());
+    say!("{}", image.elf.display());
+    say!("{}", image.bin.display());
     Ok(())
 }
 

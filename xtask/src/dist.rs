@@ -80,9 +80,9 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     names.sort_unstable();
     write(&out.join("SHA256SUMS"), sums(&out, &names)?.as_bytes())?;
     for name in names {
-        println!("{}", out.join(name).display());
+        say!("{}", out.join(name).display());
     }
-    println!("{}", out.join("SHA256SUMS").display());
+    say!("{}", out.join("SHA256SUMS").display());
     Ok(())
 }
 

@@ -54,7 +54,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
         None => build::image(workspace, &options.build)?.elf,
     };
     probe_rs.write(&elf)?;
-    println!("written, verified and started: {}", elf.display());
+    say!("written, verified and started: {}", elf.display());
     Ok(())
 }
 

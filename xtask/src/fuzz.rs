@@ -210,7 +210,7 @@ fn fuzz(workspace: &Workspace, target: Target, program: &Path, seconds: u32) -> 
     let text = String::from_utf8_lossy(&text);
     match ended {
         Ok(()) => {
-            println!("{name}: {}", log::summary(&text, begin.elapsed()));
+            say!("{name}: {}", log::summary(&text, begin.elapsed()));
             Ok(())
         }
         Err(failure) => Err(log::finding(&text).map_or(failure, |finding| {

@@ -7,6 +7,14 @@
 
 use clap::{Parser, Subcommand};
 
+/// As `println!`; a reader that has gone, as `head` goes, is no failure.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 pub mod bench;
 pub mod build;
 pub mod ci;

@@ -129,7 +129,7 @@ impl Bench {
             live::conformance(self, conformance)
         });
         report::summary(&self.output, &self.renode, &ended)?;
-        println!("\nresults: {}", self.output.display());
+        say!("\nresults: {}", self.output.display());
         steps.finish()
     }
 }

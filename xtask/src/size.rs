@@ -74,9 +74,9 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     };
     let sizes = of(&elf)?;
     if options.json {
-        println!("{:#}", as_json(&sizes));
+        say!("{:#}", as_json(&sizes));
     } else {
-        print!("{}", as_table(&sizes));
+        say!("{}", as_table(&sizes).trim_end());
     }
     within_limits(&sizes)
 }

@@ -80,7 +80,7 @@ impl Steps {
     ///
     /// When a step failed: the names of those that did.
     pub fn finish(&self) -> Result<()> {
-        println!("\n{}", self.summary());
+        say!("\n{}", self.summary());
         let failed: Vec<&str> = self
             .done
             .iter()

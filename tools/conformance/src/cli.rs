@@ -12,6 +12,7 @@ use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
 use crate::line::{CharacterFormat, LineFormat};
 use crate::profile::Profile;
+use crate::program::Files;
 
 /// Tests a Modbus serial-line server from outside, case by case, each with the section it comes from.
 ///
@@ -35,17 +36,17 @@ pub struct Cli {
 
     /// What is in the simulated board's slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "NAME", default_value = "4do", requires = "sim")]
+    #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp"])]
     pub module: register_map::Module,
 
     /// The simulated board's DIP switch: its unit address
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "sim")]
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["serial", "tcp"])]
     pub dip: u8,
 
     /// A register stored in the simulated board's configuration, such as 0x0107=1; may be repeated
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "REGISTER=VALUE", value_parser = setting, requires = "sim")]
+    #[arg(long, value_name = "REGISTER=VALUE", value_parser = setting, conflicts_with_all = ["serial", "tcp"])]
     pub set: Vec<(u16, u16)>,
 
     /// The line's rate in bit/s
@@ -85,13 +86,9 @@ pub struct Cli {
     #[arg(long)]
     pub list: bool,
 
-    /// Write the results as JUnit XML
-    #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
-
-    /// Write the results as JSON
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go
+    #[command(flatten)]
+    pub reports: Files,
 }
 
 #[cfg(feature = "sim")]

@@ -18,9 +18,10 @@ fn main() -> ExitCode {
 fn test(cli: &Cli) -> Result<u8, String> {
     let cases = cli.cases()?;
     if cli.list {
-        print!("{}", table::list(&cases));
+        program::say(table::list(&cases).trim_end());
         return Ok(0);
     }
+    cli.reports.check()?;
     let profile = cli.read_profile()?;
     let mode = cli.mode(profile.as_ref())?;
     let mut endpoint = cli.open(mode).map_err(|broken| broken.to_string())?;
@@ -32,24 +33,29 @@ fn test(cli: &Cli) -> Result<u8, String> {
         allow_config: cli.allow_config,
     };
     let (target, patience) = probe(endpoint.as_mut(), &given)?;
-    println!("{}: {}", endpoint.name(), found(&target));
+    let name = endpoint.name();
+    program::say(format_args!("{name}: {}", found(&target)));
     let options = Options {
         patience,
         allow_config: cli.allow_config,
     };
-    let tell = |outcome: &run::Outcome| println!("{}", table::row(outcome));
+    let mut outcomes = Vec::new();
+    let tell = |outcome: &run::Outcome| {
+        program::say(table::row(outcome));
+        outcomes.push(outcome.clone());
+    };
     let stop = interrupt::catch()?;
     let go_on = || !stop.load(Ordering::Relaxed);
-    let outcomes = run::run_while(endpoint.as_mut(), &target, options, &cases, go_on, tell)
-        .map_err(|broken| broken.to_string())?;
-    println!("{}", table::summary(&outcomes));
-    let name = endpoint.name();
-    if let Some(path) = &cli.junit {
-        program::write(path, &junit::document(&name, &outcomes))?;
-    }
-    if let Some(path) = &cli.json {
-        program::write(path, &format!("{:#}\n", json::value(&name, &outcomes)))?;
-    }
+    let ended = run::run_while(endpoint.as_mut(), &target, options, &cases, go_on, tell);
+    // What was found before it could not go on is worth having, too.
+    program::say(table::summary(&outcomes));
+    let (junit, json) = (
+        junit::document(&name, &outcomes),
+        json::value(&name, &outcomes),
+    );
+    let written = cli.reports.write(&junit, &json);
+    ended.map_err(|broken| broken.to_string())?;
+    written?;
     if !go_on() {
         return Ok(interrupt::STATUS);
     }

@@ -106,9 +106,22 @@ impl Profile {
                 return Err(format!("{name} cannot be written"));
             }
         }
-        let bits = spans(&self.coils.write)?.first().copied();
+        if self.unit == Some(0) {
+            return Err("unit 0 is everybody: a unit has an address from 1".to_owned());
+        }
+        for (table, name) in [
+            (&self.coils, "coils"),
+            (&self.discrete_inputs, "discrete_inputs"),
+            (&self.input_registers, "input_registers"),
+        ] {
+            if table.values.is_some() || table.refused.is_some() {
+                return Err(format!("{name} take no `values` and no `refused`"));
+            }
+        }
+        let bits = self.coils.one_to_write("coils")?;
         let holding = &self.holding_registers;
-        let words = match (spans(&holding.write)?.first(), holding.values) {
+        let to_write = holding.one_to_write("holding_registers")?;
+        let words = match (to_write, holding.values) {
             (None, _) => None,
             (Some(_), None) => {
                 return Err(
@@ -137,6 +150,24 @@ impl Profile {
             ],
             bits: bits.map(|span| span.up_to(1968)),
             words,
+        })
+    }
+}
+
+impl Table {
+    /// The run to write to, if there is one: it must be readable, for it is put back.
+    fn one_to_write(&self, name: &str) -> Result<Option<Span>, String> {
+        let run = match spans(&self.write)?[..] {
+            [] => return Ok(None),
+            [run] => run,
+            _ => return Err(format!("{name} take one run to `write`, not several")),
+        };
+        let readable = spans(&self.read)?;
+        let is_readable = readable
+            .iter()
+            .any(|span| span.first <= run.first && run.last <= span.last);
+        is_readable.then_some(Some(run)).ok_or_else(|| {
+            format!("{name}: what is in `write` must lie in one run of `read`, to be put back")
         })
     }
 }
@@ -203,9 +234,19 @@ mod tests {
             ("mode = \"tcp\"", "neither"),
             ("[coils]\nread = [\"5-3\"]", "5-3"),
             ("[coils]\nread = [\"0-70000\"]", "70000"),
-            ("[holding_registers]\nwrite = [\"1\"]", "values"),
             (
-                "[holding_registers]\nwrite = [\"1\"]\nvalues = [3, 3]",
+                "[holding_registers]\nread = [\"1\"]\nwrite = [\"1\"]",
+                "values",
+            ),
+            ("unit = 0", "unit 0"),
+            ("[coils]\nrefused = 3", "no `refused`"),
+            ("[coils]\nread = [\"0-9\"]\nwrite = [\"5-10\"]", "put back"),
+            (
+                "[coils]\nread = [\"0-9\"]\nwrite = [\"1\", \"3\"]",
+                "not several",
+            ),
+            (
+                "[holding_registers]\nread = [\"1\"]\nwrite = [\"1\"]\nvalues = [3, 3]",
                 "differ",
             ),
             ("[input_registers]\nwrite = [\"1\"]", "cannot be written"),

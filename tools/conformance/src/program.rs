@@ -1,8 +1,10 @@
 //! What the commands of this package have in common: arguments in, one line and exit status 2 when nothing
 //! could be tested, reports into files.
 
-use std::fs;
-use std::path::Path;
+use std::fmt::Display;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -24,13 +26,61 @@ pub fn run<Cli: Parser>(name: &str, test: impl FnOnce(&Cli) -> Result<u8, String
     }
 }
 
-/// Writes a report.
-///
-/// # Errors
-///
-/// When it cannot be written: where and why.
-pub fn write(path: &Path, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
+/// Tells people a line or more. A reader that has gone, as `head` goes, is no failure: the unit is still to be
+/// put back, and the reports are to be written.
+pub fn say(text: impl Display) {
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+/// The files that reports are to go to.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Files {
+    /// Write what came out as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+
+    /// Write what came out as JSON
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl Files {
+    /// Makes sure that they can be written, before the time that a test takes is spent.
+    ///
+    /// # Errors
+    ///
+    /// Which cannot, and why; or that both are the same.
+    pub fn check(&self) -> Result<(), String> {
+        if self.junit.is_some() && self.junit == self.json {
+            return Err("--junit and --json name the same file".to_owned());
+        }
+        for path in [&self.junit, &self.json].into_iter().flatten() {
+            let opened = OpenOptions::new().append(true).create(true).open(path);
+            opened.map_err(|error| cannot_write(path, &error))?;
+        }
+        Ok(())
+    }
+
+    /// Writes both, one even if the other fails.
+    ///
+    /// # Errors
+    ///
+    /// The first that cannot be written: where and why.
+    pub fn write(&self, junit: &str, json: &serde_json::Value) -> Result<(), String> {
+        let junit = write(self.junit.as_deref(), junit);
+        let json = write(self.json.as_deref(), &format!("{json:#}\n"));
+        junit.and(json)
+    }
+}
+
+fn write(path: Option<&Path>, text: &str) -> Result<(), String> {
+    path.map_or(Ok(()), |path| {
+        fs::write(path, text).map_err(|error| cannot_write(path, &error))
+    })
+}
+
+fn cannot_write(path: &Path, error: &io::Error) -> String {
+    format!("cannot write {}: {error}", path.display())
 }
 
 /// What is wrong with a command line, in one line.

@@ -187,6 +187,14 @@ fn what_cannot_be_tested_is_status_2_and_one_line() {
             &["--tcp", &silent, "--profile", "/no/profile"],
             "/no/profile",
         ),
+        (
+            &["--tcp", &nowhere, "--json", "/no/report"],
+            "cannot write /no/report",
+        ),
+        (
+            &["--tcp", &nowhere, "--json", "x", "--junit", "x"],
+            "the same file",
+        ),
         (&["--only", "no such case"], "--list"),
         (&["--format", "9N1"], "8N2"),
         (&["--no-such-option"], "unexpected argument"),

@@ -141,7 +141,10 @@ fn every_option_is_one_that_the_tester_has() {
         "j",
     ]);
     let root = Workspace::open().unwrap().root().to_owned();
-    let tester = fs::read_to_string(root.join("tools/conformance/src/hil/cli.rs")).unwrap();
+    let source = root.join("tools/conformance/src");
+    let tester = ["hil/cli.rs", "program.rs"]
+        .map(|file| fs::read_to_string(source.join(file)).unwrap())
+        .concat();
     let arguments = options.arguments();
     let names = arguments
         .iter()

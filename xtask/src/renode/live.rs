@@ -94,8 +94,8 @@ pub(super) fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Res
         Failure::new(format!("cannot make {}: {error}", bench.output.display()))
     })?;
     let script = write_script(bench, module, dip, port)?;
-    println!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the slot");
-    println!("in the monitor: modio_log shows the firmware's log, quit ends it all");
+    say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the slot");
+    say!("in the monitor: modio_log shows the firmware's log, quit ends it all");
     let mut command = bench.renode.command();
     command.arg("--console").arg(script);
     // On the terminal's own input, where Ctrl-C reaches it as well.

@@ -19,29 +19,25 @@ fn test(cli: &Cli) -> Result<u8, String> {
     }
     let stop = interrupt::catch()?;
     let mut report = Report::default();
-    let mut tell = |line: &str| println!("{line}");
+    let mut tell = |line: &str| program::say(line);
     let ended = hil::run(endpoint.as_mut(), &plan, stop, &mut report, &mut tell);
     // What was found before it could not go on is worth having, too.
-    if let Some(path) = &cli.junit {
-        program::write(path, &report.junit())?;
-    }
-    if let Some(path) = &cli.json {
-        program::write(path, &format!("{:#}\n", report.json()))?;
-    }
-    ended?;
+    let written = cli.reports.write(&report.junit(), &report.json());
     let totals = report.totals();
     let early = if report.interrupted {
         ", interrupted"
     } else {
         ""
     };
-    println!(
+    program::say(format_args!(
         "\nin all: {} passed, {} failed, {} skipped{early}",
         totals.passed, totals.failed, totals.skipped
-    );
+    ));
     for name in report.failed() {
-        println!("failed: {name}");
+        program::say(format_args!("failed: {name}"));
     }
+    ended?;
+    written?;
     Ok(if report.interrupted {
         interrupt::STATUS
     } else {

@@ -1,5 +1,6 @@
 //! Diagnostics, function 08: echo, restart, listen-only and the rest.
 
+use super::line_counters;
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::frame::Reply;
@@ -10,7 +11,7 @@ pub(super) const CASES: &[Case] = &[
     case(
         "fc08/echo",
         "V1.1b3 6.8.1, 00",
-        "sub-function 00 returns any number of data bytes",
+        "sub-function 00 returns its data, any number of words; a modio's any number of bytes",
         N,
         echo,
     ),
@@ -85,7 +86,11 @@ pub(super) fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
 }
 
 fn echo(bench: &mut Bench<'_>) -> Check {
-    for length in [2, 0, 1, 3, 4, 17, 128, 249, 250] {
+    let odd: &[u16] = match bench.target.modio {
+        Some(_) => &[0, 1, 3, 17, 249],
+        None => &[],
+    };
+    for length in [2, 4, 128, 250].iter().chain(odd).copied() {
         let data: Vec<u8> = (0..length).map(|n| (n as u8).wrapping_mul(37)).collect();
         let request = diagnose(0, &data);
         bench.reply_is(&request, &request)?;
@@ -101,6 +106,14 @@ fn unknown(bench: &mut Bench<'_>) -> Check {
 }
 
 fn data(bench: &mut Bench<'_>) -> Check {
+    let refused = data_refused(bench);
+    // One that took a bad 04 for a good one listens only, which is for no case after this.
+    bench.ask(&diagnose(1, &[0, 0]))?;
+    refused?;
+    bench.alive("diagnostics with bad data")
+}
+
+fn data_refused(bench: &mut Bench<'_>) -> Check {
     for sub in [
         0x02, 0x04, 0x0A, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x10, 0x11, 0x12, 0x14,
     ] {
@@ -123,7 +136,7 @@ fn data(bench: &mut Bench<'_>) -> Check {
             )?;
         }
     }
-    bench.alive("diagnostics with bad data")
+    Ok(())
 }
 
 fn length(bench: &mut Bench<'_>) -> Check {
@@ -219,23 +232,33 @@ fn listen_only_writes(bench: &mut Bench<'_>) -> Check {
 }
 
 fn clear(bench: &mut Bench<'_>) -> Check {
-    for _ in 0..4 {
-        bench.alive("nothing")?;
-    }
     let request = diagnose(0x0A, &[0, 0]);
     let reply = bench.reply_unless_lacking(&request, "08/0A")?;
     bench.ensure(reply == request, "the request echoed")?;
+    let Some(function) = super::dispatch::unknown_functions(bench).pop() else {
+        return Err(crate::case::Stop::Skip("every function exists".to_owned()));
+    };
     // Those that this request and its kind move themselves may have moved again.
     for (sub, moved) in [
         (0x0B, 1),
         (0x0C, 0),
         (0x0D, 0),
+        (0x0E, 1),
         (0x0F, 0),
         (0x10, 0),
         (0x11, 0),
         (0x12, 0),
         (0x02, 0),
     ] {
+        // Everything that a line can move has moved.
+        for _ in 0..2 {
+            bench.alive("a clearing")?;
+            let (bad, broadcast) = (line_counters::bad(bench), bench.target.ping.clone());
+            bench.silence_to(&bad, "its check is wrong")?;
+            bench.exception(&[function], 1)?;
+            let broadcast = bench.target.mode.frame(0, &broadcast);
+            bench.silence_to(&broadcast, "a broadcast")?;
+        }
         let again = diagnose(0x0A, &[0, 0]);
         bench.reply_is(&again, &again)?;
         let reply = bench.ask(&diagnose(sub, &[0, 0]))?;
@@ -259,5 +282,7 @@ fn clear(bench: &mut Bench<'_>) -> Check {
 fn clear_overruns(bench: &mut Bench<'_>) -> Check {
     let request = diagnose(0x14, &[0, 0]);
     let reply = bench.reply_unless_lacking(&request, "08/14")?;
-    bench.ensure(reply == request, "the request echoed")
+    bench.ensure(reply == request, "the request echoed")?;
+    let overruns = bench.reply_unless_lacking(&diagnose(0x12, &[0, 0]), "08/12")?;
+    bench.ensure(overruns == diagnose(0x12, &[0, 0]), "no overruns any more")
 }

@@ -55,7 +55,7 @@ pub(super) const CASES: &[Case] = &[
         "fc17/quantities",
         "V1.1b3 6.17",
         "reading 0 or more than 125, writing 0 or more than 121 is exception 03 and writes nothing",
-        &[Need::Function(0x17)],
+        &[Need::Function(0x17), Need::Words],
         quantities,
     ),
     case(
@@ -204,10 +204,13 @@ fn two_places(bench: &mut Bench<'_>) -> Check {
 
 fn quantities(bench: &mut Bench<'_>) -> Check {
     let read = bench.target.longest(3).map_or(0, |span| span.first);
-    let write = bench.target.words.map_or(0, |words| words.span.first);
+    let words = bench.words()?;
+    let write = words.span.first;
+    bench.set_words(write, &[words.low])?;
     let shape = |reads: u16, writes: u16, bytes: u8| {
         let head = pdu(0x17, read, reads);
-        let data = vec![0; usize::from(bytes).min(242)];
+        let data = words.high.to_be_bytes().into_iter().cycle();
+        let data = data.take(usize::from(bytes).min(242)).collect();
         let middle = [write.to_be_bytes(), writes.to_be_bytes()].concat();
         [head, middle, vec![bytes], data].concat()
     };
@@ -221,7 +224,7 @@ fn quantities(bench: &mut Bench<'_>) -> Check {
     ] {
         bench.exception(&shape(reads, writes, bytes), 3)?;
     }
-    Ok(())
+    still_low(bench)
 }
 
 fn still_low(bench: &mut Bench<'_>) -> Check {

@@ -129,7 +129,16 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
             let now = read(bench, function, address)?;
             bench.ensure(now == high, "the output as written")?;
         }
-        Ok(())
+        // Refused by all, but valid; that it is a read keeps the outputs out of it.
+        let broadcast = bench.target.mode.frame(0, &bench.target.ping.clone());
+        for _ in 0..8 {
+            bench.rest(timeout / 4)?;
+            bench.silence_to(&broadcast, "a broadcast")?;
+        }
+        let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
+        bench.ensure(tripped == 0, "status bit 0 clear: broadcasts count")?;
+        let now = read(bench, function, address)?;
+        bench.ensure(now == high, "the output as written")
     });
     write(bench, function, address, before.min(high))?;
     result

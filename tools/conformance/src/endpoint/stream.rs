@@ -15,6 +15,10 @@ use crate::line::{LineFormat, Parity};
 /// So long a read may wait before the clock is looked at again.
 const SLICE: Duration = Duration::from_millis(5);
 
+/// The longest frame, in characters (V1.02 2.5.2.1), and what else passes without a silence.
+const LONGEST: usize = 513;
+const NEVER: Duration = Duration::from_secs(2);
+
 /// What carries the bytes.
 enum Carrier {
     Serial(SerialPort),
@@ -215,7 +219,14 @@ impl Endpoint for Stream {
     ) -> Result<Vec<Heard>, Broken> {
         let mut heard: Vec<Heard> = Vec::new();
         let mut until = Instant::now() + patience;
+        let longest = until + self.line.characters(LONGEST) * 2 + NEVER;
         while heard.len() < enough {
+            if Instant::now() > longest {
+                return Err(Broken(format!(
+                    "{} is never silent: is there another master on the line, or has it another rate?",
+                    self.name
+                )));
+            }
             let left = until.saturating_duration_since(Instant::now());
             let bytes = self.read(left.min(SLICE))?;
             if bytes.is_empty() {
@@ -241,6 +252,19 @@ impl Endpoint for Stream {
 mod tests {
     use super::*;
     use std::net::TcpListener;
+
+    #[test]
+    fn a_line_that_is_never_silent_is_told() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let line = LineFormat::new(115_200, "8N1".parse().unwrap());
+        let mut stream = Stream::tcp(&address, line).unwrap();
+        let (mut peer, _) = listener.accept().unwrap();
+        thread::spawn(move || while peer.write_all(&[0x55; 20]).is_ok() {});
+        let wait = Duration::from_millis(50);
+        let told = stream.hear(wait, wait, usize::MAX).unwrap_err();
+        assert!(told.to_string().contains("never silent"), "{told}");
+    }
 
     #[test]
     fn a_socket_carries_bytes_and_notices_silence_and_the_end() {

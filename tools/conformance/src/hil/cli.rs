@@ -13,6 +13,7 @@ use crate::endpoint::{Broken, Endpoint};
 use crate::hil::Plan;
 use crate::hil::fixture::Fixture;
 use crate::line::{CharacterFormat, LineFormat};
+use crate::program::Files;
 
 /// Tests a modio on a bench: the conformance suite, how soon and how surely it answers at each rate, and
 /// the wires from outputs to inputs.
@@ -75,17 +76,13 @@ pub struct Cli {
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     pub patience: Option<u64>,
 
-    /// Check options, fixture and port, and end
+    /// Check options, fixture, report files and port, and end
     #[arg(long)]
     pub check: bool,
 
-    /// Write the results as JUnit XML
-    #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
-
-    /// Write the results and the times as JSON
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go
+    #[command(flatten)]
+    pub reports: Files,
 }
 
 /// Rates in bit/s that the device has, in the order given.
@@ -137,6 +134,12 @@ impl Cli {
     ///
     /// When the fixture is missing or wrong, or no case has a name as wanted, in one line.
     pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan, String> {
+        if self.no_suite && self.requests == 0 && self.fixture.is_none() {
+            return Err(
+                "nothing is left to do: no suite, no requests, and no --fixture".to_owned(),
+            );
+        }
+        self.reports.check()?;
         let fixture = match &self.fixture {
             None => None,
             Some(path) => {

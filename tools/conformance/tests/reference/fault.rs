@@ -58,6 +58,8 @@ faults! {
     WritesInListenOnly => "fc08/listen-only-writes",
     /// 08/0A clears nothing.
     NeverClears => "fc08/clear-counters",
+    /// 08/0A clears the first counter and no other.
+    ClearsOneAlone => "fc08/clear-counters",
     /// Counts exceptions as events.
     CountsExceptions => "fc0b/counts",
     /// Keeps the log over a restart with FF00.

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 /// Counters by sub-function, 0B to 12.
-const COUNTERS: usize = 8;
+pub const COUNTERS: usize = 8;
 
 /// What the line has seen.
 #[derive(Default)]
@@ -44,12 +44,13 @@ impl Log {
         [vec![(6 + log.len()) as u8], head, log].concat()
     }
 
-    /// A sub-function other than 00 and 03: the data of its reply.
+    /// A sub-function other than 00 and 03: the data of its reply. `clears` is how many counters it clears
+    /// where all are to be.
     pub fn diagnose(
         &mut self,
         sub: u16,
         data: &[u8],
-        clears: bool,
+        clears: usize,
         keeps: bool,
     ) -> Result<Vec<u8>, u8> {
         let zero = if data == [0, 0] { Ok(()) } else { Err(3) };
@@ -88,9 +89,9 @@ impl Log {
         }
     }
 
-    fn clear(&mut self, clears: bool) {
-        if clears {
-            self.counters = [0; COUNTERS];
+    fn clear(&mut self, clears: usize) {
+        self.counters[..clears].fill(0);
+        if clears > 0 {
             self.events = 0;
         }
     }

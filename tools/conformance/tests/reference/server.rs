@@ -1,7 +1,7 @@
 //! A Modbus server small enough to be seen to be right, from V1.1b3 alone; wrong where it is told to be.
 
 use super::fault::Fault;
-use super::log::Log;
+use super::log::{COUNTERS, Log};
 
 /// Coils and registers, and where they are.
 pub const COILS: (u16, usize) = (100, 2100);
@@ -265,7 +265,13 @@ impl Server {
             self.delimiter = delimiter;
             return Ok(pdu[1..].to_vec());
         }
-        let clears = !self.has(Fault::NeverClears);
+        let clears = if self.has(Fault::NeverClears) {
+            0
+        } else if self.has(Fault::ClearsOneAlone) {
+            1
+        } else {
+            COUNTERS
+        };
         self.log
             .diagnose(sub, data, clears, self.has(Fault::KeepsLog))
             .map(|value| [vec![high, low], value].concat())

@@ -1,6 +1,6 @@
 //! The HTTP server: takes requests off the network, hands them to the board's thread, sends the replies.
 
-use std::io::Read;
+use std::io::{Cursor, Read};
 use std::net::{SocketAddr, TcpListener};
 use std::sync::mpsc::{self, Sender};
 use std::thread;
@@ -35,6 +35,9 @@ pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, 
 }
 
 fn serve(mut request: tiny_http::Request, events: &Sender<Event>) {
+    if request.body_length() > Some(LONGEST_BODY as usize) {
+        return refuse(request);
+    }
     let mut body = Vec::new();
     let read = request
         .as_reader()
@@ -42,9 +45,7 @@ fn serve(mut request: tiny_http::Request, events: &Sender<Event>) {
         .read_to_end(&mut body);
     let reply = match read {
         Err(_) => api::Reply::error(400, "the body was cut short"),
-        Ok(length) if length as u64 > LONGEST_BODY => {
-            api::Reply::error(413, "the body is longer than 64 KiB")
-        }
+        Ok(length) if length as u64 > LONGEST_BODY => too_long(),
         Ok(_) => {
             let request = api::Request {
                 method: request.method().to_string(),
@@ -54,11 +55,26 @@ fn serve(mut request: tiny_http::Request, events: &Sender<Event>) {
             ask(request, events)
         }
     };
+    // A client that did not wait for its answer wants none.
+    let _ = request.respond(response(&reply));
+}
+
+/// Refuses a body by the length that its head tells. `tiny_http` makes room for all that was not read when
+/// it drops a request, and none that long is to be had: so this one is never dropped, and its connection
+/// stays open for as long as its client likes.
+fn refuse(request: tiny_http::Request) {
+    std::mem::forget(request.upgrade("none", response(&too_long())));
+}
+
+fn too_long() -> api::Reply {
+    api::Reply::error(413, "the body is longer than 64 KiB")
+}
+
+fn response(reply: &api::Reply) -> Response<Cursor<Vec<u8>>> {
     let json = Header::from_bytes("Content-Type", "application/json").into_iter();
     let mut response = Response::from_string(reply.body.to_string()).with_status_code(reply.status);
     json.for_each(|header| response.add_header(header));
-    // A client that did not wait for its answer wants none.
-    let _ = request.respond(response);
+    response
 }
 
 fn ask(request: api::Request, events: &Sender<Event>) -> api::Reply {
@@ -114,12 +130,21 @@ mod tests {
 
     #[test]
     fn a_body_without_end_is_refused() {
-        let length = LONGEST_BODY + 1;
-        let head =
-            format!("POST / HTTP/1.1\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n");
-        let mut request = head.into_bytes();
-        request.resize(request.len() + length as usize, b' ');
-        assert!(ask(server(), &request).starts_with("HTTP/1.1 413"));
+        let address = server();
+        for length in [LONGEST_BODY + 1, 99_999_999_999] {
+            let head = format!("POST / HTTP/1.1\r\nContent-Length: {length}\r\n\r\n{{}}");
+            let mut stream = TcpStream::connect(address).unwrap();
+            stream.write_all(head.as_bytes()).unwrap();
+            let mut answer = [0; 12];
+            stream.read_exact(&mut answer).unwrap();
+            assert_eq!(&answer, b"HTTP/1.1 413", "{length}");
+        }
+        let chunks = b"POST / HTTP/1.1\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n\
+                       20000\r\n";
+        let mut request = chunks.to_vec();
+        request.resize(request.len() + 0x20000, b' ');
+        request.extend(b"\r\n0\r\n\r\n");
+        assert!(ask(address, &request).starts_with("HTTP/1.1 413"));
     }
 
     #[test]
