@@ -55,8 +55,17 @@ impl Files {
             return Err("--junit and --json name the same file".to_owned());
         }
         for path in [&self.junit, &self.json].into_iter().flatten() {
+            let is_new = !path.exists();
             let opened = OpenOptions::new().append(true).create(true).open(path);
-            opened.map_err(|error| cannot_write(path, &error))?;
+            opened
+                .and_then(|_| {
+                    if is_new {
+                        fs::remove_file(path)
+                    } else {
+                        Ok(())
+                    }
+                })
+                .map_err(|error| cannot_write(path, &error))?;
         }
         Ok(())
     }
