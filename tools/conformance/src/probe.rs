@@ -148,6 +148,8 @@ fn first_answer(
         if let reply @ Reply::Pdu(_) = ask(endpoint, target, patience, pdu)? {
             return Ok(reply);
         }
+        // What comes late is not to stand before the next reply.
+        endpoint.hear(patience.silence, patience.silence, usize::MAX)?;
     }
     ask(endpoint, target, patience, pdu)
 }
