@@ -40,13 +40,18 @@ fn test(cli: &Cli) -> Result<u8, String> {
         allow_config: cli.allow_config,
     };
     let mut outcomes = Vec::new();
-    let tell = |outcome: &run::Outcome| {
-        program::say(table::row(outcome));
-        outcomes.push(outcome.clone());
-    };
+    let tell = |outcome: &run::Outcome| program::say(table::row(outcome));
     let stop = interrupt::catch()?;
     let go_on = || !stop.load(Ordering::Relaxed);
-    let ended = run::run_while(endpoint.as_mut(), &target, options, &cases, go_on, tell);
+    let ended = run::run_while(
+        endpoint.as_mut(),
+        &target,
+        options,
+        &cases,
+        go_on,
+        tell,
+        &mut outcomes,
+    );
     // What was found before it could not go on is worth having, too.
     program::say(table::summary(&outcomes));
     let (junit, json) = (

@@ -55,17 +55,7 @@ impl Files {
             return Err("--junit and --json name the same file".to_owned());
         }
         for path in [&self.junit, &self.json].into_iter().flatten() {
-            let is_new = !path.exists();
-            let opened = OpenOptions::new().append(true).create(true).open(path);
-            opened
-                .and_then(|_| {
-                    if is_new {
-                        fs::remove_file(path)
-                    } else {
-                        Ok(())
-                    }
-                })
-                .map_err(|error| cannot_write(path, &error))?;
+            check(path).map_err(|error| cannot_write(path, &error))?;
         }
         Ok(())
     }
@@ -80,6 +70,16 @@ impl Files {
         let json = write(self.json.as_deref(), &format!("{json:#}\n"));
         junit.and(json)
     }
+}
+
+/// Opens a file for writing and leaves all as it was.
+fn check(path: &Path) -> io::Result<()> {
+    let is_new = !path.exists();
+    OpenOptions::new().append(true).create(true).open(path)?;
+    if is_new {
+        fs::remove_file(path)?;
+    }
+    Ok(())
 }
 
 fn write(path: Option<&Path>, text: &str) -> Result<(), String> {

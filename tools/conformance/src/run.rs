@@ -56,14 +56,24 @@ pub fn run(
     cases: &[Case],
     tell: impl FnMut(&Outcome),
 ) -> Result<Vec<Outcome>, Broken> {
-    run_while(endpoint, target, options, cases, || true, tell)
+    let mut outcomes = Vec::new();
+    run_while(
+        endpoint,
+        target,
+        options,
+        cases,
+        || true,
+        tell,
+        &mut outcomes,
+    )?;
+    Ok(outcomes)
 }
 
 /// The same, as long as `go_on` before a case says so: what a case has begun it ends and puts back.
 ///
 /// # Errors
 ///
-/// As [`run`].
+/// When the endpoint breaks; what there is in `outcomes` by then stands.
 pub fn run_while(
     endpoint: &mut dyn Endpoint,
     target: &Target,
@@ -71,8 +81,8 @@ pub fn run_while(
     cases: &[Case],
     mut go_on: impl FnMut() -> bool,
     mut tell: impl FnMut(&Outcome),
-) -> Result<Vec<Outcome>, Broken> {
-    let mut outcomes = Vec::new();
+    outcomes: &mut Vec<Outcome>,
+) -> Result<(), Broken> {
     for case in cases {
         if !go_on() {
             break;
@@ -103,7 +113,7 @@ pub fn run_while(
             let _ = bench.ask(&drop_changes);
         }
     }
-    Ok(outcomes)
+    Ok(())
 }
 
 fn one(

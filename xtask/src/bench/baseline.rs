@@ -26,7 +26,7 @@ fn more(name: &str) -> f64 {
     }
 }
 
-/// The end of the names of loads.
+/// What a load is named in the report, and its figure at the end of its name.
 const LOAD: &str = "awake_percent";
 
 /// Figures by their names.
@@ -52,7 +52,7 @@ fn figures(report: &Value) -> Figures {
         }
     }
     for row in rows("load") {
-        if let Some(value) = row["awake_percent"].as_f64() {
+        if let Some(value) = row[LOAD].as_f64() {
             let request = row["request"].as_str().unwrap_or_default();
             figures.insert(format!("{} bit/s, {request}: {LOAD}", row["baud"]), value);
         }

@@ -42,15 +42,29 @@ const FREEMODBUS: [(&str, u64); 5] = [
     ("10 write multiple registers, 123", 255 * 41 + 3000 + 7 * 37),
 ];
 
-/// The columns of a request: key, heading, budget.
-const COLUMNS: [(&str, &str, Option<u64>); 6] = [
-    ("to_first_byte", "first byte", Some(TO_FIRST_BYTE)),
-    ("byte_in", "byte in", Some(BYTE)),
-    ("byte_out", "byte out", Some(BYTE)),
-    ("reply_end", "end", Some(BYTE)),
-    ("transaction", "in all", None),
-    ("server", "server", None),
+/// The columns of a request: key, heading.
+const COLUMNS: [(&str, &str); 6] = [
+    ("to_first_byte", "first byte"),
+    ("byte_in", "byte in"),
+    ("byte_out", "byte out"),
+    ("reply_end", "end"),
+    ("transaction", "in all"),
+    ("server", "server"),
 ];
+
+/// What a request may take in a column, where there is a budget.
+fn budget(key: &str, request: &str) -> Option<u64> {
+    match key {
+        "to_first_byte" => Some(TO_FIRST_BYTE),
+        "byte_in" | "byte_out" if request.starts_with(ASCII) => None,
+        "byte_in" | "byte_out" | "reply_end" => Some(BYTE),
+        "server" => {
+            let known = FREEMODBUS.iter().find(|(name, _)| *name == request);
+            known.map(|(_, taken)| *taken)
+        }
+        _ => None,
+    }
+}
 
 fn requests(report: &Value, text: &mut String) {
     let rivals: Vec<&String> = rows(report, "requests")
@@ -59,7 +73,7 @@ fn requests(report: &Value, text: &mut String) {
         .map(|rivals| rivals.keys().collect())
         .unwrap_or_default();
     let mut head = format!("{:<42}", "instructions");
-    let headings = COLUMNS.iter().map(|(_, heading, _)| *heading);
+    let headings = COLUMNS.iter().map(|(_, heading)| *heading);
     for heading in headings.chain(rivals.iter().map(|rival| rival.as_str())) {
         let _ = write!(head, " {heading:>11}");
     }
@@ -68,14 +82,10 @@ fn requests(report: &Value, text: &mut String) {
     for row in rows(report, "requests") {
         let name = row["request"].as_str().unwrap_or_default();
         let mut cells = format!("{name:<42}");
-        for (key, heading, budget) in COLUMNS {
+        for (key, heading) in COLUMNS {
             let taken = row[key].as_u64();
-            let is_byte = budget == Some(BYTE);
-            let budget = budget
-                .filter(|_| !(is_byte && name.starts_with(ASCII)))
-                .or_else(|| whole(key, name));
             let _ = write!(cells, " {:>11}", number(taken));
-            if let (Some(taken), Some(budget)) = (taken, budget)
+            if let (Some(taken), Some(budget)) = (taken, budget(key, name))
                 && taken > budget
             {
                 over.push(format!("{name}: {heading} {taken} of {budget}"));
@@ -108,12 +118,6 @@ fn requests(report: &Value, text: &mut String) {
         line(text, &format!("over budget: {over}"));
     }
     line(text, "");
-}
-
-/// The budget of the server's share of a request.
-fn whole(key: &str, request: &str) -> Option<u64> {
-    let known = FREEMODBUS.iter().find(|(name, _)| *name == request);
-    known.filter(|_| key == "server").map(|(_, taken)| *taken)
 }
 
 fn number(value: Option<u64>) -> String {

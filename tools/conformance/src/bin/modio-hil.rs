@@ -12,6 +12,7 @@ fn main() -> ExitCode {
 
 /// Tests, and gives the exit status.
 fn test(cli: &Cli) -> Result<u8, String> {
+    cli.reports.check()?;
     let mut endpoint = cli.open().map_err(|broken| broken.to_string())?;
     let plan = cli.plan(endpoint.as_ref())?;
     if cli.check {

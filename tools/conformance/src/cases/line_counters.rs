@@ -5,6 +5,7 @@ use register_map::state;
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
 use crate::cases::diagnostics::diagnose;
+use crate::cases::dispatch::unknown_function;
 use crate::endpoint::Piece;
 use crate::frame::Reply;
 use crate::points::pdu;
@@ -200,9 +201,7 @@ fn damaged_characters(bench: &mut Bench<'_>) -> Check {
 }
 
 fn exceptions(bench: &mut Bench<'_>) -> Check {
-    let Some(function) = super::dispatch::unknown_functions(bench).pop() else {
-        return Err(Stop::Skip("every function exists".to_owned()));
-    };
+    let function = unknown_function(bench)?;
     moves(bench, 0x0D, 2, "2 exceptions", |bench| {
         bench.exception(&[function], 1)?;
         bench.exception(&[function, 1, 2], 1)?;

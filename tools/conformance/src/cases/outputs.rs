@@ -130,7 +130,7 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
             bench.ensure(now == high, "the output as written")?;
         }
         // Refused by all, but valid; that it is a read keeps the outputs out of it.
-        let broadcast = bench.target.mode.frame(0, &bench.target.ping.clone());
+        let broadcast = bench.target.mode.frame(0, &bench.target.ping);
         for _ in 0..8 {
             bench.rest(timeout / 4)?;
             bench.silence_to(&broadcast, "a broadcast")?;

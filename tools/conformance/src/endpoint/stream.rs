@@ -15,9 +15,9 @@ use crate::line::{LineFormat, Parity};
 /// So long a read may wait before the clock is looked at again.
 const SLICE: Duration = Duration::from_millis(5);
 
-/// The longest frame, in characters (V1.02 2.5.2.1), and what else passes without a silence.
+/// The longest frame, in characters (V1.02 2.5.2.1), and the time after which there is a silence on any line.
 const LONGEST: usize = 513;
-const NEVER: Duration = Duration::from_secs(2);
+const GRACE: Duration = Duration::from_secs(2);
 
 /// What carries the bytes.
 enum Carrier {
@@ -219,7 +219,7 @@ impl Endpoint for Stream {
     ) -> Result<Vec<Heard>, Broken> {
         let mut heard: Vec<Heard> = Vec::new();
         let mut until = Instant::now() + patience;
-        let longest = until + self.line.characters(LONGEST) * 2 + NEVER;
+        let longest = until + self.line.characters(LONGEST) * 2 + GRACE;
         while heard.len() < enough {
             if Instant::now() > longest {
                 return Err(Broken(format!(

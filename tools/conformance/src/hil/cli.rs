@@ -139,7 +139,6 @@ impl Cli {
                 "nothing is left to do: no suite, no requests, and no --fixture".to_owned(),
             );
         }
-        self.reports.check()?;
         let fixture = match &self.fixture {
             None => None,
             Some(path) => {

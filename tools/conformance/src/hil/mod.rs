@@ -102,12 +102,16 @@ pub fn run(
             patience,
             allow_config: plan.allow_config,
         };
-        let hear = |outcome: &_| {
-            tell(&table::row(outcome));
-            report.outcomes.push(Clone::clone(outcome));
-        };
-        run_while(endpoint, &target, options, &plan.cases, go_on, hear)
-            .map_err(|broken| broken.to_string())?;
+        run_while(
+            endpoint,
+            &target,
+            options,
+            &plan.cases,
+            go_on,
+            |outcome| tell(&table::row(outcome)),
+            &mut report.outcomes,
+        )
+        .map_err(|broken| broken.to_string())?;
         tell(&table::summary(&report.outcomes));
     }
     let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);

@@ -5,6 +5,9 @@ use sim::{Channel, Module, Time};
 
 use crate::bench::Bench;
 
+/// The four inputs.
+const READ: [u8; 5] = [0x01, 0, 0x10, 0, 4];
+
 /// An ASCII frame of unit 1.
 fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
     let sum = pdu.iter().fold(1u8, |sum, byte| sum.wrapping_add(*byte));
@@ -27,9 +30,8 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
     bench.board.set_energised(2, true).unwrap();
     bench.board.run_for(Time::from_ms(50));
 
-    let read = [0x01, 0, 0x10, 0, 4];
     let start = bench.board.now();
-    let end = bench.board.line().send(start, &ascii(&read, "\r\n"));
+    let end = bench.board.line().send(start, &ascii(&READ, "\r\n"));
     bench.board.run_until(end + bench.t35());
     assert!(
         !bench.board.driver_enable(),
@@ -44,7 +46,7 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
         ascii(&change, "\r\n")
     );
     assert_eq!(
-        bench.exchange(&ascii(&read, "\r#")),
+        bench.exchange(&ascii(&READ, "\r#")),
         ascii(&[0x01, 1, 0b0010], "\r#")
     );
     let restart = [0x08, 0, 1, 0, 0];
@@ -54,7 +56,7 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
     );
 
     // A pause of less than a second does not matter, one of more spoils the frame.
-    let whole = ascii(&read, "\r\n");
+    let whole = ascii(&READ, "\r\n");
     for (ms, answered) in [(900, true), (1100, false)] {
         let now = bench.board.now();
         bench.board.line().send(now, &whole[..7]);
@@ -68,8 +70,6 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
     assert_eq!(errors, ascii(&[0x08, 0, 0x0C, 0, 1], "\r\n"));
     bench.assert_sound();
 }
-
-const READ: [u8; 5] = [0x01, 0, 0x10, 0, 4];
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
