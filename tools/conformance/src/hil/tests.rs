@@ -59,6 +59,18 @@ fn every_rate_is_measured_and_the_unit_is_back_as_it_was() {
 }
 
 #[test]
+fn an_endpoint_whose_rate_cannot_be_set_is_measured_as_it_is() {
+    let mut line = Line::new(&[1]);
+    line.lacks = Some(line.line().baud);
+    let plan = Plan {
+        requests: 10,
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!((ended, report.totals().passed), (Ok(()), 1));
+}
+
+#[test]
 fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
     let mut line = Line::new(&[1]);
     let mut count = 0;
