@@ -7,6 +7,7 @@ use clap::Parser;
 
 use crate::bench::Patience;
 use crate::case::Case;
+use crate::endpoint::exact_line;
 use crate::endpoint::stream::Stream;
 use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
@@ -29,6 +30,11 @@ pub struct Cli {
     #[arg(long, value_name = "HOST:PORT", group = "endpoint")]
     pub tcp: Option<String>,
 
+    /// Test through the exact-line protocol, in virtual time: the simulator's --exact-line, Renode's
+    /// exact-line.py
+    #[arg(long, value_name = "HOST:PORT", group = "endpoint", conflicts_with_all = ["baud", "format"])]
+    pub exact_line: Option<String>,
+
     /// Test this firmware image in the simulator, in exact virtual time
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "ELF", group = "endpoint")]
@@ -36,17 +42,17 @@ pub struct Cli {
 
     /// What is in the simulated board's slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp"])]
+    #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub module: register_map::Module,
 
     /// The simulated board's DIP switch: its unit address
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["serial", "tcp"])]
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub dip: u8,
 
     /// A register stored in the simulated board's configuration, such as 0x0107=1; may be repeated
     #[cfg(feature = "sim")]
-    #[arg(long, value_name = "REGISTER=VALUE", value_parser = setting, conflicts_with_all = ["serial", "tcp"])]
+    #[arg(long, value_name = "REGISTER=VALUE", value_parser = setting, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub set: Vec<(u16, u16)>,
 
     /// The line's rate in bit/s
@@ -168,10 +174,13 @@ impl Cli {
         if let Some(address) = &self.tcp {
             return Ok(Box::new(Stream::tcp(address, self.line())?));
         }
+        if let Some(address) = &self.exact_line {
+            return Ok(Box::new(exact_line::Tcp::connect(address)?));
+        }
         #[cfg(feature = "sim")]
         if let Some(elf) = &self.sim {
-            use crate::endpoint::sim::{Fitting, Simulated};
-            return Ok(Box::new(Simulated::new(&Fitting {
+            use crate::endpoint::sim::{Fitting, start};
+            return Ok(Box::new(start(&Fitting {
                 elf: elf.clone(),
                 module: self.module,
                 dip: self.dip,
@@ -186,7 +195,7 @@ impl Cli {
             ""
         };
         Err(Broken(format!(
-            "nothing to test: name an endpoint with --serial PORT, --tcp HOST:PORT{sim}"
+            "nothing to test: name an endpoint with --serial PORT, --tcp HOST:PORT, --exact-line HOST:PORT{sim}"
         )))
     }
 

@@ -51,6 +51,16 @@ impl LineFormat {
         }
     }
 
+    /// The format without the rate.
+    #[must_use]
+    pub const fn format(self) -> CharacterFormat {
+        CharacterFormat {
+            data_bits: self.data_bits,
+            parity: self.parity,
+            stop_bits: self.stop_bits,
+        }
+    }
+
     /// The time of `n` bits.
     #[must_use]
     pub fn bits(self, n: u64) -> Duration {
@@ -100,12 +110,7 @@ impl Default for LineFormat {
 
 impl fmt::Display for LineFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let format = CharacterFormat {
-            data_bits: self.data_bits,
-            parity: self.parity,
-            stop_bits: self.stop_bits,
-        };
-        write!(f, "{} {format}", self.baud)
+        write!(f, "{} {}", self.baud, self.format())
     }
 }
 

@@ -142,7 +142,7 @@ fn one(
         Some(before) => bench.restore(before),
         None => Ok(()),
     };
-    let complaints = bench.endpoint.take_complaints();
+    let complaints = bench.endpoint.take_complaints()?;
     match result.and(restored) {
         Ok(()) if complaints.is_empty() => Ok(Verdict::Passed),
         Ok(()) => Ok(Verdict::Failed(Failure {

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use conformance::cli::{chosen, waits};
 use conformance::endpoint::Endpoint as _;
-use conformance::endpoint::sim::{Fitting, Simulated};
+use conformance::endpoint::sim::{Fitting, start};
 use conformance::frame::Mode;
 use conformance::hil::report::Report;
 use conformance::hil::{Plan, run};
@@ -21,7 +21,7 @@ use register_map::Module;
 fn the_image_loses_nothing_at_any_rate_and_is_back_at_its_own() {
     let elf = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
     let home = LineFormat::default();
-    let mut endpoint = Simulated::new(&Fitting {
+    let mut endpoint = start(&Fitting {
         elf: PathBuf::from(elf),
         module: Module::Do4,
         dip: 3,

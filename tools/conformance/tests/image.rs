@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use conformance::cases::all;
 use conformance::cli::waits;
-use conformance::endpoint::sim::{Fitting, Simulated};
+use conformance::endpoint::sim::{Fitting, start};
 use conformance::frame::Mode;
 use conformance::line::LineFormat;
 use conformance::probe::{Given, probe};
@@ -32,7 +32,7 @@ fn conforms(
         mode,
         settings: settings.to_vec(),
     };
-    let mut endpoint = Simulated::new(&fitting).expect("the image can be read");
+    let mut endpoint = start(&fitting).expect("the image can be read");
     let given = Given {
         unit: dip,
         mode,

@@ -8,10 +8,12 @@
 //! ```text
 //! board      the public face                     line   the RS-485 bus, its waveforms and frames
 //! machine    core, memories, run loop            slot   what is plugged in, and the world outside it
+//! exact_line the protocol by which a client lets time pass
 //! soc        register blocks, clocks, wires      periph one register block of the part in each file
 //! ```
 
 pub mod board;
+pub mod exact_line;
 pub mod finding;
 pub mod image;
 pub mod line;

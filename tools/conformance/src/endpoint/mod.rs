@@ -1,5 +1,6 @@
 //! What the suite speaks through: raw bytes to one serial line, whatever carries them.
 
+pub mod exact_line;
 #[cfg(feature = "sim")]
 pub mod sim;
 pub mod stream;
@@ -9,22 +10,9 @@ use std::time::Duration;
 
 use crate::line::LineFormat;
 
-/// Something to put on the line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Piece {
-    /// Characters without a gap between them.
-    Bytes(Vec<u8>),
-    /// Silence: exactly so long on an endpoint with exact time, at least so long on any other.
-    Gap(Duration),
-    /// A character whose parity bit is wrong. Needs [`Abilities::faults`] and a format with parity.
-    BadParity(u8),
-    /// A character whose stop bits are low. Needs [`Abilities::faults`].
-    BadStop(u8),
-    /// The line low for so many bits. Needs [`Abilities::faults`].
-    Break(u8),
-    /// The line turned over for so long, followed by nothing. Needs [`Abilities::faults`].
-    Glitch(Duration),
-}
+/// Something to put on the line. A gap lasts exactly as long as asked where time is exact, elsewhere at least
+/// as long. Damaged characters, breaks and glitches need [`Abilities::faults`].
+pub use ::exact_line::Piece;
 
 /// A character that came, by the endpoint's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +42,12 @@ pub struct Abilities {
     pub echo: bool,
     /// It can change its rate and format.
     pub set_line: bool,
+    /// Characters that the unit sends take their time on its line.
+    pub character_time: bool,
+    /// The unit notices a start bit when it begins, not only when the character has ended.
+    pub start_bit: bool,
+    /// A request may get lost on the way to the unit: it is sent once more when a due reply does not come.
+    pub asks_again: bool,
 }
 
 /// The endpoint itself does not work any more, or cannot do what was asked: why, in one line.
@@ -148,7 +142,11 @@ pub trait Endpoint {
 
     /// What the unit's parts complain about since the last call, such as a byte lost because the driver
     /// was off: only a simulator knows.
-    fn take_complaints(&mut self) -> Vec<String> {
-        Vec::new()
+    ///
+    /// # Errors
+    ///
+    /// See the trait.
+    fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
+        Ok(Vec::new())
     }
 }

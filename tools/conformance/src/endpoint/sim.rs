@@ -1,17 +1,17 @@
-//! The simulator in process: the firmware's image on the virtual board, in virtual time, exact to the
-//! picosecond, with every way to damage a character.
+//! The simulator in process: the firmware's image on the virtual board, in virtual time.
 
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::path::PathBuf;
 
-use register_map::codes::{Baud, Format as FormatCode};
+use ::exact_line::{Reply, Request};
+use register_map::codes::{Baud, Format};
 use register_map::{Module, configuration, record};
-use sim::line::{Character, Format, Settings};
+use sim::exact_line::Session;
 use sim::{Board, Config, Image, Time};
 
-use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use super::Broken;
+use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
-use crate::line::{LineFormat, Parity};
+use crate::line::LineFormat;
 
 /// The part's flash, 128 KiB from here.
 const FLASH_BASE: u32 = 0x0800_0000;
@@ -37,46 +37,39 @@ pub struct Fitting {
     pub settings: Vec<(u16, u16)>,
 }
 
-/// The virtual board and a master on its line.
-pub struct Simulated {
+/// The virtual board, which carries out the requests of the exact-line protocol.
+pub struct InProcess {
     board: Board,
-    name: String,
-    line: LineFormat,
-    findings: usize,
-    /// Driver edges up to here have been told.
-    edges_until: Time,
+    session: Session,
 }
 
-impl Simulated {
-    /// A board fitted like this, switched on and started.
-    ///
-    /// # Errors
-    ///
-    /// When the image cannot be read, or the device has no such setting.
-    pub fn new(fitting: &Fitting) -> Result<Self, Broken> {
-        let image = Image::read(Path::new(&fitting.elf)).map_err(|e| Broken(e.to_string()))?;
-        let config = Config {
-            dip: fitting.dip,
-            module: fitting.module,
-            flash: Some(flash(fitting)?),
-            ..Config::default()
-        };
-        let mut board = Board::new(&image, config).map_err(|e| Broken(e.to_string()))?;
-        board.line().set_settings(settings(fitting.line)?);
-        board.run_for(START);
-        let (module, line) = (fitting.module, fitting.line);
-        Ok(Self {
-            board,
-            name: format!("the simulator with {module}, {line}"),
-            line,
-            findings: 0,
-            edges_until: Time::ZERO,
-        })
-    }
+/// A board fitted like this, switched on and started, with a master on its line.
+///
+/// # Errors
+///
+/// When the image cannot be read, or the device has no such setting.
+pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
+    let image = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
+    let config = Config {
+        dip: fitting.dip,
+        module: fitting.module,
+        flash: Some(flash(fitting)?),
+        ..Config::default()
+    };
+    let mut board = Board::new(&image, config).map_err(|e| Broken(e.to_string()))?;
+    board.run_for(START);
+    let mut server = InProcess {
+        board,
+        session: Session::default(),
+    };
+    let line = Request::Line(fitting.line.baud, fitting.line.format().to_string());
+    server.ask(&line).map_err(Broken)?;
+    ExactLine::new(server)
+}
 
-    /// The board, for what only a simulator can do.
-    pub fn board(&mut self) -> &mut Board {
-        &mut self.board
+impl Transport for InProcess {
+    fn ask(&mut self, request: &Request) -> Result<Reply, String> {
+        self.session.answer(&mut self.board, request)
     }
 }
 
@@ -96,183 +89,20 @@ fn flash(fitting: &Fitting) -> Result<Vec<u8>, Broken> {
 }
 
 /// The registers and values that stand for this rate and format.
-///
-/// # Errors
-///
-/// When the device has no such rate or format.
-pub fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
+fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
     let baud = Baud::ALL
         .iter()
         .find(|baud| baud.bits_per_second() == line.baud)
         .ok_or_else(|| Broken(format!("the device has no rate of {} bit/s", line.baud)))?;
-    let format = match format_of(line)? {
-        Format::N2 => FormatCode::F8N2,
-        Format::E1 => FormatCode::F8E1,
-        Format::O1 => FormatCode::F8O1,
-        Format::N1 => FormatCode::F8N1,
+    let format = match line.format().to_string().as_str() {
+        "8N2" => Format::F8N2,
+        "8E1" => Format::F8E1,
+        "8O1" => Format::F8O1,
+        "8N1" => Format::F8N1,
+        other => return Err(Broken(format!("the device has no format {other}"))),
     };
     Ok([
         (configuration::BAUD, baud.code()),
         (configuration::FORMAT, format.code()),
     ])
-}
-
-fn format_of(line: LineFormat) -> Result<Format, Broken> {
-    match (line.data_bits, line.parity, line.stop_bits) {
-        (8, Parity::None, 2) => Ok(Format::N2),
-        (8, Parity::Even, 1) => Ok(Format::E1),
-        (8, Parity::Odd, 1) => Ok(Format::O1),
-        (8, Parity::None, 1) => Ok(Format::N1),
-        _ => Err(Broken(format!("the simulator's line has no {line}"))),
-    }
-}
-
-fn settings(line: LineFormat) -> Result<Settings, Broken> {
-    Ok(Settings {
-        baud: line.baud,
-        format: format_of(line)?,
-    })
-}
-
-const fn time(duration: Duration) -> Time {
-    Time::from_ns(duration.as_nanos() as u64)
-}
-
-const fn duration(time: Time) -> Duration {
-    Duration::from_nanos(time.as_ns())
-}
-
-impl Endpoint for Simulated {
-    fn name(&self) -> String {
-        self.name.clone()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities {
-            exact: true,
-            faults: true,
-            power: true,
-            driver: true,
-            echo: true,
-            set_line: true,
-        }
-    }
-
-    fn line(&self) -> LineFormat {
-        self.line
-    }
-
-    fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
-        self.board.line().set_settings(settings(line)?);
-        self.line = line;
-        Ok(())
-    }
-
-    fn now(&self) -> Duration {
-        duration(self.board.now())
-    }
-
-    fn rest(&mut self, wanted: Duration) -> Result<(), Broken> {
-        self.board.run_for(time(wanted));
-        Ok(())
-    }
-
-    fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
-        let mut at = self.board.now();
-        let settings = settings(self.line)?;
-        let line = self.board.line();
-        for piece in pieces {
-            at = match piece {
-                Piece::Bytes(bytes) => line.send(at, bytes),
-                Piece::Gap(gap) => at + time(*gap),
-                Piece::BadParity(byte) => {
-                    let character = Character::new(settings, *byte).with_wrong_parity();
-                    line.send_character(at, character)
-                }
-                Piece::BadStop(byte) => {
-                    // All stop bits are low, and one more bit brings the line back up.
-                    let mut character = Character::new(settings, *byte);
-                    let stop = settings.format.stop_bits();
-                    for bit in character.bits - stop..character.bits {
-                        character = character.with_bit_flipped(bit);
-                    }
-                    character.levels |= 1 << character.bits;
-                    character.bits += 1;
-                    line.send_character(at, character)
-                }
-                Piece::Break(bits) => {
-                    line.send_character(at, Character::line_break(settings.rate(), *bits))
-                }
-                Piece::Glitch(width) => {
-                    line.noise(at, time(*width));
-                    at + time(*width)
-                }
-            };
-        }
-        self.board.run_until(at);
-        Ok(duration(at))
-    }
-
-    fn hear(
-        &mut self,
-        patience: Duration,
-        quiet: Duration,
-        enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        let slice = time(self.line.characters(1));
-        let mut heard = Vec::new();
-        let mut until = self.board.now() + time(patience);
-        loop {
-            for character in self.board.line().take_received() {
-                until = character.end + time(quiet);
-                heard.push(Heard {
-                    byte: character.byte,
-                    start: duration(character.start),
-                    end: duration(character.end),
-                    good: character.is_good(),
-                });
-            }
-            let now = self.board.now();
-            if now >= until || heard.len() >= enough {
-                return Ok(heard);
-            }
-            self.board.run_until(until.min(now + slice));
-        }
-    }
-
-    fn set_power(&mut self, on: bool) -> Result<(), Broken> {
-        if on {
-            self.board.power_on();
-        } else {
-            self.board.power_off();
-        }
-        Ok(())
-    }
-
-    fn set_echo(&mut self, echo: bool) -> Result<(), Broken> {
-        self.board.line().set_echo(echo);
-        Ok(())
-    }
-
-    fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
-        let from = std::mem::replace(&mut self.edges_until, self.board.now());
-        let new = self
-            .board
-            .line()
-            .driver_edges()
-            .filter(|edge| edge.0 > from);
-        Ok(new.map(|(at, on)| (duration(at), on)).collect())
-    }
-
-    fn take_complaints(&mut self) -> Vec<String> {
-        let new: Vec<String> = self
-            .board
-            .findings()
-            .iter()
-            .skip(self.findings)
-            .map(ToString::to_string)
-            .collect();
-        self.findings += new.len();
-        new
-    }
 }

@@ -62,7 +62,9 @@ impl Endpoint for Reference {
             power: true,
             driver: true,
             echo: true,
-            set_line: false,
+            character_time: true,
+            start_bit: true,
+            ..Abilities::default()
         }
     }
 

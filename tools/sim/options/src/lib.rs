@@ -39,6 +39,11 @@ pub struct Options {
     #[arg(long, value_name = "ADDR", value_parser = address)]
     pub tcp: Option<SocketAddr>,
 
+    /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md:
+    /// time stands still between its requests, so no endpoint that follows the clock is offered
+    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "gdb"])]
+    pub exact_line: Option<SocketAddr>,
+
     /// Where the HTTP interface listens, HOST:PORT; port 0 takes a free one
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
     pub http: SocketAddr,
@@ -116,6 +121,7 @@ mod tests {
         assert!(options.preset());
         assert_eq!((options.pty, options.tcp, options.elf), (None, None, None));
         assert_eq!((options.flash, options.gdb), (None, None));
+        assert_eq!(options.exact_line, None);
         assert_eq!(options.run_for, None);
     }
 
@@ -153,6 +159,19 @@ mod tests {
             (&["--http", "127.0.0.1:99999"][..], "not an address"),
             (&["--flash"][..], "--flash <FILE>"),
             (&["--gdb", "x"][..], "not an address"),
+            (&["--exact-line", "x"][..], "not an address"),
+            (
+                &["--exact-line", "127.0.0.1:0", "--pty", "x"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--tcp", "127.0.0.1:0"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--gdb", "127.0.0.1:0"][..],
+                "cannot be used with",
+            ),
             (&["--pty"][..], "--pty <LINK>"),
         ] {
             let text = parse(arguments).unwrap_err();

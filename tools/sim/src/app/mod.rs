@@ -1,7 +1,9 @@
-//! The command `modio-sim`: the board in step with the wall clock, between the endpoints.
+//! The command `modio-sim`: the board between its endpoints, in step with the wall clock, or with
+//! `--exact-line` in virtual time.
 //!
 //! ```text
 //! pty, TCP ──bytes──┐                     ┌──> bytes to pty and TCP
+//! exact line ───────┤                     ├──> bytes and times to the exact line
 //! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP
 //! GDB ─────bytes────┤                     ├──> bytes to GDB
 //! Ctrl-C, SIGTERM ──┘    the board's only ├──> log on stdout
@@ -14,12 +16,14 @@
 use std::path::Path;
 use std::sync::mpsc;
 
+use ::exact_line::Request;
 use register_map::{Module, record};
 use sim::{Board, Config, Image, Time};
 use sim_options::Options;
 
 mod api;
 mod bench;
+mod exact_line;
 mod flash_file;
 mod frames;
 mod gdb;
@@ -52,6 +56,8 @@ enum Event {
     Request(api::Request, mpsc::Sender<api::Reply>),
     /// From the debugger.
     Gdb(gdb::Message),
+    /// From the client of the exact line, and where the answer goes.
+    Exact(Request, exact_line::Answers),
     /// Time to end.
     Stop,
 }
@@ -74,25 +80,39 @@ pub fn run(options: &Options) -> Result<(), String> {
     ctrlc::set_handler(move || drop(stop.send(Event::Stop)))
         .map_err(|error| format!("cannot catch Ctrl-C: {error}"))?;
 
-    let pty = pty::Pty::open(options.pty.as_deref(), events.clone())?;
-    let tcp = options
-        .tcp
-        .map(|address| tcp::Tcp::listen(address, events.clone()))
-        .transpose()?;
+    let endpoints = match options.exact_line {
+        Some(address) => run::Endpoints::Exact(exact_line::listen(address, events.clone())?),
+        None => run::Endpoints::Clock {
+            pty: pty::Pty::open(options.pty.as_deref(), events.clone())?,
+            tcp: options
+                .tcp
+                .map(|address| tcp::Tcp::listen(address, events.clone()))
+                .transpose()?,
+        },
+    };
     let http = http::listen(options.http, events.clone())?;
     let gdb = options
         .gdb
         .map(|address| gdb::listen(address, events))
         .transpose()?;
-    // A place where nothing can be written is told now, not when something is to be saved.
+    // An unwritable file is reported now, not when the firmware saves something.
     flash
         .as_mut()
         .map_or(Ok(()), |file| file.keep(&bench.board))?;
 
     bench.board.run_until(START_UP);
-    bench::say(&format!("pty: {}", pty.path().display()));
-    if let Some(tcp) = &tcp {
-        bench::say(&format!("tcp: {}", tcp.address()));
+    match &endpoints {
+        run::Endpoints::Exact(address) => {
+            // The unit has set its UART up by now. From here on the client says what its own end has.
+            bench.board.line().set_follow(false);
+            bench::say(&format!("exact-line: {address}"));
+        }
+        run::Endpoints::Clock { pty, tcp } => {
+            bench::say(&format!("pty: {}", pty.path().display()));
+            if let Some(tcp) = tcp {
+                bench::say(&format!("tcp: {}", tcp.address()));
+            }
+        }
     }
     bench::say(&format!("http: http://{http}/"));
     if let Some(gdb) = gdb {
@@ -102,7 +122,7 @@ pub fn run(options: &Options) -> Result<(), String> {
     run::until_stopped(
         &mut bench,
         &queue,
-        &run::Endpoints { pty, tcp },
+        &endpoints,
         flash.as_mut(),
         options.run_for,
     );

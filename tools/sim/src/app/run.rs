@@ -1,9 +1,13 @@
-//! Runs the board in step with the wall clock, and passes on what comes in and goes out.
+//! Runs the board in step with the wall clock, or on request, and passes on what comes in and goes out.
 
+use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
+use sim::Time;
+
 use super::bench::Bench;
+use super::exact_line::Requests;
 use super::flash_file::FlashFile;
 use super::gdb::Session;
 use super::pace::{Pace, span};
@@ -15,12 +19,20 @@ const SLICE: Duration = Duration::from_millis(1);
 /// No longer than this in one go, so that Ctrl-C works on a machine too slow to keep up.
 const AT_ONCE: Duration = Duration::from_millis(20);
 
-/// Where what the unit sends is heard.
-pub struct Endpoints {
-    /// The pseudo-terminal.
-    pub pty: pty::Pty,
-    /// The TCP socket, if there is one.
-    pub tcp: Option<tcp::Tcp>,
+/// How long the loop waits for an event when nothing else is to be done.
+const IDLE: Duration = Duration::from_secs(1);
+
+/// What carries the line's bytes.
+pub enum Endpoints {
+    /// Endpoints at which time follows the wall clock.
+    Clock {
+        /// The pseudo-terminal.
+        pty: pty::Pty,
+        /// The TCP socket, if there is one.
+        tcp: Option<tcp::Tcp>,
+    },
+    /// The exact line, which listens at this address: time passes when its client asks for it.
+    Exact(SocketAddr),
 }
 
 /// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the flash's file up to date.
@@ -32,21 +44,35 @@ pub fn until_stopped(
     limit: Option<Duration>,
 ) {
     let begin = Instant::now();
-    let mut pace = Pace::new(begin, bench.board.now());
-    let mut debugger = Session::default();
+    let mut clock = Clock {
+        pace: match endpoints {
+            Endpoints::Clock { .. } => Some(Pace::new(begin, bench.board.now())),
+            Endpoints::Exact(_) => None,
+        },
+        debugger: Session::default(),
+    };
+    let mut requests = Requests::default();
     loop {
         let wall = Instant::now();
-        catch_up(bench, &mut pace, &mut debugger);
+        clock.catch_up(bench);
+        requests.run(bench, span(AT_ONCE));
         bench.tell();
         if let Some(file) = &mut flash {
             file.keep_or_tell(&bench.board);
         }
-        let bytes = bench.heard();
-        if !bytes.is_empty() {
-            endpoints.pty.write(&bytes);
-            endpoints.tcp.iter().for_each(|tcp| tcp.write(&bytes));
+        let mut wait = if requests.busy() {
+            Duration::ZERO
+        } else {
+            IDLE
+        };
+        if let Endpoints::Clock { pty, tcp } = endpoints {
+            let bytes = bench.heard();
+            if !bytes.is_empty() {
+                pty.write(&bytes);
+                tcp.iter().for_each(|tcp| tcp.write(&bytes));
+            }
+            wait = SLICE.saturating_sub(wall.elapsed());
         }
-        let mut wait = SLICE.saturating_sub(wall.elapsed());
         if let Some(limit) = limit {
             let left = limit.saturating_sub(begin.elapsed());
             if left.is_zero() {
@@ -56,22 +82,23 @@ pub fn until_stopped(
         }
         match queue.recv_timeout(wait) {
             Ok(Event::Bytes(bytes)) => {
-                catch_up(bench, &mut pace, &mut debugger);
+                clock.catch_up(bench);
                 bench.send(&bytes);
             }
+            Ok(Event::Exact(request, answers)) => requests.begin(bench, request, answers),
             Ok(Event::Request(request, reply)) => {
-                catch_up(bench, &mut pace, &mut debugger);
+                clock.catch_up(bench);
                 let before = bench.board.now();
                 // That the client has gone does not matter.
                 let _ = reply.send(api::answer(bench, &request));
                 if bench.board.now() > before {
-                    // A power cycle takes its time at once: from here on in step again.
-                    pace = Pace::new(Instant::now(), bench.board.now());
+                    // A power cycle takes virtual time at once: from here on in step again.
+                    clock.restart(bench.board.now());
                 }
             }
             Ok(Event::Gdb(message)) => {
-                catch_up(bench, &mut pace, &mut debugger);
-                debugger.take(message, bench);
+                clock.catch_up(bench);
+                clock.debugger.take(message, bench);
             }
             Ok(Event::Stop) => return,
             // Without the senders there is only time left to pass.
@@ -81,14 +108,32 @@ pub fn until_stopped(
     }
 }
 
-/// Brings virtual time to where the wall clock is, or a good way towards it; while a debugger has the core
-/// halted it stands still.
-fn catch_up(bench: &mut Bench, pace: &mut Pace, debugger: &mut Session) {
-    let at = bench.board.now();
-    if debugger.halted() {
-        *pace = Pace::new(Instant::now(), at);
-        return;
+/// What lets the board's time pass without being asked.
+struct Clock {
+    /// The wall clock; `None` when time passes on request only.
+    pace: Option<Pace>,
+    debugger: Session,
+}
+
+impl Clock {
+    /// Both clocks stand together now.
+    fn restart(&mut self, at: Time) {
+        if let Some(pace) = &mut self.pace {
+            *pace = Pace::new(Instant::now(), at);
+        }
     }
-    let target = pace.target(Instant::now(), at);
-    debugger.run_until(target.min(at + span(AT_ONCE)), bench);
+
+    /// Brings virtual time to where the wall clock is, or a good way towards it; while a debugger has the
+    /// core halted it stands still.
+    fn catch_up(&mut self, bench: &mut Bench) {
+        let at = bench.board.now();
+        if self.debugger.halted() {
+            return self.restart(at);
+        }
+        if let Some(pace) = &mut self.pace {
+            let target = pace.target(Instant::now(), at);
+            self.debugger
+                .run_until(target.min(at + span(AT_ONCE)), bench);
+        }
+    }
 }

@@ -39,6 +39,9 @@ pub enum Format {
 }
 
 impl Format {
+    /// Every format.
+    pub const ALL: [Self; 4] = [Self::N2, Self::E1, Self::O1, Self::N1];
+
     /// The parity, if there is one.
     #[must_use]
     pub const fn parity(self) -> Option<Parity> {

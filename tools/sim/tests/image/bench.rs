@@ -60,7 +60,7 @@ pub fn adu(bytes: &[u8]) -> Vec<u8> {
 
 /// The line's format for a value of FORMAT.
 pub fn format(code: u16) -> Format {
-    [Format::N2, Format::E1, Format::O1, Format::N1][usize::from(code)]
+    Format::ALL[usize::from(code)]
 }
 
 /// A board and its master.
