@@ -29,6 +29,8 @@ pub struct Bench<'a> {
     pub patience: Patience,
     /// Whether a modio's configuration may be written.
     pub allow_config: bool,
+    /// Number of due replies that did not come and were asked for once more.
+    pub asked_again: u32,
     /// What was sent last, and the answer to it, for people.
     sent: String,
     came: String,
@@ -51,6 +53,7 @@ impl<'a> Bench<'a> {
             target,
             patience,
             allow_config,
+            asked_again: 0,
             sent: String::new(),
             came: String::new(),
             sent_end: Duration::ZERO,
@@ -114,6 +117,21 @@ impl<'a> Bench<'a> {
         self.listen_until(enough)
     }
 
+    /// Puts pieces on the line to which a reply is due. Where requests may get lost on the way, they are sent
+    /// once more when none comes.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn exchange_due(&mut self, pieces: &[Piece]) -> Check<Reply> {
+        let reply = self.exchange(pieces)?;
+        if reply != Reply::Silence || !self.endpoint.abilities().asks_again {
+            return Ok(reply);
+        }
+        self.asked_again += 1;
+        self.exchange(pieces)
+    }
+
     /// Hears what comes now, without sending.
     ///
     /// # Errors
@@ -162,6 +180,15 @@ impl<'a> Bench<'a> {
         self.exchange(&[Piece::Bytes(bytes.to_vec())])
     }
 
+    /// Sends bytes as they are, to which a reply is due.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn raw_due(&mut self, bytes: &[u8]) -> Check<Reply> {
+        self.exchange_due(&[Piece::Bytes(bytes.to_vec())])
+    }
+
     /// Sends a PDU in a good frame to a unit, whichever it is.
     ///
     /// # Errors
@@ -181,13 +208,23 @@ impl<'a> Bench<'a> {
         self.ask_unit(self.target.unit, pdu)
     }
 
+    /// Sends a PDU to the unit under test, which has to reply.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Broken`].
+    pub fn ask_due(&mut self, pdu: &[u8]) -> Check<Reply> {
+        let frame = self.frame(pdu);
+        self.raw_due(&frame)
+    }
+
     /// Asks, and wants an ordinary reply: a PDU that begins with the function code.
     ///
     /// # Errors
     ///
     /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
     pub fn reply(&mut self, pdu: &[u8]) -> Check<Vec<u8>> {
-        match self.ask(pdu)? {
+        match self.ask_due(pdu)? {
             Reply::Pdu(reply) if reply[0] == pdu[0] => Ok(reply),
             _ => self.fail(format!("a reply to function {:02X}", pdu[0])),
         }
@@ -199,7 +236,7 @@ impl<'a> Bench<'a> {
     ///
     /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
     pub fn reply_is(&mut self, pdu: &[u8], wanted: &[u8]) -> Check {
-        let reply = self.ask(pdu)?;
+        let reply = self.ask_due(pdu)?;
         self.ensure(
             reply == Reply::Pdu(wanted.to_vec()),
             format!("the PDU {}", hex(wanted)),
@@ -212,7 +249,7 @@ impl<'a> Bench<'a> {
     ///
     /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
     pub fn exception(&mut self, pdu: &[u8], code: u8) -> Check {
-        let reply = self.ask(pdu)?;
+        let reply = self.ask_due(pdu)?;
         let wanted = format!("exception {code:02X} to function {:02X}", pdu[0]);
         self.ensure(reply.exception(pdu[0]) == Some(code), wanted)
     }
@@ -261,7 +298,7 @@ impl<'a> Bench<'a> {
     pub fn alive(&mut self, after: impl Display) -> Check {
         let ping = self.target.ping.clone();
         let before = self.sent.clone();
-        match self.ask(&ping)? {
+        match self.ask_due(&ping)? {
             Reply::Pdu(reply) if reply[0] == ping[0] => Ok(()),
             _ => {
                 self.sent = format!("{before}; then {}", self.sent);
@@ -288,7 +325,7 @@ impl<'a> Bench<'a> {
     ///
     /// [`Stop::Skip`] then, [`Stop::Fail`] when it is no ordinary reply, [`Stop::Broken`].
     pub fn reply_unless_lacking(&mut self, pdu: &[u8], what: &str) -> Check<Vec<u8>> {
-        match self.ask(pdu)? {
+        match self.ask_due(pdu)? {
             reply if reply.exception(pdu[0]) == Some(1) => {
                 Err(Stop::Skip(format!("the unit answers 01: it has no {what}")))
             }

@@ -24,6 +24,10 @@ pub enum Need {
     Power,
     /// The endpoint sees the driver.
     Driver,
+    /// Characters that the unit sends take their time on the endpoint's line.
+    CharacterTime,
+    /// The unit notices a start bit when it begins.
+    StartBit,
     /// The endpoint can let the unit hear itself.
     Echo,
     /// The endpoint can change rate and format.

@@ -134,7 +134,7 @@ fn ask(
     patience: Patience,
     pdu: &[u8],
 ) -> Check<Reply> {
-    Bench::new(endpoint, target, patience, false).ask(pdu)
+    Bench::new(endpoint, target, patience, false).ask_due(pdu)
 }
 
 /// Asks a unit that may be starting, or have something in its receiver from before.

@@ -33,6 +33,8 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// How long it took by the endpoint's clock.
     pub time: Duration,
+    /// Number of due replies that did not come and were asked for once more.
+    pub asked_again: u32,
 }
 
 /// What runs need to know beside the cases.
@@ -92,14 +94,15 @@ pub fn run_while(
             .needs
             .iter()
             .find_map(|need| lacking(*need, endpoint, target, options.allow_config));
-        let verdict = match lacking {
-            Some(why) => Verdict::Skipped(why),
+        let (verdict, asked_again) = match lacking {
+            Some(why) => (Verdict::Skipped(why), 0),
             None => one(endpoint, target, options, case)?,
         };
         let outcome = Outcome {
             case: *case,
             verdict,
             time: endpoint.now().saturating_sub(begin),
+            asked_again,
         };
         tell(&outcome);
         outcomes.push(outcome);
@@ -121,7 +124,7 @@ fn one(
     target: &Target,
     options: Options,
     case: &Case,
-) -> Result<Verdict, Broken> {
+) -> Result<(Verdict, u32), Broken> {
     let mut bench = Bench::new(endpoint, target, options.patience, options.allow_config);
     let writes = case
         .needs
@@ -143,17 +146,18 @@ fn one(
         None => Ok(()),
     };
     let complaints = bench.endpoint.take_complaints()?;
-    match result.and(restored) {
-        Ok(()) if complaints.is_empty() => Ok(Verdict::Passed),
-        Ok(()) => Ok(Verdict::Failed(Failure {
+    let verdict = match result.and(restored) {
+        Ok(()) if complaints.is_empty() => Verdict::Passed,
+        Ok(()) => Verdict::Failed(Failure {
             sent: case.about.to_owned(),
             came: complaints.join("; "),
             wanted: "nothing on the board that a real part would not take well".to_owned(),
-        })),
-        Err(Stop::Skip(why)) => Ok(Verdict::Skipped(why)),
-        Err(Stop::Fail(failure)) => Ok(Verdict::Failed(failure)),
-        Err(Stop::Broken(broken)) => Err(broken),
-    }
+        }),
+        Err(Stop::Skip(why)) => Verdict::Skipped(why),
+        Err(Stop::Fail(failure)) => Verdict::Failed(failure),
+        Err(Stop::Broken(broken)) => return Err(broken),
+    };
+    Ok((verdict, bench.asked_again))
 }
 
 /// Why a need is not met, if it is not.
@@ -184,7 +188,10 @@ fn lacking(
             target.words.is_some(),
             "no register to write to (on a modio, --allow-config gives some)",
         ),
-        Need::Exact => (able.exact, "the endpoint's time is not exact"),
+        Need::Exact => (
+            able.exact,
+            "the endpoint's time is not exact: it holds no silence below 100 ms",
+        ),
         Need::Faults => (able.faults, "the endpoint cannot send damaged characters"),
         Need::Parity => (
             endpoint.line().parity != Parity::None,
@@ -192,6 +199,14 @@ fn lacking(
         ),
         Need::Power => (able.power, "the endpoint cannot switch the power"),
         Need::Driver => (able.driver, "the endpoint does not see the driver"),
+        Need::CharacterTime => (
+            able.character_time,
+            "characters take no time on the endpoint's line",
+        ),
+        Need::StartBit => (
+            able.start_bit,
+            "the unit does not notice a start bit here before the character has ended",
+        ),
         Need::Echo => (able.echo, "the endpoint has no echo to switch"),
         Need::SetLine => (able.set_line, "the endpoint cannot change rate and format"),
         Need::Config => (allow_config, "writes the configuration: --allow-config"),

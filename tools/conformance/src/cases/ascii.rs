@@ -101,7 +101,7 @@ fn bad_lrc(bench: &mut Bench<'_>) -> Check {
 fn before_colon(bench: &mut Bench<'_>) -> Check {
     for noise in [&b"0"[..], b"\r\n", b"0103", b"\x00\xFF", b"hello"] {
         let frame = [noise, &bench.ping()].concat();
-        let reply = bench.raw(&frame)?;
+        let reply = bench.raw_due(&frame)?;
         bench.ensure(bench.is_pong(&reply), "a reply to what follows the colon")?;
     }
     Ok(())
@@ -110,7 +110,7 @@ fn before_colon(bench: &mut Bench<'_>) -> Check {
 fn colon_restarts(bench: &mut Bench<'_>) -> Check {
     for open in [&b":"[..], b":0", b":0103", b":010300000001"] {
         let frame = [open, &bench.ping()].concat();
-        let reply = bench.raw(&frame)?;
+        let reply = bench.raw_due(&frame)?;
         bench.ensure(
             bench.is_pong(&reply),
             "a reply to what follows the last colon",
@@ -143,21 +143,22 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn with_gap(bench: &mut Bench<'_>, gap: Duration) -> Check<Reply> {
+fn with_gap(bench: &Bench<'_>, gap: Duration) -> [Piece; 3] {
     let frame = bench.ping();
     let (first, rest) = frame.split_at(5);
-    bench.exchange(&[
+    [
         Piece::Bytes(first.to_vec()),
         Piece::Gap(gap),
         Piece::Bytes(rest.to_vec()),
-    ])
+    ]
 }
 
 fn short_gap(bench: &mut Bench<'_>) -> Check {
     let exact = bench.endpoint.abilities().exact;
     let longest = if exact { 980 } else { 500 };
     for ms in [10, 100, longest] {
-        let reply = with_gap(bench, Duration::from_millis(ms))?;
+        let pieces = with_gap(bench, Duration::from_millis(ms));
+        let reply = bench.exchange_due(&pieces)?;
         bench.ensure(
             bench.is_pong(&reply),
             format!("a reply: a gap of {ms} ms is allowed"),
@@ -168,11 +169,8 @@ fn short_gap(bench: &mut Bench<'_>) -> Check {
 
 fn long_gap(bench: &mut Bench<'_>) -> Check {
     for ms in [1050, 1500] {
-        let reply = with_gap(bench, Duration::from_millis(ms))?;
-        bench.ensure(
-            reply == Reply::Silence,
-            format!("silence: a gap of {ms} ms is too long"),
-        )?;
+        let pieces = with_gap(bench, Duration::from_millis(ms));
+        bench.silence(&pieces, format!("a gap of {ms} ms is too long"))?;
         bench.alive("a gap above a second")?;
     }
     Ok(())
@@ -188,7 +186,7 @@ fn of_length(bench: &Bench<'_>, data: usize) -> (u8, Vec<u8>) {
 fn longest(bench: &mut Bench<'_>) -> Check {
     // Unit, 253 bytes of PDU, LRC: 255 bytes as 510 digits, colon, CR and LF.
     let (function, frame) = of_length(bench, 252);
-    let reply = bench.raw(&frame)?;
+    let reply = bench.raw_due(&frame)?;
     bench.ensure(
         frame.len() == 513 && reply.exception(function) == Some(1),
         "exception 01: a frame of 513 characters is one",
@@ -224,7 +222,7 @@ fn delimiter(bench: &mut Bench<'_>) -> Check {
     let ping = bench.target.ping.clone();
     let new = with(bench, &ping, b'!');
     // The reply may end in either: what counts is that there is one.
-    let answered = bench.raw(&new)? != Reply::Silence;
+    let answered = bench.raw_due(&new)? != Reply::Silence;
     let back = with(bench, &change(b'\n'), b'!');
     bench.raw(&back)?;
     bench.ensure(

@@ -170,7 +170,7 @@ fn stray_zero(bench: &mut Bench<'_>) -> Check {
             Piece::Gap(bench.endpoint.line().t35() * 2),
             Piece::Bytes(bench.ping()),
         ];
-        let reply = bench.exchange(&apart)?;
+        let reply = bench.exchange_due(&apart)?;
         bench.ensure(
             bench.is_pong(&reply),
             "a reply: the stray byte was a frame of its own",

@@ -119,7 +119,7 @@ fn data_refused(bench: &mut Bench<'_>) -> Check {
         0x02, 0x04, 0x0A, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x10, 0x11, 0x12, 0x14,
     ] {
         for bad in [[0, 1], [1, 0], [0xFF, 0]] {
-            let reply = bench.ask(&diagnose(sub, &bad))?;
+            let reply = bench.ask_due(&diagnose(sub, &bad))?;
             if reply.exception(8) == Some(1) {
                 break;
             }
@@ -170,7 +170,7 @@ fn restart(bench: &mut Bench<'_>) -> Check {
 /// Puts the unit into listen-only mode, or skips the case.
 fn enter(bench: &mut Bench<'_>) -> Check {
     // Data that is refused tells whether it has the sub-function, without entering.
-    let reply = bench.ask(&diagnose(4, &[0, 1]))?;
+    let reply = bench.ask_due(&diagnose(4, &[0, 1]))?;
     if reply.exception(8) == Some(1) {
         return Err(crate::case::Stop::Skip(
             "the unit answers 01: it has no 08/04".to_owned(),
@@ -260,7 +260,7 @@ fn clear(bench: &mut Bench<'_>) -> Check {
         }
         let again = diagnose(0x0A, &[0, 0]);
         bench.reply_is(&again, &again)?;
-        let reply = bench.ask(&diagnose(sub, &[0, 0]))?;
+        let reply = bench.ask_due(&diagnose(sub, &[0, 0]))?;
         if reply.exception(8) == Some(1) {
             continue;
         }

@@ -179,7 +179,7 @@ fn of_length(bench: &Bench<'_>, length: usize) -> (u8, Vec<u8>) {
 fn longest(bench: &mut Bench<'_>) -> Check {
     for length in [255, 256] {
         let (function, frame) = of_length(bench, length);
-        let reply = bench.raw(&frame)?;
+        let reply = bench.raw_due(&frame)?;
         bench.ensure(
             reply.exception(function) == Some(1),
             format!("exception 01: a frame of {length} bytes is one"),

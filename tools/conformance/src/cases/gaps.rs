@@ -8,6 +8,7 @@ use crate::endpoint::Piece;
 use crate::frame::Reply;
 
 const N: &[Need] = &[Need::Rtu, Need::Exact];
+const B: &[Need] = &[Need::Rtu, Need::Exact, Need::StartBit];
 const S: &str = "V1.02 2.5.1.1";
 
 pub(super) const CASES: &[Case] = &[
@@ -26,6 +27,13 @@ pub(super) const CASES: &[Case] = &[
         between,
     ),
     case(
+        "gaps/just-below-t3.5",
+        S,
+        "a gap that is a few bits below t3.5 is treated as any other between t1.5 and t3.5",
+        B,
+        just_below_t35,
+    ),
+    case(
         "gaps/above-t3.5",
         S,
         "a gap above t3.5 ends the frame: neither half is one",
@@ -38,6 +46,13 @@ pub(super) const CASES: &[Case] = &[
         "a request less than t3.5 after another joins it, and both are lost",
         N,
         too_soon,
+    ),
+    case(
+        "gaps/a-bit-too-soon",
+        S,
+        "a request a few bits less than t3.5 after another joins it, and both are lost",
+        B,
+        a_bit_too_soon,
     ),
     case(
         "gaps/t3.5-is-enough",
@@ -100,13 +115,27 @@ fn below_t15(bench: &mut Bench<'_>) -> Check {
     bench.ensure(bench.is_pong(&reply), "a reply: all gaps are below t1.5")
 }
 
-fn between(bench: &mut Bench<'_>) -> Check {
+/// A gap between t1.5 and t3.5 that ends more than a character below t3.5, at any rate and format.
+fn middle(bench: &Bench<'_>) -> Duration {
     let line = bench.endpoint.line();
-    let (t15, t35) = (line.t15(), line.t35());
-    let margin = margin(bench);
+    line.t15() + (line.t35() - line.t15()) / 3
+}
+
+fn between(bench: &mut Bench<'_>) -> Check {
+    let low = bench.endpoint.line().t15() + margin(bench);
+    kept_or_dropped(bench, &[low, middle(bench)])
+}
+
+fn just_below_t35(bench: &mut Bench<'_>) -> Check {
+    let high = bench.endpoint.line().t35() - margin(bench);
+    kept_or_dropped(bench, &[middle(bench), high])
+}
+
+/// Frames with these gaps between t1.5 and t3.5 are all kept, or all dropped.
+fn kept_or_dropped(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
     let mut dropped = bench.target.strict_t15;
     for index in places(bench) {
-        for gap in [t15 + margin, (t15 + t35) / 2, t35 - margin] {
+        for &gap in gaps {
             let reply = with_gap(bench, index, gap)?;
             let answered = bench.is_pong(&reply);
             let right = answered || reply == Reply::Silence;
@@ -139,10 +168,20 @@ fn above_t35(bench: &mut Bench<'_>) -> Check {
 
 fn too_soon(bench: &mut Bench<'_>) -> Check {
     let t35 = bench.endpoint.line().t35();
+    joined_after(bench, &[t35 / 4, t35 / 2])
+}
+
+fn a_bit_too_soon(bench: &mut Bench<'_>) -> Check {
+    let gap = bench.endpoint.line().t35() - margin(bench);
+    joined_after(bench, &[gap])
+}
+
+/// A request these gaps after another one joins it.
+fn joined_after(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
     let mine = bench.ping();
     let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
     for first in [mine.clone(), others] {
-        for gap in [t35 / 4, t35 / 2, t35 - margin(bench)] {
+        for &gap in gaps {
             let pieces = [
                 Piece::Bytes(first.clone()),
                 Piece::Gap(gap),

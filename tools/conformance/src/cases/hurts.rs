@@ -37,7 +37,7 @@ pub(super) const CASES: &[Case] = &[
         "hurts/masters-without-gaps",
         "map, line",
         "a master that asks again at once after a reply is answered every time",
-        &[Need::Modio, Need::Rtu],
+        &[Need::Modio, Need::Rtu, Need::Exact],
         no_gaps,
     ),
     case(

@@ -25,7 +25,7 @@ pub(super) const CASES: &[Case] = &[
         "timing/no-gap-in-the-reply",
         "V1.02 2.5.1.1",
         "between a reply's characters there is less than t1.5",
-        &[Need::Rtu, Need::Exact],
+        &[Need::Rtu, Need::Exact, Need::CharacterTime],
         no_gap,
     ),
     case(

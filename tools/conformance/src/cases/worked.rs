@@ -61,7 +61,11 @@ fn play(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
             return Ok(());
         }
     }
-    let reply = bench.raw(frame)?;
+    let reply = if worked.request {
+        bench.raw_due(frame)?
+    } else {
+        bench.raw(frame)?
+    };
     let place = format!("{} {}", worked.source, worked.place);
     let right = match &reply {
         Reply::Silence => !worked.request,

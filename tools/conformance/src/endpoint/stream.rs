@@ -15,6 +15,9 @@ use crate::line::{LineFormat, Parity};
 /// So long a read may wait before the clock is looked at again.
 const SLICE: Duration = Duration::from_millis(5);
 
+/// The shortest silence that is sure to end a frame, however busy the host is and whatever carries the bytes.
+const SILENCE: Duration = Duration::from_millis(100);
+
 /// The longest frame, in characters (V1.02 2.5.2.1), and the time after which there is a silence on any line.
 const LONGEST: usize = 513;
 const GRACE: Duration = Duration::from_secs(2);
@@ -158,6 +161,10 @@ impl Endpoint for Stream {
     fn abilities(&self) -> Abilities {
         Abilities {
             set_line: matches!(self.carrier, Carrier::Serial(_)),
+            character_time: true,
+            start_bit: true,
+            // On a serial port a lost reply is a finding. A socket's bytes wait for the host's threads.
+            asks_again: matches!(self.carrier, Carrier::Tcp(_)),
             ..Abilities::default()
         }
     }
@@ -196,7 +203,7 @@ impl Endpoint for Stream {
                 Piece::Gap(gap) => {
                     self.write(&waiting)?;
                     // Bytes are on the line some time after they are written.
-                    thread::sleep(self.line.characters(waiting.len()) + *gap);
+                    thread::sleep(self.line.characters(waiting.len()) + (*gap).max(SILENCE));
                     waiting.clear();
                 }
                 Piece::BadParity(_) | Piece::BadStop(_) | Piece::Break(_) | Piece::Glitch(_) => {

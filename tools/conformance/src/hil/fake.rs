@@ -184,6 +184,8 @@ impl Endpoint for Line {
         Abilities {
             exact: true,
             set_line: true,
+            character_time: true,
+            start_bit: true,
             ..Abilities::default()
         }
     }

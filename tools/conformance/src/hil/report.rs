@@ -86,6 +86,7 @@ impl Report {
                 section: "bench",
                 verdict: &finding.verdict,
                 time: finding.time,
+                asked_again: 0,
             })
             .collect();
         let suites = [

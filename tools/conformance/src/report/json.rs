@@ -17,6 +17,7 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
             value["section"] = json!(outcome.case.section);
             value["about"] = json!(outcome.case.about);
             value["seconds"] = json!(outcome.time.as_secs_f64());
+            value["asked_again"] = json!(outcome.asked_again);
             value
         })
         .collect();
@@ -25,6 +26,7 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
         "passed": totals.passed,
         "failed": totals.failed,
         "skipped": totals.skipped,
+        "asked_again": totals.asked_again,
         "cases": cases,
     })
 }

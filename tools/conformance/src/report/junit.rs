@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use crate::report::asked_again;
 use crate::run::{Outcome, Verdict};
 
 /// What begins a document.
@@ -19,6 +20,8 @@ pub struct Test<'a> {
     pub verdict: &'a Verdict,
     /// How long it took.
     pub time: Duration,
+    /// Number of due replies that did not come and were asked for once more.
+    pub asked_again: u32,
 }
 
 /// The outcomes as a JUnit document; `suite` is what was tested.
@@ -37,6 +40,7 @@ pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
             section: outcome.case.section,
             verdict: &outcome.verdict,
             time: outcome.time,
+            asked_again: outcome.asked_again,
         })
         .collect()
 }
@@ -67,6 +71,11 @@ pub fn element(suite: &str, tests: &[Test<'_>]) -> String {
             test.time.as_secs_f64()
         );
         let _ = match test.verdict {
+            Verdict::Passed if test.asked_again > 0 => writeln!(
+                xml,
+                "><system-out>{}</system-out></testcase>",
+                asked_again(test.asked_again)
+            ),
             Verdict::Passed => writeln!(xml, "/>"),
             Verdict::Skipped(why) => {
                 writeln!(xml, "><skipped message=\"{}\"/></testcase>", escaped(why))

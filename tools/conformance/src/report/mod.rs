@@ -15,6 +15,8 @@ pub struct Totals {
     pub failed: usize,
     /// Cases that did not apply.
     pub skipped: usize,
+    /// Due replies that did not come and were asked for once more.
+    pub asked_again: u32,
 }
 
 impl Totals {
@@ -24,6 +26,7 @@ impl Totals {
         let mut totals = Self::default();
         for outcome in outcomes {
             totals.count(&outcome.verdict);
+            totals.asked_again += outcome.asked_again;
         }
         totals
     }
@@ -35,6 +38,15 @@ impl Totals {
             Verdict::Failed(_) => self.failed += 1,
             Verdict::Skipped(_) => self.skipped += 1,
         }
+    }
+}
+
+/// Says how many due replies did not come and were asked for once more; nothing when there was none.
+fn asked_again(times: u32) -> String {
+    match times {
+        0 => String::new(),
+        1 => "1 reply asked for again".to_owned(),
+        _ => format!("{times} replies asked for again"),
     }
 }
 
@@ -59,6 +71,7 @@ fn some_outcomes() -> Vec<Outcome> {
             case,
             verdict,
             time: Duration::from_millis(1250),
+            asked_again: 0,
         })
         .collect()
 }

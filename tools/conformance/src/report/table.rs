@@ -1,16 +1,16 @@
 //! The table on the terminal, and the list of cases.
 
 use crate::case::Case;
-use crate::report::Totals;
+use crate::report::{Totals, asked_again};
 use crate::run::{Outcome, Verdict};
 
 /// One row, and below it what went wrong.
 #[must_use]
 pub fn row(outcome: &Outcome) -> String {
     let (result, reason) = match &outcome.verdict {
-        Verdict::Passed => ("ok", String::new()),
+        Verdict::Passed => ("ok", asked_again(outcome.asked_again)),
         Verdict::Skipped(why) => ("skipped", why.clone()),
-        Verdict::Failed(_) => ("FAILED", String::new()),
+        Verdict::Failed(_) => ("FAILED", asked_again(outcome.asked_again)),
     };
     let case = outcome.case;
     let seconds = outcome.time.as_secs_f64();
@@ -32,8 +32,12 @@ pub fn row(outcome: &Outcome) -> String {
 #[must_use]
 pub fn summary(outcomes: &[Outcome]) -> String {
     let totals = Totals::of(outcomes);
+    let again = match asked_again(totals.asked_again) {
+        none if none.is_empty() => none,
+        again => format!("; {again}"),
+    };
     format!(
-        "{} cases: {} passed, {} failed, {} skipped",
+        "{} cases: {} passed, {} failed, {} skipped{again}",
         outcomes.len(),
         totals.passed,
         totals.failed,

@@ -106,6 +106,10 @@ faults! {
     StrictSometimes => "gaps/t1.5-to-t3.5",
     /// Takes a frame in two parts for one.
     JoinsParts => "gaps/above-t3.5",
+    /// Ends frames at three quarters of t3.5.
+    ClosesEarly => "gaps/a-bit-too-soon",
+    /// Ends frames at t1.5.
+    ClosesAtT15 => "gaps/too-soon",
     /// Ignores parity errors.
     IgnoresParity => "damage/parity-error",
     /// Ignores framing errors.
@@ -113,6 +117,9 @@ faults! {
     /// Looks for a request in what it hears first, without a silence before it.
     HasteAtStart => "power/in-the-middle-of-traffic",
 }
+
+/// Mistakes above that another case must find, too.
+pub const MORE_CASES: &[(Fault, &str)] = &[(Fault::ClosesEarly, "gaps/just-below-t3.5")];
 
 /// Mistakes of an ASCII server.
 pub const ASCII_FAULTS: &[(Fault, &str)] = &[

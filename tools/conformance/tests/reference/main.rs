@@ -17,7 +17,7 @@ use conformance::profile::Profile;
 use conformance::run::{Options, Outcome, Verdict, run};
 
 use endpoint::Reference;
-use fault::{ASCII_FAULTS, FAULTS, Fault};
+use fault::{ASCII_FAULTS, FAULTS, Fault, MORE_CASES};
 
 const PROFILE: &str = r#"
 unit = 9
@@ -99,7 +99,11 @@ fn a_faultless_server_passes_and_only_what_is_about_others_is_skipped() {
 #[test]
 fn every_fault_is_found_by_its_case() {
     let mut missed = Vec::new();
-    for (mode, faults) in [(Mode::Rtu, FAULTS), (Mode::Ascii, ASCII_FAULTS)] {
+    for (mode, faults) in [
+        (Mode::Rtu, FAULTS),
+        (Mode::Rtu, MORE_CASES),
+        (Mode::Ascii, ASCII_FAULTS),
+    ] {
         for (fault, case) in faults {
             let outcomes = outcomes(Some(*fault), mode, "8E1", Some(case));
             let [outcome] = &outcomes[..] else {

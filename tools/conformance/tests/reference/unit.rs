@@ -80,6 +80,8 @@ impl Unit {
     fn silence(&self) -> Duration {
         match self.mode {
             Mode::Rtu if self.server.has(Fault::JoinsParts) => self.line.t35() * 4,
+            Mode::Rtu if self.server.has(Fault::ClosesEarly) => self.line.t35() * 3 / 4,
+            Mode::Rtu if self.server.has(Fault::ClosesAtT15) => self.line.t15(),
             Mode::Rtu => self.line.t35(),
             Mode::Ascii if self.server.has(Fault::JoinsParts) => Duration::from_secs(3),
             Mode::Ascii => Duration::from_secs(1),
