@@ -1,11 +1,12 @@
 //! `cargo xtask renode`: the image on Renode, an emulator that nobody here wrote: its own suites, then the
-//! conformance suite through Renode's socket. With `--interactive`, for a person to try.
+//! conformance suite with every module, in virtual time. With `--interactive`, for a person to try.
 //!
 //! Renode is not needed for anything else: what can be checked of its files without it is a step of
 //! `cargo xtask test` ([`checks`]), and the simulator of `cargo xtask sim` needs none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use register_map::Module;
 
@@ -115,21 +116,27 @@ impl Bench {
         fs::create_dir_all(&self.output).map_err(|error| {
             Failure::new(format!("cannot make {}: {error}", self.output.display()))
         })?;
+        let begin = Instant::now();
         let mut steps = Steps::default();
         let mut ended = Vec::new();
-        let mut step = |name: &'static str, run: &dyn Fn() -> Result<()>| {
-            steps.run(name, || {
+        let mut step = |name: String, run: &dyn Fn() -> Result<()>| {
+            steps.run(&name, || {
+                let begin = Instant::now();
                 let outcome = Outcome::from(run());
-                ended.push((name, outcome.clone()));
+                say!("{name}: {} s", begin.elapsed().as_secs());
+                ended.push((name.clone(), outcome.clone(), begin.elapsed()));
                 outcome
             });
         };
-        step("suites in Renode", &|| suites::run(self));
-        step("conformance of the image in Renode", &|| {
-            live::conformance(self, conformance)
-        });
+        step("suites in Renode".to_owned(), &|| suites::run(self));
+        for module in Module::ALL {
+            step(format!("conformance in Renode, {module}"), &|| {
+                live::conformance(self, module, conformance)
+            });
+        }
         report::summary(&self.output, &self.renode, &ended)?;
         say!("\nresults: {}", self.output.display());
+        say!("the whole run took {} s", begin.elapsed().as_secs());
         steps.finish()
     }
 }

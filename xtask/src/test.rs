@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::steps::{Outcome, Steps};
 use crate::workspace::Workspace;
-use crate::{Result, build, command, pymodbus, renode, size};
+use crate::{Result, build, command, pymodbus, renode, sim, size};
 
 /// The options of `cargo xtask test`.
 #[derive(clap::Args, Debug)]
@@ -77,7 +77,13 @@ fn in_simulation(workspace: &Workspace, elf: &Path, package: &[&str]) -> Outcome
     let mut cargo = workspace.cargo("test");
     cargo.args(["--ignore-rust-version", "--no-fail-fast", "--package"]);
     cargo.args(package).args(["--", "--include-ignored"]);
-    command::run(cargo.env("MODIO_ELF", elf)).into()
+    cargo.env("MODIO_ELF", elf);
+    // Tests of one package cannot find the programs of another.
+    let simulator = match sim::simulator(workspace) {
+        Ok(simulator) => simulator,
+        Err(failure) => return Outcome::from(Err(failure)),
+    };
+    command::run(cargo.env("MODIO_SIM", simulator)).into()
 }
 
 /// A step on the image, which is skipped when there is none: that it is missing has failed already.

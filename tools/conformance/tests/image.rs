@@ -3,29 +3,54 @@
 #![cfg(feature = "sim")]
 
 use std::env;
+use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
 
+use conformance::case::Case;
 use conformance::cases::all;
 use conformance::cli::waits;
+use conformance::endpoint::Endpoint;
+use conformance::endpoint::exact_line::Tcp;
 use conformance::endpoint::sim::{Fitting, start};
 use conformance::frame::Mode;
 use conformance::line::LineFormat;
 use conformance::probe::{Given, probe};
 use conformance::report::table;
-use conformance::run::{Options, Verdict, run};
+use conformance::run::{Options, Outcome, Verdict, run};
 use register_map::{Module, configuration};
 
-/// Runs every case; tells how many have passed.
+fn elf() -> PathBuf {
+    PathBuf::from(env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test"))
+}
+
+/// Runs these cases against the unit at `dip`.
+fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) -> Vec<Outcome> {
+    let given = Given {
+        unit: dip,
+        mode,
+        patience: waits(endpoint, None),
+        profile: None,
+        allow_config: true,
+    };
+    let (target, patience) = probe(endpoint, &given).expect("the unit answers");
+    let options = Options {
+        patience,
+        allow_config: true,
+    };
+    run(endpoint, &target, options, cases, |_| {}).expect("the line holds")
+}
+
+/// Runs every case in process; none may fail.
 fn conforms(
     module: Module,
     dip: u8,
     line: LineFormat,
     mode: Mode,
     settings: &[(u16, u16)],
-) -> usize {
-    let elf = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
+) -> Vec<Outcome> {
     let fitting = Fitting {
-        elf: PathBuf::from(elf),
+        elf: elf(),
         module,
         dip,
         line,
@@ -33,19 +58,7 @@ fn conforms(
         settings: settings.to_vec(),
     };
     let mut endpoint = start(&fitting).expect("the image can be read");
-    let given = Given {
-        unit: dip,
-        mode,
-        patience: waits(&endpoint, None),
-        profile: None,
-        allow_config: true,
-    };
-    let (target, patience) = probe(&mut endpoint, &given).expect("the unit answers");
-    let options = Options {
-        patience,
-        allow_config: true,
-    };
-    let outcomes = run(&mut endpoint, &target, options, &all(), |_| {}).expect("the line holds");
+    let outcomes = outcomes(&mut endpoint, dip, mode, &all());
     let failed: Vec<String> = outcomes
         .iter()
         .filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
@@ -53,15 +66,82 @@ fn conforms(
         .collect();
     assert!(failed.is_empty(), "{module}:\n{}", failed.join("\n"));
     outcomes
-        .iter()
-        .filter(|o| o.verdict == Verdict::Passed)
-        .count()
 }
 
-/// 9600 8N2, as the factory sets it.
+/// The command modio-sim with this module in its slot, its line served by the exact-line protocol.
+struct Simulator {
+    child: Child,
+    address: String,
+}
+
+impl Simulator {
+    fn start(module: Module) -> Self {
+        let program =
+            env::var_os("MODIO_SIM").expect("MODIO_SIM names the simulator: cargo xtask test");
+        let mut child = Command::new(program)
+            .arg("--elf")
+            .arg(elf())
+            .args(["--module", module.name(), "--http", "127.0.0.1:0"])
+            .args(["--exact-line", "127.0.0.1:0"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the simulator can be started");
+        let stdout = child.stdout.take().expect("it is a pipe");
+        let mut lines = BufReader::new(stdout).lines();
+        let first = lines.next().expect("a line").expect("text");
+        let address = first
+            .strip_prefix("exact-line: ")
+            .expect("its address")
+            .to_owned();
+        // The rest is the firmware's log, which must not fill the pipe.
+        std::thread::spawn(move || lines.for_each(drop));
+        Self { child, address }
+    }
+
+    fn outcomes(&self, cases: &[Case]) -> Vec<Outcome> {
+        let mut endpoint = Tcp::connect(&self.address).expect("the simulator listens");
+        outcomes(&mut endpoint, 1, Mode::Rtu, cases)
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// 9600 8N2, as the factory sets it: in process and through the exact line, with the same verdicts.
 fn factory(module: Module) {
-    let passed = conforms(module, 1, LineFormat::default(), Mode::Rtu, &[]);
+    let in_process = conforms(module, 1, LineFormat::default(), Mode::Rtu, &[]);
+    let passed = in_process.iter().filter(|o| o.verdict == Verdict::Passed);
+    let passed = passed.count();
     assert!(passed > 90, "{passed} cases apply to a {module}");
+    let verdicts = |outcomes: Vec<Outcome>| -> Vec<(&str, Verdict)> {
+        let each = outcomes.into_iter();
+        each.map(|outcome| (outcome.case.name, outcome.verdict))
+            .collect()
+    };
+    let exact_line = Simulator::start(module).outcomes(&all());
+    assert_eq!(verdicts(exact_line), verdicts(in_process), "{module}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn the_same_run_on_an_exact_line_gives_the_same_report_to_the_byte() {
+    let mut cases = all();
+    cases.retain(|case| {
+        ["fc03/", "gaps/", "timing/", "power/"]
+            .iter()
+            .any(|part| case.name.starts_with(part))
+    });
+    let report = || -> Vec<String> {
+        let outcomes = Simulator::start(Module::Ai4).outcomes(&cases);
+        outcomes.iter().map(table::row).collect()
+    };
+    let first = report();
+    assert!(first.len() > 20, "{first:#?}");
+    assert_eq!(report(), first);
 }
 
 macro_rules! with_each_module {

@@ -1,8 +1,8 @@
-//! The board in a Renode of its own, with its line on a TCP socket: for the conformance suite, and for a
-//! person.
+//! The board in a Renode of its own: in virtual time for the conformance suite, with its line on a TCP
+//! socket for a person.
 
 use std::fs::{self, File};
-use std::io::Write as _;
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -16,15 +16,12 @@ use super::processes::Group;
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command};
 
-/// How long Renode may take to load the platform and open the socket.
-const START: Duration = Duration::from_secs(120);
+/// The script that serves the line by the exact-line protocol, and the one that offers it to a person.
+const EXACT: &str = "modio-02-exact.resc";
+const SOCKET: &str = "modio-02.resc";
 
-/// How long Renode takes to notice that a client has gone, before it serves the next.
-const HANDOVER: Duration = Duration::from_millis(500);
-
-/// What stays silent for so many milliseconds is silent: twice what is enough on a socket of the
-/// simulator, because Renode does not keep up with the clock everywhere.
-const PATIENCE_MS: &str = "500";
+/// How long Renode may take to load the platform, start the board and open the socket.
+const START: Duration = Duration::from_secs(180);
 
 /// Builds the conformance suite and tells where it is.
 ///
@@ -45,25 +42,23 @@ pub(super) fn suite(workspace: &Workspace) -> Result<PathBuf> {
     Ok(workspace.target().join("debug").join(name))
 }
 
-/// Runs the conformance suite against the board in Renode; results go to `conformance.*` in the output
-/// directory.
+/// Runs the conformance suite against the board in Renode with this module; results go to
+/// `conformance-MODULE.*` in the output directory.
 ///
 /// # Errors
 ///
 /// When Renode does not start, or a case failed.
-pub(super) fn conformance(bench: &Bench, suite: &Path) -> Result<()> {
+pub(super) fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
     let (port, monitor) = (free_port()?, free_port()?);
-    let script = write_script(bench, Module::Do4, 1, port)?;
-    let log = bench.output.join("renode.log");
+    let script = write_script(bench, EXACT, module, 1, port)?;
+    let log = bench.output.join(format!("renode-{module}.log"));
     let mut renode = start(bench, &script, monitor, &log)?;
     await_line(&mut renode, port, &log)?;
     let mut command = Command::new(suite);
-    command.args(["--tcp", &format!("127.0.0.1:{port}")]);
-    command.args(["--unit", "1", "--allow-config", "--patience", PATIENCE_MS]);
-    for (option, name) in [
-        ("--junit", "conformance.xml"),
-        ("--json", "conformance.json"),
-    ] {
+    command.args(["--exact-line", &format!("127.0.0.1:{port}")]);
+    command.args(["--unit", "1", "--allow-config"]);
+    for (option, extension) in [("--junit", "xml"), ("--json", "json")] {
+        let name = format!("conformance-{module}.{extension}");
         command.arg(option).arg(bench.output.join(name));
     }
     let status = Group::start(&mut command)?.wait()?;
@@ -72,7 +67,7 @@ pub(super) fn conformance(bench: &Bench, suite: &Path) -> Result<()> {
     drop(renode);
     match status.code() {
         _ if died => Err(Failure::new(format!(
-            "Renode ended meanwhile: {}",
+            "Renode ended before the conformance suite did: {}",
             last_line(&log)
         ))),
         Some(0) => Ok(()),
@@ -93,7 +88,7 @@ pub(super) fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Res
     fs::create_dir_all(&bench.output).map_err(|error| {
         Failure::new(format!("cannot make {}: {error}", bench.output.display()))
     })?;
-    let script = write_script(bench, module, dip, port)?;
+    let script = write_script(bench, SOCKET, module, dip, port)?;
     say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the slot");
     say!("in the monitor: modio_log shows the firmware's log, quit ends it all");
     let mut command = bench.renode.command();
@@ -125,12 +120,11 @@ fn quit(monitor: u16) {
     }
 }
 
-/// Waits until the line's socket is open.
+/// Waits until the line's server answers.
 fn await_line(renode: &mut Group, port: u16, log: &Path) -> Result<()> {
     let end = Instant::now() + START;
     loop {
-        if TcpStream::connect((Ipv4Addr::LOCALHOST, port)).is_ok() {
-            thread::sleep(HANDOVER);
+        if greets(port) {
             return Ok(());
         }
         if renode.has_ended() {
@@ -139,14 +133,27 @@ fn await_line(renode: &mut Group, port: u16, log: &Path) -> Result<()> {
         }
         if Instant::now() > end {
             let (seconds, log) = (START.as_secs(), log.display());
-            let what = format!("the line was not open after {seconds} s, see {log}");
+            let what = format!("the line did not answer after {seconds} s, see {log}");
             return Err(Failure::new(what));
         }
         thread::sleep(Duration::from_millis(100));
     }
 }
 
-/// The last thing that a log tells.
+/// Whether a server of the exact-line protocol answers on this port.
+fn greets(port: u16) -> bool {
+    let Ok(mut socket) = TcpStream::connect((Ipv4Addr::LOCALHOST, port)) else {
+        return false;
+    };
+    let mut reply = String::new();
+    let asked = socket
+        .set_read_timeout(Some(START))
+        .and_then(|()| socket.write_all(b"hello 1\n"))
+        .and_then(|()| BufReader::new(socket).read_line(&mut reply));
+    asked.is_ok() && reply.starts_with("ok ")
+}
+
+/// The last error in a log, or its last line.
 fn last_line(log: &Path) -> String {
     let text = fs::read(log).unwrap_or_default();
     let text = String::from_utf8_lossy(&text);
@@ -159,13 +166,19 @@ fn last_line(log: &Path) -> String {
         .to_owned()
 }
 
-/// Writes the script that says which image and board, and then starts it.
-fn write_script(bench: &Bench, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
+/// Writes the script that sets image and board, and then includes another one.
+fn write_script(
+    bench: &Bench,
+    include: &str,
+    module: Module,
+    dip: u8,
+    port: u16,
+) -> Result<PathBuf> {
     let script = bench.output.join("run.resc");
     let text = format!(
         "$elf={}\n$dip={dip}\n$module=\"{module}\"\n$port={port}\ninclude {}\n",
         token(&bench.elf),
-        token(&bench.directory.join("modio-02.resc")),
+        token(&bench.directory.join(include)),
     );
     fs::write(&script, text)
         .map_err(|error| Failure::new(format!("cannot write {}: {error}", script.display())))?;

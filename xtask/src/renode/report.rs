@@ -93,21 +93,25 @@ fn duration(status: Node) -> Option<Duration> {
     (time("endtime")? - time("starttime")?).to_std().ok()
 }
 
-/// Writes `summary.json`: the version of Renode and the outcome of every step.
+/// Writes `summary.json`: the version of Renode, and the outcome and duration of every step.
 ///
 /// # Errors
 ///
 /// Returns an error when the file cannot be written.
-pub(super) fn summary(output: &Path, renode: &Renode, steps: &[(&str, Outcome)]) -> Result<()> {
+pub(super) fn summary(
+    output: &Path,
+    renode: &Renode,
+    steps: &[(String, Outcome, Duration)],
+) -> Result<()> {
     let steps: Vec<Value> = steps
         .iter()
-        .map(|(name, outcome)| {
+        .map(|(name, outcome, took)| {
             let (state, why) = match outcome {
                 Outcome::Passed => ("passed", ""),
                 Outcome::Failed(why) => ("failed", why.as_str()),
                 Outcome::Skipped(why) => ("skipped", why.as_str()),
             };
-            json!({ "step": name, "outcome": state, "why": why })
+            json!({ "step": name, "outcome": state, "why": why, "seconds": took.as_secs_f64() })
         })
         .collect();
     let text = json!({ "renode": renode.version(), "steps": steps });

@@ -41,6 +41,7 @@ pub(super) fn run(bench: &Bench) -> Result<()> {
         (Some(0), Ok(counts)) if counts.failed == 0 && counts.passed > 0 => Ok(()),
         (Some(0), Ok(_)) => Err(Failure::new("renode-test ran no test, or hid a failure")),
         (Some(0), Err(failure)) => Err(failure),
+        (Some(1), Err(failure)) => Err(failure),
         (Some(1), Ok(counts)) => Err(Failure::new(format!(
             "{} of {} tests failed, see {}",
             counts.failed,

@@ -20,7 +20,9 @@ line = int(re.search(r'^.port=(\d+)', open(sys.argv[-1]).read(), re.M).group(1))
 monitor = socket.create_server(('127.0.0.1', int(sys.argv[sys.argv.index('--port') + 1])))
 def serve(server):
     while True:
-        server.accept()
+        client = server.accept()[0]
+        for line in client.makefile():
+            client.sendall(b'ok 0.000 version=1 line=9600,8N2 abilities= name=fake\\n')
 threading.Thread(target=serve, args=[socket.create_server(('127.0.0.1', line))], daemon=True).start()
 told = monitor.accept()[0].makefile().read().lstrip()
 open(os.environ['CALLS'], 'a').write('told ' + told)
@@ -86,7 +88,9 @@ impl Fake {
         let bench = self.bench();
         fs::create_dir_all(&bench.output).unwrap();
         let suites = suites::run(&bench);
-        (suites, live::conformance(&bench, &self.at("conformance")))
+        let conformance = self.at("conformance");
+        let conformance = live::conformance(&bench, Module::Do4, &conformance);
+        (suites, conformance)
     }
 
     fn calls(&self) -> Vec<String> {
@@ -196,14 +200,14 @@ fn suites_run_first_and_then_conformance_against_the_board() {
         "{renode}"
     );
     assert!(
-        conformance.starts_with("conformance --tcp 127.0.0.1:"),
+        conformance.starts_with("conformance --exact-line 127.0.0.1:"),
         "{conformance}"
     );
     for option in [
         "--allow-config",
         "--unit 1",
-        "conformance.xml",
-        "conformance.json",
+        "conformance-4do.xml",
+        "conformance-4do.json",
     ] {
         assert!(conformance.contains(option), "{option}");
     }
@@ -215,7 +219,7 @@ fn suites_run_first_and_then_conformance_against_the_board() {
     assert!(script.contains("$module=\"4do\"\n$"), "{script}");
     assert!(script.contains(&format!("$elf={}\n", live::token(&fake.at("modio")))));
     assert!(
-        script.trim_end().ends_with("renode/modio-02.resc"),
+        script.trim_end().ends_with("renode/modio-02-exact.resc"),
         "{script}"
     );
     assert!(fake.at("output with a space/robot.xml").is_file());
@@ -264,7 +268,11 @@ fn a_renode_that_does_not_come_up_is_told_with_what_it_said() {
     let bench = fake.bench();
     fs::create_dir_all(&bench.output).unwrap();
     fake.program("renode", "echo 'Error E25: no such type'; echo bye; exit 0");
-    let text = message(live::conformance(&bench, &fake.at("conformance")));
+    let text = message(live::conformance(
+        &bench,
+        Module::Do4,
+        &fake.at("conformance"),
+    ));
     assert_eq!(
         text,
         "Renode does not start the board: Error E25: no such type"
@@ -277,7 +285,7 @@ fn a_renode_that_does_not_come_up_is_told_with_what_it_said() {
 }
 
 #[test]
-fn a_renode_that_dies_meanwhile_fails_the_run_even_if_all_cases_passed() {
+fn renode_that_dies_during_the_run_is_a_failure_even_if_all_cases_passed() {
     let fake = Fake::new();
     let calls = fake.at("calls");
     let killer = format!(
@@ -290,7 +298,10 @@ fn a_renode_that_dies_meanwhile_fails_the_run_even_if_all_cases_passed() {
     );
     fake.program("conformance", &killer);
     let text = message(fake.run().1);
-    assert!(text.starts_with("Renode ended meanwhile"), "{text}");
+    assert!(
+        text.starts_with("Renode ended before the conformance suite did"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 #![cfg(unix)]
 
+mod exact_line;
 mod gdb;
 mod unit;
 

@@ -1,0 +1,182 @@
+//! The exact line of the running command, as a client on its socket finds it.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use super::{Running, endless_loop, refused, state};
+
+/// A client of the line.
+struct Client {
+    stream: BufReader<TcpStream>,
+}
+
+impl Client {
+    fn connect(address: &str) -> Self {
+        let stream = TcpStream::connect(address).unwrap();
+        stream
+            .set_read_timeout(Some(Duration::from_secs(60)))
+            .unwrap();
+        Self {
+            stream: BufReader::new(stream),
+        }
+    }
+
+    fn read(&mut self) -> String {
+        let mut line = String::new();
+        self.stream.read_line(&mut line).unwrap();
+        line
+    }
+
+    fn ask(&mut self, request: &[u8]) -> String {
+        self.stream.get_mut().write_all(request).unwrap();
+        self.read()
+    }
+}
+
+/// A simulator whose firmware is an endless loop, its line's address and its front panel's.
+fn started(more: &[&str]) -> (Running, String, String) {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
+    arguments.extend(["--exact-line", "127.0.0.1:0"]);
+    arguments.extend(more);
+    let mut running = Running::start(&arguments);
+    let line = running.endpoint("exact-line: ");
+    let http = running.endpoint("http: http://");
+    (running, line, http)
+}
+
+#[test]
+fn time_stands_still_between_requests() {
+    let (_running, line, http) = started(&[]);
+    let mut client = Client::connect(&line);
+    assert_eq!(client.ask(b"run 0\n"), "ok 100000.000\n");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(client.ask(b"run 1500.5\r\n"), "ok 101500.500\n");
+    assert_eq!(state(&http)["virtual_ms"], 101, "the front panel shows it");
+    let hello = client.ask(b"hello 1\n");
+    assert!(
+        hello.starts_with("ok 101500.500 version=1 line=9600,8N2 "),
+        "{hello}"
+    );
+}
+
+#[test]
+fn bad_lines_get_an_error_each_and_let_no_time_pass() {
+    let (_running, line, _) = started(&[]);
+    let mut client = Client::connect(&line);
+    let before = client.ask(b"run 0\n");
+    for request in [
+        &b"\n"[..],
+        b"\r\n",
+        b"nonsense\n",
+        b"send\n",
+        b"send 1\n",
+        b"send 01 parity:01\n",
+        b"run -1\n",
+        b"run 600000000.001\n",
+        b"line 9600 7E1\n",
+        b"send \xC3\x28\n",
+        b"\x00\xFF\n",
+        b"GET / HTTP/1.1\r\n",
+    ] {
+        let reply = client.ask(request);
+        assert!(reply.starts_with("error ") && reply.len() > 12, "{reply}");
+    }
+    assert_eq!(client.ask(b"run 0\n"), before);
+}
+
+#[test]
+fn a_line_that_is_too_long_ends_the_connection_and_the_next_client_is_served() {
+    let (_running, line, _) = started(&[]);
+    let mut client = Client::connect(&line);
+    let longest = [b"send ".to_vec(), vec![b' '; (1 << 20) - 5], b"\n".to_vec()].concat();
+    assert!(client.ask(&longest).contains("at least one piece"));
+    client
+        .stream
+        .get_mut()
+        .write_all(&vec![b'0'; (1 << 20) + 2])
+        .unwrap();
+    let reply = client.read();
+    assert!(
+        reply.starts_with("error the line is longer than 1048576"),
+        "{reply}"
+    );
+    assert_eq!(client.stream.read(&mut [0; 8]).unwrap(), 0);
+    assert_eq!(served(&line).ask(b"run 0\n"), "ok 100000.000\n");
+}
+
+/// Connects until the server has noticed that the client before has gone.
+fn served(line: &str) -> Client {
+    let end = Instant::now() + Duration::from_secs(60);
+    loop {
+        let mut client = Client::connect(line);
+        // A refused client may find its connection reset.
+        let mut reply = String::new();
+        let written = client.stream.get_mut().write_all(b"run 0\n");
+        let read = client.stream.read_line(&mut reply);
+        if written.is_ok() && read.is_ok() && reply.starts_with("ok ") {
+            return client;
+        }
+        assert!(Instant::now() < end, "{reply}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_second_client_is_refused_and_the_first_goes_on() {
+    let (_running, line, _) = started(&[]);
+    let mut first = Client::connect(&line);
+    assert_eq!(first.ask(b"run 10\n"), "ok 100010.000\n");
+    let mut second = Client::connect(&line);
+    assert_eq!(
+        second.read(),
+        "error the line is in use by another client\n"
+    );
+    assert_eq!(first.ask(b"run 10\n"), "ok 100020.000\n");
+}
+
+#[test]
+fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
+    let (_running, line, _) = started(&[]);
+    let mut client = Client::connect(&line);
+    client.stream.get_mut().write_all(b"run 1000").unwrap();
+    drop(client);
+    let mut client = served(&line);
+    assert_eq!(
+        client.ask(b"run 0\n"),
+        "ok 100000.000\n",
+        "half a line is no request"
+    );
+    // This request takes a minute of virtual time, and its client does not wait for the reply.
+    client
+        .stream
+        .get_mut()
+        .write_all(b"run 60000000\n")
+        .unwrap();
+    drop(client);
+    assert_eq!(served(&line).ask(b"run 0\n"), "ok 60100000.000\n");
+}
+
+#[test]
+fn signals_end_it_while_a_long_request_is_carried_out() {
+    let (mut running, line, _) = started(&[]);
+    let mut client = Client::connect(&line);
+    client
+        .stream
+        .get_mut()
+        .write_all(b"run 600000000\n")
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(50));
+    running.signal("-INT");
+    assert_eq!(running.end(), (Some(0), String::new()));
+}
+
+#[test]
+fn endpoints_that_follow_the_clock_are_refused_beside_it() {
+    for other in ["--pty", "--tcp", "--gdb"] {
+        let arguments = ["--exact-line", "127.0.0.1:0", other, "127.0.0.1:0"];
+        refused(&arguments, &["--exact-line", other]);
+    }
+}
