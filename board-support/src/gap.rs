@@ -1,7 +1,16 @@
 //! From a line's silences to the settings of the frame-gap timer.
 //!
 //! The timer starts when the receiver raises its flag, which is some time before the character has
-//! left the line, and must run out no sooner than the silence asked for after its end.
+//! left the line, and must reach a silence no sooner than that time after its end.
+//!
+//! ```text
+//!  character |......t1.5|.......t3.5|
+//!       ^ flag: count 0 ^           ^
+//!                       |-- late ---|-- late --->    one character each
+//! ```
+//!
+//! A character that has begun by t1.5 or t3.5 raises its flag within one more character: that long the
+//! decision can be put off, and no longer.
 
 use crate::uart::LineSettings;
 
@@ -12,8 +21,12 @@ pub struct GapTicks {
     pub prescaler: u16,
     /// Compare value: t1.5 after the character's end.
     pub t15: u16,
-    /// Reload value: t3.5 after the character's end.
+    /// Compare value: one character after `t15`.
+    pub t15_late: u16,
+    /// Compare value: t3.5 after the character's end.
     pub t35: u16,
+    /// Reload value: one character after `t35`.
+    pub t35_late: u16,
 }
 
 impl GapTicks {
@@ -28,17 +41,22 @@ impl GapTicks {
             return None;
         }
         let clock = clock_mhz as u32;
-        // At most 128 * 62,500 * 16, so that 32 bits are enough: a division of 64 bits takes 400 bytes.
-        let rest = (clock * 62_500 * line.format.sixteenths_after_flag()).div_ceil(line.baud);
+        // At most 128 * 62,500 * 176, so that 32 bits are enough: a division of 64 bits takes 400 bytes.
+        let sixteenth = clock * 62_500;
+        let rest = (sixteenth * line.format.sixteenths_after_flag()).div_ceil(line.baud);
+        let character = (sixteenth * 16 * line.format.bits()).div_ceil(line.baud);
         // 4.3 s at most, of 128 MHz: 30 bits.
         let t15 = rest.saturating_add(cycles(clock, t15_ns));
         let t35 = rest.saturating_add(cycles(clock, t35_ns));
-        let divider = t35.div_ceil(0xFFFF);
+        let t35_late = t35.saturating_add(character);
+        let divider = t35_late.div_ceil(0xFFFF);
         let divider = if divider == 0 { 1 } else { divider };
         Some(Self {
             prescaler: (divider - 1) as u16,
             t15: t15.div_ceil(divider) as u16,
+            t15_late: t15.saturating_add(character).div_ceil(divider) as u16,
             t35: t35.div_ceil(divider) as u16,
+            t35_late: t35_late.div_ceil(divider) as u16,
         })
     }
 }
@@ -74,10 +92,17 @@ mod tests {
                 let line = LineSettings { baud, format };
                 let ticks = GapTicks::new(72, line, t15, t35).unwrap();
                 let tick_ns = (i64::from(ticks.prescaler) + 1) * 1_000_000_000 / 72_000_000 + 1;
-                for (count, wanted) in [(ticks.t15, t15), (ticks.t35, t35)] {
+                let character = 1_000_000_000 / baud * format.bits();
+                for (count, wanted) in [
+                    (ticks.t15, t15),
+                    (ticks.t15_late, t15 + character),
+                    (ticks.t35, t35),
+                    (ticks.t35_late, t35 + character),
+                ] {
                     let over = after_end(ticks, count, line) - i64::from(wanted);
                     assert!(
-                        (-1..=2 * tick_ns).contains(&over),
+                        // The character above is up to 11 ns short.
+                        (-1..=2 * tick_ns + 11).contains(&over),
                         "{line:?} {wanted}: {over} ns over"
                     );
                 }

@@ -1,10 +1,14 @@
-//! The frame-gap timer: TIM2 in one-pulse mode tells t1.5 and t3.5, and TIM1 tells whether a
-//! character is already on its way.
+//! The frame-gap timer: TIM2 in one-pulse mode measures t1.5 and t3.5, and TIM1 sees whether a character
+//! may already be on its way.
 //!
-//! The receiver speaks up only when a character is whole. A character that began just before t3.5
-//! belongs to the frame, yet is not there when the timer runs out. Its start bit is: PA10 is
-//! USART1's input and TIM1's channel 3 as well, and the capture flag keeps, without any interrupt,
-//! that the line has fallen since the flag was last taken back.
+//! The UART raises its flag only when a character is complete. A character that began just before t3.5
+//! belongs to the frame, but its flag is not set yet when t3.5 is reached. Its start bit has been on the
+//! line: PA10 is the input of USART1 and of TIM1's channel 3, and the capture flag shows, without any
+//! interrupt, that the line has fallen since the flag was cleared.
+//!
+//! The line also falls when a pulse of noise is too short for a start bit (RM0008 27.3.3). So an edge
+//! puts the decision off by one character, once: a real character is complete by then and starts the
+//! silence again, and noise delays a reply by one character at most, however often it comes.
 
 use stm32f1xx_hal::{
     pac,
@@ -46,9 +50,13 @@ impl GapTimer {
         pac::TIM2::enable(rcc);
         pac::TIM2::reset(rcc);
         timer.psc().write(|w| w.psc().set(ticks.prescaler));
-        timer.arr().write(|w| w.arr().set(ticks.t35));
+        timer.arr().write(|w| w.arr().set(ticks.t35_late));
         timer.ccr1().write(|w| w.ccr().set(ticks.t15));
-        timer.dier().write(|w| w.uie().enabled().cc1ie().enabled());
+        timer.ccr2().write(|w| w.ccr().set(ticks.t15_late));
+        timer.ccr3().write(|w| w.ccr().set(ticks.t35));
+        timer
+            .dier()
+            .write(|w| w.uie().enabled().cc1ie().enabled().cc3ie().enabled());
 
         pac::TIM1::enable(rcc);
         pac::TIM1::reset(rcc);
@@ -71,9 +79,7 @@ impl GapTimer {
             .cr1()
             .write(|w| w.urs().counter_only().opm().enabled());
         self.timer.egr().write(|w| w.ug().update());
-        self.timer
-            .sr()
-            .write(|w| w.uif().clear_bit().cc1if().clear_bit());
+        self.timer.sr().reset();
         self.timer
             .cr1()
             .write(|w| w.urs().counter_only().opm().enabled().cen().enabled());
@@ -81,35 +87,51 @@ impl GapTimer {
 
     /// Stops: no silence is of interest until the next character.
     pub fn stop(&mut self) {
+        self.halt();
+        self.timer.sr().reset();
+    }
+
+    fn halt(&mut self) {
         self.timer
             .cr1()
             .write(|w| w.urs().counter_only().opm().enabled());
-        self.timer
-            .sr()
-            .write(|w| w.uif().clear_bit().cc1if().clear_bit());
     }
 
     /// Takes what the timer's interrupt is about.
     #[inline]
     pub fn take_event(&mut self) -> GapEvent {
         let flags = self.timer.sr().read();
-        let on_its_way = self.start_bit.sr().read().cc3if().bit_is_set();
-        if flags.uif().bit_is_clear() && flags.cc1if().bit_is_clear() {
-            return GapEvent::Nothing;
-        }
-        if on_its_way {
-            // The character restarts the silence itself; should the edge have been noise, this does.
-            self.restart();
-            return GapEvent::Nothing;
-        }
+        // Only the flags that were read: one that is set from here on raises the interrupt again.
+        // SAFETY: every bit of SR is cleared by 0 and left alone by 1 (RM0008 15.4.5).
+        self.timer.sr().write(|w| unsafe { w.bits(!flags.bits()) });
+        let may_be_on_its_way = self.start_bit.sr().read().cc3if().bit_is_set();
         if flags.uif().bit_is_set() {
-            self.timer
-                .sr()
-                .write(|w| w.uif().clear_bit().cc1if().clear_bit());
+            // One-pulse mode has stopped the counter.
             GapEvent::T35
-        } else {
-            self.timer.sr().modify(|_, w| w.cc1if().clear_bit());
+        } else if flags.cc3if().bit_is_set() {
+            if may_be_on_its_way {
+                return GapEvent::Nothing;
+            }
+            self.halt();
+            GapEvent::T35
+        } else if flags.cc2if().bit_is_set() && self.late_t15(false) {
             GapEvent::T15
+        } else if flags.cc1if().bit_is_set() {
+            // When the later instant has passed too, it has been waited for.
+            if may_be_on_its_way && flags.cc2if().bit_is_clear() {
+                self.late_t15(true);
+                return GapEvent::Nothing;
+            }
+            GapEvent::T15
+        } else {
+            GapEvent::Nothing
         }
+    }
+
+    /// Has t1.5 reported one character late, or not; returns whether it was to be until now.
+    fn late_t15(&mut self, on: bool) -> bool {
+        let before = self.timer.dier().read().cc2ie().bit_is_set();
+        self.timer.dier().modify(|_, w| w.cc2ie().bit(on));
+        before
     }
 }

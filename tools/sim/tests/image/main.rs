@@ -33,6 +33,7 @@ mod noise;
 mod outputs_at_start;
 mod points;
 mod power_cut;
+mod pulses;
 mod ranges;
 mod refusals;
 mod registers;

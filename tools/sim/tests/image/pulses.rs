@@ -1,0 +1,204 @@
+//! Pulses of noise on the line, each too short for a start bit (RM0008 27.3.3): they delay a reply by one
+//! character at most, and a real character that begins just before t3.5 still belongs to the frame.
+
+use register_map::{codes::Baud, configuration};
+use sim::{Module, Time};
+
+use crate::bench::{Bench, adu};
+
+/// A read of the four inputs.
+const REQUEST: [u8; 6] = [1, 2, 0, 0x10, 0, 4];
+
+/// Rates of pulses, in pulses a second.
+const PULSE_RATES: [u32; 6] = [10, 100, 333, 1000, 10_000, 100_000];
+
+fn at(baud: Baud) -> Bench {
+    let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
+    // The first t3.5 of silence.
+    bench.board.run_for(Time::from_ms(40));
+    bench
+}
+
+/// Widths of a pulse, from the shortest that TIM1 sees to the longest that is no start bit, and that leave the
+/// line high for three quarters of the time.
+fn widths(bench: &Bench, period: Time) -> Vec<Time> {
+    let bit = bench.bit().as_ns();
+    let widths = [100, bit / 20, bit / 4, bit * 9 / 20].map(Time::from_ns);
+    let fits = |width: &Time| width.as_ns() <= period.as_ns() / 4;
+    widths.into_iter().filter(fits).collect()
+}
+
+/// Puts one pulse on the line.
+fn pulse(bench: &mut Bench, at: Time, width: Time) {
+    bench.board.line().noise(at, width);
+}
+
+/// Puts pulses on the line from `from` to `to`.
+fn pulses(bench: &mut Bench, from: Time, to: Time, period: Time, width: Time) {
+    let mut at = from;
+    while at + width < to {
+        pulse(bench, at, width);
+        at += period;
+    }
+}
+
+/// From the end of the request to the unit's taking the bus; `None` when there is no reply. The driver shows it,
+/// because a pulse just before the reply may hide its first start bit from the listener.
+fn turnaround(bench: &mut Bench, end: Time) -> Option<Time> {
+    let limit = end + bench.t35() * 3 + bench.characters(20);
+    while bench.board.now() < limit {
+        let on = bench
+            .board
+            .line()
+            .driver_edges()
+            .find(|&(at, on)| on && at > end);
+        if let Some((on, _)) = on {
+            let rest = bench.characters(12) + bench.t35();
+            bench.board.run_for(rest);
+            return Some(on - end);
+        }
+        let step = bench.characters(1);
+        bench.board.run_for(step);
+    }
+    None
+}
+
+fn assert_prompt(bench: &mut Bench, end: Time, what: &str) {
+    let most = bench.t35() + bench.characters(1) + Time::from_us(60);
+    match turnaround(bench, end) {
+        Some(time) if time <= most => {}
+        other => panic!("{what}: a reply within {most}, not {other:?}"),
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn pulses_after_a_request_delay_its_reply_by_one_character_at_most() {
+    for &baud in Baud::ALL {
+        let mut bench = at(baud);
+        for rate in PULSE_RATES {
+            let period = Time::cycles(1, rate);
+            for width in widths(&bench, period) {
+                let now = bench.board.now();
+                let end = bench.board.line().send(now, &adu(&REQUEST));
+                let last = end + bench.t35() + bench.characters(1);
+                let first = end + bench.bit();
+                pulses(&mut bench, first, last, period, width);
+                let what = format!("{baud:?}, {rate} pulses a second of {width}");
+                assert_prompt(&mut bench, end, &what);
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_single_pulse_at_any_instant_after_a_request_delays_its_reply_by_one_character_at_most() {
+    for baud in [Baud::B9600, Baud::B115200] {
+        let mut bench = at(baud);
+        for sixteenth in 1..=16 {
+            let now = bench.board.now();
+            let end = bench.board.line().send(now, &adu(&REQUEST));
+            let after = Time::from_ns(bench.t35().as_ns() * sixteenth / 16);
+            let (at, width) = (end + after, Time::from_us(1).min(bench.bit()));
+            pulse(&mut bench, at, width);
+            assert_prompt(
+                &mut bench,
+                end,
+                &format!("{baud:?}, a pulse {after} after the request"),
+            );
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn pulses_before_a_request_do_not_delay_its_reply() {
+    for baud in [
+        Baud::B1200,
+        Baud::B9600,
+        Baud::B19200,
+        Baud::B115200,
+        Baud::B921600,
+    ] {
+        let mut bench = at(baud);
+        for rate in PULSE_RATES {
+            let period = Time::cycles(1, rate);
+            for width in widths(&bench, period) {
+                let begin = bench.board.now();
+                // The receiver looks at a pulse for most of a bit before it takes it for noise.
+                let start = begin + Time::from_ms(20);
+                let last = start - bench.bit();
+                pulses(&mut bench, begin, last, period, width);
+                let end = bench.board.line().send(start, &adu(&REQUEST));
+                let most = bench.t35() + Time::from_us(60);
+                let time = turnaround(&mut bench, end);
+                assert!(
+                    time.is_some_and(|time| time <= most),
+                    "{baud:?}, {rate} pulses a second of {width} before the request: {time:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn pulses_between_the_characters_of_a_request_do_not_damage_it() {
+    for baud in [Baud::B1200, Baud::B9600, Baud::B19200] {
+        let mut bench = at(baud);
+        let now = bench.board.now();
+        let mut end = now;
+        // Each character followed by a character's silence, with a pulse in it.
+        for byte in adu(&REQUEST) {
+            end = bench.board.line().send(end, &[byte]);
+            let pause = bench.characters(1);
+            let (at, width) = (end + bench.bit(), Time::from_us(5));
+            pulse(&mut bench, at, width);
+            end += pause;
+        }
+        let end = end - bench.characters(1);
+        assert_prompt(&mut bench, end, &format!("{baud:?}, a pulse in each gap"));
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_pulse_in_every_bit_of_a_request_does_not_damage_it() {
+    for &baud in Baud::ALL {
+        let mut bench = at(baud);
+        let now = bench.board.now();
+        let end = bench.board.line().send(now, &adu(&REQUEST));
+        // One of the three samples in the middle of each bit is wrong: the majority decides (RM0008 27.3.3).
+        let (bit, width) = (bench.bit(), Time::from_ns(bench.bit().as_ns() / 20));
+        let mut middle = now + Time::from_ns(bit.as_ns() / 2);
+        while middle < end {
+            pulse(&mut bench, middle, width);
+            middle += bit;
+        }
+        assert_prompt(&mut bench, end, &format!("{baud:?}, a pulse in every bit"));
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_character_that_begins_just_before_t35_belongs_to_the_frame_with_pulses_too() {
+    for baud in [Baud::B9600, Baud::B19200, Baud::B115200] {
+        for noisy in [false, true] {
+            let mut bench = at(baud);
+            let frame = adu(&REQUEST);
+            let (first, rest) = frame.split_at(5);
+            let now = bench.board.now();
+            let pause = bench.board.line().send(now, first);
+            // Two bits are what the receiver needs to see the last character's end.
+            let gap = bench.t35() - bench.bit() * 2;
+            if noisy {
+                let (at, width) = (pause + bench.bit(), Time::from_us(1).min(bench.bit()));
+                pulse(&mut bench, at, width);
+            }
+            let end = bench.board.line().send(pause + gap, rest);
+            let what = format!("{baud:?}, a gap of {gap}, noise: {noisy}");
+            assert_prompt(&mut bench, end, &what);
+        }
+    }
+}
