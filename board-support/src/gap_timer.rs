@@ -32,6 +32,7 @@ pub enum GapEvent {
 pub struct GapTimer {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
+    ticks: GapTicks,
 }
 
 impl GapTimer {
@@ -49,6 +50,27 @@ impl GapTimer {
         let ticks = GapTicks::new(clock.core_mhz(), line, t15_ns, t35_ns)?;
         pac::TIM2::enable(rcc);
         pac::TIM2::reset(rcc);
+        pac::TIM1::enable(rcc);
+        pac::TIM1::reset(rcc);
+        let mut gap = Self {
+            timer,
+            start_bit,
+            ticks,
+        };
+        gap.set_up();
+        Some(gap)
+    }
+
+    /// Sets every register of both timers that matters. The silence is measured from the next
+    /// [`restart`](Self::restart) on.
+    pub fn set_up(&mut self) {
+        let (timer, ticks) = (&self.timer, self.ticks);
+        timer.cr1().reset();
+        timer.cr2().reset();
+        timer.smcr().reset();
+        timer.ccmr1_output().reset();
+        timer.ccmr2_output().reset();
+        timer.ccer().reset();
         timer.psc().write(|w| w.psc().set(ticks.prescaler));
         timer.arr().write(|w| w.arr().set(ticks.t35_late));
         timer.ccr1().write(|w| w.ccr().set(ticks.t15));
@@ -58,15 +80,54 @@ impl GapTimer {
             .dier()
             .write(|w| w.uie().enabled().cc1ie().enabled().cc3ie().enabled());
 
-        pac::TIM1::enable(rcc);
-        pac::TIM1::reset(rcc);
+        let start_bit = &self.start_bit;
+        start_bit.cr1().reset();
+        start_bit.smcr().reset();
+        // The channel is off while its input is selected (RM0008 14.4.7).
+        start_bit.ccer().reset();
         start_bit.ccmr2_input().write(|w| w.cc3s().ti3());
         // Capture on the falling edge.
         start_bit
             .ccer()
             .write(|w| w.cc3e().set_bit().cc3p().set_bit());
+        start_bit.arr().write(|w| w.arr().set(0xFFFF));
         start_bit.cr1().write(|w| w.cen().enabled());
-        Some(Self { timer, start_bit })
+    }
+
+    /// Whether both timers are as they were set up.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        const URS_OPM: u32 = 1 << 2 | 1 << 3;
+        const CEN: u32 = 1;
+        const CC2IE: u32 = 1 << 2;
+        let (timer, ticks) = (&self.timer, self.ticks);
+        let cr1 = timer.cr1().read().bits() & !CEN;
+        let is_set = cr1 == URS_OPM
+            && timer.psc().read().bits() == ticks.prescaler.into()
+            && timer.arr().read().bits() == ticks.t35_late.into()
+            && timer.ccr1().read().bits() == ticks.t15.into()
+            && timer.ccr2().read().bits() == ticks.t15_late.into()
+            && timer.ccr3().read().bits() == ticks.t35.into()
+            // UIE, CC1IE and CC3IE.
+            && timer.dier().read().bits() & !CC2IE == 0b1011
+            && timer.smcr().read().bits() == 0
+            && timer.ccmr1_output().read().bits() == 0
+            && timer.ccmr2_output().read().bits() == 0;
+        let start_bit = &self.start_bit;
+        is_set
+            && start_bit.cr1().read().bits() == CEN
+            && start_bit.ccmr2_input().read().bits() == 1
+            && start_bit.ccer().read().bits() == 0b11 << 8
+            && start_bit.smcr().read().bits() == 0
+            && start_bit.arr().read().bits() == 0xFFFF
+    }
+
+    /// Whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        let timer = &self.timer;
+        timer.cr1().read().cen().is_enabled()
+            || timer.sr().read().bits() & timer.dier().read().bits() != 0
     }
 
     /// Starts the silence over: a character has just come in.

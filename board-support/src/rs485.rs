@@ -73,6 +73,39 @@ pub(crate) struct Pins {
 pub struct Rs485 {
     usart: pac::USART1,
     driver: PA8<Output<PushPull>>,
+    divider: u16,
+    format: Format,
+}
+
+/// CR1 of a receiver: the line's settings, with UE, TE, RE and RXNEIE (RM0008 27.6.4).
+const fn receiving(format: Format) -> u16 {
+    const UE: u16 = 1 << 13;
+    const M: u16 = 1 << 12;
+    const PCE: u16 = 1 << 10;
+    const PS: u16 = 1 << 9;
+    const TE: u16 = 1 << 3;
+    const RE: u16 = 1 << 2;
+    const RXNEIE: u16 = 1 << 5;
+    // A parity bit is a ninth bit of the word (RM0008 27.3.7).
+    let format = match format {
+        Format::N2 | Format::N1 => 0,
+        Format::E1 => M | PCE,
+        Format::O1 => M | PCE | PS,
+    };
+    UE | TE | RE | RXNEIE | format
+}
+
+/// The bits of CR1 that change with every reply: the receiver's are set while the unit listens, the
+/// transmitter's interrupts only while it sends.
+const RECEIVER: u16 = 1 << 2 | 1 << 5;
+const SENDER: u16 = 1 << 6 | 1 << 7;
+
+/// CR2: two stop bits, or one.
+const fn stop_bits(format: Format) -> u16 {
+    match format {
+        Format::N2 => 0b10 << 12,
+        Format::E1 | Format::O1 | Format::N1 => 0,
+    }
 }
 
 impl Rs485 {
@@ -88,37 +121,51 @@ impl Rs485 {
         let divider = divider(clock.core_hz(), settings.baud)?;
         pac::USART1::enable(rcc);
         pac::USART1::reset(rcc);
-        usart.brr().write(|w| {
-            w.div_mantissa().set(divider >> 4);
-            w.div_fraction().set((divider & 0xF) as u8)
-        });
-        usart.cr2().write(|w| match settings.format {
-            Format::N2 => w.stop().stop2(),
-            Format::E1 | Format::O1 | Format::N1 => w.stop().stop1(),
-        });
-        usart.cr1().write(|w| {
-            // A parity bit is a ninth bit of the word (RM0008 27.3.7).
-            match settings.format {
-                Format::N2 | Format::N1 => w.m().m8().pce().disabled(),
-                Format::E1 => w.m().m9().pce().enabled().ps().even(),
-                Format::O1 => w.m().m9().pce().enabled().ps().odd(),
-            };
-            w.ue()
-                .enabled()
-                .te()
-                .enabled()
-                .re()
-                .enabled()
-                .rxneie()
-                .enabled()
-        });
+        let mut line = Self {
+            usart,
+            driver: pins.driver,
+            divider,
+            format: settings.format,
+        };
+        line.set_up();
         // The transmitter is on and idles high before the pin becomes its output.
         let _tx = pins.tx.into_alternate_push_pull(&mut pins.cr);
         let _rx = pins.rx;
-        Some(Self {
-            usart,
-            driver: pins.driver,
-        })
+        Some(line)
+    }
+
+    /// Turns the driver off, sets every register of the UART, and listens. A character under way is lost.
+    pub fn set_up(&mut self) {
+        self.driver.set_state(PinState::Low);
+        let usart = &self.usart;
+        usart.cr1().reset();
+        usart.cr3().reset();
+        usart.gtpr().reset();
+        // SAFETY: the reserved bits of these registers are 0 in every value written here (RM0008 27.6).
+        unsafe {
+            usart.brr().write(|w| w.bits(self.divider.into()));
+            usart.cr2().write(|w| w.bits(stop_bits(self.format).into()));
+            usart.cr1().write(|w| w.bits(receiving(self.format).into()));
+        }
+        // What was received or damaged before is not the next frame's.
+        let _ = (usart.sr().read(), usart.dr().read());
+    }
+
+    /// Whether every register of the UART is as it was set up, with the driver on, or off, as it should be.
+    #[must_use]
+    pub fn is_sound(&self, sending: bool) -> bool {
+        let usart = &self.usart;
+        let cr1 = usart.cr1().read().bits();
+        let (wanted, changing) = if sending {
+            (receiving(self.format) & !RECEIVER, SENDER)
+        } else {
+            (receiving(self.format), 0)
+        };
+        cr1 & !changing == wanted.into()
+            && usart.cr2().read().bits() == stop_bits(self.format).into()
+            && usart.cr3().read().bits() == 0
+            && usart.brr().read().bits() == self.divider.into()
+            && self.driver.is_set_high() == sending
     }
 
     /// What the UART wants.

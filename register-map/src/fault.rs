@@ -26,6 +26,8 @@ block! {
     UPTIME "uptime at the fault": 0x026A x 2, "s", READ, &[];
     /// The tasks that had not begun, or not ended, when the watchdog bit: those that hung or were kept from running. 0 = only idle. Bit 0 line, 1 serve, 2 scan, 3 background
     MISSING_TASKS "missing tasks": 0x026C x 1, "", READ, &[];
+    /// How often since the start the line was set up again, because its UART or timer had lost their settings or a reply did not end; 65535 = that often or more
+    LINE_REPAIRS "line repairs": 0x026D x 1, "", READ, &[];
     /// Reserved, reads 0
-    RESERVED "reserved": 0x026D x 3, "", READ, &[];
+    RESERVED "reserved": 0x026E x 2, "", READ, &[];
 }

@@ -19,6 +19,11 @@ pub struct Line {
     hold: bool,
     /// The good frames on the bus when a reply began to be delayed.
     heard_before: u16,
+    /// Milliseconds that a reply may take, and that the one under way has taken.
+    longest_ms: u16,
+    sending_ms: u16,
+    /// The line was set up again since [`take_repaired`](Self::take_repaired).
+    repaired: bool,
 }
 
 /// How far the reply is.
@@ -36,12 +41,13 @@ enum Reply {
 
 impl Line {
     /// Listens with this receiver. The gap timer's t1.5 and t3.5 are, on an ASCII line, t3.5 and the
-    /// time-out.
+    /// time-out. A reply that takes more than `longest_ms` milliseconds is cut off.
     pub fn new(
         uart: Rs485,
         mut gap: GapTimer,
         mut receiver: Receiver<'static>,
         adus: &'static mut [Adu; 2],
+        longest_ms: u16,
     ) -> Self {
         adus.iter_mut().for_each(|adu| receiver.give_back(adu));
         gap.restart();
@@ -54,6 +60,9 @@ impl Line {
             reply: Reply::None,
             hold: false,
             heard_before: 0,
+            longest_ms,
+            sending_ms: 0,
+            repaired: false,
         }
     }
 
@@ -82,8 +91,42 @@ impl Line {
                 Next::Wait => self.uart.pause_sending(),
                 Next::Done => self.uart.finish_sending(),
             }
+        } else if !status.received() {
+            // An interrupt without a cause that is known here comes again at once, and keeps all tasks from
+            // running.
+            self.check();
         }
         false
+    }
+
+    /// Sets the line up again when its registers are not what they were set to, when the end of a frame is
+    /// not being waited for, or when a reply does not end: whatever has disturbed them, the driver goes off
+    /// and the next request is served.
+    #[cold]
+    fn check(&mut self) {
+        let sending = self.reply == Reply::Sending;
+        let stalled = !sending && !self.receiver.is_idle() && !self.gap.is_running();
+        let endless = sending && self.sending_ms >= self.longest_ms;
+        if stalled || endless || !self.uart.is_sound(sending) || !self.gap.is_sound() {
+            self.repair();
+        }
+    }
+
+    fn repair(&mut self) {
+        self.uart.set_up();
+        self.gap.set_up();
+        if self.reply == Reply::Sending {
+            self.reply = Reply::None;
+            self.take_back();
+        }
+        self.receiver.resume();
+        self.gap.restart();
+        self.repaired = true;
+    }
+
+    /// Whether the line was set up again since the last call.
+    pub const fn take_repaired(&mut self) -> bool {
+        core::mem::replace(&mut self.repaired, false)
     }
 
     /// t1.5 of silence; on an ASCII line t3.5, after which a frame that is over is taken: its sender
@@ -118,8 +161,10 @@ impl Line {
         Some(())
     }
 
-    /// A millisecond has passed: the response delay runs.
+    /// A millisecond has passed: the response delay runs, and a disturbed line is set up again.
     pub fn on_millisecond(&mut self) {
+        self.sending_ms = self.sending_ms.saturating_add(1);
+        self.check();
         match self.reply {
             Reply::Delayed { ms: 0 } => {
                 if self.receiver.is_idle() && self.heard() == self.heard_before {
@@ -221,6 +266,7 @@ impl Line {
     fn send(&mut self) {
         self.gap.stop();
         self.reply = Reply::Sending;
+        self.sending_ms = 0;
         if let Next::Byte(first) = self.transmitter.next() {
             self.uart.start_sending(first);
         }
@@ -228,7 +274,8 @@ impl Line {
 
     /// Brings the request's buffer back: the body of the reply that was started, if it has one.
     pub fn finish_reply(&mut self, adu: &'static mut Adu, replying: bool) {
-        let unneeded = if replying {
+        // A reply that has been cut off by now takes no body.
+        let unneeded = if replying && self.reply != Reply::None {
             self.transmitter.body(adu)
         } else {
             Some(adu)

@@ -26,6 +26,8 @@ pub enum Event {
     Saved,
     /// The configuration could not be stored.
     SaveFailed,
+    /// The line's registers were disturbed, or a reply did not end: the line was set up again.
+    LineRepaired,
 }
 
 /// What is known when the device starts.
@@ -163,6 +165,7 @@ impl Log {
             Event::CommunicationLost => "communication lost: outputs go to SAFE",
             Event::Saved => "configuration saved",
             Event::SaveFailed => "configuration: the flash does not take it",
+            Event::LineRepaired => "line: set up again after a disturbance",
         };
         self.write(&mut Line::of(text));
     }

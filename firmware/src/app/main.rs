@@ -311,7 +311,19 @@ mod app {
         }
         if beat {
             fault::keep_uptime(uptime_s);
-            line.lock(|line| line.as_mut().map(Line::on_millisecond));
+            let repaired = line.lock(|line| {
+                line.as_mut().is_some_and(|line| {
+                    line.on_millisecond();
+                    line.take_repaired()
+                })
+            });
+            if repaired {
+                device.lock(|device| {
+                    let repairs = &mut device.state.line_repairs;
+                    *repairs = repairs.saturating_add(1);
+                });
+                let _ = events.enqueue(Event::LineRepaired);
+            }
             if proof_beat.is_due() {
                 // A silent line gives these two no reason to run. Called for nothing they do
                 // nothing, but show that they could.

@@ -108,7 +108,8 @@ pub fn up(
             ),
         };
         let (uart, gap) = board.line.start(on_wire, silences.0, silences.1)?;
-        Some(Line::new(uart, gap, receiver, adus))
+        let longest_ms = longest_reply_ms(on_wire, framing);
+        Some(Line::new(uart, gap, receiver, adus, longest_ms))
     });
 
     Started {
@@ -125,6 +126,18 @@ pub fn up(
         log,
         trouble: Trouble::at_start(address, board.clock.is_crystal()),
     }
+}
+
+/// The longest frame on the line in whole milliseconds, and three more: the server takes up to half a millisecond,
+/// a save stalls the core for about one, and the count may begin just before a beat.
+fn longest_reply_ms(line: uart::LineSettings, framing: Framing) -> u16 {
+    // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
+    let characters = match framing {
+        Framing::Rtu => 256,
+        Framing::Ascii { .. } => 513,
+    };
+    let ms = characters * line.format.bits() * 1000 / line.baud.max(1);
+    ms as u16 + 3
 }
 
 fn wire_settings(line: config::Line) -> uart::LineSettings {

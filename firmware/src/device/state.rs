@@ -27,7 +27,7 @@ pub struct Identity {
 }
 
 const fn fault_words() -> usize {
-    (fault::RESERVED + 3 - fault::KIND) as usize
+    (fault::RESERVED + 2 - fault::KIND) as usize
 }
 
 /// The firmware's version as its registers have it: major << 8 | minor, and patch.
@@ -57,6 +57,8 @@ pub struct State {
     pub counters: Counters,
     /// The least stack left free so far, in bytes.
     pub stack_free: u16,
+    /// How often the line was set up again since the start; stops at the largest number.
+    pub line_repairs: u16,
 }
 
 impl State {
@@ -71,6 +73,7 @@ impl State {
             uptime_s: 0,
             counters: Counters::default(),
             stack_free: 0,
+            line_repairs: 0,
         }
     }
 
@@ -154,6 +157,9 @@ impl State {
 
     /// A register of the fault record.
     pub(super) fn fault_word(&self, address: u16) -> u16 {
+        if address == fault::LINE_REPAIRS {
+            return self.line_repairs;
+        }
         let index = usize::from(address.wrapping_sub(fault::KIND));
         self.identity.fault.get(index).copied().unwrap_or_default()
     }

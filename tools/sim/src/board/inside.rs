@@ -4,6 +4,7 @@ use super::{Board, Error};
 use crate::finding::Finding;
 use crate::machine::memory::{FLASH_BASE, RAM_BASE};
 use crate::periph::flash::{Durations, Torn};
+use crate::soc::map::Block;
 
 impl Board {
     /// What the firmware logged over RTT since the last call.
@@ -43,6 +44,18 @@ impl Board {
             .ok_or(outside)?
             .copy_from_slice(bytes);
         Ok(())
+    }
+
+    /// Inverts bits of a block's register, as a disturbance of the part does: the register is read, and written
+    /// as a store of the core would write it. Nothing is checked.
+    pub fn upset(&mut self, block: Block, offset: u32, mask: u32) {
+        let now = self.now();
+        let soc = &mut self.machine.bus.soc;
+        soc.sync(now);
+        // What the model has no answer to changes nothing.
+        if let Ok(value) = soc.read(block, offset, now) {
+            let _ = soc.write(block, offset, value ^ mask, now);
+        }
     }
 
     /// Grows whenever the flash's contents may have changed: when an operation has ended or was torn, or

@@ -41,3 +41,4 @@ mod saving;
 mod standard_functions;
 mod storing;
 mod timing;
+mod upsets;

@@ -1,0 +1,147 @@
+//! Registers of the line's UART and timers that change by themselves, as a disturbance of the part makes them: the
+//! driver goes off in time, and the line serves again.
+
+use register_map::{codes::Baud, configuration, fault};
+use sim::soc::map::Block;
+use sim::{Module, Time};
+
+use crate::bench::{Bench, adu};
+
+/// Registers that are disturbed: block, offset, bits, and the name for messages. RM0008 27.6 (USART),
+/// 14.4 (TIM1), 15.4 (TIM2).
+const REGISTERS: [(Block, u32, u16, &str); 17] = [
+    // Clearing TC is what an inverted bit of SR can do.
+    (Block::Usart1, 0x00, 1 << 6, "USART1 SR.TC"),
+    (Block::Usart1, 0x08, 0xFFFF, "USART1 BRR"),
+    (Block::Usart1, 0x0C, 0x3FFF, "USART1 CR1"),
+    (Block::Usart1, 0x10, 0x7F6F, "USART1 CR2"),
+    (Block::Usart1, 0x14, 0x07FF, "USART1 CR3"),
+    (Block::Tim2, 0x00, 0x03FF, "TIM2 CR1"),
+    (Block::Tim2, 0x08, 0x0077, "TIM2 SMCR"),
+    (Block::Tim2, 0x0C, 0x5F5F, "TIM2 DIER"),
+    (Block::Tim2, 0x24, 0xFFFF, "TIM2 CNT"),
+    (Block::Tim2, 0x28, 0xFFFF, "TIM2 PSC"),
+    (Block::Tim2, 0x2C, 0xFFFF, "TIM2 ARR"),
+    (Block::Tim2, 0x34, 0xFFFF, "TIM2 CCR1"),
+    (Block::Tim2, 0x38, 0xFFFF, "TIM2 CCR2"),
+    (Block::Tim2, 0x3C, 0xFFFF, "TIM2 CCR3"),
+    (Block::Tim1, 0x00, 0x03FF, "TIM1 CR1"),
+    (Block::Tim1, 0x1C, 0x00FF, "TIM1 CCMR2"),
+    (Block::Tim1, 0x20, 0x0FFF, "TIM1 CCER"),
+];
+
+/// A read of 125 registers: its reply is the longest.
+const LONG: [u8; 6] = [1, 3, 1, 0, 0, 9];
+
+/// Instants after the start of a request at which bits change, in characters: while the line is idle, in the
+/// request, in t3.5, at the beginning, in the middle and at the end of the reply.
+fn instants(bench: &Bench) -> [Time; 7] {
+    let request = bench.characters(8);
+    let reply = request + bench.t35();
+    let half = |characters: u64| Time::from_ps(bench.characters(characters).as_ps() / 2);
+    [
+        Time::ZERO,
+        half(9),
+        request + half(5),
+        reply + half(1),
+        reply + half(11),
+        reply + half(43),
+        reply + half(46),
+    ]
+}
+
+/// The longest reply at the bench's rate, and a tenth more; a save's stalls and a beat more where characters are
+/// short.
+fn bound(bench: &Bench) -> Time {
+    let longest = bench.characters(256).as_ps();
+    Time::from_ps(longest * 11 / 10).max(Time::from_ps(longest) + Time::from_ms(3))
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn any_bit_of_the_lines_registers_may_change_at_any_instant() {
+    let mut failures = Vec::new();
+    for baud in [Baud::B9600, Baud::B115200] {
+        let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
+        bench.tolerant = true;
+        bench.board.run_for(Time::from_ms(40));
+        for (block, offset, bits, name) in REGISTERS {
+            for bit in (0..16).filter(|bit| bits >> bit & 1 != 0) {
+                for (n, after) in instants(&bench).into_iter().enumerate() {
+                    if !survives(&mut bench, after, block, offset, 1 << bit) {
+                        failures.push(format!("{baud:?} {name} bit {bit}, instant {n}"));
+                        // The next one begins on a board that is whole.
+                        bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
+                        bench.tolerant = true;
+                        bench.board.run_for(Time::from_ms(40));
+                    }
+                }
+            }
+        }
+    }
+    assert!(
+        failures.is_empty(),
+        "{} failed: {failures:#?}",
+        failures.len()
+    );
+}
+
+/// Whether the driver is off in time and a request is answered 100 ms later, without a reset.
+fn survives(bench: &mut Bench, after: Time, block: Block, offset: u32, mask: u32) -> bool {
+    let resets = bench.board.resets();
+    let begin = bench.board.now();
+    bench.board.line().send(begin, &adu(&LONG));
+    bench.board.run_until(begin + after);
+    bench.board.upset(block, offset, mask);
+    let upset = bench.board.now();
+    let most = bound(bench);
+    while bench.board.now() < upset + most.max(Time::from_ms(100)) {
+        bench.board.run_for(Time::from_us(250));
+        let now = bench.board.now();
+        let last = bench.board.line().driver_edges().next_back();
+        if last.is_some_and(|(at, on)| on && now > at + most) {
+            return false;
+        }
+    }
+    bench.board.line().take_received();
+    let reply = bench.exchange(&adu(&[1, 2, 0, 0x10, 0, 4]));
+    bench.board.resets() == resets && reply == adu(&[1, 2, 1, 0])
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_line_that_was_set_up_again_is_counted_and_logged() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    bench.tolerant = true;
+    let repairs = |bench: &mut Bench| {
+        let [high, low] = fault::LINE_REPAIRS.to_be_bytes();
+        bench.ask(1, &[3, high, low, 0, 1])
+    };
+    assert_eq!(repairs(&mut bench), Some(vec![3, 2, 0, 0]));
+    bench.board.take_log();
+    // BRR: another rate.
+    bench.board.upset(Block::Usart1, 0x08, 0x0400);
+    bench.board.run_for(Time::from_ms(100));
+    assert_eq!(repairs(&mut bench), Some(vec![3, 2, 0, 1]));
+    let log = bench.board.take_log();
+    assert!(log.contains("line: set up again"), "{log}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_reply_whose_end_is_never_reported_is_cut_off() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    bench.tolerant = true;
+    let now = bench.board.now();
+    let end = bench.board.line().send(now, &adu(&[1, 2, 0, 0x10, 0, 4]));
+    let begin = end + bench.t35() + bench.characters(1);
+    bench.board.run_until(begin);
+    assert!(bench.board.driver_enable(), "the reply is under way");
+    // TE: the transmitter stops, and TC never comes.
+    bench.board.upset(Block::Usart1, 0x0C, 1 << 3);
+    let limit = begin + bound(&bench);
+    bench.board.run_until(limit);
+    assert!(!bench.board.driver_enable(), "the driver is off");
+    bench.board.line().take_received();
+    bench.assert_answers(1);
+}
