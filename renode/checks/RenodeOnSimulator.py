@@ -1,11 +1,11 @@
-"""Renode's keywords, as far as the suites use them, played on the project's own simulator.
+"""The keywords of Renode that the suites use, carried out on the project's own simulator.
 
-So the suites are run where there is no Renode: what they ask of the unit, and expect of it, is right
-when the image gives it here. What only Renode can do is in tests with the tags `renode-only` (its
-models) and `exact-time` (gaps to the millisecond), which are left out then. Names and arguments of the
-keywords are those of Renode's sources; a dry run checks the suites against them.
+A suite that passes here asks and expects the right things of the image, on a machine without Renode. Tests
+with the tag `renode-only` need Renode's models, and tests with the tag `exact-time` need gaps that are exact
+to a millisecond; both are left out here. The keywords have the names and arguments of Renode's sources, and
+a dry run checks the suites against them. What is received behaves as in Renode: see terminal_tester.py.
 
-The simulator's program and the image come from the variables SIMULATOR and ELF.
+The variables SIMULATOR and ELF name the simulator's program and the image.
 """
 
 import json
@@ -17,6 +17,8 @@ import time
 import urllib.request
 
 from robot.libraries.BuiltIn import BuiltIn
+
+from terminal_tester import TerminalTester
 
 ROBOT_LIBRARY_SCOPE = "GLOBAL"
 
@@ -33,7 +35,9 @@ class _Board:
         command += ["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.log = []
-        self.came = bytearray()
+        # Renode's keyword attaches the tester later; bytes before that are lost there, too.
+        self.tester = None
+        self.lock = threading.Lock()
         self._endpoints = {}
         threading.Thread(target=self._read_log, daemon=True).start()
         self.api = self._endpoint("http").rstrip("/") + "/api/"
@@ -64,7 +68,9 @@ class _Board:
     def _read_line(self):
         try:
             while data := self.line.recv(4096):
-                self.came += data
+                with self.lock:
+                    for byte in data if self.tester else b"":
+                        self.tester.receive(byte)
         except OSError:
             pass
 
@@ -126,6 +132,8 @@ class RenodeOnSimulator:
                                defaultPauseEmulation: bool = None, defaultWaitForEcho: bool = None,
                                defaultMatchNextLine: bool = None, binaryMode: bool = False):
         assert uart == "sysbus.usart1" and binaryMode
+        with self._board.lock:
+            self._board.tester = TerminalTester()
 
     def send_key_to_uart(self, c, testerId: int = None):
         self._keys.append(int(c, 0))
@@ -137,13 +145,8 @@ class RenodeOnSimulator:
                                treatAsRegex: bool = False, pauseEmulation: bool = None,
                                matchStart: bool = False):
         assert timeout == 0, "the suites let time go by themselves"
-        came = self._board.came
-        pattern = content.encode() if treatAsRegex else re.escape(bytes.fromhex(content))
-        find = re.match if matchStart else re.search
-        found = find(pattern, came, re.DOTALL)
-        if not found:
-            raise AssertionError(f"Terminal tester failed! There is: {came.hex(' ')}")
-        del came[: found.end()]
+        with self._board.lock:
+            self._board.tester.wait_for_bytes(content, treatAsRegex, matchStart)
 
     def execute_command(self, command, machine=None):
         for pattern, act in self._commands():
