@@ -38,6 +38,7 @@ class _Board:
         # Renode's keyword attaches the tester later; bytes before that are lost there, too.
         self.tester = None
         self.lock = threading.Lock()
+        self.received = self.sent = self.last_frame = 0
         self._endpoints = {}
         threading.Thread(target=self._read_log, daemon=True).start()
         self.api = self._endpoint("http").rstrip("/") + "/api/"
@@ -69,13 +70,17 @@ class _Board:
         try:
             while data := self.line.recv(4096):
                 with self.lock:
+                    self.received += len(data)
                     for byte in data if self.tester else b"":
                         self.tester.receive(byte)
         except OSError:
             pass
 
+    def get(self, path):
+        return json.load(urllib.request.urlopen(self.api + path))
+
     def state(self):
-        return json.load(urllib.request.urlopen(self.api + "state"))
+        return self.get("state")
 
     def post(self, path, **what):
         request = urllib.request.Request(self.api + path, json.dumps(what).encode(), method="POST")
@@ -85,8 +90,17 @@ class _Board:
         end = self.state()["virtual_ms"] + seconds * 1000
         while (left := end - self.state()["virtual_ms"]) > 0:
             time.sleep(max(left / 1000, 0.001))
-        # What has left the unit by then is on its way through the socket.
-        time.sleep(0.02)
+        self._wait_for_sent_frames()
+
+    def _wait_for_sent_frames(self):
+        """Waits until the frames that the unit has sent have crossed the socket, which takes long on a busy
+        machine."""
+        for frame in self.get(f"frames?since={self.last_frame}")["frames"]:
+            self.last_frame = frame["number"]
+            self.sent += len(frame["bytes"]) // 2 if frame["direction"] == "tx" else 0
+        deadline = time.monotonic() + 10
+        while self.received < self.sent and time.monotonic() < deadline:
+            time.sleep(0.001)
 
     def end(self):
         self.line.close()
