@@ -1,7 +1,8 @@
 # Commands for Renode's monitor, in its IronPython 2; board.resc includes them.
 #
-#   modio_inputs DIP     drives every input: SW01 to DIP, a number from 0 to 255, the others as with
-#                        nothing connected
+#   modio_inputs DIP     drives every input pin until the next reset: SW01 to DIP, a number from 0 to 255,
+#                        and the other inputs as with nothing connected. Every reset drives $dip again, so
+#                        set $dip to move the switch.
 #   modio_preset MODULE  stores that MODULE is in the slot, when nothing is stored yet
 #   modio_log            shows the firmware's log, as much of it as its buffer holds
 #   modio_quiet          keeps warnings that mean nothing out of Renode's log

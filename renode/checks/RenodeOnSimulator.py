@@ -179,8 +179,9 @@ class RenodeOnSimulator:
             (rf"sysbus ReadDoubleWord {number}", lambda at: f"{self._read(int(at, 0)):#010X}\n"),
             (rf"sysbus WriteDoubleWord {number} {number}", lambda at, to: self._write(int(at, 0), int(to, 0))),
             (r"sysbus\.gpioPortA OnGPIO ([0-3]) (true|false)", self._drive),
+            (r"modio_inputs (\d+)", self._inputs),
             (r"sysbus\.sram ZeroAll", lambda: ""),
-            (r"machine Reset", lambda: self._board.post("power", cycle=True)),
+            (r"machine Reset", self._reset),
         ]
 
     def _set(self, name, value):
@@ -208,6 +209,16 @@ class RenodeOnSimulator:
         channel = self._board.state()["channels"][int(pin)]
         what = {"di": "energised", "relay": "manual"}[channel["kind"]]
         self._board.post(f"channels/{int(pin) + 1}", **{what: not high})
+        return ""
+
+    def _inputs(self, dip):
+        self._board.post("dip", value=int(dip))
+        return ""
+
+    def _reset(self):
+        # The macro `reset` of board.resc drives the switch's position onto the pins again.
+        self._inputs(self._variables["dip"])
+        self._board.post("power", cycle=True)
         return ""
 
     def _read(self, address):
