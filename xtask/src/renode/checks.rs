@@ -63,11 +63,12 @@ fn with_robot(
 /// the image on the models.
 fn models(python: &Path, checks: &Path, elf: &Path) -> Result<()> {
     let presets = presets();
-    let tests: [(&str, &[&OsStr]); 5] = [
+    let tests: [(&str, &[&OsStr]); 6] = [
         ("test_syntax.py", &[]),
         ("test_models.py", &[]),
         ("test_commands.py", &[presets.as_ref()]),
         ("test_terminal_tester.py", &[]),
+        ("test_exact_line.py", &[]),
         ("test_boot.py", &[elf.as_os_str()]),
     ];
     for (test, arguments) in tests {
