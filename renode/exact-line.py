@@ -9,9 +9,10 @@
 # WriteChar; later versions deliver it 10 bits later, whatever the format. LineUnit finds out which one runs.
 #
 # Runs in Renode's IronPython 2, in the monitor's scope. All names begin with `line`, so that they do not
-# replace names of other scripts. Only calls are used that were seen to work in Renode 1.16.1. That is why
-# lines are read by ReadLine, with two consequences: a carriage return alone ends a line as well, and the last
-# line of a client that disconnects counts even without its end.
+# replace names of other scripts. All calls were seen to work in Renode 1.16.1 and in later versions, except
+# TcpClient.Close, whose failure does no harm. That is why ReadLine reads the requests, with two consequences:
+# a carriage return alone ends a line as well, and the last line of a client that disconnects counts even
+# without its end.
 import clr
 clr.AddReference("System.Net.Sockets")
 clr.AddReference("System.Net.Primitives")
@@ -215,14 +216,15 @@ class LineUnit(object):
     def send(self, pieces):
         """Puts pieces on the line, and lets time pass until the last one has ended."""
         clock = self.clock
-        silence = clock.now
+        # The characters' bits are summed up apart from the other times, so that rounding does not add up.
+        rest = clock.now
         bits = 0
         for data, gap in pieces:
             for byte in data:
                 bits += LINE_FORMATS[self.format]
-                silence += self.deliver(byte, silence + self.bits(bits))
-            silence += gap
-        clock.run_until(silence + self.bits(bits))
+                rest += self.deliver(byte, rest + self.bits(bits))
+            rest += gap
+        clock.run_until(rest + self.bits(bits))
 
     def deliver(self, byte, end):
         """Gives the unit the byte whose last stop bit ends at `end`. Returns how many ns later it ends."""

@@ -1,5 +1,5 @@
-"""What exact-line.py uses of .NET and of Renode, for Python 3: exactly the calls that were seen to work in
-Renode, over real sockets. Any other name raises AttributeError or ImportError.
+"""What exact-line.py uses of .NET and of Renode, for Python 3 and over real sockets. Except TcpClient.Close,
+all calls were seen to work in Renode. Any other name raises AttributeError or ImportError.
 
 A name that begins with an underscore belongs to the fake.
 """
@@ -218,7 +218,7 @@ class TcpListener(Exact):
 
 
 class TcpClient(Exact):
-    """System.Net.Sockets.TcpClient. Close is the one call that the tried sketch did not have."""
+    """System.Net.Sockets.TcpClient. Close is the one call here that was not seen in Renode."""
 
     __slots__ = ("_socket",)
 

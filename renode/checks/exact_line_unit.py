@@ -24,7 +24,7 @@ BETWEEN_BYTES_US = 3.25
 READING_US = 2
 
 POWER_ON_FLAGS, PIN_FLAG, SOFTWARE_FLAGS = 0x0C000000, 0x04000000, 0x14000000
-# Registers: one that every reset clears, one in RAM, and the reset's flags.
+# Registers: every reset clears CLEARED, IN_RAM is part of the RAM, and FLAGS holds the last reset's flags.
 CLEARED, IN_RAM, FLAGS = 0, 1, 2
 
 
