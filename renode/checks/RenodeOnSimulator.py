@@ -1,11 +1,11 @@
-"""Renode's keywords, as far as the suites use them, played on the project's own simulator.
+"""The keywords of Renode that the suites use, carried out on the project's own simulator.
 
-So the suites are run where there is no Renode: what they ask of the unit, and expect of it, is right
-when the image gives it here. What only Renode can do is in tests with the tags `renode-only` (its
-models) and `exact-time` (gaps to the millisecond), which are left out then. Names and arguments of the
-keywords are those of Renode's sources; a dry run checks the suites against them.
+A suite that passes here asks and expects the right things of the image, on a machine without Renode. Tests
+with the tag `renode-only` need Renode's models, and tests with the tag `exact-time` need gaps that are exact
+to a millisecond; both are left out here. The keywords have the names and arguments of Renode's sources, and
+a dry run checks the suites against them. What is received behaves as in Renode: see terminal_tester.py.
 
-The simulator's program and the image come from the variables SIMULATOR and ELF.
+The variables SIMULATOR and ELF name the simulator's program and the image.
 """
 
 import json
@@ -17,6 +17,8 @@ import time
 import urllib.request
 
 from robot.libraries.BuiltIn import BuiltIn
+
+from terminal_tester import TerminalTester
 
 ROBOT_LIBRARY_SCOPE = "GLOBAL"
 
@@ -33,7 +35,10 @@ class _Board:
         command += ["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.log = []
-        self.came = bytearray()
+        # Renode's keyword attaches the tester later; bytes before that are lost there, too.
+        self.tester = None
+        self.lock = threading.Lock()
+        self.received = self.sent = self.last_frame = 0
         self._endpoints = {}
         threading.Thread(target=self._read_log, daemon=True).start()
         self.api = self._endpoint("http").rstrip("/") + "/api/"
@@ -64,12 +69,18 @@ class _Board:
     def _read_line(self):
         try:
             while data := self.line.recv(4096):
-                self.came += data
+                with self.lock:
+                    self.received += len(data)
+                    for byte in data if self.tester else b"":
+                        self.tester.receive(byte)
         except OSError:
             pass
 
+    def get(self, path):
+        return json.load(urllib.request.urlopen(self.api + path))
+
     def state(self):
-        return json.load(urllib.request.urlopen(self.api + "state"))
+        return self.get("state")
 
     def post(self, path, **what):
         request = urllib.request.Request(self.api + path, json.dumps(what).encode(), method="POST")
@@ -79,8 +90,17 @@ class _Board:
         end = self.state()["virtual_ms"] + seconds * 1000
         while (left := end - self.state()["virtual_ms"]) > 0:
             time.sleep(max(left / 1000, 0.001))
-        # What has left the unit by then is on its way through the socket.
-        time.sleep(0.02)
+        self._wait_for_sent_frames()
+
+    def _wait_for_sent_frames(self):
+        """Waits until the frames that the unit has sent have crossed the socket, which takes long on a busy
+        machine."""
+        for frame in self.get(f"frames?since={self.last_frame}")["frames"]:
+            self.last_frame = frame["number"]
+            self.sent += len(frame["bytes"]) // 2 if frame["direction"] == "tx" else 0
+        deadline = time.monotonic() + 10
+        while self.received < self.sent and time.monotonic() < deadline:
+            time.sleep(0.001)
 
     def end(self):
         self.line.close()
@@ -126,6 +146,8 @@ class RenodeOnSimulator:
                                defaultPauseEmulation: bool = None, defaultWaitForEcho: bool = None,
                                defaultMatchNextLine: bool = None, binaryMode: bool = False):
         assert uart == "sysbus.usart1" and binaryMode
+        with self._board.lock:
+            self._board.tester = TerminalTester()
 
     def send_key_to_uart(self, c, testerId: int = None):
         self._keys.append(int(c, 0))
@@ -137,13 +159,8 @@ class RenodeOnSimulator:
                                treatAsRegex: bool = False, pauseEmulation: bool = None,
                                matchStart: bool = False):
         assert timeout == 0, "the suites let time go by themselves"
-        came = self._board.came
-        pattern = content.encode() if treatAsRegex else re.escape(bytes.fromhex(content))
-        find = re.match if matchStart else re.search
-        found = find(pattern, came, re.DOTALL)
-        if not found:
-            raise AssertionError(f"Terminal tester failed! There is: {came.hex(' ')}")
-        del came[: found.end()]
+        with self._board.lock:
+            self._board.tester.wait_for_bytes(content, treatAsRegex, matchStart)
 
     def execute_command(self, command, machine=None):
         for pattern, act in self._commands():
@@ -162,8 +179,9 @@ class RenodeOnSimulator:
             (rf"sysbus ReadDoubleWord {number}", lambda at: f"{self._read(int(at, 0)):#010X}\n"),
             (rf"sysbus WriteDoubleWord {number} {number}", lambda at, to: self._write(int(at, 0), int(to, 0))),
             (r"sysbus\.gpioPortA OnGPIO ([0-3]) (true|false)", self._drive),
+            (r"modio_inputs (\d+)", self._inputs),
             (r"sysbus\.sram ZeroAll", lambda: ""),
-            (r"machine Reset", lambda: self._board.post("power", cycle=True)),
+            (r"machine Reset", self._reset),
         ]
 
     def _set(self, name, value):
@@ -191,6 +209,16 @@ class RenodeOnSimulator:
         channel = self._board.state()["channels"][int(pin)]
         what = {"di": "energised", "relay": "manual"}[channel["kind"]]
         self._board.post(f"channels/{int(pin) + 1}", **{what: not high})
+        return ""
+
+    def _inputs(self, dip):
+        self._board.post("dip", value=int(dip))
+        return ""
+
+    def _reset(self):
+        # The macro `reset` of board.resc drives the switch's position onto the pins again.
+        self._inputs(self._variables["dip"])
+        self._board.post("power", cycle=True)
         return ""
 
     def _read(self, address):

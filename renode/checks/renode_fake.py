@@ -90,9 +90,13 @@ class Peripheral:
         self.write(offset, self.read(offset) & ~clear_bits | set_bits)
 
 
-def commands(machine, printed):
-    """The functions of commands.py, on a machine; what they print is added to `printed`."""
+def commands(machine, printed, parsed=None):
+    """The functions of commands.py on a machine. Adds what they print to `printed`, and the commands that
+    they give to the monitor to `parsed`."""
     path = RENODE / "commands.py"
-    scope = {"monitor": types.SimpleNamespace(Machine=machine), "print": printed.append}
+    monitor = types.SimpleNamespace(Machine=machine)
+    if parsed is not None:
+        monitor.Parse = parsed.append
+    scope = {"monitor": monitor, "print": printed.append}
     exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), scope)
     return types.SimpleNamespace(**{name: value for name, value in scope.items() if name.startswith("mc_")})

@@ -71,6 +71,19 @@ class Commands(unittest.TestCase):
         run.mc_modio_log()
         self.assertEqual(printed[1:], ["modio"])
 
+    def test_warnings_of_an_unused_dma_controller_are_kept_out_of_the_log(self):
+        parsed = []
+        self.assertIsNone(commands(Machine({"sysbus.dma1": object()}), [], parsed).mc_modio_quiet())
+        self.assertEqual(parsed, ["logLevel 3 sysbus.dma1"])
+
+    def test_machine_without_dma_controller_gets_no_command(self):
+        parsed = []
+        self.assertIsNone(commands(Machine(), [], parsed).mc_modio_quiet())
+        self.assertEqual(parsed, [])
+
+    def test_monitor_that_refuses_the_command_stops_nothing(self):
+        self.assertIsNone(commands(Machine({"sysbus.dma1": object()}), []).mc_modio_quiet())
+
 
 class Presets(unittest.TestCase):
     def test_they_are_those_of_the_register_map(self):

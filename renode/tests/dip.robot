@@ -35,12 +35,18 @@ A Position That Is No Address Makes The Unit Silent And Its Fault LED Blink
     254
 
 A Switch That Moves Counts At The Next Power-On Only
-    [Tags]    renode-only
     Start Board    dip=5
+    # The pins of a running board: the firmware does not look at them again.
     Execute Command    modio_inputs 9
-    Run For    0.5
     Unit Answers    5
     Request Gets Silence    03 0204 0001    9
+    # The switch: every reset drives its position onto the pins.
+    Execute Command    $dip=9
+    Unit Answers    5
+    Cut The Power
+    Unit Answers    9
+    Request Gets Silence    03 0204 0001    5
+    Request Gives    03 0206 0001    03 02 0009    9
 
 
 *** Keywords ***

@@ -59,13 +59,16 @@ fn with_robot(
     }
 }
 
-/// The unit tests of the models and of the monitor's commands, and the start of the image on them.
+/// Runs the unit tests of the models, of the monitor's commands and of the stand-ins for Renode, and starts
+/// the image on the models.
 fn models(python: &Path, checks: &Path, elf: &Path) -> Result<()> {
     let presets = presets();
-    let tests: [(&str, &[&OsStr]); 4] = [
+    let tests: [(&str, &[&OsStr]); 6] = [
         ("test_syntax.py", &[]),
         ("test_models.py", &[]),
         ("test_commands.py", &[presets.as_ref()]),
+        ("test_terminal_tester.py", &[]),
+        ("test_exact_line.py", &[]),
         ("test_boot.py", &[elf.as_os_str()]),
     ];
     for (test, arguments) in tests {

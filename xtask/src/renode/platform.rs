@@ -194,7 +194,12 @@ fn scripts_name_files_and_peripherals_that_exist() {
         .cloned()
         .chain(models().into_iter().map(|(_, _, _, name)| name))
         .collect();
-    for script in ["board.resc", "modio-02.resc", "modio-02-pty.resc"] {
+    for script in [
+        "board.resc",
+        "modio-02.resc",
+        "modio-02-exact.resc",
+        "modio-02-pty.resc",
+    ] {
         let text = read(&directory.join(script));
         for word in text.split_whitespace() {
             if let Some(file) = word.split_once("$ORIGIN/").map(|(_, file)| file) {
