@@ -40,8 +40,8 @@ pub struct Options {
 ///
 /// # Errors
 ///
-/// When something does not build, the image does not serve a request, or a figure is worse than the
-/// baseline by more than its tolerance.
+/// When something does not build, the image does not serve a request, or a figure is over its budget, or worse
+/// than the baseline by more than its tolerance.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let elf = build::image(workspace, &build::Options::release())?.elf;
     let report = measure(workspace, &elf)?;
@@ -54,7 +54,17 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     if options.bless {
         return baseline::write(&file, &report);
     }
+    within_budgets(&report)?;
     baseline::hold(&file, &report)
+}
+
+/// Fails when a figure is over its budget, and names all that are.
+fn within_budgets(report: &Value) -> Result<()> {
+    let over = table::over_budget(report);
+    if over.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!("over budget: {}", over.join("; "))))
 }
 
 /// The step of `cargo xtask ci`: the tables, and the baseline held.
@@ -65,6 +75,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 pub fn check(workspace: &mut Workspace, elf: &Path) -> Result<()> {
     let report = measure(workspace, elf)?;
     say!("{}", table::of(&report).trim_end());
+    within_budgets(&report)?;
     baseline::hold(&workspace.root().join(BASELINE), &report)
 }
 

@@ -41,8 +41,8 @@ const LIMITS: [Limit; 3] = [
     },
     Limit {
         name: "budget",
-        flash: 32 * KIB,
-        ram: 6 * KIB,
+        flash: 47 * KIB,
+        ram: 8 * KIB,
     },
 ];
 
@@ -113,11 +113,9 @@ fn within_limits(sizes: &Sizes) -> Result<()> {
     }
 }
 
-/// The part the image does not fit. The budget is a goal that `size` shows, not a wall: an image over
-/// it still runs.
+/// The part or budget that the image exceeds.
 fn exceeded(sizes: &Sizes) -> Option<&'static Limit> {
-    let [parts @ .., _budget] = &LIMITS;
-    parts
+    LIMITS
         .iter()
         .find(|limit| sizes.total.flash > limit.flash || sizes.total.ram > limit.ram)
 }
@@ -214,17 +212,19 @@ mod tests {
         let json = as_json(&sizes(30_000, 5_000));
         assert_eq!(json["limits"][0]["flash"]["left"], 65_536 - 30_000);
         assert_eq!(json["limits"][1]["flash"]["left"], 131_072 - 30_000);
-        assert_eq!(json["limits"][2]["ram"]["left"], 6_144 - 5_000);
+        assert_eq!(json["limits"][2]["ram"]["left"], 8_192 - 5_000);
         assert_eq!(json["crates"][0]["name"], "firmware");
         let table = as_table(&sizes(30_000, 5_000));
-        assert!(table.contains("budget (32 KiB / 6 KiB)"), "{table}");
+        assert!(table.contains("budget (47 KiB / 8 KiB)"), "{table}");
         assert!(table.lines().all(|line| line.trim_end() == line), "{table}");
     }
 
     #[test]
     fn an_image_that_is_too_large_is_found_out() {
         let limit = |flash, ram| exceeded(&sizes(flash, ram)).map(|limit| limit.name);
-        assert_eq!(limit(64 * KIB, 20 * KIB), None);
+        assert_eq!(limit(47 * KIB, 8 * KIB), None);
+        assert_eq!(limit(47 * KIB + 1, 0), Some("budget"));
+        assert_eq!(limit(0, 8 * KIB + 1), Some("budget"));
         assert_eq!(limit(64 * KIB + 1, 0), Some("STM32F103C8"));
         assert_eq!(limit(0, 20 * KIB + 1), Some("STM32F103C8"));
         let failure = within_limits(&sizes(70_000, 9_000))
@@ -234,6 +234,6 @@ mod tests {
             failure.contains("70000") && failure.contains("STM32F103C8"),
             "{failure}"
         );
-        assert!(as_table(&sizes(33 * KIB, 0)).contains("1024 over"));
+        assert!(as_table(&sizes(48 * KIB, 0)).contains("1024 over"));
     }
 }

@@ -128,8 +128,9 @@ pub fn up(
     }
 }
 
-/// The longest frame on the line in whole milliseconds, and three more: the server takes up to half a millisecond,
-/// a save stalls the core for about one, and the count may begin just before a beat.
+/// The longest frame on the line in whole milliseconds, and some more: the server takes up to half a millisecond, and
+/// the count may begin just before a beat. Above 115200 bit/s a save's stalls of the flash, about a hundred of up to
+/// 70 us, make gaps in a reply.
 fn longest_reply_ms(line: uart::LineSettings, framing: Framing) -> u16 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {
@@ -137,7 +138,7 @@ fn longest_reply_ms(line: uart::LineSettings, framing: Framing) -> u16 {
         Framing::Ascii { .. } => 513,
     };
     let ms = characters * line.format.bits() * 1000 / line.baud.max(1);
-    ms as u16 + 3
+    ms as u16 + if line.baud > 115_200 { 8 } else { 3 }
 }
 
 fn wire_settings(line: config::Line) -> uart::LineSettings {
