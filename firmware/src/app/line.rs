@@ -22,9 +22,14 @@ pub struct Line {
     /// Milliseconds that a reply may take, and that the one under way has taken.
     longest_ms: u16,
     sending_ms: u16,
+    /// Interrupts of the UART without a cause since the last millisecond.
+    causeless: u8,
     /// The line was set up again since [`take_repaired`](Self::take_repaired).
     repaired: bool,
 }
+
+/// Interrupts of the UART without a cause in one millisecond after which its registers are checked.
+const CAUSELESS: u8 = 8;
 
 /// How far the reply is.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -62,6 +67,7 @@ impl Line {
             heard_before: 0,
             longest_ms,
             sending_ms: 0,
+            causeless: 0,
             repaired: false,
         }
     }
@@ -92,11 +98,19 @@ impl Line {
                 Next::Done => self.uart.finish_sending(),
             }
         } else if !status.received() {
-            // An interrupt without a cause that is known here comes again at once, and keeps all tasks from
-            // running.
-            self.check();
+            self.without_cause();
         }
         false
+    }
+
+    /// The UART's interrupt has come without a cause that is known here. The scan pends it now and then; more
+    /// than that is a disturbed register whose interrupt comes again at once and keeps all tasks from running.
+    fn without_cause(&mut self) {
+        self.causeless += 1;
+        if self.causeless == CAUSELESS {
+            self.causeless = 0;
+            self.check();
+        }
     }
 
     /// Sets the line up again when its registers are not what they were set to, when the end of a frame is
@@ -163,6 +177,7 @@ impl Line {
 
     /// A millisecond has passed: the response delay runs, and a disturbed line is set up again.
     pub fn on_millisecond(&mut self) {
+        self.causeless = 0;
         self.sending_ms = self.sending_ms.saturating_add(1);
         self.check();
         match self.reply {

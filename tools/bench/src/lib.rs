@@ -28,6 +28,8 @@ pub struct Row {
     pub request: String,
     /// From t3.5's expiry to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
+    /// The same to the second byte, the first that depends on what the request is.
+    pub to_second_byte: u32,
     /// The line's three interrupt handlers, from the request's first byte until the driver is off.
     pub transaction: u32,
     /// The same, by the address of the instruction.
@@ -86,6 +88,7 @@ pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, Stri
         requests.push(Row {
             request: request.name,
             to_first_byte: cost.to_first_byte,
+            to_second_byte: cost.to_second_byte,
             transaction: cost.transaction,
             addresses: cost.addresses,
             byte_in: cost.byte_in,

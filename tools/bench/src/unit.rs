@@ -28,6 +28,9 @@ const TOO_MANY: u32 = 1_000_000;
 pub struct Cost {
     /// From the expiry of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
+    /// The same to the second byte, which is the first that depends on what the request is: the first byte, the
+    /// unit address, is sent before the request is decoded.
+    pub to_second_byte: u32,
     /// The line's three interrupt handlers, from the request's first byte until the driver is off.
     pub transaction: u32,
     /// The same, by the address of the instruction.
@@ -172,8 +175,11 @@ impl Unit {
             }
             if waiting == Expiry::Counting {
                 cost.to_first_byte += retired;
+            }
+            if matches!(waiting, Expiry::Counting | Expiry::FirstByte) {
+                cost.to_second_byte += retired;
                 if wrote {
-                    waiting = Expiry::Done;
+                    waiting = waiting.after_a_byte();
                 }
             }
             if matches!(exception, BYTE | GAP | SERVE) {
@@ -216,12 +222,22 @@ impl Unit {
     }
 }
 
-/// Where the counting to the first byte stands.
+/// Where the counting to the first two bytes stands.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Expiry {
     Before,
     Counting,
+    FirstByte,
     Done,
+}
+
+impl Expiry {
+    const fn after_a_byte(self) -> Self {
+        match self {
+            Self::Counting => Self::FirstByte,
+            _ => Self::Done,
+        }
+    }
 }
 
 /// A run of the byte handler.

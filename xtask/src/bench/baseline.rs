@@ -40,6 +40,7 @@ fn figures(report: &Value) -> Figures {
         let request = row["request"].as_str().unwrap_or_default();
         for kind in [
             "to_first_byte",
+            "to_second_byte",
             "transaction",
             "server",
             "byte_in",

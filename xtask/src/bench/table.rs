@@ -67,8 +67,9 @@ const FREEMODBUS: [(&str, u64); 5] = [
 ];
 
 /// The columns of a request: key, heading.
-const COLUMNS: [(&str, &str); 6] = [
+const COLUMNS: [(&str, &str); 7] = [
     ("to_first_byte", "first byte"),
+    ("to_second_byte", "second byte"),
     ("byte_in", "byte in"),
     ("byte_out", "byte out"),
     ("reply_end", "end"),
@@ -116,7 +117,7 @@ fn requests(report: &Value, text: &mut String) {
     }
     line(
         text,
-        "first byte: from t3.5's expiry until it is in the data register. end: the driver's switching off.\n\
+        "first and second byte: from t3.5's expiry until it is in the data register. end: the driver's switching off.\n\
          in all: the line's interrupts, from the request's first byte to the end; server: of these, without\n\
          RTIC and the drivers of UART and timer. Rivals: from complete frame to complete response in memory;\n\
          -: no answer, or no such function.",
@@ -196,7 +197,7 @@ mod tests {
     fn figures_budgets_and_rivals_are_shown() {
         let report = json!({
             "requests": [
-                { "request": "03 one", "to_first_byte": 326, "transaction": 2000, "byte_in": 80, "byte_out": 81, "reply_end": 70,
+                { "request": "03 one", "to_first_byte": 326, "to_second_byte": 700, "transaction": 2000, "byte_in": 80, "byte_out": 81, "reply_end": 70,
                   "server": 965, "rivals": { "rmodbus": 664, "modbus-core": null } },
                 { "request": "03 read holding registers, 1", "server": 965 },
                 { "request": "ASCII: 03 one", "to_first_byte": 401, "byte_in": 81 },
@@ -235,7 +236,7 @@ mod tests {
         let cells: Vec<_> = row.split_whitespace().collect();
         assert_eq!(
             cells[2..],
-            ["326", "80", "81", "70", "2000", "965", "-", "664"]
+            ["326", "700", "80", "81", "70", "2000", "965", "-", "664"]
         );
         assert!(text.contains("2.0 %") && text.contains("30000"), "{text}");
     }
