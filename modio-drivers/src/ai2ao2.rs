@@ -28,6 +28,9 @@ impl<'a, S: AnalogSource> Ai2Ao2<'a, S> {
     }
 }
 
+/// Channels 3 and 4, which the DAC serves, channel 1 in bit 0.
+const OUTPUTS: u8 = 0b1100;
+
 impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
     fn kinds(&self) -> [Kind; CHANNELS] {
         use Kind::{WordInput, WordOutput};
@@ -41,10 +44,10 @@ impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
         self.outputs = [third, fourth];
     }
 
-    /// Reads the inputs, then reports a DAC that does not answer, which the module's state is about.
+    /// Reads the inputs, and reports a DAC that does not answer.
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
         let inputs = self.inputs.scan(channels);
-        health(self.link).and(inputs)
+        ModuleError::in_either(health(self.link, OUTPUTS), inputs)
     }
 
     /// Leaves the codes in the link. The channels A and B, which are not wired, stay at 0.
@@ -56,7 +59,7 @@ impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
             output_code(channels, 2, third),
             output_code(channels, 3, fourth),
         ]);
-        health(self.link)
+        health(self.link, OUTPUTS)
     }
 }
 

@@ -33,8 +33,8 @@ impl<S: AnalogSource> IoModule for Ai4<S> {
         self.inputs.configure(settings);
     }
 
-    /// As the trait says. [`ModuleError::Line`] names the first channel whose conversion failed, or
-    /// that has waited for one in [`STALLED_SCANS`](crate::STALLED_SCANS) scans.
+    /// As the trait says. A channel fails when its conversion failed; all of them fail when the converter has not
+    /// answered in [`STALLED_SCANS`](crate::STALLED_SCANS) scans.
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
         self.inputs.scan(channels)
     }

@@ -10,8 +10,7 @@ use crate::{
 /// A conversion of the F103 takes some 6 us, about 20 calls.
 pub const POLLS_PER_SCAN: u8 = 64;
 
-/// Scans in a row without any answer from the converter after which the line it is asked for counts as
-/// failed.
+/// Scans in a row without any answer from the converter after which all its lines count as failed.
 pub const STALLED_SCANS: u8 = 10;
 
 /// Inputs on the slot's first lines.
@@ -56,7 +55,7 @@ impl<S: AnalogSource> AnalogInputs<S> {
         for (channel, input) in self.inputs.iter_mut().take(self.count).enumerate() {
             input.show(channels, channel);
             if input.failed {
-                result = result.and(Err(ModuleError::Line { channel }));
+                result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
             }
         }
         result
@@ -89,8 +88,9 @@ impl<S: AnalogSource> AnalogInputs<S> {
             self.stalled = 0;
         } else if self.stalled < STALLED_SCANS - 1 {
             self.stalled += 1;
-        } else if let Some(input) = self.inputs.get_mut(self.line) {
-            input.fail();
+        } else {
+            // The converter serves them all.
+            self.inputs.iter_mut().for_each(Input::fail);
         }
     }
 }

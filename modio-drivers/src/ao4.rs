@@ -26,6 +26,9 @@ impl<'a> Ao4<'a> {
     }
 }
 
+/// The DAC's channels: all of the module's.
+const ALL: u8 = 0b1111;
+
 impl IoModule for Ao4<'_> {
     fn kinds(&self) -> [Kind; CHANNELS] {
         [Kind::WordOutput; CHANNELS]
@@ -37,19 +40,19 @@ impl IoModule for Ao4<'_> {
         self.settings = *settings;
     }
 
-    /// There is nothing to read, but [`ModuleError::NotAnswering`] to report.
+    /// There is nothing to read, but a DAC that does not answer is reported.
     fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
-        health(self.link)
+        health(self.link, ALL)
     }
 
-    /// Leaves the codes in the link; [`ModuleError::NotAnswering`] while they do not get through.
+    /// Leaves the codes in the link; an error of all channels while they do not get through.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
         let mut codes = [0; CHANNELS];
         for (channel, (code, settings)) in codes.iter_mut().zip(&self.settings).enumerate() {
             *code = output_code(channels, channel, settings);
         }
         self.link.post(codes);
-        health(self.link)
+        health(self.link, ALL)
     }
 }
 
@@ -58,10 +61,10 @@ pub(crate) fn output_code(channels: &Channels, channel: usize, settings: &Channe
     output_to_raw(channels.word(channel), settings.range, settings.scale)
 }
 
-/// What the worker says of the DAC.
-pub(crate) fn health(link: &DacLink) -> Result<(), ModuleError> {
+/// What the worker says of the DAC that serves these channels, channel 1 in bit 0.
+pub(crate) fn health(link: &DacLink, channels: u8) -> Result<(), ModuleError> {
     if link.failed() {
-        Err(ModuleError::NotAnswering)
+        Err(ModuleError::chip(channels))
     } else {
         Ok(())
     }
@@ -125,7 +128,7 @@ mod tests {
         let mut module = Ao4::new(&link);
         let mut channels = words([1, 2, 3, 4]);
         link.set_failed(true);
-        let failed = Err(ModuleError::NotAnswering);
+        let failed = Err(ModuleError::chip(ALL));
         assert_eq!(module.drive_outputs(&channels), failed);
         assert_eq!(module.read_inputs(&mut channels), failed);
         assert_eq!(channels, words([1, 2, 3, 4]));

@@ -45,7 +45,9 @@ impl<P: InputPin> IoModule for Di4<P> {
         for (channel, (line, filter)) in lines.enumerate() {
             match line.is_low() {
                 Ok(energised) => channels.set_bit(channel, filter.sample(energised)),
-                Err(_) => result = Err(ModuleError::Line { channel }),
+                Err(_) => {
+                    result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
+                }
             }
         }
         result
@@ -147,10 +149,7 @@ mod tests {
         let mut module = Di4::new([good(), failing, good(), good()]);
         let mut channels = Channels::new();
         module.read_inputs(&mut channels).unwrap();
-        assert_eq!(
-            module.read_inputs(&mut channels),
-            Err(ModuleError::Line { channel: 1 })
-        );
+        assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(1)));
         assert_eq!([0, 1, 2, 3].map(|c| channels.bit(c)), [true; 4]);
         finish(module);
     }

@@ -39,7 +39,7 @@ impl<P: OutputPin> IoModule for Do4<P> {
                 .set_state(PinState::from(channels.bit(channel)))
                 .is_err()
             {
-                result = Err(ModuleError::Line { channel });
+                result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
             }
         }
         result
@@ -98,7 +98,7 @@ mod tests {
         let mut module = Do4::new([failing, low(), low(), low()]);
         assert_eq!(
             module.drive_outputs(&Channels::new()),
-            Err(ModuleError::Line { channel: 0 })
+            Err(ModuleError::line(0))
         );
         module.lines.iter_mut().for_each(Mock::done);
     }

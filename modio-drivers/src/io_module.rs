@@ -2,17 +2,66 @@
 
 use crate::{CHANNELS, ChannelSettings, Channels, Kind};
 
-/// A module could not be read or driven; its channels keep what they had.
+/// Channels of a module that could not be read or driven. They keep what they had, and are tried again at every
+/// scan. All other channels have been served.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ModuleError {
-    /// A line of the slot could not be read or driven: the channel it belongs to, 0 to 3.
-    Line {
-        /// The channel.
-        channel: usize,
-    },
-    /// The module's own chip does not answer. It is tried again all the time.
-    NotAnswering,
+pub struct ModuleError {
+    /// Channels whose own line of the slot failed, channel 1 in bit 0.
+    lines: u8,
+    /// Channels whose chip on the module does not answer, channel 1 in bit 0.
+    chip: u8,
+}
+
+impl ModuleError {
+    /// A line of the slot could not be read or driven: that of this channel, 0 to 3.
+    #[must_use]
+    pub const fn line(channel: usize) -> Self {
+        Self {
+            lines: 1 << (channel % CHANNELS),
+            chip: 0,
+        }
+    }
+
+    /// The module's chip, which serves these channels, channel 1 in bit 0, does not answer.
+    #[must_use]
+    pub const fn chip(channels: u8) -> Self {
+        Self {
+            lines: 0,
+            chip: channels,
+        }
+    }
+
+    /// Every channel that failed, channel 1 in bit 0.
+    #[must_use]
+    pub const fn channels(self) -> u8 {
+        self.lines | self.chip
+    }
+
+    /// The first channel, 0 to 3, whose own line failed, when the module's chip answers.
+    #[must_use]
+    pub const fn first_line(self) -> Option<usize> {
+        if self.chip == 0 && self.lines != 0 {
+            Some(self.lines.trailing_zeros() as usize)
+        } else {
+            None
+        }
+    }
+
+    /// What failed in either of two results.
+    ///
+    /// # Errors
+    ///
+    /// The channels of both.
+    pub const fn in_either(one: Result<(), Self>, other: Result<(), Self>) -> Result<(), Self> {
+        match (one, other) {
+            (Err(one), Err(other)) => Err(Self {
+                lines: one.lines | other.lines,
+                chip: one.chip | other.chip,
+            }),
+            (Err(error), Ok(())) | (Ok(()), Err(error)) => Err(error),
+            (Ok(()), Ok(())) => Ok(()),
+        }
+    }
 }
 
 /// A plug-in module in its slot.
@@ -33,8 +82,8 @@ pub trait IoModule {
     ///
     /// # Errors
     ///
-    /// [`ModuleError`] when a channel could not be read. Every other channel has been read all the
-    /// same, and the failed one is tried again the next time.
+    /// [`ModuleError`] with the channels that could not be read. Every other channel has been read, and the
+    /// failed ones are tried again the next time.
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError>;
 
     /// Drives the outputs as `channels` says: as often as [`read_inputs`](Self::read_inputs), and at
@@ -42,7 +91,7 @@ pub trait IoModule {
     ///
     /// # Errors
     ///
-    /// [`ModuleError`] when a channel could not be driven; otherwise as above.
+    /// [`ModuleError`] with the channels that could not be driven; otherwise as above.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError>;
 }
 

@@ -52,7 +52,9 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
         for (channel, (jumper, filter)) in jumpers.enumerate() {
             match jumper.is_low() {
                 Ok(manual) => channels.set_bit(channel, filter.sample(manual)),
-                Err(_) => result = Err(ModuleError::Line { channel }),
+                Err(_) => {
+                    result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
+                }
             }
         }
         result
@@ -64,7 +66,7 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
         for (channel, coil) in (FIRST_COIL..).zip(&mut self.coils) {
             let energised = PinState::from(channels.bit(channel));
             if coil.set_state(energised).is_err() {
-                result = Err(ModuleError::Line { channel });
+                result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
             }
         }
         result
@@ -164,15 +166,9 @@ mod tests {
         );
         let mut channels = Channels::new();
         channels.set_bit(3, true);
-        assert_eq!(
-            module.read_inputs(&mut channels),
-            Err(ModuleError::Line { channel: 0 })
-        );
+        assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(0)));
         assert!(channels.bit(1));
-        assert_eq!(
-            module.drive_outputs(&channels),
-            Err(ModuleError::Line { channel: 2 })
-        );
+        assert_eq!(module.drive_outputs(&channels), Err(ModuleError::line(2)));
         finish(module);
     }
 }

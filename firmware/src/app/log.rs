@@ -156,11 +156,13 @@ impl Log {
     /// Something happened.
     pub fn event(&mut self, event: Event) {
         let text = match event {
-            Event::ModuleFails(ModuleError::Line { channel }) => {
-                let mut line = Line::of("slot 5: channel ");
-                return self.write(line.number(channel as u32 + 1).text(" fails"));
-            }
-            Event::ModuleFails(_) => "slot 5: the module does not answer",
+            Event::ModuleFails(error) => match error.first_line() {
+                Some(channel) => {
+                    let mut line = Line::of("slot 5: channel ");
+                    return self.write(line.number(channel as u32 + 1).text(" fails"));
+                }
+                None => "slot 5: the module does not answer",
+            },
             Event::ModuleGood => "slot 5: the module works again",
             Event::CommunicationLost => "communication lost: outputs go to SAFE",
             Event::Saved => "configuration saved",

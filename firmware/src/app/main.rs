@@ -40,7 +40,7 @@ mod app {
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::{Adu, Outcome, Server};
-    use modio_drivers::{ChannelSettings, IoModule};
+    use modio_drivers::{ChannelSettings, IoModule, ModuleError};
     use register_map::codes::Command;
 
     use crate::{
@@ -286,15 +286,16 @@ mod app {
         }
         let mut result = module.drive_outputs(&channels);
         if beat {
-            result = result.and(module.read_inputs(&mut channels));
+            result = ModuleError::in_either(result, module.read_inputs(&mut channels));
         }
         let changed = device.lock(|device| {
             if beat {
                 device.points.scanned(&channels, settings);
             }
             let was_failing = device.points.failing();
+            let failed = result.map_or_else(ModuleError::channels, |()| 0);
             // Only a whole scan shows that all is well.
-            let is_failing = result.is_err() || !beat && was_failing;
+            let is_failing = if beat { failed } else { failed | was_failing };
             device.points.set_failing(is_failing);
             is_failing != was_failing
         });
@@ -396,7 +397,7 @@ mod app {
         let free = stack::free_low_water();
         let (failing, millis) = device.lock(|device| {
             device.state.stack_free = free;
-            (device.points.failing(), device.state.millis())
+            (device.points.failing() != 0, device.state.millis())
         });
         signals.show(millis, failing, || activity.lock(core::mem::take));
         while let Some(event) = logged.dequeue() {

@@ -16,7 +16,8 @@ pub struct Points {
     pulses: [u32; CHANNELS],
     /// Inputs have been scanned once: from then on a rising edge counts.
     scanned: bool,
-    failing: bool,
+    /// Channels that cannot be read or driven, channel 1 in bit 0.
+    failing: u8,
 }
 
 impl Points {
@@ -29,7 +30,7 @@ impl Points {
             channels: Channels::new(),
             pulses: [0; CHANNELS],
             scanned: false,
-            failing: false,
+            failing: 0,
         }
     }
 
@@ -79,14 +80,14 @@ impl Points {
         self.scanned = true;
     }
 
-    /// Takes note of whether the module answers.
-    pub const fn set_failing(&mut self, failing: bool) {
-        self.failing = failing;
+    /// Takes note of the channels that cannot be read or driven, channel 1 in bit 0.
+    pub const fn set_failing(&mut self, channels: u8) {
+        self.failing = channels;
     }
 
-    /// Whether the module does not answer.
+    /// The channels that cannot be read or driven, channel 1 in bit 0.
     #[must_use]
-    pub const fn failing(&self) -> bool {
+    pub const fn failing(&self) -> u8 {
         self.failing
     }
 
@@ -111,7 +112,7 @@ impl Points {
     pub fn module_state(&self) -> ModuleState {
         if self.kinds == [Kind::None; CHANNELS] {
             ModuleState::None
-        } else if self.failing {
+        } else if self.failing != 0 {
             ModuleState::NotAnswering
         } else if (0..CHANNELS).any(|c| self.channels.status(c) != ChannelStatus::Good) {
             ModuleState::OutOfRange
@@ -136,10 +137,10 @@ impl Points {
     }
 
     /// Checks that a span's points exist and are all of a kind that will do, which is 02, then that
-    /// the module answers, which is 04.
+    /// all of them can be read or driven, which is 04.
     fn check(&self, span: Span, will_do: fn(Kind) -> bool) -> Result<(), Exception> {
         self.check_exist(span, will_do)?;
-        self.check_answers()
+        self.check_answers(span)
     }
 
     fn check_exist(&self, span: Span, will_do: fn(Kind) -> bool) -> Result<(), Exception> {
@@ -155,8 +156,10 @@ impl Points {
         }
     }
 
-    const fn check_answers(&self) -> Result<(), Exception> {
-        if self.failing {
+    fn check_answers(&self, span: Span) -> Result<(), Exception> {
+        // The span exists: its channels are 0 to 3.
+        let fails = |address| self.failing >> (channel_of(address) & 3) & 1 != 0;
+        if self.failing != 0 && span.addresses().any(fails) {
             Err(Exception::ServerDeviceFailure)
         } else {
             Ok(())
@@ -167,7 +170,7 @@ impl Points {
     ///
     /// # Errors
     ///
-    /// 02 for points that do not exist, 04 when the module does not answer.
+    /// 02 for points that do not exist, 04 when one of them cannot be read or driven.
     pub fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
         self.check(span, |kind| {
             matches!(kind, Kind::BitInput | Kind::BitOutput)
@@ -213,7 +216,7 @@ impl Points {
         if !allowed {
             return Err(Exception::IllegalDataValue);
         }
-        self.check_answers()
+        self.check_answers(span)
     }
 
     /// Reads bit points that were found good.

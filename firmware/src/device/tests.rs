@@ -221,15 +221,33 @@ fn a_new_scale_does_not_move_an_output() {
 }
 
 #[test]
+fn a_failing_channel_answers_04_and_leaves_the_others_alone() {
+    let mut bench = Bench::new(Module::Ai2Ao2, &[]);
+    // The DAC, which serves channels 3 and 4.
+    bench.device.points.set_failing(0b1100);
+    assert_eq!(bench.read(0x10, 2), Ok(std::vec![0; 2]));
+    assert_eq!(bench.read(0x12, 1), Err(4));
+    assert_eq!(bench.read(0x11, 2), Err(4), "one of two fails");
+    assert_eq!(bench.write(0x12, &[1, 2]), Err(4));
+    assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
+    // One input.
+    bench.device.points.set_failing(0b0010);
+    assert_eq!(bench.read(0x11, 1), Err(4));
+    assert_eq!(bench.read(0x10, 1), Ok(std::vec![0]));
+    bench.write(0x12, &[1, 2]).unwrap();
+    assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
+}
+
+#[test]
 fn a_module_that_does_not_answer_is_04_after_all_other_checks() {
     let mut bench = Bench::new(Module::Ao4, &[]);
-    bench.device.points.set_failing(true);
+    bench.device.points.set_failing(0b1111);
     assert_eq!(bench.read(0x10, 4), Err(4));
     assert_eq!(bench.write(0x10, &[1]), Err(4));
     assert_eq!(bench.write(0x10, &[4096]), Err(3));
     assert_eq!(bench.read(0x14, 1), Err(2));
     assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
-    bench.device.points.set_failing(false);
+    bench.device.points.set_failing(0);
     assert_eq!(bench.read(0x10, 4), Ok(std::vec![0; 4]));
 }
 
@@ -303,7 +321,10 @@ fn identity_and_state_are_read_and_never_written() {
     assert_eq!(bench.read(0x0220, 6), Ok(std::vec![1, 2, 3, 4, 5, 6]));
     assert_eq!(bench.read(0x0230, 9).map(|c| c.len()), Ok(9));
     assert_eq!(bench.read(0x0240, 32), Ok(std::vec![0; 32]));
-    assert_eq!(bench.read(0x0260, 16), Ok(std::vec![3; 16]));
+    bench.device.state.line_repairs = 9;
+    let mut record = std::vec![3; 16];
+    record[13] = 9;
+    assert_eq!(bench.read(0x0260, 16), Ok(record));
     for gap in [0x020C, 0x0226, 0x0239, 0x0270, 0x02FF, 0x0340] {
         assert_eq!(bench.read(gap, 1), Err(2), "{gap:#x}");
     }

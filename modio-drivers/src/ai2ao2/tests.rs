@@ -99,24 +99,19 @@ fn a_dac_that_does_not_answer_fails_the_module_while_its_inputs_are_read() {
     assert_eq!(module.drive_outputs(&channels), Ok(()));
     assert!(worker.work(&link).is_err() && worker.work(&link).is_err());
 
-    let failed = Err(ModuleError::NotAnswering);
+    let failed = Err(ModuleError::chip(0b1100));
     channels.set_word(2, 6);
     assert_eq!(module.drive_outputs(&channels), failed);
     assert_eq!(module.read_inputs(&mut channels), failed);
     assert_eq!([0, 1].map(|c| channels.word(c)), [1, 2]);
     module.inputs.source_mut().0 = [u16::MAX, 3];
-    assert_eq!(
-        module.read_inputs(&mut channels),
-        failed,
-        "the module's failure comes before a line's"
-    );
+    let both = module.read_inputs(&mut channels).unwrap_err();
+    assert_eq!(both.channels(), 0b1101, "the DAC's channels and the line's");
+    assert_eq!(both.first_line(), None);
 
     assert_eq!(worker.work(&link), Ok(false), "left out after two failures");
     assert_eq!(worker.work(&link), Ok(true));
     assert_eq!(module.drive_outputs(&channels), Ok(()));
-    assert_eq!(
-        module.read_inputs(&mut channels),
-        Err(ModuleError::Line { channel: 0 })
-    );
+    assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(0)));
     bus.done();
 }

@@ -243,6 +243,12 @@ fn a_conversion_on_demand_is_asked_again_for_the_same_line_within_the_scans_budg
     );
 }
 
+/// Every line has failed.
+fn all_lines() -> ModuleError {
+    let each = (0..CHANNELS).map(|channel| Err(ModuleError::line(channel)));
+    each.fold(Ok(()), ModuleError::in_either).unwrap_err()
+}
+
 #[test]
 fn a_converter_that_never_answers_is_reported_in_time_and_taken_back() {
     let mut module = Ai4::new(Converter {
@@ -257,7 +263,7 @@ fn a_converter_that_never_answers_is_reported_in_time_and_taken_back() {
         let expected = if scan < STALLED_SCANS {
             Ok(())
         } else {
-            Err(ModuleError::Line { channel: 0 })
+            Err(all_lines())
         };
         assert_eq!(module.read_inputs(&mut channels), expected, "scan {scan}");
         assert_eq!(words(&channels), [1, 2, 3, 4]);
@@ -297,10 +303,7 @@ fn a_line_whose_conversion_fails_is_named_keeps_its_word_and_starts_afresh() {
     module.inputs.source_mut().codes = [4000; 4];
     module.inputs.source_mut().broken[2] = true;
     for _ in 0..300 {
-        assert_eq!(
-            module.read_inputs(&mut channels),
-            Err(ModuleError::Line { channel: 2 })
-        );
+        assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(2)));
         assert_eq!(channels.word(2), 100);
     }
     assert!(
@@ -308,10 +311,8 @@ fn a_line_whose_conversion_fails_is_named_keeps_its_word_and_starts_afresh() {
         "1 - exp(-300/256)"
     );
     module.inputs.source_mut().broken = [true, false, true, true];
-    assert_eq!(
-        module.read_inputs(&mut channels),
-        Err(ModuleError::Line { channel: 0 })
-    );
+    let failed = module.read_inputs(&mut channels).unwrap_err();
+    assert_eq!((failed.channels(), failed.first_line()), (0b1101, Some(0)));
     module.inputs.source_mut().broken = [false; 4];
     assert_eq!(module.read_inputs(&mut channels), Ok(()));
     assert_eq!(channels.word(2), 4000);

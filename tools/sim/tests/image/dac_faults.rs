@@ -17,11 +17,15 @@ const FAULTS: [BusFault; 3] = [
     BusFault::HoldsSda { clocks: None },
 ];
 
-/// Every request to the points is 04, whether it reads or writes; the rest of the device goes on.
+/// Every request to the DAC's points is 04, whether it reads or writes; the analog inputs beside them, and the
+/// rest of the device, go on.
 fn assert_out(bench: &mut Bench, first: u16) {
     for function in [3, 4] {
         assert_eq!(bench.words(function, first, 1), Err(4));
         assert_eq!(bench.words(function, SLOT, 4), Err(4));
+        for input in SLOT..first {
+            assert!(bench.words(function, input, 1).is_ok(), "an analog input");
+        }
     }
     assert_eq!(bench.write(SLOT + 2, &[1, 2]), Err(4));
     assert_eq!(bench.write_single(6, SLOT + 3, 1), Err(4));
