@@ -65,8 +65,15 @@ mod app {
         device: &'static mut Device,
         /// A request for this unit has been served since the LEDs were last set.
         activity: bool,
-        /// What a request has ordered of the background.
-        order: Option<Command>,
+        /// What requests have ordered of the background.
+        orders: Orders,
+    }
+
+    /// A save and a restart may be ordered before the background takes either: neither replaces the other.
+    #[derive(Default)]
+    pub struct Orders {
+        save: bool,
+        restart: bool,
     }
 
     #[local]
@@ -102,7 +109,7 @@ mod app {
             Shared {
                 line: started.line,
                 activity: false,
-                order: None,
+                orders: Orders::default(),
                 device: started.device,
             },
             Local {
@@ -164,14 +171,14 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI3, priority = 3, local = [server, frame_gap_ms], shared = [line, device, activity, order])]
+    #[task(binds = EXTI3, priority = 3, local = [server, frame_gap_ms], shared = [line, device, activity, orders])]
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
         let serve::SharedResources {
             mut line,
             mut device,
             mut activity,
-            mut order,
+            mut orders,
             ..
         } = cx.shared;
         let serve::LocalResources {
@@ -206,8 +213,12 @@ mod app {
                 let order = device.take_order()?;
                 device.carry_out(order)
             });
-            if left.is_some() {
-                order.lock(|order| *order = left);
+            if let Some(order) = left {
+                orders.lock(|orders| match order {
+                    Command::Save => orders.save = true,
+                    Command::Restart => orders.restart = true,
+                    _ => {}
+                });
                 rtic::pend(Interrupt::EXTI0);
             }
         }
@@ -347,7 +358,7 @@ mod app {
     #[task(
         binds = EXTI0, priority = 1,
         local = [analog_outputs, persistence, signals, log, logged],
-        shared = [line, device, activity, order],
+        shared = [line, device, activity, orders],
     )]
     fn background(cx: background::Context) {
         alive::begin(fault::marks(), Task::Background);
@@ -355,7 +366,7 @@ mod app {
             mut line,
             mut device,
             mut activity,
-            mut order,
+            mut orders,
             ..
         } = cx.shared;
         let background::LocalResources {
@@ -371,10 +382,12 @@ mod app {
             outputs.work();
         }
 
-        match order.lock(Option::take) {
-            Some(Command::Save) => persistence.begin(&mut device),
-            Some(Command::Restart) => persistence.restart_when_done(),
-            _ => {}
+        let Orders { save, restart } = orders.lock(core::mem::take);
+        if save {
+            persistence.begin(&mut device);
+        }
+        if restart {
+            persistence.restart_when_done();
         }
         if let Some(event) = persistence.work(&mut device) {
             log.event(event);
