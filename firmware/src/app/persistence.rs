@@ -1,6 +1,7 @@
 //! Saving the configuration from the background, and restarts, which wait for it.
 
 use firmware::{
+    config::Settings,
     device::Device,
     store::{Saving, Store},
 };
@@ -13,17 +14,20 @@ pub struct Persistence {
     store: Store,
     pages: Pages,
     saving: Option<Saving>,
+    /// The settings that are being saved: a copy, so that requests do not wait while they are encoded.
+    settings: Settings,
     /// The page that is no longer needed waits to be erased.
     erase: bool,
     restart: bool,
 }
 
 impl Persistence {
-    pub const fn new(store: Store, pages: Pages) -> Self {
+    pub fn new(store: Store, pages: Pages) -> Self {
         Self {
             store,
             pages,
             saving: None,
+            settings: Settings::defaults(),
             erase: false,
             restart: false,
         }
@@ -31,14 +35,12 @@ impl Persistence {
 
     /// Begins to save what the configuration has set aside for it.
     pub fn begin(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
-        self.saving = device.lock(|device| {
-            let saving = Saving::new(&self.store, &self.pages, device.config.to_save());
-            if saving.is_none() {
-                // It is stored as it is: no wear.
-                device.config.end_save();
-            }
-            saving
-        });
+        device.lock(|device| self.settings.clone_from(device.config.to_save()));
+        self.saving = Saving::new(&self.store, &self.pages, &self.settings);
+        if self.saving.is_none() {
+            // These settings are stored already: no wear.
+            self.end(device);
+        }
     }
 
     /// Restarts the device when nothing is being saved.
@@ -68,13 +70,20 @@ impl Persistence {
         let _ = self.store.make_spare(&mut self.pages);
     }
 
+    /// The settings are stored. What takes long is worked out while requests are served.
+    fn end(&self, device: &mut impl Mutex<T = &'static mut Device>) {
+        let started = device.lock(|device| device.config.started());
+        let changed = self.settings.needs_restart(&started);
+        device.lock(|device| device.config.end_save(changed));
+    }
+
     fn save(
         &mut self,
         mut saving: Saving,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) -> Event {
         let mut good = true;
-        while let Some(operation) = device.lock(|device| saving.next(device.config.to_save())) {
+        while let Some(operation) = saving.next(&self.settings) {
             good = operation.perform(&mut self.pages).is_ok();
             if !good {
                 break;
@@ -83,7 +92,7 @@ impl Persistence {
         good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
         self.erase = !self.store.has_spare();
         if good {
-            device.lock(|device| device.config.end_save());
+            self.end(device);
             Event::Saved
         } else {
             let stored = self.store.load(&self.pages).settings;

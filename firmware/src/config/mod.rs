@@ -31,6 +31,7 @@ use register_map::{Run, runs};
 pub use in_force::{Line, Lora, Point, Slot};
 use lock::Lock;
 use settings::RESTARTS;
+pub use settings::RestartValues;
 pub use settings::Settings;
 
 /// The configuration of a running device.
@@ -211,11 +212,17 @@ impl Config {
         &self.saved
     }
 
-    /// The save is complete.
-    pub fn end_save(&mut self) {
+    /// The settings in force since the start that count only after a restart.
+    #[must_use]
+    pub const fn started(&self) -> RestartValues {
+        RestartValues(self.started)
+    }
+
+    /// The save is complete; `changed` says whether the saved settings need a restart to be in force,
+    /// [`Settings::needs_restart`].
+    pub const fn end_save(&mut self, changed: bool) {
         self.saving = false;
-        let saved = self.saved.restart_values();
-        self.waiting = self.left || !saved.eq(self.started.iter().copied());
+        self.waiting = self.left || changed;
     }
 
     /// The save did not succeed; `stored` is what is stored, as before.

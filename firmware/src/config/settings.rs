@@ -10,6 +10,10 @@ const PAGE: u16 = KEY >> 8;
 /// How many settings count only after a restart.
 pub(super) const RESTARTS: usize = restarts();
 
+/// The values of all settings that count only after a restart, in the order of their addresses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RestartValues(pub(super) [u16; RESTARTS]);
+
 /// A value for every register of the configuration. They fit each other: a setting by point is one that
 /// the point's module allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -120,6 +124,12 @@ impl Settings {
         let pairs = self.values.iter().zip(&from.values);
         // There are 256 at most.
         pairs.map(|(a, b)| u16::from(a != b)).sum()
+    }
+
+    /// Whether these settings differ from those in force since the start in one that counts only after a restart.
+    #[must_use]
+    pub fn needs_restart(&self, started: &RestartValues) -> bool {
+        !self.restart_values().eq(started.0.iter().copied())
     }
 
     /// The settings that count only after a restart, in the order of their addresses.

@@ -203,6 +203,37 @@ fn a_change_made_while_a_save_runs_is_not_part_of_it_and_another_save_is_busy() 
     assert_eq!(bench.register(FILTER), 77);
 }
 
+/// While the background holds the device, no request is served.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time() {
+    const BACKGROUND: u32 = 16 + 6;
+    const XPSR: usize = 16;
+    const BASEPRI: usize = 20;
+    let mut master = Master::new(Module::Di4, &large());
+    master.write(0x0100, 0x5A17);
+    master.write(FILTER, 10);
+    let board = &mut master.bench.board;
+    let operations = board.flash_operations();
+    let request = adu(&[1, 6, 0x01, 0x08, 0, 1]);
+    let now = board.now();
+    board.line().send(now, &request);
+    let (mut longest, mut since) = (Time::ZERO, None);
+    let end = now + Time::from_ms(60);
+    while board.now() < end {
+        board.step(1);
+        let in_background = board.register(XPSR).unwrap_or_default() & 0x1FF == BACKGROUND;
+        if in_background && board.register(BASEPRI) != Some(0) {
+            let begin = *since.get_or_insert(board.now());
+            longest = longest.max(board.now() - begin);
+        } else {
+            since = None;
+        }
+    }
+    assert!(board.flash_operations() > operations + 190, "it was saved");
+    assert!(longest < Time::from_us(20), "a lock was held for {longest}");
+}
+
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_restart_waits_for_a_running_save() {
