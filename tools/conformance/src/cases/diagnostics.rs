@@ -167,15 +167,20 @@ fn restart(bench: &mut Bench<'_>) -> Check {
     bench.exception_03_or_silence(&diagnose(1, &[0, 0, 0]))
 }
 
-/// Puts the unit into listen-only mode, or skips the case.
-fn enter(bench: &mut Bench<'_>) -> Check {
-    // Data that is refused tells whether it has the sub-function, without entering.
+/// Skips the case where the unit has no listen-only mode.
+pub(super) fn needs_listen_only(bench: &mut Bench<'_>) -> Check {
+    // Data that the unit refuses shows whether it has the sub-function, without entering the mode.
     let reply = bench.ask_due(&diagnose(4, &[0, 1]))?;
     if reply.exception(8) == Some(1) {
         return Err(crate::case::Stop::Skip(
             "the unit answers 01: it has no 08/04".to_owned(),
         ));
     }
+    Ok(())
+}
+
+/// Puts the unit into listen-only mode.
+pub(super) fn enter(bench: &mut Bench<'_>) -> Check {
     let enter = bench.frame(&diagnose(4, &[0, 0]));
     bench.silence_to(&enter, "08/04 is not answered")
 }
@@ -196,6 +201,7 @@ fn leave(bench: &mut Bench<'_>, so_far: Check) -> Check {
 }
 
 fn listen_only(bench: &mut Bench<'_>) -> Check {
+    needs_listen_only(bench)?;
     enter(bench)?;
     let ping = bench.ping();
     let mut silent = bench.silence_to(&ping, "in listen-only mode nothing is answered");
@@ -215,6 +221,7 @@ fn listen_only(bench: &mut Bench<'_>) -> Check {
 fn listen_only_writes(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(1);
     bench.set_bits(span.first, &[false])?;
+    needs_listen_only(bench)?;
     enter(bench)?;
     let [high, low] = span.first.to_be_bytes();
     let mut tried = Ok(());

@@ -66,6 +66,24 @@ faults! {
     KeepsLog => "fc0c/cleared-by-restart",
     /// Puts the newest event last.
     LogBackwards => "fc0c/newest-first",
+    /// Writes no receive event for a frame with a bad check or a damaged character.
+    ErrorsUnlogged => "fc0c/communication-error",
+    /// Writes no send event for a request that gets no reply.
+    SilenceUnlogged => "fc0c/broadcast",
+    /// Writes no send event for a reply.
+    RepliesUnlogged => "fc0c/reply-sent",
+    /// Writes receive events of requests for other units.
+    LogsOthers => "fc0c/other-units",
+    /// Writes receive events of broadcasts without bit 6.
+    BroadcastsLoggedAsOthers => "fc0c/broadcast",
+    /// Writes send events of exceptions as those of ordinary replies.
+    ExceptionsLoggedAsReplies => "fc0c/exception-sent",
+    /// Writes events without bit 5 in listen-only mode.
+    ModeUnlogged => "fc0c/listen-only",
+    /// Writes no event 04 when it enters listen-only mode.
+    EntryUnlogged => "fc0c/listen-only",
+    /// Writes no event 00 for a restart.
+    RestartUnlogged => "fc0c/restart",
     /// Counts only its own messages as bus messages.
     DeafCounter => "counters/bus-messages",
     /// Does not count bad CRCs.
@@ -119,7 +137,11 @@ faults! {
 }
 
 /// Mistakes above that another case must find, too.
-pub const MORE_CASES: &[(Fault, &str)] = &[(Fault::ClosesEarly, "gaps/just-below-t3.5")];
+pub const MORE_CASES: &[(Fault, &str)] = &[
+    (Fault::ClosesEarly, "gaps/just-below-t3.5"),
+    (Fault::ErrorsUnlogged, "fc0c/communication-error-characters"),
+    (Fault::RestartUnlogged, "fc0c/cleared-by-restart"),
+];
 
 /// Mistakes of an ASCII server.
 pub const ASCII_FAULTS: &[(Fault, &str)] = &[

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use super::fault::Fault;
+
 /// Counters by sub-function, 0B to 12.
 pub const COUNTERS: usize = 8;
 
@@ -12,16 +14,39 @@ pub struct Log {
     pub listen_only: bool,
     pub events: u16,
     log: VecDeque<u8>,
+    fault: Option<Fault>,
 }
 
 impl Log {
+    pub fn new(fault: Option<Fault>) -> Self {
+        Self {
+            fault,
+            ..Self::default()
+        }
+    }
+
     /// Counts one more; `sub` is 0B to 12.
     pub fn count(&mut self, sub: usize) {
         self.counters[sub - 0x0B] = self.counters[sub - 0x0B].wrapping_add(1);
     }
 
+    /// A receive event (V1.1b3 6.10): bit 1 communication error, bit 6 broadcast; bit 5 is the mode.
+    pub fn received(&mut self, bits: u8) {
+        self.event(0x80 | self.mode_bit() | bits);
+    }
+
+    /// A send event (V1.1b3 6.10), with or without a reply: bits 0 to 3 are the kind of exception; bit 5 is
+    /// the mode.
+    pub fn sent(&mut self, bits: u8) {
+        self.event(0x40 | self.mode_bit() | bits);
+    }
+
+    fn mode_bit(&self) -> u8 {
+        u8::from(self.listen_only && self.fault != Some(Fault::ModeUnlogged)) << 5
+    }
+
     /// A new event, the newest first.
-    pub fn event(&mut self, event: u8) {
+    fn event(&mut self, event: u8) {
         self.log.push_front(event);
         self.log.truncate(64);
     }
@@ -63,13 +88,18 @@ impl Log {
                     _ => return Err(3),
                 }
                 self.listen_only = false;
-                self.event(0);
+                if self.fault != Some(Fault::RestartUnlogged) {
+                    self.event(0);
+                }
                 self.clear(clears);
                 Ok(data.to_vec())
             }
             2 => zero.map(|()| vec![0, 0]),
             4 => zero.map(|()| {
                 self.listen_only = true;
+                if self.fault != Some(Fault::EntryUnlogged) {
+                    self.event(4);
+                }
                 Vec::new()
             }),
             0x0A => zero.map(|()| {

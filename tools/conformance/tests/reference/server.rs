@@ -28,7 +28,7 @@ impl Server {
             fault,
             coils: vec![false; COILS.1],
             holding: vec![1; HOLDING.1],
-            log: Log::default(),
+            log: Log::new(fault),
             delimiter: b'\n',
         }
     }

@@ -132,7 +132,7 @@ impl Unit {
                 let good = *check == lrc(body) || self.server.has(Fault::IgnoresCrc);
                 self.message(body.to_vec(), good && !self.damaged, sign.end);
             } else {
-                self.server.log.count(0x0C);
+                self.spoilt();
             }
             self.last = None;
         }
@@ -169,11 +169,19 @@ impl Unit {
         self.message(body, good && !damaged && !long && frame.len() >= 4, at);
     }
 
+    /// A frame is lost to a bad check or a damaged character.
+    fn spoilt(&mut self) {
+        if !self.server.has(Fault::ErrorsUncounted) {
+            self.server.log.count(0x0C);
+        }
+        if !self.server.has(Fault::ErrorsUnlogged) {
+            self.server.log.received(0x02);
+        }
+    }
+
     fn message(&mut self, body: Vec<u8>, good: bool, at: Duration) {
         if !good || body.len() < 2 {
-            if !self.server.has(Fault::ErrorsUncounted) {
-                self.server.log.count(0x0C);
-            }
+            self.spoilt();
             if self.server.has(Fault::AnswersNoise) && body.first() == Some(&UNIT) {
                 self.say(&[UNIT, 0x80, 1], at);
             }
@@ -189,6 +197,9 @@ impl Unit {
             return;
         }
         if !mine {
+            if self.server.has(Fault::LogsOthers) {
+                self.server.log.received(0);
+            }
             if self.server.has(Fault::RefusesForOthers) && pdu[0] > 0x2B {
                 self.say(&[unit, pdu[0] | 0x80, 1], at);
             }
@@ -202,8 +213,8 @@ impl Unit {
     fn serve(&mut self, pdu: &[u8], broadcast: bool, at: Duration) {
         self.server.log.count(0x0E);
         let silent_before = self.server.log.listen_only;
-        let received = 0x80 | u8::from(broadcast) << 6 | u8::from(silent_before) << 5;
-        self.server.log.event(received);
+        let as_broadcast = broadcast && !self.server.has(Fault::BroadcastsLoggedAsOthers);
+        self.server.log.received(u8::from(as_broadcast) << 6);
         let restart = pdu[0] == 8 && pdu.get(1..3) == Some(&[0, 1]);
         if silent_before && !restart && !self.server.has(Fault::TalksInListenOnly) {
             if self.server.has(Fault::WritesInListenOnly) {
@@ -211,6 +222,7 @@ impl Unit {
                 let _ = self.server.answer(pdu);
             }
             self.server.log.count(0x0F);
+            self.server.log.sent(0);
             return;
         }
         let answer = self.server.answer(pdu);
@@ -228,6 +240,9 @@ impl Unit {
             }
         }
         if silent && !self.server.has(Fault::AnswersBroadcasts) {
+            if !self.server.has(Fault::SilenceUnlogged) {
+                self.server.log.sent(0);
+            }
             if !self.server.has(Fault::BroadcastsUncounted) {
                 self.server.log.count(0x0F);
             }
@@ -238,14 +253,19 @@ impl Unit {
             Err(1) if self.server.has(Fault::SilentToUnknown) => return,
             Err(code) => vec![UNIT, pdu[0] | 0x80, code],
         };
-        // V1.1b3 6.10: a send event, with the kind of its exception.
-        self.server.log.event(match reply[..] {
+        let kind = match reply[..] {
+            _ if self.server.has(Fault::ExceptionsLoggedAsReplies) => 0,
             [_, function, code] if function & 0x80 != 0 => match code {
-                1..=3 => 0x41,
-                _ => 0x42,
+                1..=3 => 0x01,
+                4 => 0x02,
+                5 | 6 => 0x04,
+                _ => 0x08,
             },
-            _ => 0x40,
-        });
+            _ => 0,
+        };
+        if !self.server.has(Fault::RepliesUnlogged) {
+            self.server.log.sent(kind);
+        }
         self.say(&reply, at);
     }
 
