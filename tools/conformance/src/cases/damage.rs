@@ -105,7 +105,7 @@ fn line_break(bench: &mut Bench<'_>) -> Check {
 
 fn glitch(bench: &mut Bench<'_>) -> Check {
     let bit = bench.endpoint.line().bits(1);
-    let apart = Piece::Gap(bench.endpoint.line().t35() * 2 + bit * 12);
+    let apart = Piece::Gap(bench.endpoint.line().t35_limits().most * 2 + bit * 12);
     for width in [Duration::from_micros(1), bit / 20, bit / 4, bit * 2 / 5] {
         let width = width.max(Duration::from_nanos(100));
         let ping = Piece::Bytes(bench.ping());

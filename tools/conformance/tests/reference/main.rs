@@ -39,10 +39,19 @@ refused = 4096
 read = ["50-59"]
 "#;
 
-/// Runs the cases whose names are `only`, or all.
-fn outcomes(fault: Option<Fault>, mode: Mode, format: &str, only: Option<&str>) -> Vec<Outcome> {
+/// A line at 9600 bit/s with the reference unit on it.
+fn reference(fault: Option<Fault>, mode: Mode, format: &str) -> Reference {
     let line = LineFormat::new(9600, format.parse().unwrap());
-    let mut endpoint = Reference::new(fault, mode, line);
+    Reference::new(fault, mode, line)
+}
+
+/// Runs the cases whose names are `only`, or all. The unit has this fault.
+fn outcomes(
+    mut endpoint: Reference,
+    fault: Option<Fault>,
+    mode: Mode,
+    only: Option<&str>,
+) -> Vec<Outcome> {
     // The probe would stumble over some faults: it is given what a faultless one has.
     let mut profile = Profile::parse(PROFILE).unwrap();
     if fault.is_some() {
@@ -65,8 +74,8 @@ fn outcomes(fault: Option<Fault>, mode: Mode, format: &str, only: Option<&str>) 
     run(&mut endpoint, &target, options, &cases, |_| {}).unwrap()
 }
 
-fn assert_faultless(mode: Mode, format: &str) -> Vec<&'static str> {
-    let outcomes = outcomes(None, mode, format, None);
+fn assert_faultless(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
+    let outcomes = outcomes(endpoint, None, mode, None);
     let mut passed = Vec::new();
     for outcome in &outcomes {
         match &outcome.verdict {
@@ -81,8 +90,8 @@ fn assert_faultless(mode: Mode, format: &str) -> Vec<&'static str> {
 #[test]
 fn a_faultless_server_passes_and_only_what_is_about_others_is_skipped() {
     let passed: Vec<&str> = [
-        assert_faultless(Mode::Rtu, "8E1"),
-        assert_faultless(Mode::Ascii, "7E1"),
+        assert_faultless(reference(None, Mode::Rtu, "8E1"), Mode::Rtu),
+        assert_faultless(reference(None, Mode::Ascii, "7E1"), Mode::Ascii),
     ]
     .concat();
     for case in all() {
@@ -97,6 +106,13 @@ fn a_faultless_server_passes_and_only_what_is_about_others_is_skipped() {
 }
 
 #[test]
+fn with_8n1_a_unit_passes_that_counts_characters_of_11_bits_and_one_that_counts_10() {
+    let unit = || reference(None, Mode::Rtu, "8N1");
+    assert_faultless(unit(), Mode::Rtu);
+    assert_faultless(unit().counting_own_characters(), Mode::Rtu);
+}
+
+#[test]
 fn every_fault_is_found_by_its_case() {
     let mut missed = Vec::new();
     for (mode, faults) in [
@@ -105,7 +121,12 @@ fn every_fault_is_found_by_its_case() {
         (Mode::Ascii, ASCII_FAULTS),
     ] {
         for (fault, case) in faults {
-            let outcomes = outcomes(Some(*fault), mode, "8E1", Some(case));
+            let outcomes = outcomes(
+                reference(Some(*fault), mode, "8E1"),
+                Some(*fault),
+                mode,
+                Some(case),
+            );
             let [outcome] = &outcomes[..] else {
                 panic!("no case {case}");
             };

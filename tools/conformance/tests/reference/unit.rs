@@ -31,6 +31,8 @@ pub struct Unit {
     pub server: Server,
     pub mode: Mode,
     pub line: LineFormat,
+    /// Counts characters of the line's format for t1.5 and t3.5, not characters of 11 bits.
+    pub own_characters: bool,
     /// What it says, and its driver's edges.
     pub said: VecDeque<Heard>,
     pub edges: Vec<(Duration, bool)>,
@@ -51,6 +53,7 @@ impl Unit {
             server: Server::new(fault),
             mode,
             line,
+            own_characters: false,
             said: VecDeque::new(),
             edges: Vec::new(),
             echo: false,
@@ -68,6 +71,7 @@ impl Unit {
     pub fn start(&mut self, at: Duration) {
         let old = std::mem::replace(self, Self::new(self.server.fault, self.mode, self.line));
         self.edges = old.edges;
+        self.own_characters = old.own_characters;
         self.last = Some(at);
         self.waiting = true;
     }
@@ -77,12 +81,28 @@ impl Unit {
         self.last.map(|last| last + self.silence())
     }
 
+    fn t15(&self) -> Duration {
+        if self.own_characters {
+            self.line.characters(1) * 3 / 2
+        } else {
+            self.line.t15()
+        }
+    }
+
+    fn t35(&self) -> Duration {
+        if self.own_characters {
+            self.line.characters(1) * 7 / 2
+        } else {
+            self.line.t35()
+        }
+    }
+
     fn silence(&self) -> Duration {
         match self.mode {
-            Mode::Rtu if self.server.has(Fault::JoinsParts) => self.line.t35() * 4,
-            Mode::Rtu if self.server.has(Fault::ClosesEarly) => self.line.t35() * 3 / 4,
-            Mode::Rtu if self.server.has(Fault::ClosesAtT15) => self.line.t15(),
-            Mode::Rtu => self.line.t35(),
+            Mode::Rtu if self.server.has(Fault::JoinsParts) => self.t35() * 4,
+            Mode::Rtu if self.server.has(Fault::ClosesEarly) => self.t35() * 3 / 4,
+            Mode::Rtu if self.server.has(Fault::ClosesAtT15) => self.t15(),
+            Mode::Rtu => self.t35(),
             Mode::Ascii if self.server.has(Fault::JoinsParts) => Duration::from_secs(3),
             Mode::Ascii => Duration::from_secs(1),
         }
@@ -94,7 +114,7 @@ impl Unit {
             let gap = sign.start.saturating_sub(last);
             let near_the_end = self.open.len() > 5;
             self.late |=
-                gap > self.line.t15() && (!self.server.has(Fault::StrictSometimes) || near_the_end);
+                gap > self.t15() && (!self.server.has(Fault::StrictSometimes) || near_the_end);
         }
         self.last = Some(sign.end);
         let parity = sign.parity_error && !self.server.has(Fault::IgnoresParity);
@@ -280,7 +300,7 @@ impl Unit {
         let character = self.line.characters(1);
         let mut start = at + THINKING;
         if self.server.has(Fault::RepliesEarly) {
-            start = start.saturating_sub(self.line.t35() / 2);
+            start = start.saturating_sub(self.t35() / 2);
         }
         self.edges.push((start, true));
         for (n, byte) in frame.iter().enumerate() {
