@@ -52,6 +52,13 @@ pub(super) const CASES: &[Case] = &[
         restart,
     ),
     case(
+        "fc08/delimiter-in-rtu",
+        "V1.1b3 6.8.1, 03",
+        "in RTU sub-function 03 has no effect: it is exception 01 or echoed; on a modio 01",
+        &[Need::Function(8), Need::Rtu],
+        delimiter_in_rtu,
+    ),
+    case(
         "fc08/listen-only",
         "V1.1b3 6.8.1, 04",
         "04 is not answered; then nothing is, nor done, but 01, which ends it, itself without reply",
@@ -165,6 +172,23 @@ fn restart(bench: &mut Bench<'_>) -> Check {
     }
     bench.exception_03_or_silence(&diagnose(1, &[]))?;
     bench.exception_03_or_silence(&diagnose(1, &[0, 0, 0]))
+}
+
+fn delimiter_in_rtu(bench: &mut Bench<'_>) -> Check {
+    let request = diagnose(3, b"!\0");
+    let reply = bench.ask_due(&request)?;
+    let refused = reply.exception(8) == Some(1);
+    if bench.target.modio.is_some() {
+        bench.ensure(refused, "exception 01: there is no delimiter in RTU")?;
+    }
+    let right = refused || reply == Reply::Pdu(request.clone());
+    bench.ensure(right, "exception 01, or the request echoed")?;
+    bench.alive("08/03 in RTU")?;
+    if !refused {
+        let back = diagnose(3, b"\n\0");
+        bench.reply_is(&back, &back)?;
+    }
+    Ok(())
 }
 
 /// Skips the case where the unit has no listen-only mode.

@@ -49,7 +49,9 @@ pub fn answer(pdu: &[u8], fault: Option<Fault>) -> Result<Vec<u8>, u8> {
         reply.extend(value);
         return Ok(reply);
     }
-    for (id, value) in &of_code[known.unwrap_or(0)..] {
+    let zero = fault == Some(Fault::StreamsFromZero) && from < 0x80;
+    let start = known.filter(|_| !zero).unwrap_or(0);
+    for (id, value) in &of_code[start..] {
         // One byte more is the function code.
         let full = reply.len() + 2 + value.len() > 252;
         if full && fault != Some(Fault::NeverSplits) {

@@ -13,6 +13,9 @@ pub const MOST: u16 = 4095;
 
 type Answer = Result<Vec<u8>, u8>;
 
+/// No exception code: the unit stays silent.
+pub const SILENT: u8 = 0xFF;
+
 /// The server.
 pub struct Server {
     pub fault: Option<Fault>,
@@ -69,6 +72,9 @@ impl Server {
             6 => {
                 exactly(5)?;
                 let (at, value) = two()?;
+                if self.has(Fault::ValueFirst) && value > MOST {
+                    return Err(3);
+                }
                 let at = place(HOLDING, at, 1)?;
                 if value <= MOST || self.has(Fault::StoresRefused) {
                     self.holding[at] = value;
@@ -157,7 +163,18 @@ impl Server {
         Ok([vec![data.len() as u8], data].concat())
     }
 
+    /// Where `quantity` points from an address in a request that writes several are in a table, looked up
+    /// before anything else is checked.
+    fn address_first(&self, table: (u16, usize), pdu: &[u8], at: usize) -> Result<(), u8> {
+        let address = pdu.get(at..at + 2);
+        match address.filter(|_| self.has(Fault::AddressFirstInWrites)) {
+            Some(word) => place(table, u16::from_be_bytes([word[0], word[1]]), 1).map(drop),
+            None => Ok(()),
+        }
+    }
+
     fn write_coils(&mut self, pdu: &[u8]) -> Answer {
+        self.address_first(COILS, pdu, 1)?;
         let (at, quantity, data) = many(pdu)?;
         if !(1..=1968).contains(&quantity) || data.len() != usize::from(quantity).div_ceil(8) {
             return Err(3);
@@ -177,6 +194,7 @@ impl Server {
     }
 
     fn write_registers(&mut self, pdu: &[u8]) -> Answer {
+        self.address_first(HOLDING, pdu, 1)?;
         let quantity = pdu.get(3..5).map(|w| u16::from_be_bytes([w[0], w[1]]));
         if self.has(Fault::IgnoresByteCount)
             && let (Some(quantity @ 1..=123), Some(data)) = (quantity, pdu.get(6..))
@@ -209,6 +227,9 @@ impl Server {
             }
             return Ok(());
         }
+        if self.has(Fault::ValueFirst) && words.iter().any(|word| *word > MOST) {
+            return Err(3);
+        }
         let start = place(HOLDING, at, words.len() as u16)?;
         if words.iter().any(|word| *word > MOST) {
             return Err(3);
@@ -218,6 +239,7 @@ impl Server {
     }
 
     fn read_write(&mut self, pdu: &[u8]) -> Answer {
+        self.address_first(HOLDING, pdu, 5)?;
         let mut pdu = pdu.to_vec();
         if self.has(Fault::FillsTruncated) && pdu.len() > 10 {
             let whole = 10 + usize::from(pdu[9]);
@@ -232,7 +254,8 @@ impl Server {
         );
         let (at, written, data) =
             many(&[&[0], rest].concat()).map(|(a, q, d)| (a, q, d.to_vec()))?;
-        let wrong = !(1..=125).contains(&quantity)
+        let most = if self.has(Fault::Reads124) { 124 } else { 125 };
+        let wrong = !(1..=most).contains(&quantity)
             || !(1..=121).contains(&written)
             || data.len() != usize::from(written) * 2;
         if wrong {
@@ -261,7 +284,17 @@ impl Server {
             return Ok(pdu[1..shown].to_vec());
         }
         if sub == 3 {
-            let [delimiter, 0] = *data else { return Err(3) };
+            if self.has(Fault::SilentToDelimiter) {
+                return Err(SILENT);
+            }
+            let [delimiter, low] = *data else {
+                return Err(3);
+            };
+            let digit = delimiter.is_ascii_digit() || (b'A'..=b'F').contains(&delimiter);
+            let wrong = low != 0 || digit || matches!(delimiter, b':' | b'\r');
+            if wrong && !self.has(Fault::TakesAnyDelimiter) {
+                return Err(3);
+            }
             self.delimiter = delimiter;
             return Ok(pdu[1..].to_vec());
         }

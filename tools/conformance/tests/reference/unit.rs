@@ -8,7 +8,7 @@ use conformance::frame::{Mode, crc, lrc};
 use conformance::line::LineFormat;
 
 use super::fault::Fault;
-use super::server::Server;
+use super::server::{SILENT, Server};
 
 /// The unit's address.
 pub const UNIT: u8 = 9;
@@ -119,19 +119,24 @@ impl Unit {
         self.last = Some(sign.end);
         let parity = sign.parity_error && !self.server.has(Fault::IgnoresParity);
         let stop = sign.stop_error && !self.server.has(Fault::IgnoresStop);
-        self.damaged |= parity || stop;
+        let damaged = parity || stop;
+        self.damaged |= damaged;
         if self.mode == Mode::Ascii {
-            self.hear_ascii(sign);
+            self.hear_ascii(sign, damaged);
         } else {
             self.open.push(sign.byte);
         }
     }
 
-    fn hear_ascii(&mut self, sign: Sign) {
+    fn hear_ascii(&mut self, sign: Sign, damaged: bool) {
         let restarts = !self.server.has(Fault::FindsRequests) || self.open.is_empty();
         if sign.byte == b':' && restarts {
             self.open.clear();
             self.damaged = false;
+            if damaged {
+                // A damaged colon starts no frame.
+                return;
+            }
         } else if self.open.is_empty() {
             return;
         }
@@ -142,7 +147,8 @@ impl Unit {
             let frame = std::mem::take(&mut self.open);
             let digits = frame[1..].iter().map(|byte| (*byte as char).to_digit(16));
             let values: Vec<u8> = digits.map_while(|d| d.map(|d| d as u8)).collect();
-            let upper = !frame.iter().any(u8::is_ascii_lowercase);
+            let upper =
+                !frame.iter().any(u8::is_ascii_lowercase) || self.server.has(Fault::TakesLowerCase);
             let whole = values.len() + 3 == frame.len() && values.len().is_multiple_of(2) && upper;
             let bytes: Vec<u8> = values
                 .chunks(2)
@@ -245,13 +251,18 @@ impl Unit {
             self.server.log.sent(0);
             return;
         }
-        let answer = self.server.answer(pdu);
+        let obeys = !broadcast || pdu[0] != 8 || self.server.has(Fault::ObeysBroadcastDiagnostics);
+        let answer = if obeys {
+            self.server.answer(pdu)
+        } else {
+            Err(SILENT)
+        };
         let listens = silent_before || self.server.log.listen_only;
         let silent = broadcast || (listens && !self.server.has(Fault::TalksInListenOnly));
         let polls = matches!(pdu[0], 0x0B | 0x0C);
         match &answer {
             Ok(_) if !polls => self.server.log.events = self.server.log.events.wrapping_add(1),
-            Ok(_) => {}
+            Ok(_) | Err(SILENT) => {}
             Err(_) => {
                 self.server.log.count(0x0D);
                 if self.server.has(Fault::CountsExceptions) {
@@ -271,6 +282,7 @@ impl Unit {
         let reply = match answer {
             Ok(data) => [vec![UNIT, pdu[0]], data].concat(),
             Err(1) if self.server.has(Fault::SilentToUnknown) => return,
+            Err(SILENT) => return,
             Err(code) => vec![UNIT, pdu[0] | 0x80, code],
         };
         let kind = match reply[..] {
