@@ -47,7 +47,7 @@ pub(super) const CASES: &[Case] = &[
     case(
         "fc08/restart",
         "V1.1b3 6.8.1, 01",
-        "sub-function 01 echoes 0000 and FF00 and goes on, anything else is 03",
+        "sub-function 01 echoes 0000 and FF00, clears the counters and goes on, anything else is 03",
         N,
         restart,
     ),
@@ -82,7 +82,7 @@ pub(super) const CASES: &[Case] = &[
     case(
         "fc08/clear-overruns",
         "V1.1b3 6.8.1, 14",
-        "14 clears the overrun counter and is echoed",
+        "14 is echoed, and the overrun counter is 0 after it",
         N,
         clear_overruns,
     ),
@@ -163,9 +163,18 @@ fn register(bench: &mut Bench<'_>) -> Check {
 fn restart(bench: &mut Bench<'_>) -> Check {
     bench.reply_unless_lacking(&diagnose(1, &[0, 0]), "08/01")?;
     for data in [[0, 0], [0xFF, 0]] {
+        let exceptions = diagnose(0x0D, &[0, 0]);
+        let counts = bench.ask_due(&exceptions)?.exception(8) != Some(1);
+        if let Some(function) = super::dispatch::unknown_functions(bench).pop() {
+            bench.exception(&[function], 1)?;
+        }
         let request = diagnose(1, &data);
         bench.reply_is(&request, &request)?;
         bench.alive("a restart of the communication")?;
+        if counts {
+            // Its reply without exceptions is the request itself.
+            bench.reply_is(&exceptions, &exceptions)?;
+        }
     }
     for bad in [[0, 1], [0xFF, 1], [0xFE, 0], [0xFF, 0xFF]] {
         bench.exception(&diagnose(1, &bad), 3)?;

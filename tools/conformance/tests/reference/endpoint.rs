@@ -129,7 +129,10 @@ impl Endpoint for Reference {
                     end: start + bit * u32::from(*bits + 1),
                     ..sign(0)
                 }),
-                Piece::Glitch(width) => self.advance(start + *width),
+                Piece::Glitch(width) => {
+                    self.advance(start + *width);
+                    self.unit.glitch();
+                }
             }
         }
         Ok(self.now)

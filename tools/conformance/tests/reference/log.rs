@@ -19,10 +19,12 @@ pub struct Log {
 
 impl Log {
     pub fn new(fault: Option<Fault>) -> Self {
-        Self {
+        let mut log = Self {
             fault,
             ..Self::default()
-        }
+        };
+        log.counters[7] = u16::from(fault == Some(Fault::OverrunsStay)) * 3;
+        log
     }
 
     /// Counts one more; `sub` is 0B to 12.
@@ -55,14 +57,18 @@ impl Log {
         [[0, 0], self.events.to_be_bytes()].concat()
     }
 
-    pub fn read(&self, backwards: bool) -> Vec<u8> {
+    fn has(&self, fault: Fault) -> bool {
+        self.fault == Some(fault)
+    }
+
+    pub fn read(&self) -> Vec<u8> {
         let mut log: Vec<u8> = self.log.iter().copied().collect();
-        if backwards {
+        if self.has(Fault::LogBackwards) {
             log.reverse();
         }
         let head = [
             [0, 0],
-            self.events.to_be_bytes(),
+            (self.events + u16::from(self.has(Fault::LogCountDiffers)) * 7).to_be_bytes(),
             self.counters[0].to_be_bytes(),
         ]
         .concat();
@@ -71,29 +77,31 @@ impl Log {
 
     /// A sub-function other than 00 and 03: the data of its reply. `clears` is how many counters it clears
     /// where all are to be.
-    pub fn diagnose(
-        &mut self,
-        sub: u16,
-        data: &[u8],
-        clears: usize,
-        keeps: bool,
-    ) -> Result<Vec<u8>, u8> {
-        let zero = if data == [0, 0] { Ok(()) } else { Err(3) };
+    pub fn diagnose(&mut self, sub: u16, data: &[u8], clears: usize) -> Result<Vec<u8>, u8> {
+        let zero = if data == [0, 0] || self.has(Fault::IgnoresDiagnosticData) {
+            Ok(())
+        } else {
+            Err(3)
+        };
         match sub {
             1 => {
                 match data {
                     [0, 0] => {}
-                    [0xFF, 0] if keeps => {}
+                    [0xFF, 0] if self.has(Fault::KeepsLog) => {}
                     [0xFF, 0] => self.log.clear(),
+                    _ if self.has(Fault::TakesAnyRestart) => {}
                     _ => return Err(3),
                 }
                 self.listen_only = false;
                 if self.fault != Some(Fault::RestartUnlogged) {
                     self.event(0);
                 }
-                self.clear(clears);
+                if !self.has(Fault::RestartKeepsCounters) {
+                    self.clear(clears);
+                }
                 Ok(data.to_vec())
             }
+            2 if self.has(Fault::ShortRegister) => zero.map(|()| vec![0]),
             2 => zero.map(|()| vec![0, 0]),
             4 => zero.map(|()| {
                 self.listen_only = true;
@@ -112,9 +120,12 @@ impl Log {
                     .to_vec()
             }),
             0x14 => zero.map(|()| {
-                self.counters[7] = 0;
+                if !self.has(Fault::OverrunsStay) {
+                    self.counters[7] = 0;
+                }
                 vec![0, 0]
             }),
+            _ if self.has(Fault::EchoesAnySubFunction) => Ok(data.to_vec()),
             _ => Err(1),
         }
     }

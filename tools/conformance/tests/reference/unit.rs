@@ -40,10 +40,15 @@ pub struct Unit {
     open: Vec<u8>,
     damaged: bool,
     late: bool,
+    /// There was a gap above t1.5 in the frame.
+    sparse: bool,
     last: Option<Duration>,
     /// No silence has come yet since power-on.
     waiting: bool,
     deaf: bool,
+    reply_end: Duration,
+    /// Characters came in front of an ASCII frame.
+    colon_spoilt: bool,
     dead: bool,
 }
 
@@ -60,6 +65,9 @@ impl Unit {
             open: Vec::new(),
             damaged: false,
             late: false,
+            sparse: false,
+            reply_end: Duration::ZERO,
+            colon_spoilt: false,
             last: None,
             waiting: false,
             deaf: false,
@@ -74,6 +82,15 @@ impl Unit {
         self.own_characters = old.own_characters;
         self.last = Some(at);
         self.waiting = true;
+        self.dead = self.server.has(Fault::DeadAfterPowerOff);
+        if self.server.has(Fault::ZeroAtStart) {
+            self.said.push_back(Heard {
+                byte: 0,
+                start: at,
+                end: at + self.line.characters(1),
+                good: true,
+            });
+        }
     }
 
     /// When the frame that is open will be over, if nothing else comes.
@@ -103,9 +120,15 @@ impl Unit {
             Mode::Rtu if self.server.has(Fault::ClosesEarly) => self.t35() * 3 / 4,
             Mode::Rtu if self.server.has(Fault::ClosesAtT15) => self.t15(),
             Mode::Rtu => self.t35(),
+            Mode::Ascii if self.server.has(Fault::ImpatientInAscii) => Duration::from_millis(500),
             Mode::Ascii if self.server.has(Fault::JoinsParts) => Duration::from_secs(3),
             Mode::Ascii => Duration::from_secs(1),
         }
+    }
+
+    /// A pulse that is too short for a character comes.
+    pub fn glitch(&mut self) {
+        self.deaf |= self.server.has(Fault::DeafAfterGlitch);
     }
 
     /// A character comes.
@@ -113,13 +136,24 @@ impl Unit {
         if let Some(last) = self.last {
             let gap = sign.start.saturating_sub(last);
             let near_the_end = self.open.len() > 5;
+            let longest = if self.server.has(Fault::DropsShortGaps) {
+                self.t15() / 3
+            } else {
+                self.t15()
+            };
+            self.sparse |= gap > longest;
             self.late |=
                 gap > self.t15() && (!self.server.has(Fault::StrictSometimes) || near_the_end);
         }
         self.last = Some(sign.end);
         let parity = sign.parity_error && !self.server.has(Fault::IgnoresParity);
         let stop = sign.stop_error && !self.server.has(Fault::IgnoresStop);
-        let damaged = parity || stop;
+        let slow = self.server.has(Fault::SlowToListen) && self.open.is_empty();
+        let missed = slow && sign.start < self.reply_end + self.t35() * 2;
+        let damaged = parity || stop || missed;
+        if sign.stop_error && sign.byte == 0 && self.server.has(Fault::DeafAfterBreak) {
+            self.deaf = true;
+        }
         self.damaged |= damaged;
         if self.mode == Mode::Ascii {
             self.hear_ascii(sign, damaged);
@@ -129,11 +163,28 @@ impl Unit {
     }
 
     fn hear_ascii(&mut self, sign: Sign, damaged: bool) {
+        let in_rtu = self.open.first().is_none_or(|first| *first != b':') && sign.byte != b':';
+        if in_rtu && self.server.has(Fault::TakesRtuInAscii) {
+            self.open.push(sign.byte);
+            if self.open.len() == 8 && crc(&self.open[..6]) == self.open[6..] {
+                let frame = std::mem::take(&mut self.open);
+                self.message(frame[..6].to_vec(), true, sign.end);
+            }
+            return;
+        }
+        let spoilt = std::mem::replace(&mut self.colon_spoilt, false);
+        if self.open.is_empty() && sign.byte != b':' && self.server.has(Fault::NeedsColonFirst) {
+            self.colon_spoilt = true;
+        }
+        if self.server.has(Fault::KeepsTruncated) && sign.byte == b':' && !self.open.is_empty() {
+            self.damaged = true;
+            return;
+        }
         let restarts = !self.server.has(Fault::FindsRequests) || self.open.is_empty();
         if sign.byte == b':' && restarts {
             self.open.clear();
             self.damaged = false;
-            if damaged {
+            if damaged || spoilt {
                 // A damaged colon starts no frame.
                 return;
             }
@@ -141,11 +192,20 @@ impl Unit {
             return;
         }
         self.open.push(sign.byte);
-        if self.open.len() > 513 && !self.server.has(Fault::TakesLongFrames) {
+        let longest = if self.server.has(Fault::ShortBuffer) {
+            511
+        } else {
+            513
+        };
+        if self.open.len() > longest && !self.server.has(Fault::TakesLongFrames) {
             self.open.clear();
         } else if self.open.ends_with(&[b'\r', self.server.delimiter]) {
             let frame = std::mem::take(&mut self.open);
-            let digits = frame[1..].iter().map(|byte| (*byte as char).to_digit(16));
+            let any = self.server.has(Fault::TakesAnyDigit);
+            let digits = frame[1..].iter().map(|byte| {
+                let digit = (*byte as char).to_digit(16);
+                digit.or((any && !byte.is_ascii_control()).then_some(0))
+            });
             let values: Vec<u8> = digits.map_while(|d| d.map(|d| d as u8)).collect();
             let upper =
                 !frame.iter().any(u8::is_ascii_lowercase) || self.server.has(Fault::TakesLowerCase);
@@ -168,18 +228,24 @@ impl Unit {
     pub fn close(&mut self, at: Duration) {
         let frame = std::mem::take(&mut self.open);
         let (damaged, late) = (self.damaged, self.late);
+        let sparse = std::mem::take(&mut self.sparse) && self.server.has(Fault::DropsShortGaps);
         self.last = None;
         (self.damaged, self.late) = (false, false);
         let waited = std::mem::take(&mut self.waiting);
         let haste = self.server.has(Fault::HasteAtStart);
-        if (waited && !haste) || self.mode == Mode::Ascii {
+        if (waited && !haste) || self.mode == Mode::Ascii || sparse {
             return;
         }
         let sometimes = self.server.has(Fault::StrictSometimes);
         if late && sometimes {
             return;
         }
-        let long = frame.len() > 256 && !haste && !self.server.has(Fault::TakesLongFrames);
+        let longest = if self.server.has(Fault::ShortBuffer) {
+            254
+        } else {
+            256
+        };
+        let long = frame.len() > longest && !haste && !self.server.has(Fault::TakesLongFrames);
         let mut body = frame.clone();
         let check = [body.pop(), body.pop()].map(|byte| byte.unwrap_or(0));
         let right = crc(&body);
@@ -190,6 +256,12 @@ impl Unit {
             let tail = &frame[frame.len() - 8..];
             if crc(&tail[..6]) == tail[6..] {
                 (body, good) = (tail[..6].to_vec(), true);
+            }
+        }
+        if self.server.has(Fault::IgnoresTrailingByte) && !good && frame.len() > 4 {
+            let inner = &frame[..frame.len() - 3];
+            if crc(inner) == frame[frame.len() - 3..frame.len() - 1] {
+                (body, good) = (inner.to_vec(), true);
             }
         }
         self.message(body, good && !damaged && !long && frame.len() >= 4, at);
@@ -208,6 +280,7 @@ impl Unit {
     fn message(&mut self, body: Vec<u8>, good: bool, at: Duration) {
         if !good || body.len() < 2 {
             self.spoilt();
+            self.deaf |= self.server.has(Fault::DeafAfterBadFrames);
             if self.server.has(Fault::AnswersNoise) && body.first() == Some(&UNIT) {
                 self.say(&[UNIT, 0x80, 1], at);
             }
@@ -215,7 +288,10 @@ impl Unit {
         }
         let (unit, pdu) = (body[0], &body[1..]);
         let broadcast = unit == 0 || (unit == 255 && self.server.has(Fault::Obeys255));
-        let mine = unit == UNIT || broadcast;
+        let mine = unit == UNIT
+            || broadcast
+            || (unit == UNIT ^ 1 && self.server.has(Fault::AnswersNeighbour))
+            || (unit >= 248 && self.server.has(Fault::AnswersReserved));
         if mine || !self.server.has(Fault::DeafCounter) {
             self.server.log.count(0x0B);
         }
@@ -229,7 +305,19 @@ impl Unit {
             if self.server.has(Fault::RefusesForOthers) && pdu[0] > 0x2B {
                 self.say(&[unit, pdu[0] | 0x80, 1], at);
             }
+            if self.server.has(Fault::RefusesForUnit1) && unit == 1 {
+                self.say(&[unit, pdu[0] | 0x80, 1], at);
+            }
             self.deaf = self.server.has(Fault::DeafAfterOthers) && pdu.len() == 3;
+            self.deaf |= self.server.has(Fault::DeafAfterLongReplies) && pdu.len() > 200;
+            if self.server.has(Fault::FindsInside) {
+                let inside = body
+                    .windows(8)
+                    .find(|w| w[0] == UNIT && crc(&w[..6]) == w[6..]);
+                if let Some(inside) = inside.map(<[u8]>::to_vec) {
+                    self.serve(&inside[1..6], false, at);
+                }
+            }
             return;
         }
         self.dead = pdu[0] == 0 && self.server.has(Fault::DiesOf00);
@@ -237,7 +325,12 @@ impl Unit {
     }
 
     fn serve(&mut self, pdu: &[u8], broadcast: bool, at: Duration) {
-        self.server.log.count(0x0E);
+        if !broadcast || !self.server.has(Fault::BroadcastsAreNoMessages) {
+            self.server.log.count(0x0E);
+        }
+        if self.server.has(Fault::CountsNak) {
+            self.server.log.count(0x10);
+        }
         let silent_before = self.server.log.listen_only;
         let as_broadcast = broadcast && !self.server.has(Fault::BroadcastsLoggedAsOthers);
         self.server.log.received(u8::from(as_broadcast) << 6);
@@ -264,7 +357,9 @@ impl Unit {
             Ok(_) if !polls => self.server.log.events = self.server.log.events.wrapping_add(1),
             Ok(_) | Err(SILENT) => {}
             Err(_) => {
-                self.server.log.count(0x0D);
+                if !self.server.has(Fault::ExceptionsUncounted) {
+                    self.server.log.count(0x0D);
+                }
                 if self.server.has(Fault::CountsExceptions) {
                     self.server.log.events = self.server.log.events.wrapping_add(1);
                 }
@@ -328,6 +423,7 @@ impl Unit {
             });
             start = end;
         }
+        self.reply_end = start;
         let early = self.server.has(Fault::ReleasesEarly);
         self.edges
             .push((if early { start - character } else { start }, false));
