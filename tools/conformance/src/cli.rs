@@ -88,6 +88,14 @@ pub struct Cli {
     #[arg(long, value_name = "PATTERN")]
     pub only: Vec<String>,
 
+    /// Do not run cases whose name contains this; may be repeated
+    #[arg(long, value_name = "PATTERN")]
+    pub exclude: Vec<String>,
+
+    /// Write every frame sent and received to the standard error output, with its time
+    #[arg(long)]
+    pub trace: bool,
+
     /// List the cases and end
     #[arg(long)]
     pub list: bool,
@@ -211,7 +219,12 @@ impl Cli {
     ///
     /// When none is left.
     pub fn cases(&self) -> Result<Vec<Case>, String> {
-        chosen(&self.only)
+        let mut cases = chosen(&self.only)?;
+        cases.retain(|case| !self.exclude.iter().any(|part| case.name.contains(part)));
+        if cases.is_empty() {
+            return Err("--exclude leaves no case to run".to_owned());
+        }
+        Ok(cases)
     }
 }
 
@@ -293,6 +306,17 @@ mod tests {
             .unwrap();
         assert!(some.len() > 10 && some.len() < all);
         assert!(parse(&["--only", "no such case"]).cases().is_err());
+        let fewer = parse(&[
+            "--only",
+            "fc05/",
+            "--exclude",
+            "length",
+            "--exclude",
+            "value",
+        ]);
+        let names: Vec<_> = fewer.cases().unwrap().iter().map(|c| c.name).collect();
+        assert_eq!(names, ["fc05/on-and-off", "fc05/address"]);
+        assert!(parse(&["--exclude", "/"]).cases().is_err());
     }
 
     #[test]
