@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Parser;
 
 use crate::bench::Patience;
-use crate::case::Case;
+use crate::case::{Case, Kind};
 use crate::endpoint::exact_line;
 use crate::endpoint::stream::Stream;
 use crate::endpoint::{Broken, Endpoint};
@@ -91,6 +91,15 @@ pub struct Cli {
     /// Do not run cases whose name contains this; may be repeated
     #[arg(long, value_name = "PATTERN")]
     pub exclude: Vec<String>,
+
+    /// Run only the cases whose demand stands in the standards: no interpretations, nothing about the modio
+    #[arg(long, conflicts_with = "strict")]
+    pub standard_only: bool,
+
+    /// Count failed interpretations of the standard, too: the exit status is then 1. On a modio they always
+    /// count
+    #[arg(long)]
+    pub strict: bool,
 
     /// Write every frame sent and received to the standard error output, with its time
     #[arg(long)]
@@ -220,9 +229,12 @@ impl Cli {
     /// When none is left.
     pub fn cases(&self) -> Result<Vec<Case>, String> {
         let mut cases = chosen(&self.only)?;
-        cases.retain(|case| !self.exclude.iter().any(|part| case.name.contains(part)));
+        cases.retain(|case| {
+            let excluded = self.exclude.iter().any(|part| case.name.contains(part));
+            !excluded && (!self.standard_only || case.kind == Kind::Standard)
+        });
         if cases.is_empty() {
-            return Err("--exclude leaves no case to run".to_owned());
+            return Err("--exclude and --standard-only leave no case to run".to_owned());
         }
         Ok(cases)
     }
@@ -317,6 +329,10 @@ mod tests {
         let names: Vec<_> = fewer.cases().unwrap().iter().map(|c| c.name).collect();
         assert_eq!(names, ["fc05/on-and-off", "fc05/address"]);
         assert!(parse(&["--exclude", "/"]).cases().is_err());
+        let standard = parse(&["--standard-only", "--only", "fc05/", "--only", "config/"]);
+        let names: Vec<_> = standard.cases().unwrap().iter().map(|c| c.name).collect();
+        assert!(names.contains(&"fc05/value") && !names.contains(&"fc05/length"));
+        assert!(names.iter().all(|name| name.starts_with("fc05/")));
     }
 
     #[test]

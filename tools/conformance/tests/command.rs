@@ -217,6 +217,32 @@ fn what_cannot_be_tested_is_status_2_and_one_line() {
 }
 
 #[test]
+fn a_failed_interpretation_gives_status_1_with_strict_only() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let profile = directory.path().join("profile.toml");
+    std::fs::write(&profile, PROFILE).expect("written");
+    for (option, status) in [(None, 0), (Some("--strict"), 1)] {
+        let address = server(Some(Fault::IgnoresSpareBytes));
+        let profile = profile.display().to_string();
+        let mut arguments = vec![
+            "--tcp",
+            &address,
+            "--profile",
+            &profile,
+            "--patience",
+            "60",
+            "--only",
+            "fc05/length",
+        ];
+        arguments.extend(option);
+        let output = command(&arguments);
+        let out = text(&output.stdout);
+        assert_eq!(output.status.code(), Some(status), "{option:?}: {out}");
+        assert!(out.contains("failed interpretations: 1"), "{out}");
+    }
+}
+
+#[test]
 fn the_list_names_every_case() {
     let output = command(&["--list"]);
     assert_eq!(output.status.code(), Some(0));

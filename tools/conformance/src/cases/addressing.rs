@@ -68,14 +68,16 @@ pub(super) const CASES: &[Case] = &[
         "a broadcast 08/01 gets silence and restarts nothing: the counters go on",
         &[Need::Function(8)],
         broadcast_restart,
-    ),
+    )
+    .interpretation(),
     case(
         "broadcast/listen-only",
         "V1.1b3 6.8, 08/04",
         "a broadcast 08/04 puts no unit into listen-only mode",
         &[Need::Function(8)],
         broadcast_listen_only,
-    ),
+    )
+    .interpretation(),
     case(
         "broadcast/refused-writes-nothing",
         "V1.02 2.1",

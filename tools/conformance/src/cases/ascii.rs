@@ -47,7 +47,8 @@ pub(super) const CASES: &[Case] = &[
         "the digits are 0-9 and A-F: a frame with lower-case digits gets silence",
         N,
         lower_case,
-    ),
+    )
+    .interpretation(),
     case(
         "ascii/damaged-character",
         S,
@@ -104,7 +105,8 @@ pub(super) const CASES: &[Case] = &[
         "08/03 with a colon, CR or a digit, or without 00 after the character, is exception 03",
         &[Need::Ascii, Need::Function(8)],
         delimiter_refused,
-    ),
+    )
+    .interpretation(),
 ];
 
 fn body(bench: &Bench<'_>) -> Vec<u8> {

@@ -59,7 +59,8 @@ pub(super) const CASES: &[Case] = &[
         "with DE and RE tied, the unit does not take its own reply for a request",
         &[Need::Rtu, Need::Echo],
         own_echo,
-    ),
+    )
+    .interpretation(),
 ];
 
 /// What other units and their master say to each other.

@@ -49,7 +49,8 @@ pub(super) const CASES: &[Case] = &[
         "short glitches on the idle line cost no later request",
         N,
         glitch,
-    ),
+    )
+    .interpretation(),
 ];
 
 fn one_by_one(bench: &mut Bench<'_>, damaged: fn(u8) -> Piece) -> Check {

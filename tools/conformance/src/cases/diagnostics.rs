@@ -36,7 +36,8 @@ pub(super) const CASES: &[Case] = &[
         "a request without a whole sub-function is 03 or silence",
         N,
         length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc08/register",
         "V1.1b3 6.8.1, 02",
@@ -57,7 +58,8 @@ pub(super) const CASES: &[Case] = &[
         "in RTU sub-function 03 has no effect: it is exception 01 or echoed; on a modio 01",
         &[Need::Function(8), Need::Rtu],
         delimiter_in_rtu,
-    ),
+    )
+    .interpretation(),
     case(
         "fc08/listen-only",
         "V1.1b3 6.8.1, 04",

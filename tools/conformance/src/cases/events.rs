@@ -122,7 +122,8 @@ pub(super) const CASES: &[Case] = &[
         "entering listen-only mode is event 04; from then on events have bit 5, up to the restart",
         &[Need::Function(8), Need::Function(0x0C)],
         log_listen_only,
-    ),
+    )
+    .interpretation(),
     case(
         "fc11/shape",
         "V1.1b3 6.13",

@@ -25,14 +25,16 @@ pub(super) const CASES: &[Case] = &[
         "a gap between t1.5 and t3.5 drops the frame, or not, as STRICT_T15 says: always alike",
         N,
         between,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/just-below-t3.5",
         S,
         "a gap that is a few bits below t3.5 is treated as any other between t1.5 and t3.5",
         B,
         just_below_t35,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/above-t3.5",
         S,
@@ -46,14 +48,16 @@ pub(super) const CASES: &[Case] = &[
         "a request less than t3.5 after another joins it, and both are lost",
         N,
         too_soon,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/a-bit-too-soon",
         S,
         "a request a few bits less than t3.5 after another joins it, and both are lost",
         B,
         a_bit_too_soon,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/t3.5-is-enough",
         S,

@@ -76,7 +76,8 @@ pub(super) const CASES: &[Case] = &[
         "a request cut short or too long is 03 or silence",
         N,
         length,
-    ),
+    )
+    .interpretation(),
 ];
 
 /// One reply.

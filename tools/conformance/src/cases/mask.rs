@@ -36,7 +36,8 @@ pub(super) const CASES: &[Case] = &[
         "a request of another length is 03 or silence, and the register stays",
         W16,
         mask_length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc17/write-before-read",
         "V1.1b3 6.17",
@@ -85,7 +86,8 @@ pub(super) const CASES: &[Case] = &[
         "a request cut short or too long is 03 or silence, never a success, and writes nothing",
         W17,
         truncated,
-    ),
+    )
+    .interpretation(),
     case(
         "fc17/address",
         "V1.1b3 6.17",

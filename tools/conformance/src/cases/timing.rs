@@ -41,7 +41,8 @@ pub(super) const CASES: &[Case] = &[
         "what gets silence does not touch the driver",
         &[Need::Exact, Need::Driver],
         driver_off,
-    ),
+    )
+    .interpretation(),
     case(
         "timing/back-to-back",
         "V1.02 2.5.1.1",

@@ -39,7 +39,8 @@ pub(super) const CASES: &[Case] = &[
         "a request a byte short or long is 03 or silence, and the coil stays",
         &[Need::Function(5), Need::Function(1), Need::Bits],
         length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc0f/every-quantity",
         "V1.1b3 6.11",
@@ -81,7 +82,8 @@ pub(super) const CASES: &[Case] = &[
         "data short of the byte count or beyond it is 03 or silence and writes nothing",
         &[Need::Function(0x0F), Need::Function(1), Need::Bits],
         data_length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc0f/padding",
         "V1.1b3 6.11",

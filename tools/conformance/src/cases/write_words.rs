@@ -36,14 +36,16 @@ pub(super) const CASES: &[Case] = &[
         "a value out of range at a bad address is exception 02, not 03",
         &[Need::Function(6), Need::Words],
         address_first,
-    ),
+    )
+    .interpretation(),
     case(
         "fc06/length",
         "V1.1b3 6.6",
         "a request a byte short or long is 03 or silence, and the register stays",
         W06,
         length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc10/every-quantity",
         "V1.1b3 6.12",
@@ -78,7 +80,8 @@ pub(super) const CASES: &[Case] = &[
         "a value out of range in a range that is not there, or partly, is exception 02, not 03",
         &[Need::Function(0x10), Need::Function(3), Need::Words],
         range_first,
-    ),
+    )
+    .interpretation(),
     case(
         "fc10/byte-count",
         "V1.1b3 6.12",
@@ -92,7 +95,8 @@ pub(super) const CASES: &[Case] = &[
         "data cut short or with bytes to spare is 03 or silence and writes nothing",
         W10,
         data_length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc10/partly-out-of-range",
         "V1.1b3 6.12",
@@ -106,7 +110,8 @@ pub(super) const CASES: &[Case] = &[
         "one value out of range refuses all of them",
         W10,
         one_bad_value,
-    ),
+    )
+    .interpretation(),
 ];
 
 fn echo(bench: &mut Bench<'_>) -> Check {
