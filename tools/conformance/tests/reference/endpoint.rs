@@ -131,7 +131,7 @@ impl Endpoint for Reference {
                 }),
                 Piece::Glitch(width) => {
                     self.advance(start + *width);
-                    self.unit.glitch();
+                    self.unit.glitch(self.now);
                 }
             }
         }

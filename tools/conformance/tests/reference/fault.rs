@@ -222,6 +222,8 @@ faults! {
     DeafAfterBreak => ["damage/break"],
     /// Deaf to one request after a glitch.
     DeafAfterGlitch => ["damage/glitch"],
+    /// Begins t3.5 again after a short pulse.
+    PulsesRestartSilence => ["damage/noise-behind-a-frame"],
     /// Deaf to one request after a bad frame.
     DeafAfterBadFrames => ["bus/others-truncated-traffic", "bus/stray-zero"],
     /// Deaf to one request after a long reply of another unit.

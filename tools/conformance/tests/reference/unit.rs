@@ -127,7 +127,10 @@ impl Unit {
     }
 
     /// A pulse that is too short for a character comes.
-    pub fn glitch(&mut self) {
+    pub fn glitch(&mut self, at: Duration) {
+        if self.server.has(Fault::PulsesRestartSilence) {
+            self.last = self.last.map(|_| at);
+        }
         self.deaf |= self.server.has(Fault::DeafAfterGlitch);
     }
 
