@@ -113,6 +113,8 @@ impl<'a> Bench<'a> {
     /// [`Stop::Broken`].
     pub fn exchange_until(&mut self, pieces: &[Piece], enough: usize) -> Check<Reply> {
         self.sent = shown(pieces);
+        // A late reply to an earlier request must not look like the reply to this one.
+        self.endpoint.flush()?;
         self.sent_end = self.endpoint.send(pieces)?;
         self.listen_until(enough)
     }
@@ -344,7 +346,8 @@ impl<'a> Bench<'a> {
     }
 }
 
-fn shown(pieces: &[Piece]) -> String {
+/// Pieces for people.
+pub(crate) fn shown(pieces: &[Piece]) -> String {
     let texts: Vec<String> = pieces
         .iter()
         .map(|piece| match piece {

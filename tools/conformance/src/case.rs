@@ -73,6 +73,29 @@ impl From<Broken> for Stop {
 /// What a step of a case results in.
 pub type Check<T = ()> = Result<T, Stop>;
 
+/// Where the demand of a case comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The words of the standards.
+    Standard,
+    /// A reading of the standards, where they leave a choice or say nothing.
+    Interpretation,
+    /// The register map and the documents of the modio.
+    Modio,
+}
+
+impl Kind {
+    /// Its name in lists and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Standard => "standard",
+            Self::Interpretation => "interpretation",
+            Self::Modio => "modio",
+        }
+    }
+}
+
 /// A named case.
 #[derive(Clone, Copy)]
 pub struct Case {
@@ -80,6 +103,8 @@ pub struct Case {
     pub name: &'static str,
     /// Where it is written that it must be so.
     pub section: &'static str,
+    /// Where the demand comes from.
+    pub kind: Kind,
     /// What must be so, in one line.
     pub about: &'static str,
     /// What it needs.
@@ -88,7 +113,17 @@ pub struct Case {
     pub run: fn(&mut Bench<'_>) -> Check,
 }
 
-/// A case, written in one go.
+impl Case {
+    /// The same case, whose demand is a reading of the standards.
+    #[must_use]
+    pub const fn interpretation(mut self) -> Self {
+        self.kind = Kind::Interpretation;
+        self
+    }
+}
+
+/// Returns a case. Its kind is [`Kind::Modio`] when it needs a modio or cites the register map, and
+/// [`Kind::Standard`] otherwise.
 #[must_use]
 pub const fn case(
     name: &'static str,
@@ -97,9 +132,17 @@ pub const fn case(
     needs: &'static [Need],
     run: fn(&mut Bench<'_>) -> Check,
 ) -> Case {
+    let source = section.as_bytes();
+    let mut modio = matches!(source, [b'm', b'a', b'p', ..]);
+    let mut at = 0;
+    while at < needs.len() {
+        modio |= matches!(needs[at], Need::Modio);
+        at += 1;
+    }
     Case {
         name,
         section,
+        kind: if modio { Kind::Modio } else { Kind::Standard },
         about,
         needs,
         run,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Parser;
 
 use crate::bench::Patience;
-use crate::case::Case;
+use crate::case::{Case, Kind};
 use crate::endpoint::exact_line;
 use crate::endpoint::stream::Stream;
 use crate::endpoint::{Broken, Endpoint};
@@ -87,6 +87,23 @@ pub struct Cli {
     /// Run only cases whose name contains this; may be repeated
     #[arg(long, value_name = "PATTERN")]
     pub only: Vec<String>,
+
+    /// Do not run cases whose name contains this; may be repeated
+    #[arg(long, value_name = "PATTERN")]
+    pub exclude: Vec<String>,
+
+    /// Run only the cases whose demand stands in the standards: no interpretations, nothing about the modio
+    #[arg(long, conflicts_with = "strict")]
+    pub standard_only: bool,
+
+    /// Count failed interpretations of the standard, too: the exit status is then 1. On a modio they always
+    /// count
+    #[arg(long)]
+    pub strict: bool,
+
+    /// Write every frame sent and received to the standard error output, with its time
+    #[arg(long)]
+    pub trace: bool,
 
     /// List the cases and end
     #[arg(long)]
@@ -211,7 +228,15 @@ impl Cli {
     ///
     /// When none is left.
     pub fn cases(&self) -> Result<Vec<Case>, String> {
-        chosen(&self.only)
+        let mut cases = chosen(&self.only)?;
+        cases.retain(|case| {
+            let excluded = self.exclude.iter().any(|part| case.name.contains(part));
+            !excluded && (!self.standard_only || case.kind == Kind::Standard)
+        });
+        if cases.is_empty() {
+            return Err("--exclude and --standard-only leave no case to run".to_owned());
+        }
+        Ok(cases)
     }
 }
 
@@ -293,6 +318,21 @@ mod tests {
             .unwrap();
         assert!(some.len() > 10 && some.len() < all);
         assert!(parse(&["--only", "no such case"]).cases().is_err());
+        let fewer = parse(&[
+            "--only",
+            "fc05/",
+            "--exclude",
+            "length",
+            "--exclude",
+            "value",
+        ]);
+        let names: Vec<_> = fewer.cases().unwrap().iter().map(|c| c.name).collect();
+        assert_eq!(names, ["fc05/on-and-off", "fc05/address"]);
+        assert!(parse(&["--exclude", "/"]).cases().is_err());
+        let standard = parse(&["--standard-only", "--only", "fc05/", "--only", "config/"]);
+        let names: Vec<_> = standard.cases().unwrap().iter().map(|c| c.name).collect();
+        assert!(names.contains(&"fc05/value") && !names.contains(&"fc05/length"));
+        assert!(names.iter().all(|name| name.starts_with("fc05/")));
     }
 
     #[test]

@@ -94,6 +94,39 @@ impl LineFormat {
             self.bits(77) / 2
         }
     }
+
+    /// Values of t1.5 that a unit may use.
+    #[must_use]
+    pub fn t15_limits(self) -> Limits {
+        Limits::new(self.t15(), self.characters(1) * 3 / 2, self.baud)
+    }
+
+    /// Values of t3.5 that a unit may use.
+    #[must_use]
+    pub fn t35_limits(self) -> Limits {
+        Limits::new(self.t35(), self.characters(1) * 7 / 2, self.baud)
+    }
+}
+
+/// Shortest and longest value that a unit may use for a silence. The standard counts characters of 11 bits,
+/// whatever the format. Up to 19200 bit/s a unit may count characters of the line's format instead: with 8N1
+/// they have 10 bits. The suite demands nothing of a silence between the two values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// A shorter silence is too short for every unit.
+    pub least: Duration,
+    /// A longer silence is long enough for every unit.
+    pub most: Duration,
+}
+
+impl Limits {
+    fn new(standard: Duration, own: Duration, baud: u32) -> Self {
+        let own = if baud > 19_200 { standard } else { own };
+        Self {
+            least: standard.min(own),
+            most: standard.max(own),
+        }
+    }
 }
 
 impl Default for LineFormat {
@@ -169,6 +202,18 @@ mod tests {
         assert_eq!(at(19_200).t35().as_micros(), 2005);
         assert_eq!(at(38_400).t35(), Duration::from_micros(1750));
         assert_eq!(at(115_200).t15(), Duration::from_micros(750));
+    }
+
+    #[test]
+    fn with_8n1_a_unit_may_count_characters_of_10_bits_up_to_19200() {
+        let limits = |baud, format: &str| {
+            let line = LineFormat::new(baud, format.parse().unwrap());
+            [line.t15_limits(), line.t35_limits()]
+                .map(|limits| (limits.least.as_micros(), limits.most.as_micros()))
+        };
+        assert_eq!(limits(9600, "8N1"), [(1562, 1718), (3645, 4010)]);
+        assert_eq!(limits(9600, "8E1"), [(1718, 1718), (4010, 4010)]);
+        assert_eq!(limits(38_400, "8N1"), [(750, 750), (1750, 1750)]);
     }
 
     #[test]

@@ -118,6 +118,9 @@ fn a_good_server_passes_and_the_reports_are_written() {
         "fc05/",
         "--only",
         "timing/",
+        "--exclude",
+        "fc05/length",
+        "--trace",
         "--junit",
         &path("junit.xml"),
         "--json",
@@ -130,12 +133,18 @@ fn a_good_server_passes_and_the_reports_are_written() {
         "{out}"
     );
     assert!(out.contains("the endpoint's time is not exact"), "{out}");
+    assert!(!out.contains("fc05/length"), "{out}");
+    let traced = |what: &str| err.lines().any(|line| line.contains(what));
+    assert!(
+        traced(" s sent     09 05 ") && traced(" s received 09 05 "),
+        "{err}"
+    );
     let xml = std::fs::read_to_string(path("junit.xml")).expect("there");
     assert!(xml.contains("failures=\"0\"") && xml.contains("classname=\"fc05\""));
     let json = std::fs::read_to_string(path("result.json")).expect("there");
     let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!(json["failed"], 0);
-    assert!(json["passed"].as_u64() > Some(4));
+    assert!(json["passed"].as_u64() > Some(3));
 }
 
 #[test]
@@ -204,6 +213,32 @@ fn what_cannot_be_tested_is_status_2_and_one_line() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
         assert!(err.contains(part), "{arguments:?}: {err}");
         assert_eq!(err.trim_end().lines().count(), 1, "{err}");
+    }
+}
+
+#[test]
+fn a_failed_interpretation_gives_status_1_with_strict_only() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let profile = directory.path().join("profile.toml");
+    std::fs::write(&profile, PROFILE).expect("written");
+    for (option, status) in [(None, 0), (Some("--strict"), 1)] {
+        let address = server(Some(Fault::IgnoresSpareBytes));
+        let profile = profile.display().to_string();
+        let mut arguments = vec![
+            "--tcp",
+            &address,
+            "--profile",
+            &profile,
+            "--patience",
+            "60",
+            "--only",
+            "fc05/length",
+        ];
+        arguments.extend(option);
+        let output = command(&arguments);
+        let out = text(&output.stdout);
+        assert_eq!(output.status.code(), Some(status), "{option:?}: {out}");
+        assert!(out.contains("failed interpretations: 1"), "{out}");
     }
 }
 

@@ -174,6 +174,13 @@ fn with_parity_a_strict_t15_and_another_address_it_conforms() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
+fn at_9600_without_parity_it_conforms() {
+    let line = LineFormat::new(9600, "8N1".parse().expect("a format"));
+    conforms(Module::Do4, 1, line, Mode::Rtu, &[]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
 fn at_115200_without_parity_it_conforms() {
     let line = LineFormat::new(115_200, "8N1".parse().expect("a format"));
     conforms(Module::Ao4, 9, line, Mode::Rtu, &[]);

@@ -2,6 +2,7 @@
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
+use crate::cases::diagnostics::diagnose;
 use crate::points::{pdu, write_bits, write_words};
 
 pub(super) const CASES: &[Case] = &[
@@ -61,6 +62,22 @@ pub(super) const CASES: &[Case] = &[
         &[],
         nonsense,
     ),
+    case(
+        "broadcast/restart",
+        "V1.1b3 6.8, 08/01",
+        "a broadcast 08/01 gets silence and restarts nothing: the counters go on",
+        &[Need::Function(8)],
+        broadcast_restart,
+    )
+    .interpretation(),
+    case(
+        "broadcast/listen-only",
+        "V1.1b3 6.8, 08/04",
+        "a broadcast 08/04 puts no unit into listen-only mode",
+        &[Need::Function(8)],
+        broadcast_listen_only,
+    )
+    .interpretation(),
     case(
         "broadcast/refused-writes-nothing",
         "V1.02 2.1",
@@ -240,6 +257,41 @@ fn nonsense(bench: &mut Bench<'_>) -> Check {
         silent_to(bench, 0, &request)?;
     }
     bench.alive("broadcasts that make no sense")
+}
+
+fn broadcast_restart(bench: &mut Bench<'_>) -> Check {
+    let messages = |bench: &mut Bench<'_>| -> Check<u16> {
+        let reply = bench.reply_unless_lacking(&diagnose(0x0B, &[0, 0]), "08/0B")?;
+        let [8, 0, 0x0B, high, low] = reply[..] else {
+            return bench.fail("08 00 0B and two bytes");
+        };
+        Ok(u16::from_be_bytes([high, low]))
+    };
+    bench.alive("nothing")?;
+    for data in [[0, 0], [0xFF, 0]] {
+        let before = messages(bench)?;
+        silent_to(bench, 0, &diagnose(1, &data))?;
+        let after = messages(bench)?;
+        bench.ensure(
+            after == before.wrapping_add(2),
+            format!(
+                "counter 0B goes on to {}, with the broadcast and this request",
+                before.wrapping_add(2)
+            ),
+        )?;
+    }
+    Ok(())
+}
+
+fn broadcast_listen_only(bench: &mut Bench<'_>) -> Check {
+    let entered = silent_to(bench, 0, &diagnose(4, &[0, 0])).and_then(|()| {
+        bench.alive("a broadcast 08/04: the mode is for the unit that is addressed")
+    });
+    if entered.is_err() {
+        // End the mode, so that later cases are not affected.
+        bench.ask(&diagnose(1, &[0, 0]))?;
+    }
+    entered
 }
 
 fn refused_writes(bench: &mut Bench<'_>) -> Check {

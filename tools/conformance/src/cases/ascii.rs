@@ -7,6 +7,7 @@ use crate::case::{Case, Check, Need, case};
 use crate::cases::diagnostics::diagnose;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
+use crate::line::Parity;
 
 const N: &[Need] = &[Need::Ascii];
 const S: &str = "V1.02 2.5.2.1";
@@ -39,6 +40,21 @@ pub(super) const CASES: &[Case] = &[
         "characters that are no digits, and odd numbers of digits, spoil the frame",
         N,
         not_digits,
+    ),
+    case(
+        "ascii/lower-case",
+        S,
+        "the digits are 0-9 and A-F: a frame with lower-case digits gets silence",
+        N,
+        lower_case,
+    )
+    .interpretation(),
+    case(
+        "ascii/damaged-character",
+        S,
+        "a character with a low stop bit or wrong parity spoils its frame, and that one only",
+        &[Need::Ascii, Need::Faults],
+        damaged,
     ),
     case(
         "ascii/truncated",
@@ -83,6 +99,14 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Ascii, Need::Function(8)],
         delimiter,
     ),
+    case(
+        "ascii/delimiter-refused",
+        "V1.1b3 6.8.1, 03",
+        "08/03 with a colon, CR or a digit, or without 00 after the character, is exception 03",
+        &[Need::Ascii, Need::Function(8)],
+        delimiter_refused,
+    )
+    .interpretation(),
 ];
 
 fn body(bench: &Bench<'_>) -> Vec<u8> {
@@ -132,6 +156,39 @@ fn not_digits(bench: &mut Bench<'_>) -> Check {
     bench.silence_to(b":\r\n", "nothing in it")?;
     bench.silence_to(b":01FF\r\n", "an address alone")?;
     bench.alive("frames that are none")
+}
+
+fn lower_case(bench: &mut Bench<'_>) -> Check {
+    // Its digits contain letters, whatever the unit's address.
+    let function = super::dispatch::unknown_function(bench)?;
+    let pdu = [function, 0xAB, 0xCD, 0xEF];
+    bench.exception(&pdu, 1)?;
+    bench.silence_to(
+        &bench.frame(&pdu).to_ascii_lowercase(),
+        "its digits are in lower case",
+    )?;
+    bench.alive("a frame in lower case")
+}
+
+fn damaged(bench: &mut Bench<'_>) -> Check {
+    let frame = bench.ping();
+    let with_parity = bench.endpoint.line().parity != Parity::None;
+    let mut kinds: Vec<fn(u8) -> Piece> = vec![Piece::BadStop];
+    if with_parity {
+        kinds.push(Piece::BadParity);
+    }
+    for damage in kinds {
+        for index in 0..frame.len() {
+            let pieces = [
+                Piece::Bytes(frame[..index].to_vec()),
+                damage(frame[index]),
+                Piece::Bytes(frame[index + 1..].to_vec()),
+            ];
+            bench.silence(&pieces, "a damaged character spoils its frame")?;
+            bench.alive("a damaged character")?;
+        }
+    }
+    Ok(())
 }
 
 fn truncated(bench: &mut Bench<'_>) -> Check {
@@ -230,4 +287,13 @@ fn delimiter(bench: &mut Bench<'_>) -> Check {
         "a reply to a frame that ends in CR and the new character",
     )?;
     bench.alive("the delimiter is LF again")
+}
+
+fn delimiter_refused(bench: &mut Bench<'_>) -> Check {
+    bench.reply_unless_lacking(&diagnose(3, b"\n\0"), "08/03")?;
+    for data in [b":\0", b"\r\0", b"0\0", b"9\0", b"A\0", b"F\0", b"!\x01"] {
+        bench.exception(&diagnose(3, data), 3)?;
+        bench.alive("a refused delimiter")?;
+    }
+    Ok(())
 }

@@ -59,7 +59,8 @@ pub(super) const CASES: &[Case] = &[
         "with DE and RE tied, the unit does not take its own reply for a request",
         &[Need::Rtu, Need::Echo],
         own_echo,
-    ),
+    )
+    .interpretation(),
 ];
 
 /// What other units and their master say to each other.
@@ -125,7 +126,7 @@ fn others_long(bench: &mut Bench<'_>) -> Check {
 
 fn right_after(bench: &mut Bench<'_>) -> Check {
     let line = bench.endpoint.line();
-    let gap = line.t35() + line.bits(3).max(Duration::from_micros(20));
+    let gap = line.t35_limits().most + line.bits(3).max(Duration::from_micros(20));
     for frame in traffic(bench) {
         let reply = bench.exchange(&[
             Piece::Bytes(frame.clone()),
@@ -167,7 +168,7 @@ fn stray_zero(bench: &mut Bench<'_>) -> Check {
         bench.alive("a stray byte in front of a request")?;
         let apart = [
             Piece::Bytes(stray.to_vec()),
-            Piece::Gap(bench.endpoint.line().t35() * 2),
+            Piece::Gap(bench.endpoint.line().t35_limits().most * 2),
             Piece::Bytes(bench.ping()),
         ];
         let reply = bench.exchange_due(&apart)?;

@@ -145,7 +145,7 @@ fn response_delay(bench: &mut Bench<'_>) -> Check {
         let request = pdu(6, configuration::RESPONSE_DELAY, ms);
         result = result.and_then(|()| bench.reply_is(&request, &request));
         result = result.and_then(|()| bench.alive("a new RESPONSE_DELAY"));
-        let least = bench.endpoint.line().t35() + Duration::from_millis(u64::from(ms));
+        let least = bench.endpoint.line().t35_limits().least + Duration::from_millis(u64::from(ms));
         let first = bench
             .heard
             .first()

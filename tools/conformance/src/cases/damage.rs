@@ -5,6 +5,7 @@ use std::time::Duration;
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
+use crate::frame::Reply;
 
 const N: &[Need] = &[Need::Rtu, Need::Faults];
 
@@ -49,7 +50,16 @@ pub(super) const CASES: &[Case] = &[
         "short glitches on the idle line cost no later request",
         N,
         glitch,
-    ),
+    )
+    .interpretation(),
+    case(
+        "damage/noise-behind-a-frame",
+        "V1.02 2.5.1.1",
+        "pulses below half a bit after a request delay its reply by one character at most",
+        &[Need::Rtu, Need::Exact, Need::Faults, Need::Driver],
+        noise_behind,
+    )
+    .interpretation(),
 ];
 
 fn one_by_one(bench: &mut Bench<'_>, damaged: fn(u8) -> Piece) -> Check {
@@ -105,7 +115,7 @@ fn line_break(bench: &mut Bench<'_>) -> Check {
 
 fn glitch(bench: &mut Bench<'_>) -> Check {
     let bit = bench.endpoint.line().bits(1);
-    let apart = Piece::Gap(bench.endpoint.line().t35() * 2 + bit * 12);
+    let apart = Piece::Gap(bench.endpoint.line().t35_limits().most * 2 + bit * 12);
     for width in [Duration::from_micros(1), bit / 20, bit / 4, bit * 2 / 5] {
         let width = width.max(Duration::from_nanos(100));
         let ping = Piece::Bytes(bench.ping());
@@ -116,4 +126,71 @@ fn glitch(bench: &mut Bench<'_>) -> Check {
         )?;
     }
     Ok(())
+}
+
+/// Sends a request and pulses after it. Returns the reply, and the time from the end of the request to the moment
+/// when the unit switches its driver on. Pulses on top of the reply would hide its first start bit.
+fn turnaround(bench: &mut Bench<'_>, pulses: &[Piece]) -> Check<(Reply, Duration)> {
+    let frame = bench.ping();
+    let end = bench.endpoint.now() + bench.endpoint.line().characters(frame.len());
+    bench.endpoint.take_driver_edges()?;
+    let reply = bench.exchange(&[&[Piece::Bytes(frame)], pulses].concat())?;
+    let edges = bench.endpoint.take_driver_edges()?;
+    match edges.first() {
+        Some((on, true)) => Ok((reply, on.saturating_sub(end))),
+        _ => bench.fail("a reply: a short pulse is no character"),
+    }
+}
+
+/// Pulses from `first` on, `spacing` apart, up to `last`.
+fn train(width: Duration, first: Duration, spacing: Duration, last: Duration) -> Vec<Piece> {
+    let mut pulses = Vec::new();
+    let (mut at, mut next) = (Duration::ZERO, first);
+    while next + width < last {
+        pulses.extend([Piece::Gap(next - at), Piece::Glitch(width)]);
+        at = next + width;
+        next += spacing;
+    }
+    pulses
+}
+
+fn noise_behind(bench: &mut Bench<'_>) -> Check {
+    let line = bench.endpoint.line();
+    let bit = line.bits(1);
+    let mut undisturbed = Duration::ZERO;
+    for _ in 0..5 {
+        undisturbed = undisturbed.max(turnaround(bench, &[])?.1);
+    }
+    let most = undisturbed + line.characters(1) + bit;
+    let silence = line.t35_limits().least;
+    for width in [bit / 20, bit * 2 / 5] {
+        let width = width.max(Duration::from_nanos(100));
+        for spacing in [
+            bit * 2,
+            bit * 5,
+            bit * 9,
+            bit * 11,
+            bit * 13,
+            bit * 23,
+            silence,
+        ] {
+            for first in [bit, bit * 4, bit * 8] {
+                // Trains that end before the reply may start, and trains that go on while it is due.
+                for last in [silence - bit * 3, most + line.characters(2)] {
+                    let pulses = train(width, first, spacing, last);
+                    let (reply, took) = turnaround(bench, &pulses)?;
+                    bench.ensure(
+                        took <= most,
+                        format!(
+                            "a reply {most:?} after the request or earlier, not {took:?}: without pulses it takes {undisturbed:?}"
+                        ),
+                    )?;
+                    // Pulses on top of the reply damage it for the master.
+                    let right = bench.is_pong(&reply) || last > silence;
+                    bench.ensure(right, "a good reply")?;
+                }
+            }
+        }
+    }
+    bench.alive("pulses after requests")
 }

@@ -36,7 +36,8 @@ pub(super) const CASES: &[Case] = &[
         "a request without a whole sub-function is 03 or silence",
         N,
         length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc08/register",
         "V1.1b3 6.8.1, 02",
@@ -47,10 +48,18 @@ pub(super) const CASES: &[Case] = &[
     case(
         "fc08/restart",
         "V1.1b3 6.8.1, 01",
-        "sub-function 01 echoes 0000 and FF00 and goes on, anything else is 03",
+        "sub-function 01 echoes 0000 and FF00, clears the counters and goes on, anything else is 03",
         N,
         restart,
     ),
+    case(
+        "fc08/delimiter-in-rtu",
+        "V1.1b3 6.8.1, 03",
+        "in RTU sub-function 03 has no effect: it is exception 01 or echoed; on a modio 01",
+        &[Need::Function(8), Need::Rtu],
+        delimiter_in_rtu,
+    )
+    .interpretation(),
     case(
         "fc08/listen-only",
         "V1.1b3 6.8.1, 04",
@@ -75,7 +84,7 @@ pub(super) const CASES: &[Case] = &[
     case(
         "fc08/clear-overruns",
         "V1.1b3 6.8.1, 14",
-        "14 clears the overrun counter and is echoed",
+        "14 is echoed, and the overrun counter is 0 after it",
         N,
         clear_overruns,
     ),
@@ -156,9 +165,18 @@ fn register(bench: &mut Bench<'_>) -> Check {
 fn restart(bench: &mut Bench<'_>) -> Check {
     bench.reply_unless_lacking(&diagnose(1, &[0, 0]), "08/01")?;
     for data in [[0, 0], [0xFF, 0]] {
+        let exceptions = diagnose(0x0D, &[0, 0]);
+        let counts = bench.ask_due(&exceptions)?.exception(8) != Some(1);
+        if let Some(function) = super::dispatch::unknown_functions(bench).pop() {
+            bench.exception(&[function], 1)?;
+        }
         let request = diagnose(1, &data);
         bench.reply_is(&request, &request)?;
         bench.alive("a restart of the communication")?;
+        if counts {
+            // Its reply without exceptions is the request itself.
+            bench.reply_is(&exceptions, &exceptions)?;
+        }
     }
     for bad in [[0, 1], [0xFF, 1], [0xFE, 0], [0xFF, 0xFF]] {
         bench.exception(&diagnose(1, &bad), 3)?;
@@ -167,15 +185,37 @@ fn restart(bench: &mut Bench<'_>) -> Check {
     bench.exception_03_or_silence(&diagnose(1, &[0, 0, 0]))
 }
 
-/// Puts the unit into listen-only mode, or skips the case.
-fn enter(bench: &mut Bench<'_>) -> Check {
-    // Data that is refused tells whether it has the sub-function, without entering.
+fn delimiter_in_rtu(bench: &mut Bench<'_>) -> Check {
+    let request = diagnose(3, b"!\0");
+    let reply = bench.ask_due(&request)?;
+    let refused = reply.exception(8) == Some(1);
+    if bench.target.modio.is_some() {
+        bench.ensure(refused, "exception 01: there is no delimiter in RTU")?;
+    }
+    let right = refused || reply == Reply::Pdu(request.clone());
+    bench.ensure(right, "exception 01, or the request echoed")?;
+    bench.alive("08/03 in RTU")?;
+    if !refused {
+        let back = diagnose(3, b"\n\0");
+        bench.reply_is(&back, &back)?;
+    }
+    Ok(())
+}
+
+/// Skips the case where the unit has no listen-only mode.
+pub(super) fn needs_listen_only(bench: &mut Bench<'_>) -> Check {
+    // Data that the unit refuses shows whether it has the sub-function, without entering the mode.
     let reply = bench.ask_due(&diagnose(4, &[0, 1]))?;
     if reply.exception(8) == Some(1) {
         return Err(crate::case::Stop::Skip(
             "the unit answers 01: it has no 08/04".to_owned(),
         ));
     }
+    Ok(())
+}
+
+/// Puts the unit into listen-only mode.
+pub(super) fn enter(bench: &mut Bench<'_>) -> Check {
     let enter = bench.frame(&diagnose(4, &[0, 0]));
     bench.silence_to(&enter, "08/04 is not answered")
 }
@@ -196,6 +236,7 @@ fn leave(bench: &mut Bench<'_>, so_far: Check) -> Check {
 }
 
 fn listen_only(bench: &mut Bench<'_>) -> Check {
+    needs_listen_only(bench)?;
     enter(bench)?;
     let ping = bench.ping();
     let mut silent = bench.silence_to(&ping, "in listen-only mode nothing is answered");
@@ -215,6 +256,7 @@ fn listen_only(bench: &mut Bench<'_>) -> Check {
 fn listen_only_writes(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(1);
     bench.set_bits(span.first, &[false])?;
+    needs_listen_only(bench)?;
     enter(bench)?;
     let [high, low] = span.first.to_be_bytes();
     let mut tried = Ok(());

@@ -25,7 +25,8 @@ pub(super) const CASES: &[Case] = &[
         "function 00 and those from 80 on get silence or exception 01, never what looks like a reply",
         &[],
         not_functions,
-    ),
+    )
+    .interpretation(),
     case(
         "dispatch/unknown-function-elsewhere",
         "V1.02 2.2",

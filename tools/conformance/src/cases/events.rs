@@ -1,8 +1,14 @@
 //! Exception status, event counter, event log, server identification: 07, 0B, 0C, 11.
 
+use register_map::configuration::{FORMAT, KEY};
+
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, case};
-use crate::cases::diagnostics::diagnose;
+use crate::case::{Case, Check, Need, Stop, case};
+use crate::cases::diagnostics::{self, diagnose};
+use crate::cases::line_counters;
+use crate::endpoint::Piece;
+use crate::frame::hex;
+use crate::points::pdu;
 
 pub(super) const CASES: &[Case] = &[
     case(
@@ -54,6 +60,70 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Function(8), Need::Function(0x0C)],
         log_cleared,
     ),
+    case(
+        "fc0c/reply-sent",
+        "V1.1b3 6.10",
+        "a request that is answered is 80, received, and then 40, sent",
+        &[Need::Function(0x0C)],
+        log_reply,
+    ),
+    case(
+        "fc0c/exception-sent",
+        "V1.1b3 6.10",
+        "a reply with exception 01 to 03 is 41, read exception sent",
+        &[Need::Function(0x0C)],
+        log_exceptions,
+    ),
+    case(
+        "fc0c/busy-exception-sent",
+        "V1.1b3 6.10",
+        "a reply with exception 06 is 44, server busy exception sent",
+        &[Need::Function(0x0C), Need::Function(6), Need::Modio],
+        log_busy,
+    ),
+    case(
+        "fc0c/broadcast",
+        "V1.1b3 6.10",
+        "a broadcast is C0, received, and then 40, done without a reply",
+        &[Need::Function(0x0C)],
+        log_broadcast,
+    ),
+    case(
+        "fc0c/communication-error",
+        "V1.1b3 6.10",
+        "a frame with a bad check is 82, received with a communication error",
+        &[Need::Function(0x0C)],
+        log_bad_check,
+    ),
+    case(
+        "fc0c/communication-error-characters",
+        "V1.1b3 6.10",
+        "a frame with a damaged character is 82, received with a communication error",
+        &[Need::Function(0x0C), Need::Faults, Need::Rtu],
+        log_bad_character,
+    ),
+    case(
+        "fc0c/other-units",
+        "V1.1b3 6.10",
+        "requests for other units are no events",
+        &[Need::Function(0x0C)],
+        log_others,
+    ),
+    case(
+        "fc0c/restart",
+        "V1.1b3 6.8, 08/01",
+        "08/01 with 0000 keeps the log and adds event 00",
+        &[Need::Function(8), Need::Function(0x0C)],
+        log_restart,
+    ),
+    case(
+        "fc0c/listen-only",
+        "V1.1b3 6.10",
+        "entering listen-only mode is event 04; from then on events have bit 5, up to the restart",
+        &[Need::Function(8), Need::Function(0x0C)],
+        log_listen_only,
+    )
+    .interpretation(),
     case(
         "fc11/shape",
         "V1.1b3 6.13",
@@ -198,6 +268,159 @@ fn log_cleared(bench: &mut Bench<'_>) -> Check {
         "no event from before the restart with FF00",
     )?;
     bench.ensure(events.contains(&0), "event 00, the restart")
+}
+
+/// Does something and checks the events that the log has for it, the newest first. Where the standard leaves
+/// the order of two events open, there are several right answers.
+fn logs(
+    bench: &mut Bench<'_>,
+    what: &str,
+    right: &[&[u8]],
+    done: impl FnOnce(&mut Bench<'_>) -> Check,
+) -> Check {
+    log(bench)?;
+    done(bench)?;
+    let (_, _, events) = log(bench)?;
+    // The request that reads the log may already be in the log.
+    let events = events.strip_prefix(&[0x80]).unwrap_or(&events);
+    let found = right.iter().any(|right| {
+        // The older events are those of the first reading.
+        let all = [right, &[0x40, 0x80][..]].concat();
+        events.starts_with(&all)
+    });
+    let shown = right.iter().map(|right| hex(right)).collect::<Vec<_>>();
+    bench.ensure(
+        found,
+        format!(
+            "for {what} the events {}, the newest first, and before them 40 80 for the reading of the log",
+            shown.join(" or ")
+        ),
+    )
+}
+
+fn log_reply(bench: &mut Bench<'_>) -> Check {
+    logs(
+        bench,
+        "two requests",
+        &[&[0x40, 0x80, 0x40, 0x80]],
+        |bench| {
+            bench.alive("a reading of the log")?;
+            bench.alive("a request")
+        },
+    )
+}
+
+fn log_exceptions(bench: &mut Bench<'_>) -> Check {
+    let function = super::dispatch::unknown_function(bench)?;
+    logs(bench, "exception 01", &[&[0x41, 0x80]], |bench| {
+        bench.exception(&[function], 1)
+    })?;
+    let Some(reading) = (1..=4).find(|function| bench.target.has(*function)) else {
+        return Ok(());
+    };
+    logs(bench, "exception 03", &[&[0x41, 0x80]], |bench| {
+        bench.exception(&pdu(reading, 0, 0), 3)
+    })?;
+    let Some(nowhere) = bench.target.nowhere(reading) else {
+        return Ok(());
+    };
+    logs(bench, "exception 02", &[&[0x41, 0x80]], |bench| {
+        bench.exception(&pdu(reading, nowhere, 1), 2)
+    })
+}
+
+fn log_busy(bench: &mut Bench<'_>) -> Check {
+    if bench.read_word(KEY)? != 0 {
+        return Err(Stop::Skip("the lock is open".to_owned()));
+    }
+    let format = bench.read_word(FORMAT)?;
+    logs(bench, "exception 06", &[&[0x44, 0x80]], |bench| {
+        bench.exception(&pdu(6, FORMAT, format), 6)
+    })
+}
+
+fn log_broadcast(bench: &mut Bench<'_>) -> Check {
+    // A broadcast read has no effect on any unit, and no reply.
+    let frame = bench.target.mode.frame(0, &bench.target.ping);
+    logs(bench, "a broadcast", &[&[0x40, 0xC0]], |bench| {
+        bench.silence_to(&frame, "a broadcast")
+    })
+}
+
+fn log_bad_check(bench: &mut Bench<'_>) -> Check {
+    let frame = line_counters::bad(bench);
+    logs(
+        bench,
+        "two frames with a bad check",
+        &[&[0x82, 0x82]],
+        |bench| {
+            bench.silence_to(&frame, "its check is wrong")?;
+            bench.silence_to(&frame, "its check is wrong")
+        },
+    )
+}
+
+fn log_bad_character(bench: &mut Bench<'_>) -> Check {
+    let frame = bench.ping();
+    let pieces = [
+        Piece::Bytes(frame[..2].to_vec()),
+        Piece::BadStop(frame[2]),
+        Piece::Bytes(frame[3..].to_vec()),
+    ];
+    logs(bench, "a damaged character", &[&[0x82]], |bench| {
+        bench.silence(&pieces, "a stop bit is low")
+    })
+}
+
+fn log_others(bench: &mut Bench<'_>) -> Check {
+    let frame = bench.target.mode.frame(bench.other(), &bench.target.ping);
+    logs(bench, "requests for another unit", &[&[]], |bench| {
+        bench.silence_to(&frame, "it is another unit's")?;
+        bench.silence_to(&frame, "it is another unit's")
+    })
+}
+
+fn log_restart(bench: &mut Bench<'_>) -> Check {
+    let request = diagnose(1, &[0, 0]);
+    bench.reply_unless_lacking(&request, "08/01")?;
+    // The unit may restart before or after it has sent the reply.
+    let right: [&[u8]; 2] = [&[0x00, 0x40, 0x80], &[0x40, 0x00, 0x80]];
+    logs(bench, "a restart with 0000", &right, |bench| {
+        bench.reply_is(&request, &request)
+    })
+}
+
+fn log_listen_only(bench: &mut Bench<'_>) -> Check {
+    diagnostics::needs_listen_only(bench)?;
+    let ping = bench.target.ping.clone();
+    let frames = [
+        (
+            bench.frame(&ping),
+            "in listen-only mode nothing is answered",
+        ),
+        (bench.target.mode.frame(0, &ping), "a broadcast"),
+        (line_counters::bad(bench), "its check is wrong"),
+    ];
+    let mut right = Vec::new();
+    // The unit enters and leaves the mode before or after it has finished the request for that.
+    for restart in [&[0x00, 0x60, 0xA0][..], &[0x40, 0x00, 0xA0]] {
+        for entry in [&[0x04, 0x40, 0x80][..], &[0x60, 0x04, 0x80]] {
+            let frames = [0xA2, 0x60, 0xE0, 0x60, 0xA0];
+            right.push([restart, &frames, entry].concat());
+        }
+    }
+    let right: Vec<&[u8]> = right.iter().map(Vec::as_slice).collect();
+    let what = "08/04, a request, a broadcast, a bad check and 08/01, all in listen-only mode";
+    logs(bench, what, &right, |bench| {
+        diagnostics::enter(bench)?;
+        let mut silent = Ok(());
+        for (frame, why) in frames {
+            silent = silent.and_then(|()| bench.silence_to(&frame, why));
+        }
+        let leave = bench.frame(&diagnose(1, &[0, 0]));
+        let left = bench.silence_to(&leave, "08/01 in listen-only mode is obeyed without reply");
+        silent.and(left)
+    })
 }
 
 fn server_id(bench: &mut Bench<'_>) -> Check {

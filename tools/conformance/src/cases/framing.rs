@@ -220,7 +220,7 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
     let half = ping.len() / 2;
     let pieces = [
         Piece::Bytes(ping[..half].to_vec()),
-        Piece::Gap(bench.endpoint.line().t35() * 2 + Duration::from_millis(20)),
+        Piece::Gap(bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20)),
         Piece::Bytes(ping[half..].to_vec()),
     ];
     bench.silence(&pieces, "a silence in the middle makes two frames of it")?;

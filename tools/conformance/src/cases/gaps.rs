@@ -25,14 +25,16 @@ pub(super) const CASES: &[Case] = &[
         "a gap between t1.5 and t3.5 drops the frame, or not, as STRICT_T15 says: always alike",
         N,
         between,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/just-below-t3.5",
         S,
         "a gap that is a few bits below t3.5 is treated as any other between t1.5 and t3.5",
         B,
         just_below_t35,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/above-t3.5",
         S,
@@ -46,14 +48,16 @@ pub(super) const CASES: &[Case] = &[
         "a request less than t3.5 after another joins it, and both are lost",
         N,
         too_soon,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/a-bit-too-soon",
         S,
         "a request a few bits less than t3.5 after another joins it, and both are lost",
         B,
         a_bit_too_soon,
-    ),
+    )
+    .interpretation(),
     case(
         "gaps/t3.5-is-enough",
         S,
@@ -95,7 +99,7 @@ fn places(bench: &Bench<'_>) -> [usize; 4] {
 }
 
 fn below_t15(bench: &mut Bench<'_>) -> Check {
-    let t15 = bench.endpoint.line().t15();
+    let t15 = bench.endpoint.line().t15_limits().least;
     for index in places(bench) {
         for gap in [t15 / 4, t15 / 2, t15 - margin(bench)] {
             let reply = with_gap(bench, index, gap)?;
@@ -118,16 +122,17 @@ fn below_t15(bench: &mut Bench<'_>) -> Check {
 /// A gap between t1.5 and t3.5 that ends more than a character below t3.5, at any rate and format.
 fn middle(bench: &Bench<'_>) -> Duration {
     let line = bench.endpoint.line();
-    line.t15() + (line.t35() - line.t15()) / 3
+    let (above, below) = (line.t15_limits().most, line.t35_limits().least);
+    above + (below - above) / 3
 }
 
 fn between(bench: &mut Bench<'_>) -> Check {
-    let low = bench.endpoint.line().t15() + margin(bench);
+    let low = bench.endpoint.line().t15_limits().most + margin(bench);
     kept_or_dropped(bench, &[low, middle(bench)])
 }
 
 fn just_below_t35(bench: &mut Bench<'_>) -> Check {
-    let high = bench.endpoint.line().t35() - margin(bench);
+    let high = bench.endpoint.line().t35_limits().least - margin(bench);
     kept_or_dropped(bench, &[middle(bench), high])
 }
 
@@ -153,13 +158,13 @@ fn kept_or_dropped(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
 }
 
 fn above_t35(bench: &mut Bench<'_>) -> Check {
-    let line = bench.endpoint.line();
+    let t35 = bench.endpoint.line().t35_limits().most;
     for index in places(bench) {
-        for gap in [line.t35() + margin(bench), line.t35() * 2, line.t35() * 10] {
+        for gap in [t35 + margin(bench), t35 * 2, t35 * 10] {
             let reply = with_gap(bench, index, gap)?;
             bench.ensure(
                 reply == Reply::Silence,
-                format!("silence: a gap of {gap:?} is above t3.5, {:?}", line.t35()),
+                format!("silence: a gap of {gap:?} is above t3.5, {t35:?}"),
             )?;
         }
     }
@@ -167,12 +172,12 @@ fn above_t35(bench: &mut Bench<'_>) -> Check {
 }
 
 fn too_soon(bench: &mut Bench<'_>) -> Check {
-    let t35 = bench.endpoint.line().t35();
+    let t35 = bench.endpoint.line().t35_limits().least;
     joined_after(bench, &[t35 / 4, t35 / 2])
 }
 
 fn a_bit_too_soon(bench: &mut Bench<'_>) -> Check {
-    let gap = bench.endpoint.line().t35() - margin(bench);
+    let gap = bench.endpoint.line().t35_limits().least - margin(bench);
     joined_after(bench, &[gap])
 }
 
@@ -195,7 +200,7 @@ fn joined_after(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
 }
 
 fn soon_enough(bench: &mut Bench<'_>) -> Check {
-    let t35 = bench.endpoint.line().t35();
+    let t35 = bench.endpoint.line().t35_limits().most;
     let mine = bench.ping();
     let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
     for gap in [t35 + margin(bench), t35 * 2] {
@@ -213,7 +218,7 @@ fn soon_enough(bench: &mut Bench<'_>) -> Check {
 }
 
 fn after_noise(bench: &mut Bench<'_>) -> Check {
-    let gap = bench.endpoint.line().t35() + margin(bench);
+    let gap = bench.endpoint.line().t35_limits().most + margin(bench);
     let mine = bench.ping();
     for length in [1, 2, 3, 8, 100, 255, 256, 257, 600] {
         let reply = bench.exchange(&[

@@ -6,7 +6,7 @@ use fastrand::Rng;
 use register_map::{configuration, state};
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::{Reply, rtu};
 use crate::points::{pdu, words_of};
@@ -48,25 +48,11 @@ pub(super) const CASES: &[Case] = &[
         wrong_settings,
     ),
     case(
-        "hurts/torn-values",
-        "map, 0x0200",
-        "values of two registers are read as one: the uptime never falls, the product code stands",
-        &[Need::Modio, Need::Function(4)],
-        torn,
-    ),
-    case(
         "hurts/half-written",
         "map, 0x0300",
         "one half of a counter cannot be written: exception 03, and the counter stays",
         &[Need::Modio, Need::Function(0x10)],
         half_written,
-    ),
-    case(
-        "hurts/flash-wear",
-        "map, 0x020A",
-        "writing outputs over and over leaves nothing to be saved",
-        &[Need::Modio, Need::Bits, Need::Function(5)],
-        flash_wear,
     ),
 ];
 
@@ -205,24 +191,6 @@ fn wrong_settings(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn torn(bench: &mut Bench<'_>) -> Check {
-    let mut last = 0;
-    for _ in 0..20 {
-        for function in [3, 4] {
-            let product = words_of(&bench.reply(&pdu(function, state::PRODUCT_CODE, 2))?);
-            bench.ensure(product == [0x2383, 0x5860], "the product code 2383 5860")?;
-            let uptime = words_of(&bench.reply(&pdu(function, state::UPTIME, 2))?);
-            let [high, low] = uptime[..] else {
-                return bench.fail("two registers");
-            };
-            let uptime = u32::from(high) << 16 | u32::from(low);
-            bench.ensure(uptime >= last, format!("an uptime of {last} s or more"))?;
-            last = uptime;
-        }
-    }
-    Ok(())
-}
-
 fn half_written(bench: &mut Bench<'_>) -> Check {
     use register_map::{counters, points::SLOT_FIRST};
     let at = counters::of_point(SLOT_FIRST);
@@ -238,24 +206,4 @@ fn half_written(bench: &mut Bench<'_>) -> Check {
     }
     let now = bench.reply(&pdu(3, at, 2))?;
     bench.ensure(now == before, "the counter as it was")
-}
-
-fn flash_wear(bench: &mut Bench<'_>) -> Check {
-    let span = bench.bits()?;
-    let pending = state::status::UNSAVED | state::status::RESTART_NEEDED;
-    let before = bench.read_word(state::STATUS)? & pending;
-    if before != 0 {
-        return Err(Stop::Skip(
-            "the configuration has changes that are not saved".to_owned(),
-        ));
-    }
-    for n in 0..50 {
-        let value = if n % 2 == 0 { 0xFF00 } else { 0 };
-        bench.reply(&pdu(5, span.first, value))?;
-    }
-    let now = bench.read_word(state::STATUS)? & pending;
-    bench.ensure(
-        now == 0,
-        "status bits 3 and 4 stay 0: nothing waits to be saved",
-    )
 }

@@ -50,6 +50,13 @@ pub(super) const CASES: &[Case] = &[
         restarts,
     ),
     case(
+        "fc2b/stream-from-the-middle",
+        S,
+        "a stream from an object that is there starts at that object",
+        N,
+        from_the_middle,
+    ),
+    case(
         "fc2b/read-code",
         S,
         "read code 00 and those above 04 are exception 03",
@@ -69,7 +76,8 @@ pub(super) const CASES: &[Case] = &[
         "a request cut short or too long is 03 or silence",
         N,
         length,
-    ),
+    )
+    .interpretation(),
 ];
 
 /// One reply.
@@ -236,6 +244,20 @@ fn restarts(bench: &mut Bench<'_>) -> Check {
                 let again = stream(bench, code, id)?;
                 bench.ensure(again == known, "the whole stream, from object 0 on")?;
             }
+        }
+    }
+    Ok(())
+}
+
+fn from_the_middle(bench: &mut Bench<'_>) -> Check {
+    for code in 1..=3 {
+        let known = stream(bench, code, 0)?;
+        for (place, (id, _)) in known.iter().enumerate().skip(1) {
+            let rest = stream(bench, code, *id)?;
+            bench.ensure(
+                rest == known[place..],
+                format!("the objects from {id:02X} on, as the whole stream has them"),
+            )?;
         }
     }
     Ok(())

@@ -36,7 +36,8 @@ pub(super) const CASES: &[Case] = &[
         "a request of another length is 03 or silence, and the register stays",
         W16,
         mask_length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc17/write-before-read",
         "V1.1b3 6.17",
@@ -59,6 +60,20 @@ pub(super) const CASES: &[Case] = &[
         quantities,
     ),
     case(
+        "fc17/quantities-most",
+        "V1.1b3 6.17",
+        "reading 125 and writing 121 registers fits a frame: done, or 02 where there are not so many",
+        &[Need::Function(0x17)],
+        quantities_most,
+    ),
+    case(
+        "fc17/quantity-before-address",
+        "V1.1b3 6.17",
+        "a bad quantity or byte count at bad addresses is exception 03, not 02",
+        &[Need::Function(0x17)],
+        quantity_first,
+    ),
+    case(
         "fc17/byte-count",
         "V1.1b3 6.17",
         "a byte count that is not twice the quantity is exception 03 and writes nothing",
@@ -71,7 +86,8 @@ pub(super) const CASES: &[Case] = &[
         "a request cut short or too long is 03 or silence, never a success, and writes nothing",
         W17,
         truncated,
-    ),
+    )
+    .interpretation(),
     case(
         "fc17/address",
         "V1.1b3 6.17",
@@ -225,6 +241,65 @@ fn quantities(bench: &mut Bench<'_>) -> Check {
         bench.exception(&shape(reads, writes, bytes), 3)?;
     }
     still_low(bench)
+}
+
+fn quantities_most(bench: &mut Bench<'_>) -> Check {
+    let wide = super::write_words::wide(bench)?;
+    let run = bench.target.longest(3).filter(|run| run.len() >= 125);
+    let (Some(wide), Some(run)) = (wide.filter(|_| bench.target.has(3)), run) else {
+        let Some(nowhere) = bench.target.nowhere(3) else {
+            return Err(Stop::Skip("every register exists".to_owned()));
+        };
+        let read = Span {
+            first: nowhere.saturating_sub(124),
+            last: nowhere.saturating_sub(124) + 124,
+        };
+        return bench.exception(&both(read, read.first, &[0; 121]), 2);
+    };
+    // The values go back to where they came from.
+    let values = bench.read_words(wide.up_to(121))?;
+    let reply = bench.reply(&both(run.up_to(125), wide.first, &values))?;
+    bench.ensure(
+        reply.len() == 252 && reply[1] == 250,
+        "250 data bytes and the byte count 250",
+    )?;
+    let now = bench.read_words(wide.up_to(121))?;
+    bench.ensure(now == values, "the registers hold what was written")
+}
+
+fn quantity_first(bench: &mut Bench<'_>) -> Check {
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
+    };
+    let good = both(
+        Span {
+            first: nowhere,
+            last: nowhere,
+        },
+        nowhere,
+        &[0],
+    );
+    let with = |changes: &[(usize, u8)]| {
+        let mut request = good.clone();
+        for (at, byte) in changes {
+            request[*at] = *byte;
+        }
+        request
+    };
+    for (changes, wrong) in [
+        (&[(4, 0)][..], "it reads 0 registers"),
+        (&[(4, 126)], "it reads 126 registers"),
+        (&[(8, 0)], "it writes 0 registers"),
+        (&[(8, 122)], "it writes 122 registers"),
+        (&[(9, 4)], "its byte count is 4"),
+    ] {
+        let reply = bench.ask_due(&with(changes))?;
+        bench.ensure(
+            reply.exception(0x17) == Some(3),
+            format!("exception 03 to function 17: {wrong}"),
+        )?;
+    }
+    bench.exception(&good, 2)
 }
 
 fn still_low(bench: &mut Bench<'_>) -> Check {

@@ -59,7 +59,21 @@ pub fn all() -> Vec<Case> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::case::{Kind, Need};
     use std::collections::BTreeSet;
+
+    #[test]
+    fn cases_about_the_modio_are_no_interpretations() {
+        for case in all() {
+            let about_modio = case.needs.contains(&Need::Modio) || case.section.starts_with("map");
+            assert_eq!(case.kind == Kind::Modio, about_modio, "{}", case.name);
+        }
+        let interpretations = all()
+            .iter()
+            .filter(|c| c.kind == Kind::Interpretation)
+            .count();
+        assert!(interpretations > 20, "{interpretations}");
+    }
 
     #[test]
     fn names_are_unique_and_everything_is_told() {

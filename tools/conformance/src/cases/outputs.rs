@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use register_map::configuration::{self, HOLD};
+use register_map::points::{PointKind, SLOT_FIRST};
 use register_map::state;
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
-use crate::points::pdu;
+use crate::points::{pdu, write_bits, write_words};
 use crate::target::Span;
 
 const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
@@ -28,6 +29,13 @@ pub(super) const CASES: &[Case] = &[
         line_lives,
     ),
     case(
+        "outputs/inputs-take-no-writes",
+        "map, points",
+        "writing an input point is exception 02, by every function that writes",
+        &[Need::Modio],
+        inputs,
+    ),
+    case(
         "outputs/start-value",
         "map, 0x01E0",
         "at power-on outputs are at START",
@@ -45,6 +53,33 @@ fn output(bench: &Bench<'_>) -> Check<(u8, u16, u16)> {
         Some(words) => Ok((3, words.span.first, words.high)),
         None => Err(Stop::Skip("the module has no outputs".to_owned())),
     }
+}
+
+fn inputs(bench: &mut Bench<'_>) -> Check {
+    let kinds = bench.target.modio.map(|modio| modio.module.points());
+    let mut requests = Vec::new();
+    for (address, kind) in (SLOT_FIRST..).zip(kinds.into_iter().flatten()) {
+        match kind {
+            PointKind::BitInput => requests.extend([
+                pdu(5, address, 0),
+                pdu(5, address, 0xFF00),
+                write_bits(address, &[true], false),
+            ]),
+            PointKind::WordInput => requests.extend([
+                pdu(6, address, 1),
+                write_words(address, &[1]),
+                [pdu(0x16, address, 0), vec![0, 1]].concat(),
+            ]),
+            PointKind::None | PointKind::BitOutput | PointKind::WordOutput => {}
+        }
+    }
+    if requests.is_empty() {
+        return Err(Stop::Skip("the module has no inputs".to_owned()));
+    }
+    for request in requests {
+        bench.exception(&request, 2)?;
+    }
+    Ok(())
 }
 
 fn read(bench: &mut Bench<'_>, function: u8, address: u16) -> Check<u16> {

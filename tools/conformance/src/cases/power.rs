@@ -13,7 +13,8 @@ pub(super) const CASES: &[Case] = &[
         "switched off and on, the unit answers within a second",
         &[Need::Power],
         answers,
-    ),
+    )
+    .interpretation(),
     case(
         "power/in-the-middle-of-traffic",
         "V1.02 2.4.2",
@@ -27,7 +28,8 @@ pub(super) const CASES: &[Case] = &[
         "nothing leaves a unit that starts",
         &[Need::Power],
         no_byte,
-    ),
+    )
+    .interpretation(),
 ];
 
 const OFF: Duration = Duration::from_millis(200);

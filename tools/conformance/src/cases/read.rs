@@ -76,7 +76,7 @@ macro_rules! reading {
                 "a request a byte short or long under a good check is 03 or silence, never data",
                 &[Need::Function($f), Need::Readable($f)],
                 length::<$f>,
-            ),
+            ).interpretation(),
         ]
     };
 }

@@ -39,7 +39,8 @@ pub(super) const CASES: &[Case] = &[
         "a request a byte short or long is 03 or silence, and the coil stays",
         &[Need::Function(5), Need::Function(1), Need::Bits],
         length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc0f/every-quantity",
         "V1.1b3 6.11",
@@ -62,6 +63,13 @@ pub(super) const CASES: &[Case] = &[
         quantity_most,
     ),
     case(
+        "fc0f/quantity-before-address",
+        "V1.1b3 6.11",
+        "a bad quantity or byte count at a bad address is exception 03, not 02",
+        &[Need::Function(0x0F)],
+        quantity_first,
+    ),
+    case(
         "fc0f/byte-count",
         "V1.1b3 6.11",
         "a byte count that does not fit the quantity is exception 03 and writes nothing",
@@ -74,7 +82,8 @@ pub(super) const CASES: &[Case] = &[
         "data short of the byte count or beyond it is 03 or silence and writes nothing",
         &[Need::Function(0x0F), Need::Function(1), Need::Bits],
         data_length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc0f/padding",
         "V1.1b3 6.11",
@@ -183,6 +192,18 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
         bench.exception(&request, 3)?;
     }
     Ok(())
+}
+
+fn quantity_first(bench: &mut Bench<'_>) -> Check {
+    let Some(nowhere) = bench.target.nowhere(1) else {
+        return Err(Stop::Skip("every coil exists".to_owned()));
+    };
+    for (quantity, count) in [(0, 0_u8), (0, 1), (1969, 247), (1, 0), (1, 2), (9, 1)] {
+        let data = vec![0; usize::from(count)];
+        let request = [pdu(0x0F, nowhere, quantity), vec![count], data].concat();
+        bench.exception(&request, 3)?;
+    }
+    bench.exception(&write_bits(nowhere, &[false], false), 2)
 }
 
 fn quantity_most(bench: &mut Bench<'_>) -> Check {

@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
 use crate::points::{pdu, write_words};
+use crate::target::Span;
 
 const W06: &[Need] = &[Need::Function(6), Need::Function(3), Need::Words];
 const W10: &[Need] = &[Need::Function(0x10), Need::Function(3), Need::Words];
@@ -30,12 +31,21 @@ pub(super) const CASES: &[Case] = &[
         address,
     ),
     case(
+        "fc06/address-before-value",
+        "V1.1b3 6.6",
+        "a value out of range at a bad address is exception 02, not 03",
+        &[Need::Function(6), Need::Words],
+        address_first,
+    )
+    .interpretation(),
+    case(
         "fc06/length",
         "V1.1b3 6.6",
         "a request a byte short or long is 03 or silence, and the register stays",
         W06,
         length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc10/every-quantity",
         "V1.1b3 6.12",
@@ -58,6 +68,21 @@ pub(super) const CASES: &[Case] = &[
         quantity_most,
     ),
     case(
+        "fc10/quantity-before-address",
+        "V1.1b3 6.12",
+        "a bad quantity or byte count at a bad address is exception 03, not 02",
+        &[Need::Function(0x10)],
+        quantity_first,
+    ),
+    case(
+        "fc10/address-before-value",
+        "V1.1b3 6.12",
+        "a value out of range in a range that is not there, or partly, is exception 02, not 03",
+        &[Need::Function(0x10), Need::Function(3), Need::Words],
+        range_first,
+    )
+    .interpretation(),
+    case(
         "fc10/byte-count",
         "V1.1b3 6.12",
         "a byte count that is not twice the quantity, odd or 255, is exception 03 and writes nothing",
@@ -70,7 +95,8 @@ pub(super) const CASES: &[Case] = &[
         "data cut short or with bytes to spare is 03 or silence and writes nothing",
         W10,
         data_length,
-    ),
+    )
+    .interpretation(),
     case(
         "fc10/partly-out-of-range",
         "V1.1b3 6.12",
@@ -84,7 +110,8 @@ pub(super) const CASES: &[Case] = &[
         "one value out of range refuses all of them",
         W10,
         one_bad_value,
-    ),
+    )
+    .interpretation(),
 ];
 
 fn echo(bench: &mut Bench<'_>) -> Check {
@@ -185,21 +212,67 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-fn quantity_most(bench: &mut Bench<'_>) -> Check {
-    // On a modio whose configuration may be written there is a run of so many, whose values go back to
-    // where they came from.
+/// The 123 registers that a test may write to, if the unit has so many. Their values must go back to them.
+pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
     let config = bench.target.modio.is_some() && bench.allow_config && bench.target.has(3);
-    let known = bench.target.words.map(|words| words.span);
-    let wide = if config {
+    if config {
         bench.unlock()?;
-        Some(crate::target::Span {
+        return Ok(Some(Span {
             first: register_map::configuration::BETA,
             last: register_map::configuration::BETA + 122,
-        })
-    } else {
-        known.filter(|span| span.len() >= 123)
+        }));
+    }
+    let known = bench.target.words.map(|words| words.span);
+    Ok(known.filter(|span| span.len() >= 123))
+}
+
+fn quantity_first(bench: &mut Bench<'_>) -> Check {
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
     };
-    if let Some(span) = wide {
+    for (quantity, count, bytes) in [(0, 0, 0), (124, 248, 246), (1, 0, 0), (1, 1, 1), (1, 4, 4)] {
+        let data = vec![0; bytes];
+        let request = [pdu(0x10, nowhere, quantity), vec![count], data].concat();
+        bench.exception(&request, 3)?;
+    }
+    bench.exception(&write_words(nowhere, &[0]), 2)
+}
+
+/// A value that the registers refuse, or the case is skipped.
+fn refused_value(bench: &Bench<'_>) -> Check<u16> {
+    let refused = bench.words()?.refused;
+    refused.ok_or_else(|| Stop::Skip("no value is known that is refused".to_owned()))
+}
+
+fn address_first(bench: &mut Bench<'_>) -> Check {
+    let bad = refused_value(bench)?;
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
+    };
+    bench.exception(&pdu(6, nowhere, bad), 2)
+}
+
+fn range_first(bench: &mut Bench<'_>) -> Check {
+    let bad = refused_value(bench)?;
+    let words = bench.words()?;
+    let Some(nowhere) = bench.target.nowhere(3) else {
+        return Err(Stop::Skip("every register exists".to_owned()));
+    };
+    bench.exception(&write_words(nowhere, &[bad]), 2)?;
+    let last = words.span.last;
+    let next = last.checked_add(1);
+    let there = |address: u16| bench.target.readable(3).iter().any(|run| run.has(address));
+    if next.is_none_or(there) {
+        return Ok(());
+    }
+    let before = bench.read_word(last)?;
+    bench.exception(&write_words(last, &[bad, words.low]), 2)?;
+    let now = bench.read_word(last)?;
+    bench.ensure(now == before, format!("the register still is {before:04X}"))
+}
+
+fn quantity_most(bench: &mut Bench<'_>) -> Check {
+    if let Some(span) = wide(bench)? {
         let values = bench.read_words(span)?;
         let request = write_words(span.first, &values);
         bench.reply_is(&request, &request[..5])?;
@@ -215,7 +288,7 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
 }
 
 fn unchanged(bench: &mut Bench<'_>, at: u16, value: u16, count: usize) -> Check {
-    let span = crate::target::Span {
+    let span = Span {
         first: at,
         last: at + count as u16 - 1,
     };
@@ -267,7 +340,7 @@ fn partly_out(bench: &mut Bench<'_>) -> Check {
     };
     // The last registers of the run, and the one after them that is not there.
     for count in 1..=run.len().min(8) as u16 {
-        let tail = crate::target::Span {
+        let tail = Span {
             first: run.last - (count - 1),
             last: run.last,
         };

@@ -4,6 +4,7 @@ pub mod exact_line;
 #[cfg(feature = "sim")]
 pub mod sim;
 pub mod stream;
+pub mod trace;
 
 use std::fmt;
 use std::time::Duration;
@@ -112,6 +113,16 @@ pub trait Endpoint {
         quiet: Duration,
         enough: usize,
     ) -> Result<Vec<Heard>, Broken>;
+
+    /// Discards the characters that were received and not yet returned by `hear`, such as those of a late reply,
+    /// and returns them. Does nothing where time is exact: there a late character is a finding.
+    ///
+    /// # Errors
+    ///
+    /// See the trait.
+    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
+        Ok(Vec::new())
+    }
 
     /// Switches the unit's power. After switching on, the unit starts while time passes.
     ///

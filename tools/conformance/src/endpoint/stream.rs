@@ -108,6 +108,19 @@ impl Stream {
         written.map_err(|error| Broken(format!("{}: cannot send: {error}", self.name)))
     }
 
+    /// Bytes with the time at which they were received: now.
+    fn received(&self, bytes: Vec<u8>) -> Vec<Heard> {
+        let end = self.begin.elapsed();
+        let start = end.saturating_sub(self.line.characters(1));
+        let heard = bytes.into_iter().map(|byte| Heard {
+            byte,
+            start,
+            end,
+            good: true,
+        });
+        heard.collect()
+    }
+
     /// What comes within `wait`; nothing is no error.
     fn read(&mut self, wait: Duration) -> Result<Vec<u8>, Broken> {
         let wait = wait.max(Duration::from_millis(1));
@@ -218,6 +231,20 @@ impl Endpoint for Stream {
         Ok(self.now())
     }
 
+    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
+        // A line that is never silent ends the wait as well: the next `hear` reports it.
+        let latest = Instant::now() + SILENCE;
+        let mut late = Vec::new();
+        while Instant::now() < latest {
+            let bytes = self.read(Duration::ZERO)?;
+            if bytes.is_empty() {
+                break;
+            }
+            late.extend(self.received(bytes));
+        }
+        Ok(late)
+    }
+
     fn hear(
         &mut self,
         patience: Duration,
@@ -242,13 +269,7 @@ impl Endpoint for Stream {
                 }
                 continue;
             }
-            let end = self.now();
-            heard.extend(bytes.into_iter().map(|byte| Heard {
-                byte,
-                start: end.saturating_sub(self.line.characters(1)),
-                end,
-                good: true,
-            }));
+            heard.extend(self.received(bytes));
             until = Instant::now() + quiet;
         }
         Ok(heard)
@@ -268,7 +289,8 @@ mod tests {
         let mut stream = Stream::tcp(&address, line).unwrap();
         let (mut peer, _) = listener.accept().unwrap();
         thread::spawn(move || while peer.write_all(&[0x55; 20]).is_ok() {});
-        let wait = Duration::from_millis(50);
+        // A busy host may run the other thread only after a pause, which must not look like silence.
+        let wait = Duration::from_secs(1);
         let told = stream.hear(wait, wait, usize::MAX).unwrap_err();
         assert!(told.to_string().contains("never silent"), "{told}");
     }
@@ -301,6 +323,20 @@ mod tests {
         drop(peer);
         let gone = stream.hear(Duration::from_secs(5), short, usize::MAX);
         assert!(gone.unwrap_err().0.contains("gone"));
+    }
+
+    #[test]
+    fn bytes_of_a_late_reply_are_discarded_before_the_next_request() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
+        let (mut peer, _) = listener.accept().unwrap();
+        peer.write_all(&[1, 2, 3]).unwrap();
+        thread::sleep(Duration::from_millis(50));
+        let late: Vec<u8> = stream.flush().unwrap().iter().map(|h| h.byte).collect();
+        assert_eq!(late, [1, 2, 3]);
+        let short = Duration::from_millis(10);
+        assert_eq!(stream.hear(short, short, usize::MAX).unwrap(), []);
     }
 
     #[test]

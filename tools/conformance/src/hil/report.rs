@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
+use crate::case::Kind;
 use crate::hil::timing::Tally;
 use crate::report::junit::{self, Test};
 use crate::report::{Totals, json as suite_json};
@@ -84,6 +85,7 @@ impl Report {
             .map(|finding| Test {
                 name: &finding.name,
                 section: "bench",
+                kind: Kind::Modio,
                 verdict: &finding.verdict,
                 time: finding.time,
                 asked_again: 0,

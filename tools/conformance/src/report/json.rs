@@ -15,6 +15,7 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
             let mut value = result(&outcome.verdict);
             value["name"] = json!(outcome.case.name);
             value["section"] = json!(outcome.case.section);
+            value["kind"] = json!(outcome.case.kind.name());
             value["about"] = json!(outcome.case.about);
             value["seconds"] = json!(outcome.time.as_secs_f64());
             value["asked_again"] = json!(outcome.asked_again);
@@ -25,6 +26,7 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
         "endpoint": endpoint,
         "passed": totals.passed,
         "failed": totals.failed,
+        "failed_interpretations": totals.failed_interpretations,
         "skipped": totals.skipped,
         "asked_again": totals.asked_again,
         "cases": cases,

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use crate::case::Kind;
 use crate::report::asked_again;
 use crate::run::{Outcome, Verdict};
 
@@ -16,6 +17,8 @@ pub struct Test<'a> {
     pub name: &'a str,
     /// Where it is written that it must be so.
     pub section: &'a str,
+    /// Where the demand comes from.
+    pub kind: Kind,
     /// How it ended.
     pub verdict: &'a Verdict,
     /// How long it took.
@@ -38,6 +41,7 @@ pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
         .map(|outcome| Test {
             name: outcome.case.name,
             section: outcome.case.section,
+            kind: outcome.case.kind,
             verdict: &outcome.verdict,
             time: outcome.time,
             asked_again: outcome.asked_again,
@@ -82,7 +86,8 @@ pub fn element(suite: &str, tests: &[Test<'_>]) -> String {
             }
             Verdict::Failed(failure) => writeln!(
                 xml,
-                "><failure message=\"{}\">{}: sent {}; came {}</failure></testcase>",
+                "><failure type=\"{}\" message=\"{}\">{}: sent {}; came {}</failure></testcase>",
+                test.kind.name(),
                 escaped(&failure.wanted),
                 escaped(test.section),
                 escaped(&failure.sent),
@@ -122,6 +127,7 @@ mod tests {
         );
         assert!(xml.contains("sent 01 03 &lt;&amp;&gt; &quot;x&quot;; came silence"));
         assert!(xml.contains("<skipped message=\"the unit answers 01"));
+        assert!(xml.contains("<failure type=\"standard\" message=\"a reply\">"));
         assert_eq!(xml.matches("<testcase").count(), 3);
         assert_eq!(escaped("a\u{7}b"), "a b");
     }

@@ -21,8 +21,12 @@ pub fn row(outcome: &Outcome) -> String {
     let line = line.trim_end().to_owned();
     match &outcome.verdict {
         Verdict::Failed(failure) => format!(
-            "{line}\n    must be: {}\n    sent:    {}\n    came:    {}\n    wanted:  {}",
-            case.about, failure.sent, failure.came, failure.wanted
+            "{line}\n    must be: {} ({})\n    sent:    {}\n    came:    {}\n    wanted:  {}",
+            case.about,
+            case.kind.name(),
+            failure.sent,
+            failure.came,
+            failure.wanted
         ),
         _ => line,
     }
@@ -36,8 +40,12 @@ pub fn summary(outcomes: &[Outcome]) -> String {
         none if none.is_empty() => none,
         again => format!("; {again}"),
     };
+    let interpretations = match totals.failed_interpretations {
+        0 => String::new(),
+        failed => format!("; failed interpretations: {failed}"),
+    };
     format!(
-        "{} cases: {} passed, {} failed, {} skipped{again}",
+        "{} cases: {} passed, {} failed, {} skipped{again}{interpretations}",
         outcomes.len(),
         totals.passed,
         totals.failed,
@@ -48,9 +56,13 @@ pub fn summary(outcomes: &[Outcome]) -> String {
 /// Every case as a table in Markdown: the output of `--list`.
 #[must_use]
 pub fn list(cases: &[Case]) -> String {
-    let mut text = "| case | section | what must be so |\n|---|---|---|\n".to_owned();
+    let mut text = "| case | section | kind | what must be so |\n|---|---|---|---|\n".to_owned();
     for case in cases {
-        text += &format!("| `{}` | {} | {} |\n", case.name, case.section, case.about);
+        let (name, section, about) = (case.name, case.section, case.about);
+        text += &format!(
+            "| `{name}` | {section} | {} | {about} |\n",
+            case.kind.name()
+        );
     }
     text
 }

@@ -29,6 +29,12 @@ impl Reference {
         }
     }
 
+    /// A unit that counts characters of the line's format for t1.5 and t3.5.
+    pub fn counting_own_characters(mut self) -> Self {
+        self.unit.own_characters = true;
+        self
+    }
+
     /// Everything due up to `to` happens.
     fn advance(&mut self, to: Duration) {
         if let Some(at) = self.starts.filter(|at| *at <= to) {
@@ -123,7 +129,10 @@ impl Endpoint for Reference {
                     end: start + bit * u32::from(*bits + 1),
                     ..sign(0)
                 }),
-                Piece::Glitch(width) => self.advance(start + *width),
+                Piece::Glitch(width) => {
+                    self.advance(start + *width);
+                    self.unit.glitch(self.now);
+                }
             }
         }
         Ok(self.now)

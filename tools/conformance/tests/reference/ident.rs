@@ -28,8 +28,14 @@ pub fn answer(pdu: &[u8], fault: Option<Fault>) -> Result<Vec<u8>, u8> {
     if mei != 0x0E {
         return Err(if fault == Some(Fault::Mei03) { 3 } else { 1 });
     }
-    let [code, from] = *rest else { return Err(3) };
+    let [code, from, ref spare @ ..] = *rest else {
+        return Err(3);
+    };
+    if !spare.is_empty() && fault != Some(Fault::IgnoresSpareBytes) {
+        return Err(3);
+    }
     let last = match code {
+        0 if fault == Some(Fault::TakesReadCode0) => 2,
         1 => 2,
         2 => 0x7F,
         3 | 4 => 0xFF,
@@ -47,9 +53,17 @@ pub fn answer(pdu: &[u8], fault: Option<Fault>) -> Result<Vec<u8>, u8> {
         reply[5] = 1;
         reply.extend([*id, value.len() as u8]);
         reply.extend(value);
+        if fault == Some(Fault::IndividualDiffers) {
+            *reply.last_mut().unwrap() ^= 1;
+        }
         return Ok(reply);
     }
-    for (id, value) in &of_code[known.unwrap_or(0)..] {
+    let zero = fault == Some(Fault::StreamsFromZero) && from < 0x80;
+    let start = known.filter(|_| !zero).unwrap_or(0);
+    if fault == Some(Fault::RefusesUnknownStart) && known.is_none() {
+        return Err(2);
+    }
+    for (id, value) in &of_code[start..] {
         // One byte more is the function code.
         let full = reply.len() + 2 + value.len() > 252;
         if full && fault != Some(Fault::NeverSplits) {
@@ -60,5 +74,6 @@ pub fn answer(pdu: &[u8], fault: Option<Fault>) -> Result<Vec<u8>, u8> {
         reply.extend([*id, value.len() as u8]);
         reply.extend(value);
     }
+    reply[5] += u8::from(fault == Some(Fault::CountsObjectsWrong));
     Ok(reply)
 }

@@ -8,7 +8,7 @@ use conformance::frame::{Mode, crc, lrc};
 use conformance::line::LineFormat;
 
 use super::fault::Fault;
-use super::server::Server;
+use super::server::{SILENT, Server};
 
 /// The unit's address.
 pub const UNIT: u8 = 9;
@@ -31,6 +31,8 @@ pub struct Unit {
     pub server: Server,
     pub mode: Mode,
     pub line: LineFormat,
+    /// Counts characters of the line's format for t1.5 and t3.5, not characters of 11 bits.
+    pub own_characters: bool,
     /// What it says, and its driver's edges.
     pub said: VecDeque<Heard>,
     pub edges: Vec<(Duration, bool)>,
@@ -38,10 +40,15 @@ pub struct Unit {
     open: Vec<u8>,
     damaged: bool,
     late: bool,
+    /// There was a gap above t1.5 in the frame.
+    sparse: bool,
     last: Option<Duration>,
     /// No silence has come yet since power-on.
     waiting: bool,
     deaf: bool,
+    reply_end: Duration,
+    /// Characters came in front of an ASCII frame.
+    colon_spoilt: bool,
     dead: bool,
 }
 
@@ -51,12 +58,16 @@ impl Unit {
             server: Server::new(fault),
             mode,
             line,
+            own_characters: false,
             said: VecDeque::new(),
             edges: Vec::new(),
             echo: false,
             open: Vec::new(),
             damaged: false,
             late: false,
+            sparse: false,
+            reply_end: Duration::ZERO,
+            colon_spoilt: false,
             last: None,
             waiting: false,
             deaf: false,
@@ -68,8 +79,18 @@ impl Unit {
     pub fn start(&mut self, at: Duration) {
         let old = std::mem::replace(self, Self::new(self.server.fault, self.mode, self.line));
         self.edges = old.edges;
+        self.own_characters = old.own_characters;
         self.last = Some(at);
         self.waiting = true;
+        self.dead = self.server.has(Fault::DeadAfterPowerOff);
+        if self.server.has(Fault::ZeroAtStart) {
+            self.said.push_back(Heard {
+                byte: 0,
+                start: at,
+                end: at + self.line.characters(1),
+                good: true,
+            });
+        }
     }
 
     /// When the frame that is open will be over, if nothing else comes.
@@ -77,15 +98,40 @@ impl Unit {
         self.last.map(|last| last + self.silence())
     }
 
+    fn t15(&self) -> Duration {
+        if self.own_characters {
+            self.line.characters(1) * 3 / 2
+        } else {
+            self.line.t15()
+        }
+    }
+
+    fn t35(&self) -> Duration {
+        if self.own_characters {
+            self.line.characters(1) * 7 / 2
+        } else {
+            self.line.t35()
+        }
+    }
+
     fn silence(&self) -> Duration {
         match self.mode {
-            Mode::Rtu if self.server.has(Fault::JoinsParts) => self.line.t35() * 4,
-            Mode::Rtu if self.server.has(Fault::ClosesEarly) => self.line.t35() * 3 / 4,
-            Mode::Rtu if self.server.has(Fault::ClosesAtT15) => self.line.t15(),
-            Mode::Rtu => self.line.t35(),
+            Mode::Rtu if self.server.has(Fault::JoinsParts) => self.t35() * 4,
+            Mode::Rtu if self.server.has(Fault::ClosesEarly) => self.t35() * 3 / 4,
+            Mode::Rtu if self.server.has(Fault::ClosesAtT15) => self.t15(),
+            Mode::Rtu => self.t35(),
+            Mode::Ascii if self.server.has(Fault::ImpatientInAscii) => Duration::from_millis(500),
             Mode::Ascii if self.server.has(Fault::JoinsParts) => Duration::from_secs(3),
             Mode::Ascii => Duration::from_secs(1),
         }
+    }
+
+    /// A pulse that is too short for a character comes.
+    pub fn glitch(&mut self, at: Duration) {
+        if self.server.has(Fault::PulsesRestartSilence) {
+            self.last = self.last.map(|_| at);
+        }
+        self.deaf |= self.server.has(Fault::DeafAfterGlitch);
     }
 
     /// A character comes.
@@ -93,36 +139,79 @@ impl Unit {
         if let Some(last) = self.last {
             let gap = sign.start.saturating_sub(last);
             let near_the_end = self.open.len() > 5;
+            let longest = if self.server.has(Fault::DropsShortGaps) {
+                self.t15() / 3
+            } else {
+                self.t15()
+            };
+            self.sparse |= gap > longest;
             self.late |=
-                gap > self.line.t15() && (!self.server.has(Fault::StrictSometimes) || near_the_end);
+                gap > self.t15() && (!self.server.has(Fault::StrictSometimes) || near_the_end);
         }
         self.last = Some(sign.end);
         let parity = sign.parity_error && !self.server.has(Fault::IgnoresParity);
         let stop = sign.stop_error && !self.server.has(Fault::IgnoresStop);
-        self.damaged |= parity || stop;
+        let slow = self.server.has(Fault::SlowToListen) && self.open.is_empty();
+        let missed = slow && sign.start < self.reply_end + self.t35() * 2;
+        let damaged = parity || stop || missed;
+        if sign.stop_error && sign.byte == 0 && self.server.has(Fault::DeafAfterBreak) {
+            self.deaf = true;
+        }
+        self.damaged |= damaged;
         if self.mode == Mode::Ascii {
-            self.hear_ascii(sign);
+            self.hear_ascii(sign, damaged);
         } else {
             self.open.push(sign.byte);
         }
     }
 
-    fn hear_ascii(&mut self, sign: Sign) {
+    fn hear_ascii(&mut self, sign: Sign, damaged: bool) {
+        let in_rtu = self.open.first().is_none_or(|first| *first != b':') && sign.byte != b':';
+        if in_rtu && self.server.has(Fault::TakesRtuInAscii) {
+            self.open.push(sign.byte);
+            if self.open.len() == 8 && crc(&self.open[..6]) == self.open[6..] {
+                let frame = std::mem::take(&mut self.open);
+                self.message(frame[..6].to_vec(), true, sign.end);
+            }
+            return;
+        }
+        let spoilt = std::mem::replace(&mut self.colon_spoilt, false);
+        if self.open.is_empty() && sign.byte != b':' && self.server.has(Fault::NeedsColonFirst) {
+            self.colon_spoilt = true;
+        }
+        if self.server.has(Fault::KeepsTruncated) && sign.byte == b':' && !self.open.is_empty() {
+            self.damaged = true;
+            return;
+        }
         let restarts = !self.server.has(Fault::FindsRequests) || self.open.is_empty();
         if sign.byte == b':' && restarts {
             self.open.clear();
             self.damaged = false;
+            if damaged || spoilt {
+                // A damaged colon starts no frame.
+                return;
+            }
         } else if self.open.is_empty() {
             return;
         }
         self.open.push(sign.byte);
-        if self.open.len() > 513 && !self.server.has(Fault::TakesLongFrames) {
+        let longest = if self.server.has(Fault::ShortBuffer) {
+            511
+        } else {
+            513
+        };
+        if self.open.len() > longest && !self.server.has(Fault::TakesLongFrames) {
             self.open.clear();
         } else if self.open.ends_with(&[b'\r', self.server.delimiter]) {
             let frame = std::mem::take(&mut self.open);
-            let digits = frame[1..].iter().map(|byte| (*byte as char).to_digit(16));
+            let any = self.server.has(Fault::TakesAnyDigit);
+            let digits = frame[1..].iter().map(|byte| {
+                let digit = (*byte as char).to_digit(16);
+                digit.or((any && !byte.is_ascii_control()).then_some(0))
+            });
             let values: Vec<u8> = digits.map_while(|d| d.map(|d| d as u8)).collect();
-            let upper = !frame.iter().any(u8::is_ascii_lowercase);
+            let upper =
+                !frame.iter().any(u8::is_ascii_lowercase) || self.server.has(Fault::TakesLowerCase);
             let whole = values.len() + 3 == frame.len() && values.len().is_multiple_of(2) && upper;
             let bytes: Vec<u8> = values
                 .chunks(2)
@@ -132,7 +221,7 @@ impl Unit {
                 let good = *check == lrc(body) || self.server.has(Fault::IgnoresCrc);
                 self.message(body.to_vec(), good && !self.damaged, sign.end);
             } else {
-                self.server.log.count(0x0C);
+                self.spoilt();
             }
             self.last = None;
         }
@@ -142,18 +231,24 @@ impl Unit {
     pub fn close(&mut self, at: Duration) {
         let frame = std::mem::take(&mut self.open);
         let (damaged, late) = (self.damaged, self.late);
+        let sparse = std::mem::take(&mut self.sparse) && self.server.has(Fault::DropsShortGaps);
         self.last = None;
         (self.damaged, self.late) = (false, false);
         let waited = std::mem::take(&mut self.waiting);
         let haste = self.server.has(Fault::HasteAtStart);
-        if (waited && !haste) || self.mode == Mode::Ascii {
+        if (waited && !haste) || self.mode == Mode::Ascii || sparse {
             return;
         }
         let sometimes = self.server.has(Fault::StrictSometimes);
         if late && sometimes {
             return;
         }
-        let long = frame.len() > 256 && !haste && !self.server.has(Fault::TakesLongFrames);
+        let longest = if self.server.has(Fault::ShortBuffer) {
+            254
+        } else {
+            256
+        };
+        let long = frame.len() > longest && !haste && !self.server.has(Fault::TakesLongFrames);
         let mut body = frame.clone();
         let check = [body.pop(), body.pop()].map(|byte| byte.unwrap_or(0));
         let right = crc(&body);
@@ -166,14 +261,29 @@ impl Unit {
                 (body, good) = (tail[..6].to_vec(), true);
             }
         }
+        if self.server.has(Fault::IgnoresTrailingByte) && !good && frame.len() > 4 {
+            let inner = &frame[..frame.len() - 3];
+            if crc(inner) == frame[frame.len() - 3..frame.len() - 1] {
+                (body, good) = (inner.to_vec(), true);
+            }
+        }
         self.message(body, good && !damaged && !long && frame.len() >= 4, at);
+    }
+
+    /// A frame is lost to a bad check or a damaged character.
+    fn spoilt(&mut self) {
+        if !self.server.has(Fault::ErrorsUncounted) {
+            self.server.log.count(0x0C);
+        }
+        if !self.server.has(Fault::ErrorsUnlogged) {
+            self.server.log.received(0x02);
+        }
     }
 
     fn message(&mut self, body: Vec<u8>, good: bool, at: Duration) {
         if !good || body.len() < 2 {
-            if !self.server.has(Fault::ErrorsUncounted) {
-                self.server.log.count(0x0C);
-            }
+            self.spoilt();
+            self.deaf |= self.server.has(Fault::DeafAfterBadFrames);
             if self.server.has(Fault::AnswersNoise) && body.first() == Some(&UNIT) {
                 self.say(&[UNIT, 0x80, 1], at);
             }
@@ -181,7 +291,10 @@ impl Unit {
         }
         let (unit, pdu) = (body[0], &body[1..]);
         let broadcast = unit == 0 || (unit == 255 && self.server.has(Fault::Obeys255));
-        let mine = unit == UNIT || broadcast;
+        let mine = unit == UNIT
+            || broadcast
+            || (unit == UNIT ^ 1 && self.server.has(Fault::AnswersNeighbour))
+            || (unit >= 248 && self.server.has(Fault::AnswersReserved));
         if mine || !self.server.has(Fault::DeafCounter) {
             self.server.log.count(0x0B);
         }
@@ -189,10 +302,25 @@ impl Unit {
             return;
         }
         if !mine {
+            if self.server.has(Fault::LogsOthers) {
+                self.server.log.received(0);
+            }
             if self.server.has(Fault::RefusesForOthers) && pdu[0] > 0x2B {
                 self.say(&[unit, pdu[0] | 0x80, 1], at);
             }
+            if self.server.has(Fault::RefusesForUnit1) && unit == 1 {
+                self.say(&[unit, pdu[0] | 0x80, 1], at);
+            }
             self.deaf = self.server.has(Fault::DeafAfterOthers) && pdu.len() == 3;
+            self.deaf |= self.server.has(Fault::DeafAfterLongReplies) && pdu.len() > 200;
+            if self.server.has(Fault::FindsInside) {
+                let inside = body
+                    .windows(8)
+                    .find(|w| w[0] == UNIT && crc(&w[..6]) == w[6..]);
+                if let Some(inside) = inside.map(<[u8]>::to_vec) {
+                    self.serve(&inside[1..6], false, at);
+                }
+            }
             return;
         }
         self.dead = pdu[0] == 0 && self.server.has(Fault::DiesOf00);
@@ -200,10 +328,15 @@ impl Unit {
     }
 
     fn serve(&mut self, pdu: &[u8], broadcast: bool, at: Duration) {
-        self.server.log.count(0x0E);
+        if !broadcast || !self.server.has(Fault::BroadcastsAreNoMessages) {
+            self.server.log.count(0x0E);
+        }
+        if self.server.has(Fault::CountsNak) {
+            self.server.log.count(0x10);
+        }
         let silent_before = self.server.log.listen_only;
-        let received = 0x80 | u8::from(broadcast) << 6 | u8::from(silent_before) << 5;
-        self.server.log.event(received);
+        let as_broadcast = broadcast && !self.server.has(Fault::BroadcastsLoggedAsOthers);
+        self.server.log.received(u8::from(as_broadcast) << 6);
         let restart = pdu[0] == 8 && pdu.get(1..3) == Some(&[0, 1]);
         if silent_before && !restart && !self.server.has(Fault::TalksInListenOnly) {
             if self.server.has(Fault::WritesInListenOnly) {
@@ -211,23 +344,34 @@ impl Unit {
                 let _ = self.server.answer(pdu);
             }
             self.server.log.count(0x0F);
+            self.server.log.sent(0);
             return;
         }
-        let answer = self.server.answer(pdu);
+        let obeys = !broadcast || pdu[0] != 8 || self.server.has(Fault::ObeysBroadcastDiagnostics);
+        let answer = if obeys {
+            self.server.answer(pdu)
+        } else {
+            Err(SILENT)
+        };
         let listens = silent_before || self.server.log.listen_only;
         let silent = broadcast || (listens && !self.server.has(Fault::TalksInListenOnly));
         let polls = matches!(pdu[0], 0x0B | 0x0C);
         match &answer {
             Ok(_) if !polls => self.server.log.events = self.server.log.events.wrapping_add(1),
-            Ok(_) => {}
+            Ok(_) | Err(SILENT) => {}
             Err(_) => {
-                self.server.log.count(0x0D);
+                if !self.server.has(Fault::ExceptionsUncounted) {
+                    self.server.log.count(0x0D);
+                }
                 if self.server.has(Fault::CountsExceptions) {
                     self.server.log.events = self.server.log.events.wrapping_add(1);
                 }
             }
         }
         if silent && !self.server.has(Fault::AnswersBroadcasts) {
+            if !self.server.has(Fault::SilenceUnlogged) {
+                self.server.log.sent(0);
+            }
             if !self.server.has(Fault::BroadcastsUncounted) {
                 self.server.log.count(0x0F);
             }
@@ -236,16 +380,22 @@ impl Unit {
         let reply = match answer {
             Ok(data) => [vec![UNIT, pdu[0]], data].concat(),
             Err(1) if self.server.has(Fault::SilentToUnknown) => return,
+            Err(SILENT) => return,
             Err(code) => vec![UNIT, pdu[0] | 0x80, code],
         };
-        // V1.1b3 6.10: a send event, with the kind of its exception.
-        self.server.log.event(match reply[..] {
+        let kind = match reply[..] {
+            _ if self.server.has(Fault::ExceptionsLoggedAsReplies) => 0,
             [_, function, code] if function & 0x80 != 0 => match code {
-                1..=3 => 0x41,
-                _ => 0x42,
+                1..=3 => 0x01,
+                4 => 0x02,
+                5 | 6 => 0x04,
+                _ => 0x08,
             },
-            _ => 0x40,
-        });
+            _ => 0,
+        };
+        if !self.server.has(Fault::RepliesUnlogged) {
+            self.server.log.sent(kind);
+        }
         self.say(&reply, at);
     }
 
@@ -260,7 +410,7 @@ impl Unit {
         let character = self.line.characters(1);
         let mut start = at + THINKING;
         if self.server.has(Fault::RepliesEarly) {
-            start = start.saturating_sub(self.line.t35() / 2);
+            start = start.saturating_sub(self.t35() / 2);
         }
         self.edges.push((start, true));
         for (n, byte) in frame.iter().enumerate() {
@@ -276,6 +426,7 @@ impl Unit {
             });
             start = end;
         }
+        self.reply_end = start;
         let early = self.server.has(Fault::ReleasesEarly);
         self.edges
             .push((if early { start - character } else { start }, false));

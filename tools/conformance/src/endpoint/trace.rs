@@ -1,0 +1,107 @@
+//! An endpoint that logs every frame sent and received, for people who look for the cause of a failure.
+
+use std::io::Write;
+use std::time::Duration;
+
+use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use crate::bench::shown;
+use crate::frame::hex;
+use crate::line::LineFormat;
+
+/// Another endpoint, with a log of what is sent and received on it.
+pub struct Trace<W> {
+    endpoint: Box<dyn Endpoint>,
+    log: W,
+}
+
+impl<W: Write> Trace<W> {
+    /// Logs what is sent and received on `endpoint`.
+    pub fn new(endpoint: Box<dyn Endpoint>, log: W) -> Self {
+        Self { endpoint, log }
+    }
+
+    fn note(&mut self, at: Duration, what: &str) {
+        // A log that cannot be written must not end the test.
+        let _ = writeln!(self.log, "{:12.6} s {what}", at.as_secs_f64());
+    }
+
+    fn note_heard(&mut self, heard: &[Heard], what: &str) {
+        let Some(first) = heard.first() else { return };
+        let bytes: Vec<u8> = heard.iter().map(|heard| heard.byte).collect();
+        let damaged = if heard.iter().all(|heard| heard.good) {
+            ""
+        } else {
+            " (damaged)"
+        };
+        self.note(first.start, &format!("{what} {}{damaged}", hex(&bytes)));
+    }
+}
+
+impl<W: Write> Endpoint for Trace<W> {
+    fn name(&self) -> String {
+        self.endpoint.name()
+    }
+
+    fn abilities(&self) -> Abilities {
+        self.endpoint.abilities()
+    }
+
+    fn line(&self) -> LineFormat {
+        self.endpoint.line()
+    }
+
+    fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
+        self.note(self.endpoint.now(), &format!("line at {line}"));
+        self.endpoint.set_line(line)
+    }
+
+    fn now(&self) -> Duration {
+        self.endpoint.now()
+    }
+
+    fn rest(&mut self, time: Duration) -> Result<(), Broken> {
+        self.endpoint.rest(time)
+    }
+
+    fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
+        self.note(self.endpoint.now(), &format!("sent     {}", shown(pieces)));
+        self.endpoint.send(pieces)
+    }
+
+    fn hear(
+        &mut self,
+        patience: Duration,
+        quiet: Duration,
+        enough: usize,
+    ) -> Result<Vec<Heard>, Broken> {
+        let heard = self.endpoint.hear(patience, quiet, enough)?;
+        self.note_heard(&heard, "received");
+        Ok(heard)
+    }
+
+    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
+        let late = self.endpoint.flush()?;
+        self.note_heard(&late, "received too late, discarded:");
+        Ok(late)
+    }
+
+    fn set_power(&mut self, on: bool) -> Result<(), Broken> {
+        let state = if on { "power on" } else { "power off" };
+        self.note(self.endpoint.now(), state);
+        self.endpoint.set_power(on)
+    }
+
+    fn set_echo(&mut self, echo: bool) -> Result<(), Broken> {
+        let state = if echo { "echo on" } else { "echo off" };
+        self.note(self.endpoint.now(), state);
+        self.endpoint.set_echo(echo)
+    }
+
+    fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
+        self.endpoint.take_driver_edges()
+    }
+
+    fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
+        self.endpoint.take_complaints()
+    }
+}
