@@ -138,3 +138,16 @@ fn all_switches_on_is_the_factory_s_line_whatever_is_stored() {
     });
     bench.assert_answers(1);
 }
+
+/// A master that writes outputs all day must not wear the flash out.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn writing_outputs_over_and_over_programs_no_flash() {
+    let mut bench = Bench::set_up(Module::Do4, &[]);
+    let operations = bench.board.flash_operations();
+    for n in 0..500_u16 {
+        bench.write_bit(0x10 + n % 4, n % 3 == 0).unwrap();
+    }
+    assert_eq!(bench.board.flash_operations(), operations);
+    assert!(!bench.status(8), "nothing waits to be saved");
+}
