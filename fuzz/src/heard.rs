@@ -59,8 +59,9 @@ impl Heard {
         }
     }
 
-    /// A character, with faults as the bits of `Faults`.
+    /// A character, with faults as the bits of `Faults`, of which noise (4) does not count.
     pub fn character(&mut self, byte: u8, faults: u8) {
+        let faults = faults & 11;
         match self.mode {
             Mode::Rtu { .. } if self.deaf => {}
             Mode::Rtu { strict } => {

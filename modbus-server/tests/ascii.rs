@@ -190,6 +190,33 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
 }
 
 #[test]
+fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_lrc() {
+    for width in [Width::Seven, Width::Eight] {
+        for at in 0..=request().len() {
+            let mut unit = Unit::ascii(width, Points::new(4, 4));
+            for (index, character) in request().into_iter().enumerate() {
+                // In the last round every character is noisy.
+                let noisy = index == at || at == request().len();
+                let faults = if noisy { Faults::NOISE } else { Faults::NONE };
+                unit.character(character, faults);
+            }
+            assert!(unit.silence().is_some(), "noise at {at}");
+            let words = unit.counters().as_words();
+            assert_eq!(words, [1, 0, 0, 1, 0, 0, 0, 0, 0], "noise at {at}");
+        }
+    }
+}
+
+#[test]
+fn noisy_colon_in_the_middle_starts_a_frame() {
+    let mut unit = unit();
+    unit.characters(&request()[..7]);
+    unit.character(b':', Faults::NOISE);
+    assert!(unit.raw(&request()[1..]).is_some());
+    assert_eq!(unit.counters().communication_errors, 1);
+}
+
+#[test]
 fn in_seven_bits_what_is_above_them_does_not_matter() {
     let with_parity = |characters: Vec<u8>| -> Vec<u8> {
         let even = |c: u8| c | (c.count_ones() as u8 & 1) << 7;

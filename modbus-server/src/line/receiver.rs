@@ -263,7 +263,7 @@ impl<'a> Receiver<'a> {
     /// A character in ASCII mode.
     fn ascii_character(&mut self, character: u8, faults: Faults) {
         let idle = self.state & IDLE != 0;
-        if character == ascii::START && (idle || faults == Faults::NONE) {
+        if character == ascii::START && (idle || !faults.spoil()) {
             // What was before it had no end: it is counted as faulty. Had it one, its reply would
             // come too late.
             if let Some(late) = self.close() {
@@ -300,7 +300,7 @@ impl<'a> Receiver<'a> {
     }
 
     fn note(&mut self, faults: Faults) {
-        if faults != Faults::NONE {
+        if faults.spoil() {
             self.state |= SPOILED;
         }
         if faults.contains(Faults::OVERRUN) {
