@@ -150,10 +150,17 @@ impl Server {
         }
     }
 
-    /// All counters as they stood at the last [`commit`](Self::commit) or
-    /// [`note_line`](Self::note_line), less what function 08 has cleared.
+    /// All counters as they stood at the last [`commit`](Self::commit), less what function 08 has
+    /// cleared.
     pub const fn counters(&self) -> Counters {
-        let line = self.line.since(&self.cleared);
+        self.counters_at(&self.line)
+    }
+
+    /// All counters with those of the line as they stand now
+    /// ([`Receiver::counters`](crate::line::Receiver::counters)), less what function 08 has cleared.
+    /// May be called at any time, also while a request is pending.
+    pub const fn counters_at(&self, line: &LineCounters) -> Counters {
+        let line = line.since(&self.cleared);
         let tally = &self.tally;
         Counters {
             bus_messages: line.bus_messages,
