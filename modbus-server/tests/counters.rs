@@ -106,7 +106,7 @@ fn buffer() -> &'static mut Adu {
 }
 
 #[test]
-fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
+fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     let mut receiver = receiver();
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     receiver.give_back(buffer());
@@ -145,7 +145,7 @@ fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
     let counters = server.counters();
     assert_eq!(
         (counters.busy, counters.no_response, counters.unit_messages),
-        (1, 1, 2)
+        (0, 1, 2)
     );
 }
 

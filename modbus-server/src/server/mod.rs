@@ -166,11 +166,12 @@ impl Server {
             bus_messages: line.bus_messages,
             communication_errors: line.communication_errors,
             exceptions: tally.exceptions,
-            // What found no buffer was for this unit all the same, and without a reply.
+            // A dropped frame was a message to this unit and got no reply. It is not in `busy`, which
+            // counts exceptions 06 that were sent (V1.1b3 6.8.1).
             unit_messages: tally.unit_messages.wrapping_add(line.dropped),
             no_response: tally.no_response.wrapping_add(line.dropped),
             nak: tally.nak,
-            busy: tally.busy.wrapping_add(line.dropped),
+            busy: tally.busy,
             overruns: line.overruns,
             gaps: line.gaps,
         }
