@@ -304,3 +304,34 @@ fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_colon_alone() {
     assert!(unit.receiver.is_over());
     assert!(unit.receiver.close().is_some());
 }
+
+#[test]
+fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
+    let good = [
+        (UNIT, [1, 0, 0, 1, 1]),
+        (0, [1, 0, 0, 1, 1]),
+        (UNIT + 1, [1, 0, 0, 0, 0]),
+    ];
+    for (to, expected) in good {
+        let mut unit = unit();
+        // Complete with CR LF, but the next frame begins before the line is free for a reply.
+        for character in ascii_frame(to, &pdu(0x06, &[0, 7]), b'\n') {
+            unit.receiver.character(character, Faults::NONE);
+        }
+        assert!(unit.receiver.is_over());
+        unit.receiver.character(b':', Faults::NONE);
+        assert!(unit.receiver.close().is_none());
+        let counters = unit.counters();
+        let counted = [
+            counters.bus_messages,
+            // The second colon, which the time-out ended.
+            counters.communication_errors - 1,
+            counters.busy,
+            counters.unit_messages,
+            counters.no_response,
+        ];
+        assert_eq!(counted, expected, "to {to}");
+        assert_eq!(unit.points.words[0], 0, "not carried out");
+        unit.must_answer();
+    }
+}

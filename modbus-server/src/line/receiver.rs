@@ -96,6 +96,14 @@ impl<'a> Receiver<'a> {
         }
     }
 
+    /// Gives back the buffer of a request that nobody has served and counts the request as dropped.
+    #[cold]
+    #[inline(never)]
+    pub fn drop_request(&mut self, adu: &'a mut Adu) {
+        count(&mut self.counters.dropped);
+        self.give_back(adu);
+    }
+
     /// A character has arrived.
     #[inline]
     pub fn character(&mut self, byte: u8, faults: Faults) {
@@ -194,10 +202,10 @@ impl<'a> Receiver<'a> {
         }
         count(&mut self.counters.bus_messages);
         let is_for_us = address == self.unit || address == BROADCAST;
-        if state & TORN != 0 || !is_for_us {
+        if !is_for_us {
             return None;
         }
-        if state & UNKEPT != 0 {
+        if state & (TORN | UNKEPT) != 0 {
             count(&mut self.counters.dropped);
             return None;
         }
@@ -264,10 +272,10 @@ impl<'a> Receiver<'a> {
     fn ascii_character(&mut self, character: u8, faults: Faults) {
         let idle = self.state & IDLE != 0;
         if character == ascii::START && (idle || !faults.spoil()) {
-            // What was before it had no end: it is counted as faulty. Had it one, its reply would
-            // come too late.
+            // A frame without its end is counted as faulty. A complete one is dropped: its reply
+            // would be sent too late.
             if let Some(late) = self.close() {
-                self.give_back(late.adu);
+                self.drop_request(late.adu);
             }
             self.begin();
             self.note(faults);
