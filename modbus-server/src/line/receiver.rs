@@ -133,7 +133,8 @@ impl<'a> Receiver<'a> {
     /// where silence ends a frame.
     #[inline]
     pub fn is_over(&self) -> bool {
-        self.state & ASCII != 0 && self.reader.is_over()
+        // The reader keeps the place of the last frame until the next one begins.
+        self.state & ASCII_IDLE == ASCII && self.reader.is_over()
     }
 
     /// Whether no frame has begun.
@@ -163,14 +164,15 @@ impl<'a> Receiver<'a> {
         } else {
             0
         };
-        self.unkept = 0;
-        self.reader.begin();
-        if self.filling.is_none() {
-            self.filling = self.spare.take();
+        if let Some(adu) = &mut self.filling {
+            adu.clear();
+            return;
         }
-        match &mut self.filling {
-            Some(adu) => adu.clear(),
-            None => self.state |= UNKEPT,
+        // A spare buffer is empty already.
+        self.filling = self.spare.take();
+        if self.filling.is_none() {
+            self.state |= UNKEPT;
+            self.unkept = 0;
         }
     }
 
@@ -228,7 +230,10 @@ impl<'a> Receiver<'a> {
     fn special(&mut self, byte: u8, faults: Faults) {
         match self.state | u16::from(faults.bits()) {
             ASCII if self.ascii_inside(byte) => {}
-            ASCII_IDLE if byte == ascii::START => self.state = ASCII,
+            ASCII_IDLE if byte == ascii::START => {
+                self.state = ASCII;
+                self.reader.begin();
+            }
             _ => self.rare(byte, faults),
         }
     }
@@ -278,6 +283,7 @@ impl<'a> Receiver<'a> {
                 self.drop_request(late.adu);
             }
             self.begin();
+            self.reader.begin();
             self.note(faults);
             return;
         }

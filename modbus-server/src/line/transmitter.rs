@@ -26,8 +26,6 @@ pub struct Transmitter<'a> {
     half: Option<u8>,
     head: Head,
     body: Option<&'a mut Adu>,
-    /// The body has been handed over, and may have been taken back since.
-    has_had_body: bool,
     /// In RTU mode: how many bytes of the body are left. In ASCII mode: 0.
     left: u16,
     /// In RTU mode: the next byte of the body. In ASCII mode: the next of head and body.
@@ -42,6 +40,8 @@ const ELSEWHERE: u8 = u8::MAX;
 /// What of a frame comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// Nothing. The first, so that it is the 0 that [`Transmitter::take_buffer`] has at hand.
+    Over,
     /// In ASCII mode, the colon.
     Start,
     /// Head and body, and after them the LRC or the first byte of the CRC.
@@ -50,8 +50,6 @@ enum Stage {
     End,
     /// In ASCII mode, the delimiter.
     Delimiter,
-    /// Nothing.
-    Over,
 }
 
 impl<'a> Transmitter<'a> {
@@ -79,7 +77,6 @@ impl<'a> Transmitter<'a> {
             half: None,
             head: Head::opening(unit),
             body: None,
-            has_had_body: false,
             left: 0,
             at: 0,
             check,
@@ -98,7 +95,7 @@ impl<'a> Transmitter<'a> {
     #[inline]
     #[must_use = "a buffer that is not needed belongs back in the receiver"]
     pub fn body(&mut self, adu: &'a mut Adu) -> Option<&'a mut Adu> {
-        if !self.head.has_body() || self.has_had_body || self.stage == Stage::Over {
+        if !self.head.has_body() || self.body.is_some() || self.stage == Stage::Over {
             return Some(adu);
         }
         if self.framing == Framing::Rtu {
@@ -107,7 +104,6 @@ impl<'a> Transmitter<'a> {
             self.left = (adu.len() as u16).saturating_sub(self.at);
         }
         self.body = Some(adu);
-        self.has_had_body = true;
         None
     }
 
@@ -145,10 +141,8 @@ impl<'a> Transmitter<'a> {
             return self.ascii(delimiter);
         }
         self.stage = match self.stage {
-            Stage::Bytes => match self.missing() {
-                Some(next) => return next,
-                None => Stage::End,
-            },
+            Stage::Bytes if self.must_wait() => return Next::Wait,
+            Stage::Bytes => Stage::End,
             Stage::End => Stage::Over,
             _ => return Next::Done,
         };
@@ -167,14 +161,12 @@ impl<'a> Transmitter<'a> {
         let byte = match self.stage {
             Stage::Bytes => match self.byte_at(self.at) {
                 Some(byte) => byte,
-                None => match self.missing() {
-                    Some(next) => return next,
-                    None => {
-                        self.stage = Stage::End;
-                        // Nothing after this counts.
-                        self.check.to_le_bytes()[0].wrapping_neg()
-                    }
-                },
+                None if self.must_wait() => return Next::Wait,
+                None => {
+                    self.stage = Stage::End;
+                    // Nothing after this counts.
+                    self.check.to_le_bytes()[0].wrapping_neg()
+                }
             },
             Stage::Start => return self.then(Stage::Bytes, ascii::START),
             Stage::End => return self.then(Stage::Delimiter, ascii::CR),
@@ -204,21 +196,17 @@ impl<'a> Transmitter<'a> {
         (usize::from(at) < adu.len()).then(|| adu.get(at as u8))
     }
 
-    /// What to do instead of sending the check, while the body of the reply is not here. A body
-    /// that has been taken back does not return: its reply is over.
-    fn missing(&self) -> Option<Next> {
-        match (&self.body, self.has_had_body) {
-            (None, true) => Some(Next::Done),
-            (None, false) if self.head.has_body() => Some(Next::Wait),
-            _ => None,
-        }
+    /// Whether there is more to come than is here.
+    fn must_wait(&self) -> bool {
+        self.head.has_body() && self.body.is_none()
     }
 
-    /// Takes the buffer of the body back, for the receiver. In the middle of a body this cuts the
-    /// reply short: [`next`](Self::next) returns [`Next::Done`] without a CRC or LRC, so that no
-    /// master accepts what was sent. Without a body yet it changes nothing.
+    /// Takes the buffer of the body back, for the receiver, and ends the reply. Before
+    /// [`Next::Done`] this cuts the reply short: at most the rest of its head is still sent, and
+    /// no CRC or LRC, so that no master accepts it.
     #[inline]
     pub fn take_buffer(&mut self) -> Option<&'a mut Adu> {
+        self.stage = Stage::Over;
         self.body.take()
     }
 }
@@ -293,11 +281,27 @@ mod tests {
         assert_eq!(transmitter.next(), Next::Done);
     }
 
+    /// What was left of the reply to send, CRC or LRC included, is not sent but for the head.
+    fn is_cut_short(transmitter: &mut Transmitter<'_>, framing: Framing, left: &[u8]) {
+        let mut sent = 0;
+        while let Next::Byte(byte) = transmitter.next() {
+            assert_eq!(byte, left[sent], "{framing:?} {left:02X?}");
+            sent += 1;
+        }
+        assert_eq!(transmitter.next(), Next::Done, "{framing:?} {left:02X?}");
+        // In RTU mode three bytes of head, in ASCII mode the second digit of a byte.
+        let most = match framing {
+            Framing::Rtu => left.len().saturating_sub(6),
+            Framing::Ascii { .. } => 1,
+        };
+        assert!(sent <= most, "{framing:?} {left:02X?}");
+    }
+
     #[test]
     fn taking_the_buffer_in_the_middle_of_a_reply_ends_the_reply() {
         let rtu: &[u8] = &[0x01, 0x03, 0x04, 1, 2, 3, 4, 0x5B, 0x3C];
         let ascii: &[u8] = b":01030401020304EE\r\n";
-        for (framing, whole, check) in [(Framing::Rtu, rtu, 7), (Framing::ASCII, ascii, 15)] {
+        for (framing, whole) in [(Framing::Rtu, rtu), (Framing::ASCII, ascii)] {
             for sent in 0..=whole.len() {
                 let (mut adu, mut other) = (Adu::new(), Adu::new());
                 adu.extend(&[1, 2, 3, 4]);
@@ -306,14 +310,7 @@ mod tests {
                 assert!(transmitter.body(&mut adu).is_none());
                 is_next(&mut transmitter, &whole[..sent]);
                 assert!(transmitter.take_buffer().is_some());
-                // What is left of the head, or the second half of the check, may follow.
-                let mut all = sent;
-                while let Next::Byte(byte) = transmitter.next() {
-                    assert_eq!(byte, whole[all], "{framing:?} {sent}");
-                    all += 1;
-                }
-                assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
-                assert!(all <= check || sent > check, "{framing:?} {sent} {all}");
+                is_cut_short(&mut transmitter, framing, &whole[sent..]);
                 assert!(transmitter.body(&mut other).is_some(), "not needed");
                 assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
             }
@@ -321,19 +318,28 @@ mod tests {
     }
 
     #[test]
-    fn taking_the_buffer_before_the_body_is_here_changes_nothing() {
+    fn taking_the_buffer_before_the_body_is_here_ends_the_reply() {
         for framing in [Framing::Rtu, Framing::ASCII] {
-            let mut adu = Adu::new();
-            adu.extend(&[1, 2, 3, 4]);
-            let mut transmitter = Transmitter::open(1, framing);
-            assert!(transmitter.take_buffer().is_none());
-            transmitter.head(Head::read(1, 3, 4));
-            while let Next::Byte(_) = transmitter.next() {}
-            assert!(transmitter.take_buffer().is_none());
-            assert_eq!(transmitter.next(), Next::Wait);
-            assert!(transmitter.body(&mut adu).is_none());
-            while let Next::Byte(_) = transmitter.next() {}
-            assert_eq!(transmitter.next(), Next::Done);
+            for head_is_known in [false, true] {
+                for sent in [0, 1, 8] {
+                    let mut adu = Adu::new();
+                    let mut transmitter = Transmitter::open(1, framing);
+                    if head_is_known {
+                        transmitter.head(Head::read(1, 3, 4));
+                    }
+                    for _ in 0..sent {
+                        transmitter.next();
+                    }
+                    assert!(transmitter.take_buffer().is_none());
+                    while let Next::Byte(_) = transmitter.next() {}
+                    assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
+                    // The rest of the reply is handed over too late.
+                    transmitter.head(Head::read(1, 3, 4));
+                    assert!(transmitter.body(&mut adu).is_some(), "not needed");
+                    while let Next::Byte(_) = transmitter.next() {}
+                    assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
+                }
+            }
         }
     }
 }
