@@ -59,8 +59,9 @@ impl Heard {
         }
     }
 
-    /// A character, with faults as the bits of `Faults`.
+    /// A character, with faults as the bits of `Faults`, of which noise (4) does not count.
     pub fn character(&mut self, byte: u8, faults: u8) {
+        let faults = faults & 11;
         match self.mode {
             Mode::Rtu { .. } if self.deaf => {}
             Mode::Rtu { strict } => {
@@ -75,8 +76,9 @@ impl Heard {
             Mode::Ascii { seven_bits, .. } => {
                 let byte = if seven_bits { byte % 128 } else { byte };
                 if byte == b':' && (self.frame.is_none() || faults == 0) {
-                    // A frame that nobody fetched in time is not lost to the buffers.
+                    // A complete frame that nobody took in time is dropped; its buffer is free again.
                     if self.close().is_some() {
+                        self.counters.dropped = self.counters.dropped.wrapping_add(1);
                         self.free += 1;
                     }
                     let frame = self.begin();
@@ -140,10 +142,10 @@ impl Heard {
             return None;
         };
         counters.bus_messages = counters.bus_messages.wrapping_add(1);
-        if frame.torn || ![0, UNIT].contains(&good[0]) {
+        if ![0, UNIT].contains(&good[0]) {
             return None;
         }
-        if !frame.kept {
+        if frame.torn || !frame.kept {
             counters.dropped = counters.dropped.wrapping_add(1);
             return None;
         }

@@ -116,8 +116,7 @@ impl Unit {
         assert!(self.points == self.reference.points, "{bytes:02X?}");
         assert_eq!(self.server.framing(), self.reference.framing);
         assert_eq!(self.server.is_listen_only(), self.reference.listening);
-        self.server.note_line(&self.line);
-        let counters = self.server.counters().as_words();
+        let counters = self.server.counters_at(&self.line).as_words();
         assert_eq!(counters, self.reference.counters, "{bytes:02X?}");
     }
 

@@ -15,7 +15,9 @@ pub struct LineCounters {
     pub overruns: u16,
     /// Silences above t1.5 inside an RTU frame.
     pub gaps: u16,
-    /// Good frames for this unit that found no free buffer.
+    /// Good frames for this unit, or for all, that were not served: there was no free buffer, a gap
+    /// above t1.5 is not tolerated, or it was too late for a reply. They are part of
+    /// `bus_messages`.
     pub dropped: u16,
 }
 
@@ -56,13 +58,13 @@ pub struct Counters {
     pub communication_errors: u16,
     /// 0D: requests refused with an exception, broadcasts included.
     pub exceptions: u16,
-    /// 0E: requests for this unit, broadcasts included.
+    /// 0E: good frames for this unit, broadcasts included, whether they were served or dropped.
     pub unit_messages: u16,
-    /// 0F: requests for this unit that got no reply, broadcasts included.
+    /// 0F: those of `unit_messages` that got no reply, broadcasts included.
     pub no_response: u16,
     /// 10: requests answered with exception 07.
     pub nak: u16,
-    /// 11: requests answered with exception 06, or dropped because every buffer was in use.
+    /// 11: requests answered with exception 06.
     pub busy: u16,
     /// 12: frames spoiled by a character overrun.
     pub overruns: u16,

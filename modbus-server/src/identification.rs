@@ -66,13 +66,20 @@ impl ReadCode {
     }
 }
 
-/// Decodes what follows the MEI type.
+/// Decodes the MEI type and what follows it.
 ///
 /// # Errors
-/// 03 for another length or a code that is not 01 to 04; 02 for one object that is not there.
+/// 01 for a device without identification, whatever the request, and for another MEI type: the
+/// function code is validated first (V1.1b3 4.5). 03 for another length or a code that is not 01 to
+/// 04; 02 for one object that is not there.
 pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode, u8), Exception> {
-    let &[code, object] = fields else {
-        return Err(Exception::IllegalDataValue);
+    if model.identification(0).is_none() {
+        return Err(Exception::IllegalFunction);
+    }
+    let (code, object) = match *fields {
+        [MEI_TYPE, code, object] => (code, object),
+        [] | [MEI_TYPE, ..] => return Err(Exception::IllegalDataValue),
+        _ => return Err(Exception::IllegalFunction),
     };
     let code = ReadCode::from_code(code).ok_or(Exception::IllegalDataValue)?;
     let known = object <= code.last() && value(object, model).is_some();

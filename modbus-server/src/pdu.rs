@@ -2,7 +2,6 @@
 //! exception 03, then the wrap at 16 bits (02). What the addresses mean is the model's business.
 
 use crate::diagnostic::Diagnostic;
-use crate::identification;
 use crate::line::Framing;
 use crate::{Bits, Exception, Function, Span, Words};
 
@@ -55,7 +54,8 @@ pub(crate) enum Request<'a> {
     EventCounter,
     EventLog,
     ServerId,
-    /// What follows the MEI type: the rest depends on what objects there are.
+    /// The MEI type and what follows it. The model decides first: a device without identification
+    /// does not have function 2B.
     Identify(&'a [u8]),
 }
 
@@ -87,11 +87,7 @@ impl<'a> Request<'a> {
             Function::GetCommEventCounter => alone(fields, Self::EventCounter),
             Function::GetCommEventLog => alone(fields, Self::EventLog),
             Function::ReportServerId => alone(fields, Self::ServerId),
-            Function::EncapsulatedInterface => match fields {
-                [identification::MEI_TYPE, fields @ ..] => Ok(Self::Identify(fields)),
-                [] => Err(Exception::IllegalDataValue),
-                _ => Err(Exception::IllegalFunction),
-            },
+            Function::EncapsulatedInterface => Ok(Self::Identify(fields)),
         }
     }
 }

@@ -190,6 +190,33 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
 }
 
 #[test]
+fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_lrc() {
+    for width in [Width::Seven, Width::Eight] {
+        for at in 0..=request().len() {
+            let mut unit = Unit::ascii(width, Points::new(4, 4));
+            for (index, character) in request().into_iter().enumerate() {
+                // In the last round every character is noisy.
+                let noisy = index == at || at == request().len();
+                let faults = if noisy { Faults::NOISE } else { Faults::NONE };
+                unit.character(character, faults);
+            }
+            assert!(unit.silence().is_some(), "noise at {at}");
+            let words = unit.counters().as_words();
+            assert_eq!(words, [1, 0, 0, 1, 0, 0, 0, 0, 0], "noise at {at}");
+        }
+    }
+}
+
+#[test]
+fn noisy_colon_in_the_middle_starts_a_frame() {
+    let mut unit = unit();
+    unit.characters(&request()[..7]);
+    unit.character(b':', Faults::NOISE);
+    assert!(unit.raw(&request()[1..]).is_some());
+    assert_eq!(unit.counters().communication_errors, 1);
+}
+
+#[test]
 fn in_seven_bits_what_is_above_them_does_not_matter() {
     let with_parity = |characters: Vec<u8>| -> Vec<u8> {
         let even = |c: u8| c | (c.count_ones() as u8 & 1) << 7;
@@ -276,4 +303,35 @@ fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_colon_alone() {
     }
     assert!(unit.receiver.is_over());
     assert!(unit.receiver.close().is_some());
+}
+
+#[test]
+fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
+    let good = [
+        (UNIT, [1, 0, 0, 1, 1]),
+        (0, [1, 0, 0, 1, 1]),
+        (UNIT + 1, [1, 0, 0, 0, 0]),
+    ];
+    for (to, expected) in good {
+        let mut unit = unit();
+        // Complete with CR LF, but the next frame begins before the line is free for a reply.
+        for character in ascii_frame(to, &pdu(0x06, &[0, 7]), b'\n') {
+            unit.receiver.character(character, Faults::NONE);
+        }
+        assert!(unit.receiver.is_over());
+        unit.receiver.character(b':', Faults::NONE);
+        assert!(unit.receiver.close().is_none());
+        let counters = unit.counters();
+        let counted = [
+            counters.bus_messages,
+            // The second colon, which the time-out ended.
+            counters.communication_errors - 1,
+            counters.busy,
+            counters.unit_messages,
+            counters.no_response,
+        ];
+        assert_eq!(counted, expected, "to {to}");
+        assert_eq!(unit.points.words[0], 0, "not carried out");
+        unit.must_answer();
+    }
 }

@@ -106,7 +106,7 @@ fn buffer() -> &'static mut Adu {
 }
 
 #[test]
-fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
+fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     let mut receiver = receiver();
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     receiver.give_back(buffer());
@@ -145,7 +145,7 @@ fn requests_without_a_buffer_are_dropped_and_counted_as_busy() {
     let counters = server.counters();
     assert_eq!(
         (counters.busy, counters.no_response, counters.unit_messages),
-        (1, 1, 2)
+        (0, 1, 2)
     );
 }
 
@@ -210,4 +210,38 @@ fn a_third_buffer_does_not_disturb_a_frame() {
     receiver.give_back(buffer());
     hear(&mut receiver, &ours[3..]);
     assert_eq!(receiver.close().expect("whole").adu.as_slice(), &ours[..6]);
+}
+
+#[test]
+fn counters_read_while_a_request_is_pending_do_not_wrap() {
+    let mut receiver = receiver();
+    receiver.give_back(buffer());
+    receiver.give_back(buffer());
+    let mut points = Points::new(4, 4);
+    let mut server = Server::new(UNIT, Framing::Rtu);
+    hear(&mut receiver, &frame(UNIT, &[0x0C]));
+    let pending = receiver.close().expect("a request");
+    // A bad frame while the request is pending.
+    hear(&mut receiver, &[0x55; 5]);
+    assert!(receiver.close().is_none());
+    let counters = server.counters_at(receiver.counters());
+    assert_eq!(counters.as_words(), [1, 1, 0, 0, 0, 0, 0, 0, 0]);
+
+    let decision = server.decide(pending.adu, &points);
+    server.commit(&decision, &pending.line);
+    server.carry_out(&decision, pending.adu, &mut points);
+    // Byte count, status, event count, message count, events.
+    assert_eq!(pending.adu.as_slice(), [7, 0, 0, 0, 0, 0, 1, 0x80]);
+    assert_eq!(server.counters().as_words(), [1, 0, 0, 1, 0, 0, 0, 0, 0]);
+    let counters = server.counters_at(receiver.counters());
+    assert_eq!(counters.as_words(), [1, 1, 0, 1, 0, 0, 0, 0, 0]);
+
+    receiver.give_back(pending.adu);
+    hear(&mut receiver, &frame(UNIT, &[0x0C]));
+    let next = receiver.close().expect("a request");
+    let decision = server.decide(next.adu, &points);
+    server.commit(&decision, &next.line);
+    server.carry_out(&decision, next.adu, &mut points);
+    let expected = [10, 0, 0, 0, 0, 0, 2, 0x80, 0x82, 0x40, 0x80];
+    assert_eq!(next.adu.as_slice(), expected);
 }

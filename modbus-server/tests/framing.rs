@@ -118,9 +118,9 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
     for faults in [
         Faults::PARITY,
         Faults::FRAMING,
-        Faults::NOISE,
         Faults::OVERRUN,
         Faults::PARITY | Faults::FRAMING,
+        Faults::PARITY | Faults::NOISE,
     ] {
         for at in 0..request().len() {
             let mut unit = unit();
@@ -138,6 +138,37 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
             unit.must_answer();
         }
     }
+}
+
+#[test]
+fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_crc() {
+    for strict in [false, true] {
+        for at in 0..=request().len() {
+            let mut unit = Unit::with(UNIT, strict, Points::new(64, 64));
+            for (index, byte) in request().into_iter().enumerate() {
+                // In the last round every character is noisy.
+                let noisy = index == at || at == request().len();
+                let faults = if noisy { Faults::NOISE } else { Faults::NONE };
+                unit.character(byte, faults);
+            }
+            assert!(unit.silence().is_some(), "noise at {at}");
+            let words = unit.counters().as_words();
+            assert_eq!(words, [1, 0, 0, 1, 0, 0, 0, 0, 0], "noise at {at}");
+        }
+    }
+}
+
+#[test]
+fn noise_flag_does_not_make_a_bad_crc_good() {
+    let mut unit = unit();
+    let mut bad = request();
+    bad[3] ^= 1;
+    for byte in bad {
+        unit.character(byte, Faults::NOISE);
+    }
+    assert_eq!(unit.silence(), None);
+    assert_eq!(unit.counters().communication_errors, 1);
+    unit.must_answer();
 }
 
 #[test]
@@ -200,8 +231,9 @@ fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
         unit.characters(&request()[at..]);
         assert_eq!(unit.silence(), None);
         let counters = unit.counters();
-        assert_eq!((counters.gaps, counters.unit_messages), (1, 0));
-        // Its CRC was good.
+        assert_eq!(counters.gaps, 1);
+        // Its CRC was good: it was a message to this unit, and got no response.
+        assert_eq!((counters.unit_messages, counters.no_response), (1, 1));
         assert_eq!(
             (counters.bus_messages, counters.communication_errors),
             (1, 0)

@@ -163,10 +163,23 @@ fn the_conformity_is_that_of_the_objects_there_are() {
     assert_eq!(conformity(0x80..256), Some(0x82));
     assert_eq!(conformity(4..256), Some(0x82));
     assert_eq!(conformity(3..256), Some(0x81));
-    unit.points.objects[..3].fill(None);
-    assert_eq!(
-        unit.refused(&[0x2B, 0x0E, 0x01, 0x00]),
-        1,
-        "no such function"
-    );
+}
+
+#[test]
+fn function_2b_without_identification_returns_illegal_function() {
+    let mut unit = unit();
+    unit.points.objects.fill(None);
+    for request in [
+        &[0x2B][..],
+        &[0x2B, 0x0E],
+        &[0x2B, 0x0E, 1],
+        &[0x2B, 0x0E, 1, 0],
+        &[0x2B, 0x0E, 1, 0, 0],
+        &[0x2B, 0x0E, 0, 0],
+        &[0x2B, 0x0E, 4, 7],
+        &[0x2B, 0x0D],
+        &[0x2B, 0x0D, 1, 0],
+    ] {
+        assert_eq!(unit.refused(request), 1, "{request:02X?}");
+    }
 }

@@ -160,7 +160,7 @@ impl Line {
         let late = self.receiver.is_over();
         self.take()?;
         if late && let Some(closed) = self.request.take() {
-            self.receiver.give_back(closed.adu);
+            self.receiver.drop_request(closed.adu);
             return None;
         }
         Some(())
@@ -170,7 +170,7 @@ impl Line {
         let closed = self.receiver.close()?;
         // One that has not been taken by now will never be answered in time.
         if let Some(late) = self.request.replace(closed) {
-            self.receiver.give_back(late.adu);
+            self.receiver.drop_request(late.adu);
         }
         Some(())
     }

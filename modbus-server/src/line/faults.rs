@@ -14,7 +14,8 @@ impl Faults {
     pub const PARITY: Self = Self(1);
     /// The stop bit is low.
     pub const FRAMING: Self = Self(1 << 1);
-    /// The samples of a bit disagreed.
+    /// The samples of a bit disagreed. The receiver ignores it: the UART has decided for the
+    /// majority of the samples, and the parity bit and the CRC or LRC show whether that was right.
     pub const NOISE: Self = Self(1 << 2);
     /// A character before this one was lost, because it was not fetched in time.
     pub const OVERRUN: Self = Self(1 << 3);
@@ -29,6 +30,13 @@ impl Faults {
     #[inline]
     pub const fn bits(self) -> u8 {
         self.0
+    }
+
+    /// Whether the character may be another one than was sent, or another one was lost: every
+    /// fault but [`NOISE`](Self::NOISE).
+    #[inline]
+    pub(super) const fn spoil(self) -> bool {
+        self.0 & !Self::NOISE.0 != 0
     }
 
     /// Whether all of `other` are among these.
@@ -56,5 +64,13 @@ mod tests {
         let both = Faults::PARITY | Faults::OVERRUN;
         assert_eq!(both, Faults::from_bits(0b1001));
         assert!(both.contains(Faults::OVERRUN) && !both.contains(Faults::NOISE));
+    }
+
+    #[test]
+    fn every_fault_but_noise_spoils_a_character() {
+        for bits in 0..16 {
+            let expected = !matches!(bits, 0 | 0b0100);
+            assert_eq!(Faults::from_bits(bits).spoil(), expected, "{bits:04b}");
+        }
     }
 }

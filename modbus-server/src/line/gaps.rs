@@ -33,9 +33,12 @@ impl Gaps {
     /// The longest silence within an ASCII frame, in ns (V1.02 2.5.2.1).
     pub const ASCII_TIMEOUT: u32 = 1_000_000_000;
 
-    /// The times of the standard in nanoseconds, for `baud` in bit/s and characters of `bits` bits
-    /// in all (11, or 10 for 8N1). The length of a bit is rounded up, so that no silence is too
-    /// short.
+    /// The times of the standard in nanoseconds (V1.02 2.5.1.1), for `baud` in bit/s and characters
+    /// of `bits` bits in all. The length of a bit is rounded up, so that no silence is too short.
+    ///
+    /// The standard counts 11-bit characters (2.5.1); with 8N1 a unit may count its own 10-bit ones.
+    /// Between the two values nothing is demanded. With `bits` 10 the unit also serves masters that
+    /// count 10.
     ///
     /// Made for 1200 bit/s and above; below 10 bit/s the times would not fit and stop at the
     /// largest `u32`.

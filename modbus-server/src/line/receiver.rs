@@ -96,6 +96,14 @@ impl<'a> Receiver<'a> {
         }
     }
 
+    /// Gives back the buffer of a request that nobody has served and counts the request as dropped.
+    #[cold]
+    #[inline(never)]
+    pub fn drop_request(&mut self, adu: &'a mut Adu) {
+        count(&mut self.counters.dropped);
+        self.give_back(adu);
+    }
+
     /// A character has arrived.
     #[inline]
     pub fn character(&mut self, byte: u8, faults: Faults) {
@@ -125,7 +133,8 @@ impl<'a> Receiver<'a> {
     /// where silence ends a frame.
     #[inline]
     pub fn is_over(&self) -> bool {
-        self.state & ASCII != 0 && self.reader.is_over()
+        // The reader keeps the place of the last frame until the next one begins.
+        self.state & ASCII_IDLE == ASCII && self.reader.is_over()
     }
 
     /// Whether no frame has begun.
@@ -155,14 +164,15 @@ impl<'a> Receiver<'a> {
         } else {
             0
         };
-        self.unkept = 0;
-        self.reader.begin();
-        if self.filling.is_none() {
-            self.filling = self.spare.take();
+        if let Some(adu) = &mut self.filling {
+            adu.clear();
+            return;
         }
-        match &mut self.filling {
-            Some(adu) => adu.clear(),
-            None => self.state |= UNKEPT,
+        // A spare buffer is empty already.
+        self.filling = self.spare.take();
+        if self.filling.is_none() {
+            self.state |= UNKEPT;
+            self.unkept = 0;
         }
     }
 
@@ -194,10 +204,10 @@ impl<'a> Receiver<'a> {
         }
         count(&mut self.counters.bus_messages);
         let is_for_us = address == self.unit || address == BROADCAST;
-        if state & TORN != 0 || !is_for_us {
+        if !is_for_us {
             return None;
         }
-        if state & UNKEPT != 0 {
+        if state & (TORN | UNKEPT) != 0 {
             count(&mut self.counters.dropped);
             return None;
         }
@@ -220,7 +230,10 @@ impl<'a> Receiver<'a> {
     fn special(&mut self, byte: u8, faults: Faults) {
         match self.state | u16::from(faults.bits()) {
             ASCII if self.ascii_inside(byte) => {}
-            ASCII_IDLE if byte == ascii::START => self.state = ASCII,
+            ASCII_IDLE if byte == ascii::START => {
+                self.state = ASCII;
+                self.reader.begin();
+            }
             _ => self.rare(byte, faults),
         }
     }
@@ -263,13 +276,14 @@ impl<'a> Receiver<'a> {
     /// A character in ASCII mode.
     fn ascii_character(&mut self, character: u8, faults: Faults) {
         let idle = self.state & IDLE != 0;
-        if character == ascii::START && (idle || faults == Faults::NONE) {
-            // What was before it had no end: it is counted as faulty. Had it one, its reply would
-            // come too late.
+        if character == ascii::START && (idle || !faults.spoil()) {
+            // A frame without its end is counted as faulty. A complete one is dropped: its reply
+            // would be sent too late.
             if let Some(late) = self.close() {
-                self.give_back(late.adu);
+                self.drop_request(late.adu);
             }
             self.begin();
+            self.reader.begin();
             self.note(faults);
             return;
         }
@@ -300,7 +314,7 @@ impl<'a> Receiver<'a> {
     }
 
     fn note(&mut self, faults: Faults) {
-        if faults != Faults::NONE {
+        if faults.spoil() {
             self.state |= SPOILED;
         }
         if faults.contains(Faults::OVERRUN) {

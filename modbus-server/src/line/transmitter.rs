@@ -40,6 +40,8 @@ const ELSEWHERE: u8 = u8::MAX;
 /// What of a frame comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// Nothing. The first, so that it is the 0 that [`Transmitter::take_buffer`] has at hand.
+    Over,
     /// In ASCII mode, the colon.
     Start,
     /// Head and body, and after them the LRC or the first byte of the CRC.
@@ -48,8 +50,6 @@ enum Stage {
     End,
     /// In ASCII mode, the delimiter.
     Delimiter,
-    /// Nothing.
-    Over,
 }
 
 impl<'a> Transmitter<'a> {
@@ -201,10 +201,12 @@ impl<'a> Transmitter<'a> {
         self.head.has_body() && self.body.is_none()
     }
 
-    /// Takes the buffer of the body back, for the receiver. Before [`Next::Done`] this cuts the
-    /// reply short.
+    /// Takes the buffer of the body back, for the receiver, and ends the reply. Before
+    /// [`Next::Done`] this cuts the reply short: at most the rest of its head is still sent, and
+    /// no CRC or LRC, so that no master accepts it.
     #[inline]
     pub fn take_buffer(&mut self) -> Option<&'a mut Adu> {
+        self.stage = Stage::Over;
         self.body.take()
     }
 }
@@ -277,5 +279,67 @@ mod tests {
         transmitter.head(Head::exception(1, 3, Exception::ServerDeviceFailure));
         is_next(&mut transmitter, b":01830478\r#");
         assert_eq!(transmitter.next(), Next::Done);
+    }
+
+    /// What was left of the reply to send, CRC or LRC included, is not sent but for the head.
+    fn is_cut_short(transmitter: &mut Transmitter<'_>, framing: Framing, left: &[u8]) {
+        let mut sent = 0;
+        while let Next::Byte(byte) = transmitter.next() {
+            assert_eq!(byte, left[sent], "{framing:?} {left:02X?}");
+            sent += 1;
+        }
+        assert_eq!(transmitter.next(), Next::Done, "{framing:?} {left:02X?}");
+        // In RTU mode three bytes of head, in ASCII mode the second digit of a byte.
+        let most = match framing {
+            Framing::Rtu => left.len().saturating_sub(6),
+            Framing::Ascii { .. } => 1,
+        };
+        assert!(sent <= most, "{framing:?} {left:02X?}");
+    }
+
+    #[test]
+    fn taking_the_buffer_in_the_middle_of_a_reply_ends_the_reply() {
+        let rtu: &[u8] = &[0x01, 0x03, 0x04, 1, 2, 3, 4, 0x5B, 0x3C];
+        let ascii: &[u8] = b":01030401020304EE\r\n";
+        for (framing, whole) in [(Framing::Rtu, rtu), (Framing::ASCII, ascii)] {
+            for sent in 0..=whole.len() {
+                let (mut adu, mut other) = (Adu::new(), Adu::new());
+                adu.extend(&[1, 2, 3, 4]);
+                let mut transmitter = Transmitter::open(1, framing);
+                transmitter.head(Head::read(1, 3, 4));
+                assert!(transmitter.body(&mut adu).is_none());
+                is_next(&mut transmitter, &whole[..sent]);
+                assert!(transmitter.take_buffer().is_some());
+                is_cut_short(&mut transmitter, framing, &whole[sent..]);
+                assert!(transmitter.body(&mut other).is_some(), "not needed");
+                assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
+            }
+        }
+    }
+
+    #[test]
+    fn taking_the_buffer_before_the_body_is_here_ends_the_reply() {
+        for framing in [Framing::Rtu, Framing::ASCII] {
+            for head_is_known in [false, true] {
+                for sent in [0, 1, 8] {
+                    let mut adu = Adu::new();
+                    let mut transmitter = Transmitter::open(1, framing);
+                    if head_is_known {
+                        transmitter.head(Head::read(1, 3, 4));
+                    }
+                    for _ in 0..sent {
+                        transmitter.next();
+                    }
+                    assert!(transmitter.take_buffer().is_none());
+                    while let Next::Byte(_) = transmitter.next() {}
+                    assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
+                    // The rest of the reply is handed over too late.
+                    transmitter.head(Head::read(1, 3, 4));
+                    assert!(transmitter.body(&mut adu).is_some(), "not needed");
+                    while let Next::Byte(_) = transmitter.next() {}
+                    assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
+                }
+            }
+        }
     }
 }

@@ -150,20 +150,28 @@ impl Server {
         }
     }
 
-    /// All counters as they stood at the last [`commit`](Self::commit) or
-    /// [`note_line`](Self::note_line), less what function 08 has cleared.
+    /// All counters as they stood at the last [`commit`](Self::commit), less what function 08 has
+    /// cleared.
     pub const fn counters(&self) -> Counters {
-        let line = self.line.since(&self.cleared);
+        self.counters_at(&self.line)
+    }
+
+    /// All counters with those of the line as they stand now
+    /// ([`Receiver::counters`](crate::line::Receiver::counters)), less what function 08 has cleared.
+    /// May be called at any time, also while a request is pending.
+    pub const fn counters_at(&self, line: &LineCounters) -> Counters {
+        let line = line.since(&self.cleared);
         let tally = &self.tally;
         Counters {
             bus_messages: line.bus_messages,
             communication_errors: line.communication_errors,
             exceptions: tally.exceptions,
-            // What found no buffer was for this unit all the same, and without a reply.
+            // A dropped frame was a message to this unit and got no reply. It is not in `busy`, which
+            // counts exceptions 06 that were sent (V1.1b3 6.8.1).
             unit_messages: tally.unit_messages.wrapping_add(line.dropped),
             no_response: tally.no_response.wrapping_add(line.dropped),
             nak: tally.nak,
-            busy: tally.busy.wrapping_add(line.dropped),
+            busy: tally.busy,
             overruns: line.overruns,
             gaps: line.gaps,
         }

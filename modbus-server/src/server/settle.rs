@@ -63,9 +63,6 @@ pub(super) fn settle(
         Request::EventLog => (plain, Work::EventLog),
         Request::ServerId => (plain, Work::ServerId),
         Request::Identify(fields) => {
-            if model.identification(0).is_none() {
-                return Err(Exception::IllegalFunction);
-            }
             let (code, object) = identification::decode(fields, model)?;
             let head = Head::before(unit, function, [identification::MEI_TYPE, code as u8]);
             (head, Work::Identify { code, object })

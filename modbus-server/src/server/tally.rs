@@ -32,6 +32,8 @@ impl Tally {
 impl Server {
     /// Takes note of a decision that is now being acted upon, and of the line's counters as they
     /// came with its request: counters and event log include it from here on.
+    ///
+    /// Requests are committed in the order in which the receiver has closed them.
     pub fn commit(&mut self, decision: &Decision, line: &LineCounters) {
         self.note_line(line);
         if decision.outcome == Outcome::NotForUs {
@@ -62,9 +64,10 @@ impl Server {
         }
     }
 
-    /// Takes note of what the line has counted, and logs its bad frames. [`commit`](Self::commit)
-    /// does it with each request; without one it may be done at any time.
-    pub fn note_line(&mut self, line: &LineCounters) {
+    /// Takes note of what the line had counted when a request was closed, and logs the bad frames
+    /// before that request. Private, because a copy that is older than the last one would make the
+    /// differences wrap: while a request is pending, its copy is older than the receiver's counters.
+    fn note_line(&mut self, line: &LineCounters) {
         let seen = &self.line;
         let errors = line
             .communication_errors

@@ -31,8 +31,9 @@ impl Ear {
         }
     }
 
-    /// A character, with faults as in `Faults`. The reply to an ASCII frame that it ended.
+    /// A character, with faults as in `Faults`, of which noise (4) does not count. The reply to an ASCII frame that it ended.
     pub fn character(&mut self, byte: u8, faults: u8) -> Option<Vec<u8>> {
+        let faults = faults & 11;
         match self.server.framing {
             Framing::Ascii { delimiter } => {
                 if byte == b':' && (!self.inside || faults == 0) {

@@ -284,9 +284,8 @@ impl Unit {
         reply[1]
     }
 
-    pub fn counters(&mut self) -> Counters {
-        self.server.note_line(self.receiver.counters());
-        self.server.counters()
+    pub fn counters(&self) -> Counters {
+        self.server.counters_at(self.receiver.counters())
     }
 
     /// The next good request must be answered.

@@ -54,12 +54,22 @@ impl Reference {
     /// A good frame was heard; `torn`: it must not be obeyed. The frame of the reply.
     pub fn good(&mut self, unit: u8, pdu: &[u8], torn: bool) -> Option<Vec<u8>> {
         self.counters[BUS] += 1;
-        if torn || (unit != UNIT && unit != 0) {
+        if unit != UNIT && unit != 0 {
+            return None;
+        }
+        if torn {
+            self.drop_good();
             return None;
         }
         let framing = self.framing;
         let reply = self.request(unit == 0, pdu)?;
         Some(framed(framing, UNIT, &reply))
+    }
+
+    /// A good frame for this unit is not served.
+    fn drop_good(&mut self) {
+        self.counters[UNIT_MESSAGES] += 1;
+        self.counters[NO_RESPONSE] += 1;
     }
 
     /// A request to this unit or to all.

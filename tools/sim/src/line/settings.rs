@@ -150,14 +150,19 @@ impl Settings {
         self.rate().bits(n * u64::from(self.format.bits()))
     }
 
-    /// t3.5, the silence that ends an RTU frame: 3.5 characters of 11 bits up to 19200 baud, 1750 us above
-    /// (Modbus over Serial Line V1.02, 2.5.1.1).
+    /// The shortest silence that ends an RTU frame. Up to 19200 bit/s it is 3.5 characters of this
+    /// format, above that 1750 us (Modbus over Serial Line V1.02, 2.5.1.1).
+    ///
+    /// The standard counts 11-bit characters (2.5.1); with 8N1 a unit may count its own 10-bit ones.
+    /// Between the two values nothing is demanded. The unit on this board counts its own, so the
+    /// shorter value is t3.5 here: with 11 bits the record would join frames that the unit answers.
     #[must_use]
     pub fn frame_silence(self) -> Time {
         if self.baud > 19_200 {
             Time::from_us(1750)
         } else {
-            Time::cycles(77, self.baud.saturating_mul(2))
+            let half_bits = 7 * u64::from(self.format.bits());
+            Time::cycles(half_bits, self.baud.saturating_mul(2))
         }
     }
 }
@@ -185,6 +190,19 @@ mod tests {
         assert_eq!(at(19_200).frame_silence().as_ns(), 2_005_208);
         assert_eq!(at(38_400).frame_silence(), Time::from_us(1750));
         assert_eq!(at(9600).characters(2), Time::cycles(22, 9600));
+    }
+
+    #[test]
+    fn frame_silence_counts_the_bits_of_the_format_up_to_19200() {
+        for format in Format::ALL {
+            let at = |baud| Settings { baud, format };
+            let bits = if format == Format::N1 { 70 } else { 77 };
+            for baud in [1200, 9600, 19_200] {
+                let expected = Time::cycles(bits, 2 * baud);
+                assert_eq!(at(baud).frame_silence(), expected, "{format:?} {baud}");
+            }
+            assert_eq!(at(38_400).frame_silence(), Time::from_us(1750));
+        }
     }
 
     #[test]

@@ -91,6 +91,23 @@ fn a_frame_that_is_complete_is_answered_whatever_the_driver_leaves_behind_it() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
+fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
+    let mut bench = Bench::set_up(Module::Di4, &[(MODE, 1)]);
+    let start = bench.board.now();
+    let cut = ascii(&READ, "\r\n");
+    let end = bench.board.line().send(start, &cut);
+    let end = bench.board.line().send(end, &cut);
+    assert_eq!(bench.answer_after(end), ascii(&[0x01, 1, 0], "\r\n"));
+    // Both frames, and the requests that read the counters.
+    for (counter, expected) in [(0x0B, 3), (0x0C, 0), (0x0E, 5), (0x0F, 1), (0x11, 0)] {
+        let reply = bench.exchange(&ascii(&[0x08, 0, counter, 0, 0], "\r\n"));
+        let expected = ascii(&[0x08, 0, counter, 0, expected], "\r\n");
+        assert_eq!(reply, expected, "{counter:02X}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
 fn the_communication_watchdog_counts_from_the_request_s_end() {
     let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
     let mut bench = Bench::set_up(Module::Do4, &settings);

@@ -1,5 +1,6 @@
 //! Frames that are damaged, cut, joined or somebody else's.
 
+use register_map::configuration::FORMAT;
 use sim::{
     Config, Module, Time,
     line::{Character, Settings},
@@ -112,6 +113,25 @@ fn a_request_too_soon_after_another_joins_it_and_both_are_lost() {
     // With t3.5 between them the second is answered.
     let gap = bench.t35() + bench.bit();
     assert_eq!(with_gap(&mut bench, &other, 8, gap), adu(&[1, 1, 1, 0]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn silence_of_own_8n1_characters_ends_a_frame_for_the_unit_and_the_record() {
+    let mut bench = Bench::set_up(Module::Di4, &[(FORMAT, 3)]);
+    let other = adu(&[2, 1, 0, 0x10, 0, 4]);
+    let two = [other.clone(), adu(&READ)].concat();
+    // 36 bits: more than 3.5 characters of 10 bits, less than 3.5 of 11.
+    let gap = bench.bit() * 36;
+    let before = bench.board.line().frames().count();
+    assert_eq!(with_gap(&mut bench, &two, 8, gap), adu(&[1, 1, 1, 0]));
+    let line = bench.board.line();
+    let frames: Vec<_> = line
+        .frames()
+        .skip(before)
+        .map(|f| f.bytes.clone())
+        .collect();
+    assert_eq!(frames, [other, adu(&READ), adu(&[1, 1, 1, 0])]);
 }
 
 #[test]

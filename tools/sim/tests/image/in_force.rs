@@ -52,15 +52,7 @@ fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
             bench.board.run_for(Time::from_ms(50));
         }
         bench.settings(settings);
-        // 3.5 characters of the format's own length; 1750 us above 19200 bit/s.
-        let bits = u64::from(settings.format.bits());
-        let half_characters = settings.rate().bits(bits * 7).as_ps() / 2;
-        let t35 = if settings.baud > 19_200 {
-            bench.t35()
-        } else {
-            Time::from_ps(half_characters)
-        };
-        assert_at(turnaround(&mut bench), t35, Time::from_us(60));
+        assert_at(turnaround(&mut bench), bench.t35(), Time::from_us(60));
         for _ in 0..10 {
             assert_eq!(
                 bench.registers(0x0100, 9).unwrap()[1..3],
