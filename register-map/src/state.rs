@@ -90,7 +90,7 @@ block! {
     NO_RESPONSES "no response": 0x0234 x 1, "", READ, &[];
     /// Negative acknowledges sent
     NAKS "NAK": 0x0235 x 1, "", READ, &[];
-    /// Busy exceptions (06) sent, and requests dropped while both buffers were in use
+    /// Busy exceptions (06) sent
     BUSY "busy": 0x0236 x 1, "", READ, &[];
     /// Messages lost to a character overrun
     OVERRUNS "character overruns": 0x0237 x 1, "", READ, &[];

@@ -18,7 +18,7 @@ pub enum Piece {
     BadParity(u8),
     /// A character whose stop bits are low.
     BadStop(u8),
-    /// The line low for 1 to 15 bits.
+    /// The line low for 1 to 15 bits, then high for one.
     Break(u8),
     /// The line inverted for this time.
     Glitch(Duration),

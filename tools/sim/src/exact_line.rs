@@ -141,7 +141,8 @@ fn check(settings: Settings, pieces: &[Piece]) -> Result<(), String> {
                 return Err(format!("{format} has no parity bit that could be wrong"));
             }
             Piece::BadParity(_) | Piece::BadStop(_) => settings.characters(1),
-            Piece::Break(bits) => settings.rate().bits(u64::from(*bits)),
+            // One bit brings the line back up.
+            Piece::Break(bits) => settings.rate().bits(u64::from(*bits) + 1),
         };
     }
     if length > time(LONGEST_RUN) {
@@ -210,7 +211,7 @@ mod tests {
         for (line, us) in [
             ("send 010203", 33.0 * 104.166_7),
             ("send gap:1000", 1000.0),
-            ("send break:15", 15.0 * 104.166_7),
+            ("send break:15", 16.0 * 104.166_7),
             ("send glitch:10", 10.0),
             ("send stop:55", 12.0 * 104.166_7),
             ("send 01 gap:50 01", 22.0 * 104.166_7 + 50.0),
