@@ -112,6 +112,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
     pac::AFIO::enable(&mut rcc);
     pac::ADC1::enable(&mut rcc);
     pac::I2C1::enable(&mut rcc);
+    pac::PWR::enable(&mut rcc);
 
     Board {
         clock,
@@ -120,7 +121,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
         unique_id: unique_id::read(),
         slot: Slot::new((a.pa0, a.pa1, a.pa2, a.pa3), a.crl, device.ADC1),
         dac: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
-        flash: Flash::new(device.FLASH),
+        flash: Flash::new(device.FLASH, device.PWR),
         leds,
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog: Watchdog::new(device.IWDG, &device.DBGMCU),

@@ -53,6 +53,15 @@ pub const FLASH_PROGRAM_US: u32 = 500;
 /// The longest wait for a page to be erased, in us: 40 ms at most (DS5319 table 29).
 pub const FLASH_ERASE_US: u32 = 100_000;
 
+/// The threshold of the voltage detector, PLS (RM0008 5.4.1): 7 is 2.9 V, at which a falling supply is found
+/// low at 2.66 to 2.9 V and a rising one good at 2.76 to 3.0 V (DS5319 table 12).
+///
+/// The highest there is: a supply of 3.3 V less 5 % is 3.13 V and never below it. One that collapses still has
+/// to fall by 0.66 V, from 2.66 V, before programming is out of its specification at 2.0 V. At 40 mA
+/// and 10 uF that takes 165 us, more than twice a half-word's 70 us. An erase, 40 ms, may still be cut short;
+/// the page's missing mark shows that at the next start.
+pub const PVD_LEVEL: u8 = 0b111;
+
 /// How often a crystal's ready flag is looked at before it is given up. One look takes some ten
 /// cycles of the 8 MHz the chip starts on, so this is about 100 ms; a good crystal needs 2 ms
 /// (DS5319 table 22).

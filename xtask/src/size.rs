@@ -41,8 +41,8 @@ const LIMITS: [Limit; 3] = [
     },
     Limit {
         name: "budget",
-        flash: 32 * KIB,
-        ram: 6 * KIB,
+        flash: 47 * KIB,
+        ram: 8 * KIB,
     },
 ];
 
@@ -214,10 +214,10 @@ mod tests {
         let json = as_json(&sizes(30_000, 5_000));
         assert_eq!(json["limits"][0]["flash"]["left"], 65_536 - 30_000);
         assert_eq!(json["limits"][1]["flash"]["left"], 131_072 - 30_000);
-        assert_eq!(json["limits"][2]["ram"]["left"], 6_144 - 5_000);
+        assert_eq!(json["limits"][2]["ram"]["left"], 8_192 - 5_000);
         assert_eq!(json["crates"][0]["name"], "firmware");
         let table = as_table(&sizes(30_000, 5_000));
-        assert!(table.contains("budget (32 KiB / 6 KiB)"), "{table}");
+        assert!(table.contains("budget (47 KiB / 8 KiB)"), "{table}");
         assert!(table.lines().all(|line| line.trim_end() == line), "{table}");
     }
 
@@ -234,6 +234,6 @@ mod tests {
             failure.contains("70000") && failure.contains("STM32F103C8"),
             "{failure}"
         );
-        assert!(as_table(&sizes(33 * KIB, 0)).contains("1024 over"));
+        assert!(as_table(&sizes(48 * KIB, 0)).contains("1024 over"));
     }
 }

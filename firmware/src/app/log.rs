@@ -26,6 +26,8 @@ pub enum Event {
     Saved,
     /// The configuration could not be stored.
     SaveFailed,
+    /// The supply is too low for the flash: a save, or an erase at the start, waits for it.
+    LowSupply,
 }
 
 /// What is known when the device starts.
@@ -163,6 +165,7 @@ impl Log {
             Event::CommunicationLost => "communication lost: outputs go to SAFE",
             Event::Saved => "configuration saved",
             Event::SaveFailed => "configuration: the flash does not take it",
+            Event::LowSupply => "configuration: the supply is too low, the flash has to wait",
         };
         self.write(&mut Line::of(text));
     }

@@ -2,13 +2,13 @@
 
 use core::mem::MaybeUninit;
 
-use board_support::{Leds, ScanTimer, Watchdog, board, fault, pac, uart};
+use board_support::{Leds, ScanTimer, Watchdog, board, fault, flash::FlashError, pac, uart};
 use firmware::{
     config::{self, Config},
     device::{Device, Identity},
     lamps::Trouble,
     start_up::{self, Address},
-    store::Store,
+    store::{Store, StoreError},
 };
 use modbus_server::{
     Adu, Server,
@@ -85,9 +85,14 @@ pub fn up(
         config_invalid: loaded.invalid,
     });
     // Erases, where it has to: the line is not served yet.
-    if store.prepare(&mut pages).is_err() {
-        log.event(log::Event::SaveFailed);
+    let prepared = store.prepare(&mut pages);
+    match prepared {
+        Ok(()) => {}
+        Err(StoreError::Flash(_, FlashError::LowSupply)) => log.event(log::Event::LowSupply),
+        Err(_) => log.event(log::Event::SaveFailed),
     }
+    // An erase that is still missing is done while a master waits for a reply, as after a change of pages.
+    let erase = prepared.is_err() && !store.has_spare();
 
     let framing = match settings.mode {
         Mode::Rtu => Framing::Rtu,
@@ -118,7 +123,7 @@ pub fn up(
         device,
         module,
         analog_outputs,
-        persistence: Persistence::new(store, pages),
+        persistence: Persistence::new(store, pages, erase),
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
         leds: board.leds,
