@@ -8,7 +8,13 @@ use stm32f1xx_hal::{
 
 use crate::{
     ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
-    design::DIP_SETTLE_CYCLES, dip, i2c::BusPins, port, rs485, uart::LineSettings, unique_id,
+    design::{CRYSTAL_FAULTS, DIP_SETTLE_CYCLES},
+    dip,
+    fault::{self, FaultRecord},
+    i2c::BusPins,
+    port, rs485,
+    uart::LineSettings,
+    unique_id,
 };
 
 /// The board's devices.
@@ -18,6 +24,8 @@ pub struct Board {
     /// Why the chip started: bit 0 low-power, 1 window watchdog, 2 independent watchdog, 3 software,
     /// 4 power-on, 5 reset pin. A power-on sets the pin's bit as well (RM0008 7.3.10).
     pub reset_cause: u8,
+    /// What went wrong before this start.
+    pub faults: FaultRecord,
     /// SW01 as a number 0 to 255.
     pub dip: u8,
     /// The chip's unique number, half-words in the order of their addresses (RM0008 30.2).
@@ -72,7 +80,9 @@ impl LineOff {
 pub fn setup(device: pac::Peripherals) -> Board {
     let mut rcc = device.RCC;
     let reset_cause = take_reset_cause(&rcc);
-    let clock = clock::start(&rcc, &device.FLASH);
+    let faults = fault::take_at_start(reset_cause);
+    let crystal = faults.crystal_faults < CRYSTAL_FAULTS;
+    let clock = clock::start(&rcc, &device.FLASH, crystal);
 
     let mut a = device.GPIOA.split(&mut rcc);
     let mut b = device.GPIOB.split(&mut rcc);
@@ -117,6 +127,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
     Board {
         clock,
         reset_cause,
+        faults,
         dip,
         unique_id: unique_id::read(),
         slot: Slot::new((a.pa0, a.pa1, a.pa2, a.pa3), a.crl, device.ADC1),

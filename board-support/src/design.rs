@@ -62,6 +62,22 @@ pub const FLASH_ERASE_US: u32 = 100_000;
 /// the page's missing mark shows that at the next start.
 pub const PVD_LEVEL: u8 = 0b111;
 
+/// Number of crystal faults since power-on after which the crystal is not started again before the next
+/// power-on. Each fault costs a reset, which drops the outputs; a crystal that starts and then fails would cost
+/// one after another.
+pub const CRYSTAL_FAULTS: u8 = 2;
+
+/// Largest error of the internal oscillator, in ppm: -2 to +2.5 % from -40 to 105 degrees Celsius (DS5319
+/// table 24, ACC_HSI, factory-calibrated).
+pub const HSI_ERROR_PPM: u32 = 25_000;
+
+/// Largest error of the other end's rate, in ppm: 1 % (MODBUS over Serial Line V1.02, 3.2).
+pub const MASTER_ERROR_PPM: u32 = 10_000;
+
+/// Time by which transceivers and cable may lengthen or shorten a bit, in ns: the skews of two common
+/// transceivers.
+pub const LINE_ASYMMETRY_NS: u32 = 50;
+
 /// How often a crystal's ready flag is looked at before it is given up. One look takes some ten
 /// cycles of the 8 MHz the chip starts on, so this is about 100 ms; a good crystal needs 2 ms
 /// (DS5319 table 22).

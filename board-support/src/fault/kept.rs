@@ -44,10 +44,10 @@ fn write(noted: &Noted) {
 
 /// Takes the record of what went wrong before this start, and starts a new account: a power-on clears
 /// it, a watchdog's bite is noted when nothing else was. `reset_cause` as
-/// [`Board::reset_cause`](crate::board::Board::reset_cause) has it. To be called once at every start,
-/// before the marks and the uptime are kept.
+/// [`Board::reset_cause`](crate::board::Board::reset_cause) has it. The board calls this once at every start,
+/// before it starts the crystal: how often that has failed is in the record.
 #[must_use]
-pub fn take_at_start(reset_cause: u8) -> FaultRecord {
+pub(crate) fn take_at_start(reset_cause: u8) -> FaultRecord {
     // SAFETY: as in `read`; bytes and words may hold anything.
     let (uptime, marks) = unsafe {
         (

@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use board_support::{Leds, ScanTimer, Watchdog, board, fault, flash::FlashError, pac, uart};
+use board_support::{Leds, ScanTimer, Watchdog, board, flash::FlashError, pac, uart};
 use firmware::{
     config::{self, Config},
     device::{Device, Identity},
@@ -51,7 +51,6 @@ pub fn up(
 ) -> Started {
     let mut log = Log::new();
     let board = board::setup(device);
-    let record = fault::take_at_start(board.reset_cause);
     let address = Address::from_dip(board.dip);
 
     let mut pages = Pages(board.flash);
@@ -60,6 +59,7 @@ pub fn up(
     let config = Config::new(loaded.settings, loaded.invalid || loaded.rejected > 0);
     let slot = config.slot();
     let settings = start_up::line(address, config.line());
+    let on_wire = wire_settings(settings);
 
     let mut module = Installed::new(slot.module, board.slot);
     let analog_outputs = AnalogOutputs::of(slot.module, board.dac);
@@ -67,7 +67,8 @@ pub fn up(
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
         unique_id: board.unique_id,
-        fault: log::fault_words(&record),
+        fault: log::fault_words(&board.faults),
+        internal_oscillator: !board.clock.is_crystal(),
     };
     let device = place.write(Device::new(module.kinds(), config, identity));
     module.configure(device.points.settings());
@@ -78,10 +79,11 @@ pub fn up(
         address,
         dip: board.dip,
         line: settings,
+        on_wire,
         module: slot.module,
         clock: board.clock,
         reset_cause: board.reset_cause,
-        fault: record.fault.kind,
+        faults: board.faults,
         config_invalid: loaded.invalid,
     });
     // Erases, where it has to: the line is not served yet.
@@ -98,7 +100,6 @@ pub fn up(
         Mode::Rtu => Framing::Rtu,
         Mode::Ascii => Framing::ASCII,
     };
-    let on_wire = wire_settings(settings);
     let gaps = Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
     let t35 = settings
         .frame_gap
