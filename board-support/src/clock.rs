@@ -87,6 +87,8 @@ fn to_internal_without_pll(rcc: &pac::RCC) {
     rcc.cfgr().modify(|_, w| w.sw().hsi());
     looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_hsi());
     rcc.cr().modify(|_, w| w.pllon().clear_bit());
+    // The PLL still runs for a while, and its settings may not be written before it is off (RM0008 7.3.2).
+    looked(PLL_READY_LOOKS, || rcc.cr().read().pllrdy().bit_is_clear());
 }
 
 fn crystal_starts(rcc: &pac::RCC) -> bool {

@@ -91,12 +91,31 @@ pub const PLL_READY_LOOKS: u32 = 8_000;
 /// stray capacitance.
 pub const DIP_SETTLE_CYCLES: u32 = SYSCLK_ON_HSE_HZ / 10_000;
 
+/// Time between two readings of the DIP switch, in us.
+pub const DIP_POLL_US: u32 = 1_000;
+
+/// Number of equal readings in a row, after a first one, that count as a stable switch: 10 ms.
+pub const DIP_STABLE_POLLS: u32 = 10;
+
+/// Number of readings at most: 50 ms. Then the last one counts.
+pub const DIP_POLLS: u32 = 50;
+
 /// The scan's rate, in Hz.
 pub const SCAN_HZ: u32 = 1_000;
 
 /// The independent watchdog's time, in milliseconds on a 40 kHz LSI. The LSI runs at 30 to 60 kHz
 /// (DS5319 table 25), so it bites between 333 and 667 ms.
 pub const WATCHDOG_MS: u32 = 500;
+
+/// The independent watchdog's time while the device starts, in milliseconds on a 40 kHz LSI: 800 to 1600. A start
+/// takes 340 at most: 150 for a crystal that does not start, 50 for the DIP switch, 120 for the store.
+pub const WATCHDOG_START_MS: u32 = 1_200;
+
+/// What the watchdog's clock is divided by while the device starts: steps of 0.4 ms.
+pub const WATCHDOG_START_DIVIDER: u32 = 16;
+
+/// The watchdog's reload value while the device starts.
+pub const WATCHDOG_START_RELOAD: u16 = (WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER - 1) as u16;
 
 /// What the watchdog's clock, the LSI, is divided by before it counts (RM0008 19.4.2): steps of
 /// 0.2 ms.
@@ -126,6 +145,7 @@ const _: () = {
         WATCHDOG_MS * 40 / WATCHDOG_DIVIDER <= 4096,
         "the watchdog counts with 12 bits"
     );
+    assert!(WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER <= 4096);
     assert!(I2C_HZ > 100_000 && I2C_HZ <= 400_000);
     assert!(I2C_STEP_US > 2 * 9 * 1_000_000 / I2C_HZ);
     assert!(STORE_PAGES[0] + PAGE_BYTES == STORE_PAGES[1]);

@@ -10,6 +10,7 @@
 //!       magic  kind, fresh,       count  pc  lr  CFSR  address  uptime  checksum    the record
 //!              crystal faults
 //!       uptime              marks                                             kept up to date
+//!       DIP switch                                                            written at power-on
 //! ```
 
 #[cfg(target_os = "none")]
@@ -18,7 +19,7 @@ mod kept;
 mod record;
 
 #[cfg(target_os = "none")]
-pub(crate) use kept::take_at_start;
+pub(crate) use kept::{keep_dip, kept_dip, take_at_start};
 #[cfg(target_os = "none")]
 pub use kept::{keep_uptime, marks, note};
 

@@ -98,7 +98,8 @@ impl Soc {
             rcc,
             flash,
             flash_access,
-            gpio: Default::default(),
+            // PC13 to PC15 are fed through a switch for 3 mA: 2 MHz at most (DS5319 table 5, notes).
+            gpio: [0, 0, 0xE000, 0].map(Gpio::with_slow_pins),
             line: Line::default(),
             slot,
             pwr: Pwr::default(),
