@@ -96,8 +96,8 @@ fn switch_that_never_is_stable_does_not_keep_the_unit_from_starting() {
         ..Config::default()
     });
     while bench.board.now() < Time::from_ms(150) {
-        let dip = 17 + 2 * u8::from(bench.board.now().as_us() / 2_000 % 2 == 0);
-        bench.board.set_dip(dip);
+        let even = (bench.board.now().as_us() / 2_000).is_multiple_of(2);
+        bench.board.set_dip(if even { 19 } else { 17 });
         bench.board.run_for(Time::from_us(500));
     }
     let log = bench.board.take_log();
