@@ -155,7 +155,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
     }
 }
 
-/// SW01 as it stands at this instant.
+/// Reads SW01 at this instant.
 fn read_dip() -> u8 {
     let (levels_a, levels_b) = (port::a().idr().read(), port::b().idr().read());
     dip::number(levels_a.bits(), levels_b.bits())

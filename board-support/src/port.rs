@@ -11,8 +11,8 @@
 //! | port B CRL | `BusPins` of the DAC's bus | in `init` and by the background task alone |
 //! | port B CRH, port C CRH | `board::setup` | in `init` |
 //!
-//! `outputs_off` writes port A CRL from fault handlers. That is a single store, and whoever it interrupts does not
-//! run again. Output bits are changed through BSRR, a single store that leaves all other pins alone.
+//! `outputs_off` writes port A CRL from fault handlers. That is a single store, and the interrupted program
+//! does not run again. Output bits are changed through BSRR, a single store that leaves all other pins alone.
 
 use stm32f1xx_hal::pac::{GPIOA, GPIOB, GPIOC, gpioa::RegisterBlock};
 

@@ -25,7 +25,7 @@ impl Watchdog {
     pub(crate) fn start(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
         debug.cr().modify(|_, w| w.dbg_iwdg_stop().set_bit());
         let mut watchdog = Self { iwdg };
-        // Starting also starts the oscillator that the settings are taken over by.
+        // The start also turns the LSI on, which copies the settings.
         watchdog.tell(START);
         watchdog.tell(OPEN);
         watchdog.iwdg.pr().write(|w| w.pr().divide_by16());
@@ -37,17 +37,17 @@ impl Watchdog {
         watchdog
     }
 
-    /// Goes over to the period of the running device: from now on the watchdog must be fed every
+    /// Sets the period of the running device: from now on the watchdog must be refreshed every
     /// [`WATCHDOG_MS`](crate::design::WATCHDOG_MS) milliseconds.
     pub fn arm(&mut self) {
-        // The settings of the start were taken over long ago, so these may be written (RM0008 19.4.4).
+        // PVU and RVU are clear: `start` has waited for that, so PR and RLR may be written (RM0008 19.4.4).
         self.tell(OPEN);
         self.iwdg.pr().write(|w| w.pr().divide_by8());
         self.iwdg.rlr().write(|w| w.rl().set(WATCHDOG_RELOAD));
         self.reload_when_set();
     }
 
-    /// Waits until the settings are taken over, then reloads the counter: it takes a new reload value no earlier.
+    /// Waits until the settings are in force, then reloads the counter. An earlier reload would use the old value.
     fn reload_when_set(&mut self) {
         within_us(WATCHDOG_SETTINGS_US, || {
             let busy = self.iwdg.sr().read();

@@ -71,7 +71,7 @@ pub struct FaultRecord {
     pub uptime: u32,
     /// After a watchdog's bite: the tasks that had left no mark, a bit for each.
     pub missing: u16,
-    /// Number of times the crystal has failed since power-on; 255 stands for more, too.
+    /// Number of times the crystal has failed since power-on, at most 255.
     pub crystal_faults: u8,
 }
 

@@ -20,7 +20,7 @@ const LSI_START: Time = Time::from_us(85);
 const PLL_LOCK: Time = Time::from_us(200);
 
 /// From PLLON = 0 to PLLRDY = 0. RM0008 gives no time; this is pessimistic, so that a firmware that does not wait
-/// for it is found out.
+/// for it raises a finding.
 const PLL_STOP: Time = Time::from_us(10);
 
 /// CSSF in CIR, and CSSC, which clears it (RM0008 7.3.3).
