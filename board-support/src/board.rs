@@ -1,15 +1,24 @@
 //! The board as one struct of named devices.
 
 use stm32f1xx_hal::{
-    gpio::{GpioExt, PinState},
+    gpio::{GpioExt, IOPinSpeed, OutputSpeed, PinState},
     pac,
     rcc::Enable,
 };
 
 use crate::{
     ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
-    design::DIP_SETTLE_CYCLES, dip, i2c::BusPins, port, rs485, uart::LineSettings, unique_id,
+    design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
+    dip,
+    fault::{self, FaultRecord},
+    i2c::BusPins,
+    port, rs485,
+    uart::LineSettings,
+    unique_id, wait,
 };
+
+/// The flag of a power-on in [`Board::reset_cause`].
+const POWER_ON: u8 = 1 << 4;
 
 /// The board's devices.
 pub struct Board {
@@ -18,7 +27,9 @@ pub struct Board {
     /// Why the chip started: bit 0 low-power, 1 window watchdog, 2 independent watchdog, 3 software,
     /// 4 power-on, 5 reset pin. A power-on sets the pin's bit as well (RM0008 7.3.10).
     pub reset_cause: u8,
-    /// SW01 as a number 0 to 255.
+    /// What went wrong before this start.
+    pub faults: FaultRecord,
+    /// SW01 as a number 0 to 255, as it was at power-on.
     pub dip: u8,
     /// The chip's unique number, half-words in the order of their addresses (RM0008 30.2).
     pub unique_id: [u16; 6],
@@ -32,7 +43,7 @@ pub struct Board {
     pub leds: Leds,
     /// The scan's beat, not started.
     pub scan_timer: ScanTimer,
-    /// The watchdog, not started.
+    /// The watchdog, started with the long period of the start-up.
     pub watchdog: Watchdog,
     /// The RS-485 line, off, with its driver disabled.
     pub line: LineOff,
@@ -63,6 +74,8 @@ impl LineOff {
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = GapTimer::new(timer, start_bit, settings, t15_ns, t35_ns, clock, rcc)?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
+        // TX, too, needs no steeper edges than those of 10 MHz.
+        port::a().crh().modify(|_, w| w.mode9().output());
         Some((line, gap))
     }
 }
@@ -72,16 +85,21 @@ impl LineOff {
 pub fn setup(device: pac::Peripherals) -> Board {
     let mut rcc = device.RCC;
     let reset_cause = take_reset_cause(&rcc);
-    let clock = clock::start(&rcc, &device.FLASH);
+    let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
+    let faults = fault::take_at_start(reset_cause);
+    let crystal = faults.crystal_faults < CRYSTAL_FAULTS;
+    let clock = clock::start(&rcc, &device.FLASH, crystal);
 
     let mut a = device.GPIOA.split(&mut rcc);
     let mut b = device.GPIOB.split(&mut rcc);
     let mut c = device.GPIOC.split(&mut rcc);
 
     // First of all the driver's pin, so that nothing gets on the bus.
-    let driver = a
+    let mut driver = a
         .pa8
         .into_push_pull_output_with_state(&mut a.crh, PinState::Low);
+    // 10 MHz is a rise in 25 ns (DS5319 table 37), a fortieth of a bit at 921600 bit/s.
+    driver.set_speed(&mut a.crh, IOPinSpeed::Mhz10);
     let rx = a.pa10.into_pull_up_input(&mut a.crh);
 
     // SW01: one side of each switch is on ground.
@@ -94,17 +112,12 @@ pub fn setup(device: pac::Peripherals) -> Board {
     b.pb14.into_pull_up_input(&mut b.crh);
     b.pb15.into_pull_up_input(&mut b.crh);
     cortex_m::asm::delay(DIP_SETTLE_CYCLES);
-    let (levels_a, levels_b) = (port::a().idr().read(), port::b().idr().read());
-    let dip = dip::number(levels_a.bits(), levels_b.bits());
+    let kept = fault::kept_dip().filter(|_| reset_cause & POWER_ON == 0);
+    let dip = kept
+        .unwrap_or_else(|| dip::stable(read_dip, || wait::wait_us(DIP_POLL_US, clock.core_mhz())));
+    fault::keep_dip(dip);
 
-    let leds = Leds::new(
-        b.pb8
-            .into_push_pull_output_with_state(&mut b.crh, PinState::Low),
-        b.pb9
-            .into_push_pull_output_with_state(&mut b.crh, PinState::Low),
-        c.pc13
-            .into_push_pull_output_with_state(&mut c.crh, PinState::High),
-    );
+    let leds = Leds::new(b.pb8, b.pb9, &mut b.crh, c.pc13, &mut c.crh);
 
     // A probe can read the log while the core sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
@@ -112,18 +125,20 @@ pub fn setup(device: pac::Peripherals) -> Board {
     pac::AFIO::enable(&mut rcc);
     pac::ADC1::enable(&mut rcc);
     pac::I2C1::enable(&mut rcc);
+    pac::PWR::enable(&mut rcc);
 
     Board {
         clock,
         reset_cause,
+        faults,
         dip,
         unique_id: unique_id::read(),
         slot: Slot::new((a.pa0, a.pa1, a.pa2, a.pa3), a.crl, device.ADC1),
         dac: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
-        flash: Flash::new(device.FLASH),
+        flash: Flash::new(device.FLASH, device.PWR),
         leds,
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
-        watchdog: Watchdog::new(device.IWDG, &device.DBGMCU),
+        watchdog,
         line: LineOff {
             usart: device.USART1,
             pins: rs485::Pins {
@@ -138,6 +153,12 @@ pub fn setup(device: pac::Peripherals) -> Board {
             rcc,
         },
     }
+}
+
+/// Reads SW01 at this instant.
+fn read_dip() -> u8 {
+    let (levels_a, levels_b) = (port::a().idr().read(), port::b().idr().read());
+    dip::number(levels_a.bits(), levels_b.bits())
 }
 
 /// Reads the reset flags and takes them back, so that the next start sees only its own.

@@ -1,5 +1,5 @@
 //! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal
-//! does not start. The HAL would wait for a dead crystal, or a PLL that does not lock, for ever, and
+//! does not start, or has failed too often since power-on. The HAL would wait for a dead crystal, or a PLL that does not lock, for ever, and
 //! panics over frequencies it does not like; here every wait has an end and the frequencies are
 //! constants. While it runs on the crystal, the clock security system watches it (RM0008 7.2.7).
 
@@ -12,7 +12,7 @@ use crate::design::{HSE_HZ, HSE_READY_LOOKS, PLL_READY_LOOKS, SYSCLK_ON_HSE_HZ, 
 pub enum ClockSource {
     /// The crystal: 72 MHz.
     Crystal,
-    /// The internal oscillator, 1 % (DS5319 table 24): 60 MHz. The crystal is missing or dead.
+    /// The internal oscillator, -2 to +2.5 % (DS5319 table 24): 60 MHz. The crystal is missing or not reliable.
     Internal,
 }
 
@@ -55,15 +55,15 @@ const ON_CRYSTAL: u8 = multiplier(HSE_HZ, SYSCLK_ON_HSE_HZ);
 /// The internal oscillator feeds the PLL at half its 8 MHz.
 const ON_INTERNAL: u8 = multiplier(4_000_000, SYSCLK_ON_HSI_HZ);
 
-/// Brings the clocks up, from wherever they are.
-pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH) -> ClockSource {
+/// Starts the clocks, whatever state they are in. `crystal`: whether to try the crystal.
+pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, crystal: bool) -> ClockSource {
     // Two wait states, for more than 48 MHz (RM0008 3.3.3), and the prefetch that makes up for them.
     // SAFETY: two is a defined number of wait states.
     flash
         .acr()
         .modify(|_, w| unsafe { w.latency().bits(2).prftbe().set_bit() });
     to_internal_without_pll(rcc);
-    if crystal_starts(rcc) {
+    if crystal && crystal_starts(rcc) {
         if pll_runs(rcc, ClockSource::Crystal) {
             // From here on a crystal that fails raises the NMI.
             rcc.cr().modify(|_, w| w.csson().set_bit());
@@ -87,6 +87,8 @@ fn to_internal_without_pll(rcc: &pac::RCC) {
     rcc.cfgr().modify(|_, w| w.sw().hsi());
     looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_hsi());
     rcc.cr().modify(|_, w| w.pllon().clear_bit());
+    // The PLL still runs for a while, and its settings may not be written before it is off (RM0008 7.3.2).
+    looked(PLL_READY_LOOKS, || rcc.cr().read().pllrdy().bit_is_clear());
 }
 
 fn crystal_starts(rcc: &pac::RCC) -> bool {

@@ -53,6 +53,31 @@ pub const FLASH_PROGRAM_US: u32 = 500;
 /// The longest wait for a page to be erased, in us: 40 ms at most (DS5319 table 29).
 pub const FLASH_ERASE_US: u32 = 100_000;
 
+/// The threshold of the voltage detector, PLS (RM0008 5.4.1): 7 is 2.9 V, at which a falling supply is found
+/// low at 2.66 to 2.9 V and a rising one good at 2.76 to 3.0 V (DS5319 table 12).
+///
+/// The highest there is: a supply of 3.3 V less 5 % is 3.13 V and never below it. One that collapses still has
+/// to fall by 0.66 V, from 2.66 V, before programming is out of its specification at 2.0 V. At 40 mA
+/// and 10 uF that takes 165 us, more than twice a half-word's 70 us. An erase, 40 ms, may still be cut short;
+/// the page's missing mark shows that at the next start.
+pub const PVD_LEVEL: u8 = 0b111;
+
+/// Number of crystal faults since power-on after which the crystal is not started again before the next
+/// power-on. Each fault costs a reset, which drops the outputs; a crystal that starts and then fails would cost
+/// one after another.
+pub const CRYSTAL_FAULTS: u8 = 2;
+
+/// Largest error of the internal oscillator, in ppm: -2 to +2.5 % from -40 to 105 degrees Celsius (DS5319
+/// table 24, ACC_HSI, factory-calibrated).
+pub const HSI_ERROR_PPM: u32 = 25_000;
+
+/// Largest error of the other end's rate, in ppm: 1 % (MODBUS over Serial Line V1.02, 3.2).
+pub const MASTER_ERROR_PPM: u32 = 10_000;
+
+/// Time by which transceivers and cable may lengthen or shorten a bit, in ns: the skews of two common
+/// transceivers.
+pub const LINE_ASYMMETRY_NS: u32 = 50;
+
 /// How often a crystal's ready flag is looked at before it is given up. One look takes some ten
 /// cycles of the 8 MHz the chip starts on, so this is about 100 ms; a good crystal needs 2 ms
 /// (DS5319 table 22).
@@ -66,12 +91,31 @@ pub const PLL_READY_LOOKS: u32 = 8_000;
 /// stray capacitance.
 pub const DIP_SETTLE_CYCLES: u32 = SYSCLK_ON_HSE_HZ / 10_000;
 
+/// Time between two readings of the DIP switch, in us.
+pub const DIP_POLL_US: u32 = 1_000;
+
+/// Number of equal readings in a row, after a first one, that count as a stable switch: 10 ms.
+pub const DIP_STABLE_POLLS: u32 = 10;
+
+/// Number of readings at most: 50 ms. Then the last one counts.
+pub const DIP_POLLS: u32 = 50;
+
 /// The scan's rate, in Hz.
 pub const SCAN_HZ: u32 = 1_000;
 
 /// The independent watchdog's time, in milliseconds on a 40 kHz LSI. The LSI runs at 30 to 60 kHz
 /// (DS5319 table 25), so it bites between 333 and 667 ms.
 pub const WATCHDOG_MS: u32 = 500;
+
+/// The independent watchdog's time while the device starts, in milliseconds on a 40 kHz LSI: 800 to 1600. A start
+/// takes 340 at most: 150 for a crystal that does not start, 50 for the DIP switch, 120 for the store.
+pub const WATCHDOG_START_MS: u32 = 1_200;
+
+/// What the watchdog's clock is divided by while the device starts: steps of 0.4 ms.
+pub const WATCHDOG_START_DIVIDER: u32 = 16;
+
+/// The watchdog's reload value while the device starts.
+pub const WATCHDOG_START_RELOAD: u16 = (WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER - 1) as u16;
 
 /// What the watchdog's clock, the LSI, is divided by before it counts (RM0008 19.4.2): steps of
 /// 0.2 ms.
@@ -101,6 +145,7 @@ const _: () = {
         WATCHDOG_MS * 40 / WATCHDOG_DIVIDER <= 4096,
         "the watchdog counts with 12 bits"
     );
+    assert!(WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER <= 4096);
     assert!(I2C_HZ > 100_000 && I2C_HZ <= 400_000);
     assert!(I2C_STEP_US > 2 * 9 * 1_000_000 / I2C_HZ);
     assert!(STORE_PAGES[0] + PAGE_BYTES == STORE_PAGES[1]);

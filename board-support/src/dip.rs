@@ -1,4 +1,9 @@
-//! SW01, the eight-way DIP switch: read once at power-on.
+//! SW01, the eight-way DIP switch: read at power-on, once it is stable, and kept over every other reset.
+//!
+//! A reset by the watchdog, by software or by the pin alone does not read it again: an address that changed in
+//! service would be a surprise to the master. The map says "read once at power-on".
+
+use crate::design::{DIP_POLLS, DIP_STABLE_POLLS};
 
 /// The switch as a number 0 to 255, from the levels of ports A and B: position 1 is bit 0, and ON pulls
 /// its pin low. Positions 1 to 4 are on PA4 to PA7, 5 to 8 on PB12 to PB15.
@@ -6,9 +11,96 @@ pub(crate) const fn number(a: u32, b: u32) -> u8 {
     !((a >> 4 & 0x0F) | (b >> 8 & 0xF0)) as u8
 }
 
+/// The switch once it has read the same [`DIP_STABLE_POLLS`] times more, with `wait` in between; as it was last when
+/// that does not happen within [`DIP_POLLS`] polls.
+pub(crate) fn stable(mut read: impl FnMut() -> u8, mut wait: impl FnMut()) -> u8 {
+    let mut value = read();
+    let mut equal = 0;
+    for _ in 0..DIP_POLLS {
+        if equal == DIP_STABLE_POLLS {
+            break;
+        }
+        wait();
+        let now = read();
+        equal = if now == value { equal + 1 } else { 0 };
+        value = now;
+    }
+    value
+}
+
+/// Distinguishes a kept switch from what RAM holds after power-on.
+const MAGIC: u32 = 0xD1B5_0000;
+
+/// The switch as a word to keep: with its complement and a magic number.
+pub(crate) const fn to_word(dip: u8) -> u32 {
+    MAGIC | (!dip as u32) << 8 | dip as u32
+}
+
+/// The switch from a kept word, if it is one.
+pub(crate) const fn from_word(word: u32) -> Option<u8> {
+    if to_word(word as u8) == word {
+        Some(word as u8)
+    } else {
+        None
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    extern crate std;
+    use std::vec::Vec;
+
     use super::*;
+
+    /// The value read from these readings, the last of which goes on for ever, and how many were taken.
+    fn read(readings: &[u8]) -> (u8, usize) {
+        let mut taken = 0;
+        let value = stable(
+            || {
+                let reading = readings[taken.min(readings.len() - 1)];
+                taken += 1;
+                reading
+            },
+            || {},
+        );
+        (value, taken)
+    }
+
+    #[test]
+    fn stable_switch_is_read_for_ten_polls() {
+        assert_eq!(read(&[17]), (17, 1 + DIP_STABLE_POLLS as usize));
+    }
+
+    #[test]
+    fn bouncing_switch_is_read_once_it_is_stable() {
+        let bounces = [17, 17, 19, 17, 17, 17, 17, 17, 19, 19, 17];
+        assert_eq!(
+            read(&bounces),
+            (17, bounces.len() + DIP_STABLE_POLLS as usize)
+        );
+    }
+
+    #[test]
+    fn switch_that_never_settles_is_given_up() {
+        let bounces: Vec<u8> = (0..200).map(|n| 17 + n % 2).collect();
+        let (value, taken) = read(&bounces);
+        assert_eq!(taken, 1 + DIP_POLLS as usize);
+        assert_eq!(value, bounces[taken - 1]);
+    }
+
+    #[test]
+    fn kept_word_returns_its_switch_and_no_flipped_bit_goes_unnoticed() {
+        for dip in 0..=255 {
+            let word = to_word(dip);
+            assert_eq!(from_word(word), Some(dip));
+            for bit in 0..32 {
+                assert_eq!(from_word(word ^ 1 << bit), None, "{dip}, bit {bit}");
+            }
+        }
+        for noise in [0, u32::MAX, 0xA5A5_A5A5] {
+            assert_eq!(from_word(noise), None);
+        }
+    }
 
     #[test]
     fn every_position_is_its_own_bit_and_other_pins_do_not_count() {

@@ -4,6 +4,9 @@
 //! An operation stalls every fetch from flash, and with it every handler there: 40 to 70 us for a
 //! half-word, 20 to 40 ms for a page. Every one unlocks the controller, checks, and locks it again,
 //! whatever comes of it.
+//!
+//! Programming needs a supply of 2.0 V (DS5319 table 28). The voltage detector is looked at before every
+//! operation, and no operation begins while the supply is below its threshold ([`PVD_LEVEL`]).
 
 use core::ptr;
 
@@ -11,7 +14,7 @@ use cortex_m::asm;
 use stm32f1xx_hal::pac;
 
 use crate::{
-    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PAGE_BYTES, STORE_PAGES},
+    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PAGE_BYTES, PVD_LEVEL, STORE_PAGES},
     wait::within_us,
 };
 
@@ -40,6 +43,11 @@ pub enum FlashError {
     Locked,
     /// The operation did not end in time; it may have been done or not.
     Timeout(u32),
+    /// The controller did not report the end of the operation (EOP, PM0075 3.5); it may have been done or
+    /// not.
+    NotEnded(u32),
+    /// The supply is too low. Nothing was done; try again when it is back.
+    LowSupply,
     /// What was programmed or erased does not read back: the page is worn out.
     Worn(u32),
 }
@@ -59,6 +67,7 @@ pub fn read<const N: usize>(address: u32) -> Option<[u8; N]> {
 /// The store's pages, and the controller that changes them.
 pub struct Flash {
     flash: pac::FLASH,
+    power: pac::PWR,
 }
 
 /// What the controller is to do.
@@ -69,8 +78,19 @@ enum Mode {
 }
 
 impl Flash {
-    pub(crate) fn new(flash: pac::FLASH) -> Self {
-        Self { flash }
+    /// Turns the voltage detector on. PWR has its clock.
+    pub(crate) fn new(flash: pac::FLASH, power: pac::PWR) -> Self {
+        power
+            .cr()
+            // SAFETY: each of the field's eight values is a threshold.
+            .modify(|_, w| unsafe { w.pls().bits(PVD_LEVEL).pvde().set_bit() });
+        Self { flash, power }
+    }
+
+    /// Whether the supply is high enough for an operation.
+    #[must_use]
+    pub fn has_supply(&self) -> bool {
+        self.power.csr().read().pvdo().bit_is_clear()
     }
 
     /// The bytes of the [store's pages](STORE_PAGES).
@@ -144,9 +164,12 @@ impl Flash {
         bound_us: u32,
         act: impl FnOnce(&pac::FLASH),
     ) -> Result<(), FlashError> {
+        if !self.has_supply() {
+            return Err(FlashError::LowSupply);
+        }
         let flash = &self.flash;
         self.unlock()?;
-        // What an earlier operation left: these are taken back by writing 1.
+        // Clear what an earlier operation left, by writing 1; otherwise its EOP would count for this one.
         flash.sr().write(|w| {
             w.eop().set_bit();
             w.pgerr().set_bit().wrprterr().set_bit()
@@ -156,6 +179,10 @@ impl Flash {
             Mode::Erase => w.per().set_bit(),
         });
         act(flash);
+        // BSY rises one cycle after the operation was started (errata sheet of the medium-density parts, "Flash
+        // memory BSY bit delay versus STRT bit setting"). Without this read the first look would find it
+        // clear, and the controller would be locked in the middle of the operation.
+        let _ = flash.sr().read();
         let done = within_us(bound_us, || flash.sr().read().bsy().bit_is_clear());
         let status = flash.sr().read();
         // Every mode bit off, and locked.
@@ -168,6 +195,8 @@ impl Flash {
             Err(FlashError::Timeout(address))
         } else if status.pgerr().bit_is_set() {
             Err(FlashError::NotErased(address))
+        } else if status.eop().bit_is_clear() {
+            Err(FlashError::NotEnded(address))
         } else {
             Ok(())
         }

@@ -1,25 +1,46 @@
 //! The three status LEDs.
 
-use stm32f1xx_hal::gpio::{Output, PB8, PB9, PC13, PinState, PushPull};
+use stm32f1xx_hal::gpio::{
+    Cr, IOPinSpeed, Output, OutputSpeed, PB8, PB9, PC13, PinState, PushPull,
+};
+
+use crate::port;
+
+/// PC13's bit in the registers of port C.
+const RUN: u32 = 1 << 13;
 
 /// Line activity, fault and running.
 pub struct Leds {
     activity: PB8<Output<PushPull>>,
     fault: PB9<Output<PushPull>>,
-    run: PC13<Output<PushPull>>,
+    /// Changed through port C's registers: the HAL makes every output a 50 MHz one at first, and PC13 may not be
+    /// faster than 2 MHz, with 3 mA (DS5319 table 5, notes).
+    _run: PC13,
 }
 
 impl Leds {
+    /// All off, with the slowest edges.
     pub(crate) fn new(
-        activity: PB8<Output<PushPull>>,
-        fault: PB9<Output<PushPull>>,
-        run: PC13<Output<PushPull>>,
+        activity: PB8,
+        fault: PB9,
+        b: &mut Cr<'B', true>,
+        run: PC13,
+        _c: &mut Cr<'C', true>,
     ) -> Self {
-        Self {
+        let mut activity = activity.into_push_pull_output_with_state(b, PinState::Low);
+        activity.set_speed(b, IOPinSpeed::Mhz2);
+        let mut fault = fault.into_push_pull_output_with_state(b, PinState::Low);
+        fault.set_speed(b, IOPinSpeed::Mhz2);
+        let mut leds = Self {
             activity,
             fault,
-            run,
-        }
+            _run: run,
+        };
+        leds.set_run(false);
+        port::c()
+            .crh()
+            .modify(|_, w| w.mode13().output2().cnf13().push_pull());
+        leds
     }
 
     /// Shows traffic for this unit.
@@ -34,6 +55,8 @@ impl Leds {
 
     /// Shows that the firmware runs. This LED is wired to the supply: low lights it.
     pub fn set_run(&mut self, on: bool) {
-        self.run.set_state(PinState::from(!on));
+        let bits = if on { RUN << 16 } else { RUN };
+        // SAFETY: changes PC13 alone, which this value owns, in one store (RM0008 9.2.5).
+        port::c().bsrr().write(|w| unsafe { w.bits(bits) });
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! `board::setup` brings the clocks up, reads the DIP switch and returns one `Board` whose fields are
 //! the devices. This is the only crate that names the HAL; a port to another board is a new module
-//! beside `board`. What needs no hardware ([`design`], [`uart`], [`gap`], the logic of [`fault`] and of
+//! beside `board`. What needs no hardware ([`design`], [`uart`], [`tolerance`], [`gap`], the logic of [`fault`] and of
 //! freeing an I2C bus) is built and tested on the host.
 
 #![no_std]
@@ -12,6 +12,7 @@ pub mod fault;
 pub mod gap;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
+pub mod tolerance;
 pub mod uart;
 
 #[cfg(target_os = "none")]

@@ -44,11 +44,11 @@ const LINES: [Line; 4] = [Line(1 << 0), Line(1 << 1), Line(1 << 2), Line(1 << 3)
 const ALL: u32 = 0b1111;
 
 /// What the lines can be: four bits of CRL for each, line 1 lowest (RM0008 9.2.1). An input is pulled
-/// up or down by its output bit.
+/// up or down by its output bit. Outputs are the slowest, 2 MHz: relays and open collectors need no steep edges.
 mod modes {
     pub const ALL_PULLED: u32 = 0x8888;
-    pub const ALL_OUTPUTS: u32 = 0x3333;
-    pub const TWO_PULLED_TWO_OUTPUTS: u32 = 0x3388;
+    pub const ALL_OUTPUTS: u32 = 0x2222;
+    pub const TWO_PULLED_TWO_OUTPUTS: u32 = 0x2288;
     pub const ALL_ANALOG: u32 = 0x0000;
     pub const TWO_ANALOG: u32 = 0x4400;
     pub const MASK: u32 = 0xFFFF;
@@ -101,7 +101,8 @@ impl Slot {
         AnalogInputs::new(self.adc, lines)
     }
 
-    /// Makes the lines what `modes` says, those in `high` pulled high, the others pulled or driven low.
+    /// Makes the lines what `modes` says, those in `high` pulled high, the others pulled or driven low. Only at the
+    /// start, before any interrupt: see [`port`] for the owner of the register.
     fn configure(&mut self, modes: u32, high: u32) {
         drive(high, ALL & !high);
         // SAFETY: the lines' own bits, which are one of the above; the others stay.

@@ -1,10 +1,11 @@
-//! The independent watchdog: resets the device when it is not fed, even with the main clock dead.
+//! The independent watchdog: resets the device when it is not fed, even with the main clock dead. It runs from
+//! the first steps of a start on.
 //! Driven through its registers, because the HAL's panics and waits without a bound.
 
 use stm32f1xx_hal::pac;
 
 use crate::{
-    design::{WATCHDOG_RELOAD, WATCHDOG_SETTINGS_US},
+    design::{WATCHDOG_RELOAD, WATCHDOG_SETTINGS_US, WATCHDOG_START_RELOAD},
     wait::within_us,
 };
 
@@ -13,31 +14,45 @@ const FEED: u16 = 0xAAAA;
 const OPEN: u16 = 0x5555;
 const START: u16 = 0xCCCC;
 
-/// The watchdog; running once started, until the next reset.
+/// The watchdog, running until the next reset.
 pub struct Watchdog {
     iwdg: pac::IWDG,
 }
 
 impl Watchdog {
-    /// It stops while a debugger has halted the core.
-    pub(crate) fn new(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
+    /// Starts it with the long period of the start-up, [`WATCHDOG_START_MS`](crate::design::WATCHDOG_START_MS), so
+    /// that a start that hangs is reset, too. It stops while a debugger has halted the core.
+    pub(crate) fn start(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
         debug.cr().modify(|_, w| w.dbg_iwdg_stop().set_bit());
-        Self { iwdg }
+        let mut watchdog = Self { iwdg };
+        // The start also turns the LSI on, which copies the settings.
+        watchdog.tell(START);
+        watchdog.tell(OPEN);
+        watchdog.iwdg.pr().write(|w| w.pr().divide_by16());
+        watchdog
+            .iwdg
+            .rlr()
+            .write(|w| w.rl().set(WATCHDOG_START_RELOAD));
+        watchdog.reload_when_set();
+        watchdog
     }
 
-    /// Starts it: from now on it must be fed every [`WATCHDOG_MS`](crate::design::WATCHDOG_MS)
-    /// milliseconds.
-    pub fn start(&mut self) {
-        // Starting also starts the oscillator that the settings are taken over by.
-        self.tell(START);
+    /// Sets the period of the running device: from now on the watchdog must be refreshed every
+    /// [`WATCHDOG_MS`](crate::design::WATCHDOG_MS) milliseconds.
+    pub fn arm(&mut self) {
+        // PVU and RVU are clear: `start` has waited for that, so PR and RLR may be written (RM0008 19.4.4).
         self.tell(OPEN);
         self.iwdg.pr().write(|w| w.pr().divide_by8());
         self.iwdg.rlr().write(|w| w.rl().set(WATCHDOG_RELOAD));
+        self.reload_when_set();
+    }
+
+    /// Waits until the settings are in force, then reloads the counter. An earlier reload would use the old value.
+    fn reload_when_set(&mut self) {
         within_us(WATCHDOG_SETTINGS_US, || {
             let busy = self.iwdg.sr().read();
             busy.pvu().bit_is_clear() && busy.rvu().bit_is_clear()
         });
-        // Should they still not be taken over, the first period is 410 ms instead.
         self.feed();
     }
 

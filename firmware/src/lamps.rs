@@ -24,7 +24,7 @@ pub enum Trouble {
     NoAddress,
     /// The slot's module does not answer.
     Module,
-    /// The crystal did not start: the clock is 1 % off at worst.
+    /// The crystal does not run: the clock is 2.5 % off at worst.
     NoCrystal,
     /// Nothing.
     None,

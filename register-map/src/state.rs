@@ -30,6 +30,8 @@ pub mod status {
     pub const RESTART_NEEDED: u16 = 1 << 4;
     /// The configuration is unlocked.
     pub const UNLOCKED: u16 = 1 << 5;
+    /// The crystal does not run; the internal oscillator is in use.
+    pub const INTERNAL_OSCILLATOR: u16 = 1 << 6;
 }
 
 /// The bits of RESET_CAUSE: the flags of the RCC (RM0008 7.3.10, from bit 26 on), the highest first.
@@ -68,7 +70,7 @@ block! {
     /// Time since the start, high word first
     UPTIME "uptime": 0x0208 x 2, "s", READ, &[];
     /// Bit 0 communication watchdog tripped, 1 stored configuration was invalid (defaults in force), 2 a module has a fault,
-    /// 3 configuration changed but not saved, 4 a saved change waits for a restart, 5 configuration unlocked
+    /// 3 configuration changed but not saved, 4 a saved change waits for a restart, 5 configuration unlocked, 6 internal oscillator in use
     STATUS "status": 0x020A x 1, "", READ, &[];
     /// Least stack that has been left free since the start
     STACK_FREE "free stack": 0x020B x 1, "bytes", READ, &[];

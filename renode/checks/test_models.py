@@ -120,6 +120,16 @@ class Flash(unittest.TestCase):
         self.flash.write(self.SR, 0x34)
         self.assertEqual(self.flash.read(self.SR), 0)
 
+    def test_programming_ends_with_eop_which_is_cleared_by_writing_one(self):
+        self.unlock()
+        self.flash.write(self.SR, 0x34)
+        self.assertEqual(self.flash.read(self.SR), 0)
+        self.flash.modify(self.CR, self.PG)
+        self.assertEqual(self.flash.read(self.SR), self.EOP)
+        self.flash.write(self.CR, self.LOCK)
+        self.flash.write(self.SR, 0x34)
+        self.assertEqual(self.flash.read(self.SR), 0)
+
     def test_the_lock_bit_locks_and_takes_the_mode_away(self):
         self.unlock()
         self.flash.modify(self.CR, self.PG)

@@ -24,6 +24,10 @@ elif request.IsRead:
     if offset == 0x00:
         request.Value = acr
     elif offset == 0x0C:
+        # A store of a half-word does not come this way. While PG is set, one has been made by the time the
+        # status is read, and it has ended.
+        if cr & 0x01:
+            sr |= 0x20
         request.Value = sr
     elif offset == 0x10:
         request.Value = cr

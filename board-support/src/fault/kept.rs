@@ -2,6 +2,8 @@
 
 use core::{array, cell::UnsafeCell, mem::MaybeUninit, ptr, sync::atomic::AtomicU8};
 
+use crate::dip;
+
 use super::{
     Fault, FaultRecord, TASKS,
     record::{Noted, WORDS},
@@ -13,11 +15,12 @@ struct Kept {
     record: [u32; WORDS],
     uptime: u32,
     marks: [AtomicU8; TASKS],
+    dip: u32,
 }
 
 struct Place(UnsafeCell<MaybeUninit<Kept>>);
 
-// SAFETY: record and uptime are accessed by the functions of this module alone, by single volatile
+// SAFETY: record, uptime and dip are accessed by the functions of this module alone, by single volatile
 // accesses of a word, which cannot be torn. They may come between each other: a fault handler stops
 // whatever it interrupts for good. The marks are atomics.
 unsafe impl Sync for Place {}
@@ -44,10 +47,10 @@ fn write(noted: &Noted) {
 
 /// Takes the record of what went wrong before this start, and starts a new account: a power-on clears
 /// it, a watchdog's bite is noted when nothing else was. `reset_cause` as
-/// [`Board::reset_cause`](crate::board::Board::reset_cause) has it. To be called once at every start,
-/// before the marks and the uptime are kept.
+/// [`Board::reset_cause`](crate::board::Board::reset_cause) has it. The board calls this once at every start,
+/// before it starts the crystal: how often that has failed is in the record.
 #[must_use]
-pub fn take_at_start(reset_cause: u8) -> FaultRecord {
+pub(crate) fn take_at_start(reset_cause: u8) -> FaultRecord {
     // SAFETY: as in `read`; bytes and words may hold anything.
     let (uptime, marks) = unsafe {
         (
@@ -85,6 +88,18 @@ pub fn note(fault: Fault) {
 pub fn keep_uptime(seconds: u32) {
     // SAFETY: as in `write`.
     unsafe { ptr::write_volatile(&raw mut (*place()).uptime, seconds) };
+}
+
+/// The DIP switch as it was read at power-on; `None` when nothing valid is kept.
+pub(crate) fn kept_dip() -> Option<u8> {
+    // SAFETY: as in `read`; a word may hold anything.
+    dip::from_word(unsafe { ptr::read_volatile(&raw const (*place()).dip) })
+}
+
+/// Keeps the DIP switch over resets.
+pub(crate) fn keep_dip(dip: u8) {
+    // SAFETY: as in `write`.
+    unsafe { ptr::write_volatile(&raw mut (*place()).dip, dip::to_word(dip)) };
 }
 
 /// The marks of the tasks, all 0 after [`take_at_start`]. Once the watchdog has bitten, the next start

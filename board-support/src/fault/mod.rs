@@ -6,9 +6,11 @@
 //! the next start finds it: the uptime (`keep_uptime`) and the marks of its tasks (`marks`).
 //!
 //! ```text
-//! word  0      1            2      3   4   5     6        7       8
-//!       magic  kind, fresh  count  pc  lr  CFSR  address  uptime  checksum    the record
+//! word  0      1                  2      3   4   5     6        7       8
+//!       magic  kind, fresh,       count  pc  lr  CFSR  address  uptime  checksum    the record
+//!              crystal faults
 //!       uptime              marks                                             kept up to date
+//!       DIP switch                                                            written at power-on
 //! ```
 
 #[cfg(target_os = "none")]
@@ -17,7 +19,9 @@ mod kept;
 mod record;
 
 #[cfg(target_os = "none")]
-pub use kept::{keep_uptime, marks, note, take_at_start};
+pub(crate) use kept::{keep_dip, kept_dip, take_at_start};
+#[cfg(target_os = "none")]
+pub use kept::{keep_uptime, marks, note};
 
 /// Tasks that leave a mark.
 pub const TASKS: usize = 4;
@@ -67,6 +71,8 @@ pub struct FaultRecord {
     pub uptime: u32,
     /// After a watchdog's bite: the tasks that had left no mark, a bit for each.
     pub missing: u16,
+    /// Number of times the crystal has failed since power-on, at most 255.
+    pub crystal_faults: u8,
 }
 
 /// Tells a stack overflow from other hard faults: by the stack pointer that the exception left behind

@@ -9,6 +9,8 @@ pub(super) const WORDS: usize = 9;
 const MAGIC: u32 = 0x4661_7501;
 /// Bit in the second word, over the kind: noted since the last start.
 const FRESH: u32 = 1 << 16;
+/// Place of the count of crystal faults in the second word: its highest byte.
+const CRYSTAL_FAULTS: u32 = 24;
 
 /// Bits of the reset cause (RM0008 7.3.10, from LPWRRSTF on).
 const BY_WATCHDOG: u8 = 1 << 2;
@@ -48,10 +50,12 @@ impl Noted {
             count,
             uptime,
             missing,
+            crystal_faults,
         } = self.record;
+        let fresh = if self.fresh { FRESH } else { 0 };
         let mut words = [
             MAGIC,
-            fault.kind as u32 | if self.fresh { FRESH } else { 0 },
+            fault.kind as u32 | fresh | u32::from(crystal_faults) << CRYSTAL_FAULTS,
             u32::from(count) | u32::from(missing) << 16,
             fault.pc,
             fault.lr,
@@ -83,6 +87,7 @@ impl Noted {
                 count: count as u16,
                 uptime,
                 missing: (count >> 16) as u16,
+                crystal_faults: (kind >> CRYSTAL_FAULTS) as u8,
             },
             fresh: kind & FRESH != 0,
         })
@@ -92,11 +97,13 @@ impl Noted {
     pub(super) fn add(&mut self, fault: Fault, uptime: u32, missing: u16) {
         if !self.fresh {
             self.fresh = true;
+            let more = u8::from(fault.kind == Kind::Crystal);
             self.record = FaultRecord {
                 fault,
                 count: self.record.count.saturating_add(1),
                 uptime,
                 missing,
+                crystal_faults: self.record.crystal_faults.saturating_add(more),
             };
         }
     }
@@ -248,6 +255,25 @@ mod tests {
         let after = at_start(&noted().words(), BY_SOFTWARE, 0, [1; TASKS]);
         let then = with(after, second, 5);
         assert_eq!((then.record.fault, then.record.count), (second, 2));
+    }
+
+    #[test]
+    fn crystal_faults_are_counted_among_others_until_power_on() {
+        let crystal = Fault {
+            kind: Kind::Crystal,
+            ..Fault::default()
+        };
+        let mut words = Noted::default().words();
+        for (fault, count) in [(crystal, 1), (fault(), 1), (crystal, 2)] {
+            let start = at_start(&words, BY_SOFTWARE, 0, [1; TASKS]);
+            let noted = with(start, fault, 5);
+            assert_eq!(noted.record.crystal_faults, count);
+            words = noted.words();
+        }
+        let start = at_start(&words, BY_SOFTWARE, 0, [1; TASKS]);
+        assert_eq!((start.record.crystal_faults, start.record.count), (2, 3));
+        let start = at_start(&words, BY_POWER_ON, 0, [1; TASKS]);
+        assert_eq!(start.record.crystal_faults, 0);
     }
 
     #[test]

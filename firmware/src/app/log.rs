@@ -1,7 +1,7 @@
 //! The log: lines on RTT channel 0, for a probe or the simulator. When nobody reads, what no longer
 //! fits is left out; nothing ever waits.
 
-use board_support::{ClockSource, fault};
+use board_support::{ClockSource, design::CRYSTAL_FAULTS, fault, tolerance, uart};
 use firmware::{config, start_up::Address};
 use heapless::Vec;
 use modio_drivers::ModuleError;
@@ -28,6 +28,8 @@ pub enum Event {
     SaveFailed,
     /// The line's registers were disturbed, or a reply did not end: the line was set up again.
     LineRepaired,
+    /// The supply is too low for the flash: a save, or an erase at the start, waits for it.
+    LowSupply,
 }
 
 /// What is known when the device starts.
@@ -35,10 +37,12 @@ pub struct Start {
     pub address: Address,
     pub dip: u8,
     pub line: config::Line,
+    /// The same, as the UART has it.
+    pub on_wire: uart::LineSettings,
     pub module: Module,
     pub clock: ClockSource,
     pub reset_cause: u8,
-    pub fault: fault::Kind,
+    pub faults: fault::FaultRecord,
     pub config_invalid: bool,
 }
 
@@ -122,7 +126,7 @@ impl Log {
                 self.write(Line::of("reset: ").text(cause));
             }
         }
-        let fault = match start.fault {
+        let fault = match start.faults.fault.kind {
             fault::Kind::None => None,
             fault::Kind::Panic => Some("panic"),
             fault::Kind::HardFault => Some("hard fault"),
@@ -135,8 +139,16 @@ impl Log {
             self.write(line.text(fault));
         }
         if start.clock == ClockSource::Internal {
-            let text = "the crystal did not start: internal oscillator";
+            let text = if start.faults.crystal_faults < CRYSTAL_FAULTS {
+                "the crystal did not start: internal oscillator"
+            } else {
+                "the crystal failed twice: internal oscillator until power-on"
+            };
             self.write(&mut Line::of(text));
+            if !tolerance::internal_oscillator_serves(start.on_wire) {
+                let text = "warning: too fast for the internal oscillator at all temperatures";
+                self.write(&mut Line::of(text));
+            }
         }
         match start.address {
             Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
@@ -168,6 +180,7 @@ impl Log {
             Event::Saved => "configuration saved",
             Event::SaveFailed => "configuration: the flash does not take it",
             Event::LineRepaired => "line: set up again after a disturbance",
+            Event::LowSupply => "configuration: the supply is too low, the flash has to wait",
         };
         self.write(&mut Line::of(text));
     }
@@ -189,6 +202,7 @@ pub fn fault_words(record: &fault::FaultRecord) -> [u16; 16] {
         count,
         uptime,
         missing,
+        crystal_faults: _,
     } = *record;
     [
         fault.kind as u16,

@@ -103,7 +103,7 @@ mod app {
         let mut started = start::up(cx.device, cx.local.adus, cx.local.device);
         let (events, logged) = cx.local.queue.split();
         started.scan_timer.start();
-        started.watchdog.start();
+        started.watchdog.arm();
         let settings = *started.device.points.settings();
         (
             Shared {

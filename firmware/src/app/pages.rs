@@ -26,6 +26,13 @@ const fn address(page: Page) -> u32 {
     }
 }
 
+impl Pages {
+    /// Whether the supply is high enough to change the pages.
+    pub fn has_supply(&self) -> bool {
+        self.0.has_supply()
+    }
+}
+
 impl store::Flash for Pages {
     type Error = FlashError;
 

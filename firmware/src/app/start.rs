@@ -2,13 +2,13 @@
 
 use core::mem::MaybeUninit;
 
-use board_support::{Leds, ScanTimer, Watchdog, board, fault, pac, uart};
+use board_support::{Leds, ScanTimer, Watchdog, board, flash::FlashError, pac, uart};
 use firmware::{
     config::{self, Config},
     device::{Device, Identity},
     lamps::Trouble,
     start_up::{self, Address},
-    store::Store,
+    store::{Store, StoreError},
 };
 use modbus_server::{
     Adu, Server,
@@ -51,7 +51,6 @@ pub fn up(
 ) -> Started {
     let mut log = Log::new();
     let board = board::setup(device);
-    let record = fault::take_at_start(board.reset_cause);
     let address = Address::from_dip(board.dip);
 
     let mut pages = Pages(board.flash);
@@ -60,6 +59,7 @@ pub fn up(
     let config = Config::new(loaded.settings, loaded.invalid || loaded.rejected > 0);
     let slot = config.slot();
     let settings = start_up::line(address, config.line());
+    let on_wire = wire_settings(settings);
 
     let mut module = Installed::new(slot.module, board.slot);
     let analog_outputs = AnalogOutputs::of(slot.module, board.dac);
@@ -67,7 +67,8 @@ pub fn up(
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
         unique_id: board.unique_id,
-        fault: log::fault_words(&record),
+        fault: log::fault_words(&board.faults),
+        internal_oscillator: !board.clock.is_crystal(),
     };
     let device = place.write(Device::new(module.kinds(), config, identity));
     module.configure(device.points.settings());
@@ -78,22 +79,27 @@ pub fn up(
         address,
         dip: board.dip,
         line: settings,
+        on_wire,
         module: slot.module,
         clock: board.clock,
         reset_cause: board.reset_cause,
-        fault: record.fault.kind,
+        faults: board.faults,
         config_invalid: loaded.invalid,
     });
     // Erases, where it has to: the line is not served yet.
-    if store.prepare(&mut pages).is_err() {
-        log.event(log::Event::SaveFailed);
+    let prepared = store.prepare(&mut pages);
+    match prepared {
+        Ok(()) => {}
+        Err(StoreError::Flash(_, FlashError::LowSupply)) => log.event(log::Event::LowSupply),
+        Err(_) => log.event(log::Event::SaveFailed),
     }
+    // An erase that is still missing is done while a master waits for a reply, as after a change of pages.
+    let erase = prepared.is_err() && !store.has_spare();
 
     let framing = match settings.mode {
         Mode::Rtu => Framing::Rtu,
         Mode::Ascii => Framing::ASCII,
     };
-    let on_wire = wire_settings(settings);
     let gaps = Gaps::standard(on_wire.baud, on_wire.format.bits() as u8);
     let t35 = settings
         .frame_gap
@@ -119,7 +125,7 @@ pub fn up(
         device,
         module,
         analog_outputs,
-        persistence: Persistence::new(store, pages),
+        persistence: Persistence::new(store, pages, erase),
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
         leds: board.leds,

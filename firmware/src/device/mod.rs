@@ -178,6 +178,10 @@ impl Device {
         self.config.status()
             | bit(status::COMM_WATCHDOG, self.comm_watchdog.has_tripped())
             | bit(status::MODULE_FAULT, self.points.has_fault())
+            | bit(
+                status::INTERNAL_OSCILLATOR,
+                self.state.on_internal_oscillator(),
+            )
     }
 
     fn state_word(&self, address: u16) -> u16 {

@@ -24,6 +24,8 @@ pub struct Identity {
     pub unique_id: [u16; 6],
     /// The fault record as registers, from 0x0260 on.
     pub fault: [u16; fault_words()],
+    /// The core runs on the internal oscillator.
+    pub internal_oscillator: bool,
 }
 
 const fn fault_words() -> usize {
@@ -96,6 +98,12 @@ impl State {
     #[must_use]
     pub const fn millis(&self) -> u32 {
         self.millis
+    }
+
+    /// Whether the core runs on the internal oscillator.
+    #[must_use]
+    pub const fn on_internal_oscillator(&self) -> bool {
+        self.identity.internal_oscillator
     }
 
     /// Seconds since the start.

@@ -39,6 +39,7 @@ impl Bench {
             reset_cause: 0b11_0000,
             unique_id: [1, 2, 3, 4, 5, 6],
             fault: [3; 16],
+            internal_oscillator: false,
         };
         Self {
             device: Device::new(kinds(module), Config::new(settings, false), identity),

@@ -76,6 +76,11 @@ impl Board {
         self.machine.bus.soc.flash.durations = durations;
     }
 
+    /// The `nth` flash operation from now (1 = the next) ends without the EOP flag.
+    pub fn end_without_eop(&mut self, nth: u64) {
+        self.machine.bus.soc.flash.end_without_eop(nth);
+    }
+
     /// What a power cut in the middle of a flash operation leaves from now on.
     pub fn set_torn(&mut self, torn: Torn) {
         self.machine.bus.soc.flash.torn = torn;

@@ -46,6 +46,27 @@ impl Board {
         self.machine.bus.soc.set_crystal(works, now);
     }
 
+    /// The supply of the part, in millivolts.
+    #[must_use]
+    pub fn supply_mv(&self) -> u16 {
+        self.machine.bus.soc.pwr.supply_mv()
+    }
+
+    /// Sets the supply of the part. It stays so over a power cycle.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Range`] outside the part's 2000 to 3600 mV (DS5319 table 9): below them it is reset, for
+    /// which there is [`Board::power_off`].
+    pub fn set_supply_mv(&mut self, millivolts: u16) -> Result<(), Error> {
+        if !(2000..=3600).contains(&millivolts) {
+            return Err(Error::Range("the supply is 2000 to 3600 mV"));
+        }
+        self.sync();
+        self.machine.bus.soc.pwr.set_supply_mv(millivolts);
+        Ok(())
+    }
+
     /// What is plugged into the slot.
     #[must_use]
     pub fn module(&self) -> Module {

@@ -225,7 +225,13 @@ impl Machine {
             budget = budget.min(1);
         }
         let budget = u32::try_from(budget).unwrap_or(u32::MAX);
-        self.core.run(budget.max(1), &mut self.bus).0
+        let busy = self.bus.soc.flash.busy_until().is_some();
+        let exit = self.core.run(budget.max(1), &mut self.bus).0;
+        if busy {
+            let ran = self.core.retired() - count;
+            self.bus.soc.flash.ran(ran);
+        }
+        exit
     }
 
     /// The earliest instant at which anything but an instruction happens; [`Time::MAX`] for never.
@@ -253,7 +259,7 @@ impl Machine {
         self.bus
             .soc
             .flash
-            .busy_until()
+            .stalled_until()
             .filter(|_| is_flash(self.pc()))
             .map(|end| (end, Rest::Stalled))
     }

@@ -10,6 +10,7 @@ pub mod gpio;
 pub mod i2c;
 pub mod ident;
 pub mod iwdg;
+pub mod pwr;
 pub mod rcc;
 pub mod timer;
 pub mod usart;

@@ -38,10 +38,12 @@ pub enum Block {
     Rcc,
     /// Flash interface.
     Flash,
+    /// Power control.
+    Pwr,
 }
 
 /// How many blocks there are.
-pub const BLOCKS: usize = 17;
+pub const BLOCKS: usize = 18;
 
 /// What answers at an address of the peripheral region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +82,7 @@ const PLACES: [(u32, Place); 34] = {
         (0x4000_6000, Absent("USB/CAN SRAM")),
         (0x4000_6400, Absent("CAN")),
         (0x4000_6C00, Absent("BKP")),
-        (0x4000_7000, Absent("PWR")),
+        (0x4000_7000, Place::Block(B::Pwr)),
         (0x4001_0000, Place::Block(B::Afio)),
         (0x4001_0400, Place::Block(B::Exti)),
         (0x4001_0800, Place::Block(B::GpioA)),
@@ -155,6 +157,7 @@ impl Block {
         Self::Usart1,
         Self::Rcc,
         Self::Flash,
+        Self::Pwr,
     ];
 
     /// The block whose clock and reset are bit `bit` of RCC's registers for APB2 (0) or APB1 (1).
@@ -183,6 +186,7 @@ impl Block {
             Self::Tim4 => (1, 2),
             Self::Usart3 => (1, 18),
             Self::I2c1 => (1, 21),
+            Self::Pwr => (1, 28),
             Self::Iwdg | Self::Exti | Self::Rcc | Self::Flash => return None,
         })
     }
@@ -199,7 +203,8 @@ impl Block {
             | Self::Iwdg
             | Self::Usart1
             | Self::Usart3
-            | Self::I2c1 => Widths::HalfWord,
+            | Self::I2c1
+            | Self::Pwr => Widths::HalfWord,
             Self::Afio
             | Self::Exti
             | Self::GpioA
@@ -232,6 +237,7 @@ impl Block {
             Self::Usart1 => "USART1",
             Self::Rcc => "RCC",
             Self::Flash => "FLASH",
+            Self::Pwr => "PWR",
         }
     }
 }

@@ -18,6 +18,7 @@ use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
 use crate::periph::i2c::{I2c, Wires};
 use crate::periph::iwdg::Iwdg;
+use crate::periph::pwr::Pwr;
 use crate::periph::rcc::{Cause, Rcc};
 use crate::periph::timer::{Kind, Timer};
 use crate::periph::usart::Usart;
@@ -39,6 +40,8 @@ pub struct Soc {
     pub line: Line,
     /// The slot and what is plugged into it.
     pub slot: Slot,
+    /// Power control, with the supply's voltage.
+    pub pwr: Pwr,
     afio: Afio,
     exti: Exti,
     iwdg: Iwdg,
@@ -95,9 +98,11 @@ impl Soc {
             rcc,
             flash,
             flash_access,
-            gpio: Default::default(),
+            // PC13 to PC15 are fed through a switch for 3 mA: 2 MHz at most (DS5319 table 5, notes).
+            gpio: [0, 0, 0xE000, 0].map(Gpio::with_slow_pins),
             line: Line::default(),
             slot,
+            pwr: Pwr::default(),
             afio: Afio::default(),
             exti: Exti::default(),
             iwdg: Iwdg::default(),
@@ -384,6 +389,7 @@ impl Soc {
             Block::Usart1 => &mut self.usart1,
             Block::Rcc => &mut self.rcc,
             Block::Flash => &mut self.flash,
+            Block::Pwr => &mut self.pwr,
         }
     }
 }

@@ -96,3 +96,77 @@ fn the_same_inputs_give_the_same_run_to_the_instruction() {
     };
     assert!(run() == run());
 }
+
+/// Code that leaves the crystal and the PLL running, as a boot loader may, and goes on to the image: HSE on, the PLL
+/// at HSE x4, then a branch to the address in the last word.
+fn boot_loader(entry: u32) -> Vec<u8> {
+    let code: [u16; 18] = [
+        0x4808, // ldr r0, RCC
+        0x4909, // ldr r1, HSEON
+        0x6001, // str r1, [r0]
+        0x6802, 0x0392, 0xD5FC, // ldr r2, [r0]; lsls r2, #14; bpl: until HSERDY
+        0x4907, // ldr r1, CFGR
+        0x6041, // str r1, [r0, #4]
+        0x4907, // ldr r1, PLLON
+        0x6001, // str r1, [r0]
+        0x6802, 0x0192, 0xD5FC, // until PLLRDY
+        0x4B06, // ldr r3, entry
+        0x4718, // bx r3
+        0xBF00, 0xBF00, 0xBF00,
+    ];
+    let words = [
+        0x4002_1000,
+        0x0001_0083,
+        0x0009_0000,
+        0x0101_0083,
+        entry | 1,
+    ];
+    let code = code.iter().flat_map(|half| half.to_le_bytes());
+    let words = words.iter().flat_map(|word: &u32| word.to_le_bytes());
+    code.chain(words).collect()
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn image_entered_with_the_pll_running_waits_for_its_end_before_setting_it_up() {
+    const LOADER: u32 = 0x2000_4800;
+    let mut bench = Bench::cold(Config {
+        flash: Some(flash_with(Module::Di4)),
+        ..Config::default()
+    });
+    let entry = bench.board.word(0x0800_0004).unwrap() & !1;
+    bench
+        .board
+        .write_memory(LOADER, &boot_loader(entry))
+        .unwrap();
+    bench.board.set_register(15, LOADER).unwrap();
+    bench.board.run_for(Time::from_ms(150));
+    assert_eq!(bench.board.hclk(), 72_000_000);
+    bench.assert_answers(1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn start_that_hangs_is_reset_by_the_watchdog() {
+    let mut bench = Bench::cold(Config {
+        flash: Some(flash_with(Module::Di4)),
+        ..Config::default()
+    });
+    bench.tolerant = true;
+    // The stack has been painted, and the crystal is starting.
+    bench.board.run_until(Time::from_us(5_000));
+    let (hung, from) = (bench.board.pc(), bench.board.now());
+    let at = (hung - 0x0800_0000) as usize;
+    let was = bench.board.flash()[at..at + 2].to_vec();
+    bench.board.patch_code(hung, &[0xFE, 0xE7]).unwrap();
+    while bench.board.resets() == 0 {
+        bench.board.run_for(Time::from_ms(1));
+        let hangs = bench.board.now() - from;
+        assert!(hangs < Time::from_ms(1_300), "it hangs for ever");
+    }
+    assert!(bench.board.now() - from > Time::from_ms(1_000));
+    bench.board.patch_code(hung, &was).unwrap();
+    bench.started();
+    assert_eq!(bench.board.resets(), 1);
+    assert_eq!(bench.register(0x0207) & 4, 4, "the watchdog");
+}

@@ -4,6 +4,9 @@ use sim::{Config, Module, Time};
 
 use crate::bench::{Bench, adu, flash_with_settings, format};
 
+/// The status bit for the internal oscillator.
+const INTERNAL: u16 = 1 << 6;
+
 /// The fault record's kind for a crystal that failed.
 const CRYSTAL: u16 = 4;
 
@@ -92,4 +95,69 @@ fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
     assert!(!bench.board.take_log().contains("crystal did not start"));
     assert_eq!(bench.board.hclk(), 72_000_000);
     assert_rate(&mut bench);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn crystal_that_fails_after_each_start_is_given_up_after_two_faults_until_power_on() {
+    // Output 1 is on by START.
+    let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152), (0x01F0, 1)]);
+    bench.tolerant = true;
+    assert!(!bench.status(INTERNAL));
+    bench.board.watch_pin('A', 0);
+    for fault in 1..=2 {
+        bench.board.run_for(Time::from_ms(100));
+        assert_eq!(bench.board.hclk(), 72_000_000, "fault {fault}");
+        bench.board.set_crystal(false);
+        bench.board.run_for(Time::from_ms(1));
+        bench.board.set_crystal(true);
+        bench.board.run_for(Time::from_ms(200));
+        assert_eq!(bench.board.resets(), fault);
+    }
+    assert_eq!(bench.board.hclk(), 60_000_000);
+    for _ in 0..10 {
+        bench.board.set_crystal(false);
+        bench.board.run_for(Time::from_ms(100));
+        bench.board.set_crystal(true);
+        bench.board.run_for(Time::from_ms(100));
+    }
+    assert_eq!(bench.board.resets(), 2);
+    // Off at a fault, on at the start after it, and not again.
+    let levels = bench.board.pin_edges('A', 0).iter().map(|edge| edge.1);
+    assert_eq!(levels.collect::<Vec<_>>(), [false, true, false, true]);
+    bench.board.line().take_received();
+    assert_rate(&mut bench);
+    assert!(bench.status(INTERNAL));
+    assert_eq!(
+        (bench.register(0x0260), bench.register(0x0261)),
+        (CRYSTAL, 2)
+    );
+    let log = bench.board.take_log();
+    assert!(log.contains("crystal failed twice"), "{log}");
+    // A reset by software does not forget the faults, a power-on does.
+    bench.restart();
+    assert_eq!(bench.board.hclk(), 60_000_000);
+    assert!(bench.status(INTERNAL));
+    bench.power_cycle();
+    assert_eq!(bench.board.hclk(), 72_000_000);
+    assert!(!bench.status(INTERNAL));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn rate_too_fast_for_the_internal_oscillator_is_logged() {
+    // Format 0 is 8N2, 1 is 8E1.
+    for (baud, code, warned) in [
+        (192, 1, false),
+        (384, 1, true),
+        (2304, 0, false),
+        (4608, 0, true),
+        (9216, 0, true),
+    ] {
+        let mut bench = without_crystal(&[(0x0101, baud), (0x0102, code)]);
+        bench.board.run_for(Time::from_ms(300));
+        let log = bench.board.take_log();
+        let found = log.contains("too fast for the internal oscillator");
+        assert_eq!(found, warned, "{baud}00, format {code}: {log}");
+    }
 }

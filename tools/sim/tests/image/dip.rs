@@ -1,8 +1,8 @@
 //! SW01.
 
-use sim::{Module, Time};
+use sim::{Config, Module, Time};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, flash_with};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -68,4 +68,72 @@ fn the_switch_counts_at_power_on_only() {
     bench.board.run_for(Time::from_ms(150));
     bench.assert_answers(18);
     assert_eq!(bench.ask(17, &[1, 0, 0x10, 0, 4]), None);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn switch_that_bounces_at_power_on_is_read_once_it_is_stable() {
+    let mut bench = Bench::cold(Config {
+        dip: 17,
+        flash: Some(flash_with(Module::Di4)),
+        ..Config::default()
+    });
+    for (until_ms, dip) in [(4, 17), (9, 19), (10, 17), (12, 19), (15, 17), (18, 16)] {
+        bench.board.set_dip(dip);
+        bench.board.run_until(Time::from_ms(until_ms));
+    }
+    bench.board.set_dip(17);
+    bench.board.run_until(Time::from_ms(150));
+    bench.assert_answers(17);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn switch_that_never_is_stable_does_not_keep_the_unit_from_starting() {
+    let mut bench = Bench::cold(Config {
+        dip: 17,
+        flash: Some(flash_with(Module::Di4)),
+        ..Config::default()
+    });
+    while bench.board.now() < Time::from_ms(150) {
+        let even = (bench.board.now().as_us() / 2_000).is_multiple_of(2);
+        bench.board.set_dip(if even { 19 } else { 17 });
+        bench.board.run_for(Time::from_us(500));
+    }
+    let log = bench.board.take_log();
+    assert!(log.contains("unit address 1"), "{log}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn reset_of_any_kind_keeps_the_address_of_power_on() {
+    let mut bench = Bench::new(Module::Di4, 17);
+    bench.tolerant = true;
+    bench.board.set_dip(18);
+    // By software: COMMAND 2.
+    bench.ask(17, &[6, 1, 0, 0x5A, 0x17]).unwrap();
+    bench.ask(17, &[6, 1, 8, 0, 2]).unwrap();
+    bench.started();
+    assert_eq!(bench.board.resets(), 1);
+    bench.assert_answers(17);
+    // By the pin.
+    bench.board.reset();
+    bench.started();
+    assert_eq!(bench.board.resets(), 2);
+    bench.assert_answers(17);
+    // By the watchdog: the scan hangs.
+    let scan = bench.board.symbol("TIM4").expect("the handler") & !1;
+    let at = (scan - 0x0800_0000) as usize;
+    let was = bench.board.flash()[at..at + 2].to_vec();
+    bench.board.patch_code(scan, &[0xFE, 0xE7]).unwrap();
+    while bench.board.resets() == 2 {
+        bench.board.run_for(Time::from_ms(1));
+    }
+    bench.board.patch_code(scan, &was).unwrap();
+    bench.started();
+    bench.assert_answers(17);
+    assert_eq!(bench.ask(18, &[1, 0, 0x10, 0, 4]), None);
+    bench.board.cycle();
+    bench.started();
+    bench.assert_answers(18);
 }

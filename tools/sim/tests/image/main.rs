@@ -8,7 +8,7 @@
 //! | a board and its master | `bench`, `registers` |
 //! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
-//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `power_cut`, `erase_cut` |
+//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults` |
 
 mod analog_inputs;
@@ -23,6 +23,7 @@ mod dac_faults;
 mod dip;
 mod erase_cut;
 mod faults;
+mod flash_faults;
 mod framing;
 mod functions;
 mod hung_task;

@@ -49,7 +49,7 @@ fn bit_banding_reaches_single_bits_of_peripherals_and_sram() {
     program.store(0x2200_0000, 1);
     program.store(0x2200_0000 + 7 * 4, 0);
     program.store(bit_band(RCC_APB2ENR, 4), 1);
-    program.store(GPIOC + 4, 0x4434_4444);
+    program.store(GPIOC + 4, 0x4424_4444);
     program.store(bit_band(GPIOC + 0x0C, 13), 1);
     program.copy(RCC_APB2ENR, OUT + 4);
     program.copy(bit_band(GPIOC + 8, 13), OUT + 8);
@@ -165,7 +165,7 @@ fn deeper_sleep_than_sleep_is_reported() {
 fn systick_program(fast: bool) -> Asm {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 1 << 4);
-    program.store(GPIOC + 4, 0x4434_4444);
+    program.store(GPIOC + 4, 0x4424_4444);
     if fast {
         program.store(FLASH_ACR, 0x12);
         program.store(RCC_CR, 0x1_0083);

@@ -192,7 +192,7 @@ fn a_timer_interrupt_comes_on_time_and_wakes_the_core() {
     let mut program = Asm::new();
     program.store(RCC_APB1ENR, 1);
     program.store(RCC_APB2ENR, 1 << 4);
-    program.store(GPIOC + 4, 0x4434_4444);
+    program.store(GPIOC + 4, 0x4424_4444);
     program.store(TIM2 + 0x28, 7);
     program.store(TIM2 + 0x2C, 999);
     program.store(TIM2 + 0x14, 1);

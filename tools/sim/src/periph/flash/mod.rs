@@ -24,6 +24,10 @@ const SR_PGERR: u32 = 1 << 2;
 const SR_WRPRTERR: u32 = 1 << 4;
 const SR_EOP: u32 = 1 << 5;
 
+/// Instructions that the core may run from its prefetch buffer before an operation stalls its fetches: two
+/// lines of 64 bits (PM0075 2.2) hold eight Thumb instructions. The worst case.
+const FETCHED_AHEAD: u32 = 8;
+
 const CR_PG: u32 = 1 << 0;
 const CR_PER: u32 = 1 << 1;
 const CR_MER: u32 = 1 << 2;
@@ -97,6 +101,14 @@ pub struct Flash {
     sr: u32,
     ar: u32,
     busy: Option<Busy>,
+    /// Instructions left in the prefetch buffer: the core does not stall before it has run them.
+    ahead: u32,
+    /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the medium-density
+    /// parts, "Flash memory BSY bit delay versus STRT bit setting"). The worst case: until the first read of a
+    /// register of this block, or until the core stalls.
+    bsy_is_late: bool,
+    /// The operation that is to end without EOP, counted as `started` does.
+    without_eop: Option<u64>,
     /// Operations started since the part was made.
     started: u64,
     complaint: Option<Complaint>,
@@ -120,6 +132,9 @@ impl Flash {
             sr: 0,
             ar: 0,
             busy: None,
+            ahead: 0,
+            bsy_is_late: false,
+            without_eop: None,
             started: 0,
             complaint: None,
             changed: None,
@@ -150,10 +165,28 @@ impl Flash {
         (self.acr & ACR_LATENCY, self.acr & ACR_PRFTBE != 0)
     }
 
-    /// The end of the operation under way: fetches from flash stall until then.
+    /// The end of the operation under way.
     #[must_use]
     pub fn busy_until(&self) -> Option<Time> {
         self.busy.map(|busy| busy.until)
+    }
+
+    /// Until when a fetch from flash stalls. It does not yet while the prefetch buffer has instructions.
+    #[must_use]
+    pub fn stalled_until(&self) -> Option<Time> {
+        self.busy_until().filter(|_| self.ahead == 0)
+    }
+
+    /// The core has run this many instructions since the operation began.
+    pub fn ran(&mut self, instructions: u64) {
+        let instructions = u32::try_from(instructions).unwrap_or(u32::MAX);
+        self.ahead = self.ahead.saturating_sub(instructions);
+        self.bsy_is_late &= self.ahead > 0;
+    }
+
+    /// The `nth` operation from now (1 = the next) changes the cells as usual, but ends without EOP.
+    pub fn end_without_eop(&mut self, nth: u64) {
+        self.without_eop = Some(self.started + nth.max(1));
     }
 
     /// When the operation under way began and ends.
@@ -186,6 +219,8 @@ impl Flash {
 
     /// The power goes at `now`: an operation under way is torn.
     pub fn power_off(&mut self, now: Time) {
+        self.ahead = 0;
+        self.bsy_is_late = false;
         if let Some(busy) = self.busy.take() {
             let whole = (busy.until - busy.from).as_ps().max(1);
             let done = now.saturating_sub(busy.from).as_ps();
@@ -236,6 +271,8 @@ impl Flash {
         };
         self.started += 1;
         self.sr |= SR_BSY;
+        self.ahead = FETCHED_AHEAD;
+        self.bsy_is_late = true;
         self.busy = Some(Busy {
             operation,
             from: now,
@@ -321,11 +358,13 @@ impl Peripheral for Flash {
             Some(Operation::Page { .. } | Operation::Mass) => CR_STRT,
             _ => 0,
         };
+        let bsy_is_late = core::mem::take(&mut self.bsy_is_late);
         Ok(match offset {
             // PRFTBS follows PRFTBE.
             0x00 => self.acr | (self.acr & ACR_PRFTBE) << 1 & ACR_PRFTBS,
             // The key registers are write-only.
             0x04 | 0x08 => 0,
+            0x0C if bsy_is_late => self.sr & !SR_BSY,
             0x0C => self.sr,
             0x10 => self.cr | locked | strt,
             0x14 => 0,
@@ -361,7 +400,14 @@ impl Peripheral for Flash {
             self.busy = None;
             self.changed = Some(self.cells.finish(busy.operation));
             self.changes += 1;
-            self.sr = self.sr & !SR_BSY | SR_EOP;
+            self.ahead = 0;
+            self.bsy_is_late = false;
+            self.sr &= !SR_BSY;
+            if self.without_eop == Some(self.started) {
+                self.without_eop = None;
+            } else {
+                self.sr |= SR_EOP;
+            }
         }
     }
 

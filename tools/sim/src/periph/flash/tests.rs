@@ -23,6 +23,7 @@ fn program(flash: &mut Flash, offset: u32, value: u16) {
 fn a_half_word_takes_its_time_and_then_stands() {
     let mut flash = open();
     program(&mut flash, 0x400, 0x1234);
+    assert_eq!(flash.read(0x0C, NOW), Ok(0), "BSY is late");
     assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY));
     assert_eq!(flash.bytes()[0x400], 0xFF);
     let end = flash.next_event().unwrap();
@@ -32,6 +33,37 @@ fn a_half_word_takes_its_time_and_then_stands() {
     assert_eq!(flash.bytes()[0x400..0x402], [0x34, 0x12]);
     assert_eq!(flash.take_changed(), Some((0x400, 0x402)));
     assert_eq!(flash.take_complaint(), None);
+}
+
+#[test]
+fn bsy_is_late_for_one_read_and_fetches_stall_after_the_prefetched_instructions() {
+    let mut flash = open();
+    program(&mut flash, 0, 0);
+    assert_eq!(flash.read(0x10, NOW), Ok(CR_PG), "any register");
+    assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY));
+    flash.ran(u64::from(FETCHED_AHEAD) - 1);
+    assert_eq!(flash.stalled_until(), None);
+    flash.ran(1);
+    assert_eq!(flash.stalled_until(), flash.busy_until());
+    flash.advance(Time::from_ms(1));
+    program(&mut flash, 2, 0);
+    flash.ran(u64::from(FETCHED_AHEAD));
+    flash.write(0x0C, SR_EOP, NOW).unwrap();
+    assert_eq!(flash.read(0x0C, NOW), Ok(SR_BSY), "no longer late");
+}
+
+#[test]
+fn chosen_operation_ends_without_eop() {
+    let mut flash = open();
+    flash.end_without_eop(2);
+    for (n, status) in [SR_EOP, 0, SR_EOP].into_iter().enumerate() {
+        let end = Time::from_ms(n as u64 + 1);
+        flash.write(0x0C, SR_EOP, NOW).unwrap();
+        program(&mut flash, 2 * n as u32, 0x1234);
+        flash.advance(end);
+        assert_eq!(flash.read(0x0C, end), Ok(status), "operation {n}");
+        assert_eq!(flash.half_at(2 * n), 0x1234);
+    }
 }
 
 #[test]

@@ -44,6 +44,8 @@ pub struct Gpio {
     level: u16,
     contention: u16,
     watched: u16,
+    /// Pins whose outputs may not be faster than 2 MHz, one bit each.
+    slow: u16,
     edges: [Vec<(Time, bool)>; 16],
 }
 
@@ -79,12 +81,30 @@ impl Default for Gpio {
             level: 0,
             contention: 0,
             watched: 0,
+            slow: 0,
             edges: Default::default(),
         }
     }
 }
 
 impl Gpio {
+    /// A port some of whose pins (`slow`, one bit each) may not be faster than 2 MHz as outputs.
+    #[must_use]
+    pub fn with_slow_pins(slow: u16) -> Self {
+        Self {
+            slow,
+            ..Self::default()
+        }
+    }
+
+    /// Whether a pin that has to be slow is an output at 10 or 50 MHz.
+    fn is_too_fast(&self) -> bool {
+        (0..16).filter(|pin| self.slow >> pin & 1 != 0).any(|pin| {
+            let register = if pin < 8 { self.crl } else { self.crh };
+            register >> (4 * (pin % 8)) & 1 != 0
+        })
+    }
+
     /// The levels at the pins, as a logic probe sees them, one bit each.
     #[must_use]
     pub fn level(&self) -> u16 {
@@ -309,6 +329,9 @@ impl Peripheral for Gpio {
             _ => return Err(Unmodelled("a reserved address of GPIO")),
         }
         self.settle(now);
+        if offset <= 0x04 && self.is_too_fast() {
+            return Err(Unmodelled("PC13 to PC15 faster than 2 MHz"));
+        }
         Ok(())
     }
 

@@ -66,3 +66,13 @@ fn a_locked_pin_keeps_its_mode() {
     port.write(0, 0x3333_3333, NOW).unwrap();
     assert_eq!(port.read(0, NOW), Ok(0x3333_3334));
 }
+
+#[test]
+fn slow_pin_faster_than_2_mhz_is_refused() {
+    let mut port = Gpio::with_slow_pins(1 << 13);
+    for (mode, allowed) in [(0x2, true), (0x1, false), (0x3, false), (0x4, true)] {
+        let written = port.write(4, 0x4404_4444 | mode << 20, NOW);
+        assert_eq!(written.is_ok(), allowed, "{mode}");
+    }
+    assert_eq!(port.write(4, 0x4444_4443, NOW), Ok(()), "another pin");
+}

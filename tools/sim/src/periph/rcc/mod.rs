@@ -19,6 +19,10 @@ const LSI_START: Time = Time::from_us(85);
 /// PLL lock: DS5319 table 27, maximum.
 const PLL_LOCK: Time = Time::from_us(200);
 
+/// From PLLON = 0 to PLLRDY = 0. RM0008 gives no time; this is pessimistic, so that a firmware that does not wait
+/// for it raises a finding.
+const PLL_STOP: Time = Time::from_us(10);
+
 /// CSSF in CIR, and CSSC, which clears it (RM0008 7.3.3).
 const CIR_CSSF: u32 = 1 << 7;
 const CIR_CSSC: u32 = 1 << 23;
@@ -99,6 +103,8 @@ pub struct Rcc {
     hsi: Ready,
     hse: Ready,
     pll: Ready,
+    /// Until when PLLRDY is still set after the PLL was switched off.
+    pll_stops: Time,
     lsi: Ready,
     iwdg_needs_lsi: bool,
     /// CSSF: the clock security system has seen the HSE die.
@@ -123,6 +129,7 @@ impl Rcc {
             hsi: Some(Time::ZERO),
             hse: None,
             pll: None,
+            pll_stops: Time::ZERO,
             lsi: None,
             iwdg_needs_lsi: false,
             failed: false,
@@ -218,7 +225,12 @@ impl Rcc {
             | CR_HSICAL
             | flag(self.hsi, CR_HSIRDY)
             | flag(self.hse, CR_HSERDY)
-            | flag(self.pll, CR_PLLRDY)
+            | if self.pll_is_ready() { CR_PLLRDY } else { 0 }
+    }
+
+    /// PLLRDY.
+    fn pll_is_ready(&self) -> bool {
+        self.is_ready(self.pll) || self.pll.is_none() && self.now < self.pll_stops
     }
 
     fn write_cr(&mut self, value: u32, now: Time) {
@@ -240,6 +252,9 @@ impl Rcc {
         };
         self.hsi = start(self.hsi, cr & CR_HSION != 0, now + HSI_START);
         self.hse = start(self.hse, cr & CR_HSEON != 0, self.hse_start(now));
+        if cr & CR_PLLON == 0 && self.is_ready(self.pll) {
+            self.pll_stops = now + PLL_STOP;
+        }
         self.pll = start(self.pll, cr & CR_PLLON != 0, self.pll_lock(now));
         // The detector acts when the HSE is ready (RM0008 7.3.1).
         self.cr = cr;
@@ -257,6 +272,7 @@ impl Rcc {
 
     fn write_cfgr(&mut self, value: u32) -> Result<(), Unmodelled> {
         let mut value = value & CFGR_WRITABLE;
+        let sets_pll = (value ^ self.cfgr) & CFGR_PLL != 0;
         if self.cr & CR_PLLON != 0 {
             value = value & !CFGR_PLL | self.cfgr & CFGR_PLL;
         }
@@ -268,6 +284,12 @@ impl Rcc {
         self.changes.clocks = true;
         if value & CFGR_MCO != 0 {
             return Err(Unmodelled("RCC_CFGR.MCO, the clock output"));
+        }
+        // RM0008 7.3.2: these bits may be written only while the PLL is off.
+        if sets_pll && self.pll_is_ready() {
+            return Err(Unmodelled(
+                "RCC_CFGR's PLL bits written while PLLRDY is set",
+            ));
         }
         Ok(())
     }

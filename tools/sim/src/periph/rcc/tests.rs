@@ -142,3 +142,18 @@ fn the_hsi_as_the_pll_s_source_outlives_the_crystal() {
     assert!(rcc.nmi());
     assert_eq!(rcc.clocks().sysclk, 64_000_000);
 }
+
+#[test]
+fn pll_settings_written_before_pllrdy_has_fallen_are_refused() {
+    let mut rcc = secured();
+    let now = at(&mut rcc, 6_000);
+    assert!(rcc.write(4, 0x0039_0402, now).is_err(), "the PLL runs");
+    rcc.write(4, 0x001D_0400, now).unwrap();
+    rcc.write(0, 0x0009_0083, now).unwrap();
+    let now = at(&mut rcc, 6_009);
+    assert_ne!(rcc.read(0, now).unwrap() & CR_PLLRDY, 0);
+    assert!(rcc.write(4, 0x0019_0400, now).is_err());
+    let now = at(&mut rcc, 6_010);
+    assert_eq!(rcc.read(0, now).unwrap() & CR_PLLRDY, 0);
+    assert_eq!(rcc.write(4, 0x0015_0400, now), Ok(()));
+}

@@ -1,0 +1,62 @@
+//! Rates that a UART still receives when this end runs on the internal oscillator.
+
+use crate::{
+    design::{HSI_ERROR_PPM, LINE_ASYMMETRY_NS, MASTER_ERROR_PPM, SYSCLK_ON_HSI_HZ},
+    uart::{Format, LineSettings, divider},
+};
+
+/// Deviation that a receiver tolerates, in ppm (RM0008 27.3.5, tables for a zero and any other DIV_Fraction,
+/// noise allowed), and half bits from the start edge to the sample of the last bit.
+const fn receiver(format: Format, whole_divider: bool) -> (u32, u32) {
+    match (format, whole_divider) {
+        (Format::N2 | Format::N1, true) => (43_750, 19),
+        (Format::N2 | Format::N1, false) => (38_800, 19),
+        (Format::E1 | Format::O1, true) => (39_700, 21),
+        (Format::E1 | Format::O1, false) => (35_300, 21),
+    }
+}
+
+/// Whether all errors together stay within what a receiver tolerates, over the whole range of temperature: those
+/// of the internal oscillator, the divider, the other end and the line.
+#[must_use]
+pub const fn internal_oscillator_serves(settings: LineSettings) -> bool {
+    let LineSettings { baud, format } = settings;
+    let Some(divider) = divider(SYSCLK_ON_HSI_HZ, baud) else {
+        return false;
+    };
+    let (tolerance, half_bits) = receiver(format, divider & 0xF == 0);
+    let mhz = SYSCLK_ON_HSI_HZ / 1_000_000;
+    let quantised = (divider as u32 * baud).abs_diff(SYSCLK_ON_HSI_HZ) / mhz;
+    let line = 2 * LINE_ASYMMETRY_NS * baud / half_bits / 1_000;
+    HSI_ERROR_PPM + MASTER_ERROR_PPM + quantised + line <= tolerance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn serves(baud: u32, format: Format) -> bool {
+        internal_oscillator_serves(LineSettings { baud, format })
+    }
+
+    #[test]
+    fn rates_up_to_230400_without_and_19200_with_parity_are_within_tolerance() {
+        let rates = [
+            1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600,
+        ];
+        for baud in rates {
+            for format in [Format::N1, Format::N2] {
+                assert_eq!(serves(baud, format), baud <= 230_400, "{baud}");
+            }
+            for format in [Format::E1, Format::O1] {
+                assert_eq!(serves(baud, format), baud <= 19_200, "{baud}");
+            }
+        }
+    }
+
+    #[test]
+    fn rate_without_a_divider_is_not_served() {
+        assert!(!serves(0, Format::N2));
+        assert!(!serves(300, Format::N2));
+    }
+}
