@@ -8,7 +8,7 @@ use crate::Board;
 use crate::line::{Character, Format, Settings};
 use crate::time::Time;
 
-/// What the client of a board's line was told already.
+/// What has been reported to the client of a board's line.
 #[derive(Clone, Debug, Default)]
 pub struct Session {
     /// Driver edges up to this instant were reported.
