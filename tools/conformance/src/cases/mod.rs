@@ -18,7 +18,7 @@ mod outputs;
 mod power;
 mod read;
 mod settings;
-mod timing;
+pub(crate) mod timing;
 mod worked;
 mod write_bits;
 mod write_words;

@@ -53,7 +53,11 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// The shortest t3.5 that a unit may use, or the silence that a modio is set to instead.
-fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
+///
+/// # Errors
+///
+/// [`Stop`](crate::case::Stop) when the unit does not report its setting.
+pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
     if bench.target.modio.is_some() {
         let gap = bench.read_word(register_map::configuration::FRAME_GAP)?;
         if gap != 0 {

@@ -41,7 +41,7 @@ fn every_rate_is_measured_and_the_unit_is_back_as_it_was() {
     let home = line.line();
     let plan = Plan {
         requests: 50,
-        rates: vec![9600, 115_200, 1200],
+        rates: vec![9600, 115_200, 19_200],
         ..plan(&line)
     };
     let (report, ended) = run_plan(&mut line, &plan, &never());
@@ -56,6 +56,22 @@ fn every_rate_is_measured_and_the_unit_is_back_as_it_was() {
     assert_eq!((line.line(), line.units[0].line), (home, home));
     assert_eq!(line.units[0].stored, [96, 0]);
     assert_eq!(report.json()["timing"][1]["turnaround_us"]["p99"], 4100);
+}
+
+#[test]
+fn turnaround_below_t35_fails_the_run() {
+    let mut line = Line::new(&[1]);
+    let plan = Plan {
+        requests: 5,
+        // The fake unit answers after 4.1 ms at every rate; t3.5 is 32 ms here.
+        rates: vec![9600, 1200],
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended, Ok(()));
+    assert_eq!((report.totals().passed, report.totals().failed), (1, 1));
+    let json = report.json().to_string();
+    assert!(json.contains("at least: t3.5, or FRAME_GAP"), "{json}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use crate::bench::Bench;
 use crate::case::{Check, Failure};
+use crate::cases::timing::silence;
 use crate::endpoint::Piece;
 use crate::frame::Reply;
 use crate::hil::spread::Spread;
@@ -39,7 +40,12 @@ pub struct Tally {
     pub example: Option<Failure>,
     /// The turnarounds of the others.
     pub spread: Option<Spread>,
+    /// The shortest turnaround that the unit may have: t3.5, or its FRAME_GAP.
+    pub least: Duration,
 }
+
+/// Turnarounds are measured to a microsecond at best.
+const TOLERANCE: Duration = Duration::from_micros(1);
 
 /// The least time that so many requests take at the line's rate.
 #[must_use]
@@ -69,6 +75,7 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
         given_up: false,
         example: None,
         spread: None,
+        least: silence(bench)?,
     };
     let mut times = Vec::new();
     let mut lost_in_a_row = 0;
@@ -115,7 +122,8 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
 }
 
 impl Tally {
-    /// Whether all is well: nothing lost, nothing wrong, 99 of 100 within the limit if there is one.
+    /// Whether every request got its reply, none before its time, and 99 of 100 replies came within the limit if
+    /// there is one.
     #[must_use]
     pub fn verdict(&self, limit: Option<Duration>) -> Verdict {
         let bad = |came: String, wanted: String| {
@@ -132,6 +140,13 @@ impl Tally {
             });
             let came = format!("{} lost, {} wrong{first}", self.lost, self.wrong);
             return bad(came, "a right reply to each".to_owned());
+        }
+        let shortest = self.spread.as_ref().map(|spread| spread.percentile(0));
+        if let Some(shortest) = shortest.filter(|time| *time + TOLERANCE < self.least) {
+            return bad(
+                format!("a turnaround of {shortest:?}"),
+                format!("{:?} at least: t3.5, or FRAME_GAP", self.least),
+            );
         }
         match (&self.spread, limit) {
             (None, _) => Verdict::Skipped("interrupted before the first reply".to_owned()),
