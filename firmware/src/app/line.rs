@@ -22,6 +22,8 @@ pub struct Line {
     /// Milliseconds that a reply may take, and that the one under way has taken.
     longest_ms: u16,
     sending_ms: u16,
+    /// Which registers are looked at in the next millisecond: the UART's or the gap timer's.
+    uart_is_next: bool,
     /// Interrupts of the UART without a cause since the last millisecond.
     causeless: u8,
     /// The line was set up again since [`take_repaired`](Self::take_repaired).
@@ -67,6 +69,7 @@ impl Line {
             heard_before: 0,
             longest_ms,
             sending_ms: 0,
+            uart_is_next: false,
             causeless: 0,
             repaired: false,
         }
@@ -109,19 +112,26 @@ impl Line {
         self.causeless += 1;
         if self.causeless == CAUSELESS {
             self.causeless = 0;
-            self.check();
+            self.check(true);
         }
     }
 
     /// Sets the line up again when its registers are not what they were set to, when the end of a frame is
     /// not being waited for, or when a reply does not end: whatever has disturbed them, the driver goes off
     /// and the next request is served.
+    ///
+    /// Looks at the UART or at the gap timer: both at once would hold the line's interrupts off for longer.
     #[cold]
-    fn check(&mut self) {
+    fn check(&mut self, uart: bool) {
         let sending = self.reply == Reply::Sending;
         let stalled = !sending && !self.receiver.is_idle() && !self.gap.is_running();
         let endless = sending && self.sending_ms >= self.longest_ms;
-        if stalled || endless || !self.uart.is_sound(sending) || !self.gap.is_sound() {
+        let is_sound = if uart {
+            self.uart.is_sound(sending)
+        } else {
+            self.gap.is_sound()
+        };
+        if stalled || endless || !is_sound {
             self.repair();
         }
     }
@@ -179,7 +189,8 @@ impl Line {
     pub fn on_millisecond(&mut self) {
         self.causeless = 0;
         self.sending_ms = self.sending_ms.saturating_add(1);
-        self.check();
+        self.uart_is_next = !self.uart_is_next;
+        self.check(self.uart_is_next);
         match self.reply {
             Reply::Delayed { ms: 0 } => {
                 if self.receiver.is_idle() && self.heard() == self.heard_before {

@@ -13,6 +13,11 @@ const ASCII: &str = "ASCII";
 /// What it allows the server with every function and two buffers, in bytes of flash and RAM.
 const SERVER: [(&str, u64); 2] = [("flash", 9216), ("ram", 900)];
 
+/// How long locks and other handlers may hold off an interrupt of the line, in microseconds, and the tasks that it
+/// is about.
+const LINE_WAIT_US: f64 = 5.0;
+const LINE_TASKS: [&str; 2] = ["byte", "frame gap"];
+
 /// The tables of a report.
 pub fn of(report: &Value) -> String {
     let mut text = String::new();
@@ -34,6 +39,18 @@ pub fn over_budget(report: &Value) -> Vec<String> {
             let taken = row[key].as_u64().unwrap_or_default();
             if let Some(budget) = budget(key, name).filter(|budget| taken > *budget) {
                 over.push(format!("{name}: {heading} {taken} of {budget}"));
+            }
+        }
+    }
+    for row in rows(report, "load") {
+        for wait in rows(row, "longest_waits_us") {
+            let task = wait[0].as_str().unwrap_or_default();
+            let us = wait[1].as_f64().unwrap_or_default();
+            if LINE_TASKS.iter().any(|name| task.starts_with(name)) && us > LINE_WAIT_US {
+                let (baud, request) = (&row["baud"], row["request"].as_str().unwrap_or_default());
+                over.push(format!(
+                    "{baud} bit/s, {request}: {task} waits {us:.1} us of {LINE_WAIT_US}"
+                ));
             }
         }
     }
@@ -204,7 +221,7 @@ mod tests {
                 { "request": "03 read holding registers, 125", "server": 13_127 },
             ],
             "load": [{ "baud": 9600, "request": "03 one", "answered": 40, "awake_percent": 2.04,
-                       "longest_waits_us": [["byte", 0.04]] }],
+                       "longest_waits_us": [["byte", 0.04], ["frame gap", 5.1], ["scan", 50.0]] }],
             "image": { "flash": 30_000, "ram": 3_000, "crates": [{ "name": "core", "flash": 500, "ram": 0 }] },
             "server": { "flash": 9216, "ram": 901 },
         });
@@ -213,6 +230,11 @@ mod tests {
             text.contains("over budget: ram of the server 901 of 900"),
             "{text}"
         );
+        assert!(
+            text.contains("over budget: 9600 bit/s, 03 one: frame gap waits 5.1 us of 5"),
+            "{text}"
+        );
+        assert!(!text.contains("byte waits") && !text.contains("scan waits"));
         assert!(!text.contains("flash of the server"), "{text}");
         assert!(
             text.contains("over budget: 03 one: byte out 81 of 80"),
