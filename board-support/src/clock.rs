@@ -1,7 +1,9 @@
-//! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal
-//! does not start, or has failed too often since power-on. The HAL would wait for a dead crystal, or a PLL that does not lock, for ever, and
-//! panics over frequencies it does not like; here every wait has an end and the frequencies are
-//! constants. While it runs on the crystal, the clock security system watches it (RM0008 7.2.7).
+//! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal does not
+//! start, or has failed too often since power-on.
+//!
+//! The HAL would wait without end for a dead crystal, or for a PLL that does not lock, and it panics over
+//! frequencies that it does not accept. Here every wait has an end and the frequencies are constants. While it
+//! runs on the crystal, the clock security system watches it (RM0008 7.2.7).
 
 use stm32f1xx_hal::pac;
 

@@ -143,9 +143,9 @@ impl Rs485 {
         usart.gtpr().reset();
         // SAFETY: the reserved bits of these registers are 0 in every value written here (RM0008 27.6).
         unsafe {
-            usart.brr().write(|w| w.bits(self.divider.into()));
-            usart.cr2().write(|w| w.bits(stop_bits(self.format).into()));
-            usart.cr1().write(|w| w.bits(receiving(self.format).into()));
+            usart.brr().write(|w| w.bits(self.divider));
+            usart.cr2().write(|w| w.bits(stop_bits(self.format)));
+            usart.cr1().write(|w| w.bits(receiving(self.format)));
         }
         // What was received or damaged before is not the next frame's.
         let _ = (usart.sr().read(), usart.dr().read());
@@ -161,10 +161,10 @@ impl Rs485 {
         } else {
             (receiving(self.format), 0)
         };
-        cr1 & !changing == wanted.into()
-            && usart.cr2().read().bits() == stop_bits(self.format).into()
+        cr1 & !changing == wanted
+            && usart.cr2().read().bits() == stop_bits(self.format)
             && usart.cr3().read().bits() == 0
-            && usart.brr().read().bits() == self.divider.into()
+            && usart.brr().read().bits() == self.divider
             && self.driver.is_set_high() == sending
     }
 
