@@ -33,7 +33,13 @@ pub struct GapTimer {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     ticks: GapTicks,
+    /// What the registers read after they were set.
+    set: Registers,
 }
+
+/// Registers of both timers, in the order of [`GapTimer::registers`]. They are compared with what they read after
+/// they were set, not with what was written: an emulator need not keep every bit.
+type Registers = [u32; 15];
 
 impl GapTimer {
     /// Sets the timer up for silences of these lengths in nanoseconds. `None` when no setting of the
@@ -56,6 +62,7 @@ impl GapTimer {
             timer,
             start_bit,
             ticks,
+            set: [0; 15],
         };
         gap.set_up();
         Some(gap)
@@ -92,34 +99,38 @@ impl GapTimer {
             .write(|w| w.cc3e().set_bit().cc3p().set_bit());
         start_bit.arr().write(|w| w.arr().set(0xFFFF));
         start_bit.cr1().write(|w| w.cen().enabled());
+        self.stop();
+        self.set = self.registers();
     }
 
     /// Whether both timers are as they were set up.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        const URS_OPM: u32 = 1 << 2 | 1 << 3;
+        self.registers() == self.set
+    }
+
+    /// The registers of both timers, without the bits that change while silences are measured.
+    fn registers(&self) -> Registers {
         const CEN: u32 = 1;
         const CC2IE: u32 = 1 << 2;
-        let (timer, ticks) = (&self.timer, self.ticks);
-        let cr1 = timer.cr1().read().bits() & !CEN;
-        let is_set = cr1 == URS_OPM
-            && timer.psc().read().bits() == ticks.prescaler.into()
-            && timer.arr().read().bits() == ticks.t35_late.into()
-            && timer.ccr1().read().bits() == ticks.t15.into()
-            && timer.ccr2().read().bits() == ticks.t15_late.into()
-            && timer.ccr3().read().bits() == ticks.t35.into()
-            // UIE, CC1IE and CC3IE.
-            && timer.dier().read().bits() & !CC2IE == 0b1011
-            && timer.smcr().read().bits() == 0
-            && timer.ccmr1_output().read().bits() == 0
-            && timer.ccmr2_output().read().bits() == 0;
-        let start_bit = &self.start_bit;
-        is_set
-            && start_bit.cr1().read().bits() == CEN
-            && start_bit.ccmr2_input().read().bits() == 1
-            && start_bit.ccer().read().bits() == 0b11 << 8
-            && start_bit.smcr().read().bits() == 0
-            && start_bit.arr().read().bits() == 0xFFFF
+        let (timer, start_bit) = (&self.timer, &self.start_bit);
+        [
+            timer.cr1().read().bits() & !CEN,
+            timer.smcr().read().bits(),
+            timer.dier().read().bits() & !CC2IE,
+            timer.ccmr1_output().read().bits(),
+            timer.ccmr2_output().read().bits(),
+            timer.psc().read().bits(),
+            timer.arr().read().bits(),
+            timer.ccr1().read().bits(),
+            timer.ccr2().read().bits(),
+            timer.ccr3().read().bits(),
+            start_bit.cr1().read().bits(),
+            start_bit.smcr().read().bits(),
+            start_bit.ccmr2_input().read().bits(),
+            start_bit.ccer().read().bits(),
+            start_bit.arr().read().bits(),
+        ]
     }
 
     /// Whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.

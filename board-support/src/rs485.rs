@@ -75,7 +75,13 @@ pub struct Rs485 {
     driver: PA8<Output<PushPull>>,
     divider: u16,
     format: Format,
+    /// What the registers read after they were set.
+    set: Registers,
 }
+
+/// CR1, CR2, CR3 and BRR. They are compared with what they read after they were set, not with what was written:
+/// an emulator need not keep every bit.
+type Registers = [u16; 4];
 
 /// CR1 of a receiver: the line's settings, with UE, TE, RE and RXNEIE (RM0008 27.6.4).
 const fn receiving(format: Format) -> u16 {
@@ -126,6 +132,7 @@ impl Rs485 {
             driver: pins.driver,
             divider,
             format: settings.format,
+            set: [0; 4],
         };
         line.set_up();
         // The transmitter is on and idles high before the pin becomes its output.
@@ -149,23 +156,30 @@ impl Rs485 {
         }
         // What was received or damaged before is not the next frame's.
         let _ = (usart.sr().read(), usart.dr().read());
+        self.set = self.registers();
+    }
+
+    fn registers(&self) -> Registers {
+        let usart = &self.usart;
+        [
+            usart.cr1().read().bits(),
+            usart.cr2().read().bits(),
+            usart.cr3().read().bits(),
+            usart.brr().read().bits(),
+        ]
     }
 
     /// Whether every register of the UART is as it was set up, with the driver on, or off, as it should be.
     #[must_use]
     pub fn is_sound(&self, sending: bool) -> bool {
-        let usart = &self.usart;
-        let cr1 = usart.cr1().read().bits();
+        let [cr1, rest @ ..] = self.registers();
+        let [wanted, set @ ..] = self.set;
         let (wanted, changing) = if sending {
-            (receiving(self.format) & !RECEIVER, SENDER)
+            (wanted & !RECEIVER, SENDER)
         } else {
-            (receiving(self.format), 0)
+            (wanted, 0)
         };
-        cr1 & !changing == wanted
-            && usart.cr2().read().bits() == stop_bits(self.format)
-            && usart.cr3().read().bits() == 0
-            && usart.brr().read().bits() == self.divider
-            && self.driver.is_set_high() == sending
+        cr1 & !changing == wanted && rest == set && self.driver.is_set_high() == sending
     }
 
     /// What the UART wants.
