@@ -15,7 +15,7 @@ use stm32f1xx_hal::{
     rcc::{Enable, Reset},
 };
 
-use crate::{ClockSource, gap::GapTicks, uart::LineSettings};
+use crate::{ClockSource, gap::GapTicks, signature, uart::LineSettings};
 
 /// What the timer's interrupt is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,13 +33,10 @@ pub struct GapTimer {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     ticks: GapTicks,
-    /// What the registers read after they were set.
-    set: Registers,
+    /// The signature of the registers after they were set. They are compared with what they read, not with what was
+    /// written: an emulator need not keep every bit.
+    set: u32,
 }
-
-/// Registers of both timers, in the order of [`GapTimer::registers`]. They are compared with what they read after
-/// they were set, not with what was written: an emulator need not keep every bit.
-type Registers = [u32; 15];
 
 impl GapTimer {
     /// Sets the timer up for silences of these lengths in nanoseconds. `None` when no setting of the
@@ -62,7 +59,7 @@ impl GapTimer {
             timer,
             start_bit,
             ticks,
-            set: [0; 15],
+            set: 0,
         };
         gap.set_up();
         Some(gap)
@@ -100,21 +97,21 @@ impl GapTimer {
         start_bit.arr().write(|w| w.arr().set(0xFFFF));
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
-        self.set = self.registers();
+        self.set = self.settings();
     }
 
     /// Whether both timers are as they were set up.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.registers() == self.set
+        self.settings() == self.set
     }
 
-    /// The registers of both timers, without the bits that change while silences are measured.
-    fn registers(&self) -> Registers {
+    /// The signature of the registers of both timers, without the bits that change while silences are measured.
+    fn settings(&self) -> u32 {
         const CEN: u32 = 1;
         const CC2IE: u32 = 1 << 2;
         let (timer, start_bit) = (&self.timer, &self.start_bit);
-        [
+        signature([
             timer.cr1().read().bits() & !CEN,
             timer.smcr().read().bits(),
             timer.dier().read().bits() & !CC2IE,
@@ -130,7 +127,7 @@ impl GapTimer {
             start_bit.ccmr2_input().read().bits(),
             start_bit.ccer().read().bits(),
             start_bit.arr().read().bits(),
-        ]
+        ])
     }
 
     /// Whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.

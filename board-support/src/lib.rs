@@ -39,6 +39,8 @@ mod rs485;
 mod safe;
 #[cfg(target_os = "none")]
 mod scan_timer;
+#[cfg(any(target_os = "none", test))]
+mod signature;
 #[cfg(target_os = "none")]
 mod slot;
 #[cfg(target_os = "none")]
@@ -50,6 +52,8 @@ mod wait;
 #[cfg(target_os = "none")]
 mod watchdog;
 
+#[cfg(target_os = "none")]
+use signature::signature;
 #[cfg(target_os = "none")]
 pub use {
     adc::{AdcError, AnalogInputs},

@@ -11,7 +11,7 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource,
+    ClockSource, signature,
     uart::{Format, LineSettings, divider},
 };
 
@@ -75,13 +75,11 @@ pub struct Rs485 {
     driver: PA8<Output<PushPull>>,
     divider: u16,
     format: Format,
-    /// What the registers read after they were set.
-    set: Registers,
+    /// What CR1 read after it was set, and the signature of the other registers. They are compared with what they
+    /// read, not with what was written: an emulator need not keep every bit.
+    cr1: u16,
+    set: u32,
 }
-
-/// CR1, CR2, CR3 and BRR. They are compared with what they read after they were set, not with what was written:
-/// an emulator need not keep every bit.
-type Registers = [u16; 4];
 
 /// CR1 of a receiver: the line's settings, with UE, TE, RE and RXNEIE (RM0008 27.6.4).
 const fn receiving(format: Format) -> u16 {
@@ -132,7 +130,8 @@ impl Rs485 {
             driver: pins.driver,
             divider,
             format: settings.format,
-            set: [0; 4],
+            cr1: 0,
+            set: 0,
         };
         line.set_up();
         // The transmitter is on and idles high before the pin becomes its output.
@@ -156,30 +155,32 @@ impl Rs485 {
         }
         // What was received or damaged before is not the next frame's.
         let _ = (usart.sr().read(), usart.dr().read());
-        self.set = self.registers();
+        self.cr1 = usart.cr1().read().bits();
+        self.set = self.settings();
     }
 
-    fn registers(&self) -> Registers {
+    /// The signature of CR2, CR3 and BRR.
+    fn settings(&self) -> u32 {
         let usart = &self.usart;
-        [
-            usart.cr1().read().bits(),
-            usart.cr2().read().bits(),
-            usart.cr3().read().bits(),
-            usart.brr().read().bits(),
-        ]
+        signature([
+            usart.cr2().read().bits().into(),
+            usart.cr3().read().bits().into(),
+            usart.brr().read().bits().into(),
+        ])
     }
 
     /// Whether every register of the UART is as it was set up, with the driver on, or off, as it should be.
     #[must_use]
     pub fn is_sound(&self, sending: bool) -> bool {
-        let [cr1, rest @ ..] = self.registers();
-        let [wanted, set @ ..] = self.set;
+        let cr1 = self.usart.cr1().read().bits();
         let (wanted, changing) = if sending {
-            (wanted & !RECEIVER, SENDER)
+            (self.cr1 & !RECEIVER, SENDER)
         } else {
-            (wanted, 0)
+            (self.cr1, 0)
         };
-        cr1 & !changing == wanted && rest == set && self.driver.is_set_high() == sending
+        cr1 & !changing == wanted
+            && self.settings() == self.set
+            && self.driver.is_set_high() == sending
     }
 
     /// What the UART wants.
@@ -217,6 +218,13 @@ impl Rs485 {
     #[inline]
     pub fn send(&mut self, byte: u8) {
         self.usart.dr().write(|w| w.dr().set(u16::from(byte)));
+        // When this comes late, the byte before may end between the reading of SR and this write, which then does
+        // not clear TC (RM0008 27.6.1). This byte cannot have ended yet: a TC that is set is not its own, and
+        // would switch the driver off too early.
+        if self.usart.sr().read().tc().bit_is_set() {
+            // SAFETY: the other flags of SR are left alone by 1 or cannot be written.
+            self.usart.sr().write(|w| unsafe { w.bits(!TC) });
+        }
     }
 
     /// No byte is ready yet: asks no more until [`resume_sending`](Self::resume_sending).

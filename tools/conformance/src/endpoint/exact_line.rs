@@ -244,7 +244,10 @@ impl Tcp {
 
     fn open(address: &str) -> Result<Self, String> {
         let mut last = "the name has no address".to_owned();
-        for address in address.to_socket_addrs().map_err(|e| e.to_string())? {
+        let found = address.to_socket_addrs();
+        for address in
+            found.map_err(|error| format!("no address such as 127.0.0.1:3470: {error}"))?
+        {
             match TcpStream::connect_timeout(&address, HANDOVER) {
                 Ok(stream) => {
                     let set = stream

@@ -127,3 +127,22 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_less_than_a_bit_m
         }
     }
 }
+
+/// A handler or a lock that delays the UART's interrupt by more than a character must not cut a reply short: the
+/// character before the last one then ends while the last one is being given to the UART.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn replies_at_the_highest_rate_are_whole_at_every_phase_of_the_scan() {
+    let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, Baud::B921600.code())]);
+    for phase in 0..1500 {
+        // The scan comes every millisecond.
+        let next = Time::from_ms(bench.board.now().as_ms() + 1);
+        bench.board.run_until(next + Time::from_ns(667 * phase));
+        let reply = bench.exchange(&adu(&[1, 3, 2, 0, 0, 2]));
+        assert_eq!(
+            reply,
+            adu(&[1, 3, 4, 0x23, 0x83, 0x58, 0x60]),
+            "phase {phase}"
+        );
+    }
+}
