@@ -99,11 +99,6 @@ const fn receiving(format: Format) -> u16 {
     UE | TE | RE | RXNEIE | format
 }
 
-/// The bits of CR1 that change with every reply: the receiver's are set while the unit listens, the
-/// transmitter's interrupts only while it sends.
-const RECEIVER: u16 = 1 << 2 | 1 << 5;
-const SENDER: u16 = 1 << 6 | 1 << 7;
-
 /// CR2: two stop bits, or one.
 const fn stop_bits(format: Format) -> u16 {
     match format {
@@ -169,18 +164,12 @@ impl Rs485 {
         ])
     }
 
-    /// Whether every register of the UART is as it was set up, with the driver on, or off, as it should be.
+    /// Whether every register of the UART is as it was set up and the driver is off, while nothing is being sent.
     #[must_use]
-    pub fn is_sound(&self, sending: bool) -> bool {
-        let cr1 = self.usart.cr1().read().bits();
-        let (wanted, changing) = if sending {
-            (self.cr1 & !RECEIVER, SENDER)
-        } else {
-            (self.cr1, 0)
-        };
-        cr1 & !changing == wanted
+    pub fn is_sound(&self) -> bool {
+        self.usart.cr1().read().bits() == self.cr1
             && self.settings() == self.set
-            && self.driver.is_set_high() == sending
+            && self.driver.is_set_low()
     }
 
     /// What the UART wants.

@@ -120,18 +120,20 @@ impl Line {
     /// not being waited for, or when a reply does not end: whatever has disturbed them, the driver goes off
     /// and the next request is served.
     ///
-    /// Looks at the UART or at the gap timer: both at once would hold the line's interrupts off for longer.
+    /// Looks at the UART or at the gap timer: both at once would hold the line's interrupts off for longer. While a
+    /// reply is being sent only its time is looked at, because the driver must go off right after the last bit.
     #[cold]
     fn check(&mut self, uart: bool) {
         let sending = self.reply == Reply::Sending;
-        let stalled = !sending && !self.receiver.is_idle() && !self.gap.is_running();
-        let endless = sending && self.sending_ms >= self.longest_ms;
-        let is_sound = if uart {
-            self.uart.is_sound(sending)
+        let is_sound = if sending {
+            self.sending_ms < self.longest_ms
+        } else if uart {
+            self.uart.is_sound()
         } else {
-            self.gap.is_sound()
+            let waits_for_silence = !self.receiver.is_idle();
+            self.gap.is_sound() && (!waits_for_silence || self.gap.is_running())
         };
-        if stalled || endless || !is_sound {
+        if !is_sound {
             self.repair();
         }
     }
