@@ -261,7 +261,13 @@ impl Machine {
             .flash
             .stalled_until()
             .filter(|_| is_flash(self.pc()))
-            .or_else(|| self.bus.soc.flash.busy_until().filter(|_| self.bus.read_stalls))
+            .or_else(|| {
+                self.bus
+                    .soc
+                    .flash
+                    .busy_until()
+                    .filter(|_| self.bus.read_stalls)
+            })
             .map(|end| (end, Rest::Stalled))
     }
 
