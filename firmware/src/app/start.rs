@@ -108,10 +108,13 @@ pub fn up(
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, silences) = match framing {
             Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
-            Framing::Ascii { .. } => (
-                Receiver::ascii(unit, Width::Eight),
-                (t35, Gaps::ASCII_TIMEOUT),
-            ),
+            Framing::Ascii { .. } => {
+                let width = match settings.format.data_bits() {
+                    7 => Width::Seven,
+                    _ => Width::Eight,
+                };
+                (Receiver::ascii(unit, width), (t35, Gaps::ASCII_TIMEOUT))
+            }
         };
         let (uart, gap) = board.line.start(on_wire, silences.0, silences.1)?;
         let longest_ms = longest_reply_ms(on_wire, framing);
@@ -155,6 +158,9 @@ fn wire_settings(line: config::Line) -> uart::LineSettings {
             Format::F8E1 => uart::Format::E1,
             Format::F8O1 => uart::Format::O1,
             Format::F8N1 => uart::Format::N1,
+            Format::F7E1 => uart::Format::SevenE1,
+            Format::F7O1 => uart::Format::SevenO1,
+            Format::F7N2 => uart::Format::SevenN2,
         },
     }
 }

@@ -76,7 +76,7 @@ fn bad_lines_get_an_error_each_and_let_no_time_pass() {
         b"send 01 parity:01\n",
         b"run -1\n",
         b"run 600000000.001\n",
-        b"line 9600 7E1\n",
+        b"line 9600 7N1\n",
         b"send \xC3\x28\n",
         b"\x00\xFF\n",
         b"GET / HTTP/1.1\r\n",
