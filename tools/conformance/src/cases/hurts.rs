@@ -54,6 +54,13 @@ pub(super) const CASES: &[Case] = &[
         &[Need::Modio, Need::Function(0x10)],
         half_written,
     ),
+    case(
+        "hurts/torn-values",
+        "map, communication watchdog",
+        "a read of several outputs while they go to SAFE gives all of them before or all of them after",
+        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)],
+        super::outputs::torn,
+    ),
 ];
 
 /// How many random frames: many where they cost no wall-clock time to wait for.
