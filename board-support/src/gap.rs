@@ -29,6 +29,28 @@ pub struct GapTicks {
     pub t35_late: u16,
 }
 
+/// Settings of the same timer for one long time, after which a reply is cut off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LimitTicks {
+    /// Prescaler register: the clock is divided by one more.
+    pub prescaler: u16,
+    /// Reload value.
+    pub reload: u16,
+}
+
+impl LimitTicks {
+    /// Settings for `us` microseconds, up to 33 s, with the timer's clock in whole MHz, up to 128; rounded up.
+    #[must_use]
+    pub const fn new(clock_mhz: u8, us: u32) -> Self {
+        let cycles = us.saturating_mul(clock_mhz as u32);
+        let divider = cycles / 0xFFFF + 1;
+        Self {
+            prescaler: (divider - 1) as u16,
+            reload: cycles.div_ceil(divider) as u16,
+        }
+    }
+}
+
 impl GapTicks {
     /// Settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock
     /// in whole MHz, up to 128. The coarsest tick is used that 16 bits need, and every time is rounded
@@ -115,6 +137,16 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_limit_is_never_short_and_at_most_a_tick_long() {
+        for us in [1, 900, 3_600, 24_900, 300_000, 4_800_000, 33_000_000] {
+            let ticks = LimitTicks::new(72, us);
+            let divider = u64::from(ticks.prescaler) + 1;
+            let over = u64::from(ticks.reload) * divider - 72 * u64::from(us);
+            assert!(over < divider, "{us}: {over} cycles over {divider}");
         }
     }
 

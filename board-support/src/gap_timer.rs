@@ -9,20 +9,27 @@
 //! The line also falls when a pulse of noise is too short for a start bit (RM0008 27.3.3). So an edge
 //! puts the decision off by one character, once: a real character is complete by then and starts the
 //! silence again, and noise delays a reply by one character at most, however often it comes.
+//!
+//! While the unit sends there is no silence to measure: TIM2 then limits the time of the reply.
 
 use stm32f1xx_hal::{
     pac,
     rcc::{Enable, Reset},
 };
 
-use crate::{ClockSource, gap::GapTicks, signature, uart::LineSettings};
+use crate::{
+    ClockSource,
+    gap::{GapTicks, LimitTicks},
+    signature,
+    uart::LineSettings,
+};
 
 /// What the timer's interrupt is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GapEvent {
     /// The line has been silent for t1.5 since the last character.
     T15,
-    /// The line has been silent for t3.5.
+    /// The line has been silent for t3.5; or the [limit](GapTimer::limit_sending) has been reached.
     T35,
     /// Nothing to do: the interrupt was overtaken by a character, or one is on its way.
     Nothing,
@@ -33,20 +40,22 @@ pub struct GapTimer {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     ticks: GapTicks,
+    limit: LimitTicks,
     /// The signature of the registers after they were set. They are compared with what they read, not with what was
     /// written: an emulator need not keep every bit.
     set: u32,
 }
 
 impl GapTimer {
-    /// Sets the timer up for silences of these lengths in nanoseconds. `None` when no setting of the
-    /// timer reaches them.
+    /// Sets the timer up for silences of these lengths in nanoseconds, and for replies of `limit_us` microseconds at
+    /// most. `None` when no setting of the timer reaches them.
     pub(crate) fn new(
         timer: pac::TIM2,
         start_bit: pac::TIM1,
         line: LineSettings,
         t15_ns: u32,
         t35_ns: u32,
+        limit_us: u32,
         clock: ClockSource,
         rcc: &mut pac::RCC,
     ) -> Option<Self> {
@@ -59,6 +68,7 @@ impl GapTimer {
             timer,
             start_bit,
             ticks,
+            limit: LimitTicks::new(clock.core_mhz(), limit_us),
             set: 0,
         };
         gap.set_up();
@@ -75,14 +85,9 @@ impl GapTimer {
         timer.ccmr1_output().reset();
         timer.ccmr2_output().reset();
         timer.ccer().reset();
-        timer.psc().write(|w| w.psc().set(ticks.prescaler));
-        timer.arr().write(|w| w.arr().set(ticks.t35_late));
         timer.ccr1().write(|w| w.ccr().set(ticks.t15));
         timer.ccr2().write(|w| w.ccr().set(ticks.t15_late));
         timer.ccr3().write(|w| w.ccr().set(ticks.t35));
-        timer
-            .dier()
-            .write(|w| w.uie().enabled().cc1ie().enabled().cc3ie().enabled());
 
         let start_bit = &self.start_bit;
         start_bit.cr1().reset();
@@ -98,6 +103,29 @@ impl GapTimer {
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
         self.set = self.settings();
+    }
+
+    /// Has the timer count for the silences from the next [`restart`](Self::restart) on.
+    #[inline]
+    fn select_silences(&mut self) {
+        let (timer, ticks) = (&self.timer, self.ticks);
+        timer.psc().write(|w| w.psc().set(ticks.prescaler));
+        timer.arr().write(|w| w.arr().set(ticks.t35_late));
+        timer
+            .dier()
+            .write(|w| w.uie().enabled().cc1ie().enabled().cc3ie().enabled());
+    }
+
+    /// A reply has begun: [`GapEvent::T35`] comes when it takes longer than it can, unless it is
+    /// [stopped](Self::stop) before.
+    #[inline]
+    pub fn limit_sending(&mut self) {
+        self.halt();
+        let (timer, limit) = (&self.timer, self.limit);
+        timer.psc().write(|w| w.psc().set(limit.prescaler));
+        timer.arr().write(|w| w.arr().set(limit.reload));
+        timer.dier().write(|w| w.uie().enabled());
+        self.start();
     }
 
     /// Whether both timers are as they were set up.
@@ -143,6 +171,12 @@ impl GapTimer {
     pub fn restart(&mut self) {
         // The flag stands for edges after this character.
         self.start_bit.sr().write(|w| w.cc3if().clear_bit());
+        self.start();
+    }
+
+    /// Starts the count over.
+    #[inline]
+    fn start(&mut self) {
         // An update by software clears counter and prescaler, and with URS raises no interrupt.
         self.timer
             .cr1()
@@ -154,10 +188,11 @@ impl GapTimer {
             .write(|w| w.urs().counter_only().opm().enabled().cen().enabled());
     }
 
-    /// Stops: no silence is of interest until the next character.
+    /// Stops: no silence is of interest until the next character, and no limit any more.
     pub fn stop(&mut self) {
         self.halt();
         self.timer.sr().reset();
+        self.select_silences();
     }
 
     fn halt(&mut self) {

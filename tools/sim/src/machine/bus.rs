@@ -11,7 +11,7 @@ use rigless::soc::Width as CoreWidth;
 use rigless::time::VirtualNanos;
 
 use super::dwt::{self, Dwt};
-use super::memory::{FLASH_BASE, FLASH_SIZE};
+use super::memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
 use super::timing::{InstructionClock, cycles_per_64};
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
@@ -48,6 +48,12 @@ pub struct Bus {
     pub(super) pc: u32,
     /// How long interrupts wait, when that is measured.
     pub(super) waits: Option<Box<Waits>>,
+    /// The SRAM.
+    pub(super) ram: Memory,
+    /// Reads of flash come here, because an operation runs.
+    pub(super) flash_is_watched: bool,
+    /// The core has read flash while an operation runs, and waits for its end.
+    pub(super) read_stalls: bool,
 }
 
 /// An access as the blocks see it.
@@ -124,6 +130,7 @@ impl Bus {
         }
         // The machine makes the reset, and waits out the flash.
         self.halt |= self.soc.signals.reset.is_some() || self.soc.flash.busy_until().is_some();
+        self.watch_flash();
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.
@@ -144,8 +151,14 @@ impl Bus {
             }
             PPB..0xE010_0000 => Some(self.debug_block(request)),
             _ => match flash_offset(address) {
-                Some(offset) if request.write.is_none() => Some(self.vectors(request, offset)),
+                Some(offset) if request.write.is_none() => {
+                    self.read_stalls |= self.soc.flash.busy_until().is_some();
+                    Some(word_of(self.soc.flash.bytes(), request, offset))
+                }
                 Some(offset) => self.store_to_flash(request, offset),
+                None if address.wrapping_sub(RAM_BASE) < RAM_SIZE as u32 => {
+                    Some(self.routed_ram(request, address - RAM_BASE))
+                }
                 None => {
                     self.note(
                         request,
@@ -281,12 +294,20 @@ impl Bus {
         }
     }
 
-    /// The core reads the flash without asking, all but the page of the vector table while [`Waits`] has it
-    /// sent here.
-    fn vectors(&self, request: Request, offset: u32) -> u32 {
-        let at = (offset & !3) as usize;
-        let flash = self.soc.flash.bytes();
-        request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| flash[at + n])))
+    /// The core reads and writes SRAM without asking, all but the page of the vector table while [`Waits`] has
+    /// it sent here.
+    fn routed_ram(&mut self, request: Request, offset: u32) -> u32 {
+        if let Some(value) = request.write {
+            let bytes = value.to_le_bytes();
+            let width = match request.width {
+                Width::Byte => 1,
+                Width::Half => 2,
+                Width::Word => 4,
+            };
+            let at = offset as usize;
+            self.ram.bytes_mut()[at..at + width].copy_from_slice(&bytes[..width]);
+        }
+        word_of(self.ram.bytes(), request, offset)
     }
 
     fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {
@@ -310,6 +331,12 @@ impl Bus {
             },
         );
     }
+}
+
+/// What a read at `offset` of `memory` gives.
+fn word_of(memory: &[u8], request: Request, offset: u32) -> u32 {
+    let at = (offset & !3) as usize;
+    request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| memory[at + n])))
 }
 
 /// The offset into flash of `address`, at its own place or at 0.

@@ -6,6 +6,7 @@
 pub mod bus;
 mod debug;
 pub mod dwt;
+mod flash_reads;
 pub mod memory;
 mod run;
 pub mod timing;
@@ -58,7 +59,6 @@ pub struct Machine {
     core: Box<dyn Processor>,
     /// Everything else.
     pub bus: Bus,
-    ram: Memory,
     /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
     fresh: Vec<u8>,
     /// Instructions done before the core's last reset.
@@ -114,8 +114,10 @@ impl Machine {
                 queued: Vec::new(),
                 pc: 0,
                 waits: None,
+                ram,
+                flash_is_watched: false,
+                read_stalls: false,
             },
-            ram,
             fresh,
             counted: 0,
             powered: false,
@@ -204,13 +206,13 @@ impl Machine {
 
     /// What the firmware logged since the last call.
     pub fn take_log(&mut self) -> String {
-        self.log.take(self.ram.bytes())
+        self.log.take(self.bus.ram.bytes())
     }
 
     /// The SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
-        self.ram.bytes()
+        self.bus.ram.bytes()
     }
 
     /// The SRAM, to change: a debugger's write.
@@ -218,7 +220,7 @@ impl Machine {
         let base = u64::from(RAM_BASE);
         self.core
             .ask(Queued::Invalidate(base, base + RAM_SIZE as u64));
-        self.ram.bytes_mut()
+        self.bus.ram.bytes_mut()
     }
 
     /// The flash, to change: a programmer's write.
@@ -268,7 +270,7 @@ impl Machine {
         }
         let now = self.now();
         self.bus.advance(now, self.core.retired());
-        self.log.poll(self.ram.bytes_mut());
+        self.log.poll(self.bus.ram.bytes_mut());
         self.powered = false;
         self.locked_up = false;
         self.cut = None;
@@ -289,7 +291,7 @@ impl Machine {
     /// A reset of the whole part.
     pub fn reset(&mut self, cause: Cause) {
         let now = self.now();
-        self.log.poll(self.ram.bytes_mut());
+        self.log.poll(self.bus.ram.bytes_mut());
         self.bus.soc.reset(cause, now);
         let count = self.core.retired();
         self.counted += count;

@@ -89,7 +89,7 @@ impl Machine {
             }
             self.serve_nmi();
             if now >= self.poll_at {
-                self.log.poll(self.ram.bytes_mut());
+                self.log.poll(self.bus.ram.bytes_mut());
                 self.poll_at = POLL * (now.as_ps() / POLL.as_ps() + 1);
             }
             if now >= limit.time {
@@ -261,6 +261,13 @@ impl Machine {
             .flash
             .stalled_until()
             .filter(|_| is_flash(self.pc()))
+            .or_else(|| {
+                self.bus
+                    .soc
+                    .flash
+                    .busy_until()
+                    .filter(|_| self.bus.read_stalls)
+            })
             .map(|end| (end, Rest::Stalled))
     }
 

@@ -64,6 +64,11 @@ impl Waits {
         self.done.get(number).copied().unwrap_or_default()
     }
 
+    /// The vector table whose page is sent to the bus.
+    pub(super) fn table(&self) -> Option<u32> {
+        self.table
+    }
+
     /// The core was reset: nothing waits any more, and the vector table is to be found again.
     pub(super) fn reset(&mut self, core: &mut dyn Processor) {
         self.since = [None; EXCEPTIONS];
