@@ -110,7 +110,15 @@ mod tests {
             (921_600, 750_000, 1_750_000),
             (9600, 1_718_750, 100_000_000),
         ] {
-            for format in [Format::N2, Format::E1, Format::O1, Format::N1] {
+            for format in [
+                Format::N2,
+                Format::E1,
+                Format::O1,
+                Format::N1,
+                Format::SevenE1,
+                Format::SevenO1,
+                Format::SevenN2,
+            ] {
                 let line = LineSettings { baud, format };
                 let ticks = GapTicks::new(72, line, t15, t35).unwrap();
                 let tick_ns = (i64::from(ticks.prescaler) + 1) * 1_000_000_000 / 72_000_000 + 1;

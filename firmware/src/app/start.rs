@@ -114,10 +114,13 @@ pub fn up(
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, silences) = match framing {
             Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
-            Framing::Ascii { .. } => (
-                Receiver::ascii(unit, Width::Eight),
-                (t35, Gaps::ASCII_TIMEOUT),
-            ),
+            Framing::Ascii { .. } => {
+                let width = match settings.format.data_bits() {
+                    7 => Width::Seven,
+                    _ => Width::Eight,
+                };
+                (Receiver::ascii(unit, width), (t35, Gaps::ASCII_TIMEOUT))
+            }
         };
         let longest_us = longest_reply_us(on_wire, framing);
         let (uart, gap) = board
@@ -166,6 +169,9 @@ fn wire_settings(line: config::Line) -> uart::LineSettings {
             Format::F8E1 => uart::Format::E1,
             Format::F8O1 => uart::Format::O1,
             Format::F8N1 => uart::Format::N1,
+            Format::F7E1 => uart::Format::SevenE1,
+            Format::F7O1 => uart::Format::SevenO1,
+            Format::F7N2 => uart::Format::SevenN2,
         },
     }
 }
