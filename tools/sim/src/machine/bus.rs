@@ -16,6 +16,7 @@ use super::timing::{InstructionClock, cycles_per_64};
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
 use crate::periph::dbgmcu::Dbgmcu;
+use crate::periph::flash::BLOCK;
 use crate::periph::ident::{self, Ident};
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::soc::Soc;
@@ -121,9 +122,25 @@ impl Bus {
             let base = u64::from(FLASH_BASE);
             self.queued
                 .push(Queued::Invalidate(base + first as u64, base + end as u64));
+            self.reroute();
         }
         // The machine makes the reset, and waits out the flash.
         self.halt |= self.soc.signals.reset.is_some() || self.soc.flash.busy_until().is_some();
+    }
+
+    /// Sends reads of blocks with unsteady cells to the bus. Instructions are fetched from the likelier bits.
+    fn reroute(&mut self) {
+        let (changed, unsteady) = self.soc.flash.take_rerouted();
+        for block in (0..u32::BITS).filter(|block| changed >> block & 1 != 0) {
+            for base in [FLASH_BASE, 0] {
+                let address = u64::from(base) + u64::from(block) * BLOCK as u64;
+                self.queued.push(if unsteady >> block & 1 != 0 {
+                    Queued::Route(address)
+                } else {
+                    Queued::Unroute(address)
+                });
+            }
+        }
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.
@@ -144,7 +161,7 @@ impl Bus {
             }
             PPB..0xE010_0000 => Some(self.debug_block(request)),
             _ => match flash_offset(address) {
-                Some(offset) if request.write.is_none() => Some(self.vectors(request, offset)),
+                Some(offset) if request.write.is_none() => Some(self.flash_word(request, offset)),
                 Some(offset) => self.store_to_flash(request, offset),
                 None => {
                     self.note(
@@ -281,12 +298,11 @@ impl Bus {
         }
     }
 
-    /// The core reads the flash without asking, all but the page of the vector table while [`Waits`] has it
-    /// sent here.
-    fn vectors(&self, request: Request, offset: u32) -> u32 {
+    /// The core reads the flash without asking, all but blocks with unsteady cells, and the page of the vector
+    /// table while [`Waits`] has it sent here.
+    fn flash_word(&mut self, request: Request, offset: u32) -> u32 {
         let at = (offset & !3) as usize;
-        let flash = self.soc.flash.bytes();
-        request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| flash[at + n])))
+        request.part_of(self.soc.flash.read_word(at))
     }
 
     fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {

@@ -1,7 +1,7 @@
 //! The flash program and erase controller, PM0075 (STM32F10xxx flash programming manual) chapters 2 and 3.
 //!
 //! It owns the flash's cells. An operation takes real time and changes them when it ends, or half-way when
-//! the power goes ([`mod@array`]). Option bytes can be read but not programmed.
+//! the power goes or the part is reset ([`mod@array`]). Option bytes can be read but not programmed.
 
 mod array;
 
@@ -11,6 +11,9 @@ use crate::time::Time;
 
 use array::{Cells, Operation};
 pub use array::{PAGE, Torn};
+
+/// Bytes of the blocks in which the core can be told to read through the bus: its pages.
+pub const BLOCK: usize = 4096;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
@@ -114,14 +117,18 @@ pub struct Flash {
     complaint: Option<Complaint>,
     changed: Option<(usize, usize)>,
     changes: u64,
+    /// The blocks of [`BLOCK`] bytes whose reads the core was told to send to the bus.
+    routed: u32,
 }
 
 impl Flash {
-    /// The controller after power-on over an erased flash, with these write-protection bits.
+    /// The controller after power-on over an erased flash, with these write-protection bits. `seed` decides
+    /// what torn operations leave.
     #[must_use]
-    pub fn new(wrpr: u32) -> Self {
+    pub fn new(wrpr: u32, seed: u64) -> Self {
         Self {
-            cells: Cells::erased(),
+            cells: Cells::erased(seed),
+            routed: 0,
             durations: Durations::default(),
             torn: Torn::default(),
             hsi_on: true,
@@ -207,6 +214,19 @@ impl Flash {
         self.changes
     }
 
+    /// Reads the word at byte `at` (a multiple of 4), with unsteady cells as this read finds them.
+    pub fn read_word(&mut self, at: usize) -> u32 {
+        u32::from_le_bytes(self.cells.read(at))
+    }
+
+    /// The blocks of [`BLOCK`] bytes, one bit each, that have begun or ceased to hold unsteady cells since the
+    /// last call, and those that hold some now. The core reads all others without asking.
+    pub fn take_rerouted(&mut self) -> (u32, u32) {
+        let unsteady = self.cells.unsteady(BLOCK);
+        let before = core::mem::replace(&mut self.routed, unsteady);
+        (before ^ unsteady, unsteady)
+    }
+
     /// What there was against the last write, since the last call.
     pub fn take_complaint(&mut self) -> Option<Complaint> {
         self.complaint.take()
@@ -244,7 +264,7 @@ impl Flash {
         } else {
             let at = offset as usize & !1;
             // A half-word that is not erased takes only 0x0000 (PM0075 2.3.3).
-            if self.cells.half(at) != 0xFFFF && value != 0 {
+            if self.cells.read(at) != [0xFF; 2] && value != 0 {
                 self.sr |= SR_PGERR;
                 self.complaint = complain("a half-word that was not erased was programmed", false);
                 return;
