@@ -40,7 +40,7 @@ pub const MESSES: [Mess; 11] = [
     Mess::Noise(4),
 ];
 
-/// A half-word whose program was cut off: the cells that were to change, and what was to be programmed.
+/// A half-word whose program was cut off, the cells that were to change, and the value to be programmed.
 #[derive(Clone, Copy, Debug)]
 struct Torn {
     page: usize,

@@ -12,6 +12,7 @@ pub const FLASH_CR: u32 = 0x4002_2010;
 pub const FLASH_AR: u32 = 0x4002_2014;
 pub const IWDG_KR: u32 = 0x4000_3000;
 pub const IWDG_PR: u32 = 0x4000_3004;
+pub const IWDG_SR: u32 = 0x4000_300C;
 pub const GPIOA: u32 = 0x4001_0800;
 pub const GPIOC: u32 = 0x4001_1000;
 pub const TIM2: u32 = 0x4000_0000;

@@ -182,7 +182,7 @@ impl Cells {
 
 /// A number from 0 to 65535 that depends on the seed and the bit's place alone (the mixer of splitmix64).
 fn draw(seed: u64, bit: usize) -> u32 {
-    let mut z = (seed ^ bit as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut z = (seed ^ (bit as u64 + 1)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
     (z ^ z >> 31) as u32 & 0xFFFF

@@ -12,7 +12,7 @@ use crate::time::Time;
 use array::{Cells, Operation};
 pub use array::{PAGE, Torn};
 
-/// Bytes of the blocks in which the core can be told to read through the bus: its pages.
+/// Bytes of a block whose reads the core can be told to send to the bus: a page of the core.
 pub const BLOCK: usize = 4096;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -117,7 +117,7 @@ pub struct Flash {
     complaint: Option<Complaint>,
     changed: Option<(usize, usize)>,
     changes: u64,
-    /// The blocks of [`BLOCK`] bytes whose reads the core was told to send to the bus.
+    /// The blocks of [`BLOCK`] bytes, one bit each, whose reads the core sends to the bus.
     routed: u32,
 }
 
