@@ -4,6 +4,9 @@
 //! The core reads flash and reads and writes SRAM without asking. All else comes here: stores to flash, the
 //! register blocks, the factory's words, the debug blocks. Bit-band aliases arrive as a read and a write of
 //! the word they stand for (PM0056 2.2.5).
+//!
+//! Bus faults are precise, as crate rigless has them. On the part the fault of a buffered store is imprecise: the
+//! program counter is some instructions on, and BFAR is not valid (PM0056 4.4.11, 4.4.14).
 
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
@@ -278,7 +281,9 @@ impl Bus {
         let word = address & !3;
         let answer = match (address, request.write) {
             (dwt::BASE.., Some(value)) if address < dwt::BASE + dwt::SIZE => {
-                self.dwt.write(word - dwt::BASE, value, cycle).map(|()| 0)
+                let answer = self.dwt.write(word - dwt::BASE, value, cycle).map(|()| 0);
+                self.halt |= self.dwt.awaits_look();
+                answer
             }
             (dwt::BASE.., None) if address < dwt::BASE + dwt::SIZE => {
                 self.dwt.read(word - dwt::BASE, cycle)

@@ -37,7 +37,7 @@ use waits::{Wait, Waits};
 
 /// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
 const CPUID: u32 = 0x411F_C231;
-/// From the supply's rise to the end of reset: DS5319 table 10, tRSTTEMPO, typical.
+/// From the supply's rise to the end of reset: DS5319 table 11, tRSTTEMPO, typical.
 const POWER_ON_RESET: Time = Time::from_us(2_500);
 /// The shortest reset pulse (RM0008 7.1.1).
 const RESET_PULSE: Time = Time::from_us(20);

@@ -24,6 +24,7 @@ pub const SYST_CSR: u32 = 0xE000_E010;
 pub const SYST_RVR: u32 = 0xE000_E014;
 pub const SYST_CVR: u32 = 0xE000_E018;
 pub const AIRCR: u32 = 0xE000_ED0C;
+pub const DEMCR: u32 = 0xE000_EDFC;
 pub const DWT_CTRL: u32 = 0xE000_1000;
 pub const DWT_CYCCNT: u32 = 0xE000_1004;
 /// Where the programs put their results.

@@ -72,7 +72,7 @@ const TEMPERATURE: usize = 16;
 const REFERENCE: usize = 17;
 /// The sensor at 25 degC: V25 typ. (DS5319 table 50).
 const TEMPERATURE_MV: u16 = 1430;
-/// VREFINT typ. (DS5319 table 13).
+/// VREFINT typ. (DS5319 table 12).
 const REFERENCE_MV: u16 = 1200;
 /// VDDA = VREF+.
 const SUPPLY_MV: u32 = 3300;

@@ -41,7 +41,7 @@ const CR_EOPIE: u32 = 1 << 12;
 const CR_OPTION: u32 = 1 << 4 | 1 << 5 | 1 << 9;
 const CR_WRITABLE: u32 = CR_PG | CR_PER | CR_MER | CR_ERRIE | CR_EOPIE;
 
-/// How long the part takes; DS5319 table 29 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
+/// How long the part takes; DS5319 table 28 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Durations {
     /// A page erase or a mass erase; 30 ms, the middle of the range, unless set.
@@ -106,9 +106,10 @@ pub struct Flash {
     busy: Option<Busy>,
     /// Instructions left in the prefetch buffer: the core does not stall before it has run them.
     ahead: u32,
-    /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the medium-density
-    /// parts, "Flash memory BSY bit delay versus STRT bit setting"). The worst case: until the first read of a
-    /// register of this block, or until the core stalls.
+    /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the STM32F10xx4 and
+    /// STM32F10xx6, 2.11 "Flash memory BSY bit delay versus STRT bit setting", for an erase; here for this part and
+    /// for a half-word, too). The worst case: until the first read of a register of this block, or until the core
+    /// stalls.
     bsy_is_late: bool,
     /// The operation that is to end without EOP, counted as `started` does.
     without_eop: Option<u64>,

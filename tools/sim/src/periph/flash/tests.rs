@@ -256,6 +256,40 @@ fn nothing_happens_without_the_hsi() {
     assert!(flash.take_complaint().is_some());
 }
 
+#[test]
+fn mass_erase_clears_every_page_and_none_when_one_is_protected() {
+    for (wrpr, status) in [(u32::MAX, SR_BSY), (!1, SR_WRPRTERR)] {
+        let mut flash = Flash::new(wrpr, SEED);
+        flash.bytes_mut().fill(0);
+        for key in KEYS {
+            flash.write(4, key, NOW).unwrap();
+        }
+        flash.write(0x10, CR_MER, NOW).unwrap();
+        flash.write(0x10, CR_MER | CR_STRT, NOW).unwrap();
+        let _ = flash.read(0x0C, NOW);
+        assert_eq!(flash.read(0x0C, NOW), Ok(status));
+        flash.advance(Time::from_ms(30));
+        let byte = if status == SR_BSY { 0xFF } else { 0 };
+        assert!(flash.bytes().iter().all(|b| *b == byte));
+    }
+}
+
+#[test]
+fn interrupts_report_the_end_and_the_errors_that_are_enabled() {
+    for (enabled, value, end, error) in [(CR_EOPIE, 1, true, false), (CR_ERRIE, 1, false, true)] {
+        let mut flash = open();
+        flash.write(0x10, CR_PG | enabled, NOW).unwrap();
+        flash.program(0, true, value, NOW);
+        assert!(!flash.irq());
+        flash.advance(Time::from_ms(1));
+        assert_eq!(flash.irq(), end);
+        flash.write(0x0C, SR_EOP, NOW).unwrap();
+        assert!(!flash.irq());
+        flash.program(0, true, 2, NOW);
+        assert_eq!(flash.irq(), error, "not erased");
+    }
+}
+
 impl Flash {
     fn half_at(&mut self, at: usize) -> u16 {
         u16::from_le_bytes(self.cells.read(at))
