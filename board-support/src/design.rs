@@ -47,14 +47,14 @@ pub const STORE_PAGES: [u32; 2] = [0x0800_F800, 0x0800_FC00];
 /// A page of flash, in bytes (medium density, PM0075 2.1).
 pub const PAGE_BYTES: u32 = 1024;
 
-/// The longest wait for a half-word to be programmed, in us: 70 at most (DS5319 table 29).
+/// The longest wait for a half-word to be programmed, in us: 70 at most (DS5319 table 28).
 pub const FLASH_PROGRAM_US: u32 = 500;
 
-/// The longest wait for a page to be erased, in us: 40 ms at most (DS5319 table 29).
+/// The longest wait for a page to be erased, in us: 40 ms at most (DS5319 table 28).
 pub const FLASH_ERASE_US: u32 = 100_000;
 
 /// The threshold of the voltage detector, PLS (RM0008 5.4.1): 7 is 2.9 V, at which a falling supply is found
-/// low at 2.66 to 2.9 V and a rising one good at 2.76 to 3.0 V (DS5319 table 12).
+/// low at 2.66 to 2.9 V and a rising one good at 2.76 to 3.0 V (DS5319 table 11).
 ///
 /// The highest there is: a supply of 3.3 V less 5 % is 3.13 V and never below it. One that collapses still has
 /// to fall by 0.66 V, from 2.66 V, before programming is out of its specification at 2.0 V. At 40 mA

@@ -115,9 +115,9 @@ unsafe fn run(
             flash.cr().modify(|_, w| w.strt().set_bit());
         }
     }
-    // BSY rises one cycle after the operation was started (errata sheet of the medium-density parts, "Flash
-    // memory BSY bit delay versus STRT bit setting"). Without this read the first look would find it
-    // clear, and the controller would be locked in the middle of the operation.
+    // BSY rises one cycle after the operation was started (errata sheet of the STM32F10xx4 and STM32F10xx6, 2.11
+    // "Flash memory BSY bit delay versus STRT bit setting"; taken to hold for this part). Without this read the first
+    // look would find it clear, and the controller would be locked in the middle of the operation.
     let _ = flash.sr().read();
     let mut left = looks;
     let ended = loop {

@@ -19,8 +19,10 @@
 //!
 //! Why a power cut does no harm, at whatever operation:
 //!
-//! - A record counts once its CRC is complete, and that is programmed last. Until then the one before
-//!   counts, and nothing is erased that holds the newest.
+//! - A record counts once its first seal is programmed, after its CRC is complete. Until then the one before
+//!   counts, and nothing is erased that holds the newest. So a CRC whose cells read differently from start to
+//!   start decides nothing.
+//! - A start that finds one seal programs both again. The first one reads the same from then on.
 //! - Behind what a cut left over nothing is written: the next start moves the newest record to the
 //!   other page (*compaction*) and erases this one.
 //! - A page is used only with its mark. The mark is destroyed before an erase and programmed after it,
@@ -35,14 +37,14 @@ mod operation;
 mod saving;
 mod survey;
 
-use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, is_newer, pair_of};
+use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
 
 use crate::config::Settings;
 pub use flash::{Flash, Page, StoreError};
 pub use operation::Operation;
 use operation::{Readying, Writing};
 pub use saving::{Progress, Saving};
-use survey::{Survey, record_at};
+use survey::{Found, Survey, record_at};
 
 /// With less room than this behind the newest record, and older ones before it, a start makes room.
 const LITTLE_ROOM: usize = 256;
@@ -58,12 +60,11 @@ pub struct Loaded {
     pub rejected: u16,
 }
 
-/// The newest good record.
+/// The good record that counts.
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     page: Page,
-    offset: usize,
-    sequence: u32,
+    found: Found,
 }
 
 /// Where things are on the two pages.
@@ -87,7 +88,7 @@ impl Store {
     #[must_use]
     pub fn load(&self, flash: &impl Flash) -> Loaded {
         let newest = self.newest();
-        match newest.and_then(|newest| record_at(flash.page(newest.page), newest.offset)) {
+        match newest.and_then(|newest| record_at(flash.page(newest.page), newest.found.offset)) {
             Some(record) => {
                 let (settings, rejected) = Settings::load(record.pairs());
                 Loaded {
@@ -112,6 +113,9 @@ impl Store {
     ///
     /// When the flash fails. What is stored is still good, and saves are still tried.
     pub fn prepare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+        // Where a seal is worn out, the record is moved, as from any page that takes no more.
+        let _ = self.seal_again(flash);
+        self.look_again(flash);
         let result = match self.newest() {
             Some(newest) => self.make_room(newest, flash),
             None if self.first.written || self.second.written => self.make_one_ready(flash),
@@ -144,6 +148,25 @@ impl Store {
         result
     }
 
+    /// Programs the seals of the newest record again when the power was cut between them: the first one may
+    /// not be steady.
+    fn seal_again<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+        let Some(Newest { page, found }) = self.newest().filter(|newest| newest.found.sealed == 1)
+        else {
+            return Ok(());
+        };
+        for offset in [found.seals, found.seals.saturating_add(2)] {
+            // Zero may be programmed over anything.
+            Operation::Program {
+                page,
+                offset,
+                half: 0,
+            }
+            .perform(flash)?;
+        }
+        Ok(())
+    }
+
     /// Clears the page without the newest record, and moves that there if the other cannot take many
     /// more.
     fn make_room<F: Flash>(
@@ -151,7 +174,8 @@ impl Store {
         newest: Newest,
         flash: &mut F,
     ) -> Result<(), StoreError<F::Error>> {
-        let Newest { page, offset, .. } = newest;
+        let Newest { page, found } = newest;
+        let offset = found.offset;
         let to = page.other();
         self.make_ready(to, flash)?;
         let survey = self.survey(page);
@@ -163,7 +187,7 @@ impl Store {
         };
         // As it is: the next start may find a newer firmware, which knows all of it.
         let count = u16::try_from(record.count()).unwrap_or(u16::MAX);
-        let sequence = newest.sequence.wrapping_add(1);
+        let sequence = found.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
         let mut writing = Writing::new(to, FIRST_OFFSET, encoder);
         let mut index: usize = 0;
@@ -238,17 +262,11 @@ impl Store {
 
     fn newest(&self) -> Option<Newest> {
         let on = |page: Page| {
-            let (offset, sequence) = self.survey(page).newest?;
-            Some(Newest {
-                page,
-                offset,
-                sequence,
-            })
+            let found = self.survey(page).newest?;
+            Some(Newest { page, found })
         };
         match (on(Page::First), on(Page::Second)) {
-            (Some(first), Some(second)) if is_newer(second.sequence, first.sequence) => {
-                Some(second)
-            }
+            (Some(first), Some(second)) if second.found.counts_before(&first.found) => Some(second),
             (None, second) => second,
             (first, _) => first,
         }

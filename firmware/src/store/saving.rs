@@ -31,11 +31,12 @@ impl Saving {
     #[must_use]
     pub fn new(store: &Store, flash: &impl Flash, settings: &Settings) -> Option<Self> {
         let newest = store.newest();
-        let stored = newest.and_then(|newest| record_at(flash.page(newest.page), newest.offset));
+        let stored =
+            newest.and_then(|newest| record_at(flash.page(newest.page), newest.found.offset));
         if stored.is_some_and(|stored| stored.pairs().eq(settings.changed_from(0))) {
             return None;
         }
-        let sequence = newest.map_or(1, |newest| newest.sequence.wrapping_add(1));
+        let sequence = newest.map_or(1, |newest| newest.found.sequence.wrapping_add(1));
         // There are as many settings as addresses at most.
         let count = settings
             .changed_from(0)
@@ -78,7 +79,7 @@ impl Saving {
     ) -> Result<(), StoreError<F::Error>> {
         store.look_again(flash);
         match store.newest() {
-            Some(newest) if newest.sequence == self.sequence => Ok(()),
+            Some(newest) if newest.found.sequence == self.sequence => Ok(()),
             _ => {
                 store.avoid(self.writing.page);
                 Err(StoreError::Worn(self.writing.page, self.writing.offset()))

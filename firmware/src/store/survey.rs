@@ -1,15 +1,54 @@
 //! What is on a page.
 
 use register_map::record::{
-    FIRST_OFFSET, PAGE_MARK, PAGE_SIZE, Record, is_newer, is_vacant, records,
+    FIRST_OFFSET, PAGE_MARK, PAGE_SIZE, Record, SEALS, is_newer, is_vacant, records,
 };
+
+/// A good record's place on its page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Found {
+    /// Where it begins.
+    pub(super) offset: usize,
+    /// Where its seals are.
+    pub(super) seals: usize,
+    pub(super) sequence: u32,
+    /// How many seals are complete, counted from the first: 0 to 2.
+    pub(super) sealed: u8,
+}
+
+impl Found {
+    fn new(page: &[u8; PAGE_SIZE], offset: usize, record: Record<'_>) -> Self {
+        let seals = offset.saturating_add(record.size());
+        let sealed = match page.get(seals..).and_then(<[u8]>::first_chunk) {
+            Some([0, 0, 0, 0]) => 2,
+            Some([0, 0, ..]) => 1,
+            _ => 0,
+        };
+        Self {
+            offset,
+            seals,
+            sequence: record.sequence,
+            sealed,
+        }
+    }
+
+    /// Whether this record counts rather than the other one. A sealed record counts before any that is not: the
+    /// CRC of that one may not be steady.
+    pub(super) const fn counts_before(&self, other: &Self) -> bool {
+        match (self.sealed > 0, other.sealed > 0) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => is_newer(self.sequence, other.sequence),
+        }
+    }
+}
 
 /// What the bytes of a page amount to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Survey {
-    /// Offset and sequence number of the newest good record.
-    pub(super) newest: Option<(usize, u32)>,
-    /// The page was erased completely, and behind its good records, if any, it still is.
+    /// The good record that counts.
+    pub(super) newest: Option<Found>,
+    /// The page was erased completely, and behind its sealed records, if any, it still is.
     pub(super) clean: bool,
     /// It has the mark of a complete erase.
     pub(super) marked: bool,
@@ -36,14 +75,15 @@ impl Survey {
             records: 0,
         };
         for (offset, record) in records(page) {
-            survey.clean &= offset == survey.end;
-            survey.end = offset.saturating_add(record.size());
+            let found = Found::new(page, offset, record);
+            survey.clean &= offset == survey.end && found.sealed == 2;
+            survey.end = found.seals.saturating_add(SEALS);
             survey.records = survey.records.saturating_add(1);
             if survey
                 .newest
-                .is_none_or(|(_, newest)| is_newer(record.sequence, newest))
+                .is_none_or(|newest| found.counts_before(&newest))
             {
-                survey.newest = Some((offset, record.sequence));
+                survey.newest = Some(found);
             }
         }
         let behind = page.get(survey.end..).unwrap_or_default();
@@ -102,19 +142,41 @@ mod tests {
         assert!(!spoilt.is_ready() && spoilt.written && spoilt.room() == 0);
     }
 
+    /// A page with a record of each of these sequence numbers, the first `unsealed` bytes of whose seals are
+    /// still erased.
+    fn records_of(sequences: &[u32], unsealed: usize) -> [u8; PAGE_SIZE] {
+        let mut bytes = page(&PAGE_MARK.to_le_bytes());
+        let mut end = FIRST_OFFSET;
+        for sequence in sequences {
+            let mut other = [0xFF; PAGE_SIZE];
+            let size = encode_page(*sequence, &[], &mut other).unwrap() - FIRST_OFFSET;
+            bytes[end..end + size].copy_from_slice(&other[FIRST_OFFSET..][..size]);
+            end += size;
+        }
+        bytes[end - unsealed..end].fill(0xFF);
+        bytes
+    }
+
     #[test]
-    fn the_next_record_goes_behind_the_last_even_if_that_ends_as_erased_flash_does() {
-        // A record whose CRC ends in FF FF: found by trying sequence numbers.
-        let mut bytes = [0xFF; PAGE_SIZE];
-        let size = (0..).find_map(|sequence| {
-            let size = encode_page(sequence, &[], &mut bytes)?;
-            bytes[..size].ends_with(&[0xFF, 0xFF]).then_some(size)
-        });
-        let survey = Survey::of(&bytes);
-        assert_eq!(
-            (Some(survey.end), survey.clean, survey.records),
-            (size, true, 1)
-        );
+    fn unsealed_record_counts_only_when_no_record_is_sealed() {
+        let newest = |bytes| {
+            Survey::of(&bytes)
+                .newest
+                .map(|found| (found.sequence, found.sealed))
+        };
+        assert_eq!(newest(records_of(&[1, 2], 0)), Some((2, 2)));
+        assert_eq!(newest(records_of(&[1, 2], 2)), Some((2, 1)));
+        assert_eq!(newest(records_of(&[1, 2], 4)), Some((1, 2)));
+        assert_eq!(newest(records_of(&[2], 4)), Some((2, 0)));
+    }
+
+    #[test]
+    fn page_with_an_incomplete_seal_takes_no_more_records() {
+        for unsealed in [0, 2, 4] {
+            let survey = Survey::of(&records_of(&[1, 2], unsealed));
+            assert_eq!(survey.clean, unsealed == 0, "{unsealed}");
+            assert_eq!((survey.end, survey.records), (2 + 2 * 18, 2));
+        }
     }
 
     #[test]
@@ -124,7 +186,7 @@ mod tests {
         assert!(Survey::of(&bytes).clean);
         bytes[preset.len() + 10] = 0;
         let survey = Survey::of(&bytes);
-        assert!(!survey.clean && survey.newest == Some((2, 0)));
+        assert!(!survey.clean && survey.newest.map(|found| found.offset) == Some(2));
     }
 
     #[test]
@@ -139,6 +201,7 @@ mod tests {
         put(200, 1);
         put(300, 0);
         let survey = Survey::of(&bytes);
-        assert_eq!((survey.newest, survey.records), (Some((200, 1)), 4));
+        let newest = survey.newest.map(|found| (found.offset, found.sequence));
+        assert_eq!((newest, survey.records), (Some((200, 1)), 4));
     }
 }

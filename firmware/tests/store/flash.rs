@@ -11,6 +11,10 @@ pub enum Mess {
     Untouched,
     /// It was just done; an erased page may still be weak.
     Complete,
+    /// It was just done but for one cell of a half-word, which reads as it was at every second
+    /// start, and not at the first. An erase as
+    /// [`Self::Complete`].
+    Nearly,
     /// Any of the bits to be changed have changed.
     Sprinkled(u64),
     /// The bytes up to here have changed.
@@ -22,9 +26,10 @@ pub enum Mess {
 }
 
 /// Messes of every sort.
-pub const MESSES: [Mess; 10] = [
+pub const MESSES: [Mess; 11] = [
     Mess::Untouched,
     Mess::Complete,
+    Mess::Nearly,
     Mess::Sprinkled(1),
     Mess::Sprinkled(2),
     Mess::Sprinkled(3),
@@ -34,6 +39,16 @@ pub const MESSES: [Mess; 10] = [
     Mess::Back(2),
     Mess::Noise(4),
 ];
+
+/// A half-word whose program was cut off, the cells that were to change, and the value to be programmed.
+#[derive(Clone, Copy, Debug)]
+struct Torn {
+    page: usize,
+    offset: usize,
+    before: u16,
+    half: u16,
+    mess: Mess,
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowerCut;
@@ -46,6 +61,10 @@ pub struct MockFlash {
     weak: [bool; 2],
     /// Its bits are not even the same at every start.
     pub unsteady: [bool; 2],
+    /// Half-words whose program was cut off.
+    torn: Vec<Torn>,
+    /// Times the power has come back.
+    starts: u64,
     /// The power is cut in the operation after so many more.
     pub cut: Option<(usize, Mess)>,
     off: bool,
@@ -68,6 +87,8 @@ impl MockFlash {
             pages,
             weak: [false; 2],
             unsteady: [false; 2],
+            torn: Vec::new(),
+            starts: 0,
             cut: None,
             off: false,
             worn: None,
@@ -92,6 +113,23 @@ impl MockFlash {
     /// The power comes back. What is unsteady reads a little differently every time.
     pub fn power_on(&mut self) {
         (self.off, self.cut) = (false, None);
+        self.starts += 1;
+        for &Torn {
+            page,
+            offset,
+            before,
+            half,
+            mess,
+        } in &self.torn
+        {
+            let cells = match mess {
+                Mess::Nearly if !self.starts.is_multiple_of(2) => 1 << before.trailing_zeros(),
+                Mess::Nearly => 0,
+                _ => Noise(self.starts << 16 ^ offset as u64).next() as u16,
+            };
+            let read = half | before & cells;
+            self.pages[page][offset..offset + 2].copy_from_slice(&read.to_le_bytes());
+        }
         for index in 0..2 {
             if self.unsteady[index] {
                 let mut noise = Noise(self.operations() as u64 + 99);
@@ -158,7 +196,7 @@ impl Flash for MockFlash {
             "{operation:?} on a weak page"
         );
         let mut after = match mess {
-            None | Some(Mess::Complete) => half,
+            None | Some(Mess::Complete | Mess::Nearly) => half,
             Some(Mess::Untouched) => before,
             Some(Mess::Front(_)) => half | (before & 0xFF00),
             Some(Mess::Back(_)) => half | (before & 0x00FF),
@@ -170,6 +208,22 @@ impl Flash for MockFlash {
             after |= before;
         }
         *place = after.to_le_bytes();
+        // A complete program steadies the cells that it programs.
+        let index = page as usize;
+        self.torn.retain(|torn| {
+            (torn.page, torn.offset) != (index, offset) || mess.is_some() || torn.before & half != 0
+        });
+        if let Some(mess @ (Mess::Nearly | Mess::Sprinkled(_) | Mess::Noise(_))) = mess
+            && before != half
+        {
+            self.torn.push(Torn {
+                page: index,
+                offset,
+                before: before & !half,
+                half,
+                mess,
+            });
+        }
         if self.off { Err(PowerCut) } else { Ok(()) }
     }
 
@@ -178,10 +232,11 @@ impl Flash for MockFlash {
         let index = page as usize;
         self.erases[index] += 1;
         self.weak[index] = mess.is_some();
+        self.torn.retain(|torn| torn.page != index);
         self.unsteady[index] = matches!(mess, Some(Mess::Sprinkled(_) | Mess::Noise(_)));
         let bytes = &mut self.pages[index];
         match mess {
-            None | Some(Mess::Complete) => bytes.fill(0xFF),
+            None | Some(Mess::Complete | Mess::Nearly) => bytes.fill(0xFF),
             Some(Mess::Untouched) => {}
             Some(Mess::Front(to)) => bytes[..to].fill(0xFF),
             Some(Mess::Back(from)) => bytes[from..].fill(0xFF),

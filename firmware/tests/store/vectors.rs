@@ -28,6 +28,25 @@ const VERSION_0_1: [u8; 64] = [
     0xFF, 0xFF,
 ];
 
+/// The records of [`VERSION_0_1`] as they are written now, with their seals.
+#[rustfmt::skip]
+const SEALED: [u8; 72] = [
+    0x6F, 0x6B,
+    0x6D, 0x6F, 0x01, 0x01, 1, 0, 0, 0, 3, 0,
+    0x01, 0x01, 0x80, 0x04,
+    0x14, 0x01, 0x06, 0x00,
+    0xD2, 0x01, 0xFF, 0xFF,
+    0x07, 0x0B, 0x1C, 0x4C, 0, 0, 0, 0,
+    0x6D, 0x6F, 0x01, 0x01, 2, 0, 0, 0, 5, 0,
+    0x01, 0x01, 0xC0, 0x00,
+    0x06, 0x01, 0xE8, 0x03,
+    0x14, 0x01, 0x06, 0x00,
+    0x62, 0x01, 0x70, 0x0D,
+    0xD2, 0x01, 0xFF, 0xFF,
+    0xBD, 0xED, 0x91, 0x3B, 0, 0, 0, 0,
+    0xFF, 0xFF,
+];
+
 /// Written by a later firmware with another register map in the same layout: settings that are not
 /// known here, and a speed and a filter that are not allowed here.
 #[rustfmt::skip]
@@ -126,7 +145,7 @@ fn a_preset_is_a_stored_configuration() {
 
 #[test]
 fn what_is_stored_is_the_documented_record() {
-    let mut flash = MockFlash::with(&VERSION_0_1[..28], &[]);
+    let mut flash = MockFlash::with(&SEALED[..32], &[]);
     let (_, mut store) = start_well(&mut flash);
     let settings = settings(&[
         (0x0101, 192),
@@ -141,6 +160,6 @@ fn what_is_stored_is_the_documented_record() {
     }
     saving.finish(&mut store, &flash).unwrap();
     let bytes = firmware::store::Flash::page(&flash, Page::First);
-    assert_eq!(bytes[..VERSION_0_1.len()], VERSION_0_1);
+    assert_eq!(bytes[..SEALED.len()], SEALED);
     assert!(Store::open(&flash).load(&flash).settings == settings);
 }

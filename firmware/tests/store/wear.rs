@@ -101,7 +101,9 @@ fn a_worn_half_word_costs_a_save_but_never_what_is_stored() {
                 Err(error) => {
                     failures += 1;
                     assert_eq!(error, StoreError::Worn(page, offset));
-                    assert!(store.load(&flash).settings == old);
+                    // The second seal is programmed when the record counts already.
+                    let stored = store.load(&flash).settings;
+                    assert!(stored == old || stored == new);
                     save(&mut store, &mut flash, &new).expect("elsewhere");
                 }
             }

@@ -2,7 +2,7 @@
 
 use crc::{Digest, NoTable};
 
-use super::{CRC, FIRST_OFFSET, HEAD, MARK, OVERHEAD, PAGE_MARK, SCHEMA};
+use super::{CRC, FIRST_OFFSET, HEAD, MARK, OVERHEAD, PAGE_MARK, SCHEMA, SEALS};
 use crate::Module;
 use crate::configuration::MODULE_SLOT;
 
@@ -38,16 +38,21 @@ impl Encoder {
         }
     }
 
-    /// Bytes of the whole record.
+    /// Bytes of the whole record with its seals.
     #[must_use]
     pub const fn size(&self) -> usize {
+        self.unsealed() + SEALS
+    }
+
+    /// Bytes of the record without its seals.
+    const fn unsealed(&self) -> usize {
         OVERHEAD + self.count as usize * 4
     }
 
     /// The next half-word; `None` after the last. Asks for the next pair of address and value when it
     /// comes to one, `count` times in all; where `pair` has none, an address that nobody knows is stored.
     pub fn next(&mut self, pair: &mut dyn FnMut() -> Option<(u16, u16)>) -> Option<u16> {
-        let body = self.size().saturating_sub(4) / 2;
+        let body = self.unsealed().saturating_sub(4) / 2;
         let half = if let Some(half) = self.head.get(self.at) {
             *half
         } else if self.at < body {
@@ -64,6 +69,7 @@ impl Encoder {
             let half = match self.at.wrapping_sub(body) {
                 0 => [c0, c1],
                 1 => [c2, c3],
+                2 | 3 => [0, 0],
                 _ => return None,
             };
             self.at = self.at.saturating_add(1);
@@ -99,14 +105,15 @@ pub fn encode_page(sequence: u32, pairs: &[(u16, u16)], page: &mut [u8]) -> Opti
     Some(size)
 }
 
-/// A record of defaults with sequence number 0: what a device stores that never stored anything.
-pub const BEGINNING: [u8; OVERHEAD] = [
+/// A sealed record of defaults with sequence number 0: what a device stores that never stored anything.
+pub const BEGINNING: [u8; OVERHEAD + SEALS] = [
     0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 0, 0, // head
     0xE9, 0xA2, 0x94, 0x2E, // CRC
+    0, 0, 0, 0, // seals
 ];
 
 /// Bytes of [`module_in_slot`].
-pub const PRESET_LEN: usize = FIRST_OFFSET + OVERHEAD + 4;
+pub const PRESET_LEN: usize = FIRST_OFFSET + OVERHEAD + 4 + SEALS;
 
 /// What to put at the start of an erased first page so that the device starts with this module in its
 /// slot and defaults for the rest: what a simulator presets, and a programmer may.
@@ -138,6 +145,7 @@ mod tests {
         0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 1, 0, // head: schema 0x0101, sequence 0, one pair
         0x14, 0x01, 0x01, 0x00, // 0x0114 = 1
         0x6A, 0x52, 0xCA, 0x95, // CRC
+        0, 0, 0, 0, // seals
     ];
 
     #[test]

@@ -26,6 +26,9 @@ pub struct Config {
     pub unique_id: [u8; 12],
     /// FLASH_WRPR (PM0075 3.9): bit n clear protects pages 4n to 4n + 3.
     pub write_protection: u32,
+    /// Decides what chance decides in the part: which cells an interrupted flash operation leaves unsteady,
+    /// and how they read. Runs with the same seed are the same.
+    pub seed: u64,
 }
 
 impl Default for Config {
@@ -38,6 +41,7 @@ impl Default for Config {
             flash: None,
             unique_id: *b"modio-sim-01",
             write_protection: u32::MAX,
+            seed: 0x6D6F_6469_6F00,
         }
     }
 }

@@ -43,7 +43,7 @@ impl Board {
     ///
     /// [`Error::Image`] when `config.flash` is not 128 KiB.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
-        let mut flash = Flash::new(config.write_protection);
+        let mut flash = Flash::new(config.write_protection, config.seed);
         if let Some(contents) = &config.flash {
             if contents.len() != FLASH_SIZE {
                 return Err(Error::Image(format!(

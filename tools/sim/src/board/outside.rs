@@ -113,9 +113,34 @@ impl Board {
         Ok(self.with_slot(|slot| slot.set_millivolts(ch, millivolts))?)
     }
 
+    /// Sets the source impedance of the analog input of channel `ch` (1 to 4), in ohms.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Channel`] when that channel is no analog input.
+    pub fn set_source_ohms(&mut self, ch: usize, ohms: u32) -> Result<(), Error> {
+        Ok(self.with_slot(|slot| slot.set_source_ohms(ch, ohms))?)
+    }
+
     /// Breaks the DAC or its wires, or repairs them.
     pub fn set_bus_fault(&mut self, fault: BusFault) {
         self.with_slot(|slot| slot.set_bus_fault(fault));
+    }
+
+    /// Locks the analog filters of I2C1 low, as the rise of the supply may: the part then sees a busy bus until
+    /// both wires have had an edge. It may be done while the power is off.
+    pub fn lock_i2c_filters(&mut self) {
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.lock_i2c_filters(now);
+    }
+
+    /// Disturbs the wires of I2C1 at this instant with what looks like a start condition. Returns whether a byte
+    /// was under way, which makes it a bus error.
+    pub fn disturb_i2c(&mut self) -> bool {
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.disturb_i2c(now)
     }
 
     /// Channel `ch` (1 to 4) of the plugged module; [`Channel::None`] for any other number.

@@ -4,6 +4,9 @@
 //! The core reads flash and reads and writes SRAM without asking. All else comes here: stores to flash, the
 //! register blocks, the factory's words, the debug blocks. Bit-band aliases arrive as a read and a write of
 //! the word they stand for (PM0056 2.2.5).
+//!
+//! Bus faults are precise, as crate rigless has them. On the part the fault of a buffered store is imprecise: the
+//! program counter is some instructions on, and BFAR is not valid (PM0056 4.4.11, 4.4.14).
 
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
@@ -53,8 +56,9 @@ pub struct Bus {
     pub(super) ram: Memory,
     /// What the code costs.
     pub(super) segments: Segments,
-    /// Reads of flash come here.
+    /// Reads of flash come here, those of these pages, one bit each.
     pub(super) flash_is_watched: bool,
+    pub(super) routed_pages: u128,
     /// The core has read flash while an operation runs, and waits for its end.
     pub(super) read_stalls: bool,
     /// A block has been accessed, so its next event may be another one.
@@ -130,14 +134,15 @@ impl Bus {
         if core::mem::take(&mut self.soc.signals.rate) {
             self.update_rate(count);
         }
-        if let Some((first, end)) = self.soc.signals.flash.take() {
+        let changed = self.soc.signals.flash.take();
+        if let Some((first, end)) = changed {
             let base = u64::from(FLASH_BASE);
             self.queued
                 .push(Queued::Invalidate(base + first as u64, base + end as u64));
         }
+        self.route_flash(changed.is_some());
         // The machine makes the reset, and waits out the flash.
         self.halt |= self.soc.signals.reset.is_some() || self.soc.flash.busy_until().is_some();
-        self.watch_flash();
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.
@@ -185,7 +190,7 @@ impl Bus {
             _ => match flash_offset(address) {
                 Some(offset) if request.write.is_none() => {
                     self.read_stalls |= self.soc.flash.busy_until().is_some();
-                    Some(word_of(self.soc.flash.bytes(), request, offset))
+                    Some(self.flash_word(request, offset))
                 }
                 Some(offset) => self.store_to_flash(request, offset),
                 None if address.wrapping_sub(RAM_BASE) < RAM_SIZE as u32 => {
@@ -306,7 +311,9 @@ impl Bus {
         let word = address & !3;
         let answer = match (address, request.write) {
             (dwt::BASE.., Some(value)) if address < dwt::BASE + dwt::SIZE => {
-                self.dwt.write(word - dwt::BASE, value, cycle).map(|()| 0)
+                let answer = self.dwt.write(word - dwt::BASE, value, cycle).map(|()| 0);
+                self.halt |= self.dwt.awaits_look();
+                answer
             }
             (dwt::BASE.., None) if address < dwt::BASE + dwt::SIZE => {
                 self.dwt.read(word - dwt::BASE, cycle)
@@ -340,6 +347,13 @@ impl Bus {
             self.ram.bytes_mut()[at..at + width].copy_from_slice(&bytes[..width]);
         }
         word_of(self.ram.bytes(), request, offset)
+    }
+
+    /// The core reads the flash without asking, all but pages with unsteady cells, and the page of the vector
+    /// table while [`Waits`] has it sent here.
+    fn flash_word(&mut self, request: Request, offset: u32) -> u32 {
+        let at = (offset & !3) as usize;
+        request.part_of(self.soc.flash.read_word(at))
     }
 
     fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {

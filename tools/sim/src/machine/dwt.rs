@@ -1,5 +1,9 @@
 //! The parts of the core's debug blocks that firmware may use without a debugger: DWT's cycle counter
 //! (ARMv7-M ARM, DDI 0403E C1.8). The core itself answers the ITM and the system control space.
+//!
+//! While DEMCR.TRCENA is clear, DWT is off (C1.6.5): writes are lost, reads give 0, and nothing counts. DEMCR is
+//! the core's own, which cannot be read within an access. So a write to a DWT that was off is kept until the core
+//! is between two instructions.
 
 use crate::peripheral::Unmodelled;
 
@@ -12,21 +16,69 @@ const CTRL_CYCCNTENA: u32 = 1;
 /// Four comparators, as the Cortex-M3 has.
 const CTRL_NUMCOMP: u32 = 4 << 28;
 
-/// The cycle counter. It counts HCLK whether or not DEMCR.TRCENA is set.
+/// The cycle counter.
 #[derive(Debug, Default)]
 pub struct Dwt {
+    /// DEMCR.TRCENA.
+    enabled: bool,
+    /// A write (offset, value, cycle) that counts if TRCENA is set by now.
+    kept: Option<(u32, u32, u64)>,
     /// CYCCNT when it is stopped; else CYCCNT minus the cycle of HCLK.
     count: u32,
     running: bool,
 }
 
 impl Dwt {
+    /// Whether DEMCR has to be looked at after the instruction under way.
+    #[must_use]
+    pub fn awaits_look(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// Whether DEMCR means anything to it.
+    #[must_use]
+    pub fn in_use(&self) -> bool {
+        self.running || self.kept.is_some()
+    }
+
+    /// DEMCR.TRCENA is `enabled` in HCLK cycle `cycle`. The counter stops without it, and keeps its count.
+    ///
+    /// # Errors
+    ///
+    /// [`Unmodelled`] for a write that was lost, or as for [`Self::write`].
+    pub fn look(&mut self, enabled: bool, cycle: u64) -> Result<(), Unmodelled> {
+        let kept = self.kept.take();
+        self.set_enabled(enabled, kept.map_or(cycle, |(_, _, at)| at));
+        match kept {
+            Some((offset, value, at)) if enabled => self.write(offset, value, at),
+            Some(_) => Err(Unmodelled("DWT written while DEMCR.TRCENA is clear")),
+            None => Ok(()),
+        }
+    }
+
+    fn set_enabled(&mut self, enabled: bool, cycle: u64) {
+        if enabled != self.enabled {
+            self.enabled = enabled;
+            if self.running {
+                let cycle = cycle as u32;
+                self.count = if enabled {
+                    self.count.wrapping_sub(cycle)
+                } else {
+                    self.count.wrapping_add(cycle)
+                };
+            }
+        }
+    }
+
     /// Reads the register at `offset` in HCLK cycle `cycle`.
     ///
     /// # Errors
     ///
     /// [`Unmodelled`] for any other than CTRL and CYCCNT.
     pub fn read(&self, offset: u32, cycle: u64) -> Result<u32, Unmodelled> {
+        if !self.enabled {
+            return Ok(0);
+        }
         match offset {
             0 => Ok(CTRL_NUMCOMP | u32::from(self.running)),
             4 if self.running => Ok(self.count.wrapping_add(cycle as u32)),
@@ -41,6 +93,10 @@ impl Dwt {
     ///
     /// [`Unmodelled`] for any other than CTRL's CYCCNTENA and CYCCNT.
     pub fn write(&mut self, offset: u32, value: u32, cycle: u64) -> Result<(), Unmodelled> {
+        if !self.enabled {
+            self.kept = Some((offset, value, cycle));
+            return Ok(());
+        }
         let cycle = cycle as u32;
         match offset {
             0 => {
@@ -70,11 +126,37 @@ mod tests {
     #[test]
     fn it_counts_only_while_enabled() {
         let mut dwt = Dwt::default();
+        dwt.set_enabled(true, 0);
         dwt.write(4, 5, 100).unwrap();
         dwt.write(0, 1, 1_000).unwrap();
         assert_eq!(dwt.read(4, 1_010), Ok(15));
         dwt.write(0, 0, 1_020).unwrap();
         assert_eq!(dwt.read(4, 9_999), Ok(25));
         assert_eq!(dwt.read(0, 0), Ok(4 << 28));
+    }
+
+    #[test]
+    fn without_trcena_it_takes_no_write_reads_0_and_does_not_count() {
+        let mut dwt = Dwt::default();
+        dwt.write(0, 1, 0).unwrap();
+        assert!(dwt.look(false, 1).is_err());
+        assert_eq!(dwt.read(0, 10), Ok(0));
+        dwt.look(true, 20).unwrap();
+        assert_eq!(dwt.read(0, 20), Ok(4 << 28));
+        dwt.write(0, 1, 100).unwrap();
+        dwt.look(false, 150).unwrap();
+        assert_eq!(dwt.read(4, 200), Ok(0));
+        dwt.look(true, 1_000).unwrap();
+        assert_eq!(dwt.read(4, 1_010), Ok(60));
+    }
+
+    #[test]
+    fn write_right_after_trcena_counts_from_its_own_cycle() {
+        let mut dwt = Dwt::default();
+        dwt.write(0, 1, 100).unwrap();
+        assert!(dwt.awaits_look());
+        dwt.look(true, 103).unwrap();
+        assert_eq!(dwt.read(4, 110), Ok(10));
+        assert!(dwt.in_use() && !dwt.awaits_look());
     }
 }

@@ -1,35 +1,41 @@
-//! Reads of flash while it is being erased or programmed: they stall like fetches.
+//! Reads of flash that are not those of plain memory: while flash is being erased or programmed, and of unsteady cells.
 //!
 //! A read by code in SRAM stalls the core until the operation ends (PM0075 2.3.1), be it a literal, a table or the
 //! vector of an interrupt. The core reads flash without asking, so all of flash is sent to the bus while an
-//! operation runs: always, where every read of constants is charged ([`super::costs`]).
+//! operation runs: always, where every read of constants is charged ([`super::costs`]). Pages with unsteady cells
+//! always are; instructions are fetched from the likelier bits.
 
 use rigless::emulator::Queued;
 
 use super::bus::Bus;
-use super::memory::{FLASH_BASE, FLASH_SIZE};
-
-/// The stretches of memory that the core sends to the bus or not.
-const PAGE: u32 = 1024;
+use super::memory::FLASH_BASE;
+use crate::periph::flash::PAGE;
 
 impl Bus {
-    /// Sends reads of flash to the bus while they are watched, and no longer.
-    pub(super) fn watch_flash(&mut self) {
+    /// Sends reads of flash to the bus, page by page, or no longer. `changed`: cells have changed.
+    pub(super) fn route_flash(&mut self, changed: bool) {
         let busy = self.soc.flash.busy_until().is_some();
         self.read_stalls &= busy;
         let watched = busy || self.charges_tables();
-        if watched == self.flash_is_watched {
+        if watched == self.flash_is_watched && !changed {
             return;
         }
         self.flash_is_watched = watched;
+        let wanted = if watched {
+            u128::MAX
+        } else {
+            self.soc.flash.unsteady_pages()
+        };
+        let differ = wanted ^ core::mem::replace(&mut self.routed_pages, wanted);
         let vectors = self.waits.as_ref().and_then(|waits| waits.table());
-        for base in [FLASH_BASE, 0] {
-            for page in (base..base + FLASH_SIZE as u32).step_by(PAGE as usize) {
-                let address = u64::from(page);
-                if watched {
-                    self.queued.push(Queued::Route(address));
-                } else if vectors.is_none_or(|table| table & !(PAGE - 1) != page) {
-                    self.queued.push(Queued::Unroute(address));
+        for page in (0..u128::BITS).filter(|page| differ >> page & 1 != 0) {
+            for base in [FLASH_BASE, 0] {
+                let first = base + page * PAGE as u32;
+                let has_vectors = vectors.is_some_and(|table| table & !(PAGE as u32 - 1) == first);
+                if wanted >> page & 1 != 0 {
+                    self.queued.push(Queued::Route(first.into()));
+                } else if !has_vectors {
+                    self.queued.push(Queued::Unroute(first.into()));
                 }
             }
         }

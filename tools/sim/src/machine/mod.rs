@@ -46,7 +46,7 @@ use waits::{Wait, Waits};
 
 /// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
 const CPUID: u32 = 0x411F_C231;
-/// From the supply's rise to the end of reset: DS5319 table 10, tRSTTEMPO, typical.
+/// From the supply's rise to the end of reset: DS5319 table 11, tRSTTEMPO, typical.
 const POWER_ON_RESET: Time = Time::from_us(2_500);
 /// The shortest reset pulse (RM0008 7.1.1).
 const RESET_PULSE: Time = Time::from_us(20);
@@ -135,6 +135,7 @@ impl Machine {
                 waits: None,
                 ram,
                 flash_is_watched: false,
+                routed_pages: 0,
                 read_stalls: false,
                 touched: false,
                 carries_on: false,

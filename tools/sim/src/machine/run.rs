@@ -13,12 +13,17 @@ use crate::finding::What;
 use crate::machine::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
 use crate::machine::usage::Rest;
 use crate::periph::rcc::Cause;
+use crate::peripheral::Unmodelled;
 use crate::rtt::POLL;
 use crate::time::Time;
 
 /// The system control register and its bit that asks for more than sleep (PM0056 4.4.6).
 const SCR: u64 = 0xE000_ED10;
 const SCR_SLEEPDEEP: u64 = 1 << 2;
+
+/// The register that enables DWT, and its bit for that (ARMv7-M ARM, DDI 0403E C1.6.5).
+const DEMCR: u64 = 0xE000_EDFC;
+const TRCENA: u64 = 1 << 24;
 
 /// The register that pends the NMI, and its bit (PM0056 4.4.3): a debugger's way to the core's NMI line.
 const ICSR: u64 = 0xE000_ED04;
@@ -81,6 +86,7 @@ impl Machine {
             let now = self.now();
             self.bus.advance(now, self.core.retired());
             self.serve_core_timer(now);
+            self.look_at_trace();
             if self.cut_is_due(now) {
                 self.power_off();
             }
@@ -130,6 +136,21 @@ impl Machine {
                 _ => {}
             }
             patience = self.now() + GIVE_UP;
+        }
+    }
+
+    /// Tells DWT whether DEMCR.TRCENA is set.
+    fn look_at_trace(&mut self) {
+        if self.bus.dwt.in_use() {
+            let cycle = self.cycles();
+            let demcr = self
+                .core
+                .debugger_access(None, DEMCR, Width::W32, VirtualNanos(cycle));
+            let enabled = demcr.is_some_and(|demcr| demcr & TRCENA != 0);
+            if let Err(Unmodelled(text)) = self.bus.dwt.look(enabled, cycle) {
+                let (now, pc) = (self.now(), self.bus.pc);
+                self.bus.findings.add(now, pc, What::Other(text));
+            }
         }
     }
 

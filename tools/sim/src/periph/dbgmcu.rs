@@ -36,3 +36,19 @@ impl Peripheral for Dbgmcu {
         // DBGMCU_CR is reset by power-on alone (RM0008 31.16.3): the board makes a new one then.
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identity_is_read_only_and_control_outlives_a_reset() {
+        let mut debug = Dbgmcu::default();
+        debug.write(0, 1, Time::ZERO).unwrap();
+        debug.write(4, 1 << 8, Time::ZERO).unwrap();
+        debug.reset(Time::ZERO);
+        assert_eq!(debug.read(0, Time::ZERO), Ok(IDCODE));
+        assert_eq!(debug.read(4, Time::ZERO), Ok(1 << 8));
+        assert!(debug.read(8, Time::ZERO).is_err());
+    }
+}

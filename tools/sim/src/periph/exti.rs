@@ -91,6 +91,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn software_trigger_sets_pending_once_until_it_is_cleared() {
+        let mut exti = Exti::default();
+        exti.write(0, 1 << 3, Time::ZERO).unwrap();
+        exti.write(0x10, 1 << 3, Time::ZERO).unwrap();
+        assert_eq!((exti.requests(), exti.read(0x10, Time::ZERO)), (8, Ok(8)));
+        exti.write(0x14, 1 << 3, Time::ZERO).unwrap();
+        assert_eq!((exti.requests(), exti.read(0x10, Time::ZERO)), (0, Ok(0)));
+        exti.write(0x10, 1 << 3, Time::ZERO).unwrap();
+        assert_eq!(exti.requests(), 8);
+        assert!(exti.write(4, 1, Time::ZERO).is_err(), "event mode");
+        assert!(exti.write(0, 1 << 16, Time::ZERO).is_err(), "the detector");
+    }
+
+    #[test]
     fn only_the_chosen_edge_sets_pending_and_writing_one_clears_it() {
         let mut exti = Exti::default();
         exti.write(0x0C, 1 << 5, Time::ZERO).unwrap();

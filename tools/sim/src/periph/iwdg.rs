@@ -1,4 +1,9 @@
 //! The independent watchdog, RM0008 chapter 19: a 12-bit down-counter on the LSI that only a reset stops.
+//!
+//! PR and RLR live in the LSI's domain. A write takes up to five cycles of the LSI to arrive (19.4.4), and PVU or
+//! RVU is set for so long. Without the LSI it never arrives: the flag stays set, and further writes are lost. The
+//! start by 0xCCCC turns the LSI on (7.2.9). The counter takes PR and RLR over at the start and at each reload,
+//! as they have arrived by then.
 
 use crate::periph::clocks::Oscillators;
 use crate::peripheral::{Peripheral, Unmodelled};
@@ -11,18 +16,45 @@ const KEY_RELOAD: u32 = 0xAAAA;
 const KEY_ACCESS: u32 = 0x5555;
 const KEY_START: u32 = 0xCCCC;
 
+/// PR or RLR.
+#[derive(Debug)]
+struct Setting {
+    in_force: u32,
+    /// A value on its way, and when it was written.
+    written: Option<(u32, Time)>,
+}
+
+impl Setting {
+    const fn new(in_force: u32) -> Self {
+        Self {
+            in_force,
+            written: None,
+        }
+    }
+
+    /// Takes a value over that has arrived, on an LSI of `hz` Hz that runs since `lsi`.
+    fn advance(&mut self, lsi: Option<Time>, hz: u32, now: Time) {
+        if let (Some((value, at)), Some(lsi)) = (self.written, lsi)
+            && at.max(lsi) + Time::cycles(UPDATE_CYCLES, hz) <= now
+        {
+            self.in_force = value;
+            self.written = None;
+        }
+    }
+}
+
 /// The watchdog.
 #[derive(Debug)]
 pub struct Iwdg {
-    /// The LSI in Hz.
-    lsi: u32,
+    /// The LSI's rate in Hz.
+    hz: u32,
     open: bool,
-    prescaler: u32,
-    reload: u32,
-    /// Until when SR shows PVU and RVU.
-    prescaler_busy: Time,
-    reload_busy: Time,
-    /// When it resets the part, once started.
+    prescaler: Setting,
+    reload: Setting,
+    /// Since when the LSI runs, or from when it will.
+    lsi: Option<Time>,
+    started: bool,
+    /// When it resets the part, once it counts.
     bites: Option<Time>,
     bitten: bool,
 }
@@ -34,16 +66,16 @@ impl Default for Iwdg {
 }
 
 impl Iwdg {
-    /// A watchdog that has not been started, on an LSI of `lsi` Hz.
+    /// A watchdog that has not been started, on an LSI of `hz` Hz.
     #[must_use]
-    pub fn new(lsi: u32) -> Self {
+    pub fn new(hz: u32) -> Self {
         Self {
-            lsi,
+            hz,
             open: false,
-            prescaler: 0,
-            reload: 0xFFF,
-            prescaler_busy: Time::ZERO,
-            reload_busy: Time::ZERO,
+            prescaler: Setting::new(0),
+            reload: Setting::new(0xFFF),
+            lsi: None,
+            started: false,
             bites: None,
             bitten: false,
         }
@@ -52,7 +84,15 @@ impl Iwdg {
     /// Whether it has been started.
     #[must_use]
     pub fn running(&self) -> bool {
-        self.bites.is_some()
+        self.started
+    }
+
+    /// The LSI runs from `since` on, or does not run.
+    pub fn set_lsi(&mut self, since: Option<Time>) {
+        self.lsi = since;
+        if self.started && self.bites.is_none() && !self.bitten {
+            self.bites = since.map(|since| since + self.timeout());
+        }
     }
 
     /// Whether it has asked for a reset since the last call.
@@ -63,18 +103,22 @@ impl Iwdg {
     /// From a reload to the reset (RM0008 table 96).
     fn timeout(&self) -> Time {
         // PR 0 to 6 divide by 4 to 256; 7 does as 6.
-        let divider = 4u64 << self.prescaler.min(6);
-        Time::cycles(u64::from(self.reload + 1) * divider, self.lsi)
+        let divider = 4u64 << self.prescaler.in_force.min(6);
+        Time::cycles(u64::from(self.reload.in_force + 1) * divider, self.hz)
     }
 }
 
 impl Peripheral for Iwdg {
-    fn read(&mut self, offset: u32, now: Time) -> Result<u32, Unmodelled> {
+    fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
         Ok(match offset {
             0x00 => 0,
-            0x04 => self.prescaler,
-            0x08 => self.reload,
-            0x0C => u32::from(self.prescaler_busy > now) | u32::from(self.reload_busy > now) << 1,
+            0x04 => self.prescaler.in_force,
+            0x08 => self.reload.in_force,
+            0x0C => {
+                let [pvu, rvu] = [&self.prescaler, &self.reload]
+                    .map(|setting| u32::from(setting.written.is_some()));
+                pvu | rvu << 1
+            }
             _ => return Err(Unmodelled("a reserved address of IWDG")),
         })
     }
@@ -84,27 +128,24 @@ impl Peripheral for Iwdg {
             0x00 => {
                 self.open = value & 0xFFFF == KEY_ACCESS;
                 match value & 0xFFFF {
-                    KEY_START if self.bites.is_none() => self.bites = Some(now + self.timeout()),
+                    KEY_START if !self.started => {
+                        self.started = true;
+                        self.bites = self.lsi.map(|since| now.max(since) + self.timeout());
+                    }
                     KEY_RELOAD if self.bites.is_some() => self.bites = Some(now + self.timeout()),
                     _ => {}
                 }
             }
             0x04 if !self.open => return Err(Unmodelled("IWDG_PR written while protected")),
             0x08 if !self.open => return Err(Unmodelled("IWDG_RLR written while protected")),
-            0x04 if self.prescaler_busy > now => {
+            0x04 if self.prescaler.written.is_some() => {
                 return Err(Unmodelled("IWDG_PR written while PVU is set"));
             }
-            0x08 if self.reload_busy > now => {
+            0x08 if self.reload.written.is_some() => {
                 return Err(Unmodelled("IWDG_RLR written while RVU is set"));
             }
-            0x04 => {
-                self.prescaler = value & 7;
-                self.prescaler_busy = now + Time::cycles(UPDATE_CYCLES, self.lsi);
-            }
-            0x08 => {
-                self.reload = value & 0xFFF;
-                self.reload_busy = now + Time::cycles(UPDATE_CYCLES, self.lsi);
-            }
+            0x04 => self.prescaler.written = Some((value & 7, now)),
+            0x08 => self.reload.written = Some((value & 0xFFF, now)),
             0x0C => {}
             _ => return Err(Unmodelled("a reserved address of IWDG")),
         }
@@ -116,6 +157,8 @@ impl Peripheral for Iwdg {
     }
 
     fn advance(&mut self, now: Time) {
+        self.prescaler.advance(self.lsi, self.hz, now);
+        self.reload.advance(self.lsi, self.hz, now);
         if self.bites.is_some_and(|at| at <= now) {
             self.bites = None;
             self.bitten = true;
@@ -123,7 +166,10 @@ impl Peripheral for Iwdg {
     }
 
     fn reset(&mut self, _now: Time) {
-        *self = Self::new(self.lsi);
+        *self = Self {
+            lsi: self.lsi,
+            ..Self::new(self.hz)
+        };
     }
 }
 
@@ -131,9 +177,23 @@ impl Peripheral for Iwdg {
 mod tests {
     use super::*;
 
-    #[test]
-    fn it_bites_after_its_timeout_unless_fed() {
+    fn at(dog: &mut Iwdg, us: u64) -> Time {
+        let now = Time::from_us(us);
+        dog.advance(now);
+        now
+    }
+
+    /// With its LSI running since 0 and the settings opened.
+    fn open() -> Iwdg {
         let mut dog = Iwdg::default();
+        dog.set_lsi(Some(Time::ZERO));
+        dog.write(0, KEY_ACCESS, Time::ZERO).unwrap();
+        dog
+    }
+
+    #[test]
+    fn it_resets_after_its_timeout_unless_reloaded() {
+        let mut dog = open();
         dog.write(0, KEY_START, Time::ZERO).unwrap();
         assert_eq!(
             dog.next_event(),
@@ -143,21 +203,67 @@ mod tests {
         dog.write(0, KEY_ACCESS, Time::ZERO).unwrap();
         dog.write(4, 2, Time::ZERO).unwrap();
         dog.write(8, 999, Time::ZERO).unwrap();
-        assert_eq!(dog.read(0x0C, Time::ZERO), Ok(3));
-        assert_eq!(dog.read(0x0C, Time::from_us(125)), Ok(0));
-        dog.write(0, KEY_RELOAD, Time::from_ms(1)).unwrap();
+        let now = at(&mut dog, 1_000);
+        dog.write(0, KEY_RELOAD, now).unwrap();
         assert_eq!(
             dog.next_event(),
             Some(Time::from_ms(401)),
             "1000 x 16 / 40 kHz"
         );
-        assert!(
-            dog.write(8, 1, Time::from_ms(1)).is_err(),
-            "a reload closes the access"
-        );
+        assert!(dog.write(8, 1, now).is_err(), "a reload closes the access");
         dog.advance(Time::from_ms(400));
         assert!(!dog.take_bite());
         dog.advance(Time::from_ms(401));
         assert!(dog.take_bite());
+    }
+
+    #[test]
+    fn settings_arrive_after_five_cycles_and_writes_until_then_are_lost() {
+        let mut dog = open();
+        dog.write(4, 2, Time::ZERO).unwrap();
+        dog.write(8, 999, Time::ZERO).unwrap();
+        let now = at(&mut dog, 124);
+        let read = |dog: &mut Iwdg, now| [4, 8, 0x0C].map(|offset| dog.read(offset, now).unwrap());
+        assert_eq!(read(&mut dog, now), [0, 0xFFF, 3]);
+        assert!(dog.write(4, 3, now).is_err() && dog.write(8, 5, now).is_err());
+        let now = at(&mut dog, 125);
+        assert_eq!(read(&mut dog, now), [2, 999, 0]);
+        let now = at(&mut dog, 1_000);
+        assert_eq!(read(&mut dog, now), [2, 999, 0]);
+    }
+
+    #[test]
+    fn reload_before_the_settings_arrive_uses_the_old_ones() {
+        let mut dog = open();
+        dog.write(0, KEY_START, Time::ZERO).unwrap();
+        dog.write(0, KEY_ACCESS, Time::ZERO).unwrap();
+        dog.write(8, 0, Time::ZERO).unwrap();
+        let now = at(&mut dog, 100);
+        dog.write(0, KEY_RELOAD, now).unwrap();
+        assert_eq!(dog.next_event(), Some(Time::from_us(409_700)));
+    }
+
+    #[test]
+    fn settings_are_locked_without_their_key() {
+        let mut dog = Iwdg::default();
+        dog.set_lsi(Some(Time::ZERO));
+        assert!(dog.write(4, 1, Time::ZERO).is_err() && dog.write(8, 1, Time::ZERO).is_err());
+        assert_eq!(dog.read(0x0C, Time::ZERO), Ok(0));
+    }
+
+    #[test]
+    fn without_the_lsi_pvu_and_rvu_stick_and_nothing_counts() {
+        let mut dog = Iwdg::default();
+        dog.write(0, KEY_ACCESS, Time::ZERO).unwrap();
+        dog.write(4, 2, Time::ZERO).unwrap();
+        dog.write(8, 999, Time::ZERO).unwrap();
+        dog.write(0, KEY_START, Time::ZERO).unwrap();
+        let now = at(&mut dog, 60_000_000);
+        assert_eq!(dog.read(0x0C, now), Ok(3));
+        assert_eq!((dog.next_event(), dog.running()), (None, true));
+        dog.set_lsi(Some(now));
+        assert_eq!(dog.next_event(), Some(now + Time::from_us(409_600)));
+        let now = at(&mut dog, 60_000_125);
+        assert_eq!(dog.read(0x0C, now), Ok(0));
     }
 }

@@ -18,9 +18,9 @@ const CR_LOW_POWER: u32 = 0b11;
 const CSR_PVDO: u32 = 1 << 2;
 const CSR_EWUP: u32 = 1 << 8;
 
-/// Typical thresholds of a falling supply in millivolts, by PLS (DS5319 table 12).
+/// Typical thresholds of a falling supply in millivolts, by PLS (DS5319 table 11).
 const FALLING_MV: [u16; 8] = [2080, 2180, 2280, 2380, 2480, 2580, 2680, 2780];
-/// A rising supply has to exceed the threshold by this much (DS5319 table 12).
+/// A rising supply has to exceed the threshold by this much (DS5319 table 11).
 const HYSTERESIS_MV: u16 = 100;
 
 /// The PWR registers.

@@ -25,6 +25,10 @@ use crate::periph::gpio::Drive;
 use crate::periph::i2c::{Bus, Wires};
 use crate::time::Time;
 
+/// The source impedance of an analog input unless set: more than the 5 kOhm of the thermistor at 25 degrees with
+/// its pull-up, the highest of the ranges.
+const SOURCE_OHMS: u32 = 10_000;
+
 /// What is wrong with the DAC or its wires.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BusFault {
@@ -50,6 +54,7 @@ pub struct Slot {
     energised: [bool; 4],
     manual: [bool; 2],
     millivolts: [u16; 4],
+    source_ohms: [u32; 4],
     /// The levels the part's pins give the lines.
     driven: [bool; 4],
     dac: Mcp4728,
@@ -74,6 +79,7 @@ impl Slot {
             energised: [false; 4],
             manual: [false; 2],
             millivolts: [0; 4],
+            source_ohms: [SOURCE_OHMS; 4],
             driven: [false; 4],
             dac: Mcp4728::default(),
             fault: BusFault::None,
@@ -178,6 +184,26 @@ impl Slot {
             _ => return Err(Error::Channel),
         }
         Ok(())
+    }
+
+    /// Sets the source impedance of the analog input of channel `ch` (1 to 4), in ohms.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Channel`] when that channel is no analog input.
+    pub fn set_source_ohms(&mut self, ch: usize, ohms: u32) -> Result<(), Error> {
+        match self.channel(ch) {
+            Channel::Ai { .. } => self.source_ohms[ch - 1] = ohms,
+            _ => return Err(Error::Channel),
+        }
+        Ok(())
+    }
+
+    /// Ohms between line `line` (1 to 4) and what drives it.
+    #[must_use]
+    pub fn source_ohms(&self, line: usize) -> u32 {
+        let ohms = line.checked_sub(1).and_then(|n| self.source_ohms.get(n));
+        ohms.copied().unwrap_or(SOURCE_OHMS)
     }
 
     /// What the module does to line `line` (1 to 4).

@@ -15,6 +15,7 @@ use crate::periph::clocks::Clocks;
 use crate::periph::gpio::Drive;
 use crate::periph::i2c::Wires;
 use crate::periph::rcc::Cause;
+use crate::peripheral::Peripheral;
 use crate::time::Time;
 
 /// The driver enable on port A.
@@ -134,6 +135,8 @@ impl Soc {
             self.gpio[0].drive(line, self.slot.drive(line + 1), now);
             let millivolts = self.gpio[0].millivolts(line);
             self.adc1.set_millivolts(line, millivolts, now);
+            self.adc1
+                .set_source_ohms(line, self.slot.source_ohms(line + 1), now);
         }
         self.wire_port(0, now);
         let held = self.slot.held();
@@ -147,8 +150,11 @@ impl Soc {
         self.note_due(Block::I2c1);
     }
 
-    /// PB6 and PB7 when the firmware moves them by hand, to free a stuck bus.
+    /// PB6 and PB7: the I2C block's, or moved by hand, to free a stuck bus.
     fn wire_i2c_pins(&mut self, now: Time) {
+        const PINS: u16 = 1 << SCL | 1 << SDA;
+        let connected = self.gpio[1].alternate_open_drains() & PINS == PINS;
+        self.i2c1.set_connected(connected, now);
         let low = self.gpio[1].pulled_low();
         let pins = Wires {
             scl: low >> SCL & 1 == 0,
@@ -175,6 +181,7 @@ impl Soc {
             }
         }
         self.flash.hsi_on = self.rcc.hsi_on();
+        self.wire_lsi(now);
         if changes.clocks {
             self.spread_clocks(now);
         }
@@ -237,9 +244,17 @@ impl Soc {
         }
     }
 
+    /// The watchdog's clock.
+    fn wire_lsi(&mut self, now: Time) {
+        self.iwdg.advance(now);
+        self.iwdg.set_lsi(self.rcc.lsi());
+        self.note_due(Block::Iwdg);
+    }
+
     fn wire_watchdog(&mut self, now: Time) {
         if self.iwdg.running() {
             self.rcc.hold_lsi(now);
+            self.wire_lsi(now);
         }
         if self.iwdg.take_bite() {
             self.signals.reset = Some(Cause::Iwdg);
@@ -255,6 +270,20 @@ impl Soc {
         };
         self.gpio[0].drive(RX, drive, now);
         self.wire_port(0, now);
+    }
+
+    /// Locks the analog filters of I2C1 low.
+    pub fn lock_i2c_filters(&mut self, now: Time) {
+        self.i2c1.lock_filters(now);
+    }
+
+    /// A disturbance that looks like a start condition on the I2C wires. Returns whether it was a bus error.
+    pub fn disturb_i2c(&mut self, now: Time) -> bool {
+        self.catch_up(Block::I2c1, now);
+        let bus_error = self.i2c1.disturb();
+        self.settle(Block::I2c1, now);
+        self.find_next();
+        bus_error
     }
 
     /// The crystal works or does not from `now` on.

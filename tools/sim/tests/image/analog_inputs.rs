@@ -208,3 +208,21 @@ fn filter_n_is_a_low_pass_over_two_to_the_n_samples() {
         }
     }
 }
+
+/// The unit samples for 55.5 cycles at 12 MHz, which is good for 50 kOhm (DS5319, RAIN against the sampling time).
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn source_of_50_kohm_reads_right_and_one_of_500_kohm_does_not() {
+    let mut bench = bench();
+    for (channel, millivolts) in [(1, 0), (2, 3300), (3, 0), (4, 3300)] {
+        bench.board.set_millivolts(channel, millivolts).unwrap();
+        bench.board.set_source_ohms(channel, 50_000).unwrap();
+    }
+    bench.board.run_for(Time::from_ms(200));
+    assert_eq!(bench.registers(0x10, 4), Ok(vec![0, 4095, 0, 4095]));
+    bench.board.set_source_ohms(3, 500_000).unwrap();
+    bench.board.run_for(Time::from_ms(200));
+    let read = bench.registers(0x10, 4).unwrap();
+    assert_eq!((read[0], read[1], read[3]), (0, 4095, 4095));
+    assert!(read[2] > 500, "{}", read[2]);
+}

@@ -8,7 +8,7 @@ use crate::bench::{Bench, adu};
 const FILTER: u16 = 0x0130;
 const UNSAVED: u16 = 8;
 
-/// The slowest flash there is (DS5319 table 29).
+/// The slowest flash there is (DS5319 table 28).
 const SLOWEST: Durations = Durations {
     erase: Time::from_ms(40),
     program: Time::from_us(70),

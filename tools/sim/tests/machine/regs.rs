@@ -12,6 +12,7 @@ pub const FLASH_CR: u32 = 0x4002_2010;
 pub const FLASH_AR: u32 = 0x4002_2014;
 pub const IWDG_KR: u32 = 0x4000_3000;
 pub const IWDG_PR: u32 = 0x4000_3004;
+pub const IWDG_SR: u32 = 0x4000_300C;
 pub const GPIOA: u32 = 0x4001_0800;
 pub const GPIOC: u32 = 0x4001_1000;
 pub const TIM2: u32 = 0x4000_0000;
@@ -23,6 +24,7 @@ pub const SYST_CSR: u32 = 0xE000_E010;
 pub const SYST_RVR: u32 = 0xE000_E014;
 pub const SYST_CVR: u32 = 0xE000_E018;
 pub const AIRCR: u32 = 0xE000_ED0C;
+pub const DEMCR: u32 = 0xE000_EDFC;
 pub const DWT_CTRL: u32 = 0xE000_1000;
 pub const DWT_CYCCNT: u32 = 0xE000_1004;
 /// Where the programs put their results.

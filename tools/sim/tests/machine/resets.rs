@@ -19,12 +19,41 @@ fn report_cause() -> Asm {
     program
 }
 
+/// Counts to 2000, which takes about a millisecond.
+fn wait_a_moment(program: &mut Asm) {
+    program.set(7, 0);
+    let top = program.here();
+    program.add(7, 1);
+    program.set(6, 2_000);
+    program.raw(0x42B7); // cmp r7, r6
+    program.branch(When::NotEqual, top);
+}
+
+#[test]
+fn watchdog_settings_do_not_arrive_while_the_lsi_is_off() {
+    let mut program = Asm::new();
+    program.store(IWDG_KR, 0x5555);
+    program.store(IWDG_PR, 1);
+    wait_a_moment(&mut program);
+    program.copy(IWDG_SR, OUT);
+    program.store(IWDG_KR, 0xCCCC);
+    wait_a_moment(&mut program);
+    program.copy(IWDG_SR, OUT + 4);
+    program.spin();
+    let mut board = board(program);
+    board.run_until(Time::from_ms(20));
+    assert_eq!([out(&board, 0), out(&board, 1)], [1, 0]);
+}
+
 #[test]
 fn the_watchdog_resets_after_its_timeout_and_says_so() {
     let mut program = report_cause();
+    // The start turns the LSI on, which takes the prescaler over.
+    program.store(IWDG_KR, 0xCCCC);
     program.store(IWDG_KR, 0x5555);
     program.store(IWDG_PR, 1);
-    program.store(IWDG_KR, 0xCCCC);
+    wait_a_moment(&mut program);
+    program.store(IWDG_KR, 0xAAAA);
     program.spin();
     let mut board = board(program);
     board.run_until(Time::from_ms(100));
@@ -33,7 +62,7 @@ fn the_watchdog_resets_after_its_timeout_and_says_so() {
     // 4096 x 8 / 40 kHz.
     board.run_until(START + Time::from_us(819_200 - 100));
     assert_eq!(board.resets(), 0);
-    board.run_until(START + Time::from_us(819_200 + 200));
+    board.run_until(START + Time::from_us(819_200 + 5_000));
     assert_eq!(board.resets(), 1);
     assert_eq!(out(&board, 0) & 0xFF00_0000, WATCHDOG);
     board.run_until(Time::from_secs(9));

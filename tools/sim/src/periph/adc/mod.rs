@@ -4,6 +4,12 @@
 //! It goes by ADCCLK, which its clock is set to. Inputs are levels in millivolts against 3300 mV of VDDA. What
 //! a real converter would do badly without saying so is reported: a clock above 14 MHz, a start before it has
 //! settled, a start while it calibrates.
+//!
+//! It converts badly, too. Before a calibration is complete (11.4), and within tSTAB of power-up, codes are off by
+//! [`UNCALIBRATED`] and [`UNSETTLED`]; the manual gives no figures, these are far beyond the accuracy of the data
+//! sheet. The sampling capacitor charges through the source's impedance and the switch for the sampling time,
+//! from the level of the conversion before: the circuit behind equation 1 of the data sheet (DS5319, ADC
+//! characteristics), RAIN < TS / (fADC x CADC x ln 2^14) - RADC for an error below a quarter of a step.
 
 mod sequence;
 
@@ -66,10 +72,18 @@ const TEMPERATURE: usize = 16;
 const REFERENCE: usize = 17;
 /// The sensor at 25 degC: V25 typ. (DS5319 table 50).
 const TEMPERATURE_MV: u16 = 1430;
-/// VREFINT typ. (DS5319 table 13).
+/// VREFINT typ. (DS5319 table 12).
 const REFERENCE_MV: u16 = 1200;
 /// VDDA = VREF+.
 const SUPPLY_MV: u32 = 3300;
+/// RADC at most, in ohms (DS5319, ADC characteristics).
+const SWITCH_OHMS: u32 = 1_000;
+/// CADC at most, in farads (DS5319, ADC characteristics).
+const CAPACITANCE: f64 = 8e-12;
+/// Steps by which an uncalibrated converter reads too high.
+const UNCALIBRATED: u16 = 64;
+/// Steps by which a converter reads too low that has not settled.
+const UNSETTLED: u16 = 128;
 /// fADC at most (DS5319 table 46).
 const MAX_HZ: u32 = 14_000_000;
 /// tSTAB at most (DS5319 table 46).
@@ -91,6 +105,12 @@ pub struct Adc {
     sequence: Sequence,
     data: u16,
     levels: [u16; CHANNELS],
+    source_ohms: [u32; CHANNELS],
+    /// The level on the sampling capacitor after the last conversion, in millivolts.
+    held: f64,
+    calibrated: bool,
+    /// The calibration under way began too early.
+    too_early: bool,
     powered_at: Time,
     /// The bit, CAL or RSTCAL, that is cleared at that instant.
     calibration: Option<(u32, Time)>,
@@ -124,6 +144,10 @@ impl Adc {
             sequence: Sequence::default(),
             data: 0,
             levels,
+            source_ohms: [0; CHANNELS],
+            held: 0.0,
+            calibrated: false,
+            too_early: false,
             powered_at: Time::ZERO,
             calibration: None,
             run: None,
@@ -156,15 +180,39 @@ impl Adc {
         }
     }
 
-    /// What a level converts to: the nearest of 4096 steps (11.1; the last one saturates).
-    fn convert(&self, channel: usize) -> u16 {
+    /// The impedance of what drives `channel`, 0 to 15, is `ohms` from `now` on. Any other channel is ignored.
+    pub fn set_source_ohms(&mut self, channel: usize, ohms: u32, now: Time) {
+        self.advance(now);
+        if channel < TEMPERATURE {
+            self.source_ohms[channel] = ohms;
+        }
+    }
+
+    /// What a channel converts to that was sampled up to `end`: the nearest of 4096 steps (11.1; the last one
+    /// saturates).
+    fn convert(&mut self, run: &Run) -> u16 {
+        let channel = run.channel;
         let internal = channel >= TEMPERATURE;
         if internal && self.cr2 & cr2::TSVREFE == 0 {
             return 0;
         }
-        let level = self.levels.get(channel).copied().unwrap_or(0);
-        let code = (u32::from(level) * 4096 + SUPPLY_MV / 2) / SUPPLY_MV;
-        code.min(4095) as u16
+        let level = f64::from(self.levels.get(channel).copied().unwrap_or(0));
+        let ohms = self.source_ohms.get(channel).copied().unwrap_or(0) + SWITCH_OHMS;
+        let constants = run.sample_seconds() / (f64::from(ohms) * CAPACITANCE);
+        self.held = level + (self.held - level) * (-constants).exp();
+        let code = (self.held * 4096.0 / f64::from(SUPPLY_MV)).round() as u16;
+        let code = if self.calibrated {
+            code
+        } else {
+            code + UNCALIBRATED
+        };
+        let settled = run.sample_end() >= self.powered_at + SETTLING;
+        let code = if settled {
+            code
+        } else {
+            code.saturating_sub(UNSETTLED)
+        };
+        code.min(4095)
     }
 
     fn start(&mut self, now: Time) -> Result<(), Unmodelled> {
@@ -193,8 +241,10 @@ impl Adc {
 
     fn calibrate(&mut self, bit: u32, cycles: u64, now: Time) -> Result<(), Unmodelled> {
         self.calibration = Some((bit, now + Time::cycles(cycles, self.hz)));
+        self.calibrated = false;
         let settled = self.powered_at + Time::cycles(2, self.hz);
-        if self.cr2 & cr2::ADON == 0 || now < settled {
+        self.too_early = self.cr2 & cr2::ADON == 0 || now < settled;
+        if self.too_early {
             // 11.4, note 2.
             return Err(Unmodelled("ADC calibration within two cycles of power-up"));
         }
@@ -212,6 +262,8 @@ impl Adc {
             self.calibration = None;
             self.cr2 &= !(cr2::CAL | cr2::RSTCAL);
         } else if old & cr2::ADON == 0 {
+            // 11.4: to be calibrated after each power-up.
+            self.calibrated = false;
             self.powered_at = now;
         }
         if value & !cr2::MODELLED != 0 {
@@ -326,6 +378,7 @@ impl Peripheral for Adc {
             && end <= now
         {
             self.calibration = None;
+            self.calibrated = bit == cr2::CAL && !self.too_early;
             self.cr2 &= !bit;
         }
         while let Some(mut run) = self.run {
@@ -333,7 +386,7 @@ impl Peripheral for Adc {
                 if now < run.sample_end() {
                     return;
                 }
-                let code = self.convert(run.channel);
+                let code = self.convert(&run);
                 run.sampled = Some(self.with_noise(code));
                 self.run = Some(run);
             }
@@ -354,6 +407,8 @@ impl Peripheral for Adc {
             levels: self.levels,
             noise: self.noise,
             random: self.random,
+            source_ohms: self.source_ohms,
+            held: self.held,
             ..Self::new()
         };
     }

@@ -92,6 +92,11 @@ impl Run {
         self.sampled = None;
     }
 
+    /// How long the input is sampled, in seconds.
+    pub fn sample_seconds(&self) -> f64 {
+        self.sample as f64 / (2.0 * f64::from(self.hz))
+    }
+
     /// When the input is disconnected: the level just then is what is converted.
     pub fn sample_end(&self) -> Time {
         self.at(self.halves + self.sample)

@@ -9,12 +9,23 @@ fn cycles(n: u64) -> Time {
     Time::cycles(n, HZ)
 }
 
-/// On and settled, at 12 MHz (72 MHz / 6).
+/// On, settled and calibrated, at 12 MHz (72 MHz / 6).
 fn settled() -> (Adc, Time) {
     let mut adc = Adc::new();
     adc.set_clock(HZ, Time::ZERO);
     adc.write(offset::CR2, ON, Time::ZERO).expect("modelled");
-    (adc, Time::from_us(2))
+    write(&mut adc, offset::CR2, ON | cr2::CAL, Time::from_us(2));
+    (adc, Time::from_us(10))
+}
+
+/// A conversion of channel 0 with sampling time `code`, begun at `at`.
+fn converted(adc: &mut Adc, code: u32, at: Time) -> u16 {
+    write(adc, offset::SMPR2, code, at);
+    adc.advance(at);
+    // Findings are another test's.
+    let _ = adc.write(offset::CR2, ON | cr2::SWSTART, at);
+    let done = at + Time::from_us(40);
+    read(adc, offset::DR, done) as u16
 }
 
 fn write(adc: &mut Adc, offset: u32, value: u32, at: Time) {
@@ -155,4 +166,71 @@ fn misuse_is_reported() {
         "discontinuous"
     );
     assert!(adc.read(0x3C, now).is_err(), "injected data");
+}
+
+#[test]
+fn codes_are_off_until_a_calibration_is_complete_and_after_each_power_up() {
+    let mut adc = Adc::new();
+    adc.set_clock(HZ, Time::ZERO);
+    adc.set_millivolts(0, 1650, Time::ZERO);
+    write(&mut adc, offset::CR2, ON, Time::ZERO);
+    let at = |n: u64| Time::from_us(100 * n);
+    assert_eq!(converted(&mut adc, 5, at(1)), 2048 + UNCALIBRATED);
+    write(&mut adc, offset::CR2, ON | cr2::CAL, at(2));
+    assert_eq!(converted(&mut adc, 5, at(3)), 2048);
+    write(&mut adc, offset::CR2, ON | cr2::RSTCAL, at(4));
+    assert_eq!(converted(&mut adc, 5, at(5)), 2048 + UNCALIBRATED);
+    write(&mut adc, offset::CR2, ON | cr2::CAL, at(6));
+    write(&mut adc, offset::CR2, 0, at(7));
+    write(&mut adc, offset::CR2, ON, at(8));
+    assert_eq!(converted(&mut adc, 5, at(9)), 2048 + UNCALIBRATED);
+    // Begun within two cycles of power-up, a calibration is worth nothing (11.4).
+    write(&mut adc, offset::CR2, 0, at(10));
+    write(&mut adc, offset::CR2, ON, at(11));
+    assert!(adc.write(offset::CR2, ON | cr2::CAL, at(11)).is_err());
+    assert_eq!(converted(&mut adc, 5, at(12)), 2048 + UNCALIBRATED);
+}
+
+#[test]
+fn conversion_within_the_settling_time_is_too_low() {
+    let mut adc = Adc::new();
+    adc.set_clock(HZ, Time::ZERO);
+    adc.set_millivolts(0, 1650, Time::ZERO);
+    write(&mut adc, offset::CR2, ON, Time::ZERO);
+    assert_eq!(
+        converted(&mut adc, 0, Time::from_ns(500)),
+        2048 + UNCALIBRATED - UNSETTLED
+    );
+}
+
+/// The data sheet's table of RAIN against the sampling time at 14 MHz, in ohms; its limit is the last of the
+/// values for 55.5 cycles and more.
+#[test]
+fn source_above_the_data_sheet_s_impedance_is_read_wrong() {
+    const LIMITS: [u32; 6] = [400, 5_900, 11_400, 25_200, 37_200, 50_000];
+    for (code, limit) in (0..).zip(LIMITS) {
+        let read = |ohms| {
+            let (mut adc, t) = settled();
+            adc.set_clock(14_000_000, t);
+            adc.set_millivolts(0, 3300, t);
+            adc.set_source_ohms(0, ohms, t);
+            converted(&mut adc, code, t)
+        };
+        assert_eq!(read(limit), 4095, "{limit} ohm");
+        assert!(read(2 * limit + 1_000) < 4090, "{limit} ohm");
+    }
+}
+
+#[test]
+fn source_of_high_impedance_is_pulled_to_the_level_converted_before() {
+    let (mut adc, t) = settled();
+    adc.set_millivolts(0, 3300, t);
+    assert_eq!(converted(&mut adc, 5, t), 4095);
+    let t = t + Time::from_us(100);
+    adc.set_millivolts(0, 0, t);
+    adc.set_source_ohms(0, 500_000, t);
+    let first = converted(&mut adc, 5, t);
+    let second = converted(&mut adc, 5, t + Time::from_us(100));
+    assert!((1000..1500).contains(&first), "{first}");
+    assert!(second < first / 2, "{second}");
 }

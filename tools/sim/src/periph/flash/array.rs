@@ -1,4 +1,11 @@
-//! The flash's cells, and what an operation does to them: whole, or torn by a power cut.
+//! The flash's cells, and what an operation does to them: whole, or torn by a power cut or a reset.
+//!
+//! PM0075 promises nothing about a half-word or a page whose operation was interrupted. The model takes the
+//! worst case that a floating-gate cell allows: a cell that was left near the threshold of the sense amplifier
+//! reads as 0 or as 1, anew at every read, until its page is erased whole. A complete program of the
+//! half-word drives the cells that it programs to 0; the rest of the half-word stays as it was left.
+
+use std::collections::BTreeMap;
 
 use crate::machine::memory::{FLASH_SIZE, Memory};
 
@@ -8,13 +15,14 @@ pub const PAGE: usize = 1024;
 /// What an interrupted operation leaves. The part promises nothing; each choice is the same in every run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Torn {
-    /// Each bit that was to change has changed with a likelihood that grows with the time spent: a mess. It is
-    /// drawn from the bit's place, so that a longer operation has changed all that a shorter one has.
+    /// Each cell that was to change has its own speed, drawn from its place and the board's seed. Cells that
+    /// are far from the threshold read as the old or as the new bit; those near it read differently from
+    /// read to read.
     #[default]
     Mess,
-    /// Nothing has changed yet, however late the cut.
+    /// Nothing has changed yet, however late the cut. Every read gives the old bits.
     Before,
-    /// Everything has changed already, however early the cut.
+    /// Everything has changed already, however early the cut. Every read gives the new bits.
     After,
 }
 
@@ -48,61 +56,133 @@ impl Operation {
     }
 }
 
-/// The cells.
+/// How far from the threshold a cell may be left and still read either way, in parts of 65536 of the whole
+/// operation. No data sheet gives a figure; a quarter leaves several such cells in most torn half-words.
+const UNSTEADY: u32 = 16_384;
+
+/// The cells of one byte that read differently from read to read.
+#[derive(Clone, Copy, Debug)]
+struct Unsteady {
+    /// Those cells.
+    bits: u8,
+    /// What they were to become.
+    target: u8,
+    /// How much of the operation was done, of 65536.
+    parts: u32,
+}
+
+/// The cells. A reader that needs no more than one answer, such as the file of the flash, gets the likelier one.
 #[derive(Debug)]
-pub(super) struct Cells(Memory);
+pub(super) struct Cells {
+    memory: Memory,
+    unsteady: BTreeMap<usize, Unsteady>,
+    seed: u64,
+    /// Draws what an unsteady cell reads as.
+    noise: fastrand::Rng,
+}
 
 impl Cells {
-    pub(super) fn erased() -> Self {
-        Self(Memory::new(FLASH_SIZE, 0xFF))
+    pub(super) fn erased(seed: u64) -> Self {
+        Self {
+            memory: Memory::new(FLASH_SIZE, 0xFF),
+            unsteady: BTreeMap::new(),
+            seed,
+            noise: fastrand::Rng::with_seed(seed),
+        }
     }
 
     pub(super) fn host(&mut self) -> *mut u8 {
-        self.0.host()
+        self.memory.host()
     }
 
     pub(super) fn bytes(&self) -> &[u8] {
-        self.0.bytes()
+        self.memory.bytes()
     }
 
+    /// The bytes, to change from outside, by a programmer that leaves every cell steady.
     pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
-        self.0.bytes_mut()
+        self.unsteady.clear();
+        self.memory.bytes_mut()
     }
 
-    /// The half-word at byte `at` (even).
-    pub(super) fn half(&self, at: usize) -> u16 {
-        let bytes = self.0.bytes();
-        u16::from_le_bytes([bytes[at], bytes[at + 1]])
+    /// Reads `N` bytes from byte `at` on.
+    pub(super) fn read<const N: usize>(&mut self, at: usize) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(&self.memory.bytes()[at..at + N]);
+        for (&at_byte, cell) in self.unsteady.range(at..at + N) {
+            let byte = &mut bytes[at_byte - at];
+            for bit in (0..8).filter(|bit| cell.bits >> bit & 1 != 0) {
+                let noise = self.noise.u32(0..2 * UNSTEADY);
+                let changed = cell.parts + noise >= draw(self.seed, at_byte * 8 + bit) + UNSTEADY;
+                let value = if changed { cell.target } else { !cell.target };
+                *byte = *byte & !(1 << bit) | value & 1 << bit;
+            }
+        }
+        bytes
+    }
+
+    /// The pages that hold unsteady cells, one bit each, lowest first.
+    pub(super) fn unsteady_pages(&self) -> u128 {
+        let pages = self.unsteady.keys().map(|at| at / PAGE);
+        pages.fold(0, |mask, page| mask | 1 << page)
     }
 
     /// Does `operation` whole; returns the bytes changed, first and end.
     pub(super) fn finish(&mut self, operation: Operation) -> (usize, usize) {
-        self.tear(operation, Torn::After, 65_536)
+        let (first, end) = operation.span();
+        for at in first..end {
+            let old = self.memory.bytes()[at];
+            let target = operation.target(at, old);
+            self.memory.bytes_mut()[at] = target;
+            if let Some(cell) = self.unsteady.get_mut(&at) {
+                // A program drives cells to 0 and leaves the others alone; an erase drives all to 1.
+                cell.bits &= match operation {
+                    Operation::Program { value, .. } => value.to_le_bytes()[at - first],
+                    Operation::Page { .. } | Operation::Mass => 0,
+                };
+            }
+        }
+        self.unsteady.retain(|_, cell| cell.bits != 0);
+        (first, end)
     }
 
     /// Does `parts` / 65536 of `operation`; returns the bytes changed, first and end.
     pub(super) fn tear(&mut self, operation: Operation, torn: Torn, parts: u32) -> (usize, usize) {
         let (first, end) = operation.span();
-        let bytes = self.0.bytes_mut();
-        for (at, byte) in bytes[first..end].iter_mut().enumerate() {
-            let at = first + at;
-            let target = operation.target(at, *byte);
-            let flips = match torn {
-                Torn::Before => 0,
-                Torn::After => 0xFF,
-                Torn::Mess => (0..8)
-                    .filter(|bit| draw(at * 8 + bit) < parts)
-                    .fold(0, |mask, bit| mask | 1u8 << bit),
+        if torn == Torn::Before {
+            return (first, end);
+        }
+        if torn == Torn::After {
+            return self.finish(operation);
+        }
+        for at in first..end {
+            let old = self.memory.bytes()[at];
+            let target = operation.target(at, old);
+            let changing = old ^ target;
+            let places = |test: &dyn Fn(u32) -> bool| {
+                (0..8)
+                    .filter(|bit| test(draw(self.seed, at * 8 + bit)))
+                    .fold(0, |mask, bit| mask | 1u8 << bit)
             };
-            *byte ^= (*byte ^ target) & flips;
+            let changed = changing & places(&|place| place < parts);
+            let near = changing & places(&|place| place.abs_diff(parts) < UNSTEADY);
+            self.memory.bytes_mut()[at] = old ^ changed;
+            if near != 0 {
+                let cell = Unsteady {
+                    bits: near,
+                    target,
+                    parts,
+                };
+                self.unsteady.insert(at, cell);
+            }
         }
         (first, end)
     }
 }
 
-/// A number from 0 to 65535 that depends on the bit's place alone (the mixer of splitmix64).
-fn draw(bit: usize) -> u32 {
-    let mut z = (bit as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+/// A number from 0 to 65535 that depends on the seed and the bit's place alone (the mixer of splitmix64).
+fn draw(seed: u64, bit: usize) -> u32 {
+    let mut z = (seed ^ (bit as u64 + 1)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
     (z ^ z >> 31) as u32 & 0xFFFF

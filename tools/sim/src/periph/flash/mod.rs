@@ -1,7 +1,7 @@
 //! The flash program and erase controller, PM0075 (STM32F10xxx flash programming manual) chapters 2 and 3.
 //!
 //! It owns the flash's cells. An operation takes real time and changes them when it ends, or half-way when
-//! the power goes ([`mod@array`]). Option bytes can be read but not programmed.
+//! the power goes or the part is reset ([`mod@array`]). Option bytes can be read but not programmed.
 
 mod array;
 
@@ -38,7 +38,7 @@ const CR_EOPIE: u32 = 1 << 12;
 const CR_OPTION: u32 = 1 << 4 | 1 << 5 | 1 << 9;
 const CR_WRITABLE: u32 = CR_PG | CR_PER | CR_MER | CR_ERRIE | CR_EOPIE;
 
-/// How long the part takes; DS5319 table 29 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
+/// How long the part takes; DS5319 table 28 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Durations {
     /// A page erase or a mass erase; 30 ms, the middle of the range, unless set.
@@ -103,9 +103,10 @@ pub struct Flash {
     busy: Option<Busy>,
     /// Instructions left in the prefetch buffer: the core does not stall before it has run them.
     ahead: u32,
-    /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the medium-density
-    /// parts, "Flash memory BSY bit delay versus STRT bit setting"). The worst case: until the first read of a
-    /// register of this block, or until the core stalls.
+    /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the STM32F10xx4 and
+    /// STM32F10xx6, 2.11 "Flash memory BSY bit delay versus STRT bit setting", for an erase; here for this part and
+    /// for a half-word, too). The worst case: until the first read of a register of this block, or until the core
+    /// stalls.
     bsy_is_late: bool,
     /// The operation that is to end without EOP, counted as `started` does.
     without_eop: Option<u64>,
@@ -117,11 +118,12 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// The controller after power-on over an erased flash, with these write-protection bits.
+    /// The controller after power-on over an erased flash, with these write-protection bits. `seed` decides
+    /// what torn operations leave.
     #[must_use]
-    pub fn new(wrpr: u32) -> Self {
+    pub fn new(wrpr: u32, seed: u64) -> Self {
         Self {
-            cells: Cells::erased(),
+            cells: Cells::erased(seed),
             durations: Durations::default(),
             torn: Torn::default(),
             hsi_on: true,
@@ -207,6 +209,17 @@ impl Flash {
         self.changes
     }
 
+    /// Reads the word at byte `at` (a multiple of 4), with unsteady cells as this read finds them.
+    pub fn read_word(&mut self, at: usize) -> u32 {
+        u32::from_le_bytes(self.cells.read(at))
+    }
+
+    /// The pages, one bit each, that hold unsteady cells. The core reads all others without asking.
+    #[must_use]
+    pub fn unsteady_pages(&self) -> u128 {
+        self.cells.unsteady_pages()
+    }
+
     /// What there was against the last write, since the last call.
     pub fn take_complaint(&mut self) -> Option<Complaint> {
         self.complaint.take()
@@ -244,7 +257,7 @@ impl Flash {
         } else {
             let at = offset as usize & !1;
             // A half-word that is not erased takes only 0x0000 (PM0075 2.3.3).
-            if self.cells.half(at) != 0xFFFF && value != 0 {
+            if self.cells.read(at) != [0xFF; 2] && value != 0 {
                 self.sr |= SR_PGERR;
                 self.complaint = complain("a half-word that was not erased was programmed", false);
                 return;

@@ -4,9 +4,10 @@ use super::*;
 use crate::machine::memory::FLASH_BASE;
 
 const NOW: Time = Time::ZERO;
+const SEED: u64 = 7;
 
 fn open() -> Flash {
-    let mut flash = Flash::new(u32::MAX);
+    let mut flash = Flash::new(u32::MAX, SEED);
     for key in KEYS {
         flash.write(4, key, NOW).unwrap();
     }
@@ -81,7 +82,7 @@ fn a_programmed_half_word_takes_only_zero() {
 
 #[test]
 fn a_wrong_key_locks_until_reset() {
-    let mut flash = Flash::new(u32::MAX);
+    let mut flash = Flash::new(u32::MAX, SEED);
     flash.write(4, KEYS[1], NOW).unwrap();
     assert!(flash.take_complaint().unwrap().bus_error);
     for key in KEYS {
@@ -131,6 +132,84 @@ fn a_torn_erase_is_between_old_and_new_and_grows() {
     assert_eq!(early, torn_at(6), "the same every time");
 }
 
+/// The half-word at 0 after a program of 0 that was cut when half of it was done.
+fn torn_half(seed: u64) -> Flash {
+    let mut flash = Flash::new(u32::MAX, seed);
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    program(&mut flash, 0, 0);
+    flash.power_off(Time::from_ns(26_250));
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    flash
+}
+
+fn reads(flash: &mut Flash) -> Vec<u16> {
+    (0..100).map(|_| flash.half_at(0)).collect()
+}
+
+#[test]
+fn half_programmed_cells_read_differently_from_read_to_read() {
+    let mut flash = torn_half(SEED);
+    let read = reads(&mut flash);
+    let ones = read.iter().fold(0, |all, half| all | half);
+    let always = read.iter().fold(0xFFFF, |all, half| all & half);
+    assert_ne!(ones, always, "some cells are unsteady");
+    assert_ne!(ones, 0xFFFF, "others read as 0");
+    assert_ne!(always, 0, "others read as 1");
+    assert_eq!(
+        flash.take_rerouted(),
+        (1, 1),
+        "the core reads through the bus"
+    );
+    assert_eq!(read, reads(&mut torn_half(SEED)), "the same for a seed");
+    assert_ne!(read, reads(&mut torn_half(SEED + 1)));
+}
+
+#[test]
+fn complete_program_steadies_only_the_cells_it_programs() {
+    for (value, steady) in [(0, true), (0xFFFF, false)] {
+        let mut flash = torn_half(SEED);
+        flash.cells.finish(Operation::Program { at: 0, value });
+        let read = reads(&mut flash);
+        assert_eq!(
+            read.iter().all(|half| *half == read[0]),
+            steady,
+            "{value:#x}"
+        );
+    }
+}
+
+#[test]
+fn half_erased_cells_stay_unsteady_over_a_reset_until_an_erase_is_complete() {
+    let mut flash = open();
+    flash.bytes_mut()[..1024].fill(0);
+    let erase = |flash: &mut Flash| {
+        for key in KEYS {
+            flash.write(4, key, NOW).unwrap();
+        }
+        flash.write(0x10, CR_PER, NOW).unwrap();
+        flash.write(0x14, FLASH_BASE, NOW).unwrap();
+        flash.write(0x10, CR_PER | CR_STRT, NOW).unwrap();
+    };
+    flash.reset(NOW);
+    erase(&mut flash);
+    flash.reset(Time::from_ms(15));
+    let words = |flash: &mut Flash| -> Vec<u32> {
+        (0..256).map(|word| flash.read_word(4 * word)).collect()
+    };
+    assert_ne!(words(&mut flash), words(&mut flash));
+    assert_eq!(flash.take_rerouted(), (1, 1));
+    flash.reset(NOW);
+    assert_ne!(words(&mut flash), words(&mut flash));
+    erase(&mut flash);
+    flash.advance(Time::from_ms(30));
+    assert_eq!(words(&mut flash), [u32::MAX; 256]);
+    assert_eq!(flash.take_rerouted(), (1, 0));
+}
+
 #[test]
 fn torn_can_be_set_to_nothing_or_everything() {
     for (torn, left) in [(Torn::Before, 0xFFFF), (Torn::After, 0x0102)] {
@@ -144,7 +223,7 @@ fn torn_can_be_set_to_nothing_or_everything() {
 
 #[test]
 fn protected_pages_refuse_and_bytes_are_a_bus_error() {
-    let mut flash = Flash::new(!1);
+    let mut flash = Flash::new(!1, SEED);
     for key in KEYS {
         flash.write(4, key, NOW).unwrap();
     }
@@ -177,8 +256,42 @@ fn nothing_happens_without_the_hsi() {
     assert!(flash.take_complaint().is_some());
 }
 
+#[test]
+fn mass_erase_clears_every_page_and_none_when_one_is_protected() {
+    for (wrpr, status) in [(u32::MAX, SR_BSY), (!1, SR_WRPRTERR)] {
+        let mut flash = Flash::new(wrpr, SEED);
+        flash.bytes_mut().fill(0);
+        for key in KEYS {
+            flash.write(4, key, NOW).unwrap();
+        }
+        flash.write(0x10, CR_MER, NOW).unwrap();
+        flash.write(0x10, CR_MER | CR_STRT, NOW).unwrap();
+        let _ = flash.read(0x0C, NOW);
+        assert_eq!(flash.read(0x0C, NOW), Ok(status));
+        flash.advance(Time::from_ms(30));
+        let byte = if status == SR_BSY { 0xFF } else { 0 };
+        assert!(flash.bytes().iter().all(|b| *b == byte));
+    }
+}
+
+#[test]
+fn interrupts_report_the_end_and_the_errors_that_are_enabled() {
+    for (enabled, value, end, error) in [(CR_EOPIE, 1, true, false), (CR_ERRIE, 1, false, true)] {
+        let mut flash = open();
+        flash.write(0x10, CR_PG | enabled, NOW).unwrap();
+        flash.program(0, true, value, NOW);
+        assert!(!flash.irq());
+        flash.advance(Time::from_ms(1));
+        assert_eq!(flash.irq(), end);
+        flash.write(0x0C, SR_EOP, NOW).unwrap();
+        assert!(!flash.irq());
+        flash.program(0, true, 2, NOW);
+        assert_eq!(flash.irq(), error, "not erased");
+    }
+}
+
 impl Flash {
-    fn half_at(&self, at: usize) -> u16 {
-        self.cells.half(at)
+    fn half_at(&mut self, at: usize) -> u16 {
+        u16::from_le_bytes(self.cells.read(at))
     }
 }

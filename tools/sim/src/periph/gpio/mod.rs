@@ -123,6 +123,12 @@ impl Gpio {
         self.modes.alternate & self.modes.output
     }
 
+    /// The pins handed to a peripheral's output as open drain, one bit each.
+    #[must_use]
+    pub fn alternate_open_drains(&self) -> u16 {
+        self.alternate_outputs() & self.modes.open_drain
+    }
+
     /// The pins that the firmware itself pulls low as plain outputs, one bit each.
     #[must_use]
     pub fn pulled_low(&self) -> u16 {

@@ -43,6 +43,7 @@ pub mod sr1 {
     pub const BTF: u32 = 1 << 2;
     pub const RXNE: u32 = 1 << 6;
     pub const TXE: u32 = 1 << 7;
+    pub const BERR: u32 = 1 << 8;
     pub const ARLO: u32 = 1 << 9;
     pub const AF: u32 = 1 << 10;
     /// Cleared by writing 0.

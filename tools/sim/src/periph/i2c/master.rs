@@ -58,15 +58,25 @@ impl I2c {
 
     /// Whether someone else keeps what is under way from ending.
     fn stretched_by_others(&self) -> bool {
-        !self.wires.scl || (matches!(self.phase, Phase::Stop | Phase::Start) && !self.wires.sda)
+        !self.connected
+            || !self.wires.scl
+            || (matches!(self.phase, Phase::Stop | Phase::Start) && !self.wires.sda)
     }
 
     /// Takes note of the wires: BUSY rises with any low, falls with a stop condition (26.6.7).
-    pub(super) fn look(&mut self, wires: Wires, now: Time) {
+    pub(super) fn look(&mut self, lines: Wires, now: Time) {
+        // An edge on a wire unlocks its filter (errata sheet, 2.13.7).
+        self.filters.scl |= lines.scl != self.lines.scl;
+        self.filters.sda |= lines.sda != self.lines.sda;
+        self.lines = lines;
+        let wires = Wires {
+            scl: lines.scl && self.filters.scl,
+            sda: lines.sda && self.filters.sda,
+        };
         if wires != Wires::FREE {
             self.busy = true;
         }
-        let stop = self.wires.scl && wires.scl && !self.wires.sda && wires.sda;
+        let stop = !self.latched && self.wires.scl && wires.scl && !self.wires.sda && wires.sda;
         if stop && self.phase == Phase::Idle {
             self.busy = false;
         }
@@ -79,7 +89,7 @@ impl I2c {
 
     /// Starts what the program has asked for, if it can be started now.
     pub(super) fn begin(&mut self, now: Time) {
-        if self.due.is_some() || self.stalled || self.cr1 & cr1::PE == 0 {
+        if self.due.is_some() || self.stalled || self.cr1 & cr1::PE == 0 || !self.connected {
             return;
         }
         let stop = self.cr1 & cr1::STOP != 0;
@@ -121,7 +131,7 @@ impl I2c {
                 self.sr1 &= !(sr1::TXE | sr1::BTF | sr1::SB | sr1::ADDR);
                 self.sr2 = 0;
                 self.phase = Phase::Idle;
-                self.busy = self.wires != Wires::FREE;
+                self.busy = self.latched || self.wires != Wires::FREE;
             }
             // The others wait for the program and have no end.
             _ => {}

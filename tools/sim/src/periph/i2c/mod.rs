@@ -2,6 +2,15 @@
 //!
 //! What happens on the bus happens in [`I2c::exchange`]. One bit lasts what CCR says of PCLK1 (26.6.8): 2, 3
 //! or 25 times CCR cycles; the wires' rise time is not counted. A start or stop condition takes one bit.
+//! Without both pins in alternate open drain (RM0008 9.1.11) nothing is driven, so nothing that was asked for
+//! begins or ends.
+//!
+//! Two ways in which the block fails are modelled. Its analog filters may stay low while the wires are high
+//! (errata sheet of the STM32F10xx8 and STM32F10xxB, 2.13.7 "I2C analog filter may provide wrong value,
+//! locking BUSY flag and preventing master mode entry"): [`I2c::lock_filters`]. BUSY is then set after every
+//! reset, until each wire has had an edge and the block a software reset. A start or stop condition of
+//! someone else in the middle of a byte is a bus error (26.3.4): [`I2c::disturb`].
+//!
 //! Rules that a real block enforces by misbehaving are reported: CR1 written while START or STOP is
 //! pending, CCR written while PE = 1, FREQ that is not PCLK1's.
 
@@ -47,8 +56,16 @@ pub struct I2c {
     due: Option<Time>,
     /// It has ended but for a wire that someone holds.
     stalled: bool,
-    /// The wires as the others leave them.
+    /// The wires as the analog filters show what the others leave.
     wires: Wires,
+    /// The wires themselves.
+    lines: Wires,
+    /// The analog filters: `false` for one that is locked low.
+    filters: Wires,
+    /// BUSY stays set until a software reset finds both filters free.
+    latched: bool,
+    /// Both pins are in alternate open drain.
+    connected: bool,
 }
 
 impl Default for I2c {
@@ -79,7 +96,43 @@ impl I2c {
             due: None,
             stalled: false,
             wires: Wires::FREE,
+            lines: Wires::FREE,
+            filters: Wires::FREE,
+            latched: false,
+            connected: false,
         }
+    }
+
+    /// Whether both pins are in alternate open drain from `now` on.
+    pub fn set_connected(&mut self, connected: bool, now: Time) {
+        self.connected = connected;
+        self.look(self.lines, now);
+    }
+
+    /// Locks both analog filters low, as the rise of the supply or a discharge may. No reset frees them.
+    pub fn lock_filters(&mut self, now: Time) {
+        self.filters = Wires {
+            scl: false,
+            sda: false,
+        };
+        self.latched = true;
+        self.look(self.lines, now);
+    }
+
+    /// Somebody else makes a start condition. In the middle of a byte that is a bus error, which leaves the
+    /// master's state as it is (26.3.4); on a free bus it makes the bus busy.
+    /// Returns whether it was a bus error.
+    pub fn disturb(&mut self) -> bool {
+        let in_byte = matches!(
+            self.phase,
+            Phase::Address(_) | Phase::Send(_) | Phase::Receive { .. }
+        );
+        if in_byte {
+            self.sr1 |= sr1::BERR;
+        } else if self.phase == Phase::Idle {
+            self.busy = true;
+        }
+        in_byte
     }
 
     /// The event interrupt, I2C1_EV (26.4, table 189).
@@ -176,11 +229,15 @@ impl I2c {
 
     fn write_cr1(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
         if value & cr1::SWRST != 0 {
-            let held = self.wires;
             self.software_reset();
             self.cr1 = cr1::SWRST;
-            self.look(held, now);
+            self.look(self.lines, now);
             return Ok(());
+        }
+        if self.cr1 & cr1::SWRST != 0 {
+            // Out of reset BUSY is what the filters show.
+            self.latched = self.filters != Wires::FREE;
+            self.busy = self.wires != Wires::FREE;
         }
         let asked = cr1::START | cr1::STOP;
         let value = value & cr1::MASK;
@@ -201,6 +258,11 @@ impl I2c {
             finding = Err(Unmodelled("I2C STOP outside a transfer"));
         }
         self.begin(now);
+        if value & cr1::START != 0 && !self.connected {
+            return Err(Unmodelled(
+                "I2C START without both pins in alternate open drain",
+            ));
+        }
         if value & !cr1::MODELLED != 0 {
             return Err(Unmodelled(
                 "I2C SMBus, PEC, general call or slave mode (CR1)",
@@ -255,6 +317,10 @@ impl I2c {
         *self = Self {
             hz: self.hz,
             wires: self.wires,
+            lines: self.lines,
+            filters: self.filters,
+            latched: self.filters != Wires::FREE,
+            connected: self.connected,
             ..Self::new()
         };
     }

@@ -24,6 +24,7 @@ impl Bench {
             now: Time::ZERO,
         };
         bench.i2c.set_clock(HZ, Time::ZERO);
+        bench.i2c.set_connected(true, Time::ZERO);
         bench.init();
         bench
     }
@@ -350,4 +351,80 @@ fn misuse_is_reported() {
         bench.write(offset::CCR, ccr);
         assert!(bench.try_write(offset::CR1, ON).is_err(), "{cr2} {ccr}");
     }
+}
+
+#[test]
+fn nothing_starts_without_the_pins_and_it_starts_once_they_are_set() {
+    let mut bench = Bench::new();
+    bench.i2c.set_connected(false, bench.now);
+    let cr1 = bench.read(offset::CR1);
+    assert!(bench.try_write(offset::CR1, cr1 | cr1::START).is_err());
+    assert!(!bench.wait(sr1::SB));
+    bench.i2c.set_connected(true, bench.now);
+    assert!(bench.wait(sr1::SB));
+}
+
+#[test]
+fn byte_stands_still_while_the_pins_are_not_the_block_s() {
+    let mut bench = Bench::new();
+    bench.set(cr1::START);
+    assert!(bench.wait(sr1::SB));
+    bench.write(offset::DR, 0xC0);
+    bench.i2c.set_connected(false, bench.now);
+    assert!(!bench.wait(sr1::ADDR | sr1::AF));
+    bench.i2c.set_connected(true, bench.now);
+    assert!(bench.wait(sr1::ADDR));
+}
+
+/// Moves the wires by hand, the pins being outputs.
+fn by_hand(bench: &mut Bench, scl: bool, sda: bool) {
+    bench.slot.set_pins(Wires { scl, sda });
+    bench.i2c.exchange(&mut bench.slot, bench.now);
+}
+
+#[test]
+fn locked_filters_keep_busy_set_until_edges_on_both_wires_and_a_software_reset() {
+    let mut bench = Bench::new();
+    bench.i2c.lock_filters(bench.now);
+    let busy = |bench: &mut Bench| bench.read(offset::SR2) & sr2::BUSY != 0;
+    let reset = |bench: &mut Bench| {
+        bench.write(offset::CR1, cr1::SWRST);
+        bench.write(offset::CR1, 0);
+        bench.init();
+    };
+    assert!(busy(&mut bench));
+    bench.i2c.reset(bench.now);
+    reset(&mut bench);
+    assert!(busy(&mut bench), "no reset helps");
+    bench.set(cr1::START);
+    assert!(!bench.wait(sr1::SB));
+    by_hand(&mut bench, false, true);
+    by_hand(&mut bench, true, true);
+    reset(&mut bench);
+    assert!(busy(&mut bench), "SDA had no edge");
+    by_hand(&mut bench, true, false);
+    by_hand(&mut bench, true, true);
+    assert!(busy(&mut bench), "only a software reset clears it");
+    reset(&mut bench);
+    assert!(!busy(&mut bench));
+    bench.set(cr1::START);
+    assert!(bench.wait(sr1::SB));
+}
+
+#[test]
+fn start_condition_of_another_is_a_bus_error_in_a_byte_and_busy_on_a_free_bus() {
+    let mut bench = Bench::new();
+    bench.i2c.disturb();
+    assert_eq!(bench.read(offset::SR2), sr2::BUSY);
+    bench.write(offset::CR1, cr1::SWRST);
+    bench.write(offset::CR1, 0);
+    bench.init();
+    bench.set(cr1::START);
+    assert!(bench.wait(sr1::SB));
+    bench.write(offset::DR, 0xC0);
+    bench.i2c.disturb();
+    assert_eq!(bench.read(offset::SR1), sr1::BERR);
+    assert!(bench.wait(sr1::ADDR), "the transfer goes on");
+    bench.write(offset::SR1, !sr1::BERR & 0xFFFF);
+    assert_eq!(bench.read(offset::SR1) & sr1::BERR, 0);
 }

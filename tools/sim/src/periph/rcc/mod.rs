@@ -152,6 +152,12 @@ impl Rcc {
         self.lsi.get_or_insert(now + LSI_START);
     }
 
+    /// Since when the LSI runs, or from when it will; `None` while it is off.
+    #[must_use]
+    pub const fn lsi(&self) -> Option<Time> {
+        self.lsi
+    }
+
     /// Whether the HSI runs: flash is programmed and erased by its clock (PM0075 2.3).
     #[must_use]
     pub fn hsi_on(&self) -> bool {
