@@ -167,6 +167,37 @@ fn code_in_sram_that_reads_flash_stalls_until_the_operation_ends() {
 }
 
 #[test]
+fn program_reads_unsteady_cells_differently_from_read_to_read() {
+    // Erases a page that holds 0; of another it reads sixteen words twice each.
+    let mut program = Asm::new();
+    program.set(3, PAGE);
+    program.ldr(4, 3, 0);
+    program.cmp(4, 0);
+    let filled_page = program.forward(When::Equal);
+    program.set(6, OUT);
+    for word in 0..16 {
+        for read in 0..2 {
+            program.ldr(4, 3, 4 * word);
+            program.str(4, 6, 4 * word + 64 * read);
+        }
+    }
+    program.spin();
+    program.land(filled_page);
+    unlock(&mut program);
+    erase(&mut program);
+    program.spin();
+
+    let mut board = board_with(&program.image(), filled());
+    board.cut_in_flash_operation(1, 0.5);
+    board.run_until(Time::from_ms(60));
+    assert!(!board.powered());
+    board.power_on();
+    board.run_until(Time::from_ms(70));
+    let reads = |from| -> Vec<u32> { (from..from + 16).map(|n| out(&board, n)).collect() };
+    assert_ne!(reads(0), reads(16));
+}
+
+#[test]
 fn a_power_cut_in_an_erase_leaves_a_mess_that_is_the_same_every_time() {
     let run = |fraction, torn| {
         let mut program = Asm::new();
