@@ -1,5 +1,5 @@
 //! `cargo xtask ci`: formatting, lints and documentation with every warning an error, for the host and
-//! for the microcontroller, then the steps of `cargo xtask test`, the figures of `cargo xtask bench` against the
+//! for the microcontroller, then the steps of `cargo xtask test`, the tests of the image at the extremes of the part, the figures of `cargo xtask bench` against the
 //! baseline, and every fuzz target for a short time.
 
 use std::process::Command;
@@ -70,6 +70,7 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
             .into()
     });
     let image = test::add(workspace, &mut steps, true);
+    test::add_corners(workspace, &mut steps, image.as_deref());
     steps.run("instructions and bytes", || {
         test::on(image.as_deref(), |elf| bench::check(workspace, elf).into())
     });

@@ -3,7 +3,7 @@
 //! The test is `noise` of `tools/sim/tests/image`, which `cargo xtask test` runs with fewer frames.
 
 use crate::workspace::Workspace;
-use crate::{Result, build, command};
+use crate::{Result, build, command, test};
 
 /// How many frames the test sends: read by it.
 const VARIABLE: &str = "MODIO_SOAK_FRAMES";
@@ -15,6 +15,19 @@ pub struct Options {
     /// So many frames
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     frames: u64,
+
+    /// Corner of the part: nominal, slow or fast
+    #[arg(long, default_value = test::NOMINAL, value_parser = corner)]
+    corner: String,
+}
+
+/// A corner by its name.
+fn corner(name: &str) -> std::result::Result<String, String> {
+    if name == test::NOMINAL || test::CORNERS.contains(&name) {
+        Ok(name.to_owned())
+    } else {
+        Err("nominal, slow or fast".to_owned())
+    }
 }
 
 /// `cargo xtask soak`.
@@ -30,5 +43,6 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     cargo.args(["--test", "image", "--", "--include-ignored", "--nocapture"]);
     cargo.args(["--exact", "noise::soak"]);
     cargo.env("MODIO_ELF", elf);
+    cargo.env(test::CORNER, &options.corner);
     command::run(cargo.env(VARIABLE, options.frames.to_string()))
 }

@@ -7,6 +7,12 @@ use crate::steps::{Outcome, Steps};
 use crate::workspace::Workspace;
 use crate::{Result, build, command, pymodbus, renode, sim, size};
 
+/// The variable that names the corner of the part to the tests of the image.
+pub const CORNER: &str = "MODIO_CORNER";
+/// The simulator's corners (`sim::Corner`): the typical part, and the extremes.
+pub const NOMINAL: &str = "nominal";
+pub const CORNERS: [&str; 2] = ["slow", "fast"];
+
 /// The options of `cargo xtask test`.
 #[derive(clap::Args, Debug)]
 pub struct Options {
@@ -36,11 +42,14 @@ pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) -> Option
     let elf = add_host(workspace, steps, &["--workspace"]);
     let image = elf.as_deref();
     steps.run("image in simulation", || {
-        on(image, |elf| in_simulation(workspace, elf, &["sim"]))
+        on(image, |elf| {
+            in_simulation(workspace, elf, &["sim"], NOMINAL)
+        })
     });
     steps.run("conformance of the image", || {
         on(image, |elf| {
-            in_simulation(workspace, elf, &["conformance", "--features", "sim"])
+            let package = ["conformance", "--features", "sim"];
+            in_simulation(workspace, elf, &package, NOMINAL)
         })
     });
     steps.run("pymodbus as master", || {
@@ -72,12 +81,23 @@ fn add_host(workspace: &mut Workspace, steps: &mut Steps, packages: &[&str]) -> 
     elf
 }
 
-/// The tests of a package, and how it is built, that run the image in the simulator.
-fn in_simulation(workspace: &Workspace, elf: &Path, package: &[&str]) -> Outcome {
+/// Adds the tests of the image at the corners beside the nominal one.
+pub fn add_corners(workspace: &Workspace, steps: &mut Steps, image: Option<&Path>) {
+    for corner in CORNERS {
+        steps.run(&format!("image in simulation, {corner} corner"), || {
+            on(image, |elf| {
+                in_simulation(workspace, elf, &["sim", "--test", "image"], corner)
+            })
+        });
+    }
+}
+
+/// The tests of a package, and how it is built, that run the image in the simulator at a corner of the part.
+fn in_simulation(workspace: &Workspace, elf: &Path, package: &[&str], corner: &str) -> Outcome {
     let mut cargo = workspace.cargo("test");
     cargo.args(["--ignore-rust-version", "--no-fail-fast", "--package"]);
     cargo.args(package).args(["--", "--include-ignored"]);
-    cargo.env("MODIO_ELF", elf);
+    cargo.env("MODIO_ELF", elf).env(CORNER, corner);
     // Tests of one package cannot find the programs of another.
     let simulator = match sim::simulator(workspace) {
         Ok(simulator) => simulator,

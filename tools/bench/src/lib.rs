@@ -13,7 +13,7 @@ pub mod unit;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use sim::Image;
+use sim::{Corner, Image};
 
 use rival::Rival;
 use unit::Unit;
@@ -70,7 +70,7 @@ pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, Stri
         let unit = match units.entry((module.name(), mode.code())) {
             std::collections::btree_map::Entry::Occupied(unit) => unit.into_mut(),
             std::collections::btree_map::Entry::Vacant(place) => {
-                place.insert(Unit::new(image, module, 1152, mode)?)
+                place.insert(Unit::new(image, module, Corner::Nominal, 1152, mode)?)
             }
         };
         let cost = unit.measure(&request);
@@ -98,9 +98,11 @@ pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, Stri
         });
     }
     let mut load = Vec::new();
-    for rate in RATES {
-        for long in [false, true] {
-            load.push(load::measure(image, rate, long)?);
+    for corner in [Corner::Nominal, Corner::Slow] {
+        for rate in RATES {
+            for long in [false, true] {
+                load.push(load::measure(image, corner, rate, long)?);
+            }
         }
     }
     Ok(Report { requests, load })

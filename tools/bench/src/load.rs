@@ -5,7 +5,7 @@ use register_map::Module;
 use register_map::codes::Mode;
 use register_map::configuration::BETA;
 use serde::Serialize;
-use sim::{Image, Time};
+use sim::{Corner, Image, Time};
 
 use crate::framing::{adu, is_adu};
 use crate::unit::{BYTE, GAP, SERVE, Unit};
@@ -26,6 +26,8 @@ const TASKS: [(u32, &str); 6] = [
 /// The processor under load.
 #[derive(Clone, Debug, Serialize)]
 pub struct Load {
+    /// The corner of the part.
+    pub corner: &'static str,
     /// Bits per second.
     pub baud: u32,
     /// What is asked.
@@ -38,13 +40,13 @@ pub struct Load {
     pub longest_waits_us: Vec<(&'static str, f64)>,
 }
 
-/// Loads the unit at a rate in units of 100 bit/s.
+/// Loads the unit at a corner of the part and a rate in units of 100 bit/s.
 ///
 /// # Errors
 ///
 /// When it leaves a request unanswered.
-pub fn measure(image: &Image, hundreds: u16, long: bool) -> Result<Load, String> {
-    let mut unit = Unit::new(image, Module::Di4, hundreds, Mode::Rtu)?;
+pub fn measure(image: &Image, corner: Corner, hundreds: u16, long: bool) -> Result<Load, String> {
+    let mut unit = Unit::new(image, Module::Di4, corner, hundreds, Mode::Rtu)?;
     let (name, count) = if long {
         ("03, 125 registers", 125)
     } else {
@@ -71,6 +73,7 @@ pub fn measure(image: &Image, hundreds: u16, long: bool) -> Result<Load, String>
         (name, longest.as_secs_f64() * 1e6)
     });
     Ok(Load {
+        corner: corner.name(),
         baud: u32::from(hundreds) * 100,
         request: name,
         answered,

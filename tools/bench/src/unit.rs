@@ -6,7 +6,7 @@ use register_map::codes::Mode;
 use register_map::{Module, configuration, record};
 use sim::line::{Format, Settings};
 use sim::machine::memory::{FLASH_BASE, FLASH_SIZE};
-use sim::{Board, Config, Image, Time};
+use sim::{Board, Config, Corner, Image, Time};
 
 use crate::framing::{adu, is_adu};
 use crate::requests::Request;
@@ -20,6 +20,8 @@ pub(crate) const SERVE: u32 = 16 + 9;
 const START: Time = Time::from_ms(150);
 /// The longest that any response takes at 115200 bit/s.
 const LONGEST: Time = Time::from_ms(100);
+/// What the unit takes to answer after t3.5, at any corner.
+const ANSWER: Time = Time::from_us(100);
 /// More instructions than anything measured needs: then it hangs.
 const TOO_MANY: u32 = 1_000_000;
 
@@ -53,12 +55,18 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// A board with this module, at a rate in units of 100 bit/s in this mode, started.
+    /// A board with this module, at a corner of the part, at a rate in units of 100 bit/s in this mode, started.
     ///
     /// # Errors
     ///
     /// When the image does not fit the board.
-    pub fn new(image: &Image, module: Module, hundreds: u16, mode: Mode) -> Result<Self, String> {
+    pub fn new(
+        image: &Image,
+        module: Module,
+        corner: Corner,
+        hundreds: u16,
+        mode: Mode,
+    ) -> Result<Self, String> {
         let pairs = [
             (configuration::BAUD, hundreds),
             (configuration::MODE, mode.code()),
@@ -70,6 +78,7 @@ impl Unit {
         record::encode_page(1, &pairs, &mut flash[page..page + 1024]);
         let config = Config {
             module,
+            corner,
             flash: Some(flash),
             ..Config::default()
         };
@@ -118,7 +127,8 @@ impl Unit {
     }
 
     fn silence(&self) -> Time {
-        self.settings.frame_silence() + self.settings.characters(2)
+        // At the highest rates what the unit takes to answer is more than two characters.
+        self.settings.frame_silence() + self.settings.characters(2) + ANSWER
     }
 
     fn heard(&mut self) -> Vec<u8> {

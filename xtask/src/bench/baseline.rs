@@ -54,8 +54,7 @@ fn figures(report: &Value) -> Figures {
     }
     for row in rows("load") {
         if let Some(value) = row[LOAD].as_f64() {
-            let request = row["request"].as_str().unwrap_or_default();
-            figures.insert(format!("{} bit/s, {request}: {LOAD}", row["baud"]), value);
+            figures.insert(format!("{}: {LOAD}", super::table::load_name(row)), value);
         }
     }
     for part in ["image", "server"] {

@@ -19,6 +19,10 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "4di")]
     pub module: Module,
 
+    /// Corner of the part, its clocks and what its instructions cost: nominal, slow or fast
+    #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
+    pub corner: String,
+
     /// Write the plugged module's code into the stored configuration when nothing is stored yet (default)
     #[arg(long, overrides_with = "no_preset")]
     preset: bool,
@@ -135,6 +139,7 @@ mod tests {
     fn without_options_it_is_unit_1_with_four_inputs_and_a_preset() {
         let options = parse(&[]).unwrap();
         assert_eq!((options.dip, options.module), (1, Module::Di4));
+        assert_eq!(options.corner, "nominal");
         assert_eq!(options.http, "127.0.0.1:8502".parse().unwrap());
         assert!(options.preset());
         assert_eq!((options.pty, options.tcp, options.elf), (None, None, None));
@@ -182,6 +187,7 @@ mod tests {
         for (arguments, part) in [
             (&["--dip", "256"][..], "256 is not in 0..=255"),
             (&["--module", "8di"][..], "one of none, 4di"),
+            (&["--corner", "hot"][..], "nominal, slow, fast"),
             (&["--tcp", "nowhere"][..], "not an address"),
             (&["--http", "127.0.0.1:99999"][..], "not an address"),
             (&["--flash"][..], "--flash <FILE>"),

@@ -152,6 +152,7 @@ fn board(options: &Options, stored: Option<Vec<u8>>) -> Result<Board, String> {
     let config = Config {
         dip: options.dip,
         module: options.module,
+        corner: options.corner.parse()?,
         flash: Some(flash),
         ..Config::default()
     };

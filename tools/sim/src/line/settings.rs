@@ -140,6 +140,20 @@ impl Rate {
         Time::cycles(n * u64::from(self.cycles), self.hz)
     }
 
+    /// The first tick at `span` or later of a clock that ticks `parts` times a bit, counted from its start, and
+    /// when it comes.
+    #[must_use]
+    pub fn ticks(self, parts: u32, span: Time) -> (u64, Time) {
+        let hz = self.hz.saturating_mul(parts);
+        let cycles = u64::from(self.cycles).max(1);
+        let mut tick = span.in_cycles(hz) / cycles;
+        let at = |tick: u64| Time::cycles(tick * cycles, hz);
+        while at(tick) < span {
+            tick += 1;
+        }
+        (tick, at(tick))
+    }
+
     /// The span of `n` sixteenths of a bit: the sampling clock of a receiver.
     #[must_use]
     pub fn sixteenths(self, n: u64) -> Time {

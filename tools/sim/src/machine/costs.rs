@@ -1,7 +1,7 @@
 //! What the core's instructions and exceptions cost in cycles of HCLK, by class.
 //!
 //! Sources: the Cortex-M3 TRM, DDI 0337E, 18.2 (instruction timings) and 18.3 (load-store timings), for a memory
-//! without wait states; PM0075 2.1 and RM0008 3.3.3 for the flash, which reads 64 bits in one cycle and its wait
+//! without wait states; PM0075 and RM0008 3.3.3 for the flash, which reads 64 bits in one cycle and its wait
 //! states, with a prefetch buffer of two such lines. What these leave open is a range: [`Costs::NOMINAL`] takes
 //! its usual value, [`Costs::SLOW`] its highest everywhere at once, which no part reaches.
 //!
@@ -88,7 +88,7 @@ impl Costs {
         barrier: 2,
         shared_bus: 1,
         sram_fetch: 0,
-        // 18 MHz at a pin (DS5319 2.3.21): a store every two cycles, one of them the store's own.
+        // 18 MHz at a pin (DS5319, GPIOs): a store every two cycles, one of them the store's own.
         apb_store: (2, 0),
         apb_load: (2, 0),
         ahb: 0,

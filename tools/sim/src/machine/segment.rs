@@ -9,7 +9,7 @@ use super::decode::{Class, decode};
 
 /// The most instructions of a segment.
 const MOST: usize = 24;
-/// Bytes that the flash reads together (PM0075 2.1), and that the core fetches from SRAM together.
+/// Bytes that the flash reads together (PM0075), and that the core fetches from SRAM together.
 const LINE: u32 = 8;
 const WORD: u32 = 4;
 

@@ -59,6 +59,20 @@ pub fn corner() -> Corner {
     name.map_or(Corner::Nominal, |name| name.parse().expect("MODIO_CORNER"))
 }
 
+/// A frequency that is `hz` from an exact crystal, from the crystal of the corner.
+pub fn on_crystal(hz: u32) -> u32 {
+    scaled(hz, corner().oscillators().hse)
+}
+
+/// A frequency that is `hz` from an exact HSI, from the HSI of the corner.
+pub fn on_hsi(hz: u32) -> u32 {
+    scaled(hz, corner().oscillators().hsi)
+}
+
+fn scaled(hz: u32, oscillator: u32) -> u32 {
+    (u64::from(hz) * u64::from(oscillator) / 8_000_000) as u32
+}
+
 /// An ADU: these bytes and their CRC.
 pub fn adu(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc(bytes)].concat()

@@ -52,7 +52,11 @@ fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
             bench.board.run_for(Time::from_ms(50));
         }
         bench.settings(settings);
-        assert_at(turnaround(&mut bench), bench.t35(), Time::from_us(60));
+        assert_at(
+            turnaround(&mut bench),
+            bench.t35(),
+            Time::from_us(60) + bench.bit(),
+        );
         for _ in 0..10 {
             assert_eq!(
                 bench.registers(0x0100, 9).unwrap()[1..3],
@@ -89,7 +93,7 @@ fn a_response_delay_counts_at_once() {
         bench.configure(RESPONSE_DELAY, &[ms]);
         let due = bench.t35() + Time::from_ms(ms.into());
         let slack = if ms == 0 {
-            Time::from_us(60)
+            Time::from_us(60) + bench.bit()
         } else {
             Time::from_ms(2)
         };
@@ -115,7 +119,11 @@ fn a_longer_frame_gap_counts_after_the_restart() {
     bench.tolerant = true;
     bench.configure(FRAME_GAP, &[100]);
     bench.save();
-    assert_at(turnaround(&mut bench), bench.t35(), Time::from_us(60));
+    assert_at(
+        turnaround(&mut bench),
+        bench.t35(),
+        Time::from_us(60) + bench.bit(),
+    );
     assert!(!answered_with_gap(&mut bench, Time::from_ms(6)));
     bench.restart();
     assert!(answered_with_gap(&mut bench, Time::from_ms(6)));
@@ -126,7 +134,7 @@ fn a_longer_frame_gap_counts_after_the_restart() {
     bench.board.run_until(end + Time::from_ms(11));
     assert!(!bench.answer_after(end).is_empty());
     let start = bench.board.line().frames().next_back().unwrap().start - end;
-    assert_at(start, Time::from_ms(10), Time::from_us(60));
+    assert_at(start, Time::from_ms(10), Time::from_us(60) + bench.bit());
 }
 
 #[test]
@@ -134,7 +142,11 @@ fn a_longer_frame_gap_counts_after_the_restart() {
 fn a_shorter_frame_gap_counts_after_the_restart() {
     let mut bench = Bench::set_up(Module::Di4, &[(FRAME_GAP, 20)]);
     // 2 ms at 9600: less than two characters.
-    assert_at(turnaround(&mut bench), Time::from_ms(2), Time::from_us(60));
+    assert_at(
+        turnaround(&mut bench),
+        Time::from_ms(2),
+        Time::from_us(60) + bench.bit(),
+    );
     assert!(answered_with_gap(&mut bench, Time::from_us(1_800)));
     assert!(!answered_with_gap(&mut bench, Time::from_us(2_300)));
 }
@@ -158,7 +170,7 @@ fn no_frame_gap_is_too_short_to_be_understood() {
         bench.configure(0x01C0, &[0; 32]);
         let gap = Time::from_us(100 * u64::from(gap));
         let shortest = bench.characters(1) + bench.bit();
-        let (due, slack) = (gap.max(shortest), Time::from_us(60) + bench.bit());
+        let (due, slack) = (gap.max(shortest), Time::from_us(60) + bench.bit() * 2);
         assert_at(turnaround(&mut bench), due, slack);
     }
 }

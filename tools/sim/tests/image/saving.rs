@@ -1,9 +1,9 @@
 //! Saving while the line is busy: at 115200, each request t3.5 behind the last reply, none is lost.
 
 use register_map::{codes::Baud, configuration, record::PAGE_SIZE};
-use sim::{Module, Time, periph::flash::Durations};
+use sim::{Corner, Module, Time, periph::flash::Durations};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, adu, corner};
 
 const FILTER: u16 = 0x0130;
 const UNSAVED: u16 = 8;
@@ -206,7 +206,7 @@ fn a_change_made_while_a_save_runs_is_not_part_of_it_and_another_save_is_busy() 
 /// RAM: that takes as long as it takes.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time() {
+fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time_35_at_the_slow_corner() {
     const BACKGROUND: u32 = 16 + 6;
     const XPSR: usize = 16;
     const BASEPRI: usize = 20;
@@ -232,7 +232,11 @@ fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time() {
         }
     }
     assert!(board.flash_operations() > operations + 190, "it was saved");
-    assert!(longest < Time::from_us(20), "a lock was held for {longest}");
+    let most = if corner() == Corner::Slow { 35 } else { 20 };
+    assert!(
+        longest < Time::from_us(most),
+        "a lock was held for {longest}"
+    );
 }
 
 #[test]

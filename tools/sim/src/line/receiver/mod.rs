@@ -3,7 +3,8 @@
 //! One model serves every listener: the USART of the part, the master, and the record of the line. It
 //! samples each bit sixteen times and decides by three of them, as the STM32's USART does (RM0008
 //! 27.3.3): sample `n` of a bit is taken `n` sixteenths of a bit after the bit began, counted from the
-//! falling edge of the start bit. A start bit is a falling edge after three high samples, with at least two
+//! falling edge of the start bit. The part's samples go by a clock of their own ([`Framing::sampled_since`]), so
+//! there the first sample of a start bit is the first one after the edge. A start bit is a falling edge after three high samples, with at least two
 //! lows among samples 3, 5, 7 and again among 8, 9, 10; otherwise the search goes on.
 
 #[cfg(test)]
@@ -24,6 +25,9 @@ pub struct Framing {
     pub parity: Option<Parity>,
     /// Stop bits: 1 or 2. Only the first is checked.
     pub stop_bits: u8,
+    /// Since when a sample is taken every sixteenth of a bit. `None`: the samples start with the edge of a start
+    /// bit.
+    pub sampled_since: Option<Time>,
 }
 
 impl Framing {
@@ -36,6 +40,7 @@ impl Framing {
             data_bits: settings.format.data_bits() + parity.is_some() as u8,
             parity,
             stop_bits: settings.format.stop_bits(),
+            sampled_since: None,
         }
     }
 
@@ -50,6 +55,17 @@ impl Framing {
     #[must_use]
     pub const fn bits(&self) -> u8 {
         1 + self.data_bits + self.stop_bits
+    }
+
+    /// Where a start bit begins by the samples when its edge comes at `edge`: a sixteenth before the first sample
+    /// that shows it.
+    fn start_of(&self, edge: Time) -> Time {
+        let Some(since) = self.sampled_since.filter(|&since| since < edge) else {
+            return edge;
+        };
+        let (_, first) = self.rate.ticks(16, edge - since);
+        // Rounded so that the first sample is never before the edge.
+        since + first - self.rate.sixteenths(1)
     }
 
     /// From the start bit's edge to the last sample (the tenth) of the first stop bit.
@@ -72,7 +88,7 @@ impl Framing {
 /// A word received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// The falling edge of the start bit.
+    /// The falling edge of the start bit, by the samples.
     pub start: Time,
     /// When the receiver had it.
     pub at: Time,
@@ -169,8 +185,9 @@ impl Receiver {
                 .previous_edge(edge)
                 .is_none_or(|rise| rise + idle <= edge);
             if rested {
-                self.start = Some(edge);
-                return Some(edge);
+                let start = framing.start_of(edge);
+                self.start = Some(start);
+                return Some(start);
             }
             from = edge;
             self.search_from = edge;
@@ -190,6 +207,16 @@ enum Verdict {
 }
 
 fn start_bit_fails(wave: &Wave, framing: &Framing, start: Time, now: Time) -> Verdict {
+    // A pulse between two samples has not been seen at all.
+    let first = start + framing.rate.sixteenths(1);
+    if framing.sampled_since.is_some() {
+        if now < first {
+            return Verdict::Open;
+        }
+        if wave.level_at(first) {
+            return Verdict::Fails(first);
+        }
+    }
     for group in [[3, 5, 7], [8, 9, 10]] {
         let last = start + framing.rate.sixteenths(group[2]);
         if now < last {

@@ -11,7 +11,7 @@ fn what_is_sent_with_the_driver_off_is_lost() {
     assert_eq!(bench.line.frames().count(), 0);
     let findings = bench.line.take_findings();
     assert_eq!(findings.len(), 1);
-    assert_eq!(findings[0].0, Time::from_ms(1));
+    assert_eq!(findings[0].0, TICK);
 }
 
 #[test]
@@ -75,8 +75,8 @@ fn both_at_once_collide_and_the_master_hears_the_mix() {
     assert!(bench.line.frames().next().expect("recorded").damaged);
     let spans: Vec<_> = bench.line.collisions().collect();
     assert_eq!(spans.len(), 1);
-    assert_eq!(spans[0].start, Time::from_ms(1));
-    assert_eq!(spans[0].end, Time::from_ms(1) + Time::cycles(11, 115_200));
+    assert_eq!(spans[0].start, TICK);
+    assert_eq!(spans[0].end, TICK + Time::cycles(11, 115_200));
     // The unit was deaf: its receiver is off while it drives.
     assert_eq!(bench.read(SR) & RXNE, 0);
 }

@@ -17,6 +17,9 @@ const CR1: u32 = 0x0C;
 const ON: u32 = 1 << 13 | 1 << 3 | 1 << 2;
 const RXNE: u32 = 1 << 5;
 
+/// A tick of the baud generator after the preamble.
+const TICK: Time = Time::cycles(116 * 625, HZ);
+
 struct Bench {
     line: Line,
     usart: Usart,
@@ -40,7 +43,7 @@ impl Bench {
         for (offset, value) in [(0x08, BRR), (0x10, 2 << 12), (CR1, ON)] {
             bench.write(offset, value);
         }
-        bench.run_to(Time::from_ms(1));
+        bench.run_to(TICK);
         bench
     }
 
@@ -79,6 +82,9 @@ impl Bench {
 
     /// The unit answers with `bytes`, as fast as it can, and lets go at the end of the last stop bit.
     fn answer(&mut self, bytes: &[u8]) -> Time {
+        // From a tick of the baud generator, so that the first byte begins at once.
+        let (_, tick) = Rate::from_clock(625, HZ).ticks(1, self.now);
+        self.run_to(tick);
         self.driver(true);
         let begin = self.now;
         for &byte in bytes {
@@ -103,8 +109,8 @@ fn a_request_and_its_answer_are_heard_and_recorded() {
     let end = bench.line.send(sent, &request);
     assert_eq!(end, sent + Time::cycles(88, 115_200));
     assert_eq!(bench.hear(end + Time::from_us(1750)), request);
-    let began = bench.now;
     let done = bench.answer(&request[..4]);
+    let began = done - Time::cycles(4 * 11 * 625, HZ);
     bench.run_to(done + Time::from_us(1751));
     let frames: Vec<_> = bench.line.frames().cloned().collect();
     assert_eq!(frames.len(), 2);

@@ -4,7 +4,11 @@
 //! [`Usart::receive_edge`]. Every instant comes from whole cycles of the kernel clock: one bit lasts BRR
 //! of them (27.3.4: USARTDIV = BRR / 16, sixteen samples a bit).
 //!
-//! Choices where the manual is silent: a character written to an idle transmitter begins at once; the
+//! The baud generator runs from the writing of BRR on, sixteen ticks a bit (27.3.4). The receiver samples at its
+//! ticks, so it sees an edge up to a sixteenth of a bit late; the transmitter, whose clock is a sixteenth of it,
+//! begins a character up to a bit after it was written.
+//!
+//! Choices where the manual is silent: the phase of the transmitter's clock is that of the writing of BRR; the
 //! clearing of UE lets the character under way out and stops the receiver at once; a new BRR holds from
 //! the next character on for the transmitter, at once for the receiver.
 
@@ -65,6 +69,8 @@ pub struct Usart {
     quiet_since: Time,
     /// Writes to DR.
     data_writes: u64,
+    /// Since when the baud generator runs at its rate.
+    baud_since: Time,
 }
 
 impl Default for Usart {
@@ -93,6 +99,7 @@ impl Usart {
             idle_armed: false,
             quiet_since: Time::ZERO,
             data_writes: 0,
+            baud_since: Time::ZERO,
         }
     }
 
@@ -161,6 +168,7 @@ impl Usart {
         (self.cr1 & on == on && self.hz > 0 && self.brr >= 16).then(|| Shape {
             bit_cycles: self.brr,
             hz: self.hz,
+            since: self.baud_since,
             data_bits: self.data_bits(),
             stop_bits: self.stop_bits(),
         })
@@ -285,6 +293,7 @@ impl Peripheral for Usart {
             offset::DR => return self.write_data(value, now),
             offset::BRR => {
                 self.brr = value & 0xFFFF;
+                self.baud_since = now;
                 let busy = self.tx.is_sending() || self.receiver.start().is_some();
                 self.kick(now);
                 if busy && self.cr1 & cr1::UE != 0 {
@@ -355,6 +364,7 @@ impl Peripheral for Usart {
         let sent = self.tx.take_sent();
         *self = Self {
             hz: self.hz,
+            baud_since: now,
             tx: Transmitter::with_sent(sent),
             rx_pin: Wave::new(self.rx_pin.last_level()),
             ..Self::new()
@@ -362,6 +372,9 @@ impl Peripheral for Usart {
     }
 
     fn set_clock(&mut self, hz: u32, now: Time) {
+        if hz != self.hz {
+            self.baud_since = now;
+        }
         self.hz = hz;
         self.kick(now);
     }

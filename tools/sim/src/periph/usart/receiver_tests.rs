@@ -50,7 +50,10 @@ fn data(usart: &mut Usart, at: Time) -> u32 {
     usart.read(offset::DR, at).expect("modelled")
 }
 
-const START: Time = Time::from_us(100);
+/// A sample of the receiver, and right after it the edge of a start bit: what is sampled counts from there.
+const SAMPLED: Time =
+    Time::from_ps(Time::cycles(185 * 625, 16 * HZ).as_ps() - Time::cycles(625, 16 * HZ).as_ps());
+const START: Time = Time::from_ps(SAMPLED.as_ps() + 1);
 
 #[test]
 fn rxne_rises_at_the_tenth_sample_of_the_stop_bit() {
@@ -63,7 +66,7 @@ fn rxne_rises_at_the_tenth_sample_of_the_stop_bit() {
     usart.advance(START);
     assert!(!usart.awaits_start());
     // 9 bits and 10/16: 9.625 * 625 = 6015.6 cycles = 83.55 us.
-    let due = START + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
+    let due = SAMPLED + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
     assert_eq!(usart.next_event(), Some(due));
     usart.advance(due - Time::from_ps(1));
     assert!(!usart.irq());
@@ -76,6 +79,44 @@ fn rxne_rises_at_the_tenth_sample_of_the_stop_bit() {
 }
 
 #[test]
+fn rxne_jitters_by_a_sixteenth_of_a_bit() {
+    let exact = Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
+    let sixteenth = Rate::from_clock(BRR, HZ).sixteenths(1);
+    let mut jitter = (Time::MAX, Time::ZERO);
+    for n in 0..100 {
+        let mut usart = receiver(cr1::RXNEIE, 0);
+        let start = Time::from_us(100) + Time::from_ns(37 * n);
+        play(
+            &mut usart,
+            Character::new(settings(Format::N1), 0x5A).at(start),
+        );
+        usart.advance(start);
+        let due = usart.next_event().expect("a character");
+        assert_eq!(data(&mut usart, due), 0x5A);
+        let early = start + exact - due;
+        jitter = (jitter.0.min(early), jitter.1.max(early));
+    }
+    assert!(jitter.0 < Time::from_ns(40), "{jitter:?}");
+    assert!(jitter.1 > sixteenth - Time::from_ns(40), "{jitter:?}");
+    assert!(jitter.1 <= sixteenth + Time::from_ps(1), "{jitter:?}");
+}
+
+#[test]
+fn a_pulse_between_two_samples_is_not_seen() {
+    let mut usart = receiver(0, 0);
+    usart.receive_edge(START, false);
+    usart.receive_edge(START + Time::from_ns(400), true);
+    let start = START + Time::from_us(4);
+    play(
+        &mut usart,
+        Character::new(settings(Format::N1), 0x42).at(start),
+    );
+    let end = START + Time::from_us(100);
+    assert_eq!(status(&mut usart, end), sr::RESET | sr::RXNE);
+    assert_eq!(data(&mut usart, end), 0x42);
+}
+
+#[test]
 fn with_two_stop_bits_rxne_rises_at_the_end_of_the_first() {
     let mut usart = receiver(0, cr2::STOP_TWO);
     play(
@@ -83,7 +124,7 @@ fn with_two_stop_bits_rxne_rises_at_the_end_of_the_first() {
         Character::new(settings(Format::N2), 0).at(START),
     );
     usart.advance(START);
-    assert_eq!(usart.next_event(), Some(START + cycles(10 * 625)));
+    assert_eq!(usart.next_event(), Some(SAMPLED + cycles(10 * 625)));
 }
 
 #[test]
@@ -211,7 +252,7 @@ fn the_wrong_rate_is_heard_wrongly() {
     // Each bit at 57600 is two here: 0 0, 0 0, 1 1, 1 1, 0 0, ... The first is the start bit, eight are
     // data, and the second half of the fourth data bit stands where the stop bit should.
     play(&mut usart, Character::new(slow, 0b0011_0110).at(START));
-    let first = START + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
+    let first = SAMPLED + Rate::from_clock(BRR, HZ).sixteenths(9 * 16 + 10);
     assert_eq!(status(&mut usart, first), sr::RESET | sr::RXNE | sr::FE);
     assert_eq!(data(&mut usart, first), 0b0111_1000);
 }
@@ -234,7 +275,7 @@ fn idle_comes_one_frame_after_the_last_character_and_only_once() {
     let rxne = START + Time::from_us(85);
     usart.advance(rxne);
     // Ten bits of the character, ten of silence.
-    let idle = START + cycles(6250) + cycles(6250);
+    let idle = SAMPLED + cycles(6250) + cycles(6250);
     assert_eq!(usart.next_event(), Some(idle));
     usart.advance(idle - Time::from_ps(1));
     assert!(!usart.irq());

@@ -30,6 +30,7 @@ impl Usart {
             data_bits: self.data_bits(),
             parity: self.parity(),
             stop_bits: self.stop_bits(),
+            sampled_since: Some(self.baud_since),
         })
     }
 

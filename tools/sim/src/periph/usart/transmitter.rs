@@ -6,7 +6,7 @@ use crate::time::Time;
 /// What a transmitter does to its TX pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sent {
-    /// A character whose start bit has begun.
+    /// A character whose start bit has begun, or begins at the next tick of the baud generator.
     Character(Character),
     /// The pin goes high at that instant: the character under way is lost from there on.
     Cut(Time),
@@ -19,6 +19,8 @@ pub struct Shape {
     pub bit_cycles: u32,
     /// The kernel clock in Hz.
     pub hz: u32,
+    /// Since when the baud generator runs.
+    pub since: Time,
     /// Data bits, the parity bit counted in: 8 or 9.
     pub data_bits: u8,
     /// Stop bits: 1 or 2.
@@ -101,13 +103,16 @@ impl Transmitter {
         self.break_wanted = wanted;
     }
 
-    /// Starts what waits, at `at`, if the shift register is free. Tells what became of it.
+    /// Starts what waits, at the first tick of the baud generator from `at` on, if the shift register is free. Tells what became of it.
     pub fn start(&mut self, at: Time, shape: Shape) -> Option<Ended> {
         if self.shift.is_some() {
             return None;
         }
         if at != self.end_of_run() || self.hz != shape.hz {
-            self.base = at;
+            // The next tick of the baud generator.
+            let rate = Rate::from_clock(shape.bit_cycles, shape.hz);
+            let (_, tick) = rate.ticks(1, at.saturating_sub(shape.since));
+            self.base = shape.since + tick;
             self.cycles = 0;
             self.hz = shape.hz;
         }

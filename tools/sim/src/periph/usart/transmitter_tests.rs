@@ -9,6 +9,8 @@ use super::*;
 const HZ: u32 = 72_000_000;
 const BRR: u32 = 0x271;
 const ON: u32 = cr1::UE | cr1::TE;
+/// A tick of the baud generator after the preamble.
+const TICK: Time = Time::cycles(116 * 625, HZ);
 /// TE costs a bit of delay and an idle frame of ten.
 const PREAMBLE: u64 = 11 * 625;
 
@@ -62,7 +64,7 @@ fn the_first_character_follows_the_idle_frame() {
 #[test]
 fn two_bytes_deep_without_a_gap_and_tc_at_the_end_of_the_last_stop_bit() {
     let mut usart = transmitter(cr1::TCIE, 0);
-    let t = Time::from_ms(1);
+    let t = TICK;
     // TC is set after the preamble; SR read, DR write clears it.
     assert_eq!(status(&mut usart, t), sr::TXE | sr::TC);
     assert!(usart.irq());
@@ -91,9 +93,25 @@ fn two_bytes_deep_without_a_gap_and_tc_at_the_end_of_the_last_stop_bit() {
 }
 
 #[test]
+fn a_character_begins_at_the_next_tick_of_the_baud_generator() {
+    for late in [1, 300, 624, 625] {
+        let mut usart = transmitter(0, 0);
+        let written = TICK + cycles(late);
+        usart.advance(written);
+        // The generator runs from BRR on, not from TE or DR.
+        write(&mut usart, offset::DR, 0x55, written);
+        assert_eq!(status(&mut usart, written) & sr::TXE, sr::TXE);
+        let (start, ..) = starts(&mut usart)[0];
+        assert_eq!(start, Time::cycles(117 * 625, HZ), "{late}");
+        let end = Time::cycles(127 * 625, HZ);
+        assert_eq!(usart.next_event(), Some(end));
+    }
+}
+
+#[test]
 fn a_thousand_characters_do_not_drift() {
     let mut usart = transmitter(0, 0);
-    let t = Time::from_ms(1);
+    let t = TICK;
     write(&mut usart, offset::DR, 0, t);
     let mut last = Time::ZERO;
     for n in 0..1000 {
@@ -117,7 +135,7 @@ fn formats_on_the_wire() {
         (cr1::M, 0, 0b1_1_0000_0111_0, 11),
     ] {
         let mut usart = transmitter(cr1, cr2);
-        let t = Time::from_ms(1);
+        let t = TICK;
         // Bit 8 is data only in nine bits without parity; bit 7 gives way to parity in eight.
         write(&mut usart, offset::DR, 0x107, t);
         assert_eq!(starts(&mut usart), [(t, levels, bits)], "{cr1:#x}");
@@ -127,7 +145,7 @@ fn formats_on_the_wire() {
 #[test]
 fn a_write_without_txe_is_reported_and_takes_the_place() {
     let mut usart = transmitter(0, 0);
-    let t = Time::from_ms(1);
+    let t = TICK;
     write(&mut usart, offset::DR, 1, t);
     write(&mut usart, offset::DR, 2, t);
     assert!(usart.write(offset::DR, 3, t).is_err());
@@ -139,7 +157,7 @@ fn a_write_without_txe_is_reported_and_takes_the_place() {
 #[test]
 fn clearing_te_cuts_the_character_clearing_ue_does_not() {
     let mut usart = transmitter(0, 0);
-    let t = Time::from_ms(1);
+    let t = TICK;
     write(&mut usart, offset::DR, 0, t);
     let cut = t + cycles(1000);
     usart.advance(cut);
@@ -158,7 +176,7 @@ fn clearing_te_cuts_the_character_clearing_ue_does_not() {
 #[test]
 fn a_break_is_low_for_a_frame_and_clears_its_bit() {
     let mut usart = transmitter(0, 0);
-    let t = Time::from_ms(1);
+    let t = TICK;
     write(&mut usart, offset::DR, 0xFF, t);
     write(&mut usart, offset::CR1, ON | cr1::SBK, t);
     let end = t + cycles(6250 + 11 * 625);
@@ -177,7 +195,7 @@ fn a_break_is_low_for_a_frame_and_clears_its_bit() {
 fn interrupts_follow_their_enables() {
     let mut usart = transmitter(0, 0);
     assert!(!usart.irq());
-    let t = Time::from_ms(1);
+    let t = TICK;
     write(&mut usart, offset::CR1, ON | cr1::TXEIE, t);
     assert!(usart.irq());
     write(&mut usart, offset::DR, 0, t);
