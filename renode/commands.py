@@ -16,15 +16,15 @@ MODIO_SW01 = [
 # Inputs that are high with nothing connected: the slot's lines, RX, and the radio's AUX.
 MODIO_PULLED_UP = [("A", 0), ("A", 1), ("A", 2), ("A", 3), ("A", 10), ("B", 5)]
 
-# The start of the store's first page, for each module: a record of one setting, MODULE of port 5.
+# The start of the store's first page, for each module: a sealed record of one setting, MODULE of port 5.
 MODIO_PRESETS = {
-    "none": "6f6b6d6f0101000000000000e9a2942e",
-    "4di": "6f6b6d6f0101000000000100140101006a52ca95",
-    "4do": "6f6b6d6f010100000000010014010200a901e7be",
-    "2relay": "6f6b6d6f010100000000010014010300e830fca7",
-    "4ai": "6f6b6d6f0101000000000100140104002fa6bde8",
-    "4ao": "6f6b6d6f0101000000000100140105006e97a6f1",
-    "2ai2ao": "6f6b6d6f010100000000010014010600adc48bda",
+    "none": "6f6b6d6f0101000000000000e9a2942e00000000",
+    "4di": "6f6b6d6f0101000000000100140101006a52ca9500000000",
+    "4do": "6f6b6d6f010100000000010014010200a901e7be00000000",
+    "2relay": "6f6b6d6f010100000000010014010300e830fca700000000",
+    "4ai": "6f6b6d6f0101000000000100140104002fa6bde800000000",
+    "4ao": "6f6b6d6f0101000000000100140105006e97a6f100000000",
+    "2ai2ao": "6f6b6d6f010100000000010014010600adc48bda00000000",
 }
 
 MODIO_STORE = 0x0800F800

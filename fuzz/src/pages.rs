@@ -3,7 +3,7 @@
 use std::fmt;
 
 use firmware::config::Settings;
-use register_map::record::{BEGINNING, PAGE_SIZE};
+use register_map::record::{BEGINNING, PAGE_SIZE, SEALS};
 
 use crate::running::random_settings;
 use crate::script::Script;
@@ -64,6 +64,7 @@ fn record(script: &mut Script<'_>, base: u32) -> Vec<u8> {
     }
     let check = crc32(&record);
     record.extend(check.to_le_bytes());
+    record.extend([0; SEALS]);
     record
 }
 
@@ -117,11 +118,17 @@ pub fn nothing_good(pages: &Pages) -> bool {
     pages.iter().all(|page| records(page).is_empty())
 }
 
-/// What a start may find on these pages: the newest record. Where the sequence numbers go so far apart
+/// What a start may find on these pages: the newest sealed record, or the newest of all when none is sealed. Where the sequence numbers go so far apart
 /// that no order is in them, as no store leaves them, any of the records.
 #[must_use]
 pub fn read(pages: &Pages) -> Vec<Found> {
-    let all: Vec<(u32, Found)> = pages.iter().flat_map(|page| records(page)).collect();
+    let good: Vec<_> = pages.iter().flat_map(|page| records(page)).collect();
+    let any_sealed = good.iter().any(|(_, sealed, _)| *sealed);
+    let all: Vec<(u32, Found)> = good
+        .into_iter()
+        .filter(|(_, sealed, _)| *sealed || !any_sealed)
+        .map(|(sequence, _, found)| (sequence, found))
+        .collect();
     let Some((first, _)) = all.first() else {
         let vacant = pages.iter().all(|page| is_vacant(page));
         return vec![if vacant {
@@ -143,7 +150,8 @@ pub fn read(pages: &Pages) -> Vec<Found> {
     place.map(|at| all[at].1.clone()).into_iter().collect()
 }
 
-fn records(page: &[u8]) -> Vec<(u32, Found)> {
+/// Sequence number, whether it is sealed, and contents of every good record.
+fn records(page: &[u8]) -> Vec<(u32, bool, Found)> {
     let half = |at: usize| u16::from_le_bytes([page[at], page[at + 1]]);
     let word = |at: usize| u32::from(half(at)) | u32::from(half(at + 2)) << 16;
     let mut found = Vec::new();
@@ -164,7 +172,9 @@ fn records(page: &[u8]) -> Vec<(u32, Found)> {
             invalid,
             rejected,
         };
-        found.push((word(at + 4), settings));
+        // The first of the two seals decides.
+        let sealed = end + 8 <= page.len() && half(end + 4) == 0;
+        found.push((word(at + 4), sealed, settings));
         at = end + 4;
     }
     found

@@ -48,7 +48,7 @@ class Commands(unittest.TestCase):
         run.mc_modio_preset("4do")
         stored = dict(bus)
         self.assertEqual(min(stored), 0x0800F800)
-        self.assertEqual(len(stored), 20)
+        self.assertEqual(len(stored), 24)
         run.mc_modio_preset("4di")
         self.assertEqual(bus, stored)
         bus.clear()

@@ -37,7 +37,7 @@ mod operation;
 mod saving;
 mod survey;
 
-use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
+use register_map::record::{Encoder, FIRST_OFFSET, PAGE_SIZE, SCHEMA, pair_of};
 
 use crate::config::Settings;
 pub use flash::{Flash, Page, StoreError};
@@ -113,9 +113,12 @@ impl Store {
     ///
     /// When the flash fails. What is stored is still good, and saves are still tried.
     pub fn prepare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
-        // Where a seal is worn out, the record is moved, as from any page that takes no more.
-        let _ = self.seal_again(flash);
+        let sealed = self.seal_again(flash);
         self.look_again(flash);
+        // Where a seal is worn out, the record is moved, as from any page that takes no more.
+        if let Err(StoreError::Flash(..)) = sealed {
+            return sealed;
+        }
         let result = match self.newest() {
             Some(newest) => self.make_room(newest, flash),
             None if self.first.written || self.second.written => self.make_one_ready(flash),
@@ -189,6 +192,10 @@ impl Store {
         let count = u16::try_from(record.count()).unwrap_or(u16::MAX);
         let sequence = found.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
+        // Version 0.1 left no room for seals.
+        if encoder.size() > PAGE_SIZE.saturating_sub(FIRST_OFFSET) {
+            return Ok(());
+        }
         let mut writing = Writing::new(to, FIRST_OFFSET, encoder);
         let mut index: usize = 0;
         while let Some(operation) = writing.next(&mut || {

@@ -49,8 +49,11 @@ proptest! {
                 let (loaded, started) = start(&mut flash);
                 prop_assert!(!loaded.invalid && loaded.rejected == 0);
                 prop_assert!(loaded.settings == old || loaded.settings == new);
-                (old, new) = (loaded.settings.clone(), loaded.settings);
                 store = started.ok();
+                // A start that is cut short decides nothing.
+                if store.is_some() {
+                    (old, new) = (loaded.settings.clone(), loaded.settings);
+                }
             }
             let settings = match event {
                 Event::Save(seed, size) => random_settings(seed, size),

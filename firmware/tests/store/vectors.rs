@@ -3,7 +3,7 @@
 use firmware::config::Settings;
 use firmware::store::{Page, Saving, Store};
 use register_map::Module;
-use register_map::record::{PAGE_SIZE, module_in_slot, records};
+use register_map::record::{PAGE_SIZE, SEALS, encode_page, module_in_slot, records};
 
 use crate::flash::MockFlash;
 use crate::running::{save, settings, start_well};
@@ -115,6 +115,21 @@ fn a_start_keeps_what_only_a_later_firmware_knows() {
     let (_, moved) = records(&flash.pages[1]).next().unwrap();
     assert!(moved.pairs().eq(before.pairs()) && moved.schema == before.schema);
     assert_eq!(records(&flash.pages[0]).count(), 0);
+}
+
+#[test]
+fn record_without_room_for_seals_stays_where_it_is_and_is_read() {
+    let pairs: Vec<_> = (0..252).map(|n| (0x0400 + n, 1)).collect();
+    let mut bytes = [0xFF; PAGE_SIZE + SEALS];
+    encode_page(1, &pairs, &mut bytes).unwrap();
+    let page: [u8; PAGE_SIZE] = *bytes.first_chunk().unwrap();
+    assert_ne!(page[PAGE_SIZE - 1], 0, "the CRC ends the page");
+    let mut flash = MockFlash::holding([page, [0xFF; PAGE_SIZE]]);
+    for _ in 0..2 {
+        let (loaded, _) = start_well(&mut flash);
+        assert!(!loaded.invalid && loaded.rejected == 0);
+        assert_eq!(flash.pages[0], page);
+    }
 }
 
 #[test]
