@@ -29,13 +29,13 @@ pub struct GapTicks {
     pub t35_late: u16,
 }
 
-/// Settings of the same timer for one long time, after which a reply is cut off.
+/// Settings of a 16-bit timer that runs free, for the time after which a reply is cut off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LimitTicks {
     /// Prescaler register: the clock is divided by one more.
     pub prescaler: u16,
-    /// Reload value.
-    pub reload: u16,
+    /// Ticks of that time.
+    pub ticks: u16,
 }
 
 impl LimitTicks {
@@ -46,7 +46,7 @@ impl LimitTicks {
         let divider = cycles / 0xFFFF + 1;
         Self {
             prescaler: (divider - 1) as u16,
-            reload: cycles.div_ceil(divider) as u16,
+            ticks: cycles.div_ceil(divider) as u16,
         }
     }
 }
@@ -145,7 +145,7 @@ mod tests {
         for us in [1, 900, 3_600, 24_900, 300_000, 4_800_000, 33_000_000] {
             let ticks = LimitTicks::new(72, us);
             let divider = u64::from(ticks.prescaler) + 1;
-            let over = u64::from(ticks.reload) * divider - 72 * u64::from(us);
+            let over = u64::from(ticks.ticks) * divider - 72 * u64::from(us);
             assert!(over < divider, "{us}: {over} cycles over {divider}");
         }
     }

@@ -10,7 +10,8 @@
 //! puts the decision off by one character, once: a real character is complete by then and starts the
 //! silence again, and noise delays a reply by one character at most, however often it comes.
 //!
-//! While the unit sends there is no silence to measure: TIM2 then limits the time of the reply.
+//! TIM1 limits the time of a reply as well: its counter runs free, with a tick so long that the longest reply has less
+//! than 65,536 of them, and its channel 1 compares.
 
 use stm32f1xx_hal::{
     pac,
@@ -29,7 +30,7 @@ use crate::{
 pub enum GapEvent {
     /// The line has been silent for t1.5 since the last character.
     T15,
-    /// The line has been silent for t3.5; or the [limit](GapTimer::limit_sending) has been reached.
+    /// The line has been silent for t3.5.
     T35,
     /// Nothing to do: the interrupt was overtaken by a character, or one is on its way.
     Nothing,
@@ -85,13 +86,20 @@ impl GapTimer {
         timer.ccmr1_output().reset();
         timer.ccmr2_output().reset();
         timer.ccer().reset();
+        timer.psc().write(|w| w.psc().set(ticks.prescaler));
+        timer.arr().write(|w| w.arr().set(ticks.t35_late));
         timer.ccr1().write(|w| w.ccr().set(ticks.t15));
         timer.ccr2().write(|w| w.ccr().set(ticks.t15_late));
         timer.ccr3().write(|w| w.ccr().set(ticks.t35));
+        timer
+            .dier()
+            .write(|w| w.uie().enabled().cc1ie().enabled().cc3ie().enabled());
 
         let start_bit = &self.start_bit;
         start_bit.cr1().reset();
         start_bit.smcr().reset();
+        start_bit.dier().reset();
+        start_bit.ccmr1_output().reset();
         // The channel is off while its input is selected (RM0008 14.4.7).
         start_bit.ccer().reset();
         start_bit.ccmr2_input().write(|w| w.cc3s().ti3());
@@ -99,33 +107,33 @@ impl GapTimer {
         start_bit
             .ccer()
             .write(|w| w.cc3e().set_bit().cc3p().set_bit());
+        start_bit.psc().write(|w| w.psc().set(self.limit.prescaler));
         start_bit.arr().write(|w| w.arr().set(0xFFFF));
+        // Loads the prescaler.
+        start_bit.egr().write(|w| w.ug().update());
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
         self.set = self.settings();
     }
 
-    /// Has the timer count for the silences from the next [`restart`](Self::restart) on.
-    #[inline]
-    fn select_silences(&mut self) {
-        let (timer, ticks) = (&self.timer, self.ticks);
-        timer.psc().write(|w| w.psc().set(ticks.prescaler));
-        timer.arr().write(|w| w.arr().set(ticks.t35_late));
-        timer
-            .dier()
-            .write(|w| w.uie().enabled().cc1ie().enabled().cc3ie().enabled());
-    }
-
-    /// A reply has begun: [`GapEvent::T35`] comes when it takes longer than it can, unless it is
-    /// [stopped](Self::stop) before.
+    /// A reply has begun: [`take_limit`](Self::take_limit) tells when it has taken longer than it can.
     #[inline]
     pub fn limit_sending(&mut self) {
-        self.halt();
-        let (timer, limit) = (&self.timer, self.limit);
-        timer.psc().write(|w| w.psc().set(limit.prescaler));
-        timer.arr().write(|w| w.arr().set(limit.reload));
-        timer.dier().write(|w| w.uie().enabled());
-        self.start();
+        let timer = &self.start_bit;
+        let end = timer
+            .cnt()
+            .read()
+            .cnt()
+            .bits()
+            .wrapping_add(self.limit.ticks);
+        timer.ccr1().write(|w| w.ccr().set(end));
+        timer.sr().write(|w| w.cc1if().clear_bit());
+        timer.dier().write(|w| w.cc1ie().enabled());
+    }
+
+    /// Takes the interrupt of the [limit](Self::limit_sending), which comes also when the reply has ended before.
+    pub fn take_limit(&mut self) {
+        self.start_bit.dier().reset();
     }
 
     /// Whether both timers are as they were set up.
@@ -154,6 +162,7 @@ impl GapTimer {
             start_bit.smcr().read().bits(),
             start_bit.ccmr2_input().read().bits(),
             start_bit.ccer().read().bits(),
+            start_bit.psc().read().bits(),
             start_bit.arr().read().bits(),
         ])
     }
@@ -171,12 +180,6 @@ impl GapTimer {
     pub fn restart(&mut self) {
         // The flag stands for edges after this character.
         self.start_bit.sr().write(|w| w.cc3if().clear_bit());
-        self.start();
-    }
-
-    /// Starts the count over.
-    #[inline]
-    fn start(&mut self) {
         // An update by software clears counter and prescaler, and with URS raises no interrupt.
         self.timer
             .cr1()
@@ -188,11 +191,10 @@ impl GapTimer {
             .write(|w| w.urs().counter_only().opm().enabled().cen().enabled());
     }
 
-    /// Stops: no silence is of interest until the next character, and no limit any more.
+    /// Stops: no silence is of interest until the next character.
     pub fn stop(&mut self) {
         self.halt();
         self.timer.sr().reset();
-        self.select_silences();
     }
 
     fn halt(&mut self) {

@@ -24,7 +24,7 @@ pub struct Line {
     reply: Reply,
     /// The good frames on the bus when a reply began to be delayed.
     heard_before: u16,
-    /// Milliseconds that a reply may take, should the gap timer not limit it, and that the one under way has taken.
+    /// Milliseconds that a reply may take, should TIM1 not limit it, and that the one under way has taken.
     longest_ms: u16,
     sending_ms: u16,
     /// Which registers are looked at in the next millisecond: the UART's or the gap timer's.
@@ -85,7 +85,6 @@ impl Line {
         // First, for the bus is another's within a bit of the last stop bit.
         if status.sent() {
             self.uart.stop_sending();
-            self.gap.stop();
             self.reply = Reply::None;
             self.receiver.resume();
             self.take_back();
@@ -154,6 +153,14 @@ impl Line {
         self.repaired = true;
     }
 
+    /// The time has passed that the last reply to begin may take: one that is still being sent never ends.
+    pub fn on_limit(&mut self) {
+        self.gap.take_limit();
+        if self.reply == Reply::Sending {
+            self.repair();
+        }
+    }
+
     /// Whether the line was set up again since the last call.
     pub const fn take_repaired(&mut self) -> bool {
         core::mem::replace(&mut self.repaired, false)
@@ -169,14 +176,9 @@ impl Line {
         None
     }
 
-    /// t3.5 of silence, or the end of the time that a reply may take; on an ASCII line the time-out, which spoils what there is of a frame. `Some`
+    /// t3.5 of silence; on an ASCII line the time-out, which spoils what there is of a frame. `Some`
     /// when a request waits to be taken.
     pub fn on_t35(&mut self) -> Option<()> {
-        if self.reply == Reply::Sending {
-            // The reply does not end.
-            self.repair();
-            return None;
-        }
         // A frame that was over long ago has found no silence for its reply: it is too late.
         let late = self.receiver.is_over();
         self.take()?;
@@ -272,6 +274,7 @@ impl Line {
     /// Takes the bus and sends the first byte.
     #[inline]
     fn send(&mut self) {
+        self.gap.stop();
         self.reply = Reply::Sending;
         self.sending_ms = 0;
         if let Next::Byte(first) = self.transmitter.next() {

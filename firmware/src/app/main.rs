@@ -5,6 +5,7 @@
 //! | `beat` | TIM4, 1 kHz | 4 | the device's clock; the line's response delay and its check; sets `scan` off. Late, the clock is late |
 //! | `uart` | USART1 | 4 | a byte in or out, driver off at the end. At 921600 bit/s a byte comes every 12 us; later than that and it is lost, which the receiver reports and the frame pays for |
 //! | `gap` | TIM2 | 4 | t1.5 and t3.5. Late, it makes the silence longer, never shorter |
+//! | `limit` | TIM1_CC | 4 | cuts off a reply that does not end. Late, the driver is on for longer |
 //! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | a closed frame becomes a response; an order is carried out when its response is out. Late, the response is late |
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | inputs into the device, outputs out of it, its time-outs. Late, it makes up for the time |
 //! | `background` | EXTI0, pended every 10 ms and on orders | 1 | DAC transfers, configuration store, LEDs, log. May be late at no cost |
@@ -177,8 +178,17 @@ mod app {
         }
     }
 
+    #[task(binds = TIM1_CC, priority = 4, shared = [line])]
+    fn limit(mut cx: limit::Context) {
+        alive::begin(fault::marks(), Task::Line);
+        cx.shared
+            .line
+            .lock(|line| line.as_mut().map(Line::on_limit));
+    }
+
     #[task(binds = TIM4, priority = 4, local = [scan_timer], shared = [line])]
     fn beat(mut cx: beat::Context) {
+        alive::begin(fault::marks(), Task::Line);
         cx.local.scan_timer.take_beat();
         clock::advance();
         cx.shared

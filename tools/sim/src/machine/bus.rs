@@ -12,7 +12,8 @@ use rigless::time::VirtualNanos;
 
 use super::dwt::{self, Dwt};
 use super::memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
-use super::timing::{InstructionClock, cycles_per_64};
+use super::segment::Segments;
+use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
 use crate::periph::dbgmcu::Dbgmcu;
@@ -50,10 +51,16 @@ pub struct Bus {
     pub(super) waits: Option<Box<Waits>>,
     /// The SRAM.
     pub(super) ram: Memory,
-    /// Reads of flash come here, because an operation runs.
+    /// What the code costs.
+    pub(super) segments: Segments,
+    /// Reads of flash come here.
     pub(super) flash_is_watched: bool,
     /// The core has read flash while an operation runs, and waits for its end.
     pub(super) read_stalls: bool,
+    /// A block has been accessed, so its next event may be another one.
+    pub(super) touched: bool,
+    /// The access under way leaves the core free to go on.
+    pub(super) carries_on: bool,
 }
 
 /// An access as the blocks see it.
@@ -137,8 +144,33 @@ impl Bus {
     pub(super) fn update_rate(&mut self, count: u64) {
         let (wait_states, prefetch) = self.soc.flash.access_control();
         let hclk = self.soc.rcc.clocks().hclk;
-        self.clock
-            .set_rate(count, hclk, cycles_per_64(wait_states, prefetch));
+        self.segments.set_flash(wait_states, prefetch);
+        self.clock.set_rate(count, hclk);
+    }
+
+    /// Whether every read of constants in flash comes here, to be charged.
+    pub(super) fn charges_tables(&self) -> bool {
+        self.segments.pace().costs.charges_tables
+    }
+
+    /// What an access costs beyond one of SRAM.
+    fn cost_of(&self, access: &Access, from_code: bool) -> u32 {
+        let pace = self.segments.pace();
+        let address = access.address as u32;
+        let clocks = self.soc.rcc.clocks();
+        let divider = |pclk: u32| Some(clocks.hclk.checked_div(pclk).unwrap_or(1));
+        let write = access.kind == AccessKind::Write;
+        match address {
+            _ if !from_code => 0,
+            // APB1, APB2 and AHB: RM0008 3.3, table 3.
+            0x4000_0000..0x4001_0000 => pace.block(write, divider(clocks.pclk1)),
+            0x4001_0000..0x4001_8000 => pace.block(write, divider(clocks.pclk2)),
+            0x4001_8000..0x6000_0000 | PPB.. => pace.block(write, None),
+            _ if self.charges_tables() && !write && flash_offset(address).is_some() => {
+                pace.flash_read()
+            }
+            _ => 0,
+        }
     }
 
     /// Answers an access; `None` is a bus fault.
@@ -350,6 +382,7 @@ fn flash_offset(address: u32) -> Option<u32> {
 
 impl CoreBus for Bus {
     fn access(&mut self, access: Access, from_code: bool) -> Option<u64> {
+        self.clock.charge(self.cost_of(&access, from_code));
         let now = self.clock.time(access.instruction_count);
         if let Some(waits) = self.waits.as_mut().filter(|_| !from_code) {
             waits.vector_read(access.address as u32, now);
@@ -372,6 +405,9 @@ impl CoreBus for Bus {
         }
         let answer = self.answer(request);
         self.take_up(access.instruction_count);
+        // A line that rose is the core's to look at first.
+        self.carries_on = self.queued.is_empty();
+        self.touched = true;
         if let Some(complaint) = self.soc.flash.take_complaint() {
             self.note(request, What::Flash(complaint.text));
             if complaint.bus_error {
@@ -391,7 +427,9 @@ impl CoreBus for Bus {
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        if self.halt || self.waits.is_some() {
+        // An access to the core's own registers, which may have pended an exception, does not set it.
+        let carries_on = core::mem::take(&mut self.carries_on);
+        if self.halt || self.waits.is_some() || !carries_on {
             return None;
         }
         let mut until = self.stop.0.min(self.soc.next_event());
