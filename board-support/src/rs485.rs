@@ -75,6 +75,8 @@ pub struct Rs485 {
     driver: PA8<Output<PushPull>>,
     divider: u16,
     format: Format,
+    /// [`Format::stop_in_data`], ready for every byte.
+    stop_in_data: u8,
     /// What CR1 read after it was set, and the signature of the other registers. They are compared with what they
     /// read, not with what was written: an emulator need not keep every bit.
     cr1: u16,
@@ -127,6 +129,7 @@ impl Rs485 {
             driver: pins.driver,
             divider,
             format: settings.format,
+            stop_in_data: settings.format.stop_in_data(),
             cr1: 0,
             set: 0,
         };
@@ -187,12 +190,10 @@ impl Rs485 {
     /// Takes the character that [`Status::received`] told of.
     #[inline]
     pub fn read(&mut self, status: Status) -> Character {
-        // With nine bits, the ninth is the parity bit.
-        let byte = self.usart.dr().read().bits() as u8;
         Character {
-            byte,
-            // The first stop bit of 7N2: when it is low, FE.
-            faults: (status.flags & FAULTS) as u8 | (!byte & self.format.stop_in_data()) >> 6,
+            // With nine bits, the ninth is the parity bit.
+            byte: self.usart.dr().read().bits() as u8,
+            faults: (status.flags & FAULTS) as u8,
         }
     }
 
@@ -210,7 +211,7 @@ impl Rs485 {
     /// A parity bit takes the place of the highest bit (RM0008 27.6.2).
     #[inline]
     fn write(&self, byte: u8) {
-        let word = byte | self.format.stop_in_data();
+        let word = byte | self.stop_in_data;
         self.usart.dr().write(|w| w.dr().set(u16::from(word)));
     }
 

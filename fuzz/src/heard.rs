@@ -17,6 +17,8 @@ pub enum Mode {
     Ascii {
         /// The top bit of a character is not data.
         seven_bits: bool,
+        /// The highest bit of a byte is a stop bit, and a character in which it is 0 is damaged.
+        stop_in_byte: bool,
         /// The last character of a frame.
         delimiter: u8,
     },
@@ -73,7 +75,13 @@ impl Heard {
                 }
                 self.take(frame, Some(byte), faults);
             }
-            Mode::Ascii { seven_bits, .. } => {
+            Mode::Ascii {
+                seven_bits,
+                stop_in_byte,
+                ..
+            } => {
+                let low_stop = stop_in_byte && byte < 128;
+                let faults = faults | u8::from(low_stop) << 1;
                 let byte = if seven_bits { byte % 128 } else { byte };
                 if byte == b':' && (self.frame.is_none() || faults == 0) {
                     // A complete frame that nobody took in time is dropped; its buffer is free again.

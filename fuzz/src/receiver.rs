@@ -33,11 +33,10 @@ pub fn rtu(input: &[u8]) {
 /// Target `receiver_ascii`.
 pub fn ascii(input: &[u8]) {
     let mut script = Script::new(input);
-    let seven_bits = script.byte() & 1 != 0;
-    let width = if seven_bits {
-        Width::Seven
-    } else {
-        Width::Eight
+    let (width, seven_bits, stop_in_byte) = match script.byte() & 3 {
+        1 => (Width::Seven, true, false),
+        3 => (Width::SevenAndStop, true, true),
+        _ => (Width::Eight, false, false),
     };
     let mut receiver = Receiver::ascii(UNIT, width);
     // Function 08 sub-function 03 sets no other (V1.1b3 6.8).
@@ -50,6 +49,7 @@ pub fn ascii(input: &[u8]) {
     receiver.set_framing(framing);
     let mode = Mode::Ascii {
         seven_bits,
+        stop_in_byte,
         delimiter,
     };
     play(script, receiver, mode, framing);
@@ -60,6 +60,8 @@ struct Pair<'a> {
     receiver: Receiver<'a>,
     heard: Heard,
     framing: Framing,
+    /// The bit that is 1 in every byte of a good character because it is a stop bit, or 0.
+    stop: u8,
     away: Vec<&'a mut Adu>,
 }
 
@@ -69,6 +71,12 @@ fn play(mut script: Script<'_>, receiver: Receiver<'_>, mode: Mode, framing: Fra
         receiver,
         heard: Heard::new(mode),
         framing,
+        stop: match mode {
+            Mode::Ascii {
+                stop_in_byte: true, ..
+            } => 0x80,
+            _ => 0,
+        },
         away: Vec::new(),
     };
     pair.receiver.give_back(&mut one);
@@ -92,7 +100,7 @@ impl Pair<'_> {
                     unit => unit,
                 };
                 let pdu = script.string();
-                self.characters(&framed(self.framing, unit, &pdu[..pdu.len().min(253)]));
+                self.frame(unit, &pdu[..pdu.len().min(253)]);
             }
             2 => {
                 let (byte, faults) = (script.byte(), script.byte() & 15);
@@ -117,6 +125,13 @@ impl Pair<'_> {
                 }
             }
         }
+    }
+
+    /// A frame with a good check.
+    fn frame(&mut self, unit: u8, pdu: &[u8]) {
+        let mut frame = framed(self.framing, unit, pdu);
+        frame.iter_mut().for_each(|byte| *byte |= self.stop);
+        self.characters(&frame);
     }
 
     fn characters(&mut self, bytes: &[u8]) {
@@ -155,7 +170,7 @@ impl Pair<'_> {
         let request = [0x03, 0, 1, 0, 1];
         for (taken, dropped) in [(1, 0), (2, 0), (2, 1)] {
             let before: LineCounters = *self.receiver.counters();
-            self.characters(&framed(self.framing, UNIT, &request));
+            self.frame(UNIT, &request);
             self.close();
             assert_eq!(self.away.len(), taken, "requests taken");
             let counters = self.receiver.counters();

@@ -229,6 +229,23 @@ fn in_seven_bits_what_is_above_them_does_not_matter() {
 }
 
 #[test]
+fn low_stop_bit_in_the_highest_bit_spoils_a_frame() {
+    let with_stop = |characters: Vec<u8>| -> Vec<u8> {
+        let set = |c: u8| c | 0x80;
+        characters.into_iter().map(set).collect()
+    };
+    let good = with_stop(request());
+    for at in 0..good.len() {
+        let mut unit = Unit::ascii(Width::SevenAndStop, Points::new(4, 4));
+        let mut bad = good.clone();
+        bad[at] &= 0x7F;
+        assert_eq!(unit.raw(&bad), None, "character {at}");
+        assert_eq!(unit.counters().communication_errors, 1, "character {at}");
+        assert!(unit.raw(&good).is_some(), "after character {at}");
+    }
+}
+
+#[test]
 fn the_delimiter_can_be_changed() {
     let mut unit = unit();
     let change = [0x08, 0x00, 0x03, b'#', 0x00];

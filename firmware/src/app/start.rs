@@ -116,6 +116,7 @@ pub fn up(
             Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
             Framing::Ascii { .. } => {
                 let width = match settings.format.data_bits() {
+                    7 if on_wire.format.stop_in_data() != 0 => Width::SevenAndStop,
                     7 => Width::Seven,
                     _ => Width::Eight,
                 };

@@ -10,7 +10,7 @@
 //! no digits of the standard and spoil a frame. The LRC is the two's complement of the sum of the
 //! bytes (6.2.1), so that the sum over a whole good frame is zero.
 
-use super::Framing;
+use super::{Faults, Framing};
 
 /// Data bits of a character on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +18,9 @@ pub enum Width {
     /// Seven, the standard's own; what a UART delivers above them, such as a parity bit, is
     /// ignored.
     Seven,
+    /// Seven, from a UART that is set to eight because it has no words of seven: the highest bit is the first of two
+    /// stop bits. A character in which it is 0 has a framing error.
+    SevenAndStop,
     /// Eight; a character above 7F spoils its frame.
     Eight,
 }
@@ -56,6 +59,8 @@ pub(super) enum Part {
 pub(super) struct Reader {
     delimiter: u8,
     mask: u8,
+    /// The bit that is a stop bit, or 0.
+    stop: u8,
     place: Place,
 }
 
@@ -64,8 +69,12 @@ impl Reader {
         Self {
             delimiter: Framing::LINE_FEED,
             mask: match width {
-                Width::Seven => 0x7F,
+                Width::Seven | Width::SevenAndStop => 0x7F,
                 Width::Eight => 0xFF,
+            },
+            stop: match width {
+                Width::SevenAndStop => 0x80,
+                Width::Seven | Width::Eight => 0,
             },
             place: Place::Byte,
         }
@@ -78,6 +87,15 @@ impl Reader {
     /// The character without what is not data.
     pub(super) const fn masked(&self, character: u8) -> u8 {
         character & self.mask
+    }
+
+    /// The faults of a character with this byte: those that the UART has found, and a low stop bit in the byte.
+    pub(super) fn faults(&self, byte: u8, found: Faults) -> Faults {
+        if !byte & self.stop == 0 {
+            found
+        } else {
+            found | Faults::FRAMING
+        }
     }
 
     /// A frame begins.

@@ -229,6 +229,7 @@ impl<'a> Receiver<'a> {
     #[inline(never)]
     fn special(&mut self, byte: u8, faults: Faults) {
         let character = self.reader.masked(byte);
+        let faults = self.reader.faults(byte, faults);
         match self.state | u16::from(faults.bits()) {
             ASCII if self.ascii_inside(character) => {}
             ASCII_IDLE if character == ascii::START => {

@@ -193,3 +193,10 @@ fn at_115200_without_parity_it_conforms() {
 fn in_ascii_it_conforms() {
     conforms(Module::Do4, 1, LineFormat::default(), Mode::Ascii, &[]);
 }
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn in_ascii_with_seven_data_bits_and_even_parity_it_conforms() {
+    let line = LineFormat::new(19_200, "7E1".parse().expect("a format"));
+    conforms(Module::Relay2, 1, line, Mode::Ascii, &[]);
+}

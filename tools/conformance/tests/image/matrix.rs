@@ -1,7 +1,7 @@
 //! Every rate and format of the register map, in RTU and in ASCII mode.
 //!
 //! Every test run tries the cases that depend on rate or format. `cargo xtask matrix` sets `MODIO_MATRIX` and tries
-//! every case, which takes most of an hour on two processors.
+//! every case.
 
 use std::env;
 use std::sync::Mutex;
