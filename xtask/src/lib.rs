@@ -74,6 +74,7 @@ enum Command {
     /// Test the image on Renode: its suites and the conformance suite
     Renode(renode::Options),
     /// Test a real board on its serial line: conformance, timing, wires
+    #[command(disable_help_flag = true)]
     Hil(hil::Options),
     /// Feed the framers, the server and the configuration store what libFuzzer comes up with
     Fuzz(fuzz::Options),
@@ -104,7 +105,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Fuzz(options) => fuzz::run(&workspace, &options),
         Command::Soak(options) => soak::run(&mut workspace, &options),
         Command::Renode(options) => renode::run(&mut workspace, &options),
-        Command::Hil(options) => hil::run(&mut workspace, &options),
+        Command::Hil(options) => hil::run(&workspace, &options),
         Command::Docs => docs::run(&workspace),
         Command::Test(options) => test::run(&mut workspace, &options),
         Command::Ci => ci::run(&mut workspace),

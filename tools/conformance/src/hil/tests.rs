@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::bench_file::BenchFile;
 use super::fake::{Fate, Line, TURNAROUND};
 use super::*;
 use crate::cli::waits;
@@ -11,13 +12,15 @@ const OUTPUT: u16 = 0x10;
 fn plan(line: &Line) -> Plan {
     Plan {
         unit: 1,
+        module: None,
         patience: waits(line, None),
         allow_config: false,
         cases: Vec::new(),
         requests: 0,
         rates: Vec::new(),
         limit: None,
-        fixture: None,
+        wires: Vec::new(),
+        analog: Vec::new(),
     }
 }
 
@@ -123,7 +126,7 @@ fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
     assert!(
         report
             .junit()
-            .contains("name=\"bench\" tests=\"1\" failures=\"1\"")
+            .contains("name=\"hil\" tests=\"1\" failures=\"1\"")
     );
 }
 
@@ -269,8 +272,10 @@ fn wired(text: &str) -> (Line, Plan) {
     let mut line = Line::new(&[1, 2]);
     line.wires = (0..2).map(|n| [(1, OUTPUT + n), (2, OUTPUT + n)]).collect();
     line.units[0].bits[16] = true;
+    let file = BenchFile::parse(text, None).unwrap();
     let plan = Plan {
-        fixture: Some(Fixture::parse(text, 1).unwrap()),
+        wires: file.wires,
+        analog: file.analog,
         ..plan(&line)
     };
     (line, plan)
@@ -326,6 +331,163 @@ fn wires_that_are_not_so_fail_each_with_its_reason() {
         inverted.contains("unit 2 point 0x0010 stays off"),
         "{inverted}"
     );
+}
+
+const PULSES: &str =
+    "[[wire]]\nfrom = { point = 16 }\nto = { unit = 2, point = 16 }\npulses = 50\n";
+
+#[test]
+fn pulses_that_are_all_counted_pass_and_any_other_count_fails() {
+    for (counts, verdict) in [(1, None), (0, Some("counted 0")), (2, Some("counted 100"))] {
+        let (mut line, plan) = wired(PULSES);
+        line.counts = counts;
+        let (report, ended) = run_plan(&mut line, &plan, &never());
+        assert_eq!(ended, Ok(()));
+        let [wire, pulses] = &report.findings[..] else {
+            panic!("{:?}", report.findings);
+        };
+        assert_eq!(wire.verdict, Verdict::Passed);
+        let shown = pulses.to_string();
+        assert!(
+            shown.starts_with("pulses/unit 1 point 0x0010 to unit 2"),
+            "{shown}"
+        );
+        match verdict {
+            None => assert_eq!(pulses.verdict, Verdict::Passed),
+            Some(came) => assert!(shown.contains("FAILED") && shown.contains(came), "{shown}"),
+        }
+        assert!(line.units[0].bits[16], "put back");
+    }
+}
+
+const ANALOG: &str = "[[analog]]\nfrom = { point = 18 }\nto = { point = 16 }\ntolerance = 20\n\
+                      [[analog]]\nfrom = { point = 19 }\nto = { point = 17 }\ntolerance = 20\n";
+
+/// A unit whose two analog outputs are wired to its two analog inputs, each with an error of 20 codes.
+fn analog() -> (Line, Plan) {
+    let mut line = Line::new(&[1]);
+    line.analog = vec![([(1, 18), (1, 16)], 20), ([(1, 19), (1, 17)], 20)];
+    line.units[0].registers.insert(18, 1234);
+    let plan = Plan {
+        analog: BenchFile::parse(ANALOG, None).unwrap().analog,
+        ..plan(&line)
+    };
+    (line, plan)
+}
+
+#[test]
+fn analog_wires_within_the_tolerance_pass_and_outputs_are_put_back() {
+    let (mut line, plan) = analog();
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    assert_eq!(ended, Ok(()));
+    assert_eq!(report.totals().passed, 2, "{:?}", report.findings);
+    assert_eq!(report.findings[0].note, "largest difference 20");
+    assert_eq!(line.units[0].registers[&18], 1234);
+    assert_eq!(line.units[0].registers.get(&19), Some(&0));
+}
+
+#[test]
+fn analog_wires_that_are_not_so_fail_each_with_its_reason() {
+    let failing = |mut line: Line, plan: Plan| {
+        let (report, ended) = run_plan(&mut line, &plan, &never());
+        assert_eq!(ended, Ok(()));
+        assert_eq!(line.units[0].registers[&18], 1234, "put back");
+        let failed = report
+            .findings
+            .iter()
+            .filter(|f| f.verdict != Verdict::Passed);
+        failed.map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let (mut line, plan) = analog();
+    line.analog[1].1 = 21;
+    let [inexact] = &failing(line, plan)[..] else {
+        panic!("one wire is inexact");
+    };
+    assert!(
+        inexact.contains("unit 1 point 0x0011 is 21 after"),
+        "{inexact}"
+    );
+
+    let (mut line, plan) = analog();
+    line.analog.pop();
+    let [broken] = &failing(line, plan)[..] else {
+        panic!("one wire is broken");
+    };
+    assert!(
+        broken.contains("unit 1 point 0x0011 is 0 after"),
+        "{broken}"
+    );
+
+    let (mut line, plan) = analog();
+    line.analog[1].0[0] = (1, 18);
+    let crossed = failing(line, plan).concat();
+    assert!(
+        crossed.contains("unit 1 point 0x0011 went from 20 to 4115 as well"),
+        "{crossed}"
+    );
+
+    let (mut line, plan) = analog();
+    let scale = register_map::configuration::SCALE + 16;
+    line.units[0].registers.insert(scale, 1);
+    let [differs] = &failing(line, plan)[..] else {
+        panic!("one wire has two scales");
+    };
+    assert!(differs.contains("the same signal and scale"), "{differs}");
+}
+
+#[test]
+fn unit_with_another_module_than_the_bench_is_not_tested() {
+    let mut line = Line::new(&[1]);
+    let plan = Plan {
+        module: Some(Module::Ao4),
+        requests: 5,
+        ..plan(&line)
+    };
+    let (report, ended) = run_plan(&mut line, &plan, &never());
+    let told = ended.unwrap_err();
+    assert_eq!(
+        told,
+        "unit 1 has the module 4do in force, but the bench has 4ao"
+    );
+    assert!(report.timing.is_empty());
+    let plan = Plan {
+        module: Some(Module::Do4),
+        ..plan
+    };
+    assert_eq!(run_plan(&mut line, &plan, &never()).1, Ok(()));
+}
+
+#[test]
+fn reports_say_which_unit_was_tested() {
+    let mut line = Line::new(&[1]);
+    let registers = &mut line.units[0].registers;
+    registers.insert(state::FIRMWARE_VERSION, 0x0102);
+    registers.insert(state::FIRMWARE_PATCH, 3);
+    registers.insert(state::UNIQUE_ID, 0xABCD);
+    let plan = Plan {
+        requests: 5,
+        ..plan(&line)
+    };
+    let (report, _) = run_plan(&mut line, &plan, &never());
+    let unit = &report.json()["about"]["unit"];
+    assert_eq!(unit["firmware"], "1.2.3");
+    assert_eq!(unit["identity"], "ABCD00000000000000000000");
+    assert_eq!(
+        (&unit["module"], unit["commit"].is_null()),
+        (&"4do".into(), true)
+    );
+    let xml = report.junit();
+    assert!(
+        xml.contains("<property name=\"firmware\" value=\"1.2.3\"/>"),
+        "{xml}"
+    );
+
+    // Register map 2 has the commit.
+    let registers = &mut line.units[0].registers;
+    registers.insert(state::MAP_VERSION, 2);
+    registers.extend([(0x020C, 0x0123), (0x020D, 0xABCD), (0x020E, 1)]);
+    let (report, _) = run_plan(&mut line, &plan, &never());
+    assert_eq!(report.json()["about"]["unit"]["commit"], "0123abcd-dirty");
 }
 
 #[test]
