@@ -1,4 +1,4 @@
-//! The bench of `modio-hil` with the firmware's image in the simulator as its board, in exact time.
+//! `modio-hil` with the firmware's image in the simulator as its board, in exact time.
 
 #![cfg(feature = "sim")]
 
