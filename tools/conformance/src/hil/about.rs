@@ -67,8 +67,6 @@ impl About {
     /// Everything but the unit: now, on this computer, through this port.
     #[must_use]
     pub fn here(port: Option<&Path>) -> Self {
-        // Without a list of ports the run is as good: the report names no adapter.
-        let ports = serialport::available_ports().unwrap_or_default();
         Self {
             date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
             host: format!(
@@ -79,7 +77,8 @@ impl About {
             ),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: commit(Path::new(env!("CARGO_MANIFEST_DIR"))),
-            adapter: port.and_then(|port| adapter(port, &ports)),
+            // Without a list of ports the run is as good: the report names no adapter.
+            adapter: port.and_then(|port| adapter(port, &serialport::available_ports().ok()?)),
             unit: None,
         }
     }

@@ -14,7 +14,7 @@ use crate::hil::remote::{put_back, read_word, registers, write_word};
 use crate::hil::report::Finding;
 use crate::hil::verdict;
 
-/// Tries all wires, or those before `stop` is set; `tell` hears of each.
+/// Tries all wires, or those before `stop` is set; `tell` gets each finding.
 ///
 /// # Errors
 ///

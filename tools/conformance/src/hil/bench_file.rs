@@ -1,4 +1,4 @@
-//! The bench file: what stands on a bench, in TOML. Every key may be left out, and an option of the command line
+//! The bench file: the hardware of a bench, in TOML. Every key may be left out, and an option of the command line
 //! takes precedence over its key.
 //!
 //! ```toml
@@ -343,6 +343,21 @@ mod tests {
             (file.analog[0].tolerance, file.analog[0].from.unit),
             (40, 3)
         );
+    }
+
+    #[test]
+    fn examples_in_the_manual_are_read() {
+        let manual = include_str!("../../../../docs/hil.md");
+        let examples: Vec<BenchFile> = manual
+            .split("```toml\n")
+            .skip(1)
+            .map(|rest| BenchFile::parse(rest.split("```").next().unwrap(), None).unwrap())
+            .collect();
+        let [bench, wires] = &examples[..] else {
+            panic!("{} examples", examples.len());
+        };
+        assert_eq!((bench.module, wires.wires.len()), (Some(Module::Do4), 1));
+        assert_eq!(wires.analog.len(), 1);
     }
 
     #[test]

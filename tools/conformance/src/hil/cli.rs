@@ -299,6 +299,17 @@ mod tests {
     }
 
     #[test]
+    fn every_option_is_in_the_manual() {
+        let manual = include_str!("../../../../docs/hil.md");
+        let command = Cli::command();
+        let options = command.get_arguments().filter_map(clap::Arg::get_long);
+        let missing: Vec<&str> = options
+            .filter(|name| !manual.contains(&format!("`--{name}")))
+            .collect();
+        assert!(missing.is_empty(), "{missing:?}");
+    }
+
+    #[test]
     fn rates_are_those_of_the_device() {
         assert_eq!(rates("9600, 115200"), Ok(Rates(vec![9600, 115_200])));
         assert_eq!(rates("all").unwrap().0.len(), Baud::ALL.len());

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! cli         the command                 timing   requests at one rate: turnaround, lost frames
-//! bench_file  what stands on the bench    spread   minimum, percentiles, histogram
+//! bench_file  the hardware of the bench   spread   minimum, percentiles, histogram
 //! shell       flash, reset, power         about    unit, adapter, host, date
 //! wires       digital wires, pulses       report   JUnit and JSON
 //! analog      analog wires                remote   asks any unit on the line

@@ -15,7 +15,7 @@ use crate::hil::report::Finding;
 use crate::hil::verdict;
 use crate::run::Verdict;
 
-/// Tries all wires, or those before `stop` is set; `tell` hears of each.
+/// Tries all wires, or those before `stop` is set; `tell` gets each finding.
 ///
 /// # Errors
 ///

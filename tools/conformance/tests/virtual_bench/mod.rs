@@ -124,7 +124,7 @@ impl Board {
         http::request(&self.address, &path, Some(level));
     }
 
-    /// Waits until the board's time has passed by so many milliseconds.
+    /// Waits until this time, in ms, has passed on the board.
     fn wait(&self, time: f64) {
         let now = || {
             let state = http::request(&self.address, "/api/state", None);
