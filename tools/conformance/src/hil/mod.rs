@@ -2,7 +2,7 @@
 //! wires that lead from outputs to inputs. Behind the command `modio-hil`, which `cargo xtask hil` runs.
 //!
 //! ```text
-//! cli         the command                 timing   requests at one rate: turnaround, lost frames
+//! cli, setup  the command                 timing   requests at one rate: turnaround, lost frames
 //! bench_file  the hardware of the bench   spread   minimum, percentiles, histogram
 //! shell       flash, reset, power         about    unit, adapter, host, date
 //! wires       digital wires, pulses       report   JUnit and JSON
@@ -35,6 +35,7 @@ pub mod cli;
 mod fake;
 mod remote;
 pub mod report;
+pub mod setup;
 pub mod shell;
 pub mod spread;
 pub mod timing;
@@ -254,3 +255,5 @@ fn verdict(result: Check) -> Result<Verdict, Stop> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wire_tests;
