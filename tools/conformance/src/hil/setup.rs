@@ -30,10 +30,10 @@ impl Cli {
         let file = match &self.bench {
             None => BenchFile::default(),
             Some(path) => {
-                let path = path.display();
-                let text = std::fs::read_to_string(path.to_string())
-                    .map_err(|error| format!("{path}: {error}"))?;
-                BenchFile::parse(&text, self.unit).map_err(|wrong| format!("{path}:{wrong}"))?
+                let shown = path.display();
+                let text =
+                    std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+                BenchFile::parse(&text, self.unit).map_err(|wrong| format!("{shown}:{wrong}"))?
             }
         };
         let setup = Setup {
