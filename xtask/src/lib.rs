@@ -26,6 +26,7 @@ pub mod flash;
 pub mod fuzz;
 pub mod hil;
 pub mod image;
+pub mod peers;
 pub mod pymodbus;
 pub mod renode;
 #[cfg(all(test, unix))]
@@ -76,6 +77,8 @@ enum Command {
     /// Test a real board on its serial line: conformance, timing, wires
     #[command(disable_help_flag = true)]
     Hil(hil::Options),
+    /// Test well-known Modbus servers with the conformance suite, and renew the table in docs/conformance.md
+    Peers(peers::Options),
     /// Feed the framers, the server and the configuration store what libFuzzer comes up with
     Fuzz(fuzz::Options),
     /// Good and damaged frames to the image in simulation, a million of them
@@ -106,6 +109,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Soak(options) => soak::run(&mut workspace, &options),
         Command::Renode(options) => renode::run(&mut workspace, &options),
         Command::Hil(options) => hil::run(&workspace, &options),
+        Command::Peers(options) => peers::run(&workspace, &options),
         Command::Docs => docs::run(&workspace),
         Command::Test(options) => test::run(&mut workspace, &options),
         Command::Ci => ci::run(&mut workspace),
