@@ -23,9 +23,11 @@ const SILENCE: Duration = Duration::from_millis(20);
 /// Time to wait for the first byte before the server waits again.
 const IDLE: Duration = Duration::from_secs(1);
 
-/// Serves the line at `port` for ever, after `ready` in a line on the standard output. `answer` gets each frame, its CRC included, and returns the reply, its CRC
-/// included, or nothing for silence. Frames that are longer than the standard allows are dropped. A frame that makes
-/// `answer` panic gets silence: the next one is served all the same.
+/// Serves the line at `port` without end. Prints `ready` in a line when the port is open.
+///
+/// `answer` gets each frame, its CRC included, and returns the reply, its CRC included, or nothing for silence. Frames
+/// that are longer than the standard allows are dropped. A frame that makes `answer` panic gets silence: the next one
+/// is served all the same.
 ///
 /// # Errors
 ///
