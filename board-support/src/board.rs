@@ -1,5 +1,6 @@
 //! The board as one struct of named devices.
 
+use cortex_m::peripheral::SCB;
 use stm32f1xx_hal::{
     gpio::{GpioExt, IOPinSpeed, OutputSpeed, PinState},
     pac,
@@ -14,7 +15,7 @@ use crate::{
     i2c::BusPins,
     port, rs485,
     uart::LineSettings,
-    unique_id, wait,
+    unique_id, vectors, wait,
 };
 
 /// The flag of a power-on in [`Board::reset_cause`].
@@ -60,8 +61,8 @@ pub struct LineOff {
 }
 
 impl LineOff {
-    /// Sets the line up, with silences of `t15_ns` and `t35_ns` nanoseconds between frames, and
-    /// listens. `None` when the rate or the silences cannot be had from the clock: the line then
+    /// Sets the line up, with silences of `t15_ns` and `t35_ns` nanoseconds between frames and replies of `limit_us`
+    /// microseconds at most, and listens. `None` when the rate or the silences cannot be had from the clock: the line then
     /// stays off.
     #[must_use]
     pub fn start(
@@ -69,10 +70,13 @@ impl LineOff {
         settings: LineSettings,
         t15_ns: u32,
         t35_ns: u32,
+        limit_us: u32,
     ) -> Option<(Rs485, GapTimer)> {
         let (clock, rcc) = (self.clock, &mut self.rcc);
         let (timer, start_bit) = (self.timer, self.start_bit);
-        let gap = GapTimer::new(timer, start_bit, settings, t15_ns, t35_ns, clock, rcc)?;
+        let gap = GapTimer::new(
+            timer, start_bit, settings, t15_ns, t35_ns, limit_us, clock, rcc,
+        )?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
         // TX, too, needs no steeper edges than those of 10 MHz.
         port::a().crh().modify(|_, w| w.mode9().output());
@@ -80,9 +84,12 @@ impl LineOff {
     }
 }
 
-/// Brings the board up. Outputs of the slot are still floating, as after the reset.
+/// Brings the board up, with interrupts disabled. Outputs of the slot are still floating, as after the reset.
+///
+/// `masked` is BASEPRI while flash is erased or programmed: what it lets through must run from RAM.
 #[must_use]
-pub fn setup(device: pac::Peripherals) -> Board {
+pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
+    vectors::move_to_ram(scb);
     let mut rcc = device.RCC;
     let reset_cause = take_reset_cause(&rcc);
     let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
@@ -135,7 +142,7 @@ pub fn setup(device: pac::Peripherals) -> Board {
         unique_id: unique_id::read(),
         slot: Slot::new((a.pa0, a.pa1, a.pa2, a.pa3), a.crl, device.ADC1),
         dac: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
-        flash: Flash::new(device.FLASH, device.PWR),
+        flash: Flash::new(device.FLASH, device.PWR, masked),
         leds,
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog,

@@ -1,21 +1,23 @@
 //! The flash: what the program is in, and the two pages at its end that keep what survives a power
 //! cycle (RM0008 3.3, PM0075 2.3).
 //!
-//! An operation stalls every fetch from flash, and with it every handler there: 40 to 70 us for a
-//! half-word, 20 to 40 ms for a page. Every one unlocks the controller, checks, and locks it again,
-//! whatever comes of it.
+//! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page. Code in RAM goes on:
+//! the operation is started and waited for there, and of the interrupts only those come through whose handlers are in
+//! RAM. Every operation unlocks the controller, checks, and locks it again, whatever comes of it.
 //!
 //! Programming needs a supply of 2.0 V (DS5319 table 28). The voltage detector is looked at before every
 //! operation, and no operation begins while the supply is below its threshold ([`PVD_LEVEL`]).
 
 use core::ptr;
 
-use cortex_m::asm;
+use cortex_m::{
+    asm,
+    register::{basepri, basepri_max},
+};
 use stm32f1xx_hal::pac;
 
-use crate::{
-    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PAGE_BYTES, PVD_LEVEL, STORE_PAGES},
-    wait::within_us,
+use crate::design::{
+    FLASH_ERASE_US, FLASH_PROGRAM_US, PAGE_BYTES, PVD_LEVEL, STORE_PAGES, SYSCLK_ON_HSE_HZ,
 };
 
 /// Where the flash of the smallest part ends: 64 KiB (DS5319 table 2).
@@ -68,23 +70,83 @@ pub fn read<const N: usize>(address: u32) -> Option<[u8; N]> {
 pub struct Flash {
     flash: pac::FLASH,
     power: pac::PWR,
+    masked: u8,
 }
 
 /// What the controller is to do.
 #[derive(Clone, Copy)]
-enum Mode {
-    Program,
-    Erase,
+enum Operation {
+    Program { place: *mut u16, half: u16 },
+    Erase { page: u32 },
+}
+
+impl Operation {
+    /// Where, and for how many microseconds at most.
+    fn bounds(self) -> (u32, u32) {
+        match self {
+            Self::Program { place, .. } => (place as u32, FLASH_PROGRAM_US),
+            Self::Erase { page } => (page, FLASH_ERASE_US),
+        }
+    }
+}
+
+/// Starts an operation of the controller, which is set up for it, and waits for its end, in RAM. `masked`: BASEPRI
+/// until then. Whether it has ended within the time that so many looks take.
+///
+/// # Safety
+///
+/// `place` is a half-word of the store of which no reference is alive; `page` is one of the store's.
+#[inline(never)]
+#[unsafe(link_section = ".ram_code")]
+unsafe fn run(
+    flash: &pac::flash::RegisterBlock,
+    operation: Operation,
+    masked: u8,
+    looks: u32,
+) -> bool {
+    let before = basepri::read();
+    basepri_max::write(masked);
+    match operation {
+        // SAFETY: the caller's promise; with PG set a store of 16 bits is how flash is programmed (PM0075 2.3.3).
+        Operation::Program { place, half } => unsafe { ptr::write_volatile(place, half) },
+        Operation::Erase { page } => {
+            // SAFETY: the caller's promise: no code is there.
+            flash.ar().write(|w| unsafe { w.far().bits(page) });
+            flash.cr().modify(|_, w| w.strt().set_bit());
+        }
+    }
+    // BSY rises one cycle after the operation was started (errata sheet of the medium-density parts, "Flash
+    // memory BSY bit delay versus STRT bit setting"). Without this read the first look would find it
+    // clear, and the controller would be locked in the middle of the operation.
+    let _ = flash.sr().read();
+    let mut left = looks;
+    let ended = loop {
+        if flash.sr().read().bsy().bit_is_clear() {
+            break true;
+        }
+        if left == 0 {
+            break false;
+        }
+        left -= 1;
+    };
+    // SAFETY: what it was.
+    unsafe { basepri::write(before) };
+    ended
 }
 
 impl Flash {
-    /// Turns the voltage detector on. PWR has its clock.
-    pub(crate) fn new(flash: pac::FLASH, power: pac::PWR) -> Self {
+    /// Turns the voltage detector on. PWR has its clock. `masked` is BASEPRI during an operation: what it lets through
+    /// must run from RAM.
+    pub(crate) fn new(flash: pac::FLASH, power: pac::PWR, masked: u8) -> Self {
         power
             .cr()
             // SAFETY: each of the field's eight values is a threshold.
             .modify(|_, w| unsafe { w.pls().bits(PVD_LEVEL).pvde().set_bit() });
-        Self { flash, power }
+        Self {
+            flash,
+            power,
+            masked,
+        }
     }
 
     /// Whether the supply is high enough for an operation.
@@ -118,11 +180,8 @@ impl Flash {
         if read() != ERASED && half != 0 {
             return Err(FlashError::NotErased(address));
         }
-        self.operate(Mode::Program, address, FLASH_PROGRAM_US, |_| {
-            // SAFETY: a half-word of the store, of which no reference is alive (`&mut self`); with PG
-            // set a store of 16 bits is how flash is programmed (PM0075 2.3.3).
-            unsafe { ptr::write_volatile(place, half) };
-        })?;
+        // SAFETY: a half-word of the store, of which no reference is alive (`&mut self`).
+        unsafe { self.operate(Operation::Program { place, half }) }?;
         if read() == half {
             Ok(())
         } else {
@@ -139,11 +198,8 @@ impl Flash {
         if !STORE_PAGES.contains(&address) {
             return Err(FlashError::Address(address));
         }
-        self.operate(Mode::Erase, address, FLASH_ERASE_US, |flash| {
-            // SAFETY: the address is that of one of the store's pages, which no code is on.
-            flash.ar().write(|w| unsafe { w.far().bits(address) });
-            flash.cr().modify(|_, w| w.strt().set_bit());
-        })?;
+        // SAFETY: one of the store's pages, which no code is on.
+        unsafe { self.operate(Operation::Erase { page: address }) }?;
         let erased = (address..address + PAGE_BYTES)
             .step_by(4)
             // SAFETY: words of the page, which is readable and aligned.
@@ -157,13 +213,14 @@ impl Flash {
 
     /// Does an operation with the controller unlocked and set up for it, within a bounded time, and
     /// locks it again.
-    fn operate(
-        &mut self,
-        mode: Mode,
-        address: u32,
-        bound_us: u32,
-        act: impl FnOnce(&pac::FLASH),
-    ) -> Result<(), FlashError> {
+    ///
+    /// # Safety
+    ///
+    /// As for [`run`].
+    unsafe fn operate(&mut self, operation: Operation) -> Result<(), FlashError> {
+        /// Of one look at the controller, at least: a load of a register, a test and a branch.
+        const CYCLES_OF_A_LOOK: u32 = 5;
+        let (address, bound_us) = operation.bounds();
         if !self.has_supply() {
             return Err(FlashError::LowSupply);
         }
@@ -174,16 +231,13 @@ impl Flash {
             w.eop().set_bit();
             w.pgerr().set_bit().wrprterr().set_bit()
         });
-        flash.cr().modify(|_, w| match mode {
-            Mode::Program => w.pg().set_bit(),
-            Mode::Erase => w.per().set_bit(),
+        flash.cr().modify(|_, w| match operation {
+            Operation::Program { .. } => w.pg().set_bit(),
+            Operation::Erase { .. } => w.per().set_bit(),
         });
-        act(flash);
-        // BSY rises one cycle after the operation was started (errata sheet of the medium-density parts, "Flash
-        // memory BSY bit delay versus STRT bit setting"). Without this read the first look would find it
-        // clear, and the controller would be locked in the middle of the operation.
-        let _ = flash.sr().read();
-        let done = within_us(bound_us, || flash.sr().read().bsy().bit_is_clear());
+        let looks = bound_us * (SYSCLK_ON_HSE_HZ / 1_000_000) / CYCLES_OF_A_LOOK;
+        // SAFETY: the caller's promise.
+        let done = unsafe { run(flash, operation, self.masked, looks) };
         let status = flash.sr().read();
         // Every mode bit off, and locked.
         flash.cr().write(|w| w.lock().set_bit());

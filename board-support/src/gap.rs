@@ -29,6 +29,28 @@ pub struct GapTicks {
     pub t35_late: u16,
 }
 
+/// Settings of a 16-bit timer that runs free, for the time after which a reply is cut off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LimitTicks {
+    /// Prescaler register: the clock is divided by one more.
+    pub prescaler: u16,
+    /// Ticks of that time.
+    pub ticks: u16,
+}
+
+impl LimitTicks {
+    /// Settings for `us` microseconds, up to 33 s, with the timer's clock in whole MHz, up to 128; rounded up.
+    #[must_use]
+    pub const fn new(clock_mhz: u8, us: u32) -> Self {
+        let cycles = us.saturating_mul(clock_mhz as u32);
+        let divider = cycles / 0xFFFF + 1;
+        Self {
+            prescaler: (divider - 1) as u16,
+            ticks: cycles.div_ceil(divider) as u16,
+        }
+    }
+}
+
 impl GapTicks {
     /// Settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock
     /// in whole MHz, up to 128. The coarsest tick is used that 16 bits need, and every time is rounded
@@ -88,7 +110,15 @@ mod tests {
             (921_600, 750_000, 1_750_000),
             (9600, 1_718_750, 100_000_000),
         ] {
-            for format in [Format::N2, Format::E1, Format::O1, Format::N1] {
+            for format in [
+                Format::N2,
+                Format::E1,
+                Format::O1,
+                Format::N1,
+                Format::SevenE1,
+                Format::SevenO1,
+                Format::SevenN2,
+            ] {
                 let line = LineSettings { baud, format };
                 let ticks = GapTicks::new(72, line, t15, t35).unwrap();
                 let tick_ns = (i64::from(ticks.prescaler) + 1) * 1_000_000_000 / 72_000_000 + 1;
@@ -107,6 +137,16 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_limit_is_never_short_and_at_most_a_tick_long() {
+        for us in [1, 900, 3_600, 24_900, 300_000, 4_800_000, 33_000_000] {
+            let ticks = LimitTicks::new(72, us);
+            let divider = u64::from(ticks.prescaler) + 1;
+            let over = u64::from(ticks.ticks) * divider - 72 * u64::from(us);
+            assert!(over < divider, "{us}: {over} cycles over {divider}");
         }
     }
 

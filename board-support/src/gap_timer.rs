@@ -9,13 +9,21 @@
 //! The line also falls when a pulse of noise is too short for a start bit (RM0008 27.3.3). So an edge
 //! puts the decision off by one character, once: a real character is complete by then and starts the
 //! silence again, and noise delays a reply by one character at most, however often it comes.
+//!
+//! TIM1 limits the time of a reply as well: its counter runs free, with a tick so long that the longest reply has less
+//! than 65,536 of them, and its channel 1 compares.
 
 use stm32f1xx_hal::{
     pac,
     rcc::{Enable, Reset},
 };
 
-use crate::{ClockSource, gap::GapTicks, signature, uart::LineSettings};
+use crate::{
+    ClockSource,
+    gap::{GapTicks, LimitTicks},
+    signature,
+    uart::LineSettings,
+};
 
 /// What the timer's interrupt is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,20 +41,22 @@ pub struct GapTimer {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     ticks: GapTicks,
+    limit: LimitTicks,
     /// The signature of the registers after they were set. They are compared with what they read, not with what was
     /// written: an emulator need not keep every bit.
     set: u32,
 }
 
 impl GapTimer {
-    /// Sets the timer up for silences of these lengths in nanoseconds. `None` when no setting of the
-    /// timer reaches them.
+    /// Sets the timer up for silences of these lengths in nanoseconds, and for replies of `limit_us` microseconds at
+    /// most. `None` when no setting of the timer reaches them.
     pub(crate) fn new(
         timer: pac::TIM2,
         start_bit: pac::TIM1,
         line: LineSettings,
         t15_ns: u32,
         t35_ns: u32,
+        limit_us: u32,
         clock: ClockSource,
         rcc: &mut pac::RCC,
     ) -> Option<Self> {
@@ -59,6 +69,7 @@ impl GapTimer {
             timer,
             start_bit,
             ticks,
+            limit: LimitTicks::new(clock.core_mhz(), limit_us),
             set: 0,
         };
         gap.set_up();
@@ -87,6 +98,8 @@ impl GapTimer {
         let start_bit = &self.start_bit;
         start_bit.cr1().reset();
         start_bit.smcr().reset();
+        start_bit.dier().reset();
+        start_bit.ccmr1_output().reset();
         // The channel is off while its input is selected (RM0008 14.4.7).
         start_bit.ccer().reset();
         start_bit.ccmr2_input().write(|w| w.cc3s().ti3());
@@ -94,10 +107,33 @@ impl GapTimer {
         start_bit
             .ccer()
             .write(|w| w.cc3e().set_bit().cc3p().set_bit());
+        start_bit.psc().write(|w| w.psc().set(self.limit.prescaler));
         start_bit.arr().write(|w| w.arr().set(0xFFFF));
+        // Loads the prescaler.
+        start_bit.egr().write(|w| w.ug().update());
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
         self.set = self.settings();
+    }
+
+    /// A reply has begun: [`take_limit`](Self::take_limit) tells when it has taken longer than it can.
+    #[inline]
+    pub fn limit_sending(&mut self) {
+        let timer = &self.start_bit;
+        let end = timer
+            .cnt()
+            .read()
+            .cnt()
+            .bits()
+            .wrapping_add(self.limit.ticks);
+        timer.ccr1().write(|w| w.ccr().set(end));
+        timer.sr().write(|w| w.cc1if().clear_bit());
+        timer.dier().write(|w| w.cc1ie().enabled());
+    }
+
+    /// Takes the interrupt of the [limit](Self::limit_sending), which comes also when the reply has ended before.
+    pub fn take_limit(&mut self) {
+        self.start_bit.dier().reset();
     }
 
     /// Whether both timers are as they were set up.
@@ -126,6 +162,7 @@ impl GapTimer {
             start_bit.smcr().read().bits(),
             start_bit.ccmr2_input().read().bits(),
             start_bit.ccer().read().bits(),
+            start_bit.psc().read().bits(),
             start_bit.arr().read().bits(),
         ])
     }

@@ -48,6 +48,8 @@ pub mod stack;
 #[cfg(target_os = "none")]
 mod unique_id;
 #[cfg(target_os = "none")]
+mod vectors;
+#[cfg(target_os = "none")]
 mod wait;
 #[cfg(target_os = "none")]
 mod watchdog;

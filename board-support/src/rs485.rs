@@ -26,7 +26,7 @@ pub struct Status {
 /// A character from the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Character {
-    /// Its eight data bits.
+    /// Its eight data bits; with seven of them, bit 7 is the parity bit or the first stop bit.
     pub byte: u8,
     /// What was wrong with it: bit 0 parity, bit 1 framing (the stop bit was low), bit 3 overrun (a
     /// character after it was lost). Never bit 2, noise, which is samples of a bit that disagreed:
@@ -90,20 +90,22 @@ const fn receiving(format: Format) -> u16 {
     const TE: u16 = 1 << 3;
     const RE: u16 = 1 << 2;
     const RXNEIE: u16 = 1 << 5;
-    // A parity bit is a ninth bit of the word (RM0008 27.3.7).
+    // A parity bit is the last bit of the word, which has nine bits with M (RM0008 27.3.7).
     let format = match format {
-        Format::N2 | Format::N1 => 0,
+        Format::N2 | Format::N1 | Format::SevenN2 => 0,
         Format::E1 => M | PCE,
         Format::O1 => M | PCE | PS,
+        Format::SevenE1 => PCE,
+        Format::SevenO1 => PCE | PS,
     };
     UE | TE | RE | RXNEIE | format
 }
 
-/// CR2: two stop bits, or one.
+/// CR2: two stop bits, or one. The first one of 7N2 is a data bit, [`Format::stop_in_data`].
 const fn stop_bits(format: Format) -> u16 {
     match format {
         Format::N2 => 0b10 << 12,
-        Format::E1 | Format::O1 | Format::N1 => 0,
+        _ => 0,
     }
 }
 
@@ -185,10 +187,12 @@ impl Rs485 {
     /// Takes the character that [`Status::received`] told of.
     #[inline]
     pub fn read(&mut self, status: Status) -> Character {
+        // With nine bits, the ninth is the parity bit.
+        let byte = self.usart.dr().read().bits() as u8;
         Character {
-            // The data register's ninth bit is the parity bit.
-            byte: self.usart.dr().read().bits() as u8,
-            faults: (status.flags & FAULTS) as u8,
+            byte,
+            // The first stop bit of 7N2: when it is low, FE.
+            faults: (status.flags & FAULTS) as u8 | (!byte & self.format.stop_in_data()) >> 6,
         }
     }
 
@@ -197,16 +201,23 @@ impl Rs485 {
         self.driver.set_state(PinState::High);
         // Reading SR and then writing DR takes TC back (RM0008 27.6.1).
         let _ = self.usart.sr().read();
-        self.usart.dr().write(|w| w.dr().set(u16::from(first)));
+        self.write(first);
         self.usart
             .cr1()
             .modify(|_, w| w.re().disabled().rxneie().disabled().txeie().enabled());
     }
 
+    /// A parity bit takes the place of the highest bit (RM0008 27.6.2).
+    #[inline]
+    fn write(&self, byte: u8) {
+        let word = byte | self.format.stop_in_data();
+        self.usart.dr().write(|w| w.dr().set(u16::from(word)));
+    }
+
     /// Sends the next byte.
     #[inline]
     pub fn send(&mut self, byte: u8) {
-        self.usart.dr().write(|w| w.dr().set(u16::from(byte)));
+        self.write(byte);
         // When this comes late, the byte before may end between the reading of SR and this write, which then does
         // not clear TC (RM0008 27.6.1). This byte cannot have ended yet: a TC that is set is not its own, and
         // would switch the driver off too early.

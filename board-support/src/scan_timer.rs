@@ -1,4 +1,4 @@
-//! TIM4: the beat of the scan, [`SCAN_HZ`].
+//! TIM4: the beat of all clocks and of the scan, [`SCAN_HZ`].
 
 use stm32f1xx_hal::{
     pac,

@@ -9,10 +9,11 @@ use crate::{
 /// noise allowed), and half bits from the start edge to the sample of the last bit.
 const fn receiver(format: Format, whole_divider: bool) -> (u32, u32) {
     match (format, whole_divider) {
-        (Format::N2 | Format::N1, true) => (43_750, 19),
-        (Format::N2 | Format::N1, false) => (38_800, 19),
         (Format::E1 | Format::O1, true) => (39_700, 21),
         (Format::E1 | Format::O1, false) => (35_300, 21),
+        // Words of 8 bits, a parity bit counted in.
+        (_, true) => (43_750, 19),
+        (_, false) => (38_800, 19),
     }
 }
 
@@ -40,12 +41,18 @@ mod tests {
     }
 
     #[test]
-    fn rates_up_to_230400_without_and_19200_with_parity_are_within_tolerance() {
+    fn rates_up_to_230400_with_words_of_8_bits_and_19200_with_9_are_within_tolerance() {
         let rates = [
             1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600,
         ];
         for baud in rates {
-            for format in [Format::N1, Format::N2] {
+            for format in [
+                Format::N1,
+                Format::N2,
+                Format::SevenE1,
+                Format::SevenO1,
+                Format::SevenN2,
+            ] {
                 assert_eq!(serves(baud, format), baud <= 230_400, "{baud}");
             }
             for format in [Format::E1, Format::O1] {

@@ -2,7 +2,7 @@
 
 use crate::design::BAUD_ERROR_PPM;
 
-/// How a character stands on the line. Every one has eight data bits.
+/// How a character stands on the line: eight data bits, unless the name says seven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// No parity, two stop bits.
@@ -14,6 +14,12 @@ pub enum Format {
     O1,
     /// No parity, one stop bit.
     N1,
+    /// Seven data bits, even parity, one stop bit.
+    SevenE1,
+    /// Seven data bits, odd parity, one stop bit.
+    SevenO1,
+    /// Seven data bits, no parity, two stop bits.
+    SevenN2,
 }
 
 impl Format {
@@ -22,19 +28,32 @@ impl Format {
     pub const fn bits(self) -> u32 {
         match self {
             Self::N2 | Self::E1 | Self::O1 => 11,
-            Self::N1 => 10,
+            Self::N1 | Self::SevenE1 | Self::SevenO1 | Self::SevenN2 => 10,
         }
     }
 
     /// Sixteenths of a bit from the receiver's interrupt to the end of the character.
     ///
     /// A stop bit is sampled in its middle, at the 10th sixteenth of it; the flag of a second stop
-    /// bit comes at the end of the first (RM0008 27.3.3).
+    /// bit comes at the end of the first (RM0008 27.3.3). In 7N2 the UART takes the first stop bit for a
+    /// data bit, so that the second is its only stop bit.
     #[must_use]
     pub const fn sixteenths_after_flag(self) -> u32 {
         match self {
             Self::N2 => 16,
-            Self::E1 | Self::O1 | Self::N1 => 6,
+            Self::E1 | Self::O1 | Self::N1 | Self::SevenE1 | Self::SevenO1 | Self::SevenN2 => 6,
+        }
+    }
+
+    /// The bit of the data register that is the first stop bit: 0x80 in 7N2, 0 in every other format.
+    ///
+    /// The USARTs of the F103 have words of 8 or 9 bits (RM0008 27.6.4, bit M), so 7N2 is 8N1 there with the
+    /// highest data bit always 1. On the line both are the same.
+    #[must_use]
+    pub const fn stop_in_data(self) -> u8 {
+        match self {
+            Self::SevenN2 => 0x80,
+            _ => 0,
         }
     }
 }

@@ -71,6 +71,28 @@ codes! {
         F8E1 = 1 "8E1",
         F8O1 = 2 "8O1",
         F8N1 = 3 "8N1",
+        F7E1 = 4 "7E1",
+        F7O1 = 5 "7O1",
+        F7N2 = 6 "7N2",
+    }
+}
+
+impl Format {
+    /// Data bits of a character: 7 or 8.
+    #[inline]
+    #[must_use]
+    pub const fn data_bits(self) -> u8 {
+        match self {
+            Self::F8N2 | Self::F8E1 | Self::F8O1 | Self::F8N1 => 8,
+            Self::F7E1 | Self::F7O1 | Self::F7N2 => 7,
+        }
+    }
+
+    /// Whether the mode can use this format: RTU needs 8 data bits (V1.02 2.5.1 and 2.5.2).
+    #[inline]
+    #[must_use]
+    pub const fn suits(self, mode: Mode) -> bool {
+        matches!(mode, Mode::Ascii) || self.data_bits() == 8
     }
 }
 
@@ -195,7 +217,17 @@ mod tests {
         assert!(taken.eq(Baud::CODES.iter().copied()));
         assert_eq!(Command::from_code(0xB007), Some(Command::EnterLoader));
         assert_eq!(Command::from_code(0), None);
-        assert_eq!(Format::from_code(4), None);
+        assert_eq!(Format::from_code(7), None);
+    }
+
+    #[test]
+    fn formats_with_seven_data_bits_suit_ascii_mode_only() {
+        for format in Format::ALL {
+            let seven = format.code() >= 4;
+            assert_eq!(format.data_bits(), if seven { 7 } else { 8 }, "{format:?}");
+            assert_eq!(format.suits(Mode::Rtu), !seven, "{format:?}");
+            assert!(format.suits(Mode::Ascii), "{format:?}");
+        }
     }
 
     #[test]

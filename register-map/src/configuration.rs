@@ -47,8 +47,8 @@ block! {
     KEY "KEY": 0x0100 x 1, "", Rule::now(Values::only(OPENING_KEY), 0), &[];
     /// Speed of the RS-485 line
     BAUD "BAUD": 0x0101 x 1, "100 bit/s", Rule::restart(Values::OneOf(Baud::CODES), 96), &[];
-    /// Data bits, parity and stop bits
-    FORMAT "FORMAT": 0x0102 x 1, "", Rule::restart(Values::up_to(3), 0), Format::NAMES;
+    /// Data bits, parity and stop bits. 7 data bits with MODE 1 only: with MODE 0 the write is exception 03
+    FORMAT "FORMAT": 0x0102 x 1, "", Rule::restart(Values::up_to(6), 0), Format::NAMES;
     /// Transmission mode
     MODE "MODE": 0x0103 x 1, "", Rule::restart(Values::up_to(1), 0), Mode::NAMES;
     /// Communication watchdog: outputs go to SAFE after so long without a valid request; 0 = off

@@ -50,7 +50,7 @@ const RESTART: InForce = InForce::Restart;
 const CONFIGURATION: &[Expected] = &[
     (0x0100, 1, &[0x5A17], &[0, 1, 0x175A, 0xFFFF], 0, NOW),
     (0x0101, 1, &[12, 24, 48, 96, 192, 384, 576, 1152, 2304, 4608, 9216], &[0, 11, 13, 144, 9600, 0xFFFF], 96, RESTART),
-    (0x0102, 1, &[0, 1, 2, 3], &[4, 0xFFFF], 0, RESTART),
+    (0x0102, 1, &[0, 1, 2, 3, 4, 5, 6], &[7, 0xFFFF], 0, RESTART),
     (0x0103, 1, &[0, 1], &[2, 0xFFFF], 0, RESTART),
     (0x0104, 1, &[0, 1, 36_000], &[36_001, 0xFFFF], 0, NOW),
     (0x0105, 1, &[0, 1000], &[1001, 0xFFFF], 0, NOW),

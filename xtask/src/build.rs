@@ -64,7 +64,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 ///
 /// # Errors
 ///
-/// When there is no toolchain for the target, the image does not build, or it could panic.
+/// When there is no toolchain for the target, the image does not build, it could panic, or its code in RAM needs flash.
 pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
     linked(workspace, options, None)
 }
@@ -101,6 +101,7 @@ fn linked(workspace: &mut Workspace, options: &Options, map: Option<&Path>) -> R
     let bin = elf.with_extension("bin");
     let bytes = image::read(&elf)?;
     check_panics(&bytes)?;
+    check_ram_code(&bytes)?;
     let bytes = image::flat(&bytes).map_err(Failure::new)?;
     fs::write(&bin, bytes)
         .map_err(|error| Failure::new(format!("cannot write {}: {error}", bin.display())))?;
@@ -111,6 +112,19 @@ fn map_argument(map: &Path) -> OsString {
     let mut argument = OsString::from("-Clink-arg=-Map=");
     argument.push(map);
     argument
+}
+
+/// Refuses an image whose code in RAM calls something in flash.
+fn check_ram_code(image: &[u8]) -> Result<()> {
+    let called = image::ram_code::calls_into_flash(image).map_err(Failure::new)?;
+    if called.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "code in RAM calls functions in flash, which cannot run during a save: add them to .ram_code in \
+         firmware/memory.x\n  {}",
+        called.join("\n  ")
+    )))
 }
 
 /// Refuses an image into which something is linked that panics.

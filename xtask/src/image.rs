@@ -1,6 +1,7 @@
 //! The image as an ELF file: read, and turned into the bytes that go into flash.
 
 pub mod panics;
+pub mod ram_code;
 
 use std::fs;
 use std::path::Path;

@@ -26,6 +26,7 @@ pub mod flash;
 pub mod fuzz;
 pub mod hil;
 pub mod image;
+mod matrix;
 pub mod peers;
 pub mod pymodbus;
 pub mod renode;
@@ -83,6 +84,8 @@ enum Command {
     Fuzz(fuzz::Options),
     /// Good and damaged frames to the image in simulation, a million of them
     Soak(soak::Options),
+    /// The conformance suite at every rate and format of the register map, in simulation
+    Matrix,
     /// Renew docs/register-map.md
     Docs,
     /// Everything a change must pass
@@ -107,6 +110,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Sim(options) => sim::run(&mut workspace, &options, std::env::args_os().skip(2)),
         Command::Fuzz(options) => fuzz::run(&workspace, &options),
         Command::Soak(options) => soak::run(&mut workspace, &options),
+        Command::Matrix => matrix::run(&mut workspace),
         Command::Renode(options) => renode::run(&mut workspace, &options),
         Command::Hil(options) => hil::run(&workspace, &options),
         Command::Peers(options) => peers::run(&workspace, &options),

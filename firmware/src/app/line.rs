@@ -1,4 +1,7 @@
 //! The RS-485 line as the tasks share it: UART, frame gap, and what is being received and sent.
+//!
+//! All of it runs from RAM (`memory.x`), so that it goes on while flash is erased or programmed: what is called here
+//! must be there, too.
 
 use board_support::{GapTimer, Rs485};
 use firmware::start_up::LOADER_UNIT;
@@ -7,6 +10,8 @@ use modbus_server::{
     line::{Closed, Faults, Framing, Next, Receiver, Transmitter},
 };
 
+use crate::clock;
+
 /// The line in use.
 pub struct Line {
     uart: Rs485,
@@ -14,12 +19,12 @@ pub struct Line {
     receiver: Receiver<'static>,
     transmitter: Transmitter<'static>,
     request: Option<Closed<'static>>,
+    /// When the request ended, by the device's clock.
+    closed_ms: u32,
     reply: Reply,
-    /// Replies are not to begin yet.
-    hold: bool,
     /// The good frames on the bus when a reply began to be delayed.
     heard_before: u16,
-    /// Milliseconds that a reply may take, and that the one under way has taken.
+    /// Milliseconds that a reply may take, should TIM1 not limit it, and that the one under way has taken.
     longest_ms: u16,
     sending_ms: u16,
     /// Which registers are looked at in the next millisecond: the UART's or the gap timer's.
@@ -38,8 +43,6 @@ const CAUSELESS: u8 = 8;
 enum Reply {
     /// There is none.
     None,
-    /// It waits to be released, and then for the response delay to pass.
-    Held { delay_ms: u16 },
     /// It waits for the response delay to pass, and is given up if the bus goes on without it.
     Delayed { ms: u16 },
     /// It is being sent.
@@ -64,8 +67,8 @@ impl Line {
             receiver,
             transmitter: Transmitter::idle(),
             request: None,
+            closed_ms: 0,
             reply: Reply::None,
-            hold: false,
             heard_before: 0,
             longest_ms,
             sending_ms: 0,
@@ -150,6 +153,14 @@ impl Line {
         self.repaired = true;
     }
 
+    /// The time has passed that the last reply to begin may take: one that is still being sent never ends.
+    pub fn on_limit(&mut self) {
+        self.gap.take_limit();
+        if self.reply == Reply::Sending {
+            self.repair();
+        }
+    }
+
     /// Whether the line was set up again since the last call.
     pub const fn take_repaired(&mut self) -> bool {
         core::mem::replace(&mut self.repaired, false)
@@ -180,6 +191,7 @@ impl Line {
 
     fn take(&mut self) -> Option<()> {
         let closed = self.receiver.close()?;
+        self.closed_ms = clock::millis();
         // One that has not been taken by now will never be answered in time.
         if let Some(late) = self.request.replace(closed) {
             self.receiver.drop_request(late.adu);
@@ -202,25 +214,7 @@ impl Line {
                 }
             }
             Reply::Delayed { ms } => self.reply = Reply::Delayed { ms: ms - 1 },
-            Reply::None | Reply::Held { .. } | Reply::Sending => {}
-        }
-    }
-
-    /// From now on replies wait for [`release_replies`](Self::release_replies).
-    pub const fn hold_replies(&mut self) {
-        self.hold = true;
-    }
-
-    /// Whether a reply waits for [`release_replies`](Self::release_replies): its master is silent.
-    pub fn is_held(&self) -> bool {
-        matches!(self.reply, Reply::Held { .. })
-    }
-
-    /// Replies begin at once again, the one that is held first.
-    pub fn release_replies(&mut self) {
-        self.hold = false;
-        if let Reply::Held { delay_ms: ms } = self.reply {
-            self.delay(ms);
+            Reply::None | Reply::Sending => {}
         }
     }
 
@@ -229,14 +223,15 @@ impl Line {
         self.reply != Reply::None
     }
 
-    /// The request that waits, if any, and what the line has counted. Its buffer comes back by
-    /// [`finish_reply`](Self::finish_reply). A reply that has not begun yet is given up: the master has.
-    pub fn take_request(&mut self) -> Option<(&'static mut Adu, LineCounters)> {
+    /// The request that waits, if any, what the line has counted, and when the request ended by the device's clock.
+    /// Its buffer comes back by [`finish_reply`](Self::finish_reply). A reply that has not begun yet is given up: the
+    /// master has.
+    pub fn take_request(&mut self) -> Option<(&'static mut Adu, LineCounters, u32)> {
         let closed = self.request.take()?;
-        if matches!(self.reply, Reply::Held { .. } | Reply::Delayed { .. }) {
+        if matches!(self.reply, Reply::Delayed { .. }) {
             self.give_up();
         }
-        Some((closed.adu, closed.line))
+        Some((closed.adu, closed.line, self.closed_ms))
     }
 
     /// Good frames on the bus so far.
@@ -255,25 +250,12 @@ impl Line {
         self.transmitter = Transmitter::open(unit, framing);
         // The loader mode is to be found by a master with any time-out.
         let delay_ms = if unit == LOADER_UNIT { 0 } else { delay_ms };
-        if self.hold {
-            self.reply = Reply::Held { delay_ms };
-        } else {
-            self.begin(delay_ms);
-        }
-    }
-
-    #[inline]
-    fn begin(&mut self, delay_ms: u16) {
         if delay_ms == 0 {
             self.send();
         } else {
-            self.delay(delay_ms);
+            self.heard_before = self.heard();
+            self.reply = Reply::Delayed { ms: delay_ms };
         }
-    }
-
-    fn delay(&mut self, ms: u16) {
-        self.heard_before = self.heard();
-        self.reply = Reply::Delayed { ms };
     }
 
     /// The reply is settled: this is how it begins.
@@ -298,6 +280,7 @@ impl Line {
         if let Next::Byte(first) = self.transmitter.next() {
             self.uart.start_sending(first);
         }
+        self.gap.limit_sending();
     }
 
     /// Brings the request's buffer back: the body of the reply that was started, if it has one.

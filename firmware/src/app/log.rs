@@ -112,6 +112,9 @@ impl Log {
             Format::F8E1 => "8E1",
             Format::F8O1 => "8O1",
             Format::F8N1 => "8N1",
+            Format::F7E1 => "7E1",
+            Format::F7O1 => "7O1",
+            Format::F7N2 => "7N2",
         };
         let baud = start.line.baud.bits_per_second();
         let version = concat!("modio ", env!("CARGO_PKG_VERSION"), " on modio-02, ");

@@ -2,20 +2,26 @@
 //!
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
+//! | `beat` | TIM4, 1 kHz | 4 | the device's clock; the line's response delay and its check; sets `scan` off. Late, the clock is late |
 //! | `uart` | USART1 | 4 | a byte in or out, driver off at the end. At 921600 bit/s a byte comes every 12 us; later than that and it is lost, which the receiver reports and the frame pays for |
 //! | `gap` | TIM2 | 4 | t1.5 and t3.5. Late, it makes the silence longer, never shorter |
+//! | `limit` | TIM1_CC | 4 | cuts off a reply that does not end. Late, the driver is on for longer |
 //! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | a closed frame becomes a response; an order is carried out when its response is out. Late, the response is late |
-//! | `scan` | TIM4, 1 kHz, and pended by a write | 2 | inputs into the device, outputs out of it, all clocks. A missed beat stretches them by 1 ms |
+//! | `scan` | EXTI1, pended by `beat` and by a write | 2 | inputs into the device, outputs out of it, its time-outs. Late, it makes up for the time |
 //! | `background` | EXTI0, pended every 10 ms and on orders | 1 | DAC transfers, configuration store, LEDs, log. May be late at no cost |
 //! | `idle` | - | - | feeds the watchdog when all of the above have been alive; sleeps |
 //!
-//! `serve` and `background` are software tasks in all but name: each is bound to an interrupt that
+//! The tasks of priority 4 run from RAM with all they call (`memory.x`): while flash is erased or programmed they go
+//! on, and the others wait, for up to 40 ms.
+//!
+//! `serve`, `scan` and `background` are software tasks in all but name: each is bound to an interrupt that
 //! nothing else uses. Pended while its handler runs, an interrupt comes again, where a second spawn
 //! would be refused and the request left lying; and no executor's panic is linked.
 
 #![no_std]
 #![no_main]
 
+mod clock;
 mod converter;
 mod every;
 mod installed;
@@ -44,6 +50,7 @@ mod app {
     use register_map::codes::Command;
 
     use crate::{
+        clock,
         every::Every,
         installed::{AnalogOutputs, Installed},
         line::Line,
@@ -100,7 +107,7 @@ mod app {
         queue: Queue<Event, 8> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let mut started = start::up(cx.device, cx.local.adus, cx.local.device);
+        let mut started = start::up(cx.device, &cx.core.SCB, cx.local.adus, cx.local.device);
         let (events, logged) = cx.local.queue.split();
         started.scan_timer.start();
         started.watchdog.arm();
@@ -171,6 +178,25 @@ mod app {
         }
     }
 
+    #[task(binds = TIM1_CC, priority = 4, shared = [line])]
+    fn limit(mut cx: limit::Context) {
+        alive::begin(fault::marks(), Task::Line);
+        cx.shared
+            .line
+            .lock(|line| line.as_mut().map(Line::on_limit));
+    }
+
+    #[task(binds = TIM4, priority = 4, local = [scan_timer], shared = [line])]
+    fn beat(mut cx: beat::Context) {
+        alive::begin(fault::marks(), Task::Line);
+        cx.local.scan_timer.take_beat();
+        clock::advance();
+        cx.shared
+            .line
+            .lock(|line| line.as_mut().map(Line::on_millisecond));
+        rtic::pend(Interrupt::EXTI1);
+    }
+
     #[task(binds = EXTI3, priority = 3, local = [server, frame_gap_ms], shared = [line, device, activity, orders])]
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
@@ -191,22 +217,17 @@ mod app {
         let delay_ms = device.lock(|device| device.config.response_delay_ms());
         let mut request = None;
         let mut silent = true;
-        let mut held = false;
         on_line(&mut |line| {
             request = line.take_request();
             silent = !line.is_replying();
             // The unit address leaves while all that follows is being done.
-            if let Some((adu, _)) = &request
+            if let Some((adu, ..)) = &request
                 && server.answers(adu)
             {
                 line.open_reply(server.unit(), server.framing(), delay_ms);
             }
-            held = line.is_held();
         });
 
-        if held {
-            rtic::pend(Interrupt::EXTI0);
-        }
         // An order of the last request, whose reply is out or never comes.
         if silent {
             let left = device.lock(|device| {
@@ -223,7 +244,7 @@ mod app {
             }
         }
 
-        let Some((adu, line_counters)) = request else {
+        let Some((adu, line_counters, closed_ms)) = request else {
             alive::end(fault::marks(), Task::Serve);
             return;
         };
@@ -238,7 +259,7 @@ mod app {
             }
             // In listen-only mode the outputs are to fall to SAFE.
             if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
-                device.request_seen(*frame_gap_ms);
+                device.request_seen(closed_ms.wrapping_sub(*frame_gap_ms));
             }
             server.carry_out(&decision, adu, &mut **device);
         });
@@ -250,7 +271,7 @@ mod app {
             }
         });
         if decision.work.writes() {
-            rtic::pend(Interrupt::TIM4);
+            rtic::pend(Interrupt::EXTI1);
             if decision.reply.is_none() {
                 // No reply to wait for: an order is carried out now.
                 rtic::pend(Interrupt::EXTI3);
@@ -261,8 +282,8 @@ mod app {
     }
 
     #[task(
-        binds = TIM4, priority = 2,
-        local = [module, settings, scan_timer, events, background_beat, proof_beat],
+        binds = EXTI1, priority = 2,
+        local = [module, settings, events, background_beat, proof_beat],
         shared = [line, device],
     )]
     fn scan(cx: scan::Context) {
@@ -272,7 +293,6 @@ mod app {
         let scan::LocalResources {
             module,
             settings,
-            scan_timer,
             events,
             background_beat,
             proof_beat,
@@ -283,13 +303,20 @@ mod app {
             mut device,
             ..
         } = cx.shared;
-        let beat = scan_timer.take_beat();
+        let now = clock::millis();
 
-        let (mut channels, wanted, uptime_s, tripped) = device.lock(|device| {
-            let tripped = beat && device.tick();
+        let (mut channels, wanted, uptime_s, beat, tripped) = device.lock(|device| {
+            let passed = now.wrapping_sub(device.state.millis());
+            let tripped = passed > 0 && device.tick(passed);
             let wanted = *device.points.settings();
             let uptime_s = device.state.uptime_s();
-            (*device.points.channels(), wanted, uptime_s, tripped)
+            (
+                *device.points.channels(),
+                wanted,
+                uptime_s,
+                passed > 0,
+                tripped,
+            )
         });
         if *settings != wanted {
             *settings = wanted;
@@ -323,12 +350,7 @@ mod app {
         }
         if beat {
             fault::keep_uptime(uptime_s);
-            let repaired = line.lock(|line| {
-                line.as_mut().is_some_and(|line| {
-                    line.on_millisecond();
-                    line.take_repaired()
-                })
-            });
+            let repaired = line.lock(|line| line.as_mut().is_some_and(Line::take_repaired));
             if repaired {
                 device.lock(|device| {
                     let repairs = &mut device.state.line_repairs;
@@ -350,7 +372,7 @@ mod app {
         if beat {
             alive::end(fault::marks(), Task::Scan);
         } else {
-            // Only the timer's beats show that it is alive.
+            // Only the beats show that it is alive.
             alive::put_back(fault::marks(), Task::Scan, mark);
         }
     }
@@ -358,12 +380,11 @@ mod app {
     #[task(
         binds = EXTI0, priority = 1,
         local = [analog_outputs, persistence, signals, log, logged],
-        shared = [line, device, activity, orders],
+        shared = [device, activity, orders],
     )]
     fn background(cx: background::Context) {
         alive::begin(fault::marks(), Task::Background);
         let background::SharedResources {
-            mut line,
             mut device,
             mut activity,
             mut orders,
@@ -393,18 +414,7 @@ mod app {
             log.event(event);
         }
         if persistence.wants_erase() {
-            // While a master waits for this unit's reply nobody sends: then the flash may stall
-            // everything for an erase, and nothing that comes in is lost.
-            let held = line.lock(|line| {
-                line.as_mut().is_some_and(|line| {
-                    line.hold_replies();
-                    line.is_held()
-                })
-            });
-            if held {
-                persistence.erase();
-                line.lock(|line| line.as_mut().map(Line::release_replies));
-            }
+            persistence.erase();
         }
 
         let free = stack::free_low_water();

@@ -77,7 +77,7 @@ impl Persistence {
         self.erase && self.pages.has_supply()
     }
 
-    /// Erases it. The program stands still for up to 40 ms.
+    /// Erases it. All but the tasks that run from RAM stand still for up to 40 ms.
     pub fn erase(&mut self) {
         self.erase = false;
         // When the flash fails, the next save that needs the page tries again; when the supply is too low, this

@@ -3,6 +3,7 @@
 use core::mem::MaybeUninit;
 
 use board_support::{Leds, ScanTimer, Watchdog, board, flash::FlashError, pac, uart};
+use cortex_m::peripheral::SCB;
 use firmware::{
     config::{self, Config},
     device::{Device, Identity},
@@ -25,6 +26,9 @@ use crate::{
     persistence::Persistence,
 };
 
+/// The highest priority of a task whose code is in flash.
+const SERVE_PRIORITY: u8 = 3;
+
 /// What start-up brings about.
 pub struct Started {
     pub line: Option<Line>,
@@ -46,11 +50,13 @@ pub struct Started {
 /// known, and the line is served last, when there is something to serve.
 pub fn up(
     device: pac::Peripherals,
+    scb: &SCB,
     adus: &'static mut [Adu; 2],
     place: &'static mut MaybeUninit<Device>,
 ) -> Started {
     let mut log = Log::new();
-    let board = board::setup(device);
+    let masked = rtic::export::cortex_logical2hw(SERVE_PRIORITY, pac::NVIC_PRIO_BITS);
+    let board = board::setup(device, scb, masked);
     let address = Address::from_dip(board.dip);
 
     let mut pages = Pages(board.flash);
@@ -93,7 +99,7 @@ pub fn up(
         Err(StoreError::Flash(_, FlashError::LowSupply)) => log.event(log::Event::LowSupply),
         Err(_) => log.event(log::Event::SaveFailed),
     }
-    // An erase that is still missing is done while a master waits for a reply, as after a change of pages.
+    // An erase that is still missing is done by the background, as after a change of pages.
     let erase = prepared.is_err() && !store.has_spare();
 
     let framing = match settings.mode {
@@ -108,13 +114,20 @@ pub fn up(
         let strict = settings.gap_rule == GapRule::Drop;
         let (receiver, silences) = match framing {
             Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
-            Framing::Ascii { .. } => (
-                Receiver::ascii(unit, Width::Eight),
-                (t35, Gaps::ASCII_TIMEOUT),
-            ),
+            Framing::Ascii { .. } => {
+                let width = match settings.format.data_bits() {
+                    7 => Width::Seven,
+                    _ => Width::Eight,
+                };
+                (Receiver::ascii(unit, width), (t35, Gaps::ASCII_TIMEOUT))
+            }
         };
-        let (uart, gap) = board.line.start(on_wire, silences.0, silences.1)?;
-        let longest_ms = longest_reply_ms(on_wire, framing);
+        let longest_us = longest_reply_us(on_wire, framing);
+        let (uart, gap) = board
+            .line
+            .start(on_wire, silences.0, silences.1, longest_us)?;
+        // The count may begin just before a beat.
+        let longest_ms = (longest_us / 1000) as u16 + 2;
         Some(Line::new(uart, gap, receiver, adus, longest_ms))
     });
 
@@ -134,17 +147,18 @@ pub fn up(
     }
 }
 
-/// The longest frame on the line in whole milliseconds, and some more: the server takes up to half a millisecond, and
-/// the count may begin just before a beat. Above 115200 bit/s a save's stalls of the flash, about a hundred of up to
-/// 70 us, make gaps in a reply.
-fn longest_reply_ms(line: uart::LineSettings, framing: Framing) -> u16 {
+/// The longest reply in microseconds: the longest frame, the half of a millisecond that the server takes for it, and 2 %
+/// for the difference between two clocks.
+fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {
         Framing::Rtu => 256,
         Framing::Ascii { .. } => 513,
     };
-    let ms = characters * line.format.bits() * 1000 / line.baud.max(1);
-    ms as u16 + if line.baud > 115_200 { 8 } else { 3 }
+    let bits = characters * line.format.bits();
+    // At most 513 * 11 bits, so that the product fits 32 bits.
+    let us = bits * 10_000 / (line.baud / 100).max(1);
+    us + us / 50 + 500
 }
 
 fn wire_settings(line: config::Line) -> uart::LineSettings {
@@ -155,6 +169,9 @@ fn wire_settings(line: config::Line) -> uart::LineSettings {
             Format::F8E1 => uart::Format::E1,
             Format::F8O1 => uart::Format::O1,
             Format::F8N1 => uart::Format::N1,
+            Format::F7E1 => uart::Format::SevenE1,
+            Format::F7O1 => uart::Format::SevenO1,
+            Format::F7N2 => uart::Format::SevenN2,
         },
     }
 }

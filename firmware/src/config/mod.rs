@@ -23,16 +23,18 @@ mod tests;
 
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::Command;
-use register_map::configuration::{COMM_TIMEOUT, COMMAND, FILTER, KEY, RESPONSE_DELAY, RULES};
+use register_map::configuration::{
+    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, MODE, RESPONSE_DELAY, RULES,
+};
 use register_map::points::{CHANNELS, PointKind, SLOT_FIRST, SLOT_PORT};
 use register_map::state::status;
 use register_map::{Run, runs};
 
 pub use in_force::{Line, Lora, Point, Slot};
 use lock::Lock;
-use settings::RESTARTS;
 pub use settings::RestartValues;
 pub use settings::Settings;
+use settings::{RESTARTS, format_suits_mode};
 
 /// The configuration of a running device.
 #[derive(Debug)]
@@ -112,7 +114,7 @@ impl Config {
     /// # Errors
     ///
     /// The first of: 02, a gap; 03, a value not allowed, for a setting by point also by its module as
-    /// chosen last; 06, the lock is closed and it is not KEY alone, or a save is ordered before the
+    /// chosen last, or a FORMAT with seven data bits in RTU mode; 06, the lock is closed and it is not KEY alone, or a save is ordered before the
     /// last is complete.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         let runs = runs(RULES, span.start(), span.count());
@@ -127,12 +129,27 @@ impl Config {
                 return Err(Exception::IllegalDataValue);
             }
         }
+        if !self.suits_the_mode(span, words) {
+            return Err(Exception::IllegalDataValue);
+        }
         let order = words.get(COMMAND.wrapping_sub(span.start()));
         let saves = self.saving && order == Some(Command::Save.code());
         if saves || !(self.lock.is_open() || span == Span::single(KEY)) {
             return Err(Exception::ServerDeviceBusy);
         }
         Ok(())
+    }
+
+    /// Whether FORMAT and MODE can be used together once these values are written.
+    fn suits_the_mode(&self, span: Span, words: Words<'_>) -> bool {
+        let written = |address: u16| words.get(address.wrapping_sub(span.start()));
+        match (written(FORMAT), written(MODE)) {
+            (None, None) => true,
+            (format, mode) => format_suits_mode(
+                format.unwrap_or_else(|| self.edited.get(FORMAT)),
+                mode.unwrap_or_else(|| self.edited.get(MODE)),
+            ),
+        }
     }
 
     /// Writes registers that [`Self::check_write`] found good, and opens the lock or keeps it open. A

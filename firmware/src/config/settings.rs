@@ -1,6 +1,7 @@
 //! The value of every setting.
 
-use register_map::configuration::{self, BY_POINT, COMMAND, KEY, MODULE, RULES};
+use register_map::codes::{Format, Mode};
+use register_map::configuration::{self, BY_POINT, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
 use register_map::points::{self, PointKind};
 use register_map::{InForce, Module, Rule, rule_at};
 
@@ -56,6 +57,11 @@ impl Settings {
                     rejected = rejected.saturating_add(1);
                 }
             }
+        }
+        // Each of the two may be allowed and the pair not.
+        if !format_suits_mode(settings.get(FORMAT), settings.get(MODE)) {
+            settings.put(FORMAT, Format::F8N2.code());
+            rejected = rejected.saturating_add(1);
         }
         (settings, rejected)
     }
@@ -175,6 +181,14 @@ impl Settings {
         if let Some(held) = self.values.get_mut(usize::from(place)) {
             *held = value;
         }
+    }
+}
+
+/// Whether a value of FORMAT can be used with a value of MODE.
+pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
+    match (Format::from_code(format), Mode::from_code(mode)) {
+        (Some(format), Some(mode)) => format.suits(mode),
+        _ => false,
     }
 }
 
@@ -338,6 +352,18 @@ mod tests {
         ]);
         assert_eq!(rejected, 3, "BAUD, MODULE of port 1, SAFE of a bit");
         assert_eq!(changed(&settings), [(MODULE_SLOT, 2), (SAFE + SLOT + 1, 1)]);
+    }
+
+    #[test]
+    fn stored_format_with_seven_data_bits_is_kept_in_ascii_mode_only() {
+        for format in 4..=6 {
+            let (settings, rejected) = loaded(&[(FORMAT, format), (MODE, 1)]);
+            assert_eq!((settings.get(FORMAT), rejected), (format, 0));
+            let (settings, rejected) = loaded(&[(FORMAT, format)]);
+            assert_eq!((settings.get(FORMAT), rejected), (0, 1));
+        }
+        let (settings, rejected) = loaded(&[(FORMAT, 7), (MODE, 1)]);
+        assert_eq!((settings.get(FORMAT), rejected), (0, 1));
     }
 
     #[test]

@@ -116,20 +116,21 @@ impl Device {
         self.points.configure(settings);
     }
 
-    /// A millisecond has passed. Returns whether outputs went to SAFE.
-    pub fn tick(&mut self) -> bool {
-        self.state.tick();
-        self.config.tick(1);
-        let tripped = self.comm_watchdog.tick(self.config.comm_timeout_ms());
+    /// So many milliseconds have passed. Returns whether outputs went to SAFE.
+    pub fn tick(&mut self, ms: u32) -> bool {
+        self.state.tick(ms);
+        self.config.tick(ms);
+        let timeout_ms = self.config.comm_timeout_ms();
+        let tripped = self.comm_watchdog.look(self.state.millis(), timeout_ms);
         if tripped {
             self.points.command_raw(self.safe);
         }
         tripped
     }
 
-    /// A valid request for this unit has come, whose end is so many milliseconds past.
-    pub const fn request_seen(&mut self, passed_ms: u32) {
-        self.comm_watchdog.feed(passed_ms);
+    /// A valid request for this unit ended when so many milliseconds had passed since the start.
+    pub const fn request_seen(&mut self, at_ms: u32) {
+        self.comm_watchdog.feed(at_ms);
     }
 
     /// Whether this work shows the line's counters, which are to be put into the state before then.

@@ -53,7 +53,8 @@ pub struct State {
     serial: [u8; SERIAL_LEN],
     /// Milliseconds since the start, wrapping.
     millis: u32,
-    until_second: u16,
+    /// Milliseconds of the second that has begun.
+    part_ms: u32,
     uptime_s: u32,
     /// The line's counters, as the server had them when they were last asked for.
     pub counters: Counters,
@@ -71,7 +72,7 @@ impl State {
             serial: identification::serial(identity.unique_id),
             identity,
             millis: 0,
-            until_second: 1000,
+            part_ms: 0,
             uptime_s: 0,
             counters: Counters::default(),
             stack_free: 0,
@@ -79,12 +80,12 @@ impl State {
         }
     }
 
-    /// A millisecond has passed.
-    pub const fn tick(&mut self) {
-        self.millis = self.millis.wrapping_add(1);
-        self.until_second -= 1;
-        if self.until_second == 0 {
-            self.until_second = 1000;
+    /// So many milliseconds have passed.
+    pub const fn tick(&mut self, ms: u32) {
+        self.millis = self.millis.wrapping_add(ms);
+        self.part_ms = self.part_ms.saturating_add(ms);
+        while self.part_ms >= 1000 {
+            self.part_ms -= 1000;
             self.uptime_s = self.uptime_s.wrapping_add(1);
         }
     }

@@ -228,9 +228,10 @@ impl<'a> Receiver<'a> {
     #[cold]
     #[inline(never)]
     fn special(&mut self, byte: u8, faults: Faults) {
+        let character = self.reader.masked(byte);
         match self.state | u16::from(faults.bits()) {
-            ASCII if self.ascii_inside(byte) => {}
-            ASCII_IDLE if byte == ascii::START => {
+            ASCII if self.ascii_inside(character) => {}
+            ASCII_IDLE if character == ascii::START => {
                 self.state = ASCII;
                 self.reader.begin();
             }

@@ -14,11 +14,12 @@ use crate::unit::{BYTE, GAP, SERVE, Unit};
 const SPAN: Time = Time::from_ms(1_000);
 
 /// The exceptions of the image's tasks (RM0008 table 63) and what they are for.
-const TASKS: [(u32, &str); 5] = [
+const TASKS: [(u32, &str); 6] = [
     (BYTE, "byte (USART1)"),
     (GAP, "frame gap (TIM2)"),
     (SERVE, "serve (EXTI3)"),
-    (16 + 30, "scan (TIM4)"),
+    (16 + 30, "beat (TIM4)"),
+    (16 + 7, "scan (EXTI1)"),
     (16 + 6, "background (EXTI0)"),
 ];
 

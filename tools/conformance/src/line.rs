@@ -110,7 +110,7 @@ impl LineFormat {
 
 /// Shortest and longest value that a unit may use for a silence. The standard counts characters of 11 bits,
 /// whatever the format. Up to 19200 bit/s a unit may count characters of the line's format instead: with 8N1
-/// they have 10 bits. The suite demands nothing of a silence between the two values.
+/// and with seven data bits they have 10 bits. The suite demands nothing of a silence between the two values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// A shorter silence is too short for every unit.

@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use register_map::codes::Command;
+use register_map::codes::{Command, Format};
 use register_map::configuration::{BAUD, COMMAND};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop};
-use crate::line::{LineFormat, Parity};
+use crate::line::LineFormat;
 use crate::points::{pdu, write_words};
 
 /// For the unit to store its configuration, and to start.
@@ -95,7 +95,7 @@ fn look_for_it(bench: &mut Bench<'_>, lines: [LineFormat; 3]) -> Check {
 /// Changes, saves and restarts the unit, and follows it.
 fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     bench.unlock()?;
-    let values = [(to.baud / 100) as u16, format_code(to)];
+    let values = [(to.baud / 100) as u16, format_code(to)?];
     let request = write_words(BAUD, &values);
     bench.reply_is(&request, &request[..5])?;
     // The old rate is in force until the restart.
@@ -112,11 +112,11 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     bench.alive(format!("the change to {to}"))
 }
 
-fn format_code(line: LineFormat) -> u16 {
-    match (line.parity, line.stop_bits) {
-        (Parity::None, 2) => 0,
-        (Parity::Even, _) => 1,
-        (Parity::Odd, _) => 2,
-        (Parity::None, _) => 3,
-    }
+/// The value of FORMAT for a format; [`Stop::Skip`] when the device does not have it.
+fn format_code(line: LineFormat) -> Check<u16> {
+    let name = line.format().to_string();
+    let known = Format::NAMES.iter().find(|(_, known)| *known == name);
+    known
+        .map(|(code, _)| *code)
+        .ok_or_else(|| Stop::Skip(format!("the device has no format {name}")))
 }

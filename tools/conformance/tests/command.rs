@@ -8,6 +8,12 @@ mod fault;
 mod ident;
 #[path = "reference/log.rs"]
 mod log;
+#[path = "reference/modio.rs"]
+#[allow(dead_code, reason = "the unit behind the socket is no modio")]
+mod modio;
+#[path = "reference/modio_fault.rs"]
+#[allow(dead_code, reason = "the unit behind the socket is no modio")]
+mod modio_fault;
 #[path = "reference/server.rs"]
 mod server;
 #[path = "reference/unit.rs"]

@@ -168,10 +168,10 @@ fn settings(baud: u32, format: &str) -> Result<Settings, String> {
     if !(300..=4_000_000).contains(&baud) {
         return Err(format!("{baud} bit/s is not within 300 to 4000000"));
     }
-    let format = Format::ALL
-        .into_iter()
-        .find(|known| known.name() == format)
-        .ok_or_else(|| format!("{format:?} is not supported; use 8N2, 8E1, 8O1 or 8N1"))?;
+    let format = Format::named(format).ok_or_else(|| {
+        let names = Format::ALL.map(Format::name).join(", ");
+        format!("{format:?} is not supported; use one of {names}")
+    })?;
     Ok(Settings { baud, format })
 }
 
@@ -253,7 +253,7 @@ mod tests {
             ("send 01 parity:02", "8N2 has no parity"),
             ("send gap:300000000 gap:300000001", "600000000"),
             ("line 100 8N2", "300 to 4000000"),
-            ("line 9600 7E1", "\"7E1\""),
+            ("line 9600 7N1", "\"7N1\""),
         ] {
             let told = ask(&mut board, line).unwrap_err();
             assert!(told.contains(reason), "{line}: {told}");

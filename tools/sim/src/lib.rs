@@ -13,6 +13,7 @@
 //! ```
 
 pub mod board;
+pub mod corner;
 pub mod exact_line;
 pub mod finding;
 pub mod image;
@@ -26,6 +27,7 @@ pub mod soc;
 pub mod time;
 
 pub use board::{Board, Config, CoreTime, Error, Leds, Wait};
+pub use corner::Corner;
 pub use finding::Finding;
 pub use image::Image;
 pub use register_map::Module;

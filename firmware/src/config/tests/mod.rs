@@ -181,6 +181,23 @@ fn one_bad_value_among_many_and_nothing_is_written() {
 }
 
 #[test]
+fn format_with_seven_data_bits_is_refused_in_rtu_mode() {
+    let mut config = unlocked(&[]);
+    for format in 4..=6 {
+        assert_eq!(write(&mut config, FORMAT, &[format]), VALUE);
+        assert_eq!(write(&mut config, FORMAT, &[format, 0]), VALUE);
+        assert_eq!(write(&mut config, FORMAT, &[format, 1]), DONE);
+        assert_eq!(write(&mut config, MODE, &[0]), VALUE, "RTU with 7 bits");
+        assert_eq!(write(&mut config, BAUD, &[96, format]), DONE);
+        assert_eq!(read(&config, FORMAT, 2).unwrap(), [format, 1]);
+        assert_eq!(write(&mut config, FORMAT, &[0, 0]), DONE);
+    }
+    assert_eq!(write(&mut config, MODE, &[1]), DONE);
+    assert_eq!(write(&mut config, FORMAT, &[4]), DONE);
+    assert_eq!(write(&mut config, FORMAT, &[7]), VALUE);
+}
+
+#[test]
 fn now_is_now_and_restart_is_after_the_restart() {
     let mut config = unlocked(&[(MODULE_SLOT, 6)]);
     assert_eq!(write(&mut config, BAUD, &[1152, 1, 0, 36_000, 7, 5]), DONE);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use register_map::{configuration, state};
+use register_map::{codes::Command, configuration, state};
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
@@ -122,7 +122,14 @@ fn command(bench: &mut Bench<'_>) -> Check {
     for value in [0, 6, 0xB006, 0xFFFF] {
         bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
     }
-    Ok(())
+    if bench.allow_config {
+        bench.unlock()?;
+        let clear_flag = Command::ClearWatchdogFlag.code();
+        let request = pdu(6, configuration::COMMAND, clear_flag);
+        bench.reply_is(&request, &request)?;
+    }
+    let now = bench.read_word(configuration::COMMAND)?;
+    bench.ensure(now == 0, "0 after commands, too")
 }
 
 fn all_or_nothing(bench: &mut Bench<'_>) -> Check {

@@ -8,7 +8,7 @@ use register_map::{configuration, state};
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
-use crate::frame::{Reply, rtu};
+use crate::frame::{Mode, Reply, rtu};
 use crate::points::{pdu, words_of};
 
 pub(super) const CASES: &[Case] = &[
@@ -53,6 +53,13 @@ pub(super) const CASES: &[Case] = &[
         "one half of a counter cannot be written: exception 03, and the counter stays",
         &[Need::Modio, Need::Function(0x10)],
         half_written,
+    ),
+    case(
+        "hurts/torn-values",
+        "map, communication watchdog",
+        "a read of several outputs while they go to SAFE gives all of them before or all of them after",
+        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)],
+        super::outputs::torn,
     ),
 ];
 
@@ -173,10 +180,19 @@ fn no_gaps(bench: &mut Bench<'_>) -> Check {
 }
 
 fn wrong_settings(bench: &mut Bench<'_>) -> Check {
+    // Formats 4 to 6 have seven data bits, which RTU cannot use.
+    let formats: &[u16] = match bench.target.mode {
+        Mode::Rtu => &[4, 5, 6, 7, 255, 0xFFFF],
+        Mode::Ascii => &[7, 255, 0xFFFF],
+    };
+    let modes: &[u16] = match bench.endpoint.line().data_bits {
+        7 => &[0, 2, 0xFFFF],
+        _ => &[2, 0xFFFF],
+    };
     for (register, values) in [
         (configuration::BAUD, &[0, 1, 95, 97, 9217, 0xFFFF][..]),
-        (configuration::FORMAT, &[4, 255, 0xFFFF]),
-        (configuration::MODE, &[2, 0xFFFF]),
+        (configuration::FORMAT, formats),
+        (configuration::MODE, modes),
     ] {
         let before = bench.read_word(register)?;
         for value in values {

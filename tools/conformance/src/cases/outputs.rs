@@ -8,7 +8,7 @@ use register_map::state;
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
-use crate::points::{pdu, write_bits, write_words};
+use crate::points::{pdu, words_of, write_bits, write_words};
 use crate::target::Span;
 
 const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
@@ -188,6 +188,86 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
     });
     write(bench, function, address, before.min(high))?;
     result
+}
+
+/// The outputs of one kind, as `function` reads them.
+fn read_all(bench: &mut Bench<'_>, function: u8, span: Span) -> Check<Vec<u16>> {
+    if function == 3 {
+        return bench.read_words(span);
+    }
+    let bits = bench.read_bits(span)?;
+    Ok(bits.into_iter().map(u16::from).collect())
+}
+
+/// Sets the outputs of one kind to these values.
+fn write_all(bench: &mut Bench<'_>, function: u8, first: u16, values: &[u16]) -> Check {
+    if function == 3 {
+        return bench.set_words(first, values);
+    }
+    let bits: Vec<bool> = values.iter().map(|value| *value != 0).collect();
+    bench.set_bits(first, &bits)
+}
+
+/// How long before the end of COMM_TIMEOUT the first read is made, and how long after it the last.
+const BEFORE: Duration = Duration::from_millis(2);
+const AFTER: Duration = Duration::from_millis(3);
+/// Number of reads around the end of COMM_TIMEOUT.
+const READS: u32 = 40;
+
+/// A module's outputs of one kind.
+fn outputs(bench: &Bench<'_>) -> Check<Span> {
+    let words = bench.target.words.filter(|words| !words.locked);
+    let span = bench.target.bits.or(words.map(|words| words.span));
+    span.ok_or_else(|| Stop::Skip("the module has no outputs".to_owned()))
+}
+
+pub(super) fn torn(bench: &mut Bench<'_>) -> Check {
+    let (function, ..) = output(bench)?;
+    let span = outputs(bench)?;
+    let before = read_all(bench, function, span)?;
+    let safe = configuration::SAFE + span.first;
+    let count = span.len() as usize;
+    let safe_before = bench.reply(&pdu(3, safe, count as u16))?;
+    bench.unlock()?;
+    bench.set_words(safe, &vec![0; count])?;
+    let result = with_timeout(bench, tenths(bench, 5), span.first, reads_around_the_end);
+    bench.unlock()?;
+    bench.set_words(safe, &words_of(&safe_before))?;
+    write_all(bench, function, span.first, &before)?;
+    result
+}
+
+/// Writes all outputs and reads them around the instant at which the timeout ends, at another distance each time.
+fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
+    let (function, _, high) = output(bench)?;
+    let span = outputs(bench)?;
+    let count = span.len() as usize;
+    let (high, low) = (vec![high; count], vec![0; count]);
+    let line = bench.endpoint.line();
+    let request = bench.frame(&pdu(function, span.first, count as u16));
+    // The unit reads its outputs when the request has ended and the silence after it has passed. The timeout may
+    // begin with the end of the write or when the silence after it has passed.
+    let ahead = line.characters(request.len()) + line.t35() + BEFORE;
+    let step = (BEFORE + line.t35() + AFTER) / READS;
+    let (mut held, mut safe) = (0, 0);
+    for n in 0..READS {
+        write_all(bench, function, span.first, &high)?;
+        let until = bench.sent_end + timeout + step * n;
+        let now = bench.endpoint.now();
+        bench.rest(until.saturating_sub(now).saturating_sub(ahead))?;
+        let values = read_all(bench, function, span)?;
+        held += u32::from(values == high);
+        safe += u32::from(values == low);
+        bench.ensure(
+            values == high || values == low,
+            "every output as written, or every output at SAFE",
+        )?;
+    }
+    // Where the watchdog never or always trips in this span of time, nothing has been tried.
+    bench.ensure(
+        held > 0 && safe > 0,
+        format!("some reads before and some after the end of the timeout, not {held} and {safe}"),
+    )
 }
 
 fn start_value(bench: &mut Bench<'_>) -> Check {

@@ -1,17 +1,17 @@
 //! Changing a modio's rate and format, and changing it back.
 
-use register_map::codes::Baud;
+use register_map::codes::{self, Baud, Format};
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
-use crate::line::{LineFormat, Parity};
+use crate::frame::Mode;
+use crate::line::{CharacterFormat, LineFormat};
 use crate::rate;
 
 const N: &[Need] = &[
     Need::Modio,
     Need::Config,
     Need::SetLine,
-    Need::Rtu,
     Need::Function(6),
     Need::Function(0x10),
 ];
@@ -34,7 +34,7 @@ pub(super) const CASES: &[Case] = &[
     case(
         "settings/every-format",
         "map, 0x0102",
-        "so can every format",
+        "so can every format that the transmission mode can use",
         N,
         every_format,
     ),
@@ -62,21 +62,19 @@ fn every_rate(bench: &mut Bench<'_>) -> Check {
 
 fn every_format(bench: &mut Bench<'_>) -> Check {
     let home = bench.endpoint.line();
-    if home.data_bits != 8 {
-        return Err(Stop::Skip("the line has no 8 data bits".to_owned()));
-    }
-    let formats = [
-        (Parity::Even, 1),
-        (Parity::Odd, 1),
-        (Parity::None, 1),
-        (Parity::None, 2),
-    ];
+    let mode = match bench.target.mode {
+        Mode::Rtu => codes::Mode::Rtu,
+        Mode::Ascii => codes::Mode::Ascii,
+    };
+    let formats: Result<Vec<CharacterFormat>, String> = Format::ALL
+        .iter()
+        .zip(Format::NAMES)
+        .filter(|(format, _)| format.suits(mode))
+        .map(|(_, (_, name))| name.parse())
+        .collect();
+    let formats = formats.map_err(Stop::Skip)?.into_iter();
     tour(
         bench,
-        formats.map(|(parity, stop_bits)| LineFormat {
-            parity,
-            stop_bits,
-            ..home
-        }),
+        formats.map(|format| LineFormat::new(home.baud, format)),
     )
 }

@@ -94,15 +94,13 @@ fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
         .iter()
         .find(|baud| baud.bits_per_second() == line.baud)
         .ok_or_else(|| Broken(format!("the device has no rate of {} bit/s", line.baud)))?;
-    let format = match line.format().to_string().as_str() {
-        "8N2" => Format::F8N2,
-        "8E1" => Format::F8E1,
-        "8O1" => Format::F8O1,
-        "8N1" => Format::F8N1,
-        other => return Err(Broken(format!("the device has no format {other}"))),
-    };
+    let name = line.format().to_string();
+    let format = Format::NAMES
+        .iter()
+        .find(|(_, known)| *known == name)
+        .ok_or_else(|| Broken(format!("the device has no format {name}")))?;
     Ok([
         (configuration::BAUD, baud.code()),
-        (configuration::FORMAT, format.code()),
+        (configuration::FORMAT, format.0),
     ])
 }

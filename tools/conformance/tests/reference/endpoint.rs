@@ -7,6 +7,7 @@ use conformance::frame::Mode;
 use conformance::line::LineFormat;
 
 use super::fault::Fault;
+use super::modio_fault::ModioFault;
 use super::unit::{Sign, Unit};
 
 /// For the unit to start in.
@@ -26,6 +27,14 @@ impl Reference {
             now: Duration::from_secs(1),
             powered: true,
             starts: None,
+        }
+    }
+
+    /// A modio with this fault.
+    pub fn modio(fault: Option<ModioFault>, mode: Mode, line: LineFormat) -> Self {
+        Self {
+            unit: Unit::modio(fault, mode, line),
+            ..Self::new(None, mode, line)
         }
     }
 
@@ -76,16 +85,19 @@ impl Endpoint for Reference {
             echo: true,
             character_time: true,
             start_bit: true,
+            set_line: self.unit.server.modio.is_some(),
             ..Abilities::default()
         }
     }
 
+    #[expect(clippy::misnamed_getters, reason = "the endpoint is the master's end")]
     fn line(&self) -> LineFormat {
-        self.unit.line
+        self.unit.master
     }
 
-    fn set_line(&mut self, _line: LineFormat) -> Result<(), Broken> {
-        Err(Broken("its line is as it is".to_owned()))
+    fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
+        self.unit.master = line;
+        Ok(())
     }
 
     fn now(&self) -> Duration {
@@ -98,8 +110,8 @@ impl Endpoint for Reference {
     }
 
     fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
-        let length = self.unit.line.characters(1);
-        let bit = self.unit.line.bits(1);
+        let length = self.unit.master.characters(1);
+        let bit = self.unit.master.bits(1);
         for piece in pieces {
             let start = self.now;
             let sign = |byte| Sign {

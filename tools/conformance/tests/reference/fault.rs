@@ -1,19 +1,23 @@
 //! What a faulty server does wrong, one thing at a time, and the cases that must find it.
 
+/// Makes an enumeration of mistakes, and a table of the cases that must find each.
 macro_rules! faults {
-    ($($(#[doc = $about:literal])+ $name:ident => [$($case:literal),+],)+) => {
+    ($name:ident $table:ident; $($(#[doc = $about:literal])+ $fault:ident => [$($case:literal),+],)+) => {
         /// A mistake.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Fault {
-            $($(#[doc = $about])+ $name,)+
+        pub enum $name {
+            $($(#[doc = $about])+ $fault,)+
         }
 
         /// Every mistake, and the names of the cases that must fail by it.
-        pub const FAULTS: &[(Fault, &[&str])] = &[$((Fault::$name, &[$($case),+])),+];
+        pub const $table: &[($name, &[&str])] = &[$(($name::$fault, &[$($case),+])),+];
     };
 }
 
+pub(super) use faults;
+
 faults! {
+    Fault FAULTS;
     /// Replies to broadcasts.
     AnswersBroadcasts => ["broadcast/coils", "broadcast/registers", "broadcast/read", "broadcast/nonsense", "timing/driver-stays-off"],
     /// Takes 255 for a broadcast.

@@ -43,6 +43,11 @@ impl Log {
         self.event(0x40 | self.mode_bit() | bits);
     }
 
+    /// A counter by its place, 0 to 7: that of sub-function 0B and up.
+    pub fn counter(&self, place: u16) -> u16 {
+        self.counters[usize::from(place)]
+    }
+
     fn mode_bit(&self) -> u8 {
         u8::from(self.listen_only && self.fault != Some(Fault::ModeUnlogged)) << 5
     }

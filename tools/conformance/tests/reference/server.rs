@@ -2,6 +2,8 @@
 
 use super::fault::Fault;
 use super::log::{COUNTERS, Log};
+use super::modio::Modio;
+use super::modio_fault::ModioFault;
 
 /// Coils and registers, and where they are.
 pub const COILS: (u16, usize) = (100, 2100);
@@ -23,6 +25,8 @@ pub struct Server {
     pub holding: Vec<u16>,
     pub log: Log,
     pub delimiter: u8,
+    /// What a modio has in place of coils and registers.
+    pub modio: Option<Modio>,
 }
 
 impl Server {
@@ -33,7 +37,13 @@ impl Server {
             holding: vec![1; HOLDING.1],
             log: Log::new(fault),
             delimiter: b'\n',
+            modio: None,
         }
+    }
+
+    /// Whether this is a modio with this fault.
+    pub fn modio_has(&self, fault: ModioFault) -> bool {
+        self.modio.as_ref().is_some_and(|modio| modio.has(fault))
     }
 
     pub fn has(&self, fault: Fault) -> bool {
@@ -42,6 +52,10 @@ impl Server {
 
     /// Does what a PDU asks for: the reply's data, or an exception code.
     pub fn answer(&mut self, pdu: &[u8]) -> Answer {
+        let of_modio = self.modio.as_mut();
+        if let Some(answer) = of_modio.and_then(|modio| modio.answer(pdu, &self.log)) {
+            return answer;
+        }
         let word = |at: usize| {
             pdu.get(at..at + 2)
                 .map(|w| u16::from_be_bytes([w[0], w[1]]))

@@ -8,10 +8,12 @@ use conformance::frame::{Mode, crc, lrc};
 use conformance::line::LineFormat;
 
 use super::fault::Fault;
+use super::modio::{self, Modio};
+use super::modio_fault::ModioFault;
 use super::server::{SILENT, Server};
 
-/// The unit's address.
-pub const UNIT: u8 = 9;
+/// The unit's address when it is no modio.
+const UNIT: u8 = 9;
 
 /// From the end of the silence to the reply.
 const THINKING: Duration = Duration::from_micros(40);
@@ -29,8 +31,11 @@ pub struct Sign {
 /// The unit.
 pub struct Unit {
     pub server: Server,
+    pub address: u8,
     pub mode: Mode,
     pub line: LineFormat,
+    /// Rate and format of the master. The two understand each other when they have the same.
+    pub master: LineFormat,
     /// Counts characters of the line's format for t1.5 and t3.5, not characters of 11 bits.
     pub own_characters: bool,
     /// It waits for the data that a write announces, or drops the write.
@@ -58,8 +63,10 @@ impl Unit {
     pub fn new(fault: Option<Fault>, mode: Mode, line: LineFormat) -> Self {
         Self {
             server: Server::new(fault),
+            address: UNIT,
             mode,
             line,
+            master: line,
             own_characters: false,
             silent_to_incomplete_writes: false,
             said: VecDeque::new(),
@@ -78,10 +85,25 @@ impl Unit {
         }
     }
 
+    /// A modio with this fault.
+    pub fn modio(fault: Option<ModioFault>, mode: Mode, line: LineFormat) -> Self {
+        let mut unit = Self::new(None, mode, line);
+        unit.address = modio::UNIT;
+        let mut modio = Modio::new(fault);
+        unit.line = modio.start(Duration::ZERO, true);
+        unit.server.modio = Some(modio);
+        unit
+    }
+
     /// Started again at this instant.
     pub fn start(&mut self, at: Duration) {
         let old = std::mem::replace(self, Self::new(self.server.fault, self.mode, self.line));
         self.edges = old.edges;
+        (self.address, self.master) = (old.address, old.master);
+        self.server.modio = old.server.modio;
+        if let Some(modio) = &mut self.server.modio {
+            self.line = modio.start(at, true);
+        }
         self.own_characters = old.own_characters;
         self.silent_to_incomplete_writes = old.silent_to_incomplete_writes;
         self.last = Some(at);
@@ -140,6 +162,13 @@ impl Unit {
 
     /// A character comes.
     pub fn hear(&mut self, sign: Sign) {
+        if self.line != self.master {
+            return;
+        }
+        let fast = sign.start < self.reply_end + self.line.t15();
+        if fast && self.server.modio_has(ModioFault::LosesFastRequests) {
+            return;
+        }
         if let Some(last) = self.last {
             let gap = sign.start.saturating_sub(last);
             let near_the_end = self.open.len() > 5;
@@ -288,16 +317,16 @@ impl Unit {
         if !good || body.len() < 2 {
             self.spoilt();
             self.deaf |= self.server.has(Fault::DeafAfterBadFrames);
-            if self.server.has(Fault::AnswersNoise) && body.first() == Some(&UNIT) {
-                self.say(&[UNIT, 0x80, 1], at);
+            if self.server.has(Fault::AnswersNoise) && body.first() == Some(&self.address) {
+                self.say(&[self.address, 0x80, 1], at);
             }
             return;
         }
         let (unit, pdu) = (body[0], &body[1..]);
         let broadcast = unit == 0 || (unit == 255 && self.server.has(Fault::Obeys255));
-        let mine = unit == UNIT
+        let mine = unit == self.address
             || broadcast
-            || (unit == UNIT ^ 1 && self.server.has(Fault::AnswersNeighbour))
+            || (unit == self.address ^ 1 && self.server.has(Fault::AnswersNeighbour))
             || (unit >= 248 && self.server.has(Fault::AnswersReserved));
         if mine || !self.server.has(Fault::DeafCounter) {
             self.server.log.count(0x0B);
@@ -320,7 +349,7 @@ impl Unit {
             if self.server.has(Fault::FindsInside) {
                 let inside = body
                     .windows(8)
-                    .find(|w| w[0] == UNIT && crc(&w[..6]) == w[6..]);
+                    .find(|w| w[0] == self.address && crc(&w[..6]) == w[6..]);
                 if let Some(inside) = inside.map(<[u8]>::to_vec) {
                     self.serve(&inside[1..6], false, at);
                 }
@@ -332,6 +361,9 @@ impl Unit {
     }
 
     fn serve(&mut self, pdu: &[u8], broadcast: bool, at: Duration) {
+        if let Some(modio) = &mut self.server.modio {
+            modio.request(at, broadcast);
+        }
         if !broadcast || !self.server.has(Fault::BroadcastsAreNoMessages) {
             self.server.log.count(0x0E);
         }
@@ -383,15 +415,19 @@ impl Unit {
             return;
         }
         let reply = match answer {
-            Ok(data) => [vec![UNIT, pdu[0]], data].concat(),
+            Ok(data) => [vec![self.address, pdu[0]], data].concat(),
             Err(1) if self.server.has(Fault::SilentToUnknown) => return,
             Err(SILENT) => return,
-            Err(code) => vec![UNIT, pdu[0] | 0x80, code],
+            Err(code) if self.server.modio_has(ModioFault::LongExceptions) => {
+                vec![self.address, pdu[0] | 0x80, code, code]
+            }
+            Err(code) => vec![self.address, pdu[0] | 0x80, code],
         };
         let kind = match reply[..] {
             _ if self.server.has(Fault::ExceptionsLoggedAsReplies) => 0,
             [_, function, code] if function & 0x80 != 0 => match code {
                 1..=3 => 0x01,
+                6 if self.server.modio_has(ModioFault::LogsBusyAsRefused) => 0x01,
                 4 => 0x02,
                 5 | 6 => 0x04,
                 _ => 0x08,
@@ -401,7 +437,19 @@ impl Unit {
         if !self.server.has(Fault::RepliesUnlogged) {
             self.server.log.sent(kind);
         }
-        self.say(&reply, at);
+        if self.server.modio_has(ModioFault::RestartsBeforeReply) {
+            self.restart(at);
+        }
+        let delay = self.server.modio.as_ref().map(Modio::response_delay);
+        self.say(&reply, at + delay.unwrap_or_default());
+        self.restart(at);
+    }
+
+    /// A modio starts again when it was told to.
+    fn restart(&mut self, at: Duration) {
+        if let Some(modio) = self.server.modio.as_mut().filter(|modio| modio.restart) {
+            self.line = modio.start(at, false);
+        }
     }
 
     fn say(&mut self, body: &[u8], at: Duration) {
@@ -427,7 +475,7 @@ impl Unit {
                 byte: *byte,
                 start,
                 end,
-                good: true,
+                good: self.line == self.master,
             });
             start = end;
         }

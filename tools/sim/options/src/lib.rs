@@ -5,7 +5,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use register_map::Module;
+use register_map::{Module, codes::Format};
 
 /// What the simulator is told on its command line.
 #[derive(clap::Args, Clone, Debug, PartialEq, Eq)]
@@ -44,6 +44,11 @@ pub struct Options {
     #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "gdb"])]
     pub exact_line: Option<SocketAddr>,
 
+    /// Rate and format of the line's client, such as 9600,7N2: it keeps them whatever the unit does. Without the
+    /// option the client follows the unit, which is not possible with 7N2, because the unit's UART is set to 8N1 then
+    #[arg(long, value_name = "RATE,FORMAT", value_parser = line)]
+    pub line: Option<(u32, String)>,
+
     /// Where the HTTP interface listens, HOST:PORT; port 0 takes a free one
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
     pub http: SocketAddr,
@@ -67,6 +72,19 @@ impl Options {
     pub fn preset(&self) -> bool {
         !self.no_preset
     }
+}
+
+/// `RATE,FORMAT` as a rate and the name of a format.
+fn line(text: &str) -> Result<(u32, String), String> {
+    let wrong = || format!("{text:?} is no rate and format such as 9600,7N2");
+    let (rate, name) = text.split_once(',').ok_or_else(wrong)?;
+    let known = |(_, format): &&(u16, &str)| format.eq_ignore_ascii_case(name);
+    let (_, format) = Format::NAMES.iter().find(known).ok_or_else(wrong)?;
+    let rate = rate.parse().map_err(|_| wrong())?;
+    let possible = (300..=4_000_000).contains(&rate);
+    possible
+        .then(|| (rate, (*format).to_owned()))
+        .ok_or_else(wrong)
 }
 
 /// `HOST:PORT` as an address; of a name with several, the first IPv4 one, as clients try that too.
@@ -121,7 +139,7 @@ mod tests {
         assert!(options.preset());
         assert_eq!((options.pty, options.tcp, options.elf), (None, None, None));
         assert_eq!((options.flash, options.gdb), (None, None));
-        assert_eq!(options.exact_line, None);
+        assert_eq!((options.exact_line, options.line), (None, None));
         assert_eq!(options.run_for, None);
     }
 
@@ -140,6 +158,15 @@ mod tests {
         assert!(!parse(&["--no-preset"]).unwrap().preset());
         assert!(parse(&["--no-preset", "--preset"]).unwrap().preset());
         assert!(!parse(&["--preset", "--no-preset"]).unwrap().preset());
+    }
+
+    #[test]
+    fn line_takes_every_format_of_the_register_map() {
+        for (_, name) in Format::NAMES {
+            let text = format!("19200,{}", name.to_lowercase());
+            let line = parse(&["--line", &text]).unwrap().line;
+            assert_eq!(line, Some((19_200, (*name).to_owned())));
+        }
     }
 
     #[test]
@@ -173,6 +200,9 @@ mod tests {
                 "cannot be used with",
             ),
             (&["--pty"][..], "--pty <LINK>"),
+            (&["--line", "9600"][..], "9600,7N2"),
+            (&["--line", "9600,7N1"][..], "9600,7N2"),
+            (&["--line", "100,8N2"][..], "9600,7N2"),
         ] {
             let text = parse(arguments).unwrap_err();
             assert!(text.contains(part), "{arguments:?}: {text}");

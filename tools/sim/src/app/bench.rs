@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::io::Write;
 
 use sim::Board;
+use sim::line::Settings;
 
 use super::gdb::Debug;
 
@@ -34,6 +35,12 @@ impl Bench {
             unfinished: String::new(),
             findings: 0,
         }
+    }
+
+    /// Sets the rate and format of the line's client, which then no longer follows the unit.
+    pub fn fix_line(&mut self, settings: Settings) {
+        self.board.line().set_follow(false);
+        self.board.line().set_settings(settings);
     }
 
     /// The last lines of the firmware's log, oldest first.

@@ -18,6 +18,7 @@ use std::sync::mpsc;
 
 use ::exact_line::Request;
 use register_map::{Module, record};
+use sim::line::{Format, Settings};
 use sim::{Board, Config, Image, Time};
 use sim_options::Options;
 
@@ -73,6 +74,13 @@ pub fn run(options: &Options) -> Result<(), String> {
         None => (None, None),
     };
     let mut bench = Bench::new(board(options, stored)?);
+    if let Some((baud, format)) = &options.line {
+        let format = Format::named(format).ok_or("the simulator does not know this format")?;
+        bench.fix_line(Settings {
+            baud: *baud,
+            format,
+        });
+    }
     let (events, queue) = mpsc::channel();
 
     let stop = events.clone();

@@ -4,6 +4,7 @@ use core::fmt;
 
 use register_map::Module;
 
+use crate::corner::Corner;
 use crate::slot;
 
 /// How the board is fitted before power first comes on.
@@ -13,6 +14,8 @@ pub struct Config {
     pub dip: u8,
     /// What is plugged into the slot.
     pub module: Module,
+    /// The corner that the part is at.
+    pub corner: Corner,
     /// Whether the 8 MHz crystal works. Without it HSERDY never comes. It can die later as well
     /// ([`crate::Board::set_crystal`]).
     pub crystal: bool,
@@ -30,6 +33,7 @@ impl Default for Config {
         Self {
             dip: 1,
             module: Module::Di4,
+            corner: Corner::Nominal,
             crystal: true,
             flash: None,
             unique_id: *b"modio-sim-01",

@@ -30,20 +30,26 @@ impl Board {
         Ok(self.machine.flash_mut())
     }
 
-    /// Overwrites code while the part runs, to break the program on purpose. Not a flash operation:
-    /// nothing stalls and nothing is checked.
+    /// Overwrites code in flash or SRAM while the part runs, to break the program on purpose. Not a flash
+    /// operation: nothing stalls and nothing is checked. What was there before.
     ///
     /// # Errors
     ///
-    /// [`Error::Range`] when the bytes do not all lie in flash.
-    pub fn patch_code(&mut self, address: u32, bytes: &[u8]) -> Result<(), Error> {
-        let outside = Error::Range("an address in flash");
-        let at = address.checked_sub(FLASH_BASE).ok_or(outside.clone())? as usize;
-        self.machine
-            .flash_range_mut(at..at.saturating_add(bytes.len()))
-            .ok_or(outside)?
-            .copy_from_slice(bytes);
-        Ok(())
+    /// [`Error::Range`] when the bytes do not all lie in flash or SRAM.
+    pub fn patch_code(&mut self, address: u32, bytes: &[u8]) -> Result<Vec<u8>, Error> {
+        let range = |base: u32| {
+            let at = address.checked_sub(base)? as usize;
+            Some(at..at.saturating_add(bytes.len()))
+        };
+        let place = if address >= RAM_BASE {
+            range(RAM_BASE).and_then(|range| self.machine.ram_mut().get_mut(range))
+        } else {
+            range(FLASH_BASE).and_then(|range| self.machine.flash_range_mut(range))
+        };
+        let place = place.ok_or(Error::Range("an address in flash or SRAM"))?;
+        let before = place.to_vec();
+        place.copy_from_slice(bytes);
+        Ok(before)
     }
 
     /// Inverts bits of a block's register, as a disturbance of the part does: the register is read, and written

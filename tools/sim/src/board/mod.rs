@@ -55,8 +55,14 @@ impl Board {
         }
         image.load(flash.bytes_mut());
         let ident = Ident::new(config.unique_id, config.write_protection);
-        let soc = Soc::new(config.crystal, flash, Slot::new(config.module));
-        let mut machine = Machine::new(soc, ident, image.symbol("_SEGGER_RTT"));
+        let soc = Soc::new(
+            config.crystal,
+            config.corner,
+            flash,
+            Slot::new(config.module),
+        );
+        let costs = config.corner.costs();
+        let mut machine = Machine::new(soc, ident, costs, image.symbol("_SEGGER_RTT"));
         machine.bus.soc.set_switch(config.dip, Time::ZERO);
         machine.power_on();
         Ok(Self {

@@ -17,13 +17,19 @@ pub struct Character {
 }
 
 impl Character {
-    /// `byte` in the format and at the rate of `settings`, starting at time 0.
+    /// `byte` in the format and at the rate of `settings`, starting at time 0. With seven data bits its
+    /// highest bit is not sent.
     #[must_use]
     pub fn new(settings: Settings, byte: u8) -> Self {
-        let data = u16::from(byte);
+        let data_bits = settings.format.data_bits();
+        let data = u16::from(byte) & ones(0, data_bits);
+        let after_data = 1 + data_bits;
         let (levels, stop) = match settings.format.parity() {
-            None => (data << 1, 9),
-            Some(parity) => (data << 1 | u16::from(parity.bit(data)) << 9, 10),
+            None => (data << 1, after_data),
+            Some(parity) => {
+                let parity = u16::from(parity.bit(data)) << after_data;
+                (data << 1 | parity, after_data + 1)
+            }
         };
         let bits = settings.format.bits();
         Self {
@@ -69,10 +75,10 @@ impl Character {
         self
     }
 
-    /// The same with its parity bit turned over, in a format that has one (8E1, 8O1): bit 9.
+    /// The same with its parity bit turned over, in a format that has one: the bit before the only stop bit.
     #[must_use]
     pub const fn with_wrong_parity(self) -> Self {
-        self.with_bit_flipped(9)
+        self.with_bit_flipped(self.bits - 2)
     }
 
     /// The same with its first stop bit low: a framing error. `settings` are those it was made with.
@@ -141,6 +147,12 @@ mod tests {
         assert_eq!(made(Format::N1, 0xFF).levels, 0b1_1111_1111_0);
         assert_eq!(made(Format::E1, 0x07).levels, 0b1_1_0000_0111_0);
         assert_eq!(made(Format::O1, 0x07).levels, 0b1_0_0000_0111_0);
+        assert_eq!(made(Format::SevenE1, 0x87).levels, 0b1_1_000_0111_0);
+        assert_eq!(made(Format::SevenO1, 0x07).levels, 0b1_0_000_0111_0);
+        assert_eq!(made(Format::SevenN2, 0x85).levels, 0b11_000_0101_0);
+        for format in [Format::SevenE1, Format::SevenO1, Format::SevenN2] {
+            assert_eq!(made(format, 0).bits, 10, "{format:?}");
+        }
         assert_eq!(made(Format::N1, 0).bits, 10);
         assert_eq!(made(Format::O1, 0).bits, 11);
     }
@@ -149,6 +161,8 @@ mod tests {
     fn damage_touches_only_its_bit() {
         let good = made(Format::E1, 0xA5);
         assert_eq!(good.with_wrong_parity().levels, good.levels ^ 1 << 9);
+        let seven = made(Format::SevenO1, 0x25);
+        assert_eq!(seven.with_wrong_parity().levels, seven.levels ^ 1 << 8);
         assert_eq!(good.with_bit_flipped(1).levels, good.levels ^ 1 << 1);
         assert_eq!(good.with_bit_flipped(11), good);
         let settings = Settings {

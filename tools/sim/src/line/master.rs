@@ -10,7 +10,7 @@ use crate::time::Time;
 /// A character the master heard while the unit spoke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received {
-    /// Its eight data bits.
+    /// Its data bits, the parity bit not among them.
     pub byte: u8,
     /// The falling edge of its start bit.
     pub start: Time,

@@ -23,7 +23,7 @@ impl Parity {
     }
 }
 
-/// Character format of the line: eight data bits, then what its name says, in the numbering of the
+/// Character format of the line: eight data bits unless the name says seven, in the numbering of the
 /// FORMAT register.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
@@ -36,19 +36,48 @@ pub enum Format {
     O1,
     /// 8N1: no parity, one stop bit.
     N1,
+    /// 7E1: seven data bits, even parity, one stop bit.
+    SevenE1,
+    /// 7O1: seven data bits, odd parity, one stop bit.
+    SevenO1,
+    /// 7N2: seven data bits, no parity, two stop bits.
+    SevenN2,
 }
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 4] = [Self::N2, Self::E1, Self::O1, Self::N1];
+    pub const ALL: [Self; 7] = [
+        Self::N2,
+        Self::E1,
+        Self::O1,
+        Self::N1,
+        Self::SevenE1,
+        Self::SevenO1,
+        Self::SevenN2,
+    ];
+
+    /// The format with this [`name`](Self::name).
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.name() == name)
+    }
+
+    /// Data bits: 7 or 8.
+    #[must_use]
+    pub const fn data_bits(self) -> u8 {
+        match self {
+            Self::N2 | Self::E1 | Self::O1 | Self::N1 => 8,
+            Self::SevenE1 | Self::SevenO1 | Self::SevenN2 => 7,
+        }
+    }
 
     /// The parity, if there is one.
     #[must_use]
     pub const fn parity(self) -> Option<Parity> {
         match self {
-            Self::N2 | Self::N1 => None,
-            Self::E1 => Some(Parity::Even),
-            Self::O1 => Some(Parity::Odd),
+            Self::N2 | Self::N1 | Self::SevenN2 => None,
+            Self::E1 | Self::SevenE1 => Some(Parity::Even),
+            Self::O1 | Self::SevenO1 => Some(Parity::Odd),
         }
     }
 
@@ -56,21 +85,18 @@ impl Format {
     #[must_use]
     pub const fn stop_bits(self) -> u8 {
         match self {
-            Self::N2 => 2,
-            Self::E1 | Self::O1 | Self::N1 => 1,
+            Self::N2 | Self::SevenN2 => 2,
+            Self::E1 | Self::O1 | Self::N1 | Self::SevenE1 | Self::SevenO1 => 1,
         }
     }
 
     /// Bits of one character, start and stop bits included: 10 or 11.
     #[must_use]
     pub const fn bits(self) -> u8 {
-        match self {
-            Self::N2 | Self::E1 | Self::O1 => 11,
-            Self::N1 => 10,
-        }
+        1 + self.data_bits() + self.parity().is_some() as u8 + self.stop_bits()
     }
 
-    /// The name on a panel: `8N2`, `8E1`, `8O1` or `8N1`.
+    /// The name on a panel, such as `8N2`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -78,6 +104,9 @@ impl Format {
             Self::E1 => "8E1",
             Self::O1 => "8O1",
             Self::N1 => "8N1",
+            Self::SevenE1 => "7E1",
+            Self::SevenO1 => "7O1",
+            Self::SevenN2 => "7N2",
         }
     }
 }
@@ -153,7 +182,7 @@ impl Settings {
     /// The shortest silence that ends an RTU frame. Up to 19200 bit/s it is 3.5 characters of this
     /// format, above that 1750 us (Modbus over Serial Line V1.02, 2.5.1.1).
     ///
-    /// The standard counts 11-bit characters (2.5.1); with 8N1 a unit may count its own 10-bit ones.
+    /// The standard counts 11-bit characters (2.5.1); in a format of 10 bits a unit may count its own.
     /// Between the two values nothing is demanded. The unit on this board counts its own, so the
     /// shorter value is t3.5 here: with 11 bits the record would join frames that the unit answers.
     #[must_use]
@@ -196,7 +225,10 @@ mod tests {
     fn frame_silence_counts_the_bits_of_the_format_up_to_19200() {
         for format in Format::ALL {
             let at = |baud| Settings { baud, format };
-            let bits = if format == Format::N1 { 70 } else { 77 };
+            let bits = match format {
+                Format::N2 | Format::E1 | Format::O1 => 77,
+                Format::N1 | Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => 70,
+            };
             for baud in [1200, 9600, 19_200] {
                 let expected = Time::cycles(bits, 2 * baud);
                 assert_eq!(at(baud).frame_silence(), expected, "{format:?} {baud}");

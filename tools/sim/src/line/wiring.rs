@@ -251,6 +251,10 @@ impl Line {
         let framing = Framing::of(self.settings);
         let silence = self.settings.frame_silence();
         while let Some(word) = self.listener.next_word(&self.bus, &framing, self.now) {
+            let word = Word {
+                data: framing.payload(word.data),
+                ..word
+            };
             self.heard(&word, silence);
         }
         let quiet_until = self.listener.start().unwrap_or(self.now);

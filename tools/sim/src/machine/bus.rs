@@ -11,8 +11,9 @@ use rigless::soc::Width as CoreWidth;
 use rigless::time::VirtualNanos;
 
 use super::dwt::{self, Dwt};
-use super::memory::{FLASH_BASE, FLASH_SIZE};
-use super::timing::{InstructionClock, cycles_per_64};
+use super::memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
+use super::segment::Segments;
+use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
 use crate::periph::dbgmcu::Dbgmcu;
@@ -48,6 +49,18 @@ pub struct Bus {
     pub(super) pc: u32,
     /// How long interrupts wait, when that is measured.
     pub(super) waits: Option<Box<Waits>>,
+    /// The SRAM.
+    pub(super) ram: Memory,
+    /// What the code costs.
+    pub(super) segments: Segments,
+    /// Reads of flash come here.
+    pub(super) flash_is_watched: bool,
+    /// The core has read flash while an operation runs, and waits for its end.
+    pub(super) read_stalls: bool,
+    /// A block has been accessed, so its next event may be another one.
+    pub(super) touched: bool,
+    /// The access under way leaves the core free to go on.
+    pub(super) carries_on: bool,
 }
 
 /// An access as the blocks see it.
@@ -124,14 +137,40 @@ impl Bus {
         }
         // The machine makes the reset, and waits out the flash.
         self.halt |= self.soc.signals.reset.is_some() || self.soc.flash.busy_until().is_some();
+        self.watch_flash();
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.
     pub(super) fn update_rate(&mut self, count: u64) {
         let (wait_states, prefetch) = self.soc.flash.access_control();
         let hclk = self.soc.rcc.clocks().hclk;
-        self.clock
-            .set_rate(count, hclk, cycles_per_64(wait_states, prefetch));
+        self.segments.set_flash(wait_states, prefetch);
+        self.clock.set_rate(count, hclk);
+    }
+
+    /// Whether every read of constants in flash comes here, to be charged.
+    pub(super) fn charges_tables(&self) -> bool {
+        self.segments.pace().costs.charges_tables
+    }
+
+    /// What an access costs beyond one of SRAM.
+    fn cost_of(&self, access: &Access, from_code: bool) -> u32 {
+        let pace = self.segments.pace();
+        let address = access.address as u32;
+        let clocks = self.soc.rcc.clocks();
+        let divider = |pclk: u32| Some(clocks.hclk.checked_div(pclk).unwrap_or(1));
+        let write = access.kind == AccessKind::Write;
+        match address {
+            _ if !from_code => 0,
+            // APB1, APB2 and AHB: RM0008 3.3, table 3.
+            0x4000_0000..0x4001_0000 => pace.block(write, divider(clocks.pclk1)),
+            0x4001_0000..0x4001_8000 => pace.block(write, divider(clocks.pclk2)),
+            0x4001_8000..0x6000_0000 | PPB.. => pace.block(write, None),
+            _ if self.charges_tables() && !write && flash_offset(address).is_some() => {
+                pace.flash_read()
+            }
+            _ => 0,
+        }
     }
 
     /// Answers an access; `None` is a bus fault.
@@ -144,8 +183,14 @@ impl Bus {
             }
             PPB..0xE010_0000 => Some(self.debug_block(request)),
             _ => match flash_offset(address) {
-                Some(offset) if request.write.is_none() => Some(self.vectors(request, offset)),
+                Some(offset) if request.write.is_none() => {
+                    self.read_stalls |= self.soc.flash.busy_until().is_some();
+                    Some(word_of(self.soc.flash.bytes(), request, offset))
+                }
                 Some(offset) => self.store_to_flash(request, offset),
+                None if address.wrapping_sub(RAM_BASE) < RAM_SIZE as u32 => {
+                    Some(self.routed_ram(request, address - RAM_BASE))
+                }
                 None => {
                     self.note(
                         request,
@@ -281,12 +326,20 @@ impl Bus {
         }
     }
 
-    /// The core reads the flash without asking, all but the page of the vector table while [`Waits`] has it
-    /// sent here.
-    fn vectors(&self, request: Request, offset: u32) -> u32 {
-        let at = (offset & !3) as usize;
-        let flash = self.soc.flash.bytes();
-        request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| flash[at + n])))
+    /// The core reads and writes SRAM without asking, all but the page of the vector table while [`Waits`] has
+    /// it sent here.
+    fn routed_ram(&mut self, request: Request, offset: u32) -> u32 {
+        if let Some(value) = request.write {
+            let bytes = value.to_le_bytes();
+            let width = match request.width {
+                Width::Byte => 1,
+                Width::Half => 2,
+                Width::Word => 4,
+            };
+            let at = offset as usize;
+            self.ram.bytes_mut()[at..at + width].copy_from_slice(&bytes[..width]);
+        }
+        word_of(self.ram.bytes(), request, offset)
     }
 
     fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {
@@ -312,6 +365,12 @@ impl Bus {
     }
 }
 
+/// What a read at `offset` of `memory` gives.
+fn word_of(memory: &[u8], request: Request, offset: u32) -> u32 {
+    let at = (offset & !3) as usize;
+    request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| memory[at + n])))
+}
+
 /// The offset into flash of `address`, at its own place or at 0.
 fn flash_offset(address: u32) -> Option<u32> {
     let size = FLASH_SIZE as u32;
@@ -323,6 +382,7 @@ fn flash_offset(address: u32) -> Option<u32> {
 
 impl CoreBus for Bus {
     fn access(&mut self, access: Access, from_code: bool) -> Option<u64> {
+        self.clock.charge(self.cost_of(&access, from_code));
         let now = self.clock.time(access.instruction_count);
         if let Some(waits) = self.waits.as_mut().filter(|_| !from_code) {
             waits.vector_read(access.address as u32, now);
@@ -345,6 +405,9 @@ impl CoreBus for Bus {
         }
         let answer = self.answer(request);
         self.take_up(access.instruction_count);
+        // A line that rose is the core's to look at first.
+        self.carries_on = self.queued.is_empty();
+        self.touched = true;
         if let Some(complaint) = self.soc.flash.take_complaint() {
             self.note(request, What::Flash(complaint.text));
             if complaint.bus_error {
@@ -364,7 +427,9 @@ impl CoreBus for Bus {
     }
 
     fn carry_on(&mut self, instructions: u64, event: Option<VirtualNanos>) -> Option<u32> {
-        if self.halt || self.waits.is_some() {
+        // An access to the core's own registers, which may have pended an exception, does not set it.
+        let carries_on = core::mem::take(&mut self.carries_on);
+        if self.halt || self.waits.is_some() || !carries_on {
             return None;
         }
         let mut until = self.stop.0.min(self.soc.next_event());

@@ -1,13 +1,19 @@
 //! The machine: the Cortex-M3 core with its memories, on the bus with everything else.
 //!
 //! The core is crate rigless's: it translates the firmware's instructions to host code and counts them. Its
-//! time is [`timing`]'s, its bus is [`bus`], and [`run`] takes it from event to event.
+//! time is [`timing`]'s, by the [`costs`] of the [`segment`]s of code that [`execute`] lets it run; its bus is
+//! [`bus`], and [`run`] takes it from event to event.
 
 pub mod bus;
+pub mod costs;
 mod debug;
+pub mod decode;
 pub mod dwt;
+mod execute;
+mod flash_reads;
 pub mod memory;
 mod run;
+pub mod segment;
 pub mod timing;
 pub mod usage;
 pub mod waits;
@@ -28,10 +34,13 @@ use crate::soc::Soc;
 use crate::soc::map::irq;
 use crate::time::Time;
 use bus::Bus;
+use costs::{Costs, Pace};
 use dwt::Dwt;
+use execute::Active;
 use memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
 pub use run::{Limit, Stop};
-use timing::{InstructionClock, cycles_per_64};
+use segment::Segments;
+use timing::InstructionClock;
 use usage::{CoreTime, Resting};
 use waits::{Wait, Waits};
 
@@ -58,7 +67,6 @@ pub struct Machine {
     core: Box<dyn Processor>,
     /// Everything else.
     pub bus: Bus,
-    ram: Memory,
     /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
     fresh: Vec<u8>,
     /// Instructions done before the core's last reset.
@@ -75,17 +83,23 @@ pub struct Machine {
     log: Log,
     /// When the log is emptied next.
     poll_at: Time,
+    /// The exception being handled.
+    active: Active,
+    /// Where the code goes on that has just ended without a branch.
+    sequential: Option<u32>,
+    /// An exception may be entered before the next instruction.
+    unsettled: bool,
 }
 
 impl Machine {
-    /// A machine around `soc`, without power, at time 0, whose firmware keeps its RTT control block at
-    /// `rtt_block`.
+    /// A machine around `soc`, without power, at time 0, whose core has these costs and whose firmware
+    /// keeps its RTT control block at `rtt_block`.
     ///
     /// # Panics
     ///
     /// On a host that the core cannot generate code for.
     #[must_use]
-    pub fn new(mut soc: Soc, ident: Ident, rtt_block: Option<u32>) -> Self {
+    pub fn new(mut soc: Soc, ident: Ident, costs: Costs, rtt_block: Option<u32>) -> Self {
         let mut ram = Memory::new(RAM_SIZE, 0);
         let mut core = core();
         let fresh = core.save();
@@ -104,7 +118,12 @@ impl Machine {
             core,
             bus: Bus {
                 soc,
-                clock: InstructionClock::new(Time::ZERO, hclk, cycles_per_64(0, true)),
+                clock: InstructionClock::new(Time::ZERO, hclk),
+                segments: Segments::new(Pace {
+                    costs,
+                    wait_states: 0,
+                    prefetch: true,
+                }),
                 findings: Findings::default(),
                 ident,
                 dbgmcu: Dbgmcu::default(),
@@ -114,8 +133,12 @@ impl Machine {
                 queued: Vec::new(),
                 pc: 0,
                 waits: None,
+                ram,
+                flash_is_watched: false,
+                read_stalls: false,
+                touched: false,
+                carries_on: false,
             },
-            ram,
             fresh,
             counted: 0,
             powered: false,
@@ -128,6 +151,9 @@ impl Machine {
             resting: Resting::default(),
             log: Log::new(rtt_block),
             poll_at: if rtt_block.is_some() { POLL } else { Time::MAX },
+            active: Active::default(),
+            sequential: None,
+            unsettled: true,
         }
     }
 
@@ -160,7 +186,8 @@ impl Machine {
         if let Some(mut waits) = self.bus.waits.take() {
             waits.leave(&mut *self.core);
         }
-        self.bus.waits = on.then(|| Box::new(Waits::new()));
+        let keep = self.bus.charges_tables();
+        self.bus.waits = on.then(|| Box::new(Waits::new(keep)));
     }
 
     /// How long exception `number` had to wait, as measured.
@@ -204,13 +231,13 @@ impl Machine {
 
     /// What the firmware logged since the last call.
     pub fn take_log(&mut self) -> String {
-        self.log.take(self.ram.bytes())
+        self.log.take(self.bus.ram.bytes())
     }
 
     /// The SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
-        self.ram.bytes()
+        self.bus.ram.bytes()
     }
 
     /// The SRAM, to change: a debugger's write.
@@ -218,7 +245,7 @@ impl Machine {
         let base = u64::from(RAM_BASE);
         self.core
             .ask(Queued::Invalidate(base, base + RAM_SIZE as u64));
-        self.ram.bytes_mut()
+        self.bus.ram.bytes_mut()
     }
 
     /// The flash, to change: a programmer's write.
@@ -268,7 +295,7 @@ impl Machine {
         }
         let now = self.now();
         self.bus.advance(now, self.core.retired());
-        self.log.poll(self.ram.bytes_mut());
+        self.log.poll(self.bus.ram.bytes_mut());
         self.powered = false;
         self.locked_up = false;
         self.cut = None;
@@ -289,7 +316,7 @@ impl Machine {
     /// A reset of the whole part.
     pub fn reset(&mut self, cause: Cause) {
         let now = self.now();
-        self.log.poll(self.ram.bytes_mut());
+        self.log.poll(self.bus.ram.bytes_mut());
         self.bus.soc.reset(cause, now);
         let count = self.core.retired();
         self.counted += count;
@@ -313,6 +340,8 @@ impl Machine {
             .retain(|queued| !matches!(queued, Queued::Line(..)));
         self.bus.soc.repeat_lines();
         self.bus.update_rate(0);
+        self.active = Active::default();
+        self.unsettled = true;
         self.locked_up = false;
         self.resets = self.resets.saturating_add(1);
         let pulse = if cause == Cause::PowerOn {

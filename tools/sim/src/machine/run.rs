@@ -24,8 +24,8 @@ const SCR_SLEEPDEEP: u64 = 1 << 2;
 const ICSR: u64 = 0xE000_ED04;
 const NMIPENDSET: u64 = 1 << 31;
 /// xPSR by its number, its field with the exception being handled, and the NMI's number (PM0056 2.1.3).
-const XPSR: usize = 16;
-const IPSR: u32 = 0x1FF;
+pub(super) const XPSR: usize = 16;
+pub(super) const IPSR: u32 = 0x1FF;
 const NMI: u32 = 2;
 
 /// A run by a count of instructions ends when the core has done none for this long.
@@ -89,7 +89,7 @@ impl Machine {
             }
             self.serve_nmi();
             if now >= self.poll_at {
-                self.log.poll(self.ram.bytes_mut());
+                self.log.poll(self.bus.ram.bytes_mut());
                 self.poll_at = POLL * (now.as_ps() / POLL.as_ps() + 1);
             }
             if now >= limit.time {
@@ -196,6 +196,7 @@ impl Machine {
         }
         for queued in core::mem::take(&mut self.bus.queued) {
             self.core.ask(queued);
+            self.unsettled = true;
         }
         let cycle = self.cycles();
         if let Some(waits) = &mut self.bus.waits {
@@ -203,39 +204,8 @@ impl Machine {
         }
     }
 
-    /// Lets the core run until something has to happen.
-    fn execute(&mut self, limit: Limit) -> Exit {
-        let count = self.core.retired();
-        let stop = limit
-            .time
-            .min(self.cut_at.unwrap_or(Time::MAX))
-            .min(self.poll_at);
-        let most = limit.instructions - self.counted;
-        let mut budget = self
-            .bus
-            .clock
-            .instructions_until(count, self.next_event().min(stop))
-            .min(most - count);
-        self.bus.stop = (stop, most);
-        // Code in SRAM that runs beside a flash operation is looked at after every instruction: once it
-        // comes back to flash it stalls.
-        // So is the NMI's handler, whose line is tested when it returns.
-        self.bus.halt = self.bus.soc.flash.busy_until().is_some() || self.bus.soc.rcc.nmi();
-        if self.bus.halt {
-            budget = budget.min(1);
-        }
-        let budget = u32::try_from(budget).unwrap_or(u32::MAX);
-        let busy = self.bus.soc.flash.busy_until().is_some();
-        let exit = self.core.run(budget.max(1), &mut self.bus).0;
-        if busy {
-            let ran = self.core.retired() - count;
-            self.bus.soc.flash.ran(ran);
-        }
-        exit
-    }
-
     /// The earliest instant at which anything but an instruction happens; [`Time::MAX`] for never.
-    fn next_event(&self) -> Time {
+    pub(super) fn next_event(&self) -> Time {
         let timer = self.core.next_event().filter(|_| self.powered);
         let timer = timer.map_or(Time::MAX, |VirtualNanos(cycle)| {
             self.bus.clock.time_of_cycle(cycle)
@@ -261,6 +231,13 @@ impl Machine {
             .flash
             .stalled_until()
             .filter(|_| is_flash(self.pc()))
+            .or_else(|| {
+                self.bus
+                    .soc
+                    .flash
+                    .busy_until()
+                    .filter(|_| self.bus.read_stalls)
+            })
             .map(|end| (end, Rest::Stalled))
     }
 
@@ -274,6 +251,7 @@ impl Machine {
             self.bus.clock.reach_cycle(count, cycle);
             self.core
                 .on_event(VirtualNanos(self.bus.clock.cycle(count)));
+            self.unsettled = true;
         }
     }
 
@@ -289,6 +267,7 @@ impl Machine {
             self.core
                 .debugger_access(Some(NMIPENDSET), ICSR, Width::W32, now);
             self.locked_up = false;
+            self.unsettled = true;
         }
     }
 
@@ -318,7 +297,7 @@ impl Machine {
 }
 
 /// Whether an instruction at `pc` is fetched from flash.
-fn is_flash(pc: u32) -> bool {
+pub(super) fn is_flash(pc: u32) -> bool {
     [FLASH_BASE, 0]
         .into_iter()
         .any(|base| (pc.wrapping_sub(base) as usize) < FLASH_SIZE)

@@ -1,50 +1,36 @@
-//! How long an instruction takes: the one place that says so.
+//! The core's clock: from a count of instructions to cycles of HCLK and to the virtual time.
 //!
-//! The Cortex-M3 executes most Thumb-2 code in a little over one cycle per instruction from memory without
-//! wait states (its TRM, DDI 0337E chapter 18; 1.25 DMIPS/MHz). Flash wait states (RM0008 3.3.3) add to that:
-//! little while the prefetch buffer keeps ahead, much without it. Every instruction is charged the same
-//! average, so that the time of a run depends on the number of instructions alone. What an average hides:
-//! divisions, long multiplications, taken branches, and the twelve cycles of an interrupt's entry.
+//! What an instruction costs is in [`costs`](super::costs); how the costs of a stretch of code add up is in
+//! [`segment`](super::segment).
 
+use super::segment::Segment;
 use crate::time::Time;
 
-/// Cycles of HCLK for 64 instructions with `wait_states` (FLASH_ACR.LATENCY) and the prefetch buffer on or off.
-#[must_use]
-pub const fn cycles_per_64(wait_states: u32, prefetch: bool) -> u32 {
-    match (wait_states, prefetch) {
-        (0, _) => 77,      // 1.2 cycles each
-        (1, true) => 86,   // 1.35
-        (1, false) => 109, // 1.7
-        (_, true) => 96,   // 1.5
-        (_, false) => 144, // 2.25
-    }
-}
-
-/// The highest SYSCLK in Hz that `wait_states` are enough for (RM0008 3.3.3).
+/// The highest SYSCLK in Hz that `wait_states` are enough for (RM0008 3.3.3), the crystal's tolerance included.
 #[must_use]
 pub const fn highest_sysclk(wait_states: u32) -> u32 {
     match wait_states {
         0 => 24_000_000,
         1 => 48_000_000,
-        _ => 72_000_000,
+        _ => crate::periph::clocks::MAX_SYSCLK,
     }
 }
 
-/// What turns a count of instructions into the virtual time and into cycles of HCLK.
+/// Turns a count of instructions into the virtual time and into cycles of HCLK.
 ///
-/// Both grow linearly from a base, the last instant at which time jumped or the rate changed, and are worked
-/// out from it in whole numbers, so nothing drifts.
+/// Cycles are counted from an anchor, the last instant at which time jumped or the rate changed, and time is
+/// worked out from the anchor in whole numbers, so it does not drift.
 #[derive(Clone, Copy, Debug)]
 pub struct InstructionClock {
     hclk: u32,
-    per_64: u32,
-    /// Picoseconds of an instruction, and of a cycle.
-    instruction: Ratio,
+    /// Picoseconds of a cycle.
     hclk_cycle: Ratio,
-    /// The base: this many instructions, at this instant, in this cycle.
+    /// The anchor: this instant, in this cycle.
+    at: (Time, u64),
+    /// This many instructions had ended in this cycle, and the code that follows them.
     count: u64,
-    at: Time,
     cycle: u64,
+    segment: Segment,
     /// Since when HCLK runs at this rate: an instant and its cycle.
     since: (Time, u64),
 }
@@ -52,31 +38,31 @@ pub struct InstructionClock {
 impl InstructionClock {
     /// A clock that starts at `at` with no instruction done.
     #[must_use]
-    pub fn new(at: Time, hclk: u32, per_64: u32) -> Self {
+    pub fn new(at: Time, hclk: u32) -> Self {
         let mut clock = Self {
             hclk,
-            per_64,
-            instruction: Ratio::new(1, 1),
             hclk_cycle: Ratio::new(1, 1),
+            at: (at, 0),
             count: 0,
-            at,
             cycle: 0,
+            segment: Segment::EMPTY,
             since: (at, 0),
         };
-        clock.set_rate(0, hclk, per_64);
+        clock.set_rate(0, hclk);
         clock
     }
 
     /// When the `count`th instruction ends.
     #[must_use]
     pub fn time(&self, count: u64) -> Time {
-        self.at + Time::from_ps(self.instruction.times(count - self.count))
+        let (at, base) = self.at;
+        at + Time::from_ps(self.hclk_cycle.times(self.cycle(count) - base))
     }
 
     /// The cycle of HCLK in which the `count`th instruction ends.
     #[must_use]
     pub fn cycle(&self, count: u64) -> u64 {
-        self.cycle + (count - self.count) * u64::from(self.per_64) / 64
+        self.cycle + self.segment.cycles(count - self.count)
     }
 
     /// When cycle `cycle` of HCLK begins, at the present rate.
@@ -89,37 +75,60 @@ impl InstructionClock {
         at + Time::from_ps(self.hclk_cycle.times(cycle.saturating_sub(base)))
     }
 
-    /// How many instructions after the `count`th the first one ends at `until` or later: 0 when the `count`th
-    /// does.
+    /// After the `count`th instruction the core executes `segment`.
+    pub fn follow(&mut self, count: u64, segment: &Segment) {
+        self.cycle = self.cycle(count);
+        self.count = count;
+        self.segment = *segment;
+    }
+
+    /// Whether the instruction after the `count`th belongs to the code that is followed, and is at `pc`.
+    #[must_use]
+    pub fn goes_on(&self, count: u64, pc: u32) -> bool {
+        self.segment.goes_on(count - self.count, pc)
+    }
+
+    /// The code that is followed, when it has ended with the `count`th instruction.
+    #[must_use]
+    pub fn ended(&self, count: u64) -> Option<&Segment> {
+        let length = self.segment.length();
+        (length > 0 && count - self.count >= length).then_some(&self.segment)
+    }
+
+    /// How many instructions after the `count`th, but not beyond the code that is followed, the first one ends
+    /// at `until` or later: 0 when the `count`th does.
     #[must_use]
     pub fn instructions_until(&self, count: u64, until: Time) -> u64 {
-        let Some(span) = until.checked_sub(self.at) else {
+        let (at, base) = self.at;
+        let Some(span) = until.checked_sub(at) else {
             return 0;
         };
-        let needed = self.instruction.least(span.as_ps());
-        needed.saturating_sub(count - self.count)
+        let last = base.saturating_add(self.hclk_cycle.least(span.as_ps()));
+        let done = count - self.count;
+        let reached = self.segment.reaches(last.saturating_sub(self.cycle));
+        reached.saturating_sub(done)
+    }
+
+    /// The core stands still for `cycles` of HCLK, or the instruction under way takes as many more.
+    pub fn charge(&mut self, cycles: u32) {
+        self.cycle += u64::from(cycles);
     }
 
     /// Nothing was executed up to `until`, after the `count`th instruction: the core waited or stalled.
     pub fn jump(&mut self, count: u64, until: Time) {
         let until = until.max(self.time(count));
         let (at, base) = self.since;
-        if self.hclk == 0 {
-            (self.at, self.count) = (until, count);
-            return;
+        let mut cycle = self.cycle(count);
+        if self.hclk != 0 {
+            cycle = cycle.max(base + self.hclk_cycle.whole((until - at).as_ps()));
         }
-        let cycle = base + self.hclk_cycle.whole((until - at).as_ps());
-        self.cycle = cycle.max(self.cycle(count));
-        self.at = until;
-        self.count = count;
+        self.anchor(count, until, cycle);
     }
 
     /// The core's own timer has reached `cycle`: no instruction sees an earlier one.
     pub fn reach_cycle(&mut self, count: u64, cycle: u64) {
         let now = self.time(count);
-        self.cycle = cycle.max(self.cycle(count));
-        self.at = now;
-        self.count = count;
+        self.anchor(count, now, cycle.max(self.cycle(count)));
     }
 
     /// The core was reset: it counts its instructions from 0 again.
@@ -128,17 +137,20 @@ impl InstructionClock {
         self.count = 0;
     }
 
-    /// From the `count`th instruction on HCLK runs at `hclk` Hz and 64 instructions take `per_64` of its cycles.
-    /// At 0 Hz no cycle comes; no instruction may be counted then.
-    pub fn set_rate(&mut self, count: u64, hclk: u32, per_64: u32) {
+    /// From the `count`th instruction on HCLK runs at `hclk` Hz. The code followed keeps its costs. At 0 Hz no
+    /// cycle comes; no instruction may be counted then.
+    pub fn set_rate(&mut self, count: u64, hclk: u32) {
         let (now, cycle) = (self.time(count), self.cycle(count));
-        (self.at, self.cycle, self.count) = (now, cycle, count);
+        self.at = (now, cycle);
         self.since = (now, cycle);
         self.hclk = hclk;
-        self.per_64 = per_64;
-        let hz = u64::from(hclk.max(1));
-        self.instruction = Ratio::new(u64::from(per_64) * PS_PER_S, hz * 64);
-        self.hclk_cycle = Ratio::new(PS_PER_S, hz);
+        self.hclk_cycle = Ratio::new(PS_PER_S, u64::from(hclk.max(1)));
+    }
+
+    fn anchor(&mut self, count: u64, at: Time, cycle: u64) {
+        self.at = (at, cycle);
+        (self.count, self.cycle) = (count, cycle);
+        self.segment = Segment::EMPTY;
     }
 }
 
@@ -197,37 +209,57 @@ const fn gcd(mut a: u64, mut b: u64) -> u64 {
 mod tests {
     use super::*;
 
+    fn every_cycle() -> Segment {
+        Segment::of_costs(&[1, 3, 2, 12])
+    }
+
     #[test]
-    fn instructions_take_their_share_exactly_for_hours() {
-        let clock = InstructionClock::new(Time::ZERO, 72_000_000, 96);
-        let n = 48_000_000 * 3_600 * 5;
-        assert_eq!(clock.time(n), Time::from_secs(3_600 * 5));
-        assert_eq!(clock.cycle(n), 72_000_000 * 3_600 * 5);
-        assert_eq!(clock.instructions_until(0, Time::from_secs(18_000)), n);
-        assert_eq!(clock.instructions_until(n, Time::from_secs(18_000)), 0);
+    fn cycles_take_their_share_exactly_for_hours() {
+        let mut clock = InstructionClock::new(Time::ZERO, 72_000_000);
+        let segment = every_cycle();
+        let mut count = 0;
+        for _ in 0..100_000 {
+            clock.follow(count, &segment);
+            count += 4;
+        }
+        assert_eq!(clock.cycle(count), 1_800_000);
+        assert_eq!(clock.time(count), Time::from_ms(25));
+        let cycles = 72_000_000 * 3_600 * 5;
+        assert_eq!(clock.time_of_cycle(cycles), Time::from_secs(3_600 * 5));
     }
 
     #[test]
     fn the_number_of_instructions_until_an_instant_is_the_smallest() {
-        for (hclk, per_64) in [(72_000_000, 96), (8_000_000, 77), (64_000_000, 144)] {
-            let clock = InstructionClock::new(Time::from_us(7), hclk, per_64);
-            for ps in [1, 999, 20_833, 20_834, 1_000_000, 12_345_678] {
+        for hclk in [72_000_000, 8_000_000, 64_000_000] {
+            let mut clock = InstructionClock::new(Time::from_us(7), hclk);
+            clock.follow(0, &every_cycle());
+            for ps in [1, 999, 13_888, 13_889, 62_500, 125_000, 200_000] {
                 let until = Time::from_us(7) + Time::from_ps(ps);
                 let n = clock.instructions_until(0, until);
-                assert!(clock.time(n) >= until);
-                assert!(n == 0 || clock.time(n - 1) < until);
+                assert!(clock.time(n) >= until || n == 4, "{hclk} {ps}: {n}");
+                assert!(clock.time(n - 1) < until, "{hclk} {ps}: {n}");
             }
+            assert_eq!(clock.instructions_until(3, Time::MAX), 1);
         }
     }
 
     #[test]
+    fn a_charge_moves_what_follows() {
+        let mut clock = InstructionClock::new(Time::ZERO, 1_000_000);
+        clock.follow(0, &every_cycle());
+        clock.charge(5);
+        assert_eq!(clock.cycle(2), 5 + 4);
+        assert_eq!(clock.time(2), Time::from_us(9));
+    }
+
+    #[test]
     fn a_jump_moves_time_and_cycles_together() {
-        let mut clock = InstructionClock::new(Time::ZERO, 72_000_000, 96);
+        let mut clock = InstructionClock::new(Time::ZERO, 72_000_000);
         clock.jump(10, Time::from_ms(30));
         assert_eq!(clock.time(10), Time::from_ms(30));
         assert_eq!(clock.cycle(10), 72_000 * 30);
         assert_eq!(clock.time_of_cycle(72_000 * 31), Time::from_ms(31));
-        clock.set_rate(10, 8_000_000, 77);
+        clock.set_rate(10, 8_000_000);
         clock.jump(10, Time::from_ms(40));
         assert_eq!(clock.cycle(10), 72_000 * 30 + 8_000 * 10);
         clock.restart_count(10);

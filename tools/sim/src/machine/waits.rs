@@ -1,7 +1,7 @@
 //! How long interrupts wait: from the instant one is pending and enabled to the entry of its handler.
 //!
 //! What holds one up counts: PRIMASK, BASEPRI, a handler of the same or a higher priority, a flash operation.
-//! The twelve cycles of the entry itself do not, see [`super::timing`].
+//! The cycles of the entry itself do not ([`super::costs`]).
 //!
 //! While this is on, the core comes back to the run loop after every access beside the memories, so that no
 //! change of the NVIC's registers is missed. An entry is seen by its read of the vector table, whose page is
@@ -11,6 +11,7 @@ use rigless::emulator::{Processor, Queued};
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
+use crate::machine::memory::RAM_BASE;
 use crate::soc::map::irq;
 use crate::time::Time;
 
@@ -48,11 +49,14 @@ pub(super) struct Waits {
     done: [Wait; EXCEPTIONS],
     /// The vector table whose page is sent to the bus.
     table: Option<u32>,
+    /// Flash is sent to the bus anyhow.
+    flash_is_sent: bool,
 }
 
 impl Waits {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(flash_is_sent: bool) -> Self {
         Self {
+            flash_is_sent,
             since: [None; EXCEPTIONS],
             done: [Wait::default(); EXCEPTIONS],
             table: None,
@@ -64,6 +68,11 @@ impl Waits {
         self.done.get(number).copied().unwrap_or_default()
     }
 
+    /// The vector table whose page is sent to the bus.
+    pub(super) fn table(&self) -> Option<u32> {
+        self.table
+    }
+
     /// The core was reset: nothing waits any more, and the vector table is to be found again.
     pub(super) fn reset(&mut self, core: &mut dyn Processor) {
         self.since = [None; EXCEPTIONS];
@@ -72,7 +81,8 @@ impl Waits {
 
     /// Sends nothing to the bus any more.
     pub(super) fn leave(&mut self, core: &mut dyn Processor) {
-        if let Some(table) = self.table.take() {
+        let table = self.table.take();
+        if let Some(table) = table.filter(|&table| !self.flash_is_sent || table >= RAM_BASE) {
             core.ask(Queued::Unroute(u64::from(table)));
         }
     }

@@ -1,9 +1,37 @@
 //! The clock tree as a calculation: from RCC_CFGR to the frequency of every bus (RM0008 figure 8, 7.3.2).
 
-/// The internal oscillator.
+use crate::time::Time;
+
+/// The internal oscillator, as typical.
 pub const HSI_HZ: u32 = 8_000_000;
 /// The crystal of the modio-02 board.
 pub const HSE_HZ: u32 = 8_000_000;
+
+/// The most that SYSCLK may be in Hz (RM0008 7.2), and what a crystal 100 ppm above its frequency makes of it.
+pub const MAX_SYSCLK: u32 = 72_000_000 + 72_000_000 / 10_000;
+
+/// The part's oscillators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Oscillators {
+    /// The HSI in Hz.
+    pub hsi: u32,
+    /// The HSE in Hz.
+    pub hse: u32,
+    /// The LSI in Hz.
+    pub lsi: u32,
+    /// From HSEON to HSERDY.
+    pub hse_start: Time,
+}
+
+impl Oscillators {
+    /// As typical: the start of the crystal by DS5319 table 22, the LSI by table 25.
+    pub const TYPICAL: Self = Self {
+        hsi: HSI_HZ,
+        hse: HSE_HZ,
+        lsi: 40_000,
+        hse_start: Time::from_us(2_000),
+    };
+}
 
 /// The frequencies, in Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,11 +66,11 @@ impl Clocks {
 
     /// The clocks with `cfgr` in RCC_CFGR and `sws` as the clock in use (0 HSI, 1 HSE, 2 PLL).
     #[must_use]
-    pub const fn of(cfgr: u32, sws: u32) -> Self {
+    pub const fn of(cfgr: u32, sws: u32, oscillators: &Oscillators) -> Self {
         let sysclk = match sws {
-            0 => HSI_HZ,
-            1 => HSE_HZ,
-            _ => pll(cfgr),
+            0 => oscillators.hsi,
+            1 => oscillators.hse,
+            _ => pll(cfgr, oscillators),
         };
         let hclk = sysclk >> ahb_shift(cfgr >> 4 & 0xF);
         let apb1 = apb_shift(cfgr >> 8 & 7);
@@ -62,9 +90,9 @@ impl Clocks {
     /// What is above the part's limits (RM0008 7.2), if anything is.
     #[must_use]
     pub const fn over_limit(&self) -> Option<&'static str> {
-        if self.sysclk > 72_000_000 {
+        if self.sysclk > MAX_SYSCLK {
             Some("SYSCLK above 72 MHz")
-        } else if self.pclk1 > 36_000_000 {
+        } else if self.pclk1 > MAX_SYSCLK / 2 {
             Some("PCLK1 above 36 MHz")
         } else {
             None
@@ -72,13 +100,13 @@ impl Clocks {
     }
 }
 
-const fn pll(cfgr: u32) -> u32 {
+const fn pll(cfgr: u32, oscillators: &Oscillators) -> u32 {
     let source = if cfgr & 1 << 16 == 0 {
-        HSI_HZ / 2
+        oscillators.hsi / 2
     } else if cfgr & 1 << 17 == 0 {
-        HSE_HZ
+        oscillators.hse
     } else {
-        HSE_HZ / 2
+        oscillators.hse / 2
     };
     let times = (cfgr >> 18 & 0xF) + 2;
     source * if times > 16 { 16 } else { times }
@@ -102,23 +130,27 @@ const fn apb_shift(ppre: u32) -> u32 {
 mod tests {
     use super::*;
 
+    fn of(cfgr: u32, sws: u32) -> Clocks {
+        Clocks::of(cfgr, sws, &Oscillators::TYPICAL)
+    }
+
     #[test]
     fn prescalers_divide_as_rm0008_says() {
-        let divided = Clocks::of(0b1100 << 4 | 0b100 << 8 | 0b111 << 11 | 0b11 << 14, 0);
+        let divided = of(0b1100 << 4 | 0b100 << 8 | 0b111 << 11 | 0b11 << 14, 0);
         assert_eq!(divided.hclk, 8_000_000 / 64);
         assert_eq!(divided.pclk1, divided.hclk / 2);
         assert_eq!(divided.apb1_timers, divided.hclk);
         assert_eq!(divided.pclk2, divided.hclk / 16);
         assert_eq!(divided.adc, divided.pclk2 / 8);
-        assert_eq!(Clocks::of(0b1111 << 4, 0).hclk, 8_000_000 / 512);
+        assert_eq!(of(0b1111 << 4, 0).hclk, 8_000_000 / 512);
     }
 
     #[test]
     fn the_pll_multiplies_its_source() {
-        assert_eq!(Clocks::of(0b1110 << 18, 2).sysclk, 64_000_000, "HSI/2 x16");
-        assert_eq!(Clocks::of(1 << 16 | 7 << 18, 2).sysclk, 72_000_000);
+        assert_eq!(of(0b1110 << 18, 2).sysclk, 64_000_000, "HSI/2 x16");
+        assert_eq!(of(1 << 16 | 7 << 18, 2).sysclk, 72_000_000);
         assert_eq!(
-            Clocks::of(1 << 16 | 14 << 18, 2).over_limit(),
+            of(1 << 16 | 14 << 18, 2).over_limit(),
             Some("SYSCLK above 72 MHz")
         );
     }

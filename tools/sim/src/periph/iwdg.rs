@@ -1,12 +1,11 @@
-//! The independent watchdog, RM0008 chapter 19: a 12-bit down-counter on the 40 kHz LSI that only a reset stops.
+//! The independent watchdog, RM0008 chapter 19: a 12-bit down-counter on the LSI that only a reset stops.
 
+use crate::periph::clocks::Oscillators;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-/// The LSI's nominal frequency (DS5319 table 25: 30 to 60 kHz).
-pub const LSI_HZ: u32 = 40_000;
-/// PR and RLR take up to five LSI cycles to arrive (RM0008 19.4.4).
-const UPDATE: Time = Time::cycles(5, LSI_HZ);
+/// PR and RLR take up to this many LSI cycles to arrive (RM0008 19.4.4).
+const UPDATE_CYCLES: u64 = 5;
 
 const KEY_RELOAD: u32 = 0xAAAA;
 const KEY_ACCESS: u32 = 0x5555;
@@ -15,6 +14,8 @@ const KEY_START: u32 = 0xCCCC;
 /// The watchdog.
 #[derive(Debug)]
 pub struct Iwdg {
+    /// The LSI in Hz.
+    lsi: u32,
     open: bool,
     prescaler: u32,
     reload: u32,
@@ -28,7 +29,16 @@ pub struct Iwdg {
 
 impl Default for Iwdg {
     fn default() -> Self {
+        Self::new(Oscillators::TYPICAL.lsi)
+    }
+}
+
+impl Iwdg {
+    /// A watchdog that has not been started, on an LSI of `lsi` Hz.
+    #[must_use]
+    pub fn new(lsi: u32) -> Self {
         Self {
+            lsi,
             open: false,
             prescaler: 0,
             reload: 0xFFF,
@@ -38,9 +48,7 @@ impl Default for Iwdg {
             bitten: false,
         }
     }
-}
 
-impl Iwdg {
     /// Whether it has been started.
     #[must_use]
     pub fn running(&self) -> bool {
@@ -56,7 +64,7 @@ impl Iwdg {
     fn timeout(&self) -> Time {
         // PR 0 to 6 divide by 4 to 256; 7 does as 6.
         let divider = 4u64 << self.prescaler.min(6);
-        Time::cycles(u64::from(self.reload + 1) * divider, LSI_HZ)
+        Time::cycles(u64::from(self.reload + 1) * divider, self.lsi)
     }
 }
 
@@ -91,11 +99,11 @@ impl Peripheral for Iwdg {
             }
             0x04 => {
                 self.prescaler = value & 7;
-                self.prescaler_busy = now + UPDATE;
+                self.prescaler_busy = now + Time::cycles(UPDATE_CYCLES, self.lsi);
             }
             0x08 => {
                 self.reload = value & 0xFFF;
-                self.reload_busy = now + UPDATE;
+                self.reload_busy = now + Time::cycles(UPDATE_CYCLES, self.lsi);
             }
             0x0C => {}
             _ => return Err(Unmodelled("a reserved address of IWDG")),
@@ -115,7 +123,7 @@ impl Peripheral for Iwdg {
     }
 
     fn reset(&mut self, _now: Time) {
-        *self = Self::default();
+        *self = Self::new(self.lsi);
     }
 }
 

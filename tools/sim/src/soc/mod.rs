@@ -8,6 +8,7 @@
 pub mod map;
 mod wires;
 
+use crate::corner::Corner;
 use crate::finding::What;
 use crate::line::{Line, TxPin};
 use crate::periph::adc::Adc;
@@ -88,10 +89,11 @@ impl Soc {
         &self.usart1
     }
 
-    /// The part after power-on, around these flash cells; `crystal`: whether the HSE works.
+    /// The part after power-on, at `corner`, around these flash cells; `crystal`: whether the HSE works.
     #[must_use]
-    pub fn new(crystal: bool, flash: Flash, slot: Slot) -> Self {
-        let rcc = Rcc::new(crystal);
+    pub fn new(crystal: bool, corner: Corner, flash: Flash, slot: Slot) -> Self {
+        let oscillators = corner.oscillators();
+        let rcc = Rcc::new(crystal, oscillators);
         let flash_access = flash.access_control();
         let mut soc = Self {
             clocks: rcc.clocks(),
@@ -105,7 +107,7 @@ impl Soc {
             pwr: Pwr::default(),
             afio: Afio::default(),
             exti: Exti::default(),
-            iwdg: Iwdg::default(),
+            iwdg: Iwdg::new(oscillators.lsi),
             usart1: Usart::new(),
             usart3: Usart::new(),
             tim1: Timer::new(Kind::Advanced),
@@ -124,6 +126,7 @@ impl Soc {
             signals: Signals::default(),
             notes: Vec::new(),
         };
+        soc.adc1.set_noise(corner.adc_noise());
         soc.set_clocks(Time::ZERO);
         soc
     }

@@ -63,6 +63,17 @@ fn time_stands_still_between_requests() {
 }
 
 #[test]
+fn line_option_sets_rate_and_format_of_the_client() {
+    for line_format in ["19200,7N2", "921600,7E1", "1200,8O1"] {
+        let (_running, line, http) = started(&["--line", line_format]);
+        let hello = Client::connect(&line).ask(b"hello 1\n");
+        assert!(hello.contains(&format!(" line={line_format} ")), "{hello}");
+        let (_, format) = line_format.split_once(',').unwrap();
+        assert_eq!(state(&http)["line"]["format"], format);
+    }
+}
+
+#[test]
 fn bad_lines_get_an_error_each_and_let_no_time_pass() {
     let (_running, line, _) = started(&[]);
     let mut client = Client::connect(&line);
@@ -76,7 +87,7 @@ fn bad_lines_get_an_error_each_and_let_no_time_pass() {
         b"send 01 parity:01\n",
         b"run -1\n",
         b"run 600000000.001\n",
-        b"line 9600 7E1\n",
+        b"line 9600 7N1\n",
         b"send \xC3\x28\n",
         b"\x00\xFF\n",
         b"GET / HTTP/1.1\r\n",

@@ -285,5 +285,6 @@ fn a_wrong_option_is_refused() {
     refused(&["--dip", "256"], &["--dip", "0..=255"]);
     refused(&["--module", "4xx"], &["--module", "2ai2ao"]);
     refused(&["--for", "ever"], &["--for"]);
+    refused(&["--line", "9600,7N1"], &["--line", "9600,7N2"]);
     refused(&["--flash"], &["--flash"]);
 }

@@ -1,6 +1,7 @@
 //! ASCII mode on the image as it is flashed.
 
-use register_map::configuration::{COMM_TIMEOUT, FRAME_GAP, MODE};
+use register_map::configuration::{BAUD, COMM_TIMEOUT, FORMAT, FRAME_GAP, MODE};
+use sim::line::{Character, Format, Settings};
 use sim::{Channel, Module, Time};
 
 use crate::bench::Bench;
@@ -9,7 +10,7 @@ use crate::bench::Bench;
 const READ: [u8; 5] = [0x01, 0, 0x10, 0, 4];
 
 /// An ASCII frame of unit 1.
-fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
+pub fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
     let sum = pdu.iter().fold(1u8, |sum, byte| sum.wrapping_add(*byte));
     let mut text = String::from(":01");
     for byte in pdu.iter().chain(&[sum.wrapping_neg()]) {
@@ -122,4 +123,98 @@ fn the_communication_watchdog_counts_from_the_request_s_end() {
         bench.board.run_until(bench.sent + Time::from_ms(ms));
         assert_eq!(bench.board.channel(1), Channel::Do { on: is_on }, "{ms} ms");
     }
+}
+
+/// Reads a counter of function 08 with the master's settings.
+fn counter(bench: &mut Bench, which: u8) -> u8 {
+    let reply = bench.exchange(&ascii(&[0x08, 0, which, 0, 0], "\r\n"));
+    let known = |count: &u8| ascii(&[0x08, 0, which, 0, *count], "\r\n") == reply;
+    (0..=255).find(known).expect("a counter below 256")
+}
+
+/// At the lowest rate, the factory's, and the highest: the line answers in this format of seven data bits, and a
+/// character with a wrong parity bit or a low first stop bit spoils its frame only.
+fn is_spoken(format: Format) {
+    for baud in [12, 96, 9216] {
+        let code = Format::ALL.iter().position(|known| *known == format);
+        let code = code.expect("a code of FORMAT") as u16;
+        let stored = [(MODE, 1), (BAUD, baud), (FORMAT, code)];
+        let mut bench = Bench::set_up(Module::Di4, &stored);
+        bench.board.set_energised(2, true).unwrap();
+        bench.board.run_for(Time::from_ms(50));
+        let good = ascii(&READ, "\r\n");
+        let reply = ascii(&[0x01, 1, 0b0010], "\r\n");
+        assert_eq!(bench.exchange(&good), reply, "{baud}00");
+
+        let settings = bench.board.line().settings();
+        assert_eq!(settings.format, format);
+        let damage = |byte: u8| match settings.format.parity() {
+            Some(_) => Character::new(settings, byte).with_wrong_parity(),
+            None => Character::new(settings, byte).with_bad_stop(settings),
+        };
+        for (index, byte) in good.iter().enumerate() {
+            let start = bench.board.now();
+            let line = bench.board.line();
+            let at = line.send(start, &good[..index]);
+            let at = line.send_character(at, damage(*byte));
+            let end = line.send(at, &good[index + 1..]);
+            assert_eq!(bench.answer_after(end), [], "{baud}00, character {index}");
+            assert_eq!(bench.exchange(&good), reply, "{baud}00, after {index}");
+        }
+        assert_eq!(usize::from(counter(&mut bench, 0x0C)), good.len());
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn seven_data_bits_with_even_parity_are_spoken() {
+    is_spoken(Format::SevenE1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn seven_data_bits_with_odd_parity_are_spoken() {
+    is_spoken(Format::SevenO1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn seven_data_bits_with_two_stop_bits_are_spoken() {
+    is_spoken(Format::SevenN2);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn characters_of_eight_data_bits_are_framing_errors_with_7n2() {
+    let mut bench = Bench::set_up(Module::Di4, &[(MODE, 1), (FORMAT, 6)]);
+    let seven = bench.board.line().settings();
+    let good = ascii(&READ, "\r\n");
+    let format = Format::N1;
+    bench.settings(Settings { format, ..seven });
+    assert_eq!(bench.exchange(&good), [], "bit 7 is the first stop bit");
+    bench.settings(seven);
+    bench.board.run_for(Time::from_ms(1100));
+    assert_eq!(bench.exchange(&good), ascii(&[0x01, 1, 0], "\r\n"));
+    assert_eq!(counter(&mut bench, 0x0C), 1);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn rtu_with_seven_data_bits_is_refused_with_exception_03() {
+    let mut bench = Bench::new(Module::Di4, 1);
+    bench.unlock();
+    for format in 4..=6 {
+        assert_eq!(bench.write(FORMAT, &[format]), Err(3), "{format}");
+        assert_eq!(bench.write(FORMAT, &[format, 0]), Err(3), "{format}");
+    }
+    bench.write(FORMAT, &[6, 1]).unwrap();
+    assert_eq!(bench.write(MODE, &[0]), Err(3));
+    bench.save();
+    bench.power_cycle();
+    bench.settings(Settings {
+        baud: 9600,
+        format: Format::SevenN2,
+    });
+    let reply = ascii(&[0x01, 1, 0], "\r\n");
+    assert_eq!(bench.exchange(&ascii(&READ, "\r\n")), reply);
 }

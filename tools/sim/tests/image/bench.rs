@@ -4,7 +4,7 @@ use std::{env, path::Path, sync::OnceLock};
 
 use register_map::{configuration, record};
 use sim::{
-    Board, Config, Image, Module, Time,
+    Board, Config, Corner, Image, Module, Time,
     line::{Format, Settings},
 };
 
@@ -51,6 +51,12 @@ pub fn crc(bytes: &[u8]) -> [u8; 2] {
         }
     }
     crc.to_le_bytes()
+}
+
+/// The corner of the part that the tests run at: `MODIO_CORNER`, nominal without it.
+pub fn corner() -> Corner {
+    let name = env::var("MODIO_CORNER");
+    name.map_or(Corner::Nominal, |name| name.parse().expect("MODIO_CORNER"))
 }
 
 /// An ADU: these bytes and their CRC.
@@ -109,8 +115,12 @@ impl Bench {
         bench
     }
 
-    /// A board powered just now.
+    /// A board powered just now, at the corner that the tests run at.
     pub fn cold(config: Config) -> Self {
+        let config = Config {
+            corner: corner(),
+            ..config
+        };
         Self {
             board: Board::new(image(), config).expect("the image fits"),
             settings: Settings::default(),

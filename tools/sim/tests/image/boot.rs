@@ -154,7 +154,7 @@ fn start_that_hangs_is_reset_by_the_watchdog() {
     });
     bench.tolerant = true;
     // The stack has been painted, and the crystal is starting.
-    bench.board.run_until(Time::from_us(5_000));
+    bench.board.run_until(Time::from_us(6_500));
     let (hung, from) = (bench.board.pc(), bench.board.now());
     let at = (hung - 0x0800_0000) as usize;
     let was = bench.board.flash()[at..at + 2].to_vec();

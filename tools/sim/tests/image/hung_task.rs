@@ -38,9 +38,7 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
     let before = bench.board.resets();
     (0..4).for_each(|pin| bench.board.watch_pin('A', pin));
     let address = address & !1;
-    let at = (address - 0x0800_0000) as usize;
-    let was = bench.board.flash()[at..at + 2].to_vec();
-    bench
+    let was = bench
         .board
         .patch_code(address, &code.to_le_bytes())
         .unwrap();
@@ -85,7 +83,7 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
 #[ignore = "needs the image: cargo xtask test"]
 fn every_task_that_spins_is_bitten_out_of_it() {
     let mut bench = bench();
-    for handler in ["USART1", "TIM2", "EXTI3", "TIM4", "EXTI0"] {
+    for handler in ["USART1", "TIM2", "TIM4", "EXTI3", "EXTI1", "EXTI0"] {
         let address = bench.board.symbol(handler).expect("the task's handler");
         break_at(&mut bench, handler, address, SPIN);
     }
@@ -116,7 +114,8 @@ fn a_task_that_hangs_on_its_way_is_named() {
         ("USART1", LINE),
         ("TIM2", LINE),
         ("EXTI3", SERVE),
-        ("TIM4", SCAN),
+        ("TIM4", LINE),
+        ("EXTI1", SCAN),
         ("EXTI0", BACKGROUND),
     ] {
         let address = within(&mut bench, handler);
@@ -154,7 +153,7 @@ fn every_task_that_does_nothing_any_more_is_missed() {
 fn the_record_keeps_the_uptime_and_outlives_other_resets_but_not_the_power() {
     let mut bench = bench();
     bench.board.run_for(Time::from_secs(5));
-    let scan = bench.board.symbol("TIM4").unwrap();
+    let scan = bench.board.symbol("EXTI1").unwrap();
     break_at(&mut bench, "scan", scan, SPIN);
     let uptime = bench.long(0x026A);
     assert!((6..=8).contains(&uptime), "{uptime} s");

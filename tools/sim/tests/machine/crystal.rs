@@ -66,12 +66,12 @@ fn the_clock_security_system_goes_to_the_hsi_and_raises_the_nmi() {
     assert_eq!(cr & 0x0303_0003, 3, "{cr:#x}");
     assert_eq!(cfgr & 0xF, 0, "SW and SWS say HSI: {cfgr:#x}");
     assert_eq!((cir & CSSF, cleared & CSSF), (CSSF, 0));
-    // Two wait states and the prefetch buffer: 96 cycles for 64 instructions, now of 8 MHz.
+    // A NOP, and a branch with the wait states of its target: 6 cycles for 2 instructions, now of 8 MHz.
     let before = (board.now(), board.instructions());
     board.step(64_000);
     assert_eq!(
         board.now() - before.0,
-        Time::cycles(96_000, 8_000_000),
+        Time::cycles(192_000, 8_000_000),
         "time goes by the HSI"
     );
     assert_eq!(findings(&board), [""; 0]);

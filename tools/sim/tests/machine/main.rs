@@ -2,6 +2,7 @@
 
 mod asm;
 mod core;
+mod costs;
 mod crystal;
 mod debug;
 mod flash;

@@ -33,10 +33,17 @@ impl Framing {
         let parity = settings.format.parity();
         Self {
             rate: settings.rate(),
-            data_bits: if parity.is_some() { 9 } else { 8 },
+            data_bits: settings.format.data_bits() + parity.is_some() as u8,
             parity,
             stop_bits: settings.format.stop_bits(),
         }
+    }
+
+    /// The data bits of a word without the parity bit.
+    #[must_use]
+    pub const fn payload(&self, data: u16) -> u16 {
+        let bits = self.data_bits - self.parity.is_some() as u8;
+        data & !(u16::MAX << bits)
     }
 
     /// Bits of a whole character, start and stop bits included.

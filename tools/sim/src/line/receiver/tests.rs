@@ -28,6 +28,9 @@ fn a_byte_of_each_format_arrives_and_when() {
         (Format::N2, 16 * 10),
         (Format::E1, 16 * 10 + 10),
         (Format::O1, 16 * 10 + 10),
+        (Format::SevenE1, 16 * 9 + 10),
+        (Format::SevenO1, 16 * 9 + 10),
+        (Format::SevenN2, 16 * 9),
     ] {
         let s = settings(115_200, format);
         let start = Time::from_us(7);
@@ -36,7 +39,8 @@ fn a_byte_of_each_format_arrives_and_when() {
         let words = hear(&wave, s);
         assert_eq!(words.len(), 1, "{format:?}");
         let word = words[0];
-        assert_eq!(word.data & 0xFF, 0xA7);
+        let sent = if format.data_bits() == 7 { 0x27 } else { 0xA7 };
+        assert_eq!(Framing::of(s).payload(word.data), sent);
         assert_eq!(word.start, start);
         assert_eq!(word.at, start + s.rate().sixteenths(sixteenths));
         assert!(!word.parity_error && !word.framing_error && !word.noise);

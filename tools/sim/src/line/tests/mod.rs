@@ -233,9 +233,17 @@ fn a_master_that_follows_takes_over_the_units_settings() {
     bench.write(0x08, 1000);
     bench.run_to(Time::from_ms(10));
     assert_eq!(bench.line.settings().baud, 72_000);
-    bench.write(CR1, ON | 1 << 10);
+    // Nine data bits, no parity.
+    bench.write(CR1, ON | 1 << 12);
     bench.run_to(Time::from_ms(11));
     assert_eq!(bench.line.settings().format, Format::E1);
+    // A parity bit in words of eight bits: seven data bits.
+    for (parity, format) in [(0, Format::SevenE1), (1 << 9, Format::SevenO1)] {
+        bench.write(CR1, ON | 1 << 10 | parity);
+        let now = bench.line.now;
+        bench.run_to(now + Time::from_ms(1));
+        assert_eq!(bench.line.settings().format, format);
+    }
 }
 
 #[test]

@@ -95,6 +95,10 @@ pub struct Adc {
     /// The bit, CAL or RSTCAL, that is cleared at that instant.
     calibration: Option<(u32, Time)>,
     run: Option<Run>,
+    /// How far a conversion may be off, in LSB either way, and the state of the generator that picks how far
+    /// it is (xorshift32).
+    noise: u16,
+    random: u32,
 }
 
 impl Default for Adc {
@@ -123,7 +127,24 @@ impl Adc {
             powered_at: Time::ZERO,
             calibration: None,
             run: None,
+            noise: 0,
+            random: 0x6D6F_6469,
         }
+    }
+
+    /// Conversions are off by up to `lsb` either way from now on, the same in every run.
+    pub fn set_noise(&mut self, lsb: u16) {
+        self.noise = lsb;
+    }
+
+    /// A code with noise on it.
+    fn with_noise(&mut self, code: u16) -> u16 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 17;
+        self.random ^= self.random << 5;
+        let most = u32::from(self.noise);
+        let off = (self.random % (2 * most + 1)) as u16;
+        (code + off).saturating_sub(self.noise).min(4095)
     }
 
     /// The voltage at the pin of `channel`, 0 to 15, is `millivolts` from `now` on. Any other channel is
@@ -312,7 +333,8 @@ impl Peripheral for Adc {
                 if now < run.sample_end() {
                     return;
                 }
-                run.sampled = Some(self.convert(run.channel));
+                let code = self.convert(run.channel);
+                run.sampled = Some(self.with_noise(code));
                 self.run = Some(run);
             }
             if now < run.end() {
@@ -330,6 +352,8 @@ impl Peripheral for Adc {
         *self = Self {
             hz: self.hz,
             levels: self.levels,
+            noise: self.noise,
+            random: self.random,
             ..Self::new()
         };
     }

@@ -7,7 +7,7 @@
 //! reset. (A real PLL without its input runs wild for a while; nothing can be said about that.) The break input
 //! of TIM1 is not modelled.
 
-use super::{CFGR_SW, CR_CSSON, CR_HSEON, CR_HSION, CR_PLLON, HSE_START, Rcc};
+use super::{CFGR_SW, CR_CSSON, CR_HSEON, CR_HSION, CR_PLLON, Rcc};
 use crate::time::Time;
 
 impl Rcc {
@@ -50,7 +50,7 @@ impl Rcc {
     /// When an HSE switched on now is ready.
     pub(super) fn hse_start(&self, now: Time) -> Time {
         if self.crystal {
-            now + HSE_START
+            now + self.oscillators.hse_start
         } else {
             Time::MAX
         }

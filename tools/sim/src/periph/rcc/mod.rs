@@ -8,10 +8,8 @@ mod crystal;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-use crate::periph::clocks::{Clocks, HSE_HZ, HSI_HZ};
+use crate::periph::clocks::{Clocks, HSE_HZ, HSI_HZ, Oscillators};
 
-/// HSE start-up: datasheet DS5319 table 22, typical with the crystal in its recommended circuit.
-const HSE_START: Time = Time::from_us(2_000);
 /// HSI wake-up: DS5319 table 24, maximum.
 const HSI_START: Time = Time::from_us(2);
 /// LSI start-up: DS5319 table 25, maximum.
@@ -93,6 +91,7 @@ type Ready = Option<Time>;
 #[derive(Debug)]
 pub struct Rcc {
     crystal: bool,
+    oscillators: Oscillators,
     cr: u32,
     cfgr: u32,
     sws: u32,
@@ -114,11 +113,12 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// RCC as power-on leaves it, on a board whose crystal works or not.
+    /// RCC as power-on leaves it, on a board with these oscillators, whose crystal works or not.
     #[must_use]
-    pub fn new(crystal: bool) -> Self {
+    pub fn new(crystal: bool, oscillators: Oscillators) -> Self {
         Self {
             crystal,
+            oscillators,
             cr: CR_RESET,
             cfgr: 0,
             sws: 0,
@@ -181,7 +181,7 @@ impl Rcc {
         if self.stopped() {
             return Clocks::STOPPED;
         }
-        Clocks::of(self.cfgr, self.sws)
+        Clocks::of(self.cfgr, self.sws, &self.oscillators)
     }
 
     fn is_ready(&self, source: Ready) -> bool {
@@ -393,7 +393,7 @@ impl Peripheral for Rcc {
     }
 
     fn reset(&mut self, now: Time) {
-        let fresh = Self::new(self.crystal);
+        let fresh = Self::new(self.crystal, self.oscillators);
         *self = Self {
             csr_flags: self.csr_flags,
             now,

@@ -11,7 +11,7 @@ fn at(rcc: &mut Rcc, us: u64) -> Time {
 /// HSE on, PLL x9, APB1 / 2, as the HAL does it for 72 MHz.
 #[test]
 fn the_pll_from_the_crystal_gives_72_mhz_when_both_are_ready() {
-    let mut rcc = Rcc::new(true);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     let now = at(&mut rcc, 10);
     rcc.write(0, 0x1_0083, now).unwrap();
     assert_eq!(rcc.read(0, now).unwrap() & CR_HSERDY, 0);
@@ -33,7 +33,7 @@ fn the_pll_from_the_crystal_gives_72_mhz_when_both_are_ready() {
 
 #[test]
 fn a_dead_crystal_never_gets_ready() {
-    let mut rcc = Rcc::new(false);
+    let mut rcc = Rcc::new(false, Oscillators::TYPICAL);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0x1_0083, now).unwrap();
     rcc.write(4, 1, now).unwrap();
@@ -45,7 +45,7 @@ fn a_dead_crystal_never_gets_ready() {
 
 #[test]
 fn reset_flags_gather_until_rmvf() {
-    let mut rcc = Rcc::new(true);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     assert_eq!(rcc.read(0x24, Time::ZERO).unwrap(), 0x0C00_0000);
     rcc.note_reset(Cause::Iwdg);
     rcc.reset(Time::ZERO);
@@ -58,7 +58,7 @@ fn reset_flags_gather_until_rmvf() {
 
 #[test]
 fn the_clock_in_use_cannot_be_stopped() {
-    let mut rcc = Rcc::new(true);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0, now).unwrap();
     assert_ne!(rcc.read(0, now).unwrap() & CR_HSIRDY, 0);
@@ -66,7 +66,7 @@ fn the_clock_in_use_cannot_be_stopped() {
 
 /// 72 MHz from the crystal, with the clock security system on.
 fn secured() -> Rcc {
-    let mut rcc = Rcc::new(true);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0x9_0083, now).unwrap();
     rcc.write(4, 0x001D_0400, now).unwrap();
@@ -101,7 +101,7 @@ fn after_a_failure_the_crystal_can_be_taken_into_use_again() {
 
 #[test]
 fn a_crystal_that_dies_while_it_starts_is_no_failure() {
-    let mut rcc = Rcc::new(true);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0x9_0083, now).unwrap();
     let now = at(&mut rcc, 1_000);
@@ -131,7 +131,7 @@ fn the_security_system_can_be_switched_off() {
 
 #[test]
 fn the_hsi_as_the_pll_s_source_outlives_the_crystal() {
-    let mut rcc = Rcc::new(true);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     let now = at(&mut rcc, 0);
     rcc.write(4, 0x0038_0400, now).unwrap();
     rcc.write(0, 0x0109_0083, now).unwrap();

@@ -109,12 +109,15 @@ impl Usart {
     }
 
     /// The rate and format it is set to, the rate rounded to a usual one within 2 %. `None` while it is off,
-    /// or in a format that is not one of eight data bits.
+    /// or in a format that is none of the line's. 7N2 reads as 8N1: the registers are the same, only the words
+    /// that are sent differ.
     #[must_use]
     pub fn settings(&self) -> Option<Settings> {
         let format = match (self.data_bits(), self.parity(), self.stop_bits()) {
             (8, None, 2) => Format::N2,
             (8, None, 1) => Format::N1,
+            (8, Some(Parity::Even), 1) => Format::SevenE1,
+            (8, Some(Parity::Odd), 1) => Format::SevenO1,
             (9, Some(Parity::Even), 1) => Format::E1,
             (9, Some(Parity::Odd), 1) => Format::O1,
             _ => return None,

@@ -132,6 +132,23 @@ fn parity_framing_and_noise_errors_have_their_flags() {
         assert_eq!(status(&mut usart, t), sr::RESET);
     }
 
+    // With words of eight bits, the parity bit is the eighth and seven data bits are left.
+    for (format, parity) in [
+        (Format::SevenE1, cr1::PCE),
+        (Format::SevenO1, cr1::PCE | cr1::PS),
+    ] {
+        let mut usart = receiver(parity, 0);
+        let c = Character::new(settings(format), 0x31).at(START);
+        play(&mut usart, c);
+        let t = START + Time::from_us(100);
+        assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE, "{format:?}");
+        let eighth = if format == Format::SevenE1 { 0x80 } else { 0 };
+        assert_eq!(data(&mut usart, t), 0x31 | eighth);
+        play(&mut usart, c.with_wrong_parity().at(t));
+        let t = t + Time::from_us(100);
+        assert_eq!(status(&mut usart, t), sr::RESET | sr::RXNE | sr::PE);
+    }
+
     let mut usart = receiver(0, 0);
     let n1 = settings(Format::N1);
     play(

@@ -2,6 +2,8 @@
 
 #![cfg(feature = "sim")]
 
+mod matrix;
+
 use std::env;
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;

@@ -1,0 +1,371 @@
+//! What makes the reference server a modio: its points and registers by the register map, its lock, its
+//! communication watchdog, its commands. The module in its slot is a 2Relay: two inputs, two outputs.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use conformance::line::LineFormat;
+use register_map::codes::{Baud, Command, Format, Mode};
+use register_map::points::{PointKind, SLOT_FIRST};
+use register_map::{BLOCKS, Module, configuration as at, counters, rule_at, runs, state};
+
+use super::log::Log;
+use super::modio_fault::ModioFault;
+
+type Answer = Result<Vec<u8>, u8>;
+
+/// The unit's address: that of most worked frames.
+pub const UNIT: u8 = 1;
+
+const MODULE: Module = Module::Relay2;
+/// The relays' modes, which are inputs, and the relays, which are outputs.
+const INPUTS: [bool; 2] = [true, false];
+const OUTPUT: u16 = SLOT_FIRST + 2;
+const OUTPUTS: usize = 2;
+
+/// Reset causes: power-on or the software, and the pin.
+const POWER_ON: u16 = 0x30;
+const SOFTWARE: u16 = 0x28;
+
+/// How long the lock stays open.
+const OPEN: Duration = Duration::from_secs(60);
+
+/// From one output to the next on the way to SAFE, with [`ModioFault::SafeOneByOne`].
+const ONE_BY_ONE: Duration = Duration::from_millis(1);
+
+/// A modio behind its line.
+pub struct Modio {
+    fault: Option<ModioFault>,
+    edited: BTreeMap<u16, u16>,
+    saved: BTreeMap<u16, u16>,
+    outputs: [bool; OUTPUTS],
+    now: Duration,
+    booted: Duration,
+    cause: u16,
+    open_until: Duration,
+    /// The last valid request.
+    last: Duration,
+    /// The watchdog has tripped; the flag may outlive that it is in force.
+    tripped: Option<Duration>,
+    flag: bool,
+    last_command: u16,
+    /// The unit is to start again once the reply is out.
+    pub restart: bool,
+}
+
+impl Modio {
+    pub fn new(fault: Option<ModioFault>) -> Self {
+        let mut settings = BTreeMap::new();
+        for rule in at::RULES {
+            let default = |address| (address, rule.default);
+            settings.extend(rule.addresses().map(default));
+        }
+        settings.insert(at::MODULE_SLOT, MODULE.code());
+        Self {
+            fault,
+            saved: settings.clone(),
+            edited: settings,
+            outputs: [false; OUTPUTS],
+            now: Duration::ZERO,
+            booted: Duration::ZERO,
+            cause: POWER_ON,
+            open_until: Duration::ZERO,
+            last: Duration::ZERO,
+            tripped: None,
+            flag: false,
+            last_command: 0,
+            restart: false,
+        }
+    }
+
+    pub fn has(&self, fault: ModioFault) -> bool {
+        self.fault == Some(fault)
+    }
+
+    /// The unit starts; returns the line as it is from now on.
+    pub fn start(&mut self, at: Duration, power_on: bool) -> LineFormat {
+        self.edited.clone_from(&self.saved);
+        (self.booted, self.last, self.now) = (at, at, at);
+        self.cause = if power_on { POWER_ON } else { SOFTWARE };
+        (self.open_until, self.tripped, self.flag) = (Duration::ZERO, None, false);
+        self.restart = false;
+        if !self.has(ModioFault::KeepsOutputs) {
+            for (n, output) in (0..).zip(&mut self.outputs) {
+                *output = self.saved[&(at::START + OUTPUT + n)] == 1;
+            }
+        }
+        let mut baud = u32::from(self.saved[&at::BAUD]) * 100;
+        if baud == Baud::B230400.bits_per_second() && self.has(ModioFault::LacksARate) {
+            baud = Baud::B115200.bits_per_second();
+        }
+        let mut format = Format::from_code(self.saved[&at::FORMAT]).unwrap_or(Format::F8N2);
+        if format == Format::F8O1 && self.has(ModioFault::OddIsEven) {
+            format = Format::F8E1;
+        }
+        let name = Format::NAMES[usize::from(format.code())].1;
+        LineFormat::new(baud, name.parse().unwrap())
+    }
+
+    /// Silence beyond t3.5 before a reply.
+    pub fn response_delay(&self) -> Duration {
+        if self.has(ModioFault::RepliesUndelayed) {
+            return Duration::ZERO;
+        }
+        Duration::from_millis(self.edited[&at::RESPONSE_DELAY].into())
+    }
+
+    /// A valid request for this unit, or a broadcast, at this instant.
+    pub fn request(&mut self, at: Duration, broadcast: bool) {
+        self.now = at;
+        let timeout = Duration::from_millis(100) * u32::from(self.edited[&at::COMM_TIMEOUT]);
+        let dead = !timeout.is_zero() && at > self.last + timeout;
+        if dead && self.tripped.is_none() && !self.has(ModioFault::WatchdogSleeps) {
+            self.tripped = Some(self.last + timeout);
+            self.flag = true;
+        }
+        if let Some(tripped) = self.tripped {
+            let each = if self.has(ModioFault::SafeOneByOne) {
+                ONE_BY_ONE
+            } else {
+                Duration::ZERO
+            };
+            for (n, output) in (0_u16..).zip(&mut self.outputs) {
+                let safe = self.edited[&(at::SAFE + OUTPUT + n)];
+                if safe != at::HOLD && at >= tripped + each * u32::from(n) {
+                    *output = safe == 1;
+                }
+            }
+        }
+        if !broadcast || !self.has(ModioFault::BroadcastsAreNoLife) {
+            self.last = at;
+        }
+    }
+
+    /// Does what a PDU asks for; `None` when the function has nothing to do with points and registers.
+    pub fn answer(&mut self, pdu: &[u8], log: &Log) -> Option<Answer> {
+        let odd = pdu[0] >= 0x80 && self.has(ModioFault::RestartsByOddFrames);
+        if odd {
+            self.start(self.now, false);
+        }
+        match pdu[0] {
+            1..=6 | 0x0F | 0x10 | 0x16 | 0x17 => Some(self.points(pdu, log)),
+            _ => None,
+        }
+    }
+
+    fn points(&mut self, pdu: &[u8], log: &Log) -> Answer {
+        let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
+        let fixed = match pdu[0] {
+            1..=6 => Some(5),
+            0x16 => Some(7),
+            _ => None,
+        };
+        let least = if pdu[0] == 0x17 { 10 } else { 6 };
+        if fixed.map_or(pdu.len() < least, |length| pdu.len() != length) {
+            return Err(3);
+        }
+        let (start, second) = (word(1), word(3));
+        let echo = || Ok(pdu[1..5].to_vec());
+        match pdu[0] {
+            function @ 1..=2 => self.read_bits(function, start, second),
+            function @ 3..=4 => self.read(function, start, second, log),
+            5 => {
+                let value = match second {
+                    0xFF00 => true,
+                    0 => false,
+                    _ => return Err(3),
+                };
+                self.write_bits(start, &[value]).and_then(|()| echo())
+            }
+            6 => self.write(start, &[second]).and_then(|()| echo()),
+            0x0F => {
+                let data = &pdu[6..];
+                let whole = usize::from(second).div_ceil(8);
+                let right = usize::from(pdu[5]) == whole && data.len() == whole;
+                if !(1..=1968).contains(&second) || !right {
+                    return Err(3);
+                }
+                let bit = |n: usize| data[n / 8] >> (n % 8) & 1 == 1;
+                let bits: Vec<bool> = (0..usize::from(second)).map(bit).collect();
+                self.write_bits(start, &bits).and_then(|()| echo())
+            }
+            0x10 => {
+                let words = words(second, 123, &pdu[5..])?;
+                self.write(start, &words).and_then(|()| echo())
+            }
+            0x16 => {
+                let before = self.read(3, start, 1, log)?;
+                let before = u16::from_be_bytes([before[1], before[2]]);
+                let (and, or) = (second, word(5));
+                self.write(start, &[before & and | or & !and])?;
+                Ok(pdu[1..].to_vec())
+            }
+            _ => {
+                let words = words(word(7), 121, &pdu[9..])?;
+                self.read(3, start, second, log)?;
+                self.write(word(5), &words)?;
+                self.read(3, start, second, log)
+            }
+        }
+    }
+
+    fn read_bits(&self, function: u8, start: u16, quantity: u16) -> Answer {
+        if !(1..=2000).contains(&quantity) {
+            return Err(3);
+        }
+        let points = [INPUTS, self.outputs].concat();
+        let from = usize::from(start.checked_sub(SLOT_FIRST).ok_or(2)?);
+        let bits = points.get(from..from + usize::from(quantity)).ok_or(2)?;
+        let mut data = 0;
+        for (n, bit) in bits.iter().enumerate() {
+            let hidden = function == 1 && from + n < INPUTS.len();
+            let hidden = hidden && self.has(ModioFault::InputsBy02Only);
+            data |= u8::from(*bit && !hidden) << n;
+        }
+        Ok(vec![1, data])
+    }
+
+    fn read(&self, function: u8, start: u16, quantity: u16, log: &Log) -> Answer {
+        if !(1..=125).contains(&quantity) {
+            return Err(3);
+        }
+        let registers = BLOCKS.iter().skip(1);
+        let there = |block: &&&register_map::Block| runs(block.rules, start, quantity).is_some();
+        registers.into_iter().find(there).ok_or(2)?;
+        let mut data = vec![(quantity * 2) as u8];
+        for address in start..=start + (quantity - 1) {
+            let hidden = function == 4 && address == at::BAUD && self.has(ModioFault::HidesFrom04);
+            let value = if hidden { 0 } else { self.value(address, log) };
+            data.extend(value.to_be_bytes());
+        }
+        Ok(data)
+    }
+
+    fn value(&self, address: u16, log: &Log) -> u16 {
+        const SLOT_MODULE: u16 = state::MODULE_IN_FORCE + 4;
+        let open = self.now < self.open_until;
+        let uptime = (self.now - self.booted).as_secs() as u32;
+        match address {
+            at::KEY => u16::from(open),
+            at::COMMAND if self.has(ModioFault::CommandReadsBack) => self.last_command,
+            at::COMMAND => 0,
+            0x0200 => (state::PRODUCT >> 16) as u16,
+            0x0201 => state::PRODUCT as u16,
+            state::UNIT_ADDRESS => UNIT.into(),
+            state::RESET_CAUSE => self.cause,
+            0x0208 => (uptime >> 16) as u16,
+            0x0209 => uptime as u16,
+            state::STATUS => {
+                let flags = [
+                    (state::status::COMM_WATCHDOG, self.flag),
+                    (state::status::UNSAVED, self.edited != self.saved),
+                    (state::status::UNLOCKED, open),
+                ];
+                flags.iter().map(|(bit, set)| bit * u16::from(*set)).sum()
+            }
+            SLOT_MODULE => MODULE.code(),
+            state::BUS_MESSAGES..state::T15_GAPS => {
+                let lag = u16::from(self.has(ModioFault::RegistersLag));
+                log.counter(address - state::BUS_MESSAGES).wrapping_sub(lag)
+            }
+            _ => self.edited.get(&address).copied().unwrap_or(0),
+        }
+    }
+
+    fn write_bits(&mut self, start: u16, bits: &[bool]) -> Result<(), u8> {
+        let inputs = SLOT_FIRST..OUTPUT;
+        if inputs.contains(&start) && self.has(ModioFault::EchoesInputs) {
+            return Ok(());
+        }
+        let from = usize::from(start.checked_sub(OUTPUT).ok_or(2)?);
+        let outputs = self.outputs.get_mut(from..from + bits.len()).ok_or(2)?;
+        outputs.copy_from_slice(bits);
+        self.tripped = None;
+        Ok(())
+    }
+
+    fn write(&mut self, start: u16, words: &[u16]) -> Result<(), u8> {
+        let count = words.len() as u16;
+        if runs(counters::RULES, start, count).is_some() {
+            let whole = start.is_multiple_of(2) && count.is_multiple_of(2);
+            let zero = words.iter().all(|word| *word == 0);
+            let right = whole || self.has(ModioFault::ClearsHalfCounters);
+            return if right && zero { Ok(()) } else { Err(3) };
+        }
+        let echoes = self.has(ModioFault::EchoesStateWrites);
+        if echoes && runs(state::RULES, start, count).is_some() {
+            return Ok(());
+        }
+        runs(at::RULES, start, count).ok_or(2)?;
+        let locked = self.now >= self.open_until && (start, count) != (at::KEY, 1);
+        let locked = locked && !self.has(ModioFault::NoLock);
+        if locked && self.has(ModioFault::LockFirst) {
+            return Err(6);
+        }
+        for (address, value) in (start..).zip(words) {
+            if !self.allows(address, *value) {
+                return Err(3);
+            }
+            if self.has(ModioFault::WritesUpToTheBadOne) && !locked {
+                self.edited.insert(address, *value);
+            }
+        }
+        let pair = |address: u16| {
+            let new = usize::from(address.wrapping_sub(start));
+            words.get(new).copied().unwrap_or(self.edited[&address])
+        };
+        let mode = Mode::from_code(pair(at::MODE)).unwrap_or(Mode::Rtu);
+        let format = Format::from_code(pair(at::FORMAT));
+        if format.is_some_and(|format| !format.suits(mode)) {
+            return Err(3);
+        }
+        if locked {
+            return Err(6);
+        }
+        self.open_until = self.now + OPEN;
+        for (address, value) in (start..).zip(words) {
+            match address {
+                at::KEY => {}
+                at::COMMAND => self.command(*value),
+                _ => drop(self.edited.insert(address, *value)),
+            }
+        }
+        Ok(())
+    }
+
+    fn allows(&self, address: u16, value: u16) -> bool {
+        if address == at::KEY && self.has(ModioFault::AnyKey)
+            || address == at::BAUD && self.has(ModioFault::AnyBaud)
+        {
+            return true;
+        }
+        let kind = match at::point_of(address) {
+            Some(point) if (OUTPUT..OUTPUT + 2).contains(&point) => PointKind::BitOutput,
+            Some(point) if (SLOT_FIRST..OUTPUT).contains(&point) => PointKind::BitInput,
+            _ => PointKind::None,
+        };
+        rule_at(at::RULES, address).is_some_and(|(rule, _)| rule.values_for(kind).allow(value))
+    }
+
+    fn command(&mut self, code: u16) {
+        self.last_command = code;
+        match Command::from_code(code) {
+            Some(Command::Save) => self.saved.clone_from(&self.edited),
+            Some(Command::Restart) => self.restart = true,
+            Some(Command::DropChanges) => self.edited.clone_from(&self.saved),
+            Some(Command::ClearWatchdogFlag) => self.flag = false,
+            _ => {}
+        }
+    }
+}
+
+/// The words of a write of `quantity`, at most `most`, after their byte count.
+fn words(quantity: u16, most: u16, data: &[u8]) -> Result<Vec<u16>, u8> {
+    let (count, data) = data.split_first().ok_or(3)?;
+    let whole = usize::from(quantity) * 2;
+    if !(1..=most).contains(&quantity) || usize::from(*count) != whole || data.len() != whole {
+        return Err(3);
+    }
+    let (pairs, _) = data.as_chunks::<2>();
+    Ok(pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect())
+}

@@ -1,0 +1,211 @@
+//! Lets the core execute: a segment of code at a time, each with its cost.
+
+use rigless::emulator::Exit;
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+
+use super::run::{IPSR, Limit, XPSR, is_flash};
+use super::segment::{End, Place, Segment};
+use super::{FLASH_BASE, FLASH_SIZE, Machine, RAM_BASE};
+use crate::time::Time;
+
+/// The vector table's offset (PM0056 4.4.4).
+const VTOR: u64 = 0xE000_ED08;
+
+/// The exception being handled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Active {
+    /// Its number, 0 for none.
+    number: u32,
+    /// Where its handler starts.
+    handler: u32,
+}
+
+impl Machine {
+    /// Lets the core run until something has to happen.
+    pub(super) fn execute(&mut self, limit: Limit) -> Exit {
+        let stop = limit
+            .time
+            .min(self.cut_at.unwrap_or(Time::MAX))
+            .min(self.poll_at);
+        let most = limit.instructions - self.counted;
+        self.bus.stop = (stop, most);
+        // Code in SRAM that runs beside a flash operation is looked at after every instruction: once it
+        // comes back to flash it stalls.
+        // So is the NMI's handler, whose line is tested when it returns.
+        self.bus.halt = self.bus.soc.flash.busy_until().is_some() || self.bus.soc.rcc.nmi();
+        if let Some(exit) = self.enter_exception() {
+            return exit;
+        }
+        let mut until = self.next_event().min(stop);
+        loop {
+            let count = self.core.retired();
+            let pc = self.pc();
+            if !self.bus.clock.goes_on(count, pc) {
+                let segment = *self.segment(pc);
+                self.bus.clock.follow(count, &segment);
+            }
+            let budget = self
+                .bus
+                .clock
+                .instructions_until(count, until)
+                .min(most.saturating_sub(count));
+            let budget = if self.bus.halt { 1 } else { budget.max(1) };
+            let busy = self.bus.soc.flash.busy_until().is_some();
+            let exit = self.core.run(budget as u32, &mut self.bus).0;
+            let ran = self.core.retired() - count;
+            if busy {
+                self.bus.soc.flash.ran(ran);
+            }
+            if let Some(segment) = self.bus.clock.ended(count + ran) {
+                let (end, after) = (segment.end, segment.after());
+                self.charge_end(end, after);
+            }
+            if exit != Exit::Budget {
+                self.unsettled = true;
+                return exit;
+            }
+            if self.bus.halt || !self.bus.queued.is_empty() || self.core.retired() >= most {
+                return exit;
+            }
+            if core::mem::take(&mut self.bus.touched) {
+                until = self.next_event().min(stop);
+            }
+            if self.now() >= until {
+                return exit;
+            }
+        }
+    }
+
+    /// Lets the core enter an exception that is pending, without an instruction, so that the entry has its own
+    /// cost. `None` when there is none.
+    fn enter_exception(&mut self) -> Option<Exit> {
+        if !core::mem::take(&mut self.unsettled) && self.bus.queued.is_empty() {
+            return None;
+        }
+        let before = self.pc();
+        let exit = self.core.run(0, &mut self.bus).0;
+        if self.pc() != before {
+            self.note_active();
+            self.bus.clock.charge(self.bus.segments.pace().entry());
+            return Some(Exit::Returned);
+        }
+        (exit != Exit::Budget).then_some(exit)
+    }
+
+    /// The segment of code at `pc`; none outside the memories.
+    fn segment(&mut self, pc: u32) -> &Segment {
+        let in_flash = is_flash(pc);
+        let (memory, base) = if in_flash {
+            (self.bus.soc.flash.bytes(), FLASH_BASE)
+        } else {
+            (self.bus.ram.bytes(), RAM_BASE)
+        };
+        let offset = pc.wrapping_sub(base) as usize;
+        // Flash is at 0 as well.
+        let offset = if in_flash {
+            offset % FLASH_SIZE
+        } else {
+            offset
+        };
+        let code = memory.get(offset..).unwrap_or_default();
+        let place = Place {
+            start: pc,
+            in_flash,
+            branched: self.sequential != Some(pc),
+        };
+        self.bus.segments.at(place, code)
+    }
+
+    /// Charges what the end of a segment costs by where it has led to; `after` is the address after it.
+    fn charge_end(&mut self, end: End, after: u32) {
+        let pc = self.pc();
+        self.sequential = (pc == after).then_some(pc);
+        let pace = *self.bus.segments.pace();
+        let cycles = match end {
+            End::Sequential => 0,
+            End::Return if self.active.number != 0 => match self.leave(pc) {
+                Left::Not => self.branched(after, pc),
+                Left::Return => pace.exit(),
+                Left::TailChain => pace.tail_chain(),
+            },
+            End::Exception => {
+                if pc == after {
+                    0
+                } else {
+                    self.note_active();
+                    pace.entry()
+                }
+            }
+            End::Branch | End::Return => self.branched(after, pc),
+        };
+        self.bus.clock.charge(cycles);
+    }
+
+    fn branched(&self, after: u32, pc: u32) -> u32 {
+        let pace = self.bus.segments.pace();
+        if pc != after {
+            pace.taken(is_flash(pc))
+        } else if is_flash(pc) {
+            pace.not_taken()
+        } else {
+            0
+        }
+    }
+
+    /// Whether a branch to `pc` was the end of the exception being handled.
+    fn leave(&mut self, pc: u32) -> Left {
+        let was = self.active;
+        let number = self.exception();
+        if number == was.number {
+            return if pc == was.handler {
+                Left::TailChain
+            } else {
+                Left::Not
+            };
+        }
+        self.note_active();
+        if number != 0 && pc == self.active.handler {
+            Left::TailChain
+        } else {
+            Left::Return
+        }
+    }
+
+    /// The number of the exception being handled.
+    fn exception(&self) -> u32 {
+        self.register(XPSR).unwrap_or_default() & IPSR
+    }
+
+    /// Another exception is being handled, or none.
+    fn note_active(&mut self) {
+        let number = self.exception();
+        let now = VirtualNanos(self.cycles());
+        let table = self.core.debugger_access(None, VTOR, Width::W32, now);
+        let at = table.unwrap_or(0) as u32 + 4 * number;
+        let word = |bytes: &[u8], base: u32| {
+            let at = at.checked_sub(base)? as usize;
+            let bytes = bytes.get(at..at + 4)?;
+            Some(u32::from_le_bytes(bytes.try_into().ok()?))
+        };
+        let flash = self.bus.soc.flash.bytes();
+        let handler = word(self.bus.ram.bytes(), RAM_BASE)
+            .or_else(|| word(flash, FLASH_BASE))
+            .or_else(|| word(flash, 0))
+            .unwrap_or_default();
+        self.active = Active {
+            number,
+            handler: handler & !1,
+        };
+    }
+}
+
+/// What a branch did to the exception being handled.
+enum Left {
+    /// Nothing: it stays within the handler.
+    Not,
+    /// It returned from it.
+    Return,
+    /// Another one, or the same again, follows at once.
+    TailChain,
+}
