@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::steps::Steps;
 use crate::toolchain::Need;
 use crate::workspace::Workspace;
-use crate::{Result, bench, build, command, fuzz, renode, test};
+use crate::{Result, bench, build, command, fuzz, peers, renode, test};
 
 /// What ends up in the image.
 const TARGET_PACKAGES: [&str; 5] = [
@@ -19,7 +19,7 @@ const TARGET_PACKAGES: [&str; 5] = [
 ];
 
 /// The workspaces there are.
-const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, bench::RIVALS];
+const WORKSPACES: [&str; 4] = ["Cargo.toml", fuzz::MANIFEST, bench::RIVALS, peers::MANIFEST];
 
 /// `cargo xtask ci`.
 ///
@@ -29,11 +29,11 @@ const WORKSPACES: [&str; 3] = ["Cargo.toml", fuzz::MANIFEST, bench::RIVALS];
 pub fn run(workspace: &mut Workspace) -> Result<()> {
     let mut steps = Steps::default();
     steps.run("formatting", || {
-        let [modio, fuzz, rivals] = WORKSPACES.map(|manifest| {
+        let [modio, fuzz, rivals, peers] = WORKSPACES.map(|manifest| {
             let mut cargo = workspace.cargo("fmt");
             command::run(cargo.args(["--all", "--check", "--manifest-path", manifest]))
         });
-        modio.and(fuzz).and(rivals).into()
+        modio.and(fuzz).and(rivals).and(peers).into()
     });
     steps.run("lints, host", || {
         command::run(&mut host_lints(workspace.cargo("clippy"))).into()
@@ -60,6 +60,12 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
             })
             .into()
     });
+    steps.run("lints, peers", || {
+        let mut cargo = workspace.cargo("clippy");
+        cargo.args(["--locked", "--target-dir"]);
+        cargo.arg(workspace.target().join("peers"));
+        command::run(&mut other_lints(cargo, peers::MANIFEST)).into()
+    });
     steps.run("documentation, host", || {
         command::run(&mut host_documentation(workspace.cargo("doc"))).into()
     });
@@ -78,6 +84,9 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
         test::on(image.as_deref(), |elf| {
             renode::checks::on_simulator(workspace, elf, true)
         })
+    });
+    steps.run("servers of cargo xtask peers, briefly", || {
+        peers::step(workspace)
     });
     steps.run("fuzz targets, briefly", || fuzz::step(workspace, true));
     steps.finish()

@@ -25,14 +25,6 @@ pub struct Options {
     elf: Option<PathBuf>,
 }
 
-impl Options {
-    /// Whether a probe or an image is named.
-    #[must_use]
-    pub const fn is_told(&self) -> bool {
-        self.probe.is_some() || self.elf.is_some()
-    }
-}
-
 /// `cargo xtask flash`.
 ///
 /// # Errors

@@ -27,6 +27,7 @@ pub mod fuzz;
 pub mod hil;
 pub mod image;
 mod matrix;
+pub mod peers;
 pub mod pymodbus;
 pub mod renode;
 #[cfg(all(test, unix))]
@@ -75,7 +76,10 @@ enum Command {
     /// Test the image on Renode: its suites and the conformance suite
     Renode(renode::Options),
     /// Test a real board on its serial line: conformance, timing, wires
+    #[command(disable_help_flag = true)]
     Hil(hil::Options),
+    /// Test well-known Modbus servers with the conformance suite, and renew the table in docs/conformance.md
+    Peers(peers::Options),
     /// Feed the framers, the server and the configuration store what libFuzzer comes up with
     Fuzz(fuzz::Options),
     /// Good and damaged frames to the image in simulation, a million of them
@@ -108,7 +112,8 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Soak(options) => soak::run(&mut workspace, &options),
         Command::Matrix => matrix::run(&mut workspace),
         Command::Renode(options) => renode::run(&mut workspace, &options),
-        Command::Hil(options) => hil::run(&mut workspace, &options),
+        Command::Hil(options) => hil::run(&workspace, &options),
+        Command::Peers(options) => peers::run(&workspace, &options),
         Command::Docs => docs::run(&workspace),
         Command::Test(options) => test::run(&mut workspace, &options),
         Command::Ci => ci::run(&mut workspace),

@@ -1,5 +1,6 @@
 //! pymodbus and mbpoll, Modbus masters that nobody here wrote, against the image in simulation: a virtual
 //! environment for the first under target/, and the script that drives them. mbpoll is the machine's own.
+//! `cargo xtask peers` uses the environment as well.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,8 +20,7 @@ const MBPOLL: &str = "mbpoll";
 /// in CI. Without mbpoll the script leaves its tests out, and the others have to pass all the same.
 pub fn step(workspace: &Workspace, elf: &Path, strict: bool) -> Outcome {
     let scripts = workspace.root().join(SCRIPTS);
-    let environment = workspace.target().join("pymodbus-venv");
-    match prepare("python3", &environment, &scripts.join("requirements.txt")) {
+    match environment(workspace) {
         Ok(python) => match drive(workspace, &python, &scripts, elf) {
             Ok(()) => {
                 find(MBPOLL).map_or_else(|missing| lacking(&missing, strict), |()| Outcome::Passed)
@@ -29,6 +29,17 @@ pub fn step(workspace: &Workspace, elf: &Path, strict: bool) -> Outcome {
         },
         Err(missing) => lacking(&missing, strict),
     }
+}
+
+/// Makes the virtual environment with pymodbus, or takes the one made earlier; returns its interpreter.
+///
+/// # Errors
+///
+/// When Python or its module venv is missing, or PyPI cannot be reached, with what to install.
+pub fn environment(workspace: &Workspace) -> Result<PathBuf> {
+    let environment = workspace.target().join("pymodbus-venv");
+    let requirements = workspace.root().join(SCRIPTS).join("requirements.txt");
+    prepare("python3", &environment, &requirements)
 }
 
 /// What becomes of the step where a master is missing.

@@ -256,6 +256,21 @@ impl<'a> Bench<'a> {
         self.ensure(reply.exception(pdu[0]) == Some(code), wanted)
     }
 
+    /// Asks with a PDU whose last byte before the data announces their number, and wants exception 03. Where it
+    /// announces another number than there is, silence is right as well: the frame is not whole.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    pub fn exception_03_with(&mut self, head: &[u8], data: &[u8]) -> Check {
+        let request = [head, data].concat();
+        if head.last().copied().map(usize::from) == Some(data.len()) {
+            self.exception(&request, 3)
+        } else {
+            self.exception_03_or_silence(&request)
+        }
+    }
+
     /// Asks with a PDU of the wrong length: exception 03 or silence.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! The bench of `modio-hil` with the firmware's image in the simulator as its board, in exact time.
+//! `modio-hil` with the firmware's image in the simulator as its board, in exact time.
 
 #![cfg(feature = "sim")]
 
@@ -35,11 +35,13 @@ fn the_image_loses_nothing_at_any_rate_and_is_back_at_its_own() {
         unit: 3,
         patience: waits(&endpoint, None),
         allow_config: false,
+        module: None,
         cases: chosen(&["fc05/".to_owned()]).expect("there are such cases"),
         requests: 300,
         rates: rates.clone(),
         limit: Some(home.t35() + Duration::from_millis(1)),
-        fixture: None,
+        wires: Vec::new(),
+        analog: Vec::new(),
     };
     let mut report = Report::default();
     let never = AtomicBool::new(false);

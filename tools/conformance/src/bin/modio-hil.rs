@@ -1,25 +1,35 @@
-//! `modio-hil`: tests a modio on a bench and tells what it found.
+//! `modio-hil`: tests a modio on a bench and reports what it found.
 
 use std::process::ExitCode;
 
+use conformance::hil::about::About;
 use conformance::hil::cli::Cli;
 use conformance::hil::report::Report;
+use conformance::hil::shell;
 use conformance::{hil, interrupt, program};
 
 fn main() -> ExitCode {
     program::run("modio-hil", test)
 }
 
-/// Tests, and gives the exit status.
+/// Gets the board ready and tests it; returns the exit status.
 fn test(cli: &Cli) -> Result<u8, String> {
+    let setup = cli.setup()?;
     cli.reports.check()?;
-    let mut endpoint = cli.open().map_err(|broken| broken.to_string())?;
-    let plan = cli.plan(endpoint.as_ref())?;
-    if cli.check {
-        return Ok(0);
+    let mut endpoint = setup.open().map_err(|broken| broken.to_string())?;
+    let plan = setup.plan(endpoint.as_ref())?;
+    // A mistake has been reported by now: nothing was done to the board yet.
+    if let Some(flash) = setup.flash() {
+        flash.write()?;
+    }
+    if let Some(reset) = setup.reset() {
+        shell::run(reset)?;
     }
     let stop = interrupt::catch()?;
-    let mut report = Report::default();
+    let mut report = Report {
+        about: About::here(setup.port()),
+        ..Report::default()
+    };
     let mut tell = |line: &str| program::say(line);
     let ended = hil::run(endpoint.as_mut(), &plan, stop, &mut report, &mut tell);
     // What was found before it could not go on is worth having, too.

@@ -227,11 +227,8 @@ fn byte_count(bench: &mut Bench<'_>) -> Check {
     let quantity = span.len() as u16;
     bench.set_bits(span.first, &vec![false; usize::from(quantity)])?;
     for (count, bytes) in [(0_u8, 0), (0, 1), (2, 2), (3, 3), (255, 1), (246, 246)] {
-        let data = vec![0xFF; bytes];
-        bench.exception(
-            &[pdu(0x0F, span.first, quantity), vec![count], data].concat(),
-            3,
-        )?;
+        let head = [pdu(0x0F, span.first, quantity), vec![count]].concat();
+        bench.exception_03_with(&head, &vec![0xFF; bytes])?;
     }
     let now = bench.read_bits(span)?;
     bench.ensure(!now.contains(&true), "no coil has been written")

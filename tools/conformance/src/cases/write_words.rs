@@ -198,16 +198,17 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
     let at = bench.target.words.map_or(0, |words| words.span.first);
     bench.exception(&[pdu(0x10, at, 0), vec![0]].concat(), 3)?;
     bench.exception(&[pdu(0x10, at, 0), vec![2, 0, 1]].concat(), 3)?;
-    // 124 registers would make a frame of 257 bytes: their data is left out.
+    // 124 registers would make a frame of 257 bytes: data are left out.
     for (quantity, count) in [
+        (124, 246),
         (124, 248_u8),
         (125, 250),
         (128, 0),
         (0x8001, 2),
         (0xFFFF, 254),
     ] {
-        let data = vec![0; usize::from(count.min(246))];
-        bench.exception(&[pdu(0x10, at, quantity), vec![count], data].concat(), 3)?;
+        let head = [pdu(0x10, at, quantity), vec![count]].concat();
+        bench.exception_03_with(&head, &vec![0; usize::from(count.min(246))])?;
     }
     Ok(())
 }
@@ -230,8 +231,8 @@ fn quantity_first(bench: &mut Bench<'_>) -> Check {
     let Some(nowhere) = bench.target.nowhere(3) else {
         return Err(Stop::Skip("every register exists".to_owned()));
     };
-    for (quantity, count, bytes) in [(0, 0, 0), (124, 248, 246), (1, 0, 0), (1, 1, 1), (1, 4, 4)] {
-        let data = vec![0; bytes];
+    for (quantity, count) in [(0, 0), (124, 246), (1, 0), (1, 1), (1, 4)] {
+        let data = vec![0; usize::from(count)];
         let request = [pdu(0x10, nowhere, quantity), vec![count], data].concat();
         bench.exception(&request, 3)?;
     }
@@ -310,8 +311,8 @@ fn byte_count(bench: &mut Bench<'_>) -> Check {
             .high
             .to_be_bytes()
             .repeat(usize::from(count).div_ceil(2));
-        let data = high[..usize::from(count).min(246)].to_vec();
-        bench.exception(&[pdu(0x10, at, quantity), vec![count], data].concat(), 3)?;
+        let head = [pdu(0x10, at, quantity), vec![count]].concat();
+        bench.exception_03_with(&head, &high[..usize::from(count).min(246)])?;
     }
     unchanged(bench, at, words.low, usize::from(quantity))
 }

@@ -1,18 +1,12 @@
-//! The command line of `modio-hil`.
+//! The command line of `modio-hil`, and of `cargo xtask hil`, which passes everything on to it.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::Parser;
+use register_map::Module;
 use register_map::codes::Baud;
 
-use crate::case::Case;
-use crate::cli::waits;
-use crate::endpoint::stream::Stream;
-use crate::endpoint::{Broken, Endpoint};
-use crate::hil::Plan;
-use crate::hil::fixture::Fixture;
-use crate::line::{CharacterFormat, LineFormat};
+use crate::line::CharacterFormat;
 use crate::program::Files;
 
 /// Tests a modio on a bench: the conformance suite, how soon and how surely it answers at each rate, and
@@ -23,25 +17,55 @@ use crate::program::Files;
 #[derive(Clone, Debug, Parser)]
 #[command(name = "modio-hil", version)]
 pub struct Cli {
+    /// The bench file: port, probe, unit, line, module, commands and wires in TOML (docs/hil.md). An option takes
+    /// precedence over its key
+    #[arg(long, value_name = "FILE")]
+    pub bench: Option<PathBuf>,
+
     /// The serial port
-    #[arg(long, value_name = "PORT", group = "endpoint", required = true)]
+    #[arg(long, value_name = "PORT")]
     pub port: Option<PathBuf>,
 
     /// Raw bytes over TCP in its place: a serial device server
-    #[arg(long, value_name = "HOST:PORT", group = "endpoint")]
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "port")]
     pub tcp: Option<String>,
 
-    /// The unit's address
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
-    pub unit: u8,
+    /// Write the image into the board first, by `cargo xtask flash`
+    #[arg(long)]
+    pub flash: bool,
 
-    /// The line's rate in bit/s
-    #[arg(long, value_name = "RATE", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
-    pub baud: u32,
+    /// The debug probe, when there are several: VID:PID or VID:PID:SERIAL, as `probe-rs list` shows it
+    #[arg(long, value_name = "SELECTOR", requires = "flash")]
+    pub probe: Option<String>,
 
-    /// The line's format: 8N2, 8E1, 8O1 or 8N1
-    #[arg(long, value_name = "FORMAT", default_value = "8N2")]
-    pub format: CharacterFormat,
+    /// Write this image instead of building one
+    #[arg(long, value_name = "FILE", requires = "flash")]
+    pub elf: Option<PathBuf>,
+
+    /// Run this in a shell before the tests, to reset the board or to switch it on
+    #[arg(long, value_name = "CMD")]
+    pub reset_cmd: Option<String>,
+
+    /// Run this in a shell, followed by ` off` or ` on`, to switch the unit's power; without it the cases that need
+    /// that are skipped
+    #[arg(long, value_name = "CMD")]
+    pub power_cmd: Option<String>,
+
+    /// The unit's address [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    pub unit: Option<u8>,
+
+    /// The line's rate in bit/s [default: 9600]
+    #[arg(long, value_name = "RATE", value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
+    pub baud: Option<u32>,
+
+    /// The line's format: 8N2, 8E1, 8O1 or 8N1 [default: 8N2]
+    #[arg(long, value_name = "FORMAT")]
+    pub format: Option<CharacterFormat>,
+
+    /// The module that must be in the unit's slot [default: any]
+    #[arg(long, value_name = "NAME")]
+    pub module: Option<Module>,
 
     /// Run the cases too that write the unit's configuration; they put it back
     #[arg(long)]
@@ -68,17 +92,9 @@ pub struct Cli {
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     pub limit: Option<u64>,
 
-    /// Try the wires of this fixture
-    #[arg(long, value_name = "FILE")]
-    pub fixture: Option<PathBuf>,
-
     /// What stays silent for so long, in ms, is silent [default: 250]
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     pub patience: Option<u64>,
-
-    /// Check options, fixture, report files and port, and end
-    #[arg(long)]
-    pub check: bool,
 
     /// Where the results go
     #[command(flatten)]
@@ -108,86 +124,42 @@ fn rates(text: &str) -> Result<Rates, String> {
         .map(Rates)
 }
 
-impl Cli {
-    /// Opens the line.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be opened, or the device has no such format, in one line.
-    pub fn open(&self) -> Result<Box<dyn Endpoint>, Broken> {
-        let line = LineFormat::new(self.baud, self.format);
-        if !["8N2", "8E1", "8O1", "8N1"].contains(&self.format.to_string().as_str()) {
-            let what = format!("a modio has no format {}: 8N2, 8E1, 8O1, 8N1", self.format);
-            return Err(Broken(what));
-        }
-        Ok(match (&self.port, &self.tcp) {
-            (Some(port), _) => Box::new(Stream::serial(port, line)?),
-            (None, Some(address)) => Box::new(Stream::tcp(address, line)?),
-            // The parser wants one of them.
-            (None, None) => return Err(Broken("no --port".to_owned())),
-        })
-    }
-
-    /// What to do, on this line.
-    ///
-    /// # Errors
-    ///
-    /// When the fixture is missing or wrong, or no case has a name as wanted, in one line.
-    pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan, String> {
-        if self.no_suite && self.requests == 0 && self.fixture.is_none() {
-            return Err(
-                "nothing is left to do: no suite, no requests, and no --fixture".to_owned(),
-            );
-        }
-        let fixture = match &self.fixture {
-            None => None,
-            Some(path) => {
-                let told = |why: String| format!("{}: {why}", path.display());
-                let text =
-                    std::fs::read_to_string(path).map_err(|error| told(error.to_string()))?;
-                Some(Fixture::parse(&text, self.unit).map_err(told)?)
-            }
-        };
-        Ok(Plan {
-            unit: self.unit,
-            patience: waits(endpoint, self.patience.map(Duration::from_millis)),
-            allow_config: self.allow_config,
-            cases: self.cases()?,
-            requests: self.requests,
-            rates: self.rates.clone().map_or_else(Vec::new, |rates| rates.0),
-            limit: self.limit.map(Duration::from_millis),
-            fixture,
-        })
-    }
-
-    fn cases(&self) -> Result<Vec<Case>, String> {
-        if self.no_suite {
-            return Ok(Vec::new());
-        }
-        crate::cli::chosen(&self.only)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::CommandFactory;
 
+    fn parse(arguments: &[&str]) -> Result<Cli, clap::Error> {
+        Cli::try_parse_from([&["x"], arguments].concat())
+    }
+
     #[test]
     fn the_options_are_consistent() {
         Cli::command().debug_assert();
-        let parse = |arguments: &[&str]| Cli::try_parse_from([&["x"], arguments].concat());
-        assert!(parse(&["--port", "a"]).is_ok());
+        assert!(parse(&["--port", "a", "--flash", "--probe", "b", "--elf", "c"]).is_ok());
         for wrong in [
-            &[][..],
-            &["--port", "a", "--tcp", "b"],
+            &["--port", "a", "--tcp", "b"][..],
             &["--port", "a", "--unit", "0"],
             &["--port", "a", "--rates", "9601"],
             &["--port", "a", "--rates", ""],
+            &["--port", "a", "--module", "5do"],
             &["--port", "a", "--no-suite", "--only", "x"],
+            &["--port", "a", "--probe", "b"],
+            &["--port", "a", "--elf", "c"],
         ] {
             assert!(parse(wrong).is_err(), "{wrong:?}");
         }
+    }
+
+    #[test]
+    fn every_option_is_in_the_manual() {
+        let manual = include_str!("../../../../docs/hil.md");
+        let command = Cli::command();
+        let options = command.get_arguments().filter_map(clap::Arg::get_long);
+        let missing: Vec<&str> = options
+            .filter(|name| !manual.contains(&format!("`--{name}")))
+            .collect();
+        assert!(missing.is_empty(), "{missing:?}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use register_map::configuration::{BAUD, COMMAND, FORMAT, KEY};
-use register_map::{Module, points, state};
+use register_map::{Module, counters, points, state};
 
 use crate::endpoint::{Abilities, Broken, Endpoint, Heard, Piece};
 use crate::frame::Mode;
@@ -55,11 +55,11 @@ impl Unit {
         let exception = |code| vec![pdu[0] | 0x80, code];
         match pdu[0] {
             1 | 2 if address < 32 => vec![pdu[0], 1, u8::from(self.bits[usize::from(address)])],
-            3 => {
+            3 | 4 => {
                 let words =
                     (address..address + value).map(|at| self.registers.get(&at).unwrap_or(&0));
                 let data: Vec<u8> = words.flat_map(|word| word.to_be_bytes()).collect();
-                [vec![3, data.len() as u8], data].concat()
+                [vec![pdu[0], data.len() as u8], data].concat()
             }
             5 if address < 32 => {
                 self.bits[usize::from(address)] = value == 0xFF00;
@@ -81,6 +81,10 @@ impl Unit {
                     }
                     _ => {}
                 }
+                pdu.to_vec()
+            }
+            6 if address < points::COUNT => {
+                self.registers.insert(address, value);
                 pdu.to_vec()
             }
             8 => pdu.to_vec(),
@@ -113,6 +117,10 @@ pub(super) struct Line {
     pub units: Vec<Unit>,
     /// Inputs that follow outputs: unit and point of both.
     pub wires: Vec<[(u8, u16); 2]>,
+    /// Analog inputs that follow analog outputs: unit and point of both, and the input's error.
+    pub analog: Vec<([(u8, u16); 2], u16)>,
+    /// The pulse counters count so many for each rising edge.
+    pub counts: u16,
     /// Decides about every frame that is sent.
     pub watch: Watch,
     /// A rate that the endpoint lacks.
@@ -131,9 +139,35 @@ impl Line {
             line,
             units: units.iter().map(|unit| Unit::new(*unit, line)).collect(),
             wires: Vec::new(),
+            analog: Vec::new(),
+            counts: 1,
             watch: Box::new(|_, _| Fate::Good),
             lacks: None,
             reply: Vec::new(),
+        }
+    }
+
+    fn unit(&mut self, address: u8) -> &mut Unit {
+        let mut units = self.units.iter_mut();
+        units.find(|unit| unit.address == address).unwrap()
+    }
+
+    /// Lets inputs follow their outputs.
+    fn carry(&mut self) {
+        for [(unit, output), (other, input)] in self.wires.clone() {
+            let level = self.unit(unit).bits[usize::from(output)];
+            let counts = self.counts;
+            let other = self.unit(other);
+            let before = std::mem::replace(&mut other.bits[usize::from(input)], level);
+            if level && !before {
+                let low = counters::of_point(input) + 1;
+                *other.registers.entry(low).or_default() += counts;
+            }
+        }
+        for ([(unit, output), (other, input)], error) in self.analog.clone() {
+            let value = self.unit(unit).registers.get(&output).copied();
+            let value = value.unwrap_or_default().saturating_add(error);
+            self.unit(other).registers.insert(input, value);
         }
     }
 
@@ -154,12 +188,7 @@ impl Line {
         if matches!(fate, Fate::Stale) {
             *reply.last_mut().unwrap() ^= 1;
         }
-        for [(unit, output), (other, input)] in self.wires.clone() {
-            let level =
-                self.units.iter().find(|u| u.address == unit).unwrap().bits[usize::from(output)];
-            let other = self.units.iter_mut().find(|u| u.address == other).unwrap();
-            other.bits[usize::from(input)] = level;
-        }
+        self.carry();
         let mut start = self.now + TURNAROUND;
         for byte in Mode::Rtu.frame(address, &reply) {
             let end = start + line.characters(1);

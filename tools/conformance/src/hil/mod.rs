@@ -2,9 +2,11 @@
 //! wires that lead from outputs to inputs. Behind the command `modio-hil`, which `cargo xtask hil` runs.
 //!
 //! ```text
-//! cli       the command                timing    requests at one rate: turnaround, lost frames
-//! fixture   which wires there are      spread    minimum, percentiles, histogram
-//! wires     tries them                 report    JUnit and JSON
+//! cli, setup  the command                 timing   requests at one rate: turnaround, lost frames
+//! bench_file  the hardware of the bench   spread   minimum, percentiles, histogram
+//! shell       flash, reset, power         about    unit, adapter, host, date
+//! wires       digital wires, pulses       report   JUnit and JSON
+//! analog      analog wires                remote   asks any unit on the line
 //! ```
 //!
 //! The unit is left as it was found: rate, outputs, configuration; also when a step fails and when the run
@@ -13,7 +15,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use register_map::state;
+use register_map::{Module, state};
 
 use crate::bench::{Bench, Patience};
 use crate::case::{Case, Check, Failure, Stop};
@@ -25,16 +27,21 @@ use crate::rate::tour;
 use crate::report::table;
 use crate::run::{Options, Verdict, run_while};
 
+pub mod about;
+pub mod analog;
+pub mod bench_file;
 pub mod cli;
 #[cfg(test)]
 mod fake;
-pub mod fixture;
+mod remote;
 pub mod report;
+pub mod setup;
+pub mod shell;
 pub mod spread;
 pub mod timing;
 pub mod wires;
 
-use fixture::Fixture;
+use bench_file::{Analog, Wire};
 use report::{Finding, Report};
 
 /// The unit address of loader mode, in which the line has its own rate, whatever is stored.
@@ -48,6 +55,8 @@ const UNSETTLED: u16 = 1 << 3 | 1 << 4;
 pub struct Plan {
     /// The unit's address.
     pub unit: u8,
+    /// The module that must be in its slot; `None`: any.
+    pub module: Option<Module>,
     /// How long to wait.
     pub patience: Patience,
     /// Whether cases may write the unit's configuration.
@@ -60,8 +69,10 @@ pub struct Plan {
     pub rates: Vec<u32>,
     /// The longest turnaround that 99 of 100 requests may have; `None`: it is only told.
     pub limit: Option<Duration>,
-    /// The wires.
-    pub fixture: Option<Fixture>,
+    /// Digital outputs wired to digital inputs.
+    pub wires: Vec<Wire>,
+    /// Analog outputs wired to analog inputs.
+    pub analog: Vec<Analog>,
 }
 
 /// Does it; `tell` hears each line for people as it comes. What has been found up to an error stands in
@@ -69,7 +80,7 @@ pub struct Plan {
 ///
 /// # Errors
 ///
-/// Why it cannot go on, in one line: no answer, another device, an endpoint that is gone, a unit that
+/// Why it cannot go on, in one line: no answer, another device or module, an endpoint that is gone, a unit that
 /// could not be brought back.
 pub fn run(
     endpoint: &mut dyn Endpoint,
@@ -87,13 +98,19 @@ pub fn run(
     };
     let (target, patience) = probe(endpoint, &given)?;
     report.endpoint = endpoint.name();
-    let module = target
-        .modio
-        .map_or_else(String::new, |modio| modio.module.to_string());
-    tell(&format!(
-        "{}: unit {} with {module}",
-        report.endpoint, plan.unit
-    ));
+    let module = target.modio.map_or(Module::None, |modio| modio.module);
+    if let Some(wanted) = plan.module.filter(|wanted| *wanted != module) {
+        return Err(format!(
+            "unit {} has the module {module} in force, but the bench has {wanted}",
+            plan.unit
+        ));
+    }
+    let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);
+    report.about.unit = Some(about::Unit::ask(&mut bench, module).map_err(told)?);
+    tell(&report.endpoint);
+    for (name, value) in report.about.properties() {
+        tell(&format!("{name}: {value}"));
+    }
     let go_on = || !stop.load(Ordering::Relaxed);
 
     if !plan.cases.is_empty() {
@@ -118,15 +135,19 @@ pub fn run(
     if plan.requests > 0 && go_on() {
         timing_at_each_rate(&mut bench, plan, stop, report, tell)?;
     }
-    if let Some(fixture) = &plan.fixture
-        && go_on()
-    {
-        tell(&format!("\nwires: {}", fixture.wires.len()));
-        let finding = |finding: Finding| {
-            tell(&finding.to_string());
-            report.findings.push(finding);
-        };
-        wires::run(&mut bench, fixture, stop, finding).map_err(told)?;
+    let wires = plan.wires.len() + plan.analog.len();
+    if wires > 0 && go_on() {
+        tell(&format!("\nwires: {wires}"));
+    }
+    let mut finding = |finding: Finding| {
+        tell(&finding.to_string());
+        report.findings.push(finding);
+    };
+    if !plan.wires.is_empty() && go_on() {
+        wires::run(&mut bench, &plan.wires, stop, &mut finding).map_err(told)?;
+    }
+    if !plan.analog.is_empty() && go_on() {
+        analog::run(&mut bench, &plan.analog, stop, &mut finding).map_err(told)?;
     }
     report.interrupted = !go_on();
     Ok(())
@@ -234,3 +255,5 @@ fn verdict(result: Check) -> Result<Verdict, Stop> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wire_tests;

@@ -1,4 +1,4 @@
-//! What was found on the bench: lines for people, JUnit XML and JSON for machines.
+//! What was found: lines for people, JUnit XML and JSON for machines.
 
 use std::fmt;
 use std::time::Duration;
@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::case::Kind;
+use crate::hil::about::About;
 use crate::hil::timing::Tally;
 use crate::report::junit::{self, Test};
 use crate::report::{Totals, json as suite_json};
@@ -29,13 +30,15 @@ pub struct Finding {
 /// All that was found.
 #[derive(Clone, Default)]
 pub struct Report {
+    /// What was tested, with what, where and when.
+    pub about: About,
     /// What the unit was tested through.
     pub endpoint: String,
     /// The cases of the suite.
     pub outcomes: Vec<Outcome>,
     /// The requests at each rate.
     pub timing: Vec<Tally>,
-    /// Rates and wires.
+    /// Rates, wires and pulses.
     pub findings: Vec<Finding>,
     /// Whether it ended early because somebody wanted so.
     pub interrupted: bool,
@@ -79,12 +82,12 @@ impl Report {
     /// A JUnit document: a suite for the cases and one for the rest.
     #[must_use]
     pub fn junit(&self) -> String {
-        let bench: Vec<Test<'_>> = self
+        let rest: Vec<Test<'_>> = self
             .findings
             .iter()
             .map(|finding| Test {
                 name: &finding.name,
-                section: "bench",
+                section: "hil",
                 kind: Kind::Modio,
                 verdict: &finding.verdict,
                 time: finding.time,
@@ -93,11 +96,11 @@ impl Report {
             .collect();
         let suites = [
             (self.endpoint.as_str(), junit::tests(&self.outcomes)),
-            ("bench", bench),
+            ("hil", rest),
         ];
         let mut xml = format!("{}<testsuites>\n", junit::HEADER);
         for (name, tests) in suites.iter().filter(|(_, tests)| !tests.is_empty()) {
-            xml += &junit::element(name, tests);
+            xml += &junit::element(name, &self.about.properties(), tests);
         }
         xml + "</testsuites>\n"
     }
@@ -119,6 +122,7 @@ impl Report {
             })
             .collect();
         json!({
+            "about": self.about.json(),
             "endpoint": self.endpoint,
             "interrupted": self.interrupted,
             "passed": totals.passed,
@@ -126,7 +130,7 @@ impl Report {
             "skipped": totals.skipped,
             "suite": suite_json::value(&self.endpoint, &self.outcomes),
             "timing": self.timing.iter().map(tally).collect::<Vec<_>>(),
-            "bench": findings,
+            "hil": findings,
         })
     }
 }

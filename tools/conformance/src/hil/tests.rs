@@ -6,28 +6,32 @@ use super::fake::{Fate, Line, TURNAROUND};
 use super::*;
 use crate::cli::waits;
 
-const OUTPUT: u16 = 0x10;
-
-fn plan(line: &Line) -> Plan {
+pub(super) fn plan(line: &Line) -> Plan {
     Plan {
         unit: 1,
+        module: None,
         patience: waits(line, None),
         allow_config: false,
         cases: Vec::new(),
         requests: 0,
         rates: Vec::new(),
         limit: None,
-        fixture: None,
+        wires: Vec::new(),
+        analog: Vec::new(),
     }
 }
 
-fn run_plan(line: &mut Line, plan: &Plan, stop: &AtomicBool) -> (Report, Result<(), String>) {
+pub(super) fn run_plan(
+    line: &mut Line,
+    plan: &Plan,
+    stop: &AtomicBool,
+) -> (Report, Result<(), String>) {
     let mut report = Report::default();
     let ended = run(line, plan, stop, &mut report, &mut |_| {});
     (report, ended)
 }
 
-fn never() -> AtomicBool {
+pub(super) fn never() -> AtomicBool {
     AtomicBool::new(false)
 }
 
@@ -123,7 +127,7 @@ fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
     assert!(
         report
             .junit()
-            .contains("name=\"bench\" tests=\"1\" failures=\"1\"")
+            .contains("name=\"hil\" tests=\"1\" failures=\"1\"")
     );
 }
 
@@ -265,84 +269,59 @@ fn a_unit_with_unsaved_settings_keeps_its_rate() {
     assert_eq!(line.units[0].saves, 0);
 }
 
-fn wired(text: &str) -> (Line, Plan) {
-    let mut line = Line::new(&[1, 2]);
-    line.wires = (0..2).map(|n| [(1, OUTPUT + n), (2, OUTPUT + n)]).collect();
-    line.units[0].bits[16] = true;
+#[test]
+fn unit_with_another_module_than_the_bench_is_not_tested() {
+    let mut line = Line::new(&[1]);
     let plan = Plan {
-        fixture: Some(Fixture::parse(text, 1).unwrap()),
+        module: Some(Module::Ao4),
+        requests: 5,
         ..plan(&line)
     };
-    (line, plan)
-}
-
-const WIRES: &str = "[[wire]]\nfrom = { point = 16 }\nto = { unit = 2, point = 16 }\n\
-                     [[wire]]\nfrom = { point = 17 }\nto = { unit = 2, point = 17 }\n";
-
-#[test]
-fn wires_as_described_pass_and_outputs_are_put_back() {
-    let (mut line, plan) = wired(WIRES);
     let (report, ended) = run_plan(&mut line, &plan, &never());
-    assert_eq!(ended, Ok(()));
-    assert_eq!(report.totals().passed, 2, "{:?}", report.findings);
-    assert!(report.findings[0].note.starts_with("on after "));
-    assert_eq!(line.units[0].bits[16..18], [true, false]);
+    let told = ended.unwrap_err();
+    assert_eq!(
+        told,
+        "unit 1 has the module 4do in force, but the bench has 4ao"
+    );
+    assert!(report.timing.is_empty());
+    let plan = Plan {
+        module: Some(Module::Do4),
+        ..plan
+    };
+    assert_eq!(run_plan(&mut line, &plan, &never()).1, Ok(()));
 }
 
 #[test]
-fn wires_that_are_not_so_fail_each_with_its_reason() {
-    let failing = |mut line: Line, plan: Plan| {
-        let (report, ended) = run_plan(&mut line, &plan, &never());
-        assert_eq!(ended, Ok(()));
-        assert_eq!(line.units[0].bits[16..18], [true, false], "put back");
-        let failed = report
-            .findings
-            .iter()
-            .filter(|f| f.verdict != Verdict::Passed);
-        failed.map(ToString::to_string).collect::<Vec<_>>()
+fn reports_say_which_unit_was_tested() {
+    let mut line = Line::new(&[1]);
+    let registers = &mut line.units[0].registers;
+    registers.insert(state::FIRMWARE_VERSION, 0x0102);
+    registers.insert(state::FIRMWARE_PATCH, 3);
+    registers.insert(state::UNIQUE_ID, 0xABCD);
+    let plan = Plan {
+        requests: 5,
+        ..plan(&line)
     };
-    let (mut line, plan) = wired(WIRES);
-    line.wires.pop();
-    let [broken] = &failing(line, plan)[..] else {
-        panic!("one wire is broken");
-    };
-    assert!(broken.contains("unit 2 point 0x0011 stays off"), "{broken}");
-
-    let (mut line, plan) = wired(WIRES);
-    line.wires.push([(1, 16), (2, 17)]);
-    let crossed = failing(line, plan).concat();
+    let (report, _) = run_plan(&mut line, &plan, &never());
+    let unit = &report.json()["about"]["unit"];
+    assert_eq!(unit["firmware"], "1.2.3");
+    assert_eq!(unit["identity"], "ABCD00000000000000000000");
+    assert_eq!(
+        (&unit["module"], unit["commit"].is_null()),
+        (&"4do".into(), true)
+    );
+    let xml = report.junit();
     assert!(
-        crossed.contains("unit 2 point 0x0011 went on as well"),
-        "{crossed}"
+        xml.contains("<property name=\"firmware\" value=\"1.2.3\"/>"),
+        "{xml}"
     );
 
-    let (line, plan) = wired(&WIRES.replace("unit = 2, point = 17", "unit = 3, point = 17"));
-    let silent = failing(line, plan).concat();
-    assert!(silent.contains("an answer from unit 3"), "{silent}");
-
-    let (line, plan) = wired(&WIRES.replacen("}\n[[", "}\ninverted = true\n[[", 1));
-    let inverted = failing(line, plan).concat();
-    assert!(
-        inverted.contains("unit 2 point 0x0010 stays off"),
-        "{inverted}"
-    );
-}
-
-#[test]
-fn an_interrupt_among_the_wires_puts_outputs_back() {
-    let (mut line, plan) = wired(WIRES);
-    let stop = Arc::new(never());
-    let pressed = Arc::clone(&stop);
-    line.watch = Box::new(move |frame, _| {
-        let on = frame[1] == 5 && frame[4] == 0xFF;
-        pressed.fetch_or(on, Ordering::Relaxed);
-        Fate::Good
-    });
-    let (report, ended) = run_plan(&mut line, &plan, &stop);
-    assert_eq!(ended, Ok(()));
-    assert!(report.interrupted);
-    assert_eq!(report.findings.len(), 1);
-    assert_eq!(line.units[0].bits[16..18], [true, false]);
+    // Register map 2 has the commit.
+    let registers = &mut line.units[0].registers;
+    registers.insert(state::MAP_VERSION, 2);
+    registers.extend([(0x020C, 0x0123), (0x020D, 0xABCD), (0x020E, 1)]);
+    let (report, _) = run_plan(&mut line, &plan, &never());
+    assert_eq!(report.json()["about"]["unit"]["commit"], "0123abcd-dirty");
 }
 
 #[test]

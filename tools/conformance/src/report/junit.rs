@@ -30,7 +30,7 @@ pub struct Test<'a> {
 /// The outcomes as a JUnit document; `suite` is what was tested.
 #[must_use]
 pub fn document(suite: &str, outcomes: &[Outcome]) -> String {
-    format!("{HEADER}{}", element(suite, &tests(outcomes)))
+    format!("{HEADER}{}", element(suite, &[], &tests(outcomes)))
 }
 
 /// The outcomes as JUnit has them.
@@ -49,9 +49,9 @@ pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
         .collect()
 }
 
-/// One `testsuite` of a document.
+/// One `testsuite` of a document, with properties: names and values.
 #[must_use]
-pub fn element(suite: &str, tests: &[Test<'_>]) -> String {
+pub fn element(suite: &str, properties: &[(&str, String)], tests: &[Test<'_>]) -> String {
     let count = |is: fn(&Verdict) -> bool| tests.iter().filter(|test| is(test.verdict)).count();
     let time: Duration = tests.iter().map(|test| test.time).sum();
     let mut xml = String::new();
@@ -65,6 +65,14 @@ pub fn element(suite: &str, tests: &[Test<'_>]) -> String {
         count(|verdict| matches!(verdict, Verdict::Skipped(_))),
         time.as_secs_f64()
     );
+    if !properties.is_empty() {
+        xml.push_str("  <properties>\n");
+        for (name, value) in properties {
+            let (name, value) = (escaped(name), escaped(value));
+            let _ = writeln!(xml, "    <property name=\"{name}\" value=\"{value}\"/>");
+        }
+        xml.push_str("  </properties>\n");
+    }
     for test in tests {
         let (class, name) = test.name.split_once('/').unwrap_or(("", test.name));
         let _ = write!(

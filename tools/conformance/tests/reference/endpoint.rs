@@ -44,6 +44,12 @@ impl Reference {
         self
     }
 
+    /// A unit that is silent to a write whose data are not as many bytes as it announces.
+    pub fn silent_to_incomplete_writes(mut self) -> Self {
+        self.unit.silent_to_incomplete_writes = true;
+        self
+    }
+
     /// Everything due up to `to` happens.
     fn advance(&mut self, to: Duration) {
         if let Some(at) = self.starts.filter(|at| *at <= to) {

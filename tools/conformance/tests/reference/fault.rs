@@ -165,7 +165,9 @@ faults! {
     /// Checks the address before the value in 05.
     CoilAddressFirst => ["fc05/value-before-address"],
     /// Ignores bytes after a request of a fixed length.
-    IgnoresSpareBytes => ["fc05/length", "fc06/length", "fc16/length", "fc07/shape", "fc0b/shape", "fc0c/shape", "fc11/shape", "fc2b/length"],
+    IgnoresSpareBytes => ["fc05/length", "fc06/length", "fc16/length", "fc07/length", "fc0b/length", "fc0c/length", "fc11/length", "fc2b/length"],
+    /// Adds a byte to the replies of 07, 0B, 0C and 11.
+    AddsAByte => ["fc07/shape", "fc0b/shape", "fc0c/shape", "fc11/shape"],
     /// Echoes requests of 08 without a whole sub-function.
     EchoesShortDiagnostics => ["fc08/length"],
     /// Ignores data after the number of bytes that 0F and 10 announce.

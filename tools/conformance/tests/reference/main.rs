@@ -119,6 +119,12 @@ fn with_8n1_a_unit_passes_that_counts_characters_of_11_bits_and_one_that_counts_
 }
 
 #[test]
+fn unit_that_is_silent_to_incomplete_writes_passes() {
+    let unit = reference(None, Mode::Rtu, "8E1").silent_to_incomplete_writes();
+    assert_faultless(unit, Mode::Rtu);
+}
+
+#[test]
 fn every_fault_is_found_by_its_case() {
     let mut missed = Vec::new();
     for (fault, cases) in FAULTS {

@@ -66,6 +66,11 @@ impl Server {
             let right = pdu.len() == length || (spare && pdu.len() > length);
             if right { Ok(()) } else { Err(3) }
         };
+        let adds_a_byte = self.has(Fault::AddsAByte);
+        let status = |mut reply: Vec<u8>| {
+            reply.extend(adds_a_byte.then_some(0));
+            reply
+        };
         match pdu[0] {
             function @ 1..=4 => {
                 if !self.has(Fault::IgnoresLength) || pdu.len() < 5 {
@@ -116,13 +121,13 @@ impl Server {
                     Ok(pdu[1..].to_vec())
                 }
             }
-            7 => exactly(1).map(|()| vec![0x6D]),
+            7 => exactly(1).map(|()| status(vec![0x6D])),
             8 => self.diagnose(pdu),
-            0x0B => exactly(1).map(|()| self.log.event_counter()),
-            0x0C => exactly(1).map(|()| self.log.read()),
+            0x0B => exactly(1).map(|()| status(self.log.event_counter())),
+            0x0C => exactly(1).map(|()| status(self.log.read())),
             0x0F => self.write_coils(pdu),
             0x10 => self.write_registers(pdu),
-            0x11 => exactly(1).map(|()| vec![2, 0x42, 0xFF]),
+            0x11 => exactly(1).map(|()| status(vec![2, 0x42, 0xFF])),
             0x16 => {
                 exactly(7)?;
                 let (at, and) = two()?;

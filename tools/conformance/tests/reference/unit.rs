@@ -38,6 +38,8 @@ pub struct Unit {
     pub master: LineFormat,
     /// Counts characters of the line's format for t1.5 and t3.5, not characters of 11 bits.
     pub own_characters: bool,
+    /// It waits for the data that a write announces, or drops the write.
+    pub silent_to_incomplete_writes: bool,
     /// What it says, and its driver's edges.
     pub said: VecDeque<Heard>,
     pub edges: Vec<(Duration, bool)>,
@@ -66,6 +68,7 @@ impl Unit {
             line,
             master: line,
             own_characters: false,
+            silent_to_incomplete_writes: false,
             said: VecDeque::new(),
             edges: Vec::new(),
             echo: false,
@@ -102,6 +105,7 @@ impl Unit {
             self.line = modio.start(at, true);
         }
         self.own_characters = old.own_characters;
+        self.silent_to_incomplete_writes = old.silent_to_incomplete_writes;
         self.last = Some(at);
         self.waiting = true;
         self.dead = self.server.has(Fault::DeadAfterPowerOff);
@@ -380,7 +384,8 @@ impl Unit {
             return;
         }
         let obeys = !broadcast || pdu[0] != 8 || self.server.has(Fault::ObeysBroadcastDiagnostics);
-        let answer = if obeys {
+        let incomplete = self.silent_to_incomplete_writes && !is_complete(pdu);
+        let answer = if obeys && !incomplete {
             self.server.answer(pdu)
         } else {
             Err(SILENT)
@@ -486,4 +491,15 @@ impl Unit {
             self.echo = true;
         }
     }
+}
+
+/// Whether a write of several points has as many bytes of data as it announces.
+fn is_complete(pdu: &[u8]) -> bool {
+    let at = match pdu[0] {
+        0x0F | 0x10 => 5,
+        0x17 => 9,
+        _ => return true,
+    };
+    pdu.get(at)
+        .is_some_and(|count| pdu.len() == at + 1 + usize::from(*count))
 }

@@ -1,0 +1,264 @@
+//! What was tested, with what, where and when: for the reports.
+
+use std::fmt;
+use std::path::Path;
+use std::process::Command;
+
+use chrono::{SecondsFormat, Utc};
+use register_map::{Module, state};
+use serde_json::{Value, json};
+use serialport::{SerialPortInfo, SerialPortType};
+
+use crate::bench::Bench;
+use crate::case::Check;
+use crate::target::Span;
+
+/// First version of the register map that has the registers of [`COMMIT`].
+const MAP_WITH_COMMIT: u16 = 2;
+
+/// Two registers with the first 32 bits of the commit that the image was built from, high word first, and one
+/// whose bit 0 is set when the tree had uncommitted changes.
+const COMMIT: u16 = 0x020C;
+
+/// Where and when a run took place, and with what.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// Date and time of its begin, in UTC, as RFC 3339 has them.
+    pub date: String,
+    /// Name, operating system and architecture of the computer.
+    pub host: String,
+    /// Version of this program.
+    pub version: String,
+    /// Commit of the tree that this program was built in, if it is still there.
+    pub commit: Option<String>,
+    /// The USB adapter on whose port the line is, if it is one.
+    pub adapter: Option<Adapter>,
+    /// The unit, once it has answered.
+    pub unit: Option<Unit>,
+}
+
+/// A USB serial adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Adapter {
+    /// USB vendor and product identity, in hexadecimal: `0403:6001`.
+    pub id: String,
+    /// Name of the manufacturer and of the product, as far as the adapter reports them.
+    pub name: String,
+    /// Its serial number, if it has one.
+    pub serial_number: Option<String>,
+}
+
+/// The unit, by its own registers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unit {
+    /// Its address.
+    pub address: u8,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// First 32 bits of the commit that its image was built from; `None` when its register map has none.
+    pub commit: Option<String>,
+    /// Its unique identity, in hexadecimal.
+    pub identity: String,
+    /// The module in force in its slot.
+    pub module: Module,
+}
+
+impl About {
+    /// Everything but the unit: now, on this computer, through this port.
+    #[must_use]
+    pub fn here(port: Option<&Path>) -> Self {
+        Self {
+            date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
+            host: format!(
+                "{}, {} {}",
+                gethostname::gethostname().to_string_lossy(),
+                std::env::consts::OS,
+                std::env::consts::ARCH
+            ),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: commit(Path::new(env!("CARGO_MANIFEST_DIR"))),
+            // Without a list of ports the run is as good: the report names no adapter.
+            adapter: port.and_then(|port| adapter(port, &serialport::available_ports().ok()?)),
+            unit: None,
+        }
+    }
+
+    /// Names and values, in the order in which they are reported.
+    #[must_use]
+    pub fn properties(&self) -> Vec<(&'static str, String)> {
+        let mut all = vec![
+            ("date", self.date.clone()),
+            ("host", self.host.clone()),
+            ("modio-hil", self.version.clone()),
+        ];
+        all.extend(self.commit.clone().map(|commit| ("commit", commit)));
+        if let Some(adapter) = &self.adapter {
+            all.push(("adapter", adapter.to_string()));
+        }
+        if let Some(unit) = &self.unit {
+            all.push(("unit", unit.address.to_string()));
+            all.push(("firmware", unit.firmware.clone()));
+            all.extend(unit.commit.clone().map(|it| ("firmware commit", it)));
+            all.push(("identity", unit.identity.clone()));
+            all.push(("module", unit.module.to_string()));
+        }
+        all
+    }
+
+    /// The same in JSON; what is not known is null.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "date": self.date,
+            "host": self.host,
+            "version": self.version,
+            "commit": self.commit,
+            "adapter": self.adapter.as_ref().map(|adapter| json!({
+                "usb": adapter.id,
+                "name": adapter.name,
+                "serial_number": adapter.serial_number,
+            })),
+            "unit": self.unit.as_ref().map(|unit| json!({
+                "address": unit.address,
+                "firmware": unit.firmware,
+                "commit": unit.commit,
+                "identity": unit.identity,
+                "module": unit.module.to_string(),
+            })),
+        })
+    }
+}
+
+impl fmt::Display for Adapter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.id, self.name)?;
+        match &self.serial_number {
+            Some(number) => write!(f, ", serial number {number}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Unit {
+    /// Asks the unit, a modio with this module.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`](crate::case::Stop::Fail) when it does not give its registers, `Stop::Broken`.
+    pub fn ask(bench: &mut Bench<'_>, module: Module) -> Check<Self> {
+        let mut read = |first, count: u16| {
+            bench.read_words(Span {
+                first,
+                last: first + (count - 1),
+            })
+        };
+        let version = read(state::FIRMWARE_VERSION, 3)?;
+        let [firmware, patch, map] = version[..] else {
+            unreachable!("three registers were read");
+        };
+        let commit = if map < MAP_WITH_COMMIT {
+            None
+        } else {
+            let words = read(COMMIT, 3)?;
+            let dirty = if words[2] & 1 == 0 { "" } else { "-dirty" };
+            Some(format!("{:04x}{:04x}{dirty}", words[0], words[1]))
+        };
+        let identity = read(state::UNIQUE_ID, 6)?;
+        Ok(Self {
+            address: bench.unit(),
+            firmware: format!("{}.{}.{patch}", firmware >> 8, firmware & 0xFF),
+            commit,
+            identity: identity.iter().map(|word| format!("{word:04X}")).collect(),
+            module,
+        })
+    }
+}
+
+/// The adapter that has this port, which may be a link to it.
+fn adapter(port: &Path, ports: &[SerialPortInfo]) -> Option<Adapter> {
+    let name = port.canonicalize().unwrap_or_else(|_| port.to_owned());
+    let found = ports.iter().find(|one| Path::new(&one.port_name) == name)?;
+    let SerialPortType::UsbPort(usb) = &found.port_type else {
+        return None;
+    };
+    let names = [&usb.manufacturer, &usb.product].map(|name| name.clone().unwrap_or_default());
+    Some(Adapter {
+        id: format!("{:04x}:{:04x}", usb.vid, usb.pid),
+        name: names.join(" ").trim().to_owned(),
+        serial_number: usb.serial_number.clone(),
+    })
+}
+
+/// The commit of a tree, with `-dirty` when it has changes.
+fn commit(tree: &Path) -> Option<String> {
+    let mut git = Command::new("git");
+    git.arg("-C").arg(tree);
+    git.args([
+        "describe",
+        "--always",
+        "--dirty",
+        "--abbrev=40",
+        "--exclude=*",
+    ]);
+    let output = git.output().ok().filter(|output| output.status.success())?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    Some(text.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serialport::UsbPortInfo;
+
+    fn usb(port_name: &str, serial_number: Option<&str>) -> SerialPortInfo {
+        SerialPortInfo {
+            port_name: port_name.to_owned(),
+            port_type: SerialPortType::UsbPort(UsbPortInfo {
+                vid: 0x0403,
+                pid: 0x6001,
+                serial_number: serial_number.map(str::to_owned),
+                manufacturer: Some("FTDI".to_owned()),
+                product: Some("FT232R USB UART".to_owned()),
+            }),
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn adapter_is_found_by_its_port_and_by_a_link_to_the_port() {
+        let directory = tempfile::tempdir().unwrap();
+        let directory = directory.path().canonicalize().unwrap();
+        let (port, link) = (directory.join("ttyUSB0"), directory.join("by-id"));
+        std::fs::write(&port, "").unwrap();
+        std::os::unix::fs::symlink(&port, &link).unwrap();
+        let ports = [
+            usb("/dev/ttyUSB7", None),
+            usb(&port.to_string_lossy(), Some("A50285BI")),
+        ];
+        for path in [&port, &link] {
+            let shown = adapter(path, &ports).unwrap().to_string();
+            let wanted = "0403:6001 FTDI FT232R USB UART, serial number A50285BI";
+            assert_eq!(shown, wanted);
+        }
+        assert_eq!(adapter(Path::new("/dev/pts/3"), &ports), None);
+    }
+
+    #[test]
+    fn run_is_described_in_json_and_in_properties() {
+        let mut about = About::here(None);
+        assert!(about.date.ends_with('Z') && !about.host.is_empty());
+        about.commit = None;
+        assert_eq!(about.json()["commit"], Value::Null);
+        assert!(about.properties().iter().all(|(name, _)| *name != "commit"));
+        about.unit = Some(Unit {
+            address: 7,
+            firmware: "1.2.3".to_owned(),
+            commit: Some("0123abcd".to_owned()),
+            identity: "00AA".to_owned(),
+            module: Module::Do4,
+        });
+        assert_eq!(about.json()["unit"]["module"], "4do");
+        let properties = about.properties();
+        assert!(properties.contains(&("firmware commit", "0123abcd".to_owned())));
+    }
+}

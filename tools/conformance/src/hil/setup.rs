@@ -1,0 +1,228 @@
+//! The command line and the bench file, merged: which line, what is done to the board, what is tested.
+
+use std::path::Path;
+use std::time::Duration;
+
+use crate::case::Case;
+use crate::cli::{chosen, waits};
+use crate::endpoint::stream::Stream;
+use crate::endpoint::{Broken, Endpoint};
+use crate::hil::Plan;
+use crate::hil::bench_file::BenchFile;
+use crate::hil::cli::Cli;
+use crate::hil::shell::{Flash, Powered};
+use crate::line::LineFormat;
+
+/// The command line and the bench file, merged.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    cli: Cli,
+    file: BenchFile,
+}
+
+impl Cli {
+    /// Reads the bench file, if one is named.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the file, or with both together, in one line.
+    pub fn setup(&self) -> Result<Setup, String> {
+        let file = match &self.bench {
+            None => BenchFile::default(),
+            Some(path) => {
+                let shown = path.display();
+                let text =
+                    std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+                BenchFile::parse(&text, self.unit).map_err(|wrong| format!("{shown}:{wrong}"))?
+            }
+        };
+        let setup = Setup {
+            cli: self.clone(),
+            file,
+        };
+        if setup.port().is_none() && self.tcp.is_none() {
+            return Err("which serial port? Name it with --port, or in the bench file".to_owned());
+        }
+        let format = setup.line().format().to_string();
+        if !["8N2", "8E1", "8O1", "8N1"].contains(&format.as_str()) {
+            return Err(format!(
+                "a modio has no format {format}: 8N2, 8E1, 8O1, 8N1"
+            ));
+        }
+        let wires = setup.file.wires.len() + setup.file.analog.len();
+        if self.no_suite && self.requests == 0 && wires == 0 {
+            let what = "nothing is left to do: no suite, no requests, and no wires in a bench file";
+            return Err(what.to_owned());
+        }
+        Ok(setup)
+    }
+}
+
+impl Setup {
+    /// The serial port, if the line is on one.
+    #[must_use]
+    pub fn port(&self) -> Option<&Path> {
+        let told = self.cli.port.as_deref();
+        match self.cli.tcp {
+            Some(_) => None,
+            None => told.or(self.file.port.as_deref()),
+        }
+    }
+
+    fn line(&self) -> LineFormat {
+        let usual = LineFormat::default();
+        let format = self.cli.format.or(self.file.format);
+        LineFormat::new(
+            self.cli.baud.or(self.file.baud).unwrap_or(usual.baud),
+            format.unwrap_or_else(|| usual.format()),
+        )
+    }
+
+    /// Opens the line.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be opened, in one line.
+    pub fn open(&self) -> Result<Box<dyn Endpoint>, Broken> {
+        let line: Box<dyn Endpoint> = match (self.port(), &self.cli.tcp) {
+            (Some(port), _) => Box::new(Stream::serial(port, self.line())?),
+            (None, Some(address)) => Box::new(Stream::tcp(address, self.line())?),
+            (None, None) => return Err(Broken("no --port".to_owned())),
+        };
+        let power = self.cli.power_cmd.as_ref().or(self.file.power_cmd.as_ref());
+        Ok(match power {
+            Some(command) => Box::new(Powered::new(line, command.clone())),
+            None => line,
+        })
+    }
+
+    /// How the image is to be written, if it is.
+    #[must_use]
+    pub fn flash(&self) -> Option<Flash> {
+        let probe = self.cli.probe.as_ref().or(self.file.probe.as_ref());
+        self.cli.flash.then(|| Flash {
+            probe: probe.cloned(),
+            elf: self.cli.elf.clone(),
+        })
+    }
+
+    /// The command that resets the board, if there is one.
+    #[must_use]
+    pub fn reset(&self) -> Option<&str> {
+        let told = self.cli.reset_cmd.as_deref();
+        told.or(self.file.reset_cmd.as_deref())
+    }
+
+    /// What to do, on this line.
+    ///
+    /// # Errors
+    ///
+    /// When no case has a name as wanted, in one line.
+    pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan, String> {
+        let (cli, file) = (&self.cli, &self.file);
+        Ok(Plan {
+            unit: cli.unit.or(file.unit).unwrap_or(1),
+            module: cli.module.or(file.module),
+            patience: waits(endpoint, cli.patience.map(Duration::from_millis)),
+            allow_config: cli.allow_config,
+            cases: self.cases()?,
+            requests: cli.requests,
+            rates: cli.rates.clone().map_or_else(Vec::new, |rates| rates.0),
+            limit: cli.limit.map(Duration::from_millis),
+            wires: file.wires.clone(),
+            analog: file.analog.clone(),
+        })
+    }
+
+    fn cases(&self) -> Result<Vec<Case>, String> {
+        if self.cli.no_suite {
+            return Ok(Vec::new());
+        }
+        chosen(&self.cli.only)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+    use register_map::Module;
+
+    use super::*;
+    use crate::hil::fake::Line;
+
+    fn parse(arguments: &[&str]) -> Result<Cli, clap::Error> {
+        Cli::try_parse_from([&["x"], arguments].concat())
+    }
+
+    fn setup(file: &str, arguments: &[&str]) -> Result<Setup, String> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("bench.toml");
+        std::fs::write(&path, file).unwrap();
+        let path = path.to_string_lossy();
+        parse(&[&["--bench", &path], arguments].concat())
+            .unwrap()
+            .setup()
+    }
+
+    const FILE: &str = "port = \"/dev/a\"\nprobe = \"1:2\"\nunit = 7\nbaud = 19200\nformat = \"8E1\"\n\
+                        module = \"4ao\"\nreset_cmd = \"r\"\n";
+
+    #[test]
+    fn bench_file_is_used_where_the_command_line_says_nothing() {
+        let setup = setup(FILE, &["--flash"]).unwrap();
+        assert_eq!(setup.port(), Some(Path::new("/dev/a")));
+        assert_eq!(setup.line().to_string(), "19200 8E1");
+        assert_eq!(setup.flash().unwrap().probe.as_deref(), Some("1:2"));
+        assert_eq!(setup.reset(), Some("r"));
+        let plan = setup.plan(&Line::new(&[1])).unwrap();
+        assert_eq!((plan.unit, plan.module), (7, Some(Module::Ao4)));
+    }
+
+    #[test]
+    fn command_line_takes_precedence_over_the_bench_file() {
+        let arguments = [
+            "--port",
+            "/dev/b",
+            "--flash",
+            "--probe",
+            "3:4",
+            "--unit",
+            "9",
+            "--baud",
+            "9600",
+            "--format",
+            "8N1",
+            "--module",
+            "4di",
+            "--reset-cmd",
+            "s",
+        ];
+        let told = setup(FILE, &arguments).unwrap();
+        assert_eq!(told.port(), Some(Path::new("/dev/b")));
+        assert_eq!(told.line().to_string(), "9600 8N1");
+        assert_eq!(told.flash().unwrap().probe.as_deref(), Some("3:4"));
+        assert_eq!(told.reset(), Some("s"));
+        let plan = told.plan(&Line::new(&[1])).unwrap();
+        assert_eq!((plan.unit, plan.module), (9, Some(Module::Di4)));
+        assert_eq!(setup(FILE, &["--tcp", "b:1"]).unwrap().port(), None);
+        assert_eq!(setup(FILE, &[]).unwrap().flash(), None);
+    }
+
+    #[test]
+    fn mistake_is_one_line_that_names_the_file_and_the_line() {
+        let told = setup("unit = 1\nprot = \"x\"", &[]).unwrap_err();
+        assert!(
+            told.contains("bench.toml:2: unknown field `prot`"),
+            "{told}"
+        );
+        assert!(!told.contains('\n'), "{told}");
+        let told = setup("unit = 1", &[]).unwrap_err();
+        assert!(told.contains("--port"), "{told}");
+        let told = setup(FILE, &["--no-suite", "--requests", "0"]).unwrap_err();
+        assert!(told.starts_with("nothing is left to do"), "{told}");
+        let told = setup(FILE, &["--format", "7E1"]).unwrap_err();
+        assert!(told.starts_with("a modio has no format 7E1"), "{told}");
+        let cli = parse(&["--bench", "/nowhere/b.toml"]).unwrap();
+        assert!(cli.setup().unwrap_err().starts_with("/nowhere/b.toml: "));
+    }
+}

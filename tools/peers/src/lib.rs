@@ -1,0 +1,84 @@
+//! What the Rust servers have in common: the data that they serve, and frames that end by silence.
+
+use std::io::{self, ErrorKind};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use serial2::{FlowControl, Parity, SerialPort, Settings, StopBits};
+
+/// Unit address of every server.
+pub const UNIT: u8 = 1;
+/// Number of coils and of discrete inputs, at addresses from 0 on. A multiple of 16, for pymodbus has them in words.
+pub const BITS: usize = 2096;
+/// Number of holding registers and of input registers, at addresses from 0 on.
+pub const WORDS: usize = 200;
+/// Longest frame of V1.02 2.5.1, in bytes.
+pub const LONGEST: usize = 256;
+
+/// Rate of the line, in bit/s.
+const BAUD: u32 = 19_200;
+/// Silence that ends a frame. t3.5 is 2 ms at 19200 bit/s, but a busy host delivers bytes late. The conformance
+/// suite makes no silence shorter than 100 ms on a serial port.
+const SILENCE: Duration = Duration::from_millis(20);
+/// Time to wait for the first byte before the server waits again.
+const IDLE: Duration = Duration::from_secs(1);
+
+/// Serves the line at `port` without end. Prints `ready` in a line when the port is open.
+///
+/// `answer` gets each frame, its CRC included, and returns the reply, its CRC included, or nothing for silence. Frames
+/// that are longer than the standard allows are dropped. A frame that makes `answer` panic gets silence: the next one
+/// is served all the same.
+///
+/// # Errors
+///
+/// When the port cannot be opened or used any more.
+pub fn serve(port: &str, mut answer: impl FnMut(&[u8]) -> Option<Vec<u8>>) -> io::Result<()> {
+    let mut line = SerialPort::open(port, |mut settings: Settings| {
+        settings.set_raw();
+        settings.set_baud_rate(BAUD)?;
+        settings.set_parity(Parity::None);
+        settings.set_stop_bits(StopBits::Two);
+        settings.set_flow_control(FlowControl::None);
+        Ok(settings)
+    })?;
+    println!("ready");
+    loop {
+        let frame = receive(&mut line)?;
+        if frame.len() > LONGEST {
+            continue;
+        }
+        // The panic has been reported on the standard error output.
+        let answer = catch_unwind(AssertUnwindSafe(|| answer(&frame)));
+        if let Ok(Some(reply)) = answer {
+            line.write_all(&reply)?;
+        }
+    }
+}
+
+/// Waits for bytes, and returns all of them up to the next silence.
+fn receive(line: &mut SerialPort) -> io::Result<Vec<u8>> {
+    let mut frame = Vec::new();
+    let mut buffer = [0; 512];
+    loop {
+        line.set_read_timeout(if frame.is_empty() { IDLE } else { SILENCE })?;
+        match line.read(&mut buffer) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(length) => frame.extend_from_slice(&buffer[..length]),
+            Err(error) if error.kind() == ErrorKind::TimedOut && frame.is_empty() => {}
+            Err(error) if error.kind() == ErrorKind::TimedOut => return Ok(frame),
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// Runs a server on the port that the command line names, up to a failure of the line.
+///
+/// # Errors
+///
+/// When the command line names no port, and as [`serve`].
+pub fn main(answer: impl FnMut(&[u8]) -> Option<Vec<u8>>) -> io::Result<()> {
+    let port = std::env::args()
+        .nth(1)
+        .ok_or_else(|| io::Error::new(ErrorKind::InvalidInput, "name a serial port"))?;
+    serve(&port, answer)
+}
