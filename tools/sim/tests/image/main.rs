@@ -21,7 +21,6 @@ mod comm_watchdog;
 mod counters;
 mod dac_faults;
 mod dip;
-mod erase_cut;
 mod faults;
 mod flash_faults;
 mod framing;
