@@ -9,8 +9,9 @@ use crate::{Result, build, command, pymodbus, renode, sim, size};
 
 /// The variable that names the corner of the part to the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
-/// The simulator's corners (`sim::Corner`): the typical part, and the extremes.
+/// The simulator's nominal corner (`sim::Corner`): the typical part.
 pub const NOMINAL: &str = "nominal";
+/// The simulator's other corners: the extremes.
 pub const CORNERS: [&str; 2] = ["slow", "fast"];
 
 /// The options of `cargo xtask test`.

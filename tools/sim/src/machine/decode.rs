@@ -73,7 +73,7 @@ fn narrow(code: u32) -> (Class, End) {
         0b10110 | 0b10111 => miscellaneous(code),
         0b11000 | 0b11001 => (Class::Multiple((code & 0xFF).count_ones()), End::Sequential),
         0b11010 | 0b11011 if code >> 8 & 0xF >= 0xE => (Class::Simple, End::Exception),
-        0b11010 | 0b11011 | 0b11100 => (Class::Simple, End::Branch),
+        0b11010..=0b11100 => (Class::Simple, End::Branch),
         _ => simple,
     }
 }

@@ -305,7 +305,7 @@ impl I2c {
         if count < if fast { 1 } else { 4 } {
             return Err(Unmodelled("I2C CCR below its minimum"));
         }
-        if u64::from(self.hz - self.hz / 33) > limit * self.bit_cycles() {
+        if u64::from(set) > limit * self.bit_cycles() {
             return Err(Unmodelled(
                 "I2C clock above 100 kHz, or 400 kHz in fast mode,",
             ));
