@@ -11,7 +11,7 @@ use crate::{Result, build, command, pymodbus, renode, sim, size};
 pub const CORNER: &str = "MODIO_CORNER";
 /// The simulator's nominal corner (`sim::Corner`): the typical part.
 pub const NOMINAL: &str = "nominal";
-/// The simulator's other corners: the extremes.
+/// The corners of the part, beside the nominal one, at which the tests of the image run.
 pub const CORNERS: [&str; 2] = ["slow", "fast"];
 
 /// The options of `cargo xtask test`.

@@ -44,6 +44,8 @@ pub struct Bus {
     pub(super) dwt: Dwt,
     /// The core is to come back before this instant, or before this many instructions (its own count).
     pub(super) stop: (Time, u64),
+    /// An operation of the flash ran when the core was let run last.
+    pub(super) busy: bool,
     /// The core has to come back at once.
     pub(super) halt: bool,
     /// What the core has to do before its next instruction.
@@ -142,7 +144,8 @@ impl Bus {
         }
         self.route_flash(changed.is_some());
         // The machine makes the reset, and waits out the flash.
-        self.halt |= self.soc.signals.reset.is_some() || self.soc.flash.busy_until().is_some();
+        let busy = self.soc.flash.busy_until().is_some();
+        self.halt |= self.soc.signals.reset.is_some() || busy != self.busy;
     }
 
     /// The instruction rate follows HCLK and the flash's wait states.
@@ -189,7 +192,9 @@ impl Bus {
             PPB..0xE010_0000 => Some(self.debug_block(request)),
             _ => match flash_offset(address) {
                 Some(offset) if request.write.is_none() => {
-                    self.read_stalls |= self.soc.flash.busy_until().is_some();
+                    let busy = self.soc.flash.busy_until().is_some();
+                    self.read_stalls |= busy;
+                    self.halt |= busy;
                     Some(self.flash_word(request, offset))
                 }
                 Some(offset) => self.store_to_flash(request, offset),

@@ -30,10 +30,12 @@ impl Machine {
             .min(self.poll_at);
         let most = limit.instructions - self.counted;
         self.bus.stop = (stop, most);
-        // Code in SRAM that runs beside a flash operation is looked at after every instruction: once it
-        // comes back to flash it stalls.
-        // So is the NMI's handler, whose line is tested when it returns.
-        self.bus.halt = self.bus.soc.flash.busy_until().is_some() || self.bus.soc.rcc.nmi();
+        // Code in flash that runs on from the prefetch buffer beside a flash operation is looked at after every
+        // instruction: then it stalls. So is the NMI's handler, whose line is tested when it returns.
+        let busy = self.bus.soc.flash.busy_until().is_some();
+        self.bus.busy = busy;
+        let nmi = self.bus.soc.rcc.nmi();
+        self.bus.halt = nmi || busy && is_flash(self.pc());
         if let Some(exit) = self.enter_exception() {
             return exit;
         }
@@ -51,7 +53,6 @@ impl Machine {
                 .instructions_until(count, until)
                 .min(most.saturating_sub(count));
             let budget = if self.bus.halt { 1 } else { budget.max(1) };
-            let busy = self.bus.soc.flash.busy_until().is_some();
             let exit = self.core.run(budget as u32, &mut self.bus).0;
             let ran = self.core.retired() - count;
             if busy {
@@ -65,7 +66,10 @@ impl Machine {
                 self.unsettled = true;
                 return exit;
             }
-            if self.bus.halt || !self.bus.queued.is_empty() || self.core.retired() >= most {
+            // Code in SRAM that comes back to flash stalls there.
+            let stalls = busy && is_flash(self.pc());
+            if self.bus.halt || stalls || !self.bus.queued.is_empty() || self.core.retired() >= most
+            {
                 return exit;
             }
             if core::mem::take(&mut self.bus.touched) {

@@ -129,6 +129,7 @@ impl Machine {
                 dbgmcu: Dbgmcu::default(),
                 dwt: Dwt::default(),
                 stop: (Time::ZERO, 0),
+                busy: false,
                 halt: false,
                 queued: Vec::new(),
                 pc: 0,

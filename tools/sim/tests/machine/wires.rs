@@ -59,10 +59,9 @@ fn a_byte_crosses_the_line_and_comes_back() {
         (Direction::FromUnit, &b"B"[..])
     );
     assert!(!frames[1].damaged);
-    assert!(
-        frames[1].start < end,
-        "RXNE comes in the middle of the stop bit"
-    );
+    // RXNE comes at ten sixteenths of the stop bit, and the answer begins at the next tick of the baud generator: a
+    // bit of 52 us later at most.
+    assert!(frames[1].start < end + Time::from_us(40), "{frames:?}");
     assert!(!board.driver_enable());
     let edges: Vec<_> = board.line().driver_edges().collect();
     assert_eq!(edges.len(), 2);
