@@ -12,6 +12,7 @@ use crate::{
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
     dip,
     fault::{self, FaultRecord},
+    gap::LineTimes,
     i2c::BusPins,
     port, rs485,
     uart::LineSettings,
@@ -61,22 +62,13 @@ pub struct LineOff {
 }
 
 impl LineOff {
-    /// Sets the line up, with silences of `t15_ns` and `t35_ns` nanoseconds between frames and replies of `limit_us`
-    /// microseconds at most, and listens. `None` when the rate or the silences cannot be had from the clock: the line then
-    /// stays off.
+    /// Sets the line up with these times, and listens. `None` when the rate or the silences cannot be had from the
+    /// clock: the line then stays off.
     #[must_use]
-    pub fn start(
-        mut self,
-        settings: LineSettings,
-        t15_ns: u32,
-        t35_ns: u32,
-        limit_us: u32,
-    ) -> Option<(Rs485, GapTimer)> {
+    pub fn start(mut self, settings: LineSettings, times: LineTimes) -> Option<(Rs485, GapTimer)> {
         let (clock, rcc) = (self.clock, &mut self.rcc);
         let (timer, start_bit) = (self.timer, self.start_bit);
-        let gap = GapTimer::new(
-            timer, start_bit, settings, t15_ns, t35_ns, limit_us, clock, rcc,
-        )?;
+        let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
         // TX, too, needs no steeper edges than those of 10 MHz.
         port::a().crh().modify(|_, w| w.mode9().output());

@@ -14,6 +14,17 @@
 
 use crate::uart::LineSettings;
 
+/// Times on a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineTimes {
+    /// t1.5 in nanoseconds.
+    pub t15_ns: u32,
+    /// t3.5 in nanoseconds.
+    pub t35_ns: u32,
+    /// The most a reply may take, in microseconds, up to 33 s.
+    pub limit_us: u32,
+}
+
 /// Settings of a 16-bit up-counting timer in one-pulse mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GapTicks {

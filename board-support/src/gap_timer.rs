@@ -20,7 +20,7 @@ use stm32f1xx_hal::{
 
 use crate::{
     ClockSource,
-    gap::{GapTicks, LimitTicks},
+    gap::{GapTicks, LimitTicks, LineTimes},
     signature,
     uart::LineSettings,
 };
@@ -42,25 +42,22 @@ pub struct GapTimer {
     start_bit: pac::TIM1,
     ticks: GapTicks,
     limit: LimitTicks,
-    /// The signature of the registers after they were set. They are compared with what they read, not with what was
+    /// The signatures of the registers of TIM2 and TIM1 after they were set. They are compared with what they read, not with what was
     /// written: an emulator need not keep every bit.
-    set: u32,
+    set: [u32; 2],
 }
 
 impl GapTimer {
-    /// Sets the timer up for silences of these lengths in nanoseconds, and for replies of `limit_us` microseconds at
-    /// most. `None` when no setting of the timer reaches them.
+    /// Sets the timers up for these times. `None` when no setting of TIM2 reaches the silences.
     pub(crate) fn new(
         timer: pac::TIM2,
         start_bit: pac::TIM1,
         line: LineSettings,
-        t15_ns: u32,
-        t35_ns: u32,
-        limit_us: u32,
+        times: LineTimes,
         clock: ClockSource,
         rcc: &mut pac::RCC,
     ) -> Option<Self> {
-        let ticks = GapTicks::new(clock.core_mhz(), line, t15_ns, t35_ns)?;
+        let ticks = GapTicks::new(clock.core_mhz(), line, times.t15_ns, times.t35_ns)?;
         pac::TIM2::enable(rcc);
         pac::TIM2::reset(rcc);
         pac::TIM1::enable(rcc);
@@ -69,8 +66,8 @@ impl GapTimer {
             timer,
             start_bit,
             ticks,
-            limit: LimitTicks::new(clock.core_mhz(), limit_us),
-            set: 0,
+            limit: LimitTicks::new(clock.core_mhz(), times.limit_us),
+            set: [0; 2],
         };
         gap.set_up();
         Some(gap)
@@ -113,7 +110,7 @@ impl GapTimer {
         start_bit.egr().write(|w| w.ug().update());
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
-        self.set = self.settings();
+        self.set = [self.silences(), self.start_bit()];
     }
 
     /// A reply has begun: [`take_limit`](Self::take_limit) tells when it has taken longer than it can.
@@ -136,17 +133,23 @@ impl GapTimer {
         self.start_bit.dier().reset();
     }
 
-    /// Whether both timers are as they were set up.
+    /// Whether TIM2, which measures the silences, is as it was set up.
     #[must_use]
-    pub fn is_sound(&self) -> bool {
-        self.settings() == self.set
+    pub fn silences_are_sound(&self) -> bool {
+        self.silences() == self.set[0]
     }
 
-    /// The signature of the registers of both timers, without the bits that change while silences are measured.
-    fn settings(&self) -> u32 {
+    /// Whether TIM1, which sees the start bit and limits replies, is as it was set up.
+    #[must_use]
+    pub fn start_bit_is_sound(&self) -> bool {
+        self.start_bit() == self.set[1]
+    }
+
+    /// The signature of TIM2's registers, without the bits that change while silences are measured.
+    fn silences(&self) -> u32 {
         const CEN: u32 = 1;
         const CC2IE: u32 = 1 << 2;
-        let (timer, start_bit) = (&self.timer, &self.start_bit);
+        let timer = &self.timer;
         signature([
             timer.cr1().read().bits() & !CEN,
             timer.smcr().read().bits(),
@@ -158,6 +161,13 @@ impl GapTimer {
             timer.ccr1().read().bits(),
             timer.ccr2().read().bits(),
             timer.ccr3().read().bits(),
+        ])
+    }
+
+    /// The signature of TIM1's registers, without those that change with each reply.
+    fn start_bit(&self) -> u32 {
+        let start_bit = &self.start_bit;
+        signature([
             start_bit.cr1().read().bits(),
             start_bit.smcr().read().bits(),
             start_bit.ccmr2_input().read().bits(),

@@ -72,7 +72,7 @@ enum Command {
     /// Count what the image costs: instructions of every request, load, flash and RAM
     Bench(bench::Options),
     /// Build the image and run it on the virtual board
-    Sim(sim_options::Options),
+    Sim(Box<sim_options::Options>),
     /// Test the image on Renode: its suites and the conformance suite
     Renode(renode::Options),
     /// Test a real board on its serial line: conformance, timing, wires

@@ -27,8 +27,8 @@ pub struct Line {
     /// Milliseconds that a reply may take, should TIM1 not limit it, and that the one under way has taken.
     longest_ms: u16,
     sending_ms: u16,
-    /// Which registers are looked at in the next millisecond: the UART's or the gap timer's.
-    uart_is_next: bool,
+    /// Which registers were looked at in the last millisecond.
+    looked_at: Registers,
     /// Interrupts of the UART without a cause since the last millisecond.
     causeless: u8,
     /// The line was set up again since [`take_repaired`](Self::take_repaired).
@@ -37,6 +37,14 @@ pub struct Line {
 
 /// Interrupts of the UART without a cause in one millisecond after which its registers are checked.
 const CAUSELESS: u8 = 8;
+
+/// Registers that are looked at together. All at once would hold the line's interrupts off for longer.
+#[derive(Clone, Copy)]
+enum Registers {
+    Uart,
+    Silences,
+    StartBit,
+}
 
 /// How far the reply is.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -72,7 +80,7 @@ impl Line {
             heard_before: 0,
             longest_ms,
             sending_ms: 0,
-            uart_is_next: false,
+            looked_at: Registers::StartBit,
             causeless: 0,
             repaired: false,
         }
@@ -115,26 +123,28 @@ impl Line {
         self.causeless += 1;
         if self.causeless == CAUSELESS {
             self.causeless = 0;
-            self.check(true);
+            self.check(Registers::Uart);
         }
     }
 
-    /// Sets the line up again when its registers are not what they were set to, when the end of a frame is
+    /// Sets the line up again when registers are not what they were set to, when the end of a frame is
     /// not being waited for, or when a reply does not end: whatever has disturbed them, the driver goes off
-    /// and the next request is served.
-    ///
-    /// Looks at the UART or at the gap timer: both at once would hold the line's interrupts off for longer. While a
-    /// reply is being sent only its time is looked at, because the driver must go off right after the last bit.
+    /// and the next request is served. While a reply is being sent only its time is looked at, because the driver must
+    /// go off right after the last bit.
     #[cold]
-    fn check(&mut self, uart: bool) {
+    fn check(&mut self, registers: Registers) {
         let sending = self.reply == Reply::Sending;
         let is_sound = if sending {
             self.sending_ms < self.longest_ms
-        } else if uart {
-            self.uart.is_sound()
         } else {
-            let waits_for_silence = !self.receiver.is_idle();
-            self.gap.is_sound() && (!waits_for_silence || self.gap.is_running())
+            match registers {
+                Registers::Uart => self.uart.is_sound(),
+                Registers::Silences => {
+                    let waits_for_silence = !self.receiver.is_idle();
+                    self.gap.silences_are_sound() && (!waits_for_silence || self.gap.is_running())
+                }
+                Registers::StartBit => self.gap.start_bit_is_sound(),
+            }
         };
         if !is_sound {
             self.repair();
@@ -203,8 +213,12 @@ impl Line {
     pub fn on_millisecond(&mut self) {
         self.causeless = 0;
         self.sending_ms = self.sending_ms.saturating_add(1);
-        self.uart_is_next = !self.uart_is_next;
-        self.check(self.uart_is_next);
+        self.looked_at = match self.looked_at {
+            Registers::Uart => Registers::Silences,
+            Registers::Silences => Registers::StartBit,
+            Registers::StartBit => Registers::Uart,
+        };
+        self.check(self.looked_at);
         match self.reply {
             Reply::Delayed { ms: 0 } => {
                 if self.receiver.is_idle() && self.heard() == self.heard_before {

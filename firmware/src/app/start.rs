@@ -2,7 +2,9 @@
 
 use core::mem::MaybeUninit;
 
-use board_support::{Leds, ScanTimer, Watchdog, board, flash::FlashError, pac, uart};
+use board_support::{
+    Leds, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, pac, uart,
+};
 use cortex_m::peripheral::SCB;
 use firmware::{
     config::{self, Config},
@@ -112,7 +114,7 @@ pub fn up(
         .map_or(gaps.t35, |tenths| gaps.frame_gap(tenths));
     let line = address.unit().and_then(|unit| {
         let strict = settings.gap_rule == GapRule::Drop;
-        let (receiver, silences) = match framing {
+        let (receiver, (t15_ns, t35_ns)) = match framing {
             Framing::Rtu => (Receiver::rtu(unit, strict), (gaps.t15.min(t35), t35)),
             Framing::Ascii { .. } => {
                 let width = match settings.format.data_bits() {
@@ -123,12 +125,15 @@ pub fn up(
                 (Receiver::ascii(unit, width), (t35, Gaps::ASCII_TIMEOUT))
             }
         };
-        let longest_us = longest_reply_us(on_wire, framing);
-        let (uart, gap) = board
-            .line
-            .start(on_wire, silences.0, silences.1, longest_us)?;
+        let limit_us = longest_reply_us(on_wire, framing);
+        let times = LineTimes {
+            t15_ns,
+            t35_ns,
+            limit_us,
+        };
+        let (uart, gap) = board.line.start(on_wire, times)?;
         // The count may begin just before a beat.
-        let longest_ms = (longest_us / 1000) as u16 + 2;
+        let longest_ms = (limit_us / 1000) as u16 + 2;
         Some(Line::new(uart, gap, receiver, adus, longest_ms))
     });
 

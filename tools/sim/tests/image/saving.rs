@@ -257,7 +257,7 @@ fn a_restart_waits_for_a_running_save() {
 #[ignore = "needs the image: cargo xtask test"]
 fn no_byte_is_lost_at_any_rate_while_saves_run() {
     for baud in Baud::ALL
-        .into_iter()
+        .iter()
         .filter(|baud| baud.bits_per_second() >= 57_600)
     {
         let settings = [&[(configuration::BAUD, baud.code())], &large()[..]].concat();
