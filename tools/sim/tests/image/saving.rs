@@ -294,3 +294,44 @@ fn no_byte_is_lost_at_any_rate_while_saves_run() {
         }
     }
 }
+
+/// All tasks but those in RAM stand still in an erase: the clocks make up for it.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn uptime_and_communication_watchdog_are_right_over_many_erases() {
+    let settings = [&large()[..], &[(configuration::COMM_TIMEOUT, 1)]].concat();
+    let mut master = Master::new(Module::Do4, &settings);
+    master.write(0x0100, 0x5A17);
+    let bench = &mut master.bench;
+    bench.patience = Time::from_ms(50);
+    bench.write_bits(0x10, &[true; 4]).unwrap();
+    let (from, uptime) = (bench.board.now(), bench.long(0x0208));
+    let spare = |bench: &Bench| {
+        let flash = bench.board.flash();
+        [0xF800, 0xFC00].map(|page| flash[page + 2..page + PAGE_SIZE].iter().all(|b| *b == 0xFF))
+    };
+    let mut erases = 0;
+    for n in 0..30 {
+        bench.configure(FILTER, &[10 + n]);
+        let before = spare(bench);
+        bench.write(0x0108, &[1]).unwrap();
+        // A request every 90 ms holds a time-out of 100 ms off, also when it comes in an erase.
+        for _ in 0..6 {
+            let next = bench.sent + Time::from_ms(90);
+            bench.board.run_until(next);
+            assert!(bench.ask(1, &[1, 0, 0x10, 0, 4]).is_some());
+        }
+        erases += u32::from(spare(bench) != before);
+    }
+    assert!(erases > 5, "{erases} erases");
+    assert!(
+        !bench.status(1),
+        "the communication watchdog has not tripped"
+    );
+    let passed = (bench.board.now() - from).as_ms() / 1000;
+    let counted = u64::from(bench.long(0x0208) - uptime);
+    assert!(counted.abs_diff(passed) <= 1, "{counted} s of {passed} s");
+    // Without requests it trips.
+    bench.board.run_for(Time::from_ms(110));
+    assert!(bench.status(1));
+}
