@@ -224,10 +224,15 @@ fn source_of_50_kohm_reads_right_and_one_of_500_kohm_does_not() {
         bench.board.set_source_ohms(channel, 50_000).unwrap();
     }
     bench.board.run_for(Time::from_ms(200));
-    assert_eq!(bench.registers(0x10, 4), Ok(vec![0, 4095, 0, 4095]));
+    // The noise of the converter at a corner is 2 LSB.
+    let is_right = |word: u16, right: u16| word.abs_diff(right) <= 2;
+    let read = bench.registers(0x10, 4).unwrap();
+    assert!(is_right(read[0], 0) && is_right(read[1], 4095), "{read:?}");
+    assert!(is_right(read[2], 0) && is_right(read[3], 4095), "{read:?}");
     bench.board.set_source_ohms(3, 500_000).unwrap();
     bench.board.run_for(Time::from_ms(200));
     let read = bench.registers(0x10, 4).unwrap();
-    assert_eq!((read[0], read[1], read[3]), (0, 4095, 4095));
+    assert!(is_right(read[0], 0) && is_right(read[1], 4095), "{read:?}");
+    assert!(is_right(read[3], 4095), "{read:?}");
     assert!(read[2] > 500, "{}", read[2]);
 }
