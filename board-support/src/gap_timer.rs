@@ -129,8 +129,13 @@ impl GapTimer {
     }
 
     /// Takes the interrupt of the [limit](Self::limit_sending), which comes also when the reply has ended before.
-    pub fn take_limit(&mut self) {
-        self.start_bit.dier().reset();
+    /// Whether the limit has been reached: not when a reply has begun since, and set another.
+    pub fn take_limit(&mut self) -> bool {
+        let reached = self.start_bit.sr().read().cc1if().bit_is_set();
+        if reached {
+            self.start_bit.dier().reset();
+        }
+        reached
     }
 
     /// Whether TIM2, which measures the silences, is as it was set up.

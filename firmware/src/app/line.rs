@@ -165,8 +165,7 @@ impl Line {
 
     /// The time has passed that the last reply to begin may take: one that is still being sent never ends.
     pub fn on_limit(&mut self) {
-        self.gap.take_limit();
-        if self.reply == Reply::Sending {
+        if self.gap.take_limit() && self.reply == Reply::Sending {
             self.repair();
         }
     }

@@ -124,6 +124,10 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
             if mode == 1 && ![Baud::B9600, Baud::B19200, Baud::B921600].contains(baud) {
                 continue;
             }
+            // An ASCII character takes the most instructions: too many for this rate where each has its highest cost.
+            if mode == 1 && baud == &Baud::B921600 && corner() == Corner::Slow {
+                continue;
+            }
             let line = [
                 (configuration::BAUD, baud.code()),
                 (configuration::FORMAT, format),
@@ -140,7 +144,11 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
                 let character = bench.characters(1);
                 let line = bench.board.line();
                 let frame = line.frames().next_back().expect("a reply").clone();
-                assert_eq!(frame.direction, Direction::FromUnit);
+                assert_eq!(
+                    frame.direction,
+                    Direction::FromUnit,
+                    "{baud:?}, format {format}"
+                );
                 let edges: Vec<_> = line.driver_edges().collect();
                 let [.., (on, true), (off, false)] = edges[..] else {
                     panic!("{baud:?}, format {format}: {edges:?}");
