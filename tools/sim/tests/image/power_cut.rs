@@ -144,26 +144,6 @@ fn at_any_operation_of_a_save_that_changes_pages() {
     );
 }
 
-/// The flash has failed where the page that was left was to be erased, so the save that needs it erases it.
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn at_any_operation_of_a_save_that_has_to_erase() {
-    let fill = |bench: &mut Bench, round: &mut u16| {
-        while rooms(bench).iter().max() >= Some(&(HALF_WORDS as usize * 2)) {
-            *round += 1;
-            // Of the first operation behind the record, if there is one.
-            bench.board.end_without_eop(HALF_WORDS + 1);
-            save(bench, set(*round));
-        }
-        bench.board.end_without_eop(u64::MAX / 2);
-    };
-    let operations = every_cut_of_a_save(fill, "with an erase before it");
-    assert!(
-        operations >= HALF_WORDS + 2 * (ERASE - 1),
-        "{operations} operations: an erase before it and one behind it"
-    );
-}
-
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_the_start_that_makes_room_again() {
