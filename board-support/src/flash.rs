@@ -90,8 +90,8 @@ impl Operation {
     }
 }
 
-/// Starts an operation of the controller, which is set up for it, and waits for its end, in RAM. `masked`: BASEPRI
-/// until then. Whether it has ended within the time that so many looks take.
+/// Starts an operation of the controller, which is set up for it, and waits in RAM for its end, with BASEPRI at
+/// `masked`. Returns false when it has not ended after `looks` looks at the controller.
 ///
 /// # Safety
 ///

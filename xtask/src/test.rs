@@ -82,8 +82,8 @@ fn add_host(workspace: &mut Workspace, steps: &mut Steps, packages: &[&str]) -> 
     elf
 }
 
-/// What the other corners leave out: these tests take half of the time, and go by flash operations, whose order no
-/// corner changes.
+/// What the other corners leave out: these tests take many minutes, and go by flash operations, whose order no corner
+/// changes.
 const NOMINAL_ONLY: &str = "power_cut::";
 
 /// Adds the tests of the image at the corners beside the nominal one.

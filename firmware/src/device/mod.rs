@@ -116,7 +116,7 @@ impl Device {
         self.points.configure(settings);
     }
 
-    /// So many milliseconds have passed. Returns whether outputs went to SAFE.
+    /// Lets `ms` milliseconds pass. Returns whether outputs went to SAFE.
     pub fn tick(&mut self, ms: u32) -> bool {
         self.state.tick(ms);
         self.config.tick(ms);
@@ -128,7 +128,7 @@ impl Device {
         tripped
     }
 
-    /// A valid request for this unit ended when so many milliseconds had passed since the start.
+    /// A valid request for this unit ended `at_ms` milliseconds after the start.
     pub const fn request_seen(&mut self, at_ms: u32) {
         self.comm_watchdog.feed(at_ms);
     }

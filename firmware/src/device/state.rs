@@ -80,7 +80,7 @@ impl State {
         }
     }
 
-    /// So many milliseconds have passed.
+    /// Lets `ms` milliseconds pass.
     pub const fn tick(&mut self, ms: u32) {
         self.millis = self.millis.wrapping_add(ms);
         self.part_ms = self.part_ms.saturating_add(ms);

@@ -304,7 +304,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
     master.write(0x0100, 0x5A17);
     let bench = &mut master.bench;
     bench.write_bits(0x10, &[true; 4]).unwrap();
-    // When the next second of the uptime begins, to some 20 ms, and which it is.
+    // Waits until the uptime shows another second. Gives the time, some 20 ms late, and that second.
     let next_second = |bench: &mut Bench| {
         bench.patience = Time::ZERO;
         let was = bench.long(0x0208);

@@ -124,7 +124,7 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
             if mode == 1 && ![Baud::B9600, Baud::B19200, Baud::B921600].contains(baud) {
                 continue;
             }
-            // An ASCII character takes the most instructions: too many for this rate where each has its highest cost.
+            // There the unit does not answer at this rate. An ASCII character takes the most instructions.
             if mode == 1 && baud == &Baud::B921600 && corner() == Corner::Slow {
                 continue;
             }
