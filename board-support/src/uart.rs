@@ -32,16 +32,17 @@ impl Format {
         }
     }
 
-    /// Sixteenths of a bit from the receiver's interrupt to the end of the character.
+    /// The most sixteenths of a bit from the receiver's interrupt to the end of the character.
     ///
     /// A stop bit is sampled in its middle, at the 10th sixteenth of it; the flag of a second stop
-    /// bit comes at the end of the first (RM0008 27.3.3). In 7N2 the UART takes the first stop bit for a
-    /// data bit, so that the second is its only stop bit.
+    /// bit comes at the end of the first (RM0008 27.3.3). The receiver's own sixteenths begin at any instant, and the
+    /// first one with the line low counts as the start bit's first: so all of this can be up to one sixteenth early.
+    /// In 7N2 the UART takes the first stop bit for a data bit, so that the second is its only stop bit.
     #[must_use]
     pub const fn sixteenths_after_flag(self) -> u32 {
         match self {
-            Self::N2 => 16,
-            Self::E1 | Self::O1 | Self::N1 | Self::SevenE1 | Self::SevenO1 | Self::SevenN2 => 6,
+            Self::N2 => 16 + 1,
+            Self::E1 | Self::O1 | Self::N1 | Self::SevenE1 | Self::SevenO1 | Self::SevenN2 => 6 + 1,
         }
     }
 

