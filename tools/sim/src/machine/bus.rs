@@ -339,7 +339,7 @@ impl Bus {
     }
 
     /// The core reads and writes SRAM without asking, all but the page of the vector table while [`Waits`] has
-    /// it sent here.
+    /// it sent here, and the pages of [`RamCode`](super::ram_code::RamCode).
     fn routed_ram(&mut self, request: Request, offset: u32) -> u32 {
         if let Some(value) = request.write {
             let bytes = value.to_le_bytes();

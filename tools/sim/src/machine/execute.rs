@@ -44,6 +44,10 @@ impl Machine {
             let count = self.core.retired();
             let pc = self.pc();
             if !self.bus.clock.goes_on(count, pc) {
+                if pc >= RAM_BASE {
+                    let offset = (pc - RAM_BASE) as usize;
+                    self.ram_code.runs(offset, &mut *self.core, &self.bus.ram);
+                }
                 let segment = *self.segment(pc);
                 self.bus.clock.follow(count, &segment);
             }

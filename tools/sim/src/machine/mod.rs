@@ -12,6 +12,7 @@ pub mod dwt;
 mod execute;
 mod flash_reads;
 pub mod memory;
+mod ram_code;
 mod run;
 pub mod segment;
 pub mod timing;
@@ -38,6 +39,7 @@ use costs::{Costs, Pace};
 use dwt::Dwt;
 use execute::Active;
 use memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
+use ram_code::RamCode;
 pub use run::{Limit, Stop};
 use segment::Segments;
 use timing::InstructionClock;
@@ -89,6 +91,7 @@ pub struct Machine {
     sequential: Option<u32>,
     /// An exception may be entered before the next instruction.
     unsettled: bool,
+    ram_code: RamCode,
 }
 
 impl Machine {
@@ -156,6 +159,7 @@ impl Machine {
             active: Active::default(),
             sequential: None,
             unsettled: true,
+            ram_code: RamCode::default(),
         }
     }
 
@@ -185,11 +189,22 @@ impl Machine {
 
     /// Measures how long interrupts wait from now on, anew, or no longer.
     pub fn measure_waits(&mut self, on: bool) {
+        self.ram_code.end(&mut *self.core, &self.bus.ram);
         if let Some(mut waits) = self.bus.waits.take() {
             waits.leave(&mut *self.core);
         }
         let keep = self.bus.charges_tables();
         self.bus.waits = on.then(|| Box::new(Waits::new(keep)));
+    }
+
+    /// What was translated from SRAM outlasts a start that copies the same code there.
+    fn keep_ram_code(&mut self) {
+        if self.bus.waits.is_none() {
+            self.ram_code.reset(&mut *self.core, &self.bus.ram);
+        } else {
+            // The measurement decides which pages are sent to the bus.
+            self.ram_mut();
+        }
     }
 
     /// How long exception `number` had to wait, as measured.
@@ -281,8 +296,8 @@ impl Machine {
         }
         self.powered = true;
         self.power_ons += 1;
-        let seed = self.power_ons;
-        fill_with_noise(self.ram_mut(), seed);
+        self.keep_ram_code();
+        fill_with_noise(self.bus.ram.bytes_mut(), self.power_ons);
         self.bus.dbgmcu = Dbgmcu::default();
         self.bus.dwt = Dwt::default();
         self.bus.soc.set_power(true, self.now());
@@ -326,6 +341,7 @@ impl Machine {
         self.core
             .load(&self.fresh)
             .expect("the state the same core saved");
+        self.keep_ram_code();
         let vectors = self.bus.soc.flash.bytes();
         let word = |address: u64, _: Width| {
             let at = address as usize;

@@ -322,3 +322,27 @@ fn new_code_in_flash_is_what_runs() {
     board.run_until(Time::from_ms(50));
     assert_eq!((out(&board, 0), out(&board, 1)), (1, 2));
 }
+
+#[test]
+fn code_that_every_start_copies_to_sram_runs_as_it_was_copied_last() {
+    const CODE: u32 = 0x2000_1000;
+    let mut program = Asm::new();
+    program.copy(PAGE, CODE);
+    program.set(3, CODE | 1);
+    program.blx(3);
+    program.set(0, OUT);
+    program.str(5, 0, 0);
+    program.spin();
+    let mut board = board_with(&program.image(), filled());
+    for (start, returns) in [1, 1, 2, 2, 1].into_iter().enumerate() {
+        board.power_off();
+        let code = [returns, 0x25, 0x70, 0x47]; // movs r5, #returns; bx lr
+        board.flash_mut().expect("the power is off")[OFFSET..OFFSET + 4].copy_from_slice(&code);
+        board.power_on();
+        for _ in 0..3 {
+            board.run_for(Time::from_ms(5));
+            assert_eq!(out(&board, 0), returns.into(), "start {start}");
+            board.reset();
+        }
+    }
+}

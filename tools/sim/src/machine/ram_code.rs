@@ -1,0 +1,66 @@
+//! Code in SRAM that a start copies there again.
+//!
+//! The core drops what it has translated when the bytes it came from are stored, also when they are stored as they
+//! were. So from a reset on the stores to pages with code are sent to the bus, until code in SRAM runs: then what
+//! was translated from bytes that have changed is dropped, and the rest is kept.
+
+use rigless::emulator::{Processor, Queued};
+
+use super::memory::{Memory, RAM_BASE, RAM_SIZE};
+use crate::periph::flash::PAGE;
+
+const PAGES: usize = RAM_SIZE / PAGE;
+
+/// The pages of SRAM that code has run from.
+#[derive(Debug, Default)]
+pub(super) struct RamCode {
+    /// One bit for each page with code.
+    pages: u32,
+    /// The bytes of SRAM that the translated code came from, while the stores are sent to the bus.
+    translated: Option<Vec<u8>>,
+}
+
+impl RamCode {
+    /// A reset: stores to code come to the bus from now on.
+    pub(super) fn reset(&mut self, core: &mut dyn Processor, ram: &Memory) {
+        if self.pages == 0 || self.translated.is_some() {
+            return;
+        }
+        self.translated = Some(ram.bytes().to_vec());
+        for page in self.with_code() {
+            core.ask(Queued::Route(address(page * PAGE)));
+        }
+    }
+
+    /// Code at this offset of SRAM is about to run.
+    pub(super) fn runs(&mut self, offset: usize, core: &mut dyn Processor, ram: &Memory) {
+        self.end(core, ram);
+        self.pages |= 1 << (offset / PAGE % PAGES);
+    }
+
+    /// Stores to code come to the bus no more.
+    pub(super) fn end(&mut self, core: &mut dyn Processor, ram: &Memory) {
+        let Some(translated) = self.translated.take() else {
+            return;
+        };
+        for page in self.with_code() {
+            let bytes = page * PAGE..(page + 1) * PAGE;
+            let (was, is) = (&translated[bytes.clone()], &ram.bytes()[bytes.clone()]);
+            for (at, (was, is)) in bytes.clone().zip(was.iter().zip(is)) {
+                if was != is {
+                    core.ask(Queued::Invalidate(address(at), address(at + 1)));
+                }
+            }
+            core.ask(Queued::Unroute(address(bytes.start)));
+        }
+    }
+
+    fn with_code(&self) -> impl Iterator<Item = usize> + use<> {
+        let pages = self.pages;
+        (0..PAGES).filter(move |page| pages >> page & 1 != 0)
+    }
+}
+
+fn address(offset: usize) -> u64 {
+    u64::from(RAM_BASE) + offset as u64
+}
