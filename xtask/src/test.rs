@@ -82,10 +82,6 @@ fn add_host(workspace: &mut Workspace, steps: &mut Steps, packages: &[&str]) -> 
     elf
 }
 
-/// What the other corners leave out: these tests take many minutes, and go by flash operations, whose order no corner
-/// changes.
-const NOMINAL_ONLY: &str = "power_cut::";
-
 /// Adds the tests of the image at the corners beside the nominal one.
 pub fn add_corners(workspace: &Workspace, steps: &mut Steps, image: Option<&Path>) {
     for corner in CORNERS {
@@ -102,9 +98,6 @@ fn in_simulation(workspace: &Workspace, elf: &Path, package: &[&str], corner: &s
     let mut cargo = workspace.cargo("test");
     cargo.args(["--ignore-rust-version", "--no-fail-fast", "--package"]);
     cargo.args(package).args(["--", "--include-ignored"]);
-    if corner != NOMINAL {
-        cargo.args(["--skip", NOMINAL_ONLY]);
-    }
     cargo.env("MODIO_ELF", elf).env(CORNER, corner);
     // Tests of one package cannot find the programs of another.
     let simulator = match sim::simulator(workspace) {

@@ -53,6 +53,11 @@ pub fn crc(bytes: &[u8]) -> [u8; 2] {
     crc.to_le_bytes()
 }
 
+/// A supply below the detector's threshold of 2.78 V, far above the 2.0 V at which the part is reset.
+pub const LOW_MV: u16 = 2700;
+/// A supply that flash can be programmed with.
+pub const GOOD_MV: u16 = 3300;
+
 /// The corner of the part that the tests run at: `MODIO_CORNER`, nominal without it.
 pub fn corner() -> Corner {
     let name = env::var("MODIO_CORNER");

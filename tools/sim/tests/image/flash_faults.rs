@@ -2,14 +2,11 @@
 
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, adu, flash_with_settings};
+use crate::bench::{Bench, GOOD_MV, LOW_MV, adu, flash_with_settings};
 
 const FILTER: u16 = 0x0130;
 const UNSAVED: u16 = 8;
 const SAVE: [u16; 1] = [1];
-/// Below the detector's threshold of 2.78 V, far above the 2.0 V at which the part is reset.
-const LOW_MV: u16 = 2700;
-const GOOD_MV: u16 = 3300;
 
 fn stored_value_after_power_cycle(bench: &mut Bench) -> u16 {
     bench.power_cycle();

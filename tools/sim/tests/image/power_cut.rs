@@ -5,7 +5,7 @@ use fastrand::Rng;
 use register_map::record::{PAGE_ADDRESSES, PAGE_SIZE};
 use sim::{Channel, Module, Time, periph::flash::Torn};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, GOOD_MV, LOW_MV, adu};
 
 const FILTER: u16 = 0x0130;
 const INVALID: u16 = 2;
@@ -102,6 +102,9 @@ fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u6
             bench.configure(FILTER, &sets[1]);
             bench.board.cut_in_flash_operation(operation, fraction);
             bench.write(0x0108, &[1]).unwrap();
+            // It may have waited for the supply.
+            bench.board.run_for(Time::from_ms(20));
+            bench.board.set_supply_mv(GOOD_MV).unwrap();
             bench.board.run_for(Time::from_ms(100));
             if bench.board.powered() {
                 assert!(seen[0] > 0 && seen[1] > 0, "{what}: {seen:?}");
@@ -114,6 +117,20 @@ fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u6
     unreachable!()
 }
 
+/// Saves until the page in use has no room for another record; the other one is spare.
+fn fill(bench: &mut Bench, round: &mut u16) {
+    // Both pages have something, or a mark; the one with more is in use.
+    while rooms(bench).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
+        *round += 1;
+        save(bench, set(*round));
+    }
+    assert!(
+        rooms(bench).iter().max() >= Some(&1000),
+        "{:?}",
+        rooms(bench)
+    );
+}
+
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_a_save_behind_the_last_record() {
@@ -124,23 +141,37 @@ fn at_any_operation_of_a_save_behind_the_last_record() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_a_save_that_changes_pages() {
-    let fill = |bench: &mut Bench, round: &mut u16| {
-        // Both pages have something, or a mark; the one with more is in use.
-        while rooms(bench).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
-            *round += 1;
-            save(bench, set(*round));
-        }
-        assert!(
-            rooms(bench).iter().max() >= Some(&1000),
-            "{:?}",
-            rooms(bench)
-        );
-    };
     let operations = every_cut_of_a_save(fill, "onto the other page");
     assert_eq!(
         operations,
         HALF_WORDS + ERASE,
         "it finds the other page erased, and erases the one it leaves"
+    );
+}
+
+/// A save that is ordered while the supply is too low, when neither page has room: the start could not erase the page
+/// that is not in use, so the save has to when the supply is back.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn at_any_operation_of_a_save_that_has_to_erase() {
+    let prepare = |bench: &mut Bench, round: &mut u16| {
+        fill(bench, round);
+        bench.board.power_off();
+        bench.board.set_supply_mv(LOW_MV).unwrap();
+        let spare = rooms(bench)
+            .iter()
+            .position(|room| *room >= 1000)
+            .expect("a spare page");
+        let old = [0; PAGE_SIZE];
+        bench.board.patch_code(PAGE_ADDRESSES[spare], &old).unwrap();
+        bench.board.power_on();
+        bench.started();
+        bench.unlock();
+    };
+    let operations = every_cut_of_a_save(prepare, "with an erase before it");
+    assert!(
+        operations >= HALF_WORDS + 2 * (ERASE - 1),
+        "{operations} operations: an erase before it and one behind it"
     );
 }
 
