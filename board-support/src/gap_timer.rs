@@ -21,7 +21,7 @@ use stm32f1xx_hal::{
 use crate::{
     ClockSource,
     gap::{GapTicks, LimitTicks, LineTimes},
-    signature,
+    signature::Signature,
     uart::LineSettings,
 };
 
@@ -44,7 +44,7 @@ pub struct GapTimer {
     limit: LimitTicks,
     /// The signatures of the registers of TIM2 and TIM1 after they were set. They are compared with what they read, not with what was
     /// written: an emulator need not keep every bit.
-    set: [u32; 2],
+    set: [Signature; 3],
 }
 
 impl GapTimer {
@@ -67,7 +67,7 @@ impl GapTimer {
             start_bit,
             ticks,
             limit: LimitTicks::new(clock.core_mhz(), times.limit_us),
-            set: [0; 2],
+            set: [Signature::default(); 3],
         };
         gap.set_up();
         Some(gap)
@@ -110,7 +110,7 @@ impl GapTimer {
         start_bit.egr().write(|w| w.ug().update());
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
-        self.set = [self.silences(), self.start_bit()];
+        self.set = [self.control(), self.times(), self.start_bit()];
     }
 
     /// A reply has begun: [`take_limit`](Self::take_limit) tells when it has taken longer than it can.
@@ -138,48 +138,58 @@ impl GapTimer {
         reached
     }
 
-    /// Whether TIM2, which measures the silences, is as it was set up.
+    /// Whether TIM2, which measures the silences, works as it was set up to.
     #[must_use]
-    pub fn silences_are_sound(&self) -> bool {
-        self.silences() == self.set[0]
+    pub fn control_is_sound(&self) -> bool {
+        self.control() == self.set[0]
+    }
+
+    /// Whether the times that TIM2 measures are those it was set up for.
+    #[must_use]
+    pub fn times_are_sound(&self) -> bool {
+        self.times() == self.set[1]
     }
 
     /// Whether TIM1, which sees the start bit and limits replies, is as it was set up.
     #[must_use]
     pub fn start_bit_is_sound(&self) -> bool {
-        self.start_bit() == self.set[1]
+        self.start_bit() == self.set[2]
     }
 
-    /// The signature of TIM2's registers, without the bits that change while silences are measured.
-    fn silences(&self) -> u32 {
+    /// The signature of TIM2's control registers, without the bits that change while silences are measured.
+    fn control(&self) -> Signature {
         const CEN: u32 = 1;
         const CC2IE: u32 = 1 << 2;
         let timer = &self.timer;
-        signature([
-            timer.cr1().read().bits() & !CEN,
-            timer.smcr().read().bits(),
-            timer.dier().read().bits() & !CC2IE,
-            timer.ccmr1_output().read().bits(),
-            timer.ccmr2_output().read().bits(),
-            timer.psc().read().bits(),
-            timer.arr().read().bits(),
-            timer.ccr1().read().bits(),
-            timer.ccr2().read().bits(),
-            timer.ccr3().read().bits(),
-        ])
+        Signature::default()
+            .with(timer.cr1().read().bits() & !CEN)
+            .with(timer.smcr().read().bits())
+            .with(timer.dier().read().bits() & !CC2IE)
+            .with(timer.ccmr1_output().read().bits())
+            .with(timer.ccmr2_output().read().bits())
+    }
+
+    /// The signature of TIM2's times.
+    fn times(&self) -> Signature {
+        let timer = &self.timer;
+        Signature::default()
+            .with(timer.psc().read().bits())
+            .with(timer.arr().read().bits())
+            .with(timer.ccr1().read().bits())
+            .with(timer.ccr2().read().bits())
+            .with(timer.ccr3().read().bits())
     }
 
     /// The signature of TIM1's registers, without those that change with each reply.
-    fn start_bit(&self) -> u32 {
+    fn start_bit(&self) -> Signature {
         let start_bit = &self.start_bit;
-        signature([
-            start_bit.cr1().read().bits(),
-            start_bit.smcr().read().bits(),
-            start_bit.ccmr2_input().read().bits(),
-            start_bit.ccer().read().bits(),
-            start_bit.psc().read().bits(),
-            start_bit.arr().read().bits(),
-        ])
+        Signature::default()
+            .with(start_bit.cr1().read().bits())
+            .with(start_bit.smcr().read().bits())
+            .with(start_bit.ccmr2_input().read().bits())
+            .with(start_bit.ccer().read().bits())
+            .with(start_bit.psc().read().bits())
+            .with(start_bit.arr().read().bits())
     }
 
     /// Whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.

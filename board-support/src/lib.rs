@@ -55,7 +55,6 @@ mod wait;
 mod watchdog;
 
 #[cfg(target_os = "none")]
-use signature::signature;
 #[cfg(target_os = "none")]
 pub use {
     adc::{AdcError, AnalogInputs},

@@ -11,7 +11,8 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, signature,
+    ClockSource,
+    signature::Signature,
     uart::{Format, LineSettings, divider},
 };
 
@@ -80,7 +81,7 @@ pub struct Rs485 {
     /// What CR1 read after it was set, and the signature of the other registers. They are compared with what they
     /// read, not with what was written: an emulator need not keep every bit.
     cr1: u16,
-    set: u32,
+    set: Signature,
 }
 
 /// CR1 of a receiver: the line's settings, with UE, TE, RE and RXNEIE (RM0008 27.6.4).
@@ -131,7 +132,7 @@ impl Rs485 {
             format: settings.format,
             stop_in_data: settings.format.stop_in_data(),
             cr1: 0,
-            set: 0,
+            set: Signature::default(),
         };
         line.set_up();
         // The transmitter is on and idles high before the pin becomes its output.
@@ -160,13 +161,12 @@ impl Rs485 {
     }
 
     /// The signature of CR2, CR3 and BRR.
-    fn settings(&self) -> u32 {
+    fn settings(&self) -> Signature {
         let usart = &self.usart;
-        signature([
-            usart.cr2().read().bits().into(),
-            usart.cr3().read().bits().into(),
-            usart.brr().read().bits().into(),
-        ])
+        Signature::default()
+            .with(usart.cr2().read().bits().into())
+            .with(usart.cr3().read().bits().into())
+            .with(usart.brr().read().bits().into())
     }
 
     /// Whether every register of the UART is as it was set up and the driver is off, while nothing is being sent.

@@ -2,16 +2,30 @@
 
 /// A number that differs when the registers differ in any one bit. Comparing it takes fewer instructions, and less
 /// RAM, than comparing every register.
-#[inline]
-pub(crate) fn signature<const N: usize>(registers: [u32; N]) -> u32 {
-    registers
-        .iter()
-        .fold(0, |sum: u32, register| sum.rotate_left(5) ^ register)
+///
+/// Always inlined, because its callers run from RAM. One register at a time, because a loop over all of them takes
+/// four times as long.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Signature(u32);
+
+impl Signature {
+    /// Of these registers and one more.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) const fn with(self, register: u32) -> Self {
+        Self(self.0.rotate_left(5) ^ register)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn signature(registers: [u32; 15]) -> Signature {
+        registers
+            .into_iter()
+            .fold(Signature::default(), Signature::with)
+    }
 
     #[test]
     fn every_inverted_bit_changes_the_signature() {

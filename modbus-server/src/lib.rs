@@ -135,6 +135,6 @@ pub use function::Function;
 pub use head::Head;
 pub use identification::ReadCode;
 pub use model::DataModel;
-pub use server::Server;
+pub use server::{Answered, Committed, Decided, Request, Served, Server};
 pub use span::Span;
 pub use words::{Words, WordsOut};

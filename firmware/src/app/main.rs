@@ -38,11 +38,12 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{GapEvent, ScanTimer, Watchdog, fault, pac::Interrupt, stack};
+    use board_support::{ScanTimer, Watchdog, fault, pac::Interrupt, stack};
     use firmware::{
         alive::{self, Task},
         device::Device,
         lamps::TICK_MS,
+        start_up::LOADER_UNIT,
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::{Adu, Outcome, Server};
@@ -164,16 +165,11 @@ mod app {
     #[task(binds = TIM2, priority = 4, shared = [line])]
     fn gap(mut cx: gap::Context) {
         alive::begin(fault::marks(), Task::Line);
-        let request = cx.shared.line.lock(|line| {
-            let line = line.as_mut()?;
-            match line.gap.take_event() {
-                GapEvent::T15 => return line.on_t15(),
-                GapEvent::T35 => return line.on_t35(),
-                GapEvent::Nothing => {}
-            }
-            None
-        });
-        if request.is_some() {
+        let waits = cx
+            .shared
+            .line
+            .lock(|line| line.as_mut().is_some_and(Line::on_gap));
+        if waits {
             rtic::pend(Interrupt::EXTI3);
         }
     }
@@ -212,20 +208,17 @@ mod app {
             frame_gap_ms,
             ..
         } = cx.local;
-        let mut on_line = |f: &mut dyn FnMut(&mut Line)| line.lock(|line| line.as_mut().map(f));
-
-        let delay_ms = device.lock(|device| device.config.response_delay_ms());
-        let mut request = None;
-        let mut silent = true;
-        on_line(&mut |line| {
-            request = line.take_request();
-            silent = !line.is_replying();
-            // The unit address leaves while all that follows is being done.
-            if let Some((adu, ..)) = &request
-                && server.answers(adu)
-            {
-                line.open_reply(server.unit(), server.framing(), delay_ms);
-            }
+        let delay_ms = if server.unit() == LOADER_UNIT {
+            // The loader mode is to be found by a master with any time-out.
+            0
+        } else {
+            device.lock(|device| device.config.response_delay_ms())
+        };
+        // The unit address leaves while all that follows is being done.
+        let (silent, request) = line.lock(|line| {
+            line.as_mut().map_or((true, None), |line| {
+                (!line.is_replying(), line.take(server, delay_ms))
+            })
         });
 
         // An order of the last request, whose reply is out or never comes.
@@ -244,32 +237,28 @@ mod app {
             }
         }
 
-        let Some((adu, line_counters, closed_ms)) = request else {
+        let Some(request) = request else {
             alive::end(fault::marks(), Task::Serve);
             return;
         };
-        let decision = device.lock(|device| server.decide(adu, &**device));
-        if let Some(head) = decision.reply {
-            on_line(&mut |line| line.continue_reply(head));
-        }
-        server.commit(&decision, &line_counters);
-        device.lock(|device| {
+        let decided = device.lock(|device| request.decide(server, &**device));
+        let Some(answered) = line.lock(|line| line.as_mut().map(|line| line.answer(decided)))
+        else {
+            return;
+        };
+        let committed = answered.commit(server);
+        let decision = *committed.decision();
+        let served = device.lock(|device| {
             if Device::shows_counters(&decision.work) {
                 device.state.counters = server.counters();
             }
             // In listen-only mode the outputs are to fall to SAFE.
             if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
-                device.request_seen(closed_ms.wrapping_sub(*frame_gap_ms));
+                device.request_seen(committed.ended().wrapping_sub(*frame_gap_ms));
             }
-            server.carry_out(&decision, adu, &mut **device);
+            committed.carry_out(server, &mut **device)
         });
-        let mut adu = Some(adu);
-        on_line(&mut |line| {
-            line.set_framing(server.framing());
-            if let Some(adu) = adu.take() {
-                line.finish_reply(adu, decision.reply.is_some());
-            }
-        });
+        line.lock(|line| line.as_mut().map(|line| line.finish(served)));
         if decision.work.writes() {
             rtic::pend(Interrupt::EXTI1);
             if decision.reply.is_none() {

@@ -15,7 +15,7 @@ use firmware::{
 };
 use modbus_server::{
     Adu, Server,
-    line::{Framing, Gaps, Receiver, Width},
+    line::{Framing, Gaps, Port, Receiver, Width},
 };
 use modio_drivers::IoModule;
 use register_map::codes::{Format, GapRule, Mode};
@@ -134,7 +134,7 @@ pub fn up(
         let (uart, gap) = board.line.start(on_wire, times)?;
         // The count may begin just before a beat.
         let longest_ms = (limit_us / 1000) as u16 + 2;
-        Some(Line::new(uart, gap, receiver, adus, longest_ms))
+        Some(Line::new(uart, gap, Port::new(receiver, adus), longest_ms))
     });
 
     Started {

@@ -1,5 +1,6 @@
 //! Requests in, decisions and replies out.
 
+mod serving;
 mod settle;
 mod tally;
 mod work;
@@ -8,6 +9,7 @@ use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
 use crate::line::Framing;
 use crate::{Adu, Counters, DataModel, Decision, Function, Head, LineCounters, Outcome, Work};
+pub use serving::{Answered, Committed, Decided, Request, Served};
 use tally::Tally;
 
 /// The unit address of a broadcast (V1.02 2.2).

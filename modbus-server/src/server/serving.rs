@@ -1,0 +1,153 @@
+//! The steps of serving a request, in the only order there is.
+
+use super::Server;
+use crate::line::{Framing, Port};
+use crate::{Adu, DataModel, Decision, LineCounters, Outcome, Work};
+
+/// A request that was taken from its port. The unit address of its reply may be on its way.
+#[must_use = "its buffer is the port's"]
+#[derive(Debug)]
+pub struct Request<'a> {
+    adu: &'a mut Adu,
+    line: LineCounters,
+    ended: u32,
+}
+
+/// A request that has been decided upon.
+#[must_use = "its buffer is the port's"]
+#[derive(Debug)]
+pub struct Decided<'a> {
+    request: Request<'a>,
+    decision: Decision,
+}
+
+/// A request whose reply has its beginning.
+#[must_use = "its buffer is the port's"]
+#[derive(Debug)]
+pub struct Answered<'a>(Decided<'a>);
+
+/// A request that counters and event log include.
+#[must_use = "its buffer is the port's"]
+#[derive(Debug)]
+pub struct Committed<'a>(Decided<'a>);
+
+/// A request that has been carried out.
+#[must_use = "its buffer is the port's"]
+#[derive(Debug)]
+pub struct Served<'a> {
+    adu: &'a mut Adu,
+    replying: bool,
+    framing: Framing,
+}
+
+impl Server {
+    /// Takes the request that waits at `port`, if any, and lets its reply start, at once or after `delay` ticks
+    /// ([`Port::start`]): the unit address leaves while the rest is being decided.
+    ///
+    /// What follows has to be done step by step, each in a lock of what it needs if there is one:
+    /// [`Request::decide`] (model), [`Decided::answer`] (port), [`Answered::commit`],
+    /// [`Committed::carry_out`] (model), [`Served::finish`] (port). [`serve`](Self::serve) does it all at once.
+    #[inline]
+    pub fn take<'a>(&self, port: &mut Port<'a>, delay: u16) -> Option<Request<'a>> {
+        let (closed, ended) = port.take_request()?;
+        if self.answers(closed.adu) {
+            port.open(self.unit(), self.framing(), delay);
+        }
+        Some(Request {
+            adu: closed.adu,
+            line: closed.line,
+            ended,
+        })
+    }
+
+    /// Serves the request that waits at `port`, if any; how it fared.
+    pub fn serve(
+        &mut self,
+        port: &mut Port<'_>,
+        delay: u16,
+        model: &mut impl DataModel,
+    ) -> Option<Outcome> {
+        let committed = self
+            .take(port, delay)?
+            .decide(self, model)
+            .answer(port)
+            .commit(self);
+        let outcome = committed.decision().outcome;
+        committed.carry_out(self, model).finish(port);
+        Some(outcome)
+    }
+}
+
+impl<'a> Request<'a> {
+    /// Settles the reply: everything that can be refused is refused here. Changes nothing.
+    #[inline]
+    pub fn decide(self, server: &Server, model: &impl DataModel) -> Decided<'a> {
+        Decided {
+            decision: server.decide(self.adu, model),
+            request: self,
+        }
+    }
+}
+
+impl<'a> Decided<'a> {
+    /// Gives the port the beginning of the reply, if there is one.
+    #[inline]
+    pub fn answer(self, port: &mut Port<'a>) -> Answered<'a> {
+        if let Some(head) = self.decision.reply {
+            port.set_head(head);
+        }
+        Answered(self)
+    }
+}
+
+impl<'a> Answered<'a> {
+    /// Counts and logs the request.
+    #[inline]
+    pub fn commit(self, server: &mut Server) -> Committed<'a> {
+        server.commit(&self.0.decision, &self.0.request.line);
+        Committed(self.0)
+    }
+}
+
+impl<'a> Committed<'a> {
+    /// What was decided.
+    #[inline]
+    #[must_use]
+    pub const fn decision(&self) -> &Decision {
+        &self.0.decision
+    }
+
+    /// What is to be done.
+    #[inline]
+    #[must_use]
+    pub const fn work(&self) -> Work {
+        self.0.decision.work
+    }
+
+    /// The tick in which the request ended.
+    #[inline]
+    #[must_use]
+    pub const fn ended(&self) -> u32 {
+        self.0.request.ended
+    }
+
+    /// Does the work: points and registers are written, and the rest of the reply is put together.
+    #[inline]
+    pub fn carry_out(self, server: &mut Server, model: &mut impl DataModel) -> Served<'a> {
+        let Decided { request, decision } = self.0;
+        server.carry_out(&decision, request.adu, model);
+        Served {
+            adu: request.adu,
+            replying: decision.reply.is_some(),
+            framing: server.framing(),
+        }
+    }
+}
+
+impl<'a> Served<'a> {
+    /// Gives the port the rest of the reply, and the buffer back.
+    #[inline]
+    pub fn finish(self, port: &mut Port<'a>) {
+        port.finish(self.adu, self.replying, self.framing);
+    }
+}

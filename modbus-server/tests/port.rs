@@ -1,0 +1,313 @@
+//! A port and its server: when a reply starts, what becomes of it, and where the buffers go.
+
+use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Width};
+use modbus_server::{
+    Adu, Bits, BitsOut, Counters, DataModel, Exception, Outcome, Server, Span, Words, WordsOut,
+};
+
+/// Holding registers at 0 to 9.
+#[derive(Default)]
+struct Registers([u16; 10]);
+
+impl DataModel for Registers {
+    fn check_read_bits(&self, _: Span) -> Result<(), Exception> {
+        Err(Exception::IllegalDataAddress)
+    }
+
+    fn check_write_bits(&self, _: Span, _: Bits<'_>) -> Result<(), Exception> {
+        Err(Exception::IllegalDataAddress)
+    }
+
+    fn check_read_words(&self, span: Span) -> Result<(), Exception> {
+        if span.end() <= 10 {
+            Ok(())
+        } else {
+            Err(Exception::IllegalDataAddress)
+        }
+    }
+
+    fn check_write_words(&self, span: Span, _: Words<'_>) -> Result<(), Exception> {
+        self.check_read_words(span)
+    }
+
+    fn read_bits(&self, _: Span, _: &mut BitsOut<'_>) {}
+
+    fn write_bits(&mut self, _: Span, _: Bits<'_>) {}
+
+    fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
+        for address in span.addresses() {
+            out.push(self.0[usize::from(address)]);
+        }
+    }
+
+    fn write_words(&mut self, span: Span, words: Words<'_>) {
+        for (address, word) in span.addresses().zip(words.iter()) {
+            self.0[usize::from(address)] = word;
+        }
+    }
+}
+
+const UNIT: u8 = 17;
+const READ: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
+const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
+/// A good frame of somebody else: unit 18 reads a register.
+const OTHERS: [u8; 8] = [0x12, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x68];
+
+struct Unit<'a> {
+    port: Port<'a>,
+    server: Server,
+    registers: Registers,
+    now: u32,
+}
+
+impl<'a> Unit<'a> {
+    fn rtu(adus: &'a mut [Adu; 2]) -> Self {
+        let mut unit = Self {
+            port: Port::new(Receiver::rtu(UNIT, false), adus),
+            server: Server::new(UNIT, Framing::Rtu),
+            registers: Registers([0x1111; 10]),
+            now: 0,
+        };
+        // What comes before the first silence is nobody's.
+        assert!(!unit.silence());
+        unit
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.port.received(*byte, Faults::NONE);
+        }
+    }
+
+    /// t1.5, then t3.5. Whether a request waits.
+    fn silence(&mut self) -> bool {
+        assert!(!self.port.short_silence(self.now), "RTU frames end at t3.5");
+        self.port.long_silence(self.now)
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> bool {
+        self.receive(bytes);
+        self.silence()
+    }
+
+    fn serve(&mut self, delay: u16) -> Option<Outcome> {
+        self.server
+            .serve(&mut self.port, delay, &mut self.registers)
+    }
+
+    /// What leaves the unit of a reply that may start; its end included.
+    fn sends(&mut self) -> Vec<u8> {
+        let mut sent: Vec<u8> = self.port.start().into_iter().collect();
+        if sent.is_empty() {
+            return sent;
+        }
+        assert!(self.port.is_sending());
+        while let Next::Byte(byte) = self.port.next() {
+            sent.push(byte);
+        }
+        self.port.sent();
+        sent
+    }
+
+    fn counters(&self) -> Counters {
+        self.server.counters_at(self.port.counters())
+    }
+
+    /// It answers again, so both its buffers are back and it listens.
+    fn is_well(&mut self) {
+        for _ in 0..3 {
+            assert!(self.hear(&READ));
+            assert_eq!(self.serve(0), Some(Outcome::Accepted));
+            assert_eq!(self.sends(), REPLY);
+            assert!(!self.port.is_replying());
+        }
+    }
+}
+
+#[test]
+fn a_request_is_served_and_its_reply_sent() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    assert_eq!(unit.serve(0), None, "nothing has come");
+    assert_eq!(unit.port.start(), None);
+    unit.is_well();
+}
+
+#[test]
+fn the_first_byte_leaves_before_anything_is_decided() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    unit.now = 1234;
+    assert!(unit.hear(&READ));
+    unit.now = 1300;
+    let request = unit.server.take(&mut unit.port, 0).expect("it waits");
+    assert_eq!(unit.port.start(), Some(UNIT));
+    assert_eq!(unit.port.start(), None, "it has started");
+    assert_eq!(unit.port.next(), Next::Wait);
+    let answered = request
+        .decide(&unit.server, &unit.registers)
+        .answer(&mut unit.port);
+    assert_eq!(unit.port.next(), Next::Byte(3));
+    assert_eq!(unit.port.next(), Next::Byte(2));
+    assert_eq!(unit.port.next(), Next::Wait);
+    let committed = answered.commit(&mut unit.server);
+    assert_eq!(committed.ended(), 1234);
+    assert_eq!(unit.server.counters().unit_messages, 1);
+    let served = committed.carry_out(&mut unit.server, &mut unit.registers);
+    served.finish(&mut unit.port);
+    for byte in &REPLY[3..] {
+        assert_eq!(unit.port.next(), Next::Byte(*byte));
+    }
+    assert_eq!(unit.port.next(), Next::Done);
+    unit.port.sent();
+    unit.is_well();
+}
+
+#[test]
+fn a_delayed_reply_starts_after_its_ticks() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    for delay in [1, 2, 7] {
+        assert!(unit.hear(&READ));
+        unit.serve(delay);
+        // The request ended somewhere within a tick, so that the first one does not count.
+        for _ in 0..delay {
+            unit.port.tick();
+            assert_eq!(unit.port.start(), None);
+            assert!(unit.port.is_replying());
+        }
+        unit.port.tick();
+        assert_eq!(unit.sends(), REPLY);
+    }
+    unit.is_well();
+}
+
+#[test]
+fn a_delayed_reply_is_given_up_when_the_bus_goes_on() {
+    for frame in [&OTHERS[..], &OTHERS[..3]] {
+        let mut adus = [Adu::new(), Adu::new()];
+        let mut unit = Unit::rtu(&mut adus);
+        assert!(unit.hear(&READ));
+        unit.serve(2);
+        unit.receive(frame);
+        if frame.len() == OTHERS.len() {
+            assert!(!unit.silence());
+        }
+        (0..5).for_each(|_| unit.port.tick());
+        assert_eq!(unit.port.start(), None);
+        assert!(!unit.port.is_replying());
+        unit.silence();
+        unit.is_well();
+    }
+}
+
+#[test]
+fn a_request_gives_up_the_delayed_reply_before_it() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    assert!(unit.hear(&READ));
+    unit.serve(5);
+    assert!(unit.port.is_replying());
+    assert!(unit.hear(&READ));
+    assert!(!unit.port.is_replying(), "that reply will not come");
+    unit.serve(0);
+    assert_eq!(unit.sends(), REPLY);
+    unit.is_well();
+}
+
+#[test]
+fn a_request_that_nobody_has_taken_is_dropped_for_the_next() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    assert!(unit.hear(&READ));
+    assert!(unit.hear(&READ));
+    assert_eq!(unit.serve(0), Some(Outcome::Accepted));
+    assert_eq!(unit.sends(), REPLY);
+    assert_eq!(unit.serve(0), None, "the first one is gone");
+    assert_eq!(unit.port.counters().dropped, 1);
+    assert_eq!(unit.counters().no_response, 1);
+    unit.is_well();
+}
+
+#[test]
+fn a_reply_that_is_cut_off_gives_its_buffer_back() {
+    for sent in 0..REPLY.len() {
+        let mut adus = [Adu::new(), Adu::new()];
+        let mut unit = Unit::rtu(&mut adus);
+        assert!(unit.hear(&READ));
+        unit.serve(0);
+        assert_eq!(unit.port.start(), Some(UNIT));
+        for byte in &REPLY[1..=sent.min(REPLY.len() - 1)] {
+            assert_eq!(unit.port.next(), Next::Byte(*byte));
+        }
+        unit.port.sent();
+        assert!(!unit.port.is_replying());
+        unit.is_well();
+    }
+}
+
+#[test]
+fn a_reply_that_is_cut_off_before_it_is_served_takes_no_body() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    assert!(unit.hear(&READ));
+    let request = unit.server.take(&mut unit.port, 0).expect("it waits");
+    assert_eq!(unit.port.start(), Some(UNIT));
+    unit.port.sent();
+    request
+        .decide(&unit.server, &unit.registers)
+        .answer(&mut unit.port)
+        .commit(&mut unit.server)
+        .carry_out(&mut unit.server, &mut unit.registers)
+        .finish(&mut unit.port);
+    assert!(!unit.port.is_replying());
+    unit.is_well();
+}
+
+#[test]
+fn what_gets_silence_starts_no_reply() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    assert!(!unit.hear(&OTHERS));
+    // A broadcast writes 7 to register 4.
+    assert!(unit.hear(&[0x00, 0x06, 0x00, 0x04, 0x00, 0x07, 0x88, 0x18]));
+    assert_eq!(unit.serve(0), Some(Outcome::Accepted));
+    assert_eq!(unit.port.start(), None);
+    assert!(!unit.port.is_replying());
+    assert_eq!(unit.registers.0[4], 7);
+    unit.registers.0[4] = 0x1111;
+    unit.is_well();
+}
+
+/// An ASCII line: its frames end with a character, and the short silence is t3.5.
+#[test]
+fn an_ascii_request_is_taken_at_the_short_silence_and_is_too_late_at_the_long_one() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut port = Port::new(Receiver::ascii(UNIT, Width::Eight), &mut adus);
+    let mut server = Server::new(UNIT, Framing::ASCII);
+    let mut registers = Registers([0x1111; 10]);
+    for round in 0..3 {
+        for late in [false, true] {
+            for byte in b":110300040001E7\r\n" {
+                assert!(!port.short_silence(0), "it is not over");
+                port.received(*byte, Faults::NONE);
+            }
+            if late {
+                assert!(!port.long_silence(0));
+                assert!(server.serve(&mut port, 0, &mut registers).is_none());
+                assert_eq!(port.counters().dropped, round + 1);
+                continue;
+            }
+            assert!(port.short_silence(0));
+            server
+                .serve(&mut port, 0, &mut registers)
+                .expect("it waits");
+            let mut sent = vec![port.start().expect("it is answered")];
+            while let Next::Byte(byte) = port.next() {
+                sent.push(byte);
+            }
+            port.sent();
+            assert_eq!(sent, b":1103021111C8\r\n");
+        }
+    }
+}
