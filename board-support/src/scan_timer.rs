@@ -32,12 +32,8 @@ impl ScanTimer {
         self.timer.cr1().write(|w| w.cen().enabled());
     }
 
-    /// Whether a beat has come since the last call.
-    pub fn take_beat(&mut self) -> bool {
-        let beat = self.timer.sr().read().uif().bit_is_set();
-        if beat {
-            self.timer.sr().write(|w| w.uif().clear_bit());
-        }
-        beat
+    /// Takes a beat: its interrupt is over.
+    pub fn take_beat(&mut self) {
+        self.timer.sr().write(|w| w.uif().clear_bit());
     }
 }

@@ -72,13 +72,12 @@ impl Persistence {
         event
     }
 
-    /// Whether there is a page to erase, so that the next save that needs it does not have to.
-    pub fn wants_erase(&self) -> bool {
-        self.erase && self.pages.has_supply()
-    }
-
-    /// Erases it. All but the tasks that run from RAM stand still for up to 40 ms.
+    /// Erases the page that is no longer needed, if there is one, so that the next save that needs it does not have to.
+    /// All but the tasks that run from RAM stand still for up to 40 ms.
     pub fn erase(&mut self) {
+        if !self.erase || !self.pages.has_supply() {
+            return;
+        }
         self.erase = false;
         // When the flash fails, the next save that needs the page tries again; when the supply is too low, this
         // does.
