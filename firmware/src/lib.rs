@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod alive;
+mod built;
 pub mod config;
 pub mod device;
 pub mod lamps;

@@ -74,6 +74,11 @@ block! {
     STATUS "status": 0x020A x 1, "", READ, &[];
     /// Least stack that has been left free since the start
     STACK_FREE "free stack": 0x020B x 1, "bytes", READ, &[];
+    /// The commit that the firmware was built from, its first 32 bits, high word first; 0 when that is not known
+    COMMIT "commit": 0x020C x 2, "", READ, &[];
+    /// How the firmware was built. Bit 0 from sources with changes that are not in the commit, 1 signed with the
+    /// development key, 2 not signed
+    BUILD "build": 0x020E x 1, "", READ, &[];
     /// By port: the module in force
     MODULE_IN_FORCE "module in force": 0x0210 x 8, "", READ, &Module::NAMES;
     /// By port: how the module fares

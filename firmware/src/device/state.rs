@@ -11,6 +11,7 @@ use register_map::{
 
 use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
+use crate::built;
 
 /// What is known of the device when it starts, and never changes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -117,6 +118,7 @@ impl State {
     pub(super) fn word(&self, address: u16, points: &Points, module: Module) -> u16 {
         let [product_high, product_low] = words_of(at::PRODUCT);
         let [uptime_high, uptime_low] = words_of(self.uptime_s);
+        let [commit_high, commit_low] = words_of(built::COMMIT);
         let [version, patch] = VERSION;
         match address {
             0x0200 => product_high,
@@ -130,6 +132,9 @@ impl State {
             at::UPTIME => uptime_high,
             0x0209 => uptime_low,
             at::STACK_FREE => self.stack_free,
+            at::COMMIT => commit_high,
+            0x020D => commit_low,
+            at::BUILD => built::FLAGS,
             at::MODULE_IN_FORCE.. => self.by_index(address, points, module),
             _ => 0,
         }

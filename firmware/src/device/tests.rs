@@ -320,6 +320,9 @@ fn identity_and_state_are_read_and_never_written() {
     assert_eq!(bench.read(0x0200, 2), Ok(std::vec![0x2383, 0x5860]));
     assert_eq!(bench.read(0x0204, 4), Ok(std::vec![1, 1, 1, 0b11_0000]));
     assert_eq!(bench.read(0x0208, 2), Ok(std::vec![0, 2]));
+    let [high, low] = [crate::built::COMMIT >> 16, crate::built::COMMIT & 0xFFFF];
+    let built = std::vec![high as u16, low as u16, crate::built::FLAGS];
+    assert_eq!(bench.read(0x020C, 3), Ok(built));
     assert_eq!(bench.read(0x0210, 8), Ok(std::vec![0, 0, 0, 0, 3, 0, 0, 0]));
     assert_eq!(bench.read(0x0218, 8), Ok(std::vec![1, 1, 1, 1, 0, 1, 1, 1]));
     assert_eq!(bench.read(0x0220, 6), Ok(std::vec![1, 2, 3, 4, 5, 6]));
@@ -329,10 +332,10 @@ fn identity_and_state_are_read_and_never_written() {
     let mut record = std::vec![3; 16];
     record[13] = 9;
     assert_eq!(bench.read(0x0260, 16), Ok(record));
-    for gap in [0x020C, 0x0226, 0x0239, 0x0270, 0x02FF, 0x0340] {
+    for gap in [0x020F, 0x0226, 0x0239, 0x0270, 0x02FF, 0x0340] {
         assert_eq!(bench.read(gap, 1), Err(2), "{gap:#x}");
     }
-    assert_eq!(bench.read(0x020B, 2), Err(2), "into a gap");
+    assert_eq!(bench.read(0x020E, 2), Err(2), "into a gap");
     assert_eq!(
         bench.read(0x01FF, 2),
         Err(2),
