@@ -13,6 +13,7 @@ mod gaps;
 mod port;
 mod receiver;
 mod state;
+mod timed;
 mod transmitter;
 
 pub use ascii::Width;
@@ -21,4 +22,5 @@ pub use framing::Framing;
 pub use gaps::Gaps;
 pub use port::Port;
 pub use receiver::{Closed, Receiver};
+pub use timed::{Silences, TimedPort};
 pub use transmitter::{Next, Transmitter};
