@@ -22,6 +22,7 @@ pub mod machine;
 pub mod periph;
 pub mod peripheral;
 pub mod rtt;
+pub mod serial;
 pub mod slot;
 pub mod soc;
 pub mod time;

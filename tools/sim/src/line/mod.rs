@@ -12,12 +12,9 @@
 //!                         noise
 //! ```
 
-mod character;
 mod frames;
 mod master;
-mod receiver;
-mod settings;
-mod wave;
+mod silence;
 mod wiring;
 
 #[cfg(test)]
@@ -25,14 +22,12 @@ mod tests;
 
 use std::collections::VecDeque;
 
-pub use character::Character;
 pub use frames::{Direction, Frame, KEPT, LONGEST, Record, crc_ok};
 pub use master::Received;
-pub use receiver::{Framing, Receiver, Word};
-pub use settings::{Format, Parity, Rate, Settings};
-pub use wave::Wave;
 pub use wiring::TxPin;
 
+pub use crate::serial::{Character, Format, Parity, Rate, Settings};
+use crate::serial::{Receiver, Wave};
 use crate::time::Time;
 use master::Master;
 

@@ -1,9 +1,10 @@
 //! How the bus is wired to the board: USART1 through the driver, RX back, and TIM1's capture input.
 
-use super::{Direction, Framing, HISTORY, Line, Received, Span, Wave, Word, keep};
+use super::{Direction, HISTORY, Line, Received, Span, keep};
 use crate::periph::timer::Timer;
 use crate::periph::usart::{Sent, Usart};
 use crate::peripheral::Peripheral;
+use crate::serial::{Framing, Wave, Word};
 use crate::time::Time;
 
 /// Who drives the driver's data input, the board's TX pin.

@@ -21,8 +21,8 @@ mod receiver_tests;
 #[cfg(test)]
 mod transmitter_tests;
 
-use crate::line::{Format, Parity, Receiver, Settings, Wave};
 use crate::peripheral::{Peripheral, Unmodelled};
+use crate::serial::{Format, Parity, Receiver, Settings, Wave};
 use crate::time::Time;
 use bits::{cr1, cr2, cr3, sr};
 pub use transmitter::Sent;

@@ -2,7 +2,7 @@
 
 use super::Usart;
 use super::bits::{cr1, sr};
-use crate::line::{Framing, Rate, Word};
+use crate::serial::{Framing, Rate, Word};
 use crate::time::Time;
 
 impl Usart {
