@@ -5,7 +5,7 @@ use std::path::Path;
 
 use object::{Object, ObjectSegment, ObjectSymbol};
 
-use crate::board::Error;
+use crate::chip::Error;
 use crate::machine::memory::{FLASH_BASE, FLASH_SIZE};
 use crate::periph::flash::PAGE;
 

@@ -7,6 +7,7 @@ use rigless::time::VirtualNanos;
 use super::run::{IPSR, Limit, XPSR, is_flash};
 use super::segment::{End, Place, Segment};
 use super::{FLASH_BASE, FLASH_SIZE, Machine, RAM_BASE};
+use crate::soc::Circuit;
 use crate::time::Time;
 
 /// The vector table's offset (PM0056 4.4.4).
@@ -21,7 +22,7 @@ pub(super) struct Active {
     handler: u32,
 }
 
-impl Machine {
+impl<C: Circuit> Machine<C> {
     /// Lets the core run until something has to happen.
     pub(super) fn execute(&mut self, limit: Limit) -> Exit {
         let stop = limit

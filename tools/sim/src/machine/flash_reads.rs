@@ -10,8 +10,9 @@ use rigless::emulator::Queued;
 use super::bus::Bus;
 use super::memory::FLASH_BASE;
 use crate::periph::flash::PAGE;
+use crate::soc::Circuit;
 
-impl Bus {
+impl<C: Circuit> Bus<C> {
     /// Sends reads of flash to the bus, page by page, or no longer. `changed`: cells have changed.
     pub(super) fn route_flash(&mut self, changed: bool) {
         let busy = self.soc.flash.busy_until().is_some();

@@ -4,7 +4,9 @@
 //! time is [`timing`]'s, by the [`costs`] of the [`segment`]s of code that [`execute`] lets it run; its bus is
 //! [`bus`], and [`run`] takes it from event to event.
 
+mod answer;
 pub mod bus;
+mod cortex;
 pub mod costs;
 mod debug;
 pub mod decode;
@@ -19,20 +21,15 @@ pub mod timing;
 pub mod usage;
 pub mod waits;
 
-use core::num::{NonZeroU32, NonZeroU64};
-
-use rigless::cpu::armv7m::{Window, processor};
 use rigless::emulator::{Processor, Queued};
-use rigless::machine::armv7m::{Config, Core, MpuRegions, Variant};
-use rigless::soc::{Endian, Width};
+use rigless::soc::Width;
 
 use crate::finding::Findings;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;
 use crate::periph::rcc::Cause;
 use crate::rtt::{Log, POLL};
-use crate::soc::Soc;
-use crate::soc::map::irq;
+use crate::soc::{Circuit, Soc};
 use crate::time::Time;
 use bus::Bus;
 use costs::{Costs, Pace};
@@ -46,8 +43,6 @@ use timing::InstructionClock;
 use usage::{CoreTime, Resting};
 use waits::{Wait, Waits};
 
-/// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
-const CPUID: u32 = 0x411F_C231;
 /// From the supply's rise to the end of reset: DS5319 table 11, tRSTTEMPO, typical.
 const POWER_ON_RESET: Time = Time::from_us(2_500);
 /// The shortest reset pulse (RM0008 7.1.1).
@@ -64,11 +59,11 @@ struct Cut {
 
 /// The core, its memories and its bus.
 #[derive(Debug)]
-pub struct Machine {
+pub struct Machine<C> {
     /// Dropped before the memories mapped into it.
     core: Box<dyn Processor>,
     /// Everything else.
-    pub bus: Bus,
+    pub bus: Bus<C>,
     /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
     fresh: Vec<u8>,
     /// Instructions done before the core's last reset.
@@ -94,7 +89,7 @@ pub struct Machine {
     ram_code: RamCode,
 }
 
-impl Machine {
+impl<C: Circuit> Machine<C> {
     /// A machine around `soc`, without power, at time 0, whose core has these costs and whose firmware
     /// keeps its RTT control block at `rtt_block`.
     ///
@@ -102,9 +97,9 @@ impl Machine {
     ///
     /// On a host that the core cannot generate code for.
     #[must_use]
-    pub fn new(mut soc: Soc, ident: Ident, costs: Costs, rtt_block: Option<u32>) -> Self {
+    pub fn new(mut soc: Soc<C>, ident: Ident, costs: Costs, rtt_block: Option<u32>) -> Self {
         let mut ram = Memory::new(RAM_SIZE, 0);
-        let mut core = core();
+        let mut core = cortex::m3();
         let fresh = core.save();
         let flash = soc.flash.host();
         let base = u64::from(FLASH_BASE);
@@ -368,40 +363,6 @@ impl Machine {
             RESET_PULSE
         };
         self.held_until = now + pulse;
-    }
-}
-
-/// The Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits, 43 interrupt lines.
-fn core() -> Box<dyn Processor> {
-    // The core's time unit is a cycle of HCLK, so its clock has as many to the second as the unit, a
-    // nanosecond by name, does. SysTick's other clock is HCLK / 8 (RM0008 figure 8).
-    const UNITS: NonZeroU64 = NonZeroU64::new(1_000_000_000).expect("not 0");
-    let core = Core {
-        variant: Variant::M3,
-        clock_hz: UNITS,
-        interrupt_lines: NonZeroU32::new(u32::from(irq::LINES)).expect("not 0"),
-        priority_bits: 4,
-        refclk_divider: NonZeroU32::new(8).expect("not 0"),
-        instructions_per_second: UNITS,
-        boot: "flash",
-    };
-    let window = |base, end| Window {
-        base,
-        size: end - base,
-    };
-    // All of the private peripheral bus but the ITM and the system control space.
-    let mut config = Config::new(
-        core,
-        &[
-            window(0xE000_1000, 0xE000_E000),
-            window(0xE000_F000, 0xE010_0000),
-        ],
-    );
-    config.mpu_regions = MpuRegions::None;
-    config.cpuid = CPUID;
-    match processor(&config, Endian::Little) {
-        Ok(core) => core,
-        Err(error) => panic!("no core for this host: {error}"),
     }
 }
 

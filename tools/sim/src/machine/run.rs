@@ -15,6 +15,7 @@ use crate::machine::usage::Rest;
 use crate::periph::rcc::Cause;
 use crate::peripheral::Unmodelled;
 use crate::rtt::POLL;
+use crate::soc::Circuit;
 use crate::time::Time;
 
 /// The system control register and its bit that asks for more than sleep (PM0056 4.4.6).
@@ -62,7 +63,7 @@ pub enum Stop {
     Stuck,
 }
 
-impl Machine {
+impl<C: Circuit> Machine<C> {
     /// Runs to `limit`. With the power off, time passes for the board's other parts.
     pub fn run(&mut self, limit: Limit) -> Stop {
         let address = limit.pc.map(|pc| u64::from(pc & !1));
