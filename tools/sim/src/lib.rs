@@ -11,7 +11,7 @@
 //! ```text
 //! chip       the part as its user sees it        serial characters on a wire, and how they are sampled
 //! machine    core, memories, run loop            periph one register block of the part in each file
-//! soc        register blocks, clocks, pins
+//! soc        register blocks, clocks, pins       part   flash, SRAM, pins and identity of each part
 //! ```
 //!
 //! The board knows the part by its pins:
@@ -30,6 +30,7 @@ pub mod finding;
 pub mod image;
 pub mod line;
 pub mod machine;
+pub mod part;
 pub mod periph;
 pub mod peripheral;
 pub mod rtt;

@@ -2,6 +2,7 @@
 
 use register_map::Module;
 
+use super::PART;
 use crate::chip::{self, Error};
 use crate::corner::Corner;
 use crate::slot;
@@ -33,6 +34,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         let chip::Config {
+            part: _,
             crystal_hz: _,
             corner,
             crystal,
@@ -58,6 +60,7 @@ impl Config {
     /// What of it concerns the part.
     pub(super) fn chip(self) -> chip::Config {
         chip::Config {
+            part: &PART,
             corner: self.corner,
             crystal: self.crystal,
             flash: self.flash,

@@ -11,6 +11,10 @@ pub use outside::Leds;
 
 use crate::chip::{Chip, Error};
 use crate::image::Image;
+use crate::part::{Part, STM32F103CB};
+
+/// The part of the modio-02.
+pub const PART: Part = STM32F103CB;
 
 /// The virtual modio-02.
 pub type Board = Chip<Modio>;

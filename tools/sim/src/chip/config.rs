@@ -3,11 +3,14 @@
 use core::fmt;
 
 use crate::corner::Corner;
+use crate::part::{Part, STM32F103CB};
 use crate::periph::clocks::HSE_HZ;
 
 /// What may differ from one part to the next, and its crystal, before power first comes on.
 #[derive(Clone, Debug)]
 pub struct Config {
+    /// Which part it is.
+    pub part: &'static Part,
     /// The frequency of the crystal (HSE) in Hz, without its error.
     pub crystal_hz: u32,
     /// The corner that the part is at.
@@ -15,12 +18,12 @@ pub struct Config {
     /// Whether the crystal works. Without it HSERDY never comes. It can die later as well
     /// ([`super::Chip::set_crystal`]).
     pub crystal: bool,
-    /// The flash's 128 KiB before the image is written into it, which erases the pages that it needs;
+    /// The flash's contents before the image is written into it, which erases the pages that it needs;
     /// erased when `None`.
     pub flash: Option<Vec<u8>>,
     /// The 96-bit unique identity, as its bytes stand at 0x1FFF_F7E8 (RM0008 30.2).
     pub unique_id: [u8; 12],
-    /// FLASH_WRPR (PM0075 3.9): bit n clear protects pages 4n to 4n + 3.
+    /// FLASH_WRPR (PM0075 3.9): bit n clear protects the `n`th 4 KiB, bit 31 all that follow, too.
     pub write_protection: u32,
     /// Decides what chance decides in the part: which cells an interrupted flash operation leaves unsteady,
     /// and how they read. Runs with the same seed are the same.
@@ -30,6 +33,7 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
+            part: &STM32F103CB,
             crystal_hz: HSE_HZ,
             corner: Corner::Nominal,
             crystal: true,

@@ -2,7 +2,7 @@
 //! and [`Chip::step_instruction`], as in every other run.
 
 use super::{Chip, Error};
-use crate::machine::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE};
+use crate::machine::memory::RAM_BASE;
 use crate::machine::{Limit, Stop};
 use crate::soc::Circuit;
 use crate::time::Time;
@@ -69,15 +69,10 @@ impl<C: Circuit> Chip<C> {
     }
 
     fn byte(&mut self, address: u32) -> Option<u8> {
-        let at = |base: u32| address.checked_sub(base).map(|offset| offset as usize);
-        let flash = if (address as usize) < FLASH_SIZE {
-            at(0)
-        } else {
-            at(FLASH_BASE)
-        };
-        at(RAM_BASE)
-            .and_then(|offset| self.ram().get(offset))
-            .or_else(|| self.flash().get(flash?))
+        let flash = self.machine.bus.flash_offset(address);
+        let ram = address.checked_sub(RAM_BASE);
+        ram.and_then(|offset| self.ram().get(offset as usize))
+            .or_else(|| self.flash().get(flash? as usize))
             .copied()
             .or_else(|| self.machine.system_control(address))
     }

@@ -13,13 +13,13 @@ impl<C: Circuit> Chip<C> {
         self.machine.take_log()
     }
 
-    /// The flash's 128 KiB.
+    /// The flash.
     #[must_use]
     pub fn flash(&self) -> &[u8] {
         self.machine.bus.soc.flash.bytes()
     }
 
-    /// The flash's 128 KiB, to change.
+    /// The flash, to change.
     ///
     /// # Errors
     ///
@@ -93,13 +93,13 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.soc.flash.torn = torn;
     }
 
-    /// The SRAM's 20 KiB.
+    /// The SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
         self.machine.ram()
     }
 
-    /// The SRAM's 20 KiB, to change as a debug probe does: to break something on purpose.
+    /// The SRAM, to change as a debug probe does: to break something on purpose.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         self.machine.ram_mut()
     }

@@ -15,7 +15,6 @@ pub use crate::machine::usage::CoreTime;
 pub use crate::machine::waits::Wait;
 
 use crate::image::Image;
-use crate::machine::memory::FLASH_SIZE;
 use crate::machine::{Limit, Machine, Stop};
 use crate::periph::flash::Flash;
 use crate::periph::ident::Ident;
@@ -38,23 +37,25 @@ impl<C: Circuit> Chip<C> {
     ///
     /// # Errors
     ///
-    /// [`Error::Image`] when `config.flash` is not as large as the flash.
+    /// [`Error::Image`] when the image does not fit the flash, or `config.flash` is not as large as the flash.
     pub fn in_circuit(image: &Image, config: Config, circuit: C) -> Result<Self, Error> {
-        let mut flash = Flash::new(config.write_protection, config.seed);
+        let part = config.part;
+        let mut flash = Flash::new(part, config.write_protection, config.seed);
         if let Some(contents) = &config.flash {
-            if contents.len() != FLASH_SIZE {
+            if contents.len() != part.flash_size {
                 return Err(Error::Image(format!(
-                    "flash contents of {} bytes, not {FLASH_SIZE}",
-                    contents.len()
+                    "flash contents of {} bytes, not {}",
+                    contents.len(),
+                    part.flash_size
                 )));
             }
             flash.bytes_mut().copy_from_slice(contents);
         }
-        image.load(flash.bytes_mut());
-        let ident = Ident::new(config.unique_id, config.write_protection);
+        image.load(flash.bytes_mut(), part.page_size)?;
+        let ident = Ident::new(part, config.unique_id, config.write_protection);
         let soc = Soc::new(&config, flash, circuit);
         let costs = config.corner.costs();
-        let mut machine = Machine::new(soc, ident, costs, image.symbol("_SEGGER_RTT"));
+        let mut machine = Machine::new(part, soc, ident, costs, image.symbol("_SEGGER_RTT"));
         machine.bus.soc.refresh(Time::ZERO);
         machine.power_on();
         Ok(Self {

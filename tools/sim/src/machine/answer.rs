@@ -3,7 +3,7 @@
 
 use super::bus::Bus;
 use super::dwt;
-use super::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
+use super::memory::{FLASH_BASE, RAM_BASE};
 use crate::finding::{What, Width};
 use crate::periph::ident;
 use crate::peripheral::{Peripheral, Unmodelled};
@@ -62,7 +62,7 @@ impl<C: Circuit> Bus<C> {
                 self.read_only(request, |bus, offset| bus.ident.read(offset))
             }
             PPB..0xE010_0000 => Some(self.debug_block(request)),
-            _ => match flash_offset(address) {
+            _ => match self.flash_offset(address) {
                 Some(offset) if request.write.is_none() => {
                     let busy = self.soc.flash.busy_until().is_some();
                     self.read_stalls |= busy;
@@ -70,7 +70,7 @@ impl<C: Circuit> Bus<C> {
                     Some(self.flash_word(request, offset))
                 }
                 Some(offset) => self.store_to_flash(request, offset),
-                None if address.wrapping_sub(RAM_BASE) < RAM_SIZE as u32 => {
+                None if (address.wrapping_sub(RAM_BASE) as usize) < self.part.ram_size => {
                     Some(self.routed_ram(request, address - RAM_BASE))
                 }
                 None => {
@@ -85,6 +85,14 @@ impl<C: Circuit> Bus<C> {
                 }
             },
         }
+    }
+
+    /// The offset into flash of `address`, at its own place or at 0.
+    pub(crate) fn flash_offset(&self, address: u32) -> Option<u32> {
+        [FLASH_BASE, 0]
+            .into_iter()
+            .map(|base| address.wrapping_sub(base))
+            .find(|&offset| (offset as usize) < self.part.flash_size)
     }
 
     fn read_only(&mut self, request: Request, read: impl FnOnce(&Self, u32) -> u32) -> Option<u32> {
@@ -106,7 +114,8 @@ impl<C: Circuit> Bus<C> {
                 return 0;
             }
             Place::Reserved => {
-                self.note_unmodelled(request, "a reserved address");
+                let name = self.part.unmodelled(address);
+                self.note_unmodelled(request, name.unwrap_or("a reserved address"));
                 return 0;
             }
         };
@@ -260,13 +269,4 @@ impl<C: Circuit> Bus<C> {
 fn word_of(memory: &[u8], request: Request, offset: u32) -> u32 {
     let at = (offset & !3) as usize;
     request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| memory[at + n])))
-}
-
-/// The offset into flash of `address`, at its own place or at 0.
-pub(super) fn flash_offset(address: u32) -> Option<u32> {
-    let size = FLASH_SIZE as u32;
-    [FLASH_BASE, 0]
-        .into_iter()
-        .map(|base| address.wrapping_sub(base))
-        .find(|&offset| offset < size)
 }

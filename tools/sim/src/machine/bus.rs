@@ -13,13 +13,14 @@ use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
 use rigless::soc::Width as CoreWidth;
 use rigless::time::VirtualNanos;
 
-use super::answer::{PPB, Request, flash_offset};
+use super::answer::{PPB, Request};
 use super::dwt::Dwt;
 use super::memory::{FLASH_BASE, Memory};
 use super::segment::Segments;
 use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
+use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;
 use crate::soc::{Circuit, Soc};
@@ -28,6 +29,8 @@ use crate::time::Time;
 /// Everything the core is lent while it runs, except the memories mapped into it.
 #[derive(Debug)]
 pub struct Bus<C> {
+    /// Which part it is.
+    pub(super) part: &'static Part,
     /// The part around the core.
     pub soc: Soc<C>,
     /// Instructions to time.
@@ -53,9 +56,9 @@ pub struct Bus<C> {
     pub(super) ram: Memory,
     /// What the code costs.
     pub(super) segments: Segments,
-    /// Reads of flash come here, those of these pages, one bit each.
+    /// Reads of flash come here: all of them, or those of these pages of the core's.
     pub(super) flash_is_watched: bool,
-    pub(super) routed_pages: u128,
+    pub(super) routed_pages: Vec<bool>,
     /// The core has read flash while an operation runs, and waits for its end.
     pub(super) read_stalls: bool,
     /// A block has been accessed, so its next event may be another one.
@@ -132,7 +135,7 @@ impl<C: Circuit> Bus<C> {
             0x4000_0000..0x4001_0000 => pace.block(write, divider(clocks.pclk1)),
             0x4001_0000..0x4001_8000 => pace.block(write, divider(clocks.pclk2)),
             0x4001_8000..0x6000_0000 | PPB.. => pace.block(write, None),
-            _ if self.charges_tables() && !write && flash_offset(address).is_some() => {
+            _ if self.charges_tables() && !write && self.flash_offset(address).is_some() => {
                 pace.flash_read()
             }
             _ => 0,

@@ -7,20 +7,17 @@ use rigless::emulator::Processor;
 use rigless::machine::armv7m::{Config, Core, MpuRegions, Variant};
 use rigless::soc::Endian;
 
-use crate::soc::map::irq;
+use crate::part::Part;
 
-/// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
-const CPUID: u32 = 0x411F_C231;
-
-/// The Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits, 43 interrupt lines.
-pub(super) fn m3() -> Box<dyn Processor> {
+/// The Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits.
+pub(super) fn m3(part: &Part) -> Box<dyn Processor> {
     // The core's time unit is a cycle of HCLK, so its clock has as many to the second as the unit, a
     // nanosecond by name, does. SysTick's other clock is HCLK / 8 (RM0008 figure 8).
     const UNITS: NonZeroU64 = NonZeroU64::new(1_000_000_000).expect("not 0");
     let core = Core {
         variant: Variant::M3,
         clock_hz: UNITS,
-        interrupt_lines: NonZeroU32::new(u32::from(irq::LINES)).expect("not 0"),
+        interrupt_lines: NonZeroU32::new(u32::from(part.interrupt_lines)).expect("not 0"),
         priority_bits: 4,
         refclk_divider: NonZeroU32::new(8).expect("not 0"),
         instructions_per_second: UNITS,
@@ -39,7 +36,7 @@ pub(super) fn m3() -> Box<dyn Processor> {
         ],
     );
     config.mpu_regions = MpuRegions::None;
-    config.cpuid = CPUID;
+    config.cpuid = part.cpuid;
     match processor(&config, Endian::Little) {
         Ok(core) => core,
         Err(error) => panic!("no core for this host: {error}"),

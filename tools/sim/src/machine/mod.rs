@@ -25,6 +25,7 @@ use rigless::emulator::{Processor, Queued};
 use rigless::soc::Width;
 
 use crate::finding::Findings;
+use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;
 use crate::periph::rcc::Cause;
@@ -35,7 +36,7 @@ use bus::Bus;
 use costs::{Costs, Pace};
 use dwt::Dwt;
 use execute::Active;
-use memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
+use memory::{FLASH_BASE, Memory, RAM_BASE, ROUTED_PAGE};
 use ram_code::RamCode;
 pub use run::{Limit, Stop};
 use segment::Segments;
@@ -90,16 +91,22 @@ pub struct Machine<C> {
 }
 
 impl<C: Circuit> Machine<C> {
-    /// A machine around `soc`, without power, at time 0, whose core has these costs and whose firmware
+    /// The machine of `part` around `soc`, without power, at time 0, whose core has these costs and whose firmware
     /// keeps its RTT control block at `rtt_block`.
     ///
     /// # Panics
     ///
     /// On a host that the core cannot generate code for.
     #[must_use]
-    pub fn new(mut soc: Soc<C>, ident: Ident, costs: Costs, rtt_block: Option<u32>) -> Self {
-        let mut ram = Memory::new(RAM_SIZE, 0);
-        let mut core = cortex::m3();
+    pub fn new(
+        part: &'static Part,
+        mut soc: Soc<C>,
+        ident: Ident,
+        costs: Costs,
+        rtt_block: Option<u32>,
+    ) -> Self {
+        let mut ram = Memory::new(part.ram_size, 0);
+        let mut core = cortex::m3(part);
         let fresh = core.save();
         let flash = soc.flash.host();
         let base = u64::from(FLASH_BASE);
@@ -107,14 +114,15 @@ impl<C: Circuit> Machine<C> {
         // pointers that do not move, until after `core` is dropped. Slices of them are lent out only by
         // methods that borrow the machine while the core does not run, or by its bus inside a call.
         unsafe {
-            core.map(base, FLASH_SIZE as u64, flash, false);
-            core.map(0, FLASH_SIZE as u64, flash, false);
-            core.map(u64::from(RAM_BASE), RAM_SIZE as u64, ram.host(), true);
+            core.map(base, part.flash_size as u64, flash, false);
+            core.map(0, part.flash_size as u64, flash, false);
+            core.map(u64::from(RAM_BASE), part.ram_size as u64, ram.host(), true);
         }
         let hclk = soc.rcc.clocks().hclk;
         Self {
             core,
             bus: Bus {
+                part,
                 soc,
                 clock: InstructionClock::new(Time::ZERO, hclk),
                 segments: Segments::new(Pace {
@@ -124,7 +132,7 @@ impl<C: Circuit> Machine<C> {
                 }),
                 findings: Findings::default(),
                 ident,
-                dbgmcu: Dbgmcu::default(),
+                dbgmcu: Dbgmcu::new(part.idcode),
                 dwt: Dwt::default(),
                 stop: (Time::ZERO, 0),
                 busy: false,
@@ -134,7 +142,7 @@ impl<C: Circuit> Machine<C> {
                 waits: None,
                 ram,
                 flash_is_watched: false,
-                routed_pages: 0,
+                routed_pages: vec![false; part.flash_size / ROUTED_PAGE],
                 read_stalls: false,
                 touched: false,
                 carries_on: false,
@@ -255,20 +263,23 @@ impl<C: Circuit> Machine<C> {
     /// The SRAM, to change: a debugger's write.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         let base = u64::from(RAM_BASE);
-        self.core
-            .ask(Queued::Invalidate(base, base + RAM_SIZE as u64));
+        self.core.ask(Queued::Invalidate(
+            base,
+            base + self.bus.ram.bytes().len() as u64,
+        ));
         self.bus.ram.bytes_mut()
     }
 
     /// The flash, to change: a programmer's write.
     pub fn flash_mut(&mut self) -> &mut [u8] {
-        self.flash_range_mut(0..FLASH_SIZE).unwrap_or_default()
+        self.flash_range_mut(0..self.bus.part.flash_size)
+            .unwrap_or_default()
     }
 
     /// A part of the flash, to change; only the code in it is translated anew. `None` when it does not
     /// all lie in flash.
     pub fn flash_range_mut(&mut self, range: core::ops::Range<usize>) -> Option<&mut [u8]> {
-        if range.start > range.end || range.end > FLASH_SIZE {
+        if range.start > range.end || range.end > self.bus.part.flash_size {
             return None;
         }
         let at = |offset: usize| u64::from(FLASH_BASE) + offset as u64;
@@ -293,7 +304,7 @@ impl<C: Circuit> Machine<C> {
         self.power_ons += 1;
         self.keep_ram_code();
         fill_with_noise(self.bus.ram.bytes_mut(), self.power_ons);
-        self.bus.dbgmcu = Dbgmcu::default();
+        self.bus.dbgmcu = Dbgmcu::new(self.bus.part.idcode);
         self.bus.dwt = Dwt::default();
         self.bus.soc.set_power(true, self.now());
         self.reset(Cause::PowerOn);

@@ -10,7 +10,7 @@ use rigless::time::VirtualNanos;
 
 use super::Machine;
 use crate::finding::What;
-use crate::machine::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
+use crate::machine::memory::RAM_BASE;
 use crate::machine::usage::Rest;
 use crate::periph::rcc::Cause;
 use crate::peripheral::Unmodelled;
@@ -198,17 +198,17 @@ impl<C: Circuit> Machine<C> {
 
     /// The half-word of code at `address`.
     fn half(&self, address: u32) -> Option<u16> {
-        let offset = |base, size| {
-            let offset = address.wrapping_sub(base) as usize;
-            (offset + 1 < size).then_some(offset)
+        let (bytes, at) = match self.bus.flash_offset(address) {
+            Some(at) => (self.bus.soc.flash.bytes(), at),
+            None => (self.ram(), address.wrapping_sub(RAM_BASE)),
         };
-        let (bytes, at) = if let Some(at) = offset(RAM_BASE, RAM_SIZE) {
-            (self.ram(), at)
-        } else {
-            let at = offset(FLASH_BASE, FLASH_SIZE).or_else(|| offset(0, FLASH_SIZE))?;
-            (self.bus.soc.flash.bytes(), at)
-        };
-        Some(u16::from_le_bytes([bytes[at], bytes[at + 1]]))
+        let half = bytes.get(at as usize..)?.first_chunk()?;
+        Some(u16::from_le_bytes(*half))
+    }
+
+    /// Whether an instruction at `pc` is fetched from flash.
+    pub(super) fn is_flash(&self, pc: u32) -> bool {
+        self.bus.flash_offset(pc).is_some()
     }
 
     /// What is pending now, for the measurement of waits; the core is told of its lines first.
@@ -252,7 +252,7 @@ impl<C: Circuit> Machine<C> {
             .soc
             .flash
             .stalled_until()
-            .filter(|_| is_flash(self.pc()))
+            .filter(|_| self.is_flash(self.pc()))
             .or_else(|| {
                 self.bus
                     .soc
@@ -316,11 +316,4 @@ impl<C: Circuit> Machine<C> {
         }
         self.cut_at.is_some_and(|at| at <= now)
     }
-}
-
-/// Whether an instruction at `pc` is fetched from flash.
-pub(super) fn is_flash(pc: u32) -> bool {
-    [FLASH_BASE, 0]
-        .into_iter()
-        .any(|base| (pc.wrapping_sub(base) as usize) < FLASH_SIZE)
 }

@@ -1,5 +1,6 @@
 //! What surrounds the part: a circuit that is connected to its pins.
 
+use crate::part::Part;
 use crate::periph::adc::Adc;
 use crate::periph::gpio::{Drive, Gpio};
 use crate::periph::i2c::Bus;
@@ -67,6 +68,7 @@ impl Pin {
 /// The part's pins, for a circuit that drives them.
 #[derive(Debug)]
 pub struct Pins<'a> {
+    pub(super) part: &'static Part,
     pub(super) gpio: &'a mut [Gpio; PORTS],
     pub(super) adc: &'a mut Adc,
     pub(super) now: Time,
@@ -74,7 +76,13 @@ pub struct Pins<'a> {
 
 impl Pins<'_> {
     /// The circuit does this to `pin` from now on.
+    ///
+    /// # Panics
+    ///
+    /// When the part does not have the pin.
     pub fn drive(&mut self, pin: Pin, drive: Drive) {
+        let exists = self.part.ports[pin.port] >> pin.number & 1 != 0;
+        assert!(exists, "the {} has no such pin: {pin:?}", self.part.name);
         let gpio = &mut self.gpio[pin.port];
         gpio.drive(pin.number, drive, self.now);
         if let Some(input) = pin.analog_input() {

@@ -12,6 +12,7 @@ mod wires;
 
 use crate::chip::Config;
 use crate::finding::What;
+use crate::part::Part;
 use crate::periph::adc::Adc;
 use crate::periph::afio::Afio;
 use crate::periph::clocks::Clocks;
@@ -33,6 +34,7 @@ use wires::SERIALS;
 /// The blocks, and the circuit at the pins.
 #[derive(Debug)]
 pub struct Soc<C> {
+    part: &'static Part,
     /// Reset and clock control.
     pub rcc: Rcc,
     /// The flash controller and its cells.
@@ -95,6 +97,7 @@ impl<C: Circuit> Soc<C> {
         let rcc = Rcc::new(config.crystal, oscillators);
         let flash_access = flash.access_control();
         let mut soc = Self {
+            part: config.part,
             clocks: rcc.clocks(),
             rcc,
             flash,
@@ -164,6 +167,7 @@ impl<C: Circuit> Soc<C> {
     /// Takes up what someone outside did to the circuit.
     pub fn refresh(&mut self, now: Time) {
         self.circuit.drive(&mut Pins {
+            part: self.part,
             gpio: &mut self.gpio,
             adc: &mut self.adc1,
             now,
