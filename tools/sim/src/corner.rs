@@ -45,7 +45,7 @@ impl Corner {
         }
     }
 
-    /// The oscillators.
+    /// The oscillators, with a crystal of 8 MHz.
     #[must_use]
     pub const fn oscillators(self) -> Oscillators {
         match self {

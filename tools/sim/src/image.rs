@@ -5,9 +5,11 @@ use std::path::Path;
 
 use object::{Object, ObjectSegment, ObjectSymbol};
 
-use crate::board::Error;
-use crate::machine::memory::{FLASH_BASE, FLASH_SIZE};
-use crate::periph::flash::PAGE;
+use crate::chip::Error;
+use crate::machine::memory::FLASH_BASE;
+
+/// Bytes of flash of the largest part of the family (RM0008 3.3.3).
+const LARGEST_FLASH: usize = 1024 * 1024;
 
 /// A firmware image, ready to be written into flash.
 #[derive(Clone, Debug)]
@@ -118,28 +120,40 @@ impl Image {
         self.segments.iter().map(|(_, data)| data.len()).sum()
     }
 
-    /// Writes it into `flash`, as a programmer on the SWD pins would: the pages it needs are erased first,
-    /// the others keep what they hold.
-    pub(crate) fn load(&self, flash: &mut [u8]) {
+    /// Writes it into `flash` with pages of `page` bytes, as a programmer on the SWD pins would: the pages it
+    /// needs are erased first, the others keep what they hold.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Image`] when it does not fit.
+    pub(crate) fn load(&self, flash: &mut [u8], page: usize) -> Result<(), Error> {
         for (offset, data) in &self.segments {
-            let first = offset / PAGE * PAGE;
-            let end = (offset + data.len()).next_multiple_of(PAGE);
+            if offset + data.len() > flash.len() {
+                return Err(does_not_fit(FLASH_BASE + *offset as u32, data.len()));
+            }
+            let first = offset / page * page;
+            let end = (offset + data.len()).next_multiple_of(page);
             flash[first..end].fill(0xFF);
         }
         for (offset, data) in &self.segments {
             flash[*offset..*offset + data.len()].copy_from_slice(data);
         }
+        Ok(())
     }
 }
 
 /// The offset into flash of `length` bytes at `address`.
 fn flash_offset(address: u32, length: usize) -> Result<usize, Error> {
     let offset = address.wrapping_sub(FLASH_BASE) as usize;
-    if offset < FLASH_SIZE && length <= FLASH_SIZE - offset {
+    if offset < LARGEST_FLASH && length <= LARGEST_FLASH - offset {
         Ok(offset)
     } else {
-        Err(Error::Image(format!(
-            "{length} bytes at {address:#010x} do not fit the flash"
-        )))
+        Err(does_not_fit(address, length))
     }
+}
+
+fn does_not_fit(address: u32, length: usize) -> Error {
+    Error::Image(format!(
+        "{length} bytes at {address:#010x} do not fit the flash"
+    ))
 }

@@ -1,32 +1,46 @@
-//! The virtual modio-02: a simulated STM32F103CB and the board around it, running the real firmware image.
+//! A simulated STM32F103 with a circuit around it, and the virtual modio-02, a board built on it, running the real
+//! firmware image.
 //!
-//! A [`board::Board`] holds the part, what is plugged into its slot, its switch and its RS-485 line. It has
-//! no clock but its own: time passes only while a caller runs it, the same calls give the same run to the
-//! instruction, and nothing here reads the wall clock. What the firmware does that no real part would take
-//! well is collected as [`finding::Finding`]s.
+//! A [`Chip`] is the part in a [`Circuit`](soc::Circuit), which is connected to its pins; [`Board`] is the part on the
+//! modio-02, with what is plugged into its slot, its switch and its RS-485 line. A chip has no clock but its own: time
+//! passes only while a caller runs it, the same calls give the same run to the instruction, and nothing here reads the
+//! wall clock. What the firmware does that no real part would take well is collected as [`finding::Finding`]s.
+//!
+//! The part knows nothing of any board:
 //!
 //! ```text
-//! board      the public face                     line   the RS-485 bus, its waveforms and frames
-//! machine    core, memories, run loop            slot   what is plugged in, and the world outside it
-//! exact_line the protocol by which a client lets time pass
-//! soc        register blocks, clocks, wires      periph one register block of the part in each file
+//! chip       the part as its user sees it        serial characters on a wire, and how they are sampled
+//! machine    core, memories, run loop            periph one register block of the part in each file
+//! soc        register blocks, clocks, pins       part   flash, SRAM, pins and identity of each part
+//! ```
+//!
+//! The board knows the part by its pins:
+//!
+//! ```text
+//! board      the modio-02                        line   the RS-485 bus and its frames
+//! exact_line the protocol by which a client      slot   what is plugged in, and the world outside it
+//!            lets time pass
 //! ```
 
 pub mod board;
+pub mod chip;
 pub mod corner;
 pub mod exact_line;
 pub mod finding;
 pub mod image;
 pub mod line;
 pub mod machine;
+pub mod part;
 pub mod periph;
 pub mod peripheral;
 pub mod rtt;
+pub mod serial;
 pub mod slot;
 pub mod soc;
 pub mod time;
 
-pub use board::{Board, Config, CoreTime, Error, Leds, Wait};
+pub use board::{Board, Config, Leds};
+pub use chip::{Chip, CoreTime, Error, Wait};
 pub use corner::Corner;
 pub use finding::Finding;
 pub use image::Image;

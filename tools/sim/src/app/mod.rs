@@ -42,7 +42,7 @@ use bench::Bench;
 use flash_file::FlashFile;
 
 /// Flash of the STM32F103CB, in bytes, and where it begins.
-const FLASH_SIZE: usize = 128 * 1024;
+const FLASH_SIZE: usize = sim::board::PART.flash_size;
 const FLASH_BASE: u32 = 0x0800_0000;
 
 /// So long the board has been on when the endpoints are announced: its start-up and the first silence on

@@ -1,9 +1,9 @@
-//! How a board is fitted, and why it refuses something.
-
-use core::fmt;
+//! How a modio-02 is fitted.
 
 use register_map::Module;
 
+use super::PART;
+use crate::chip::{self, Error};
 use crate::corner::Corner;
 use crate::slot;
 
@@ -33,45 +33,44 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
+        let chip::Config {
+            part: _,
+            crystal_hz: _,
+            corner,
+            crystal,
+            flash,
+            unique_id,
+            write_protection,
+            seed,
+        } = chip::Config::default();
         Self {
             dip: 1,
             module: Module::Di4,
-            corner: Corner::Nominal,
-            crystal: true,
-            flash: None,
-            unique_id: *b"modio-sim-01",
-            write_protection: u32::MAX,
-            seed: 0x6D6F_6469_6F00,
+            corner,
+            crystal,
+            flash,
+            unique_id,
+            write_protection,
+            seed,
         }
     }
 }
 
-/// Why the board refuses something.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Error {
-    /// The image or the flash contents are not fit for this board: the reason.
-    Image(String),
-    /// That can only be done while the power is off.
-    Powered,
-    /// No such channel, or nothing of that kind on it.
-    Channel,
-    /// A value out of range: what it may be.
-    Range(&'static str),
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Image(text) => f.write_str(text),
-            Self::Powered => f.write_str("only while the power is off"),
-            Self::Channel => slot::Error::Channel.fmt(f),
-            Self::Range(text) => write!(f, "out of range: {text}"),
+impl Config {
+    /// What of it concerns the part.
+    pub(super) fn chip(self) -> chip::Config {
+        chip::Config {
+            part: &PART,
+            corner: self.corner,
+            crystal: self.crystal,
+            flash: self.flash,
+            unique_id: self.unique_id,
+            write_protection: self.write_protection,
+            seed: self.seed,
+            ..chip::Config::default()
         }
     }
 }
-
-impl std::error::Error for Error {}
 
 impl From<slot::Error> for Error {
     fn from(error: slot::Error) -> Self {

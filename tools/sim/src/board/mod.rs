@@ -1,40 +1,23 @@
-//! The board as its user sees it: power and time here, its outside in [`outside`], its memories in [`inside`],
-//! measurements in [`measure`], a debugger's doings in [`debug`].
+//! The modio-02: an STM32F103CB with an RS-485 line, a slot, a switch and LEDs. What is connected to which pin is in
+//! [`circuit`], what a person or a test does to the board in [`outside`].
 
+mod circuit;
 mod config;
-mod debug;
-mod inside;
-mod measure;
 mod outside;
 
-use std::collections::BTreeMap;
-
-pub use config::{Config, Error};
+pub use circuit::Modio;
+pub use config::Config;
 pub use outside::Leds;
 
-pub use crate::machine::usage::CoreTime;
-pub use crate::machine::waits::Wait;
-
+use crate::chip::{Chip, Error};
 use crate::image::Image;
-use crate::machine::memory::FLASH_SIZE;
-use crate::machine::{Limit, Machine, Stop};
-use crate::periph::flash::Flash;
-use crate::periph::ident::Ident;
-use crate::periph::rcc::Cause;
-use crate::slot::Slot;
-use crate::soc::Soc;
-use crate::time::Time;
+use crate::part::{Part, STM32F103CB};
 
-/// From power off to power on in [`Board::cycle`].
-const CYCLE: Time = Time::from_ms(100);
+/// The part of the modio-02.
+pub const PART: Part = STM32F103CB;
 
 /// The virtual modio-02.
-#[derive(Debug)]
-pub struct Board {
-    machine: Machine,
-    symbols: BTreeMap<String, u32>,
-    dip: u8,
-}
+pub type Board = Chip<Modio>;
 
 impl Board {
     /// A board with `image` in its flash, powered on at time 0.
@@ -43,136 +26,7 @@ impl Board {
     ///
     /// [`Error::Image`] when `config.flash` is not 128 KiB.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
-        let mut flash = Flash::new(config.write_protection, config.seed);
-        if let Some(contents) = &config.flash {
-            if contents.len() != FLASH_SIZE {
-                return Err(Error::Image(format!(
-                    "flash contents of {} bytes, not {FLASH_SIZE}",
-                    contents.len()
-                )));
-            }
-            flash.bytes_mut().copy_from_slice(contents);
-        }
-        image.load(flash.bytes_mut());
-        let ident = Ident::new(config.unique_id, config.write_protection);
-        let soc = Soc::new(
-            config.crystal,
-            config.corner,
-            flash,
-            Slot::new(config.module),
-        );
-        let costs = config.corner.costs();
-        let mut machine = Machine::new(soc, ident, costs, image.symbol("_SEGGER_RTT"));
-        machine.bus.soc.set_switch(config.dip, Time::ZERO);
-        machine.power_on();
-        Ok(Self {
-            machine,
-            symbols: image
-                .symbols()
-                .map(|(name, address)| (name.to_owned(), address))
-                .collect(),
-            dip: config.dip,
-        })
-    }
-
-    /// The virtual time.
-    #[must_use]
-    pub fn now(&self) -> Time {
-        self.machine.now()
-    }
-
-    /// Runs until the virtual time is `t`, or the end of the instruction under way then; at once when it is
-    /// past. Time passes with the power off too.
-    pub fn run_until(&mut self, t: Time) {
-        self.run(Limit {
-            time: t,
-            instructions: u64::MAX,
-            pc: None,
-            breakpoints: false,
-        });
-    }
-
-    /// Runs for `d`.
-    pub fn run_for(&mut self, d: Time) {
-        self.run_until(self.now() + d);
-    }
-
-    /// Runs `n` instructions. Waiting in WFI costs none. Stops early when the power is off or the core has
-    /// done nothing for a minute of virtual time.
-    pub fn step(&mut self, n: u64) {
-        self.run(Limit {
-            time: Time::MAX,
-            instructions: self.instructions().saturating_add(n),
-            pc: None,
-            breakpoints: false,
-        });
-    }
-
-    /// Runs until the instruction at `address` is next, or until `limit`; tells whether it got there. From
-    /// that very instruction it runs on to the next time.
-    pub fn run_until_pc(&mut self, address: u32, limit: Time) -> bool {
-        self.run(Limit {
-            time: limit,
-            instructions: u64::MAX,
-            pc: Some(address),
-            breakpoints: false,
-        }) == Stop::Pc
-    }
-
-    fn run(&mut self, limit: Limit) -> Stop {
-        let now = self.now();
-        self.machine.bus.soc.refresh(now);
-        let stop = self.machine.run(limit);
-        self.sync();
-        stop
-    }
-
-    /// Brings the line up to the present.
-    fn sync(&mut self) {
-        let now = self.now();
-        self.machine.bus.soc.sync(now);
-    }
-
-    /// Turns the power on; nothing when it is on.
-    pub fn power_on(&mut self) {
-        self.machine.power_on();
-    }
-
-    /// Cuts the power at this instant, between two instructions, in the middle of a flash operation if one
-    /// runs. RAM is lost.
-    pub fn power_off(&mut self) {
-        self.machine.power_off();
-    }
-
-    /// Power off, 100 ms, power on.
-    pub fn cycle(&mut self) {
-        self.power_off();
-        self.run_for(CYCLE);
-        self.power_on();
-    }
-
-    /// Whether the power is on.
-    #[must_use]
-    pub fn powered(&self) -> bool {
-        self.machine.powered()
-    }
-
-    /// Cuts the power in the middle of the `nth` flash operation (page erase, mass erase or half-word) from
-    /// now, 1 = the next, when `fraction` (0 to 1) of it is done. A power cut before then takes it back.
-    pub fn cut_in_flash_operation(&mut self, nth: u64, fraction: f64) {
-        self.machine.cut_in_flash_operation(nth, fraction);
-    }
-
-    /// Pulls the reset pin for a moment.
-    pub fn reset(&mut self) {
-        if self.powered() {
-            self.machine.reset(Cause::Pin);
-        }
-    }
-
-    /// Resets since power-on, by the watchdog, by software or by the pin.
-    #[must_use]
-    pub fn resets(&self) -> u32 {
-        self.machine.resets()
+        let circuit = Modio::new(config.module, config.dip);
+        Self::in_circuit(image, config.chip(), circuit)
     }
 }

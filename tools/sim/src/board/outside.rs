@@ -1,12 +1,10 @@
-//! What surrounds the part: the switch, the slot, the LEDs, the line and the pins.
+//! What surrounds the part on a modio-02: the switch, the slot, the LEDs and the line.
 
 use register_map::Module;
 
 use super::{Board, Error};
 use crate::line::Line;
-use crate::periph::gpio::Gpio;
 use crate::slot::{BusFault, Channel, Slot};
-use crate::time::Time;
 
 /// The three LEDs, as a person sees them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,48 +21,12 @@ impl Board {
     /// The DIP switch: bit 0 = position 1, a set bit = ON.
     #[must_use]
     pub fn dip(&self) -> u8 {
-        self.dip
+        self.circuit().dip
     }
 
     /// Moves the DIP switch.
     pub fn set_dip(&mut self, dip: u8) {
-        self.dip = dip;
-        let now = self.now();
-        self.machine.bus.soc.set_switch(dip, now);
-    }
-
-    /// Whether the 8 MHz crystal works.
-    #[must_use]
-    pub fn crystal(&self) -> bool {
-        self.machine.bus.soc.rcc.crystal()
-    }
-
-    /// Lets the crystal die at this instant, or come back: then it starts again where RCC still has it on.
-    pub fn set_crystal(&mut self, works: bool) {
-        self.sync();
-        let now = self.now();
-        self.machine.bus.soc.set_crystal(works, now);
-    }
-
-    /// The supply of the part, in millivolts.
-    #[must_use]
-    pub fn supply_mv(&self) -> u16 {
-        self.machine.bus.soc.pwr.supply_mv()
-    }
-
-    /// Sets the supply of the part. It stays so over a power cycle.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Range`] outside the part's 2000 to 3600 mV (DS5319 table 9): below them it is reset, for
-    /// which there is [`Board::power_off`].
-    pub fn set_supply_mv(&mut self, millivolts: u16) -> Result<(), Error> {
-        if !(2000..=3600).contains(&millivolts) {
-            return Err(Error::Range("the supply is 2000 to 3600 mV"));
-        }
-        self.sync();
-        self.machine.bus.soc.pwr.set_supply_mv(millivolts);
-        Ok(())
+        self.change(|circuit| circuit.dip = dip);
     }
 
     /// What is plugged into the slot.
@@ -127,22 +89,6 @@ impl Board {
         self.with_slot(|slot| slot.set_bus_fault(fault));
     }
 
-    /// Locks the analog filters of I2C1 low, as the rise of the supply may: the part then sees a busy bus until
-    /// both wires have had an edge. It may be done while the power is off.
-    pub fn lock_i2c_filters(&mut self) {
-        self.sync();
-        let now = self.now();
-        self.machine.bus.soc.lock_i2c_filters(now);
-    }
-
-    /// Disturbs the wires of I2C1 at this instant with what looks like a start condition. Returns whether a byte
-    /// was under way, which makes it a bus error.
-    pub fn disturb_i2c(&mut self) -> bool {
-        self.sync();
-        let now = self.now();
-        self.machine.bus.soc.disturb_i2c(now)
-    }
-
     /// Channel `ch` (1 to 4) of the plugged module; [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
@@ -152,16 +98,11 @@ impl Board {
     /// The slot, to look at.
     #[must_use]
     pub fn slot(&self) -> &Slot {
-        &self.machine.bus.soc.slot
+        &self.circuit().slot
     }
 
-    /// Does something to the slot at this instant; the part sees it at once.
     fn with_slot<T>(&mut self, action: impl FnOnce(&mut Slot) -> T) -> T {
-        self.sync();
-        let answer = action(&mut self.machine.bus.soc.slot);
-        let now = self.now();
-        self.machine.bus.soc.refresh(now);
-        answer
+        self.change(|circuit| action(&mut circuit.slot))
     }
 
     /// The LEDs.
@@ -181,45 +122,15 @@ impl Board {
         self.pin('A', 8)
     }
 
+    /// Writes to USART1's data register since the last reset: one for each byte the firmware sends.
+    #[must_use]
+    pub fn line_bytes_written(&self) -> u64 {
+        self.machine.bus.soc.usart1().data_writes()
+    }
+
     /// The RS-485 line, to send on and to read what was sent.
     pub fn line(&mut self) -> &mut Line {
         self.sync();
-        &mut self.machine.bus.soc.line
+        &mut self.machine.bus.soc.circuit.line
     }
-
-    /// The level at a pin, as a logic probe sees it: port `'A'` to `'D'`, pin 0 to 15; low for a pin
-    /// that does not exist.
-    #[must_use]
-    pub fn pin(&self, port: char, pin: u8) -> bool {
-        self.port(port)
-            .is_some_and(|gpio| pin < 16 && gpio.level() >> pin & 1 != 0)
-    }
-
-    fn is_output(&self, port: char, pin: u8) -> bool {
-        self.port(port)
-            .is_some_and(|gpio| gpio.outputs() >> pin & 1 != 0)
-    }
-
-    /// Records the edges of a pin from now on.
-    pub fn watch_pin(&mut self, port: char, pin: u8) {
-        if let Some(index) = port_index(port).filter(|_| pin < 16) {
-            self.machine.bus.soc.gpio[index].watch(usize::from(pin));
-        }
-    }
-
-    /// The recorded edges of a watched pin: when, and the level after it.
-    #[must_use]
-    pub fn pin_edges(&self, port: char, pin: u8) -> &[(Time, bool)] {
-        self.port(port)
-            .filter(|_| pin < 16)
-            .map_or(&[], |gpio| gpio.edges(usize::from(pin)))
-    }
-
-    fn port(&self, port: char) -> Option<&Gpio> {
-        port_index(port).map(|index| &self.machine.bus.soc.gpio[index])
-    }
-}
-
-fn port_index(port: char) -> Option<usize> {
-    "ABCD".find(port.to_ascii_uppercase())
 }

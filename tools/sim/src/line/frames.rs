@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crc::{CRC_16_MODBUS, Crc};
 
-use super::receiver::Word;
+use crate::serial::Word;
 use crate::time::Time;
 
 /// Frames kept unless the record is told to keep them all.

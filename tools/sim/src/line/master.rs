@@ -2,9 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::character::Character;
-use super::wave::Wave;
-use super::{Line, Span};
+use super::{Character, Line, Span};
+use crate::serial::Wave;
 use crate::time::Time;
 
 /// A character the master heard while the unit spoke.

@@ -12,12 +12,9 @@
 //!                         noise
 //! ```
 
-mod character;
 mod frames;
 mod master;
-mod receiver;
-mod settings;
-mod wave;
+mod silence;
 mod wiring;
 
 #[cfg(test)]
@@ -25,16 +22,13 @@ mod tests;
 
 use std::collections::VecDeque;
 
-pub use character::Character;
-pub use frames::{Direction, Frame, KEPT, LONGEST, Record, crc_ok};
-pub use master::Received;
-pub use receiver::{Framing, Receiver, Word};
-pub use settings::{Format, Parity, Rate, Settings};
-pub use wave::Wave;
-pub use wiring::TxPin;
-
+use crate::periph::usart::TxPin;
+pub use crate::serial::{Character, Format, Parity, Rate, Settings};
+use crate::serial::{Receiver, Wave};
 use crate::time::Time;
+pub use frames::{Direction, Frame, KEPT, LONGEST, Record, crc_ok};
 use master::Master;
+pub use master::Received;
 
 /// How long the bus can be looked back at, [`Line::level_at`].
 pub const HISTORY: Time = Time::from_ms(100);
@@ -71,8 +65,6 @@ pub struct Line {
     /// The level of the unit's RX pin, and its edges the USART has not heard of yet.
     rx: bool,
     rx_edges: Vec<(Time, bool)>,
-    /// The last two falling and rising edges since TIM1 was told.
-    captures: [[Option<Time>; 2]; 2],
     listener: Receiver,
     record: Record,
     received: VecDeque<Received>,
@@ -101,7 +93,6 @@ impl Default for Line {
             bus: Wave::default(),
             rx: true,
             rx_edges: Vec::new(),
-            captures: [[None; 2]; 2],
             listener: Receiver::default(),
             record: Record::default(),
             received: VecDeque::new(),

@@ -1,66 +1,40 @@
-//! How the bus is wired to the board: USART1 through the driver, RX back, and TIM1's capture input.
+//! How the bus is connected to the board: the TX pin through the driver, and the receiver to the RX pin.
 
-use super::{Direction, Framing, HISTORY, Line, Received, Span, Wave, Word, keep};
-use crate::periph::timer::Timer;
-use crate::periph::usart::{Sent, Usart};
-use crate::peripheral::Peripheral;
+use super::{Direction, HISTORY, Line, Received, Span, keep};
+use crate::periph::usart::{Sent, TxPin, Usart, Wire};
+use crate::serial::{Framing, Wave, Word};
 use crate::time::Time;
 
-/// Who drives the driver's data input, the board's TX pin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TxPin {
-    /// USART1: the pin is an alternate function output.
-    Usart,
-    /// The pin stands at this level: a plain output, or an input pulled one way. A floating input reads
-    /// high at the driver.
-    Level(bool),
-}
+impl Wire for Line {
+    fn sent(&mut self, sent: Sent) {
+        self.put(sent);
+    }
 
-/// TIM1's channel at the RX pin, PA10.
-const CAPTURE_CHANNEL: usize = 3;
-
-impl Line {
-    /// Everything up to `now` happens on the line and in USART1, in order: this takes the place of
-    /// `usart.advance(now)`. To be called before each access to USART1, before its pins or the driver change,
-    /// and at each event.
-    pub fn exchange(&mut self, usart: &mut Usart, now: Time) {
-        self.take_sent(usart);
-        loop {
-            // A stalled core lets more than one event pass: take them one by one.
-            let due = usart.next_event().filter(|&due| due > self.now);
-            let to = due.unwrap_or(now).min(now).max(self.now);
-            self.extend(to);
-            for (at, level) in self.rx_edges.drain(..) {
-                usart.receive_edge(at, level);
-            }
-            usart.advance(to);
-            self.take_sent(usart);
-            if to >= now {
-                break;
-            }
-        }
-        self.listen();
-        if self.follow && self.master_free() == self.now {
-            self.settings = usart.settings().unwrap_or(self.settings);
+    fn set_tx_pin(&mut self, pin: TxPin, now: Time) {
+        if pin != self.tx_pin {
+            let now = now.max(self.now);
+            self.extend(now);
+            self.tx_pin = pin;
+            self.settle(now);
         }
     }
 
-    /// The next instant at which something happens in USART1, by itself or because of the line.
-    #[must_use]
-    pub fn next_event(&self, usart: &Usart) -> Option<Time> {
-        let edge = usart.awaits_start().then(|| self.next_capture()).flatten();
-        // An edge made by the driver itself, which USART1 has not heard of.
-        let pending = (!self.rx_edges.is_empty()).then_some(self.now);
-        [usart.next_event(), edge, pending]
-            .into_iter()
-            .flatten()
-            .min()
+    fn advance(&mut self, to: Time) {
+        self.extend(to);
     }
 
-    /// The next instant at which the RX pin may have an edge; to be scheduled while TIM1 captures with its
-    /// interrupt on.
-    #[must_use]
-    pub fn next_capture(&self) -> Option<Time> {
+    fn now(&self) -> Time {
+        self.now
+    }
+
+    fn take_edges(&mut self) -> Vec<(Time, bool)> {
+        std::mem::take(&mut self.rx_edges)
+    }
+
+    fn next_edge(&self) -> Option<Time> {
+        if self.has_edges() {
+            return Some(self.now);
+        }
         if self.driver && !self.echo {
             return None;
         }
@@ -73,22 +47,26 @@ impl Line {
             .min()
     }
 
-    /// Tells TIM1 what its channel 3 has seen on the RX pin since the last call: of each kind of edge the
-    /// last two, which is all its registers can show. To be called after [`Line::exchange`] and before each
-    /// access to TIM1.
-    pub fn feed_captures(&mut self, timer: &mut Timer) {
-        let mut edges: Vec<_> = std::mem::take(&mut self.captures)
-            .into_iter()
-            .zip([false, true])
-            .flat_map(|(times, rising)| times.into_iter().flatten().map(move |at| (at, rising)))
-            .collect();
-        edges.sort_unstable();
-        for (at, rising) in edges {
-            timer.capture_edge(CAPTURE_CHANNEL, at, rising);
-        }
+    /// An edge that the driver itself has made.
+    fn has_edges(&self) -> bool {
+        !self.rx_edges.is_empty()
     }
 
-    /// The unit's driver goes on or off at `now`, right after [`Line::exchange`].
+    /// The receiver's output, pulled high while it is off.
+    fn rx_level(&self) -> bool {
+        self.rx
+    }
+
+    fn caught_up(&mut self, usart: &Usart) {
+        self.listen();
+        if self.follow && self.master_free() == self.now {
+            self.settings = usart.settings().unwrap_or(self.settings);
+        }
+    }
+}
+
+impl Line {
+    /// The unit's driver goes on or off at `now`, right after [`Usart::exchange`].
     pub fn set_driver(&mut self, on: bool, now: Time) {
         if on == self.driver {
             return;
@@ -113,16 +91,6 @@ impl Line {
         self.settle(now);
     }
 
-    /// The board's TX pin is driven by someone else from `now` on.
-    pub fn set_tx_pin(&mut self, pin: TxPin, now: Time) {
-        if pin != self.tx_pin {
-            let now = now.max(self.now);
-            self.extend(now);
-            self.tx_pin = pin;
-            self.settle(now);
-        }
-    }
-
     /// Whether the unit hears itself: the receiver stays on while the driver is. Off at first: DE and RE
     /// are tied.
     pub fn set_echo(&mut self, echo: bool) {
@@ -136,20 +104,8 @@ impl Line {
         self.driver
     }
 
-    /// The level at the board's RX pin: the receiver's output, pulled high while it is off.
-    #[must_use]
-    pub const fn rx_level(&self) -> bool {
-        self.rx
-    }
-
-    fn take_sent(&mut self, usart: &mut Usart) {
-        for sent in usart.take_sent() {
-            self.sent(sent);
-        }
-    }
-
     /// USART1 did something to its TX pin.
-    fn sent(&mut self, sent: Sent) {
+    fn put(&mut self, sent: Sent) {
         match sent {
             Sent::Character(character) => {
                 for bit in 0..character.bits {
@@ -216,8 +172,6 @@ impl Line {
         if rx != self.rx {
             self.rx = rx;
             self.rx_edges.push((at, rx));
-            let seen = &mut self.captures[usize::from(rx)];
-            *seen = [seen[1], Some(at)];
         }
     }
 

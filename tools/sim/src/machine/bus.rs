@@ -13,28 +13,26 @@ use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
 use rigless::soc::Width as CoreWidth;
 use rigless::time::VirtualNanos;
 
-use super::dwt::{self, Dwt};
-use super::memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
+use super::answer::{PPB, Request};
+use super::dwt::Dwt;
+use super::memory::{FLASH_BASE, Memory};
 use super::segment::Segments;
 use super::timing::InstructionClock;
 use super::waits::Waits;
 use crate::finding::{Findings, What, Width};
+use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
-use crate::periph::ident::{self, Ident};
-use crate::peripheral::{Peripheral, Unmodelled};
-use crate::soc::Soc;
-use crate::soc::map::{self, Block, Place, Widths};
+use crate::periph::ident::Ident;
+use crate::soc::{Circuit, Soc};
 use crate::time::Time;
-
-/// Where the private peripheral bus starts.
-const PPB: u32 = 0xE000_0000;
-const DBGMCU: u32 = 0xE004_2000;
 
 /// Everything the core is lent while it runs, except the memories mapped into it.
 #[derive(Debug)]
-pub struct Bus {
+pub struct Bus<C> {
+    /// Which part it is.
+    pub(super) part: &'static Part,
     /// The part around the core.
-    pub soc: Soc,
+    pub soc: Soc<C>,
     /// Instructions to time.
     pub clock: InstructionClock,
     /// What was wrong.
@@ -58,9 +56,9 @@ pub struct Bus {
     pub(super) ram: Memory,
     /// What the code costs.
     pub(super) segments: Segments,
-    /// Reads of flash come here, those of these pages, one bit each.
+    /// Reads of flash come here: all of them, or those of these pages of the core's.
     pub(super) flash_is_watched: bool,
-    pub(super) routed_pages: u128,
+    pub(super) routed_pages: Vec<bool>,
     /// The core has read flash while an operation runs, and waits for its end.
     pub(super) read_stalls: bool,
     /// A block has been accessed, so its next event may be another one.
@@ -69,44 +67,7 @@ pub struct Bus {
     pub(super) carries_on: bool,
 }
 
-/// An access as the blocks see it.
-#[derive(Clone, Copy)]
-struct Request {
-    address: u32,
-    width: Width,
-    write: Option<u32>,
-    now: Time,
-    count: u64,
-    pc: u32,
-}
-
-impl Request {
-    /// Which byte of its word the access starts at.
-    const fn lane(&self) -> u32 {
-        self.address & 3
-    }
-
-    /// The part of `word` that this access reads.
-    const fn part_of(&self, word: u32) -> u32 {
-        let part = word >> (8 * self.lane());
-        match self.width {
-            Width::Byte => part & 0xFF,
-            Width::Half => part & 0xFFFF,
-            Width::Word => word,
-        }
-    }
-
-    /// The value a store puts on the bus: a narrow one is repeated on every lane.
-    const fn on_every_lane(&self, value: u32) -> u32 {
-        match self.width {
-            Width::Byte => (value & 0xFF) * 0x0101_0101,
-            Width::Half => (value & 0xFFFF) * 0x0001_0001,
-            Width::Word => value,
-        }
-    }
-}
-
-impl Bus {
+impl<C: Circuit> Bus<C> {
     /// Everything due up to `now` happens, and what came of it is taken up. `count` instructions are done.
     pub(super) fn advance(&mut self, now: Time, count: u64) {
         if self.soc.next_event() <= now {
@@ -174,232 +135,15 @@ impl Bus {
             0x4000_0000..0x4001_0000 => pace.block(write, divider(clocks.pclk1)),
             0x4001_0000..0x4001_8000 => pace.block(write, divider(clocks.pclk2)),
             0x4001_8000..0x6000_0000 | PPB.. => pace.block(write, None),
-            _ if self.charges_tables() && !write && flash_offset(address).is_some() => {
+            _ if self.charges_tables() && !write && self.flash_offset(address).is_some() => {
                 pace.flash_read()
             }
             _ => 0,
         }
     }
-
-    /// Answers an access; `None` is a bus fault.
-    fn answer(&mut self, request: Request) -> Option<u32> {
-        let address = request.address;
-        match address {
-            0x4000_0000..0x6000_0000 => Some(self.peripheral(request)),
-            ident::BASE.. if address < ident::BASE + ident::SIZE => {
-                self.read_only(request, |bus, offset| bus.ident.read(offset))
-            }
-            PPB..0xE010_0000 => Some(self.debug_block(request)),
-            _ => match flash_offset(address) {
-                Some(offset) if request.write.is_none() => {
-                    let busy = self.soc.flash.busy_until().is_some();
-                    self.read_stalls |= busy;
-                    self.halt |= busy;
-                    Some(self.flash_word(request, offset))
-                }
-                Some(offset) => self.store_to_flash(request, offset),
-                None if address.wrapping_sub(RAM_BASE) < RAM_SIZE as u32 => {
-                    Some(self.routed_ram(request, address - RAM_BASE))
-                }
-                None => {
-                    self.note(
-                        request,
-                        What::NoSuchAddress {
-                            address,
-                            write: request.write.is_some(),
-                        },
-                    );
-                    None
-                }
-            },
-        }
-    }
-
-    fn read_only(&mut self, request: Request, read: impl FnOnce(&Self, u32) -> u32) -> Option<u32> {
-        if request.write.is_some() {
-            self.note(request, What::Other("a store to the factory's memory"));
-            return None;
-        }
-        let word = read(self, (request.address - ident::BASE) & !3);
-        Some(request.part_of(word))
-    }
-
-    fn peripheral(&mut self, request: Request) -> u32 {
-        let Request { address, write, .. } = request;
-        let (place, offset) = map::place(address);
-        let block = match place {
-            Place::Block(block) => block,
-            Place::Absent(name) => {
-                self.note_unmodelled(request, name);
-                return 0;
-            }
-            Place::Reserved => {
-                self.note_unmodelled(request, "a reserved address");
-                return 0;
-            }
-        };
-        if !self.soc.is_clocked(block) {
-            self.note(
-                request,
-                What::Unclocked {
-                    address,
-                    write: write.is_some(),
-                    block: block.name(),
-                },
-            );
-            return 0;
-        }
-        self.check_width(request, block);
-        let answer = match write {
-            Some(value) => self.write_block(request, block, offset, value),
-            None => self.soc.read(block, offset & !3, request.now),
-        };
-        match answer {
-            Ok(word) => request.part_of(word),
-            Err(Unmodelled(name)) => {
-                self.note_unmodelled(request, name);
-                0
-            }
-        }
-    }
-
-    fn write_block(
-        &mut self,
-        request: Request,
-        block: Block,
-        offset: u32,
-        value: u32,
-    ) -> Result<u32, Unmodelled> {
-        let mut word = request.on_every_lane(value);
-        if block.widths() == Widths::Any && request.width != Width::Word {
-            // A block that takes bytes changes only the lanes written.
-            let mask = if request.width == Width::Byte {
-                0xFF
-            } else {
-                0xFFFF
-            } << (8 * request.lane());
-            let held = self.soc.read(block, offset & !3, request.now)?;
-            word = held & !mask | word & mask;
-        }
-        self.soc
-            .write(block, offset & !3, word, request.now)
-            .map(|()| 0)
-    }
-
-    fn check_width(&mut self, request: Request, block: Block) {
-        let fits = match block.widths() {
-            Widths::Any => true,
-            Widths::HalfWord => request.width != Width::Byte,
-            Widths::Word => request.width == Width::Word,
-        };
-        if !fits {
-            self.note(
-                request,
-                What::OddAccess {
-                    address: request.address,
-                    width: request.width,
-                    block: block.name(),
-                },
-            );
-        }
-    }
-
-    /// The private peripheral bus outside what the core answers itself.
-    fn debug_block(&mut self, request: Request) -> u32 {
-        let Request {
-            address,
-            now,
-            count,
-            ..
-        } = request;
-        let cycle = self.clock.cycle(count);
-        let word = address & !3;
-        let answer = match (address, request.write) {
-            (dwt::BASE.., Some(value)) if address < dwt::BASE + dwt::SIZE => {
-                let answer = self.dwt.write(word - dwt::BASE, value, cycle).map(|()| 0);
-                self.halt |= self.dwt.awaits_look();
-                answer
-            }
-            (dwt::BASE.., None) if address < dwt::BASE + dwt::SIZE => {
-                self.dwt.read(word - dwt::BASE, cycle)
-            }
-            (DBGMCU.., Some(value)) if address < DBGMCU + 0x1000 => {
-                self.dbgmcu.write(word - DBGMCU, value, now).map(|()| 0)
-            }
-            (DBGMCU.., None) if address < DBGMCU + 0x1000 => self.dbgmcu.read(word - DBGMCU, now),
-            _ => Err(Unmodelled("a debug block of the core")),
-        };
-        match answer {
-            Ok(word) => request.part_of(word),
-            Err(Unmodelled(name)) => {
-                self.note_unmodelled(request, name);
-                0
-            }
-        }
-    }
-
-    /// The core reads and writes SRAM without asking, all but the page of the vector table while [`Waits`] has
-    /// it sent here, and the pages of [`RamCode`](super::ram_code::RamCode).
-    fn routed_ram(&mut self, request: Request, offset: u32) -> u32 {
-        if let Some(value) = request.write {
-            let bytes = value.to_le_bytes();
-            let width = match request.width {
-                Width::Byte => 1,
-                Width::Half => 2,
-                Width::Word => 4,
-            };
-            let at = offset as usize;
-            self.ram.bytes_mut()[at..at + width].copy_from_slice(&bytes[..width]);
-        }
-        word_of(self.ram.bytes(), request, offset)
-    }
-
-    /// The core reads the flash without asking, all but pages with unsteady cells, and the page of the vector
-    /// table while [`Waits`] has it sent here.
-    fn flash_word(&mut self, request: Request, offset: u32) -> u32 {
-        let at = (offset & !3) as usize;
-        request.part_of(self.soc.flash.read_word(at))
-    }
-
-    fn store_to_flash(&mut self, request: Request, offset: u32) -> Option<u32> {
-        let value = request.write? as u16;
-        let half = request.width == Width::Half;
-        self.soc.program(offset, half, value, request.now);
-        Some(0)
-    }
-
-    fn note(&mut self, request: Request, what: What) {
-        self.findings.add(request.now, request.pc, what);
-    }
-
-    fn note_unmodelled(&mut self, request: Request, name: &'static str) {
-        self.note(
-            request,
-            What::Unmodelled {
-                address: request.address,
-                write: request.write.is_some(),
-                name,
-            },
-        );
-    }
 }
 
-/// What a read at `offset` of `memory` gives.
-fn word_of(memory: &[u8], request: Request, offset: u32) -> u32 {
-    let at = (offset & !3) as usize;
-    request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| memory[at + n])))
-}
-
-/// The offset into flash of `address`, at its own place or at 0.
-fn flash_offset(address: u32) -> Option<u32> {
-    let size = FLASH_SIZE as u32;
-    [FLASH_BASE, 0]
-        .into_iter()
-        .map(|base| address.wrapping_sub(base))
-        .find(|&offset| offset < size)
-}
-
-impl CoreBus for Bus {
+impl<C: Circuit> CoreBus for Bus<C> {
     fn access(&mut self, access: Access, from_code: bool) -> Option<u64> {
         self.clock.charge(self.cost_of(&access, from_code));
         let now = self.clock.time(access.instruction_count);

@@ -4,6 +4,7 @@ use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
 use super::{Limit, Machine, Stop};
+use crate::soc::Circuit;
 use crate::time::Time;
 
 /// The system control space (PM0056 4): NVIC, SCB and SysTick.
@@ -12,7 +13,7 @@ const SCS: core::ops::Range<u32> = 0xE000_E000..0xE000_F000;
 /// A step over a sleep that nothing ends gives up after this long.
 const STEP_LIMIT: Time = Time::from_secs(1);
 
-impl Machine {
+impl<C: Circuit> Machine<C> {
     /// A run with breakpoints ends before the instruction at `address`. The memory is left alone. As many
     /// removals as additions take it away.
     pub fn add_breakpoint(&mut self, address: u32) {

@@ -4,9 +4,10 @@ use rigless::emulator::Exit;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
-use super::run::{IPSR, Limit, XPSR, is_flash};
+use super::run::{IPSR, Limit, XPSR};
 use super::segment::{End, Place, Segment};
-use super::{FLASH_BASE, FLASH_SIZE, Machine, RAM_BASE};
+use super::{FLASH_BASE, Machine, RAM_BASE};
+use crate::soc::Circuit;
 use crate::time::Time;
 
 /// The vector table's offset (PM0056 4.4.4).
@@ -21,7 +22,7 @@ pub(super) struct Active {
     handler: u32,
 }
 
-impl Machine {
+impl<C: Circuit> Machine<C> {
     /// Lets the core run until something has to happen.
     pub(super) fn execute(&mut self, limit: Limit) -> Exit {
         let stop = limit
@@ -35,7 +36,7 @@ impl Machine {
         let busy = self.bus.soc.flash.busy_until().is_some();
         self.bus.busy = busy;
         let nmi = self.bus.soc.rcc.nmi();
-        self.bus.halt = nmi || busy && is_flash(self.pc());
+        self.bus.halt = nmi || busy && self.is_flash(self.pc());
         if let Some(exit) = self.enter_exception() {
             return exit;
         }
@@ -71,7 +72,7 @@ impl Machine {
                 return exit;
             }
             // Code in SRAM that comes back to flash stalls there.
-            let stalls = busy && is_flash(self.pc());
+            let stalls = busy && self.is_flash(self.pc());
             if self.bus.halt || stalls || !self.bus.queued.is_empty() || self.core.retired() >= most
             {
                 return exit;
@@ -103,20 +104,13 @@ impl Machine {
 
     /// The segment of code at `pc`; none outside the memories.
     fn segment(&mut self, pc: u32) -> &Segment {
-        let in_flash = is_flash(pc);
-        let (memory, base) = if in_flash {
-            (self.bus.soc.flash.bytes(), FLASH_BASE)
-        } else {
-            (self.bus.ram.bytes(), RAM_BASE)
+        let flash = self.bus.flash_offset(pc);
+        let in_flash = flash.is_some();
+        let (memory, offset) = match flash {
+            Some(offset) => (self.bus.soc.flash.bytes(), offset),
+            None => (self.bus.ram.bytes(), pc.wrapping_sub(RAM_BASE)),
         };
-        let offset = pc.wrapping_sub(base) as usize;
-        // Flash is at 0 as well.
-        let offset = if in_flash {
-            offset % FLASH_SIZE
-        } else {
-            offset
-        };
-        let code = memory.get(offset..).unwrap_or_default();
+        let code = memory.get(offset as usize..).unwrap_or_default();
         let place = Place {
             start: pc,
             in_flash,
@@ -153,8 +147,8 @@ impl Machine {
     fn branched(&self, after: u32, pc: u32) -> u32 {
         let pace = self.bus.segments.pace();
         if pc != after {
-            pace.taken(is_flash(pc))
-        } else if is_flash(pc) {
+            pace.taken(self.is_flash(pc))
+        } else if self.is_flash(pc) {
             pace.not_taken()
         } else {
             0

@@ -8,10 +8,10 @@
 use rigless::emulator::Queued;
 
 use super::bus::Bus;
-use super::memory::FLASH_BASE;
-use crate::periph::flash::PAGE;
+use super::memory::{FLASH_BASE, ROUTED_PAGE};
+use crate::soc::Circuit;
 
-impl Bus {
+impl<C: Circuit> Bus<C> {
     /// Sends reads of flash to the bus, page by page, or no longer. `changed`: cells have changed.
     pub(super) fn route_flash(&mut self, changed: bool) {
         let busy = self.soc.flash.busy_until().is_some();
@@ -21,18 +21,18 @@ impl Bus {
             return;
         }
         self.flash_is_watched = watched;
-        let wanted = if watched {
-            u128::MAX
-        } else {
-            self.soc.flash.unsteady_pages()
-        };
-        let differ = wanted ^ core::mem::replace(&mut self.routed_pages, wanted);
         let vectors = self.waits.as_ref().and_then(|waits| waits.table());
-        for page in (0..u128::BITS).filter(|page| differ >> page & 1 != 0) {
+        for (page, routed) in self.routed_pages.iter_mut().enumerate() {
+            let start = page * ROUTED_PAGE;
+            let wanted = watched || self.soc.flash.is_unsteady(start..start + ROUTED_PAGE);
+            if core::mem::replace(routed, wanted) == wanted {
+                continue;
+            }
             for base in [FLASH_BASE, 0] {
-                let first = base + page * PAGE as u32;
-                let has_vectors = vectors.is_some_and(|table| table & !(PAGE as u32 - 1) == first);
-                if wanted >> page & 1 != 0 {
+                let first = base + start as u32;
+                let has_vectors =
+                    vectors.is_some_and(|table| table & !(ROUTED_PAGE as u32 - 1) == first);
+                if wanted {
                     self.queued.push(Queued::Route(first.into()));
                 } else if !has_vectors {
                     self.queued.push(Queued::Unroute(first.into()));

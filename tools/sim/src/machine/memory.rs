@@ -1,4 +1,4 @@
-//! The part's memories: 128 KiB of flash and 20 KiB of SRAM (STM32F103CB).
+//! The part's memories, flash and SRAM.
 //!
 //! The core reads them, and writes SRAM, through a raw pointer while it runs, so they are kept behind one
 //! and lent out as slices only between its calls.
@@ -9,12 +9,10 @@ use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
 
 /// Where the flash starts (RM0008 3.3.3); it is at 0 as well (boot from main flash, RM0008 3.4).
 pub const FLASH_BASE: u32 = 0x0800_0000;
-/// Bytes of flash: 128 pages of 1 KiB.
-pub const FLASH_SIZE: usize = 128 * 1024;
 /// Where the SRAM starts (RM0008 3.3.1).
 pub const RAM_BASE: u32 = 0x2000_0000;
-/// Bytes of SRAM.
-pub const RAM_SIZE: usize = 20 * 1024;
+/// Bytes of a page of crate rigless's: accesses are sent to the bus page by page.
+pub(super) const ROUTED_PAGE: usize = 1024;
 
 /// More than any page size the core asks for.
 const ALIGNMENT: usize = 4096;

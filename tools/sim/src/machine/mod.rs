@@ -4,7 +4,9 @@
 //! time is [`timing`]'s, by the [`costs`] of the [`segment`]s of code that [`execute`] lets it run; its bus is
 //! [`bus`], and [`run`] takes it from event to event.
 
+mod answer;
 pub mod bus;
+mod cortex;
 pub mod costs;
 mod debug;
 pub mod decode;
@@ -19,26 +21,22 @@ pub mod timing;
 pub mod usage;
 pub mod waits;
 
-use core::num::{NonZeroU32, NonZeroU64};
-
-use rigless::cpu::armv7m::{Window, processor};
 use rigless::emulator::{Processor, Queued};
-use rigless::machine::armv7m::{Config, Core, MpuRegions, Variant};
-use rigless::soc::{Endian, Width};
+use rigless::soc::Width;
 
 use crate::finding::Findings;
+use crate::part::Part;
 use crate::periph::dbgmcu::Dbgmcu;
 use crate::periph::ident::Ident;
 use crate::periph::rcc::Cause;
 use crate::rtt::{Log, POLL};
-use crate::soc::Soc;
-use crate::soc::map::irq;
+use crate::soc::{Circuit, Soc};
 use crate::time::Time;
 use bus::Bus;
 use costs::{Costs, Pace};
 use dwt::Dwt;
 use execute::Active;
-use memory::{FLASH_BASE, FLASH_SIZE, Memory, RAM_BASE, RAM_SIZE};
+use memory::{FLASH_BASE, Memory, RAM_BASE, ROUTED_PAGE};
 use ram_code::RamCode;
 pub use run::{Limit, Stop};
 use segment::Segments;
@@ -46,8 +44,6 @@ use timing::InstructionClock;
 use usage::{CoreTime, Resting};
 use waits::{Wait, Waits};
 
-/// CPUID of the part's Cortex-M3, revision r1p1 (PM0056 4.4.1).
-const CPUID: u32 = 0x411F_C231;
 /// From the supply's rise to the end of reset: DS5319 table 11, tRSTTEMPO, typical.
 const POWER_ON_RESET: Time = Time::from_us(2_500);
 /// The shortest reset pulse (RM0008 7.1.1).
@@ -64,11 +60,11 @@ struct Cut {
 
 /// The core, its memories and its bus.
 #[derive(Debug)]
-pub struct Machine {
+pub struct Machine<C> {
     /// Dropped before the memories mapped into it.
     core: Box<dyn Processor>,
     /// Everything else.
-    pub bus: Bus,
+    pub bus: Bus<C>,
     /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
     fresh: Vec<u8>,
     /// Instructions done before the core's last reset.
@@ -94,17 +90,23 @@ pub struct Machine {
     ram_code: RamCode,
 }
 
-impl Machine {
-    /// A machine around `soc`, without power, at time 0, whose core has these costs and whose firmware
+impl<C: Circuit> Machine<C> {
+    /// The machine of `part` around `soc`, without power, at time 0, whose core has these costs and whose firmware
     /// keeps its RTT control block at `rtt_block`.
     ///
     /// # Panics
     ///
     /// On a host that the core cannot generate code for.
     #[must_use]
-    pub fn new(mut soc: Soc, ident: Ident, costs: Costs, rtt_block: Option<u32>) -> Self {
-        let mut ram = Memory::new(RAM_SIZE, 0);
-        let mut core = core();
+    pub fn new(
+        part: &'static Part,
+        mut soc: Soc<C>,
+        ident: Ident,
+        costs: Costs,
+        rtt_block: Option<u32>,
+    ) -> Self {
+        let mut ram = Memory::new(part.ram_size, 0);
+        let mut core = cortex::m3(part);
         let fresh = core.save();
         let flash = soc.flash.host();
         let base = u64::from(FLASH_BASE);
@@ -112,14 +114,15 @@ impl Machine {
         // pointers that do not move, until after `core` is dropped. Slices of them are lent out only by
         // methods that borrow the machine while the core does not run, or by its bus inside a call.
         unsafe {
-            core.map(base, FLASH_SIZE as u64, flash, false);
-            core.map(0, FLASH_SIZE as u64, flash, false);
-            core.map(u64::from(RAM_BASE), RAM_SIZE as u64, ram.host(), true);
+            core.map(base, part.flash_size as u64, flash, false);
+            core.map(0, part.flash_size as u64, flash, false);
+            core.map(u64::from(RAM_BASE), part.ram_size as u64, ram.host(), true);
         }
         let hclk = soc.rcc.clocks().hclk;
         Self {
             core,
             bus: Bus {
+                part,
                 soc,
                 clock: InstructionClock::new(Time::ZERO, hclk),
                 segments: Segments::new(Pace {
@@ -129,7 +132,7 @@ impl Machine {
                 }),
                 findings: Findings::default(),
                 ident,
-                dbgmcu: Dbgmcu::default(),
+                dbgmcu: Dbgmcu::new(part.idcode),
                 dwt: Dwt::default(),
                 stop: (Time::ZERO, 0),
                 busy: false,
@@ -139,7 +142,7 @@ impl Machine {
                 waits: None,
                 ram,
                 flash_is_watched: false,
-                routed_pages: 0,
+                routed_pages: vec![false; part.flash_size / ROUTED_PAGE],
                 read_stalls: false,
                 touched: false,
                 carries_on: false,
@@ -260,20 +263,23 @@ impl Machine {
     /// The SRAM, to change: a debugger's write.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         let base = u64::from(RAM_BASE);
-        self.core
-            .ask(Queued::Invalidate(base, base + RAM_SIZE as u64));
+        self.core.ask(Queued::Invalidate(
+            base,
+            base + self.bus.ram.bytes().len() as u64,
+        ));
         self.bus.ram.bytes_mut()
     }
 
     /// The flash, to change: a programmer's write.
     pub fn flash_mut(&mut self) -> &mut [u8] {
-        self.flash_range_mut(0..FLASH_SIZE).unwrap_or_default()
+        self.flash_range_mut(0..self.bus.part.flash_size)
+            .unwrap_or_default()
     }
 
     /// A part of the flash, to change; only the code in it is translated anew. `None` when it does not
     /// all lie in flash.
     pub fn flash_range_mut(&mut self, range: core::ops::Range<usize>) -> Option<&mut [u8]> {
-        if range.start > range.end || range.end > FLASH_SIZE {
+        if range.start > range.end || range.end > self.bus.part.flash_size {
             return None;
         }
         let at = |offset: usize| u64::from(FLASH_BASE) + offset as u64;
@@ -298,7 +304,7 @@ impl Machine {
         self.power_ons += 1;
         self.keep_ram_code();
         fill_with_noise(self.bus.ram.bytes_mut(), self.power_ons);
-        self.bus.dbgmcu = Dbgmcu::default();
+        self.bus.dbgmcu = Dbgmcu::new(self.bus.part.idcode);
         self.bus.dwt = Dwt::default();
         self.bus.soc.set_power(true, self.now());
         self.reset(Cause::PowerOn);
@@ -368,40 +374,6 @@ impl Machine {
             RESET_PULSE
         };
         self.held_until = now + pulse;
-    }
-}
-
-/// The Cortex-M3 of the STM32F103 (PM0056): no MPU, four priority bits, 43 interrupt lines.
-fn core() -> Box<dyn Processor> {
-    // The core's time unit is a cycle of HCLK, so its clock has as many to the second as the unit, a
-    // nanosecond by name, does. SysTick's other clock is HCLK / 8 (RM0008 figure 8).
-    const UNITS: NonZeroU64 = NonZeroU64::new(1_000_000_000).expect("not 0");
-    let core = Core {
-        variant: Variant::M3,
-        clock_hz: UNITS,
-        interrupt_lines: NonZeroU32::new(u32::from(irq::LINES)).expect("not 0"),
-        priority_bits: 4,
-        refclk_divider: NonZeroU32::new(8).expect("not 0"),
-        instructions_per_second: UNITS,
-        boot: "flash",
-    };
-    let window = |base, end| Window {
-        base,
-        size: end - base,
-    };
-    // All of the private peripheral bus but the ITM and the system control space.
-    let mut config = Config::new(
-        core,
-        &[
-            window(0xE000_1000, 0xE000_E000),
-            window(0xE000_F000, 0xE010_0000),
-        ],
-    );
-    config.mpu_regions = MpuRegions::None;
-    config.cpuid = CPUID;
-    match processor(&config, Endian::Little) {
-        Ok(core) => core,
-        Err(error) => panic!("no core for this host: {error}"),
     }
 }
 

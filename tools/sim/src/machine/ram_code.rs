@@ -6,16 +6,13 @@
 
 use rigless::emulator::{Processor, Queued};
 
-use super::memory::{Memory, RAM_BASE, RAM_SIZE};
-use crate::periph::flash::PAGE;
-
-const PAGES: usize = RAM_SIZE / PAGE;
+use super::memory::{Memory, RAM_BASE, ROUTED_PAGE as PAGE};
 
 /// The pages of SRAM that code has run from.
 #[derive(Debug, Default)]
 pub(super) struct RamCode {
     /// One bit for each page with code.
-    pages: u32,
+    pages: u64,
     /// The bytes of SRAM that the translated code came from, while the stores are sent to the bus.
     translated: Option<Vec<u8>>,
 }
@@ -35,7 +32,7 @@ impl RamCode {
     /// Code at this offset of SRAM is about to run.
     pub(super) fn runs(&mut self, offset: usize, core: &mut dyn Processor, ram: &Memory) {
         self.end(core, ram);
-        self.pages |= 1 << (offset / PAGE % PAGES);
+        self.pages |= 1 << (offset % ram.bytes().len() / PAGE);
     }
 
     /// Stores to code come to the bus no more.
@@ -57,7 +54,7 @@ impl RamCode {
 
     fn with_code(&self) -> impl Iterator<Item = usize> + use<> {
         let pages = self.pages;
-        (0..PAGES).filter(move |page| pages >> page & 1 != 0)
+        (0..u64::BITS as usize).filter(move |page| pages >> page & 1 != 0)
     }
 }
 

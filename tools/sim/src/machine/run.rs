@@ -10,11 +10,12 @@ use rigless::time::VirtualNanos;
 
 use super::Machine;
 use crate::finding::What;
-use crate::machine::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
+use crate::machine::memory::RAM_BASE;
 use crate::machine::usage::Rest;
 use crate::periph::rcc::Cause;
 use crate::peripheral::Unmodelled;
 use crate::rtt::POLL;
+use crate::soc::Circuit;
 use crate::time::Time;
 
 /// The system control register and its bit that asks for more than sleep (PM0056 4.4.6).
@@ -62,7 +63,7 @@ pub enum Stop {
     Stuck,
 }
 
-impl Machine {
+impl<C: Circuit> Machine<C> {
     /// Runs to `limit`. With the power off, time passes for the board's other parts.
     pub fn run(&mut self, limit: Limit) -> Stop {
         let address = limit.pc.map(|pc| u64::from(pc & !1));
@@ -197,17 +198,17 @@ impl Machine {
 
     /// The half-word of code at `address`.
     fn half(&self, address: u32) -> Option<u16> {
-        let offset = |base, size| {
-            let offset = address.wrapping_sub(base) as usize;
-            (offset + 1 < size).then_some(offset)
+        let (bytes, at) = match self.bus.flash_offset(address) {
+            Some(at) => (self.bus.soc.flash.bytes(), at),
+            None => (self.ram(), address.wrapping_sub(RAM_BASE)),
         };
-        let (bytes, at) = if let Some(at) = offset(RAM_BASE, RAM_SIZE) {
-            (self.ram(), at)
-        } else {
-            let at = offset(FLASH_BASE, FLASH_SIZE).or_else(|| offset(0, FLASH_SIZE))?;
-            (self.bus.soc.flash.bytes(), at)
-        };
-        Some(u16::from_le_bytes([bytes[at], bytes[at + 1]]))
+        let half = bytes.get(at as usize..)?.first_chunk()?;
+        Some(u16::from_le_bytes(*half))
+    }
+
+    /// Whether an instruction at `pc` is fetched from flash.
+    pub(super) fn is_flash(&self, pc: u32) -> bool {
+        self.bus.flash_offset(pc).is_some()
     }
 
     /// What is pending now, for the measurement of waits; the core is told of its lines first.
@@ -251,7 +252,7 @@ impl Machine {
             .soc
             .flash
             .stalled_until()
-            .filter(|_| is_flash(self.pc()))
+            .filter(|_| self.is_flash(self.pc()))
             .or_else(|| {
                 self.bus
                     .soc
@@ -315,11 +316,4 @@ impl Machine {
         }
         self.cut_at.is_some_and(|at| at <= now)
     }
-}
-
-/// Whether an instruction at `pc` is fetched from flash.
-pub(super) fn is_flash(pc: u32) -> bool {
-    [FLASH_BASE, 0]
-        .into_iter()
-        .any(|base| (pc.wrapping_sub(base) as usize) < FLASH_SIZE)
 }

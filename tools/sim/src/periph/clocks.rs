@@ -4,7 +4,7 @@ use crate::time::Time;
 
 /// The internal oscillator, as typical.
 pub const HSI_HZ: u32 = 8_000_000;
-/// The crystal of the modio-02 board.
+/// The usual crystal.
 pub const HSE_HZ: u32 = 8_000_000;
 
 /// The most that SYSCLK may be in Hz (RM0008 7.2), and what a crystal 100 ppm above its frequency makes of it.
@@ -31,6 +31,16 @@ impl Oscillators {
         lsi: 40_000,
         hse_start: Time::from_us(2_000),
     };
+
+    /// The same with a crystal of `hz`, as many parts per million off as this one is from [`HSE_HZ`].
+    #[must_use]
+    pub const fn with_crystal(self, hz: u32) -> Self {
+        let hse = self.hse as u64 * hz as u64 / HSE_HZ as u64;
+        Self {
+            hse: hse as u32,
+            ..self
+        }
+    }
 }
 
 /// The frequencies, in Hz.

@@ -3,19 +3,25 @@
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-/// A medium-density device (0x410), revision Y (0x2003).
-pub const IDCODE: u32 = 0x2003_6410;
-
 /// DBGMCU. Its freeze bits act only while a debugger halts the core.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Dbgmcu {
+    idcode: u32,
     cr: u32,
+}
+
+impl Dbgmcu {
+    /// That of a part with this DBGMCU_IDCODE, after power-on.
+    #[must_use]
+    pub const fn new(idcode: u32) -> Self {
+        Self { idcode, cr: 0 }
+    }
 }
 
 impl Peripheral for Dbgmcu {
     fn read(&mut self, offset: u32, _now: Time) -> Result<u32, Unmodelled> {
         match offset {
-            0 => Ok(IDCODE),
+            0 => Ok(self.idcode),
             4 => Ok(self.cr),
             _ => Err(Unmodelled("a reserved address of DBGMCU")),
         }
@@ -43,11 +49,11 @@ mod tests {
 
     #[test]
     fn identity_is_read_only_and_control_outlives_a_reset() {
-        let mut debug = Dbgmcu::default();
+        let mut debug = Dbgmcu::new(0x2003_6410);
         debug.write(0, 1, Time::ZERO).unwrap();
         debug.write(4, 1 << 8, Time::ZERO).unwrap();
         debug.reset(Time::ZERO);
-        assert_eq!(debug.read(0, Time::ZERO), Ok(IDCODE));
+        assert_eq!(debug.read(0, Time::ZERO), Ok(0x2003_6410));
         assert_eq!(debug.read(4, Time::ZERO), Ok(1 << 8));
         assert!(debug.read(8, Time::ZERO).is_err());
     }

@@ -1,12 +1,12 @@
 //! What the factory wrote: flash size and unique identity (RM0008 chapter 30), and the option bytes
 //! (PM0075 2.5) as they leave the factory. All of it can only be read.
 
+use crate::part::Part;
+
 /// Where this memory starts.
 pub const BASE: u32 = 0x1FFF_F7E0;
 /// Bytes up to the end of the option bytes.
 pub const SIZE: u32 = 0x30;
-/// Flash size in KiB, an unsigned half-word (RM0008 30.1.1).
-const FLASH_KIB: u16 = 128;
 
 /// The read-only words at [`BASE`].
 #[derive(Debug)]
@@ -15,11 +15,12 @@ pub struct Ident {
 }
 
 impl Ident {
-    /// With this unique identity and these write-protection bits (FLASH_WRPR: 0 = protected).
+    /// Those of `part` with this unique identity and these write-protection bits (FLASH_WRPR: 0 = protected).
     #[must_use]
-    pub fn new(unique_id: [u8; 12], wrpr: u32) -> Self {
+    pub fn new(part: &Part, unique_id: [u8; 12], wrpr: u32) -> Self {
         let mut bytes = [0xFF; SIZE as usize];
-        bytes[..2].copy_from_slice(&FLASH_KIB.to_le_bytes());
+        let kib = (part.flash_size / 1024) as u16;
+        bytes[..2].copy_from_slice(&kib.to_le_bytes());
         bytes[8..20].copy_from_slice(&unique_id);
         // Option bytes from 0x1FFF_F800: RDP, USER, Data0, Data1, WRP0 to WRP3, each with its complement.
         let wrp = wrpr.to_le_bytes();
@@ -42,11 +43,14 @@ impl Ident {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::part::{STM32F103CB, STM32F103RC};
 
     #[test]
     fn identity_size_and_options_are_where_the_manual_says() {
-        let ident = Ident::new(*b"0123456789ab", 0xFFFF_FFFE);
+        let ident = Ident::new(&STM32F103CB, *b"0123456789ab", 0xFFFF_FFFE);
         assert_eq!(ident.read(0) & 0xFFFF, 128);
+        let larger = Ident::new(&STM32F103RC, [0; 12], 0);
+        assert_eq!(larger.read(0) & 0xFFFF, 256);
         assert_eq!(ident.read(0x1FFF_F7E8 - BASE), u32::from_le_bytes(*b"0123"));
         assert_eq!(ident.read(0x1FFF_F7F0 - BASE), u32::from_le_bytes(*b"89ab"));
         assert_eq!(ident.read(0x1FFF_F800 - BASE), 0x00FF_5AA5);

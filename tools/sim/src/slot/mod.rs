@@ -252,8 +252,11 @@ impl Slot {
     }
 
     /// The I2C pins as the part drives them by hand, `true` = not pulled low; [`Wires::FREE`] while they are
-    /// the I2C block's. Clock pulses made so free a stuck data wire.
-    pub fn set_pins(&mut self, pins: Wires) {
+    /// the I2C block's. Clock pulses made so free a stuck data wire. Returns whether the pins have changed.
+    pub fn set_pins(&mut self, pins: Wires) -> bool {
+        if pins == self.pins {
+            return false;
+        }
         let rises = pins.scl && !self.pins.scl;
         self.pins = pins;
         if let BusFault::HoldsSda {
@@ -266,6 +269,7 @@ impl Slot {
                 self.fault = BusFault::None;
             }
         }
+        true
     }
 
     /// What the devices do to the I2C wires, whatever the part does: for the part's input pins.

@@ -242,10 +242,10 @@ impl Block {
     }
 }
 
-/// The interrupt lines of the medium-density STM32F103 (RM0008 table 63).
+/// The interrupt lines (RM0008 table 63).
 pub mod irq {
-    /// Lines in all.
-    pub const LINES: u16 = 43;
+    /// Lines of the largest parts.
+    pub const LINES: u16 = 60;
     /// FLASH.
     pub const FLASH: u16 = 4;
     /// ADC1 and ADC2.

@@ -1,46 +1,48 @@
-//! The part around its core: every register block, its clock, its interrupt lines, and the wires between the
-//! blocks and to the board.
+//! The part around its core: every register block, its clock, its interrupt lines, the wires between the
+//! blocks, and its pins, to which a [`Circuit`] is connected.
 //!
 //! Blocks know nothing of each other. Whatever one means to another goes through [`wires`], after every
 //! access to a block and after everything a block does by itself. Time moves from event to event: each
 //! block's next one is remembered, and [`Soc::advance`] takes them in their order.
 
+mod circuit;
 pub mod map;
+mod requests;
 mod wires;
 
-use crate::corner::Corner;
+use crate::chip::Config;
 use crate::finding::What;
-use crate::line::{Line, TxPin};
+use crate::part::Part;
 use crate::periph::adc::Adc;
 use crate::periph::afio::Afio;
 use crate::periph::clocks::Clocks;
 use crate::periph::exti::Exti;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
-use crate::periph::i2c::{I2c, Wires};
+use crate::periph::i2c::I2c;
 use crate::periph::iwdg::Iwdg;
 use crate::periph::pwr::Pwr;
 use crate::periph::rcc::{Cause, Rcc};
 use crate::periph::timer::{Kind, Timer};
 use crate::periph::usart::Usart;
 use crate::peripheral::{Peripheral, Unmodelled};
-use crate::slot::Slot;
 use crate::time::Time;
-use map::{BLOCKS, Block, irq};
+pub use circuit::{Circuit, PORTS, Pin, Pins};
+use map::{BLOCKS, Block};
+use wires::SERIALS;
 
-/// The blocks, and what they are wired to.
+/// The blocks, and the circuit at the pins.
 #[derive(Debug)]
-pub struct Soc {
+pub struct Soc<C> {
+    part: &'static Part,
     /// Reset and clock control.
     pub rcc: Rcc,
     /// The flash controller and its cells.
     pub flash: Flash,
     /// Ports A to D.
-    pub gpio: [Gpio; 4],
-    /// The RS-485 bus.
-    pub line: Line,
-    /// The slot and what is plugged into it.
-    pub slot: Slot,
+    pub gpio: [Gpio; PORTS],
+    /// What is connected to the pins.
+    pub circuit: C,
     /// Power control, with the supply's voltage.
     pub pwr: Pwr,
     afio: Afio,
@@ -54,10 +56,9 @@ pub struct Soc {
     tim4: Timer,
     adc1: Adc,
     i2c1: I2c,
-    /// What the wires last passed on: port levels, the TX pin, the I2C pins, clocks, FLASH_ACR.
-    seen: [u16; 4],
-    tx_pin: TxPin,
-    i2c_pins: Wires,
+    /// What the wires last passed on: port levels, the I2C pins that are pulled low by hand, clocks, FLASH_ACR.
+    seen: [u16; PORTS],
+    i2c_by_hand: u16,
     clocks: Clocks,
     flash_access: (u32, bool),
     /// When each block acts by itself next, and the earliest of them.
@@ -82,28 +83,28 @@ pub struct Signals {
     pub flash: Option<(usize, usize)>,
 }
 
-impl Soc {
-    /// The line's USART.
+impl<C: Circuit> Soc<C> {
+    /// USART1.
     #[must_use]
     pub const fn usart1(&self) -> &Usart {
         &self.usart1
     }
 
-    /// The part after power-on, at `corner`, around these flash cells; `crystal`: whether the HSE works.
+    /// The part after power-on, around these flash cells, in `circuit`.
     #[must_use]
-    pub fn new(crystal: bool, corner: Corner, flash: Flash, slot: Slot) -> Self {
-        let oscillators = corner.oscillators();
-        let rcc = Rcc::new(crystal, oscillators);
+    pub fn new(config: &Config, flash: Flash, circuit: C) -> Self {
+        let oscillators = config.corner.oscillators().with_crystal(config.crystal_hz);
+        let rcc = Rcc::new(config.crystal, oscillators);
         let flash_access = flash.access_control();
         let mut soc = Self {
+            part: config.part,
             clocks: rcc.clocks(),
             rcc,
             flash,
             flash_access,
             // PC13 to PC15 are fed through a switch for 3 mA: 2 MHz at most (DS5319 table 5, notes).
             gpio: [0, 0, 0xE000, 0].map(Gpio::with_slow_pins),
-            line: Line::default(),
-            slot,
+            circuit,
             pwr: Pwr::default(),
             afio: Afio::default(),
             exti: Exti::default(),
@@ -116,9 +117,8 @@ impl Soc {
             tim4: Timer::new(Kind::General),
             adc1: Adc::new(),
             i2c1: I2c::new(),
-            seen: [0; 4],
-            tx_pin: TxPin::Level(true),
-            i2c_pins: Wires::FREE,
+            seen: [0; PORTS],
+            i2c_by_hand: 0,
             due: [Time::MAX; BLOCKS],
             next: Time::MAX,
             levels: 0,
@@ -126,7 +126,7 @@ impl Soc {
             signals: Signals::default(),
             notes: Vec::new(),
         };
-        soc.adc1.set_noise(corner.adc_noise());
+        soc.adc1.set_noise(config.corner.adc_noise());
         soc.set_clocks(Time::ZERO);
         soc
     }
@@ -151,22 +151,35 @@ impl Soc {
             }
             self.set_clocks(now);
         }
-        self.slot.set_power(on, now);
-        self.wire_slot(now);
+        self.circuit.set_power(on, now);
+        self.refresh(now);
     }
 
     /// Brings everything that is worked out lazily up to `now`, before someone outside looks or acts.
     pub fn sync(&mut self, now: Time) {
         self.advance(now);
-        self.sync_line(now);
+        for serial in &SERIALS {
+            self.sync_wire(serial, now);
+        }
         self.find_next();
     }
 
-    /// Takes up what someone outside did to the line or the slot.
+    /// Takes up what someone outside did to the circuit.
     pub fn refresh(&mut self, now: Time) {
-        self.wire_slot(now);
-        self.note_due(Block::Usart1);
-        self.note_due(Block::Tim1);
+        self.circuit.drive(&mut Pins {
+            part: self.part,
+            gpio: &mut self.gpio,
+            adc: &mut self.adc1,
+            now,
+        });
+        for port in 0..PORTS {
+            self.wire_port(port, now);
+        }
+        self.exchange_i2c(now);
+        self.note_requests(Block::I2c1);
+        for block in [Block::I2c1, Block::Usart1, Block::Usart3, Block::Tim1] {
+            self.note_due(block);
+        }
         self.find_next();
     }
 
@@ -179,22 +192,6 @@ impl Soc {
     #[must_use]
     pub fn has_notes(&self) -> bool {
         !self.notes.is_empty()
-    }
-
-    /// Forgets which interrupt lines were told: all that are high will be told again.
-    pub fn repeat_lines(&mut self) {
-        self.changed_lines = self.levels;
-    }
-
-    /// Takes the interrupt lines whose level changed, one bit each, with the levels of all.
-    pub fn take_lines(&mut self) -> (u64, u64) {
-        (core::mem::take(&mut self.changed_lines), self.levels)
-    }
-
-    /// Whether an interrupt line has changed since they were taken.
-    #[must_use]
-    pub fn lines_changed(&self) -> bool {
-        self.changed_lines != 0
     }
 
     /// The earliest instant at which any block acts by itself; [`Time::MAX`] for never.
@@ -286,17 +283,24 @@ impl Soc {
     /// A block's own past, and what comes to it over a wire, up to `now`.
     fn catch_up(&mut self, block: Block, now: Time) {
         match block {
-            Block::Usart1 => self.sync_line(now),
+            Block::Usart1 | Block::Usart3 | Block::GpioA | Block::GpioB => {
+                for serial in &SERIALS {
+                    if serial.usart == block {
+                        self.sync_wire(serial, now);
+                    } else if serial.port() == block {
+                        self.sync_wire(serial, now);
+                        self.drive_rx(serial, now);
+                    }
+                }
+            }
             Block::Tim1 => {
-                self.sync_line(now);
-                self.line.feed_captures(&mut self.tim1);
+                self.sync_wire(wires::CAPTURED, now);
+                for (at, rising) in self.usart1.take_edges() {
+                    self.tim1.capture_edge(wires::RX_CAPTURE, at, rising);
+                }
                 self.tim1.advance(now);
             }
-            Block::GpioA => {
-                self.sync_line(now);
-                self.drive_rx(now);
-            }
-            Block::I2c1 => self.i2c1.exchange(&mut self.slot, now),
+            Block::I2c1 => self.exchange_i2c(now),
             _ => self.block(block).advance(now),
         }
     }
@@ -318,9 +322,11 @@ impl Soc {
 
     fn note_due(&mut self, block: Block) {
         let next = match block {
-            Block::Usart1 => self.line.next_event(&self.usart1),
+            Block::Usart1 => self.next_exchange(&SERIALS[0]),
+            Block::Usart3 => self.next_exchange(&SERIALS[1]),
             Block::Tim1 if self.tim1.capture_interrupt_enabled(wires::RX_CAPTURE) => {
-                let edge = self.line.next_capture();
+                let wire = self.circuit.wire(wires::CAPTURED.tx);
+                let edge = wire.and_then(|wire| wire.next_edge());
                 [self.tim1.next_event(), edge].into_iter().flatten().min()
             }
             _ => self.block(block).next_event(),
@@ -330,47 +336,6 @@ impl Soc {
 
     fn find_next(&mut self) {
         self.next = self.due.iter().copied().fold(Time::MAX, Time::min);
-    }
-
-    /// Brings the interrupt lines of `block` to where its requests are.
-    fn note_requests(&mut self, block: Block) {
-        let line = match block {
-            Block::Exti => {
-                let requests = self.exti.requests();
-                for (line, pins) in irq::EXTI {
-                    self.set_line(line, requests & pins != 0);
-                }
-                return;
-            }
-            Block::I2c1 => {
-                self.set_line(irq::I2C1_EV, self.i2c1.irq_event());
-                self.set_line(irq::I2C1_ER, self.i2c1.irq_error());
-                return;
-            }
-            Block::Tim1 => {
-                self.set_line(irq::TIM1_UP, self.tim1.update_irq());
-                self.set_line(irq::TIM1_CC, self.tim1.capture_compare_irq());
-                return;
-            }
-            Block::Tim2 => irq::TIM2,
-            Block::Tim3 => irq::TIM3,
-            Block::Tim4 => irq::TIM4,
-            Block::Usart1 => irq::USART1,
-            Block::Usart3 => irq::USART3,
-            Block::Adc1 => irq::ADC1,
-            Block::Flash => irq::FLASH,
-            _ => return,
-        };
-        let level = self.block(block).irq();
-        self.set_line(line, level);
-    }
-
-    fn set_line(&mut self, line: u16, level: bool) {
-        let bit = 1u64 << line;
-        if (self.levels & bit != 0) != level {
-            self.levels ^= bit;
-            self.changed_lines |= bit;
-        }
     }
 
     fn block(&mut self, block: Block) -> &mut dyn Peripheral {

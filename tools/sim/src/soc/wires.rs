@@ -1,109 +1,165 @@
-//! The wires between the blocks, and from the part's pins to the board (hardware page of the modio-02).
-//!
-//! ```text
-//! PA0-3  slot lines 1-4, ADC1 IN0-3     PA9    USART1 TX -> RS-485 driver
-//! PA4-7  SW01 positions 1-4             PA10   RS-485 receiver -> USART1 RX, TIM1 CH3
-//! PA8    driver enable                  PB6-7  I2C1 -> the slot's DAC
-//! PB8-9  LEDs, PC13 LED                 PB12-15 SW01 positions 5-8
-//! ```
+//! The wires between the blocks, and from the part's pins to the circuit (default pins, DS5319 table 5).
 
 use super::Soc;
+use super::circuit::{Circuit, PORTS, Pin};
 use super::map::Block;
 use crate::finding::What;
-use crate::line::TxPin;
 use crate::periph::clocks::Clocks;
 use crate::periph::gpio::Drive;
-use crate::periph::i2c::Wires;
+use crate::periph::i2c::NoDevice;
 use crate::periph::rcc::Cause;
+use crate::periph::usart::{TxPin, Usart, Wire};
 use crate::peripheral::Peripheral;
 use crate::time::Time;
 
-/// The driver enable on port A.
-pub(super) const DRIVER_ENABLE: usize = 8;
-const TX: usize = 9;
-const RX: usize = 10;
-/// TIM1's channel at the RX pin.
-pub(super) const RX_CAPTURE: usize = 3;
-const SCL: usize = 6;
-const SDA: usize = 7;
-/// Lines from the slot, on PA0 and up.
-const LINES: usize = 4;
-/// SW01: position n + 1 is on this port and pin.
-const SWITCH: [(usize, usize); 8] = [
-    (0, 4),
-    (0, 5),
-    (0, 6),
-    (0, 7),
-    (1, 12),
-    (1, 13),
-    (1, 14),
-    (1, 15),
+/// A USART and its pins, both on one port.
+#[derive(Debug)]
+pub(super) struct Serial {
+    pub(super) usart: Block,
+    pub(super) tx: Pin,
+    rx: Pin,
+    /// What is wrong when it receives through a pin that is no input.
+    deaf: &'static str,
+}
+
+impl Serial {
+    /// The port of its pins.
+    pub(super) const fn port(&self) -> Block {
+        GPIO[self.tx.port()]
+    }
+}
+
+/// The ports, from A on.
+const GPIO: [Block; PORTS] = [Block::GpioA, Block::GpioB, Block::GpioC, Block::GpioD];
+
+/// The USARTs that are modelled.
+pub(super) const SERIALS: [Serial; 2] = [
+    Serial {
+        usart: Block::Usart1,
+        tx: Pin::new('A', 9),
+        rx: Pin::new('A', 10),
+        deaf: "USART1 receives, but its RX pin is no digital input",
+    },
+    Serial {
+        usart: Block::Usart3,
+        tx: Pin::new('B', 10),
+        rx: Pin::new('B', 11),
+        deaf: "USART3 receives, but its RX pin is no digital input",
+    },
 ];
 
-impl Soc {
+/// The USART whose RX pin is TIM1's channel 3 as well.
+pub(super) const CAPTURED: &Serial = &SERIALS[0];
+/// TIM1's channel at that pin.
+pub(super) const RX_CAPTURE: usize = 3;
+
+/// I2C1's pins.
+const SCL: Pin = Pin::new('B', 6);
+const SDA: Pin = Pin::new('B', 7);
+
+impl<C: Circuit> Soc<C> {
     /// Passes on what `block` has done at `now`.
     pub(super) fn wire(&mut self, block: Block, now: Time) {
         match block {
-            Block::GpioA => {
-                self.wire_driver(now);
-                self.wire_outputs();
-                self.wire_port(0, now);
-            }
-            Block::GpioB => {
-                self.wire_i2c_pins(now);
-                self.wire_port(1, now);
-            }
-            Block::GpioC => self.wire_port(2, now),
-            Block::GpioD => self.wire_port(3, now),
+            Block::GpioA => self.wire_gpio(0, now),
+            Block::GpioB => self.wire_gpio(1, now),
+            Block::GpioC => self.wire_gpio(2, now),
+            Block::GpioD => self.wire_gpio(3, now),
             Block::Rcc => self.wire_rcc(now),
             Block::Flash => self.wire_flash(),
             Block::Iwdg => self.wire_watchdog(now),
-            Block::Usart1 => self.check_receiver(now),
-            // The radio is not on this board: nobody hears it.
-            Block::Usart3 => drop(self.usart3.take_sent()),
+            Block::Usart1 => self.check_receiver(&SERIALS[0], now),
+            Block::Usart3 => self.check_receiver(&SERIALS[1], now),
             _ => {}
         }
     }
 
-    /// Brings the line, USART1 and what TIM1 captures up to `now`.
-    pub(super) fn sync_line(&mut self, now: Time) {
-        self.line.exchange(&mut self.usart1, now);
-        for (at, text) in self.line.take_findings() {
+    /// A USART with what is connected to it.
+    fn usart(&mut self, serial: &Serial) -> (&mut Usart, Option<&mut dyn Wire>) {
+        let usart = match serial.usart {
+            Block::Usart3 => &mut self.usart3,
+            _ => &mut self.usart1,
+        };
+        (usart, self.circuit.wire(serial.tx))
+    }
+
+    /// Brings a USART and its wire up to `now`.
+    pub(super) fn sync_wire(&mut self, serial: &Serial, now: Time) {
+        match self.usart(serial) {
+            (usart, Some(wire)) => usart.exchange(wire, now),
+            (usart, None) => {
+                usart.advance(now);
+                usart.take_sent();
+            }
+        }
+        for (at, text) in self.circuit.take_findings() {
             self.notes.push((at, What::Other(text)));
         }
-        self.note_requests(Block::Usart1);
-        self.note_due(Block::Usart1);
+        self.note_requests(serial.usart);
+        self.note_due(serial.usart);
     }
 
-    /// The driver enable and the TX pin, as port A has them now.
-    fn wire_driver(&mut self, now: Time) {
-        let port = &self.gpio[0];
-        let on = port.level() >> DRIVER_ENABLE & 1 != 0;
-        let tx = if port.alternate_outputs() >> TX & 1 != 0 {
-            TxPin::Usart
-        } else {
-            TxPin::Level(port.held(TX).unwrap_or(true))
+    /// When something happens next in a USART or at its RX pin.
+    pub(super) fn next_exchange(&mut self, serial: &Serial) -> Option<Time> {
+        match self.usart(serial) {
+            (usart, Some(wire)) => usart.next_exchange(wire),
+            (usart, None) => usart.next_event(),
+        }
+    }
+
+    /// A USART receives nothing through a pin that is no input.
+    fn check_receiver(&mut self, serial: &Serial, now: Time) {
+        let port = &self.gpio[serial.rx.port()];
+        let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;
+        let (usart, wire) = self.usart(serial);
+        if closed && wire.is_some() && usart.awaits_start() {
+            self.notes.push((now, What::Other(serial.deaf)));
+        }
+    }
+
+    /// The level at the RX pin, for a firmware that reads the pin.
+    pub(super) fn drive_rx(&mut self, serial: &Serial, now: Time) {
+        let Some(wire) = self.circuit.wire(serial.tx) else {
+            return;
         };
-        if on != self.line.driver() || tx != self.tx_pin {
-            self.tx_pin = tx;
-            self.sync_line(now);
-            self.line.set_tx_pin(tx, now);
-            self.line.set_driver(on, now);
-            self.note_due(Block::Usart1);
-        }
+        let drive = if wire.rx_level() {
+            Drive::High
+        } else {
+            Drive::Low
+        };
+        self.gpio[serial.rx.port()].drive(serial.rx.number(), drive, now);
+        self.wire_port(serial.rx.port(), now);
     }
 
-    /// USART1 hears nothing through a pin that is no input.
-    fn check_receiver(&mut self, now: Time) {
-        let port = &self.gpio[0];
-        if self.usart1.awaits_start() && (port.outputs() | port.analog()) >> RX & 1 != 0 {
-            let text = "USART1 receives, but its RX pin is no digital input";
-            self.notes.push((now, What::Other(text)));
+    /// What the part does to the pins of a port: to its wires and to the circuit.
+    fn wire_gpio(&mut self, port: usize, now: Time) {
+        let gpio = &self.gpio[port];
+        for serial in SERIALS.iter().filter(|serial| serial.tx.port() == port) {
+            let tx = serial.tx.number();
+            let pin = if gpio.alternate_outputs() >> tx & 1 != 0 {
+                TxPin::Usart
+            } else {
+                TxPin::Level(gpio.held(tx).unwrap_or(true))
+            };
+            if let Some(wire) = self.circuit.wire(serial.tx) {
+                wire.set_tx_pin(pin, now);
+            }
         }
+        if port == SCL.port() {
+            self.wire_i2c_pins(now);
+        }
+        let name = char::from(b'A' + port as u8);
+        if self.circuit.port_changed(name, &self.gpio[port], now) {
+            self.refresh(now);
+        }
+        for serial in SERIALS.iter().filter(|serial| serial.tx.port() == port) {
+            self.note_due(serial.usart);
+        }
+        self.wire_port(port, now);
     }
 
     /// Edges of a port to EXTI.
-    fn wire_port(&mut self, port: usize, now: Time) {
+    pub(super) fn wire_port(&mut self, port: usize, now: Time) {
         let level = self.gpio[port].level();
         let changed = level ^ self.seen[port];
         self.seen[port] = level;
@@ -120,51 +176,24 @@ impl Soc {
         }
     }
 
-    /// The part's outputs to the slot's lines.
-    fn wire_outputs(&mut self) {
-        let port = &self.gpio[0];
-        let high = port.outputs() & port.level();
-        for line in 0..LINES {
-            self.slot.set_line(line + 1, high >> line & 1 != 0);
-        }
-    }
-
-    /// What the module does to its lines, and to the wires of I2C1.
-    pub(super) fn wire_slot(&mut self, now: Time) {
-        for line in 0..LINES {
-            self.gpio[0].drive(line, self.slot.drive(line + 1), now);
-            let millivolts = self.gpio[0].millivolts(line);
-            self.adc1.set_millivolts(line, millivolts, now);
-            self.adc1
-                .set_source_ohms(line, self.slot.source_ohms(line + 1), now);
-        }
-        self.wire_port(0, now);
-        let held = self.slot.held();
-        for (pin, free) in [(SCL, held.scl), (SDA, held.sda)] {
-            let drive = if free { Drive::PullUp } else { Drive::Low };
-            self.gpio[1].drive(pin, drive, now);
-        }
-        self.wire_port(1, now);
-        self.i2c1.exchange(&mut self.slot, now);
-        self.note_requests(Block::I2c1);
-        self.note_due(Block::I2c1);
-    }
-
     /// PB6 and PB7: the I2C block's, or moved by hand, to free a stuck bus.
     fn wire_i2c_pins(&mut self, now: Time) {
-        const PINS: u16 = 1 << SCL | 1 << SDA;
-        let connected = self.gpio[1].alternate_open_drains() & PINS == PINS;
+        const PINS: u16 = 1 << SCL.number() | 1 << SDA.number();
+        let port = &self.gpio[SCL.port()];
+        let connected = port.alternate_open_drains() & PINS == PINS;
         self.i2c1.set_connected(connected, now);
-        let low = self.gpio[1].pulled_low();
-        let pins = Wires {
-            scl: low >> SCL & 1 == 0,
-            sda: low >> SDA & 1 == 0,
-        };
-        if pins != self.i2c_pins {
-            self.i2c_pins = pins;
-            self.i2c1.exchange(&mut self.slot, now);
-            self.slot.set_pins(pins);
-            self.wire_slot(now);
+        let by_hand = port.pulled_low() & PINS;
+        if by_hand != self.i2c_by_hand {
+            self.i2c_by_hand = by_hand;
+            self.exchange_i2c(now);
+        }
+    }
+
+    /// Brings I2C1 and the devices on its bus up to `now`.
+    pub(super) fn exchange_i2c(&mut self, now: Time) {
+        match self.circuit.i2c(SCL) {
+            Some(bus) => self.i2c1.exchange(bus, now),
+            None => self.i2c1.exchange(&mut NoDevice, now),
         }
     }
 
@@ -261,17 +290,6 @@ impl Soc {
         }
     }
 
-    /// The receiver's output at PA10, for a firmware that reads the pin.
-    pub(super) fn drive_rx(&mut self, now: Time) {
-        let drive = if self.line.rx_level() {
-            Drive::High
-        } else {
-            Drive::Low
-        };
-        self.gpio[0].drive(RX, drive, now);
-        self.wire_port(0, now);
-    }
-
     /// Locks the analog filters of I2C1 low.
     pub fn lock_i2c_filters(&mut self, now: Time) {
         self.i2c1.lock_filters(now);
@@ -292,19 +310,5 @@ impl Soc {
         self.rcc.set_crystal(works, now);
         self.settle(Block::Rcc, now);
         self.find_next();
-    }
-
-    /// SW01 stands at `positions`: bit 0 = position 1, a set bit = ON = connected to ground.
-    pub fn set_switch(&mut self, positions: u8, now: Time) {
-        for (n, (port, pin)) in SWITCH.into_iter().enumerate() {
-            let drive = if positions >> n & 1 != 0 {
-                Drive::Low
-            } else {
-                Drive::Floating
-            };
-            self.gpio[port].drive(pin, drive, now);
-        }
-        self.wire_port(0, now);
-        self.wire_port(1, now);
     }
 }

@@ -7,6 +7,7 @@ mod crystal;
 mod debug;
 mod flash;
 mod measure;
+mod parts;
 mod regs;
 mod resets;
 mod wires;

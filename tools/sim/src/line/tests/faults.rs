@@ -92,7 +92,7 @@ fn a_driver_let_go_in_the_middle_of_the_masters_byte_hears_its_rest() {
     assert!(bench.line.rx_level());
     bench.driver(false);
     assert!(!bench.line.rx_level());
-    assert_eq!(bench.line.next_event(&bench.usart), Some(bench.now));
+    assert_eq!(bench.usart.next_exchange(&bench.line), Some(bench.now));
     // Six bits low from there: start and five zeros, then ones.
     assert_eq!(bench.hear(Time::from_ms(3)), [0xE0]);
 }

@@ -4,7 +4,7 @@ mod faults;
 
 use super::*;
 use crate::periph::timer::{Kind, Timer};
-use crate::periph::usart::Usart;
+use crate::periph::usart::{Usart, Wire};
 use crate::peripheral::Peripheral;
 
 const HZ: u32 = 72_000_000;
@@ -49,28 +49,28 @@ impl Bench {
 
     fn run_to(&mut self, at: Time) {
         self.now = at;
-        self.line.exchange(&mut self.usart, at);
+        self.usart.exchange(&mut self.line, at);
     }
 
     fn write(&mut self, offset: u32, value: u32) {
-        self.line.exchange(&mut self.usart, self.now);
+        self.usart.exchange(&mut self.line, self.now);
         assert_eq!(self.usart.write(offset, value, self.now), Ok(()));
     }
 
     fn read(&mut self, offset: u32) -> u32 {
-        self.line.exchange(&mut self.usart, self.now);
+        self.usart.exchange(&mut self.line, self.now);
         self.usart.read(offset, self.now).expect("modelled")
     }
 
     fn driver(&mut self, on: bool) {
-        self.line.exchange(&mut self.usart, self.now);
+        self.usart.exchange(&mut self.line, self.now);
         self.line.set_driver(on, self.now);
     }
 
     /// Takes the bytes the USART receives up to `end`, each at the event that brings it.
     fn hear(&mut self, end: Time) -> Vec<u8> {
         let mut bytes = Vec::new();
-        while let Some(at) = self.line.next_event(&self.usart).filter(|&at| at <= end) {
+        while let Some(at) = self.usart.next_exchange(&self.line).filter(|&at| at <= end) {
             self.run_to(at);
             if self.read(SR) & RXNE != 0 {
                 bytes.push(self.read(DR) as u8);
@@ -183,8 +183,10 @@ fn tim1_captures_the_start_bits() {
     assert_eq!(tim1.write(0x20, 3 << 8, Time::ZERO), ok);
     assert_eq!(tim1.write(0x00, 1, Time::ZERO), ok);
     let mut flags = |bench: &mut Bench, clear: bool| {
-        bench.line.exchange(&mut bench.usart, bench.now);
-        bench.line.feed_captures(&mut tim1);
+        bench.usart.exchange(&mut bench.line, bench.now);
+        for (at, rising) in bench.usart.take_edges() {
+            tim1.capture_edge(3, at, rising);
+        }
         tim1.advance(bench.now);
         let sr = tim1.read(0x10, bench.now).expect("modelled") & 0x808;
         if clear {

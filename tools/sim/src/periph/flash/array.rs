@@ -5,12 +5,11 @@
 //! reads as 0 or as 1, anew at every read, until its page is erased whole. A complete program of the
 //! half-word drives the cells that it programs to 0; the rest of the half-word stays as it was left.
 
+use core::ops::Range;
 use std::collections::BTreeMap;
 
-use crate::machine::memory::{FLASH_SIZE, Memory};
-
-/// Bytes in a page (medium density, RM0008 table 5).
-pub const PAGE: usize = 1024;
+use crate::machine::memory::Memory;
+use crate::part::Part;
 
 /// What an interrupted operation leaves. The part promises nothing; each choice is the same in every run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,15 +37,6 @@ pub(super) enum Operation {
 }
 
 impl Operation {
-    /// The bytes it changes: first and end.
-    const fn span(self) -> (usize, usize) {
-        match self {
-            Self::Program { at, .. } => (at, at + 2),
-            Self::Page { page } => (page * PAGE, (page + 1) * PAGE),
-            Self::Mass => (0, FLASH_SIZE),
-        }
-    }
-
     /// What the byte at `at` is to become from `old`.
     const fn target(self, at: usize, old: u8) -> u8 {
         match self {
@@ -75,6 +65,8 @@ struct Unsteady {
 #[derive(Debug)]
 pub(super) struct Cells {
     memory: Memory,
+    /// Bytes in a page.
+    page: usize,
     unsteady: BTreeMap<usize, Unsteady>,
     seed: u64,
     /// Draws what an unsteady cell reads as.
@@ -82,9 +74,10 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    pub(super) fn erased(seed: u64) -> Self {
+    pub(super) fn erased(part: &Part, seed: u64) -> Self {
         Self {
-            memory: Memory::new(FLASH_SIZE, 0xFF),
+            memory: Memory::new(part.flash_size, 0xFF),
+            page: part.page_size,
             unsteady: BTreeMap::new(),
             seed,
             noise: fastrand::Rng::with_seed(seed),
@@ -121,15 +114,28 @@ impl Cells {
         bytes
     }
 
-    /// The pages that hold unsteady cells, one bit each, lowest first.
-    pub(super) fn unsteady_pages(&self) -> u128 {
-        let pages = self.unsteady.keys().map(|at| at / PAGE);
-        pages.fold(0, |mask, page| mask | 1 << page)
+    /// Whether there are unsteady cells among these bytes.
+    pub(super) fn is_unsteady(&self, bytes: Range<usize>) -> bool {
+        self.unsteady.range(bytes).next().is_some()
+    }
+
+    /// The page that the byte at `offset` is in; `None` beyond the last one.
+    pub(super) fn page_of(&self, offset: usize) -> Option<usize> {
+        (offset < self.bytes().len()).then_some(offset / self.page)
+    }
+
+    /// The bytes that `operation` changes: first and end.
+    fn span(&self, operation: Operation) -> (usize, usize) {
+        match operation {
+            Operation::Program { at, .. } => (at, at + 2),
+            Operation::Page { page } => (page * self.page, (page + 1) * self.page),
+            Operation::Mass => (0, self.bytes().len()),
+        }
     }
 
     /// Does `operation` whole; returns the bytes changed, first and end.
     pub(super) fn finish(&mut self, operation: Operation) -> (usize, usize) {
-        let (first, end) = operation.span();
+        let (first, end) = self.span(operation);
         for at in first..end {
             let old = self.memory.bytes()[at];
             let target = operation.target(at, old);
@@ -148,7 +154,7 @@ impl Cells {
 
     /// Does `parts` / 65536 of `operation`; returns the bytes changed, first and end.
     pub(super) fn tear(&mut self, operation: Operation, torn: Torn, parts: u32) -> (usize, usize) {
-        let (first, end) = operation.span();
+        let (first, end) = self.span(operation);
         if torn == Torn::Before {
             return (first, end);
         }

@@ -4,13 +4,14 @@
 //! the power goes or the part is reset ([`mod@array`]). Option bytes can be read but not programmed.
 
 mod array;
+mod operations;
 
-use crate::machine::memory::FLASH_SIZE;
+use crate::part::Part;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
+pub use array::Torn;
 use array::{Cells, Operation};
-pub use array::{PAGE, Torn};
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
@@ -93,7 +94,7 @@ pub struct Flash {
     pub torn: Torn,
     /// Whether the HSI, which times the operations, runs (PM0075 2.3).
     pub hsi_on: bool,
-    /// FLASH_WRPR: bit n clear protects pages 4n to 4n + 3 (medium density).
+    /// FLASH_WRPR: each bit that is clear protects 4 KiB, the last one all that follow, too.
     wrpr: u32,
     acr: u32,
     lock: Lock,
@@ -118,12 +119,12 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// The controller after power-on over an erased flash, with these write-protection bits. `seed` decides
-    /// what torn operations leave.
+    /// The controller of `part` after power-on over an erased flash, with these write-protection bits. `seed`
+    /// decides what torn operations leave.
     #[must_use]
-    pub fn new(wrpr: u32, seed: u64) -> Self {
+    pub fn new(part: &Part, wrpr: u32, seed: u64) -> Self {
         Self {
-            cells: Cells::erased(seed),
+            cells: Cells::erased(part, seed),
             durations: Durations::default(),
             torn: Torn::default(),
             hsi_on: true,
@@ -214,10 +215,10 @@ impl Flash {
         u32::from_le_bytes(self.cells.read(at))
     }
 
-    /// The pages, one bit each, that hold unsteady cells. The core reads all others without asking.
+    /// Whether there are unsteady cells among these bytes. The core reads all others without asking.
     #[must_use]
-    pub fn unsteady_pages(&self) -> u128 {
-        self.cells.unsteady_pages()
+    pub fn is_unsteady(&self, bytes: core::ops::Range<usize>) -> bool {
+        self.cells.is_unsteady(bytes)
     }
 
     /// What there was against the last write, since the last call.
@@ -228,90 +229,6 @@ impl Flash {
     /// The bytes (first, end) that an operation changed since the last call.
     pub fn take_changed(&mut self) -> Option<(usize, usize)> {
         self.changed.take()
-    }
-
-    /// The power goes at `now`: an operation under way is torn.
-    pub fn power_off(&mut self, now: Time) {
-        self.ahead = 0;
-        self.bsy_is_late = false;
-        if let Some(busy) = self.busy.take() {
-            let whole = (busy.until - busy.from).as_ps().max(1);
-            let done = now.saturating_sub(busy.from).as_ps();
-            let parts = (u128::from(done) * 65_536 / u128::from(whole)).min(65_536) as u32;
-            self.changed = Some(self.cells.tear(busy.operation, self.torn, parts));
-            self.changes += 1;
-        }
-    }
-
-    /// The core stores `value` at `offset` into the flash; `half` when the store is 16 bits wide.
-    pub fn program(&mut self, offset: u32, half: bool, value: u16, now: Time) {
-        let complain = |text, bus_error| Some(Complaint { text, bus_error });
-        if !half {
-            self.complaint = complain("flash is written by half-words only", true);
-        } else if self.busy.is_some() {
-            self.complaint = complain("flash written while an operation runs", false);
-        } else if self.cr & CR_PG == 0 || self.lock != Lock::Open {
-            self.complaint = complain("a store to flash with PG clear", false);
-        } else if self.is_protected(offset as usize / PAGE) {
-            self.sr |= SR_WRPRTERR;
-        } else {
-            let at = offset as usize & !1;
-            // A half-word that is not erased takes only 0x0000 (PM0075 2.3.3).
-            if self.cells.read(at) != [0xFF; 2] && value != 0 {
-                self.sr |= SR_PGERR;
-                self.complaint = complain("a half-word that was not erased was programmed", false);
-                return;
-            }
-            self.start(Operation::Program { at, value }, now);
-        }
-    }
-
-    fn is_protected(&self, page: usize) -> bool {
-        self.wrpr >> (page / 4).min(31) & 1 == 0
-    }
-
-    fn start(&mut self, operation: Operation, now: Time) {
-        if !self.hsi_on {
-            self.complaint = Some(Complaint {
-                text: "flash operation with the HSI off",
-                bus_error: false,
-            });
-            return;
-        }
-        let lasts = match operation {
-            Operation::Program { .. } => self.durations.program,
-            Operation::Page { .. } | Operation::Mass => self.durations.erase,
-        };
-        self.started += 1;
-        self.sr |= SR_BSY;
-        self.ahead = FETCHED_AHEAD;
-        self.bsy_is_late = true;
-        self.busy = Some(Busy {
-            operation,
-            from: now,
-            until: now + lasts,
-        });
-    }
-
-    /// STRT: the erase that PER or MER asks for.
-    fn erase(&mut self, now: Time) {
-        let complain = |text| {
-            Some(Complaint {
-                text,
-                bus_error: false,
-            })
-        };
-        let page = self.ar.wrapping_sub(crate::machine::memory::FLASH_BASE) as usize / PAGE;
-        match self.cr & (CR_PG | CR_PER | CR_MER) {
-            CR_PER if page >= FLASH_SIZE / PAGE => {
-                self.complaint = complain("erase of a page that does not exist");
-            }
-            CR_PER if self.is_protected(page) => self.sr |= SR_WRPRTERR,
-            CR_PER => self.start(Operation::Page { page }, now),
-            CR_MER if self.wrpr != u32::MAX => self.sr |= SR_WRPRTERR,
-            CR_MER => self.start(Operation::Mass, now),
-            _ => self.complaint = complain("STRT without exactly one of PER and MER"),
-        }
     }
 
     fn write_cr(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {

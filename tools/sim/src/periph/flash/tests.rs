@@ -2,12 +2,13 @@
 
 use super::*;
 use crate::machine::memory::FLASH_BASE;
+use crate::part::{STM32F103CB, STM32F103RC};
 
 const NOW: Time = Time::ZERO;
 const SEED: u64 = 7;
 
 fn open() -> Flash {
-    let mut flash = Flash::new(u32::MAX, SEED);
+    let mut flash = Flash::new(&STM32F103CB, u32::MAX, SEED);
     for key in KEYS {
         flash.write(4, key, NOW).unwrap();
     }
@@ -82,7 +83,7 @@ fn a_programmed_half_word_takes_only_zero() {
 
 #[test]
 fn a_wrong_key_locks_until_reset() {
-    let mut flash = Flash::new(u32::MAX, SEED);
+    let mut flash = Flash::new(&STM32F103CB, u32::MAX, SEED);
     flash.write(4, KEYS[1], NOW).unwrap();
     assert!(flash.take_complaint().unwrap().bus_error);
     for key in KEYS {
@@ -134,7 +135,7 @@ fn a_torn_erase_is_between_old_and_new_and_grows() {
 
 /// The half-word at 0 after a program of 0 that was cut when half of it was done.
 fn torn_half(seed: u64) -> Flash {
-    let mut flash = Flash::new(u32::MAX, seed);
+    let mut flash = Flash::new(&STM32F103CB, u32::MAX, seed);
     for key in KEYS {
         flash.write(4, key, NOW).unwrap();
     }
@@ -159,7 +160,7 @@ fn half_programmed_cells_read_differently_from_read_to_read() {
     assert_ne!(ones, always, "some cells are unsteady");
     assert_ne!(ones, 0xFFFF, "others read as 0");
     assert_ne!(always, 0, "others read as 1");
-    assert_eq!(flash.unsteady_pages(), 1, "the core reads through the bus");
+    assert!(flash.is_unsteady(0..1024), "the core reads through the bus");
     assert_eq!(read, reads(&mut torn_half(SEED)), "the same for a seed");
     assert_ne!(read, reads(&mut torn_half(SEED + 1)));
 }
@@ -197,13 +198,13 @@ fn half_erased_cells_stay_unsteady_over_a_reset_until_an_erase_is_complete() {
         (0..256).map(|word| flash.read_word(4 * word)).collect()
     };
     assert_ne!(words(&mut flash), words(&mut flash));
-    assert_eq!(flash.unsteady_pages(), 1);
+    assert!(flash.is_unsteady(0..1024));
     flash.reset(NOW);
     assert_ne!(words(&mut flash), words(&mut flash));
     erase(&mut flash);
     flash.advance(Time::from_ms(30));
     assert_eq!(words(&mut flash), [u32::MAX; 256]);
-    assert_eq!(flash.unsteady_pages(), 0);
+    assert!(!flash.is_unsteady(0..1024));
 }
 
 #[test]
@@ -219,7 +220,7 @@ fn torn_can_be_set_to_nothing_or_everything() {
 
 #[test]
 fn protected_pages_refuse_and_bytes_are_a_bus_error() {
-    let mut flash = Flash::new(!1, SEED);
+    let mut flash = Flash::new(&STM32F103CB, !1, SEED);
     for key in KEYS {
         flash.write(4, key, NOW).unwrap();
     }
@@ -255,7 +256,7 @@ fn nothing_happens_without_the_hsi() {
 #[test]
 fn mass_erase_clears_every_page_and_none_when_one_is_protected() {
     for (wrpr, status) in [(u32::MAX, SR_BSY), (!1, SR_WRPRTERR)] {
-        let mut flash = Flash::new(wrpr, SEED);
+        let mut flash = Flash::new(&STM32F103CB, wrpr, SEED);
         flash.bytes_mut().fill(0);
         for key in KEYS {
             flash.write(4, key, NOW).unwrap();
@@ -290,4 +291,30 @@ impl Flash {
     fn half_at(&mut self, at: usize) -> u16 {
         u16::from_le_bytes(self.cells.read(at))
     }
+}
+
+#[test]
+fn a_high_density_part_erases_and_protects_pages_of_2_kib() {
+    let mut flash = Flash::new(&STM32F103RC, !2, SEED);
+    flash.bytes_mut().fill(0);
+    for key in KEYS {
+        flash.write(4, key, NOW).unwrap();
+    }
+    let mut erase = |offset: u32, now: Time| {
+        flash.write(0x10, CR_PER, now).unwrap();
+        flash.write(0x14, FLASH_BASE + offset, now).unwrap();
+        flash.write(0x10, CR_PER | CR_STRT, now).unwrap();
+        flash.advance(now + Time::from_ms(30));
+        let status = flash.read(0x0C, now).unwrap();
+        flash.write(0x0C, status, now).unwrap();
+        (status, flash.take_changed(), flash.take_complaint())
+    };
+    let last = 256 * 1024 - 0x800;
+    let changed = Some((last as usize, 256 * 1024));
+    assert_eq!(erase(last + 0x400, NOW), (SR_EOP, changed, None));
+    // Bit 1 of FLASH_WRPR: pages 2 and 3.
+    assert_eq!(erase(0x1000, NOW), (SR_WRPRTERR, None, None));
+    assert_eq!(erase(0x1FFF, NOW), (SR_WRPRTERR, None, None));
+    assert_eq!(erase(0x2000, NOW).1, Some((0x2000, 0x2800)));
+    assert!(erase(256 * 1024, NOW).2.is_some(), "beyond the last page");
 }

@@ -19,6 +19,30 @@ impl Wires {
     };
 }
 
+/// A bus without devices, with its pull-ups.
+#[derive(Clone, Copy, Debug)]
+pub struct NoDevice;
+
+impl Bus for NoDevice {
+    fn wires(&self) -> Wires {
+        Wires::FREE
+    }
+
+    fn address(&mut self, _byte: u8, _now: Time) -> bool {
+        false
+    }
+
+    fn write(&mut self, _byte: u8, _now: Time) -> bool {
+        false
+    }
+
+    fn read(&mut self, _now: Time) -> u8 {
+        0xFF
+    }
+
+    fn stop(&mut self, _now: Time) {}
+}
+
 /// The devices on a bus, all of them together.
 pub trait Bus {
     /// What the devices, and whoever drives the pins by hand, do to the wires.

@@ -24,7 +24,7 @@ mod tests;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 use bits::{ccr, cr1, cr2, offset, sr1, sr2};
-pub use bus::{Bus, Wires};
+pub use bus::{Bus, NoDevice, Wires};
 use master::Phase;
 
 /// TRISE out of reset, 26.6.9.

@@ -8,7 +8,7 @@ mod crystal;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-use crate::periph::clocks::{Clocks, HSE_HZ, HSI_HZ, Oscillators};
+use crate::periph::clocks::{Clocks, Oscillators};
 
 /// HSI wake-up: DS5319 table 24, maximum.
 const HSI_START: Time = Time::from_us(2);
@@ -412,8 +412,6 @@ impl Peripheral for Rcc {
         };
     }
 }
-
-const _: () = assert!(HSE_HZ == HSI_HZ, "the board's crystal is 8 MHz, as the HSI");
 
 #[cfg(test)]
 mod tests;

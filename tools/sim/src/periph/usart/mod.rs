@@ -1,7 +1,7 @@
 //! A USART in asynchronous mode, without DMA, LIN, smartcard, IrDA or flow control (RM0008 27).
 //!
-//! It knows no line: what it sends is taken with [`Usart::take_sent`], what it hears is given with
-//! [`Usart::receive_edge`]. Every instant comes from whole cycles of the kernel clock: one bit lasts BRR
+//! What it sends is taken with [`Usart::take_sent`], what it receives is given with [`Usart::receive_edge`];
+//! [`Usart::exchange`] does both with whatever [`Wire`] is connected to its pins. Every instant comes from whole cycles of the kernel clock: one bit lasts BRR
 //! of them (27.3.4: USARTDIV = BRR / 16, sixteen samples a bit).
 //!
 //! The baud generator runs from the writing of BRR on, sixteen ticks a bit (27.3.4). The receiver samples at its
@@ -15,18 +15,20 @@
 mod bits;
 mod reception;
 mod transmitter;
+mod wire;
 
 #[cfg(test)]
 mod receiver_tests;
 #[cfg(test)]
 mod transmitter_tests;
 
-use crate::line::{Format, Parity, Receiver, Settings, Wave};
 use crate::peripheral::{Peripheral, Unmodelled};
+use crate::serial::{Format, Parity, Receiver, Settings, Wave};
 use crate::time::Time;
 use bits::{cr1, cr2, cr3, sr};
 pub use transmitter::Sent;
 use transmitter::{Ended, Shape, Transmitter};
+pub use wire::{TxPin, Wire};
 
 /// Register offsets, RM0008 27.6.8.
 mod offset {
@@ -62,6 +64,8 @@ pub struct Usart {
     hz: u32,
     tx: Transmitter,
     rx_pin: Wave,
+    /// The last two falling and the last two rising edges at the RX pin, until they are taken.
+    last_edges: [[Option<Time>; 2]; 2],
     receiver: Receiver,
     /// IDLE may be set again (27.6.1: not before RXNE has been set).
     idle_armed: bool,
@@ -95,6 +99,7 @@ impl Usart {
             hz: 0,
             tx: Transmitter::default(),
             rx_pin: Wave::default(),
+            last_edges: [[None; 2]; 2],
             receiver: Receiver::default(),
             idle_armed: false,
             quiet_since: Time::ZERO,
@@ -367,6 +372,7 @@ impl Peripheral for Usart {
             baud_since: now,
             tx: Transmitter::with_sent(sent),
             rx_pin: Wave::new(self.rx_pin.last_level()),
+            last_edges: self.last_edges,
             ..Self::new()
         };
     }

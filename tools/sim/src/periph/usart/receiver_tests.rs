@@ -1,7 +1,7 @@
 //! What the receiver makes of its pin, and how its flags are cleared.
 
 use super::*;
-use crate::line::{Character, Rate};
+use crate::serial::{Character, Rate};
 
 const HZ: u32 = 72_000_000;
 /// 115200 baud at 72 MHz: 625 cycles a bit (RM0008 table 192).

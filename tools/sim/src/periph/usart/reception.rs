@@ -2,7 +2,7 @@
 
 use super::Usart;
 use super::bits::{cr1, sr};
-use crate::line::{Framing, Rate, Word};
+use crate::serial::{Framing, Rate, Word};
 use crate::time::Time;
 
 impl Usart {
@@ -10,6 +10,8 @@ impl Usart {
     /// [`Peripheral::advance`](crate::peripheral::Peripheral::advance) to or past their instant.
     pub fn receive_edge(&mut self, at: Time, level: bool) {
         self.rx_pin.push(at, level);
+        let last = &mut self.last_edges[usize::from(level)];
+        *last = [last[1], Some(at)];
     }
 
     /// Whether the receiver is on and waits for a start bit: only then does the next edge at its pin

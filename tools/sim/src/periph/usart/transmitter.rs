@@ -1,6 +1,6 @@
 //! The transmitting half of a USART: transmit data register, shift register, and their times.
 
-use crate::line::{Character, Rate};
+use crate::serial::{Character, Rate};
 use crate::time::Time;
 
 /// What a transmitter does to its TX pin.

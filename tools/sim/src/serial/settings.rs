@@ -1,4 +1,4 @@
-//! How characters are cut on the line: the rate, the parity, the stop bits.
+//! How characters are made up: the rate, the parity, the stop bits.
 
 use crate::time::Time;
 
@@ -23,8 +23,7 @@ impl Parity {
     }
 }
 
-/// Character format of the line: eight data bits unless the name says seven, in the numbering of the
-/// FORMAT register.
+/// Character format: eight data bits unless the name says seven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// 8N2: no parity, two stop bits.
@@ -171,7 +170,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// The device's factory default: 9600 8N2.
+    /// 9600 8N2, the factory default of the modio boards.
     fn default() -> Self {
         Self {
             baud: 9600,
@@ -192,22 +191,6 @@ impl Settings {
     pub fn characters(self, n: u64) -> Time {
         self.rate().bits(n * u64::from(self.format.bits()))
     }
-
-    /// The shortest silence that ends an RTU frame. Up to 19200 bit/s it is 3.5 characters of this
-    /// format, above that 1750 us (Modbus over Serial Line V1.02, 2.5.1.1).
-    ///
-    /// The standard counts 11-bit characters (2.5.1); in a format of 10 bits a unit may count its own.
-    /// Between the two values nothing is demanded. The unit on this board counts its own, so the
-    /// shorter value is t3.5 here: with 11 bits the record would join frames that the unit answers.
-    #[must_use]
-    pub fn frame_silence(self) -> Time {
-        if self.baud > 19_200 {
-            Time::from_us(1750)
-        } else {
-            let half_bits = 7 * u64::from(self.format.bits());
-            Time::cycles(half_bits, self.baud.saturating_mul(2))
-        }
-    }
 }
 
 #[cfg(test)]
@@ -221,34 +204,6 @@ mod tests {
         assert_eq!(rate.bits(1).as_ps(), 8_680_555);
         assert_eq!(rate.bits(10).as_ps(), 86_805_555);
         assert_eq!(rate.sixteenths(16), rate.bits(1));
-    }
-
-    #[test]
-    fn silence_is_fixed_above_19200() {
-        let at = |baud| Settings {
-            baud,
-            ..Settings::default()
-        };
-        // 38.5 bits at 19200 baud: 2.005 ms.
-        assert_eq!(at(19_200).frame_silence().as_ns(), 2_005_208);
-        assert_eq!(at(38_400).frame_silence(), Time::from_us(1750));
-        assert_eq!(at(9600).characters(2), Time::cycles(22, 9600));
-    }
-
-    #[test]
-    fn frame_silence_counts_the_bits_of_the_format_up_to_19200() {
-        for format in Format::ALL {
-            let at = |baud| Settings { baud, format };
-            let bits = match format {
-                Format::N2 | Format::E1 | Format::O1 => 77,
-                Format::N1 | Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => 70,
-            };
-            for baud in [1200, 9600, 19_200] {
-                let expected = Time::cycles(bits, 2 * baud);
-                assert_eq!(at(baud).frame_silence(), expected, "{format:?} {baud}");
-            }
-            assert_eq!(at(38_400).frame_silence(), Time::from_us(1750));
-        }
     }
 
     #[test]

@@ -1,32 +1,27 @@
 //! Measuring the firmware: its instructions, its time, and how long its interrupts wait.
 //!
-//! Instructions between two places are counted with [`Board::symbol`], [`Board::run_until_pc`] and
-//! [`Board::instructions`], which cost next to nothing. All measurements leave the run as it is.
+//! Instructions between two places are counted with [`Chip::symbol`], [`Chip::run_until_pc`] and
+//! [`Chip::instructions`], which cost next to nothing. All measurements leave the run as it is.
 
-use super::Board;
+use super::Chip;
 use crate::machine::usage::CoreTime;
 use crate::machine::waits::Wait;
+use crate::soc::Circuit;
 
-impl Board {
-    /// Instructions retired since the board was made.
+impl<C: Circuit> Chip<C> {
+    /// Instructions retired since the chip was made.
     #[must_use]
     pub fn instructions(&self) -> u64 {
         self.machine.instructions()
     }
 
-    /// Cycles of HCLK since the board was made, those that the core slept through included.
+    /// Cycles of HCLK since the chip was made, those that the core slept through included.
     #[must_use]
     pub fn cycles(&self) -> u64 {
         self.machine.cycles()
     }
 
-    /// Writes to USART1's data register since the last reset: one for each byte the firmware sends.
-    #[must_use]
-    pub fn line_bytes_written(&self) -> u64 {
-        self.machine.bus.soc.usart1().data_writes()
-    }
-
-    /// How the core has spent the time since the board was made.
+    /// How the core has spent the time since the chip was made.
     #[must_use]
     pub fn core_time(&self) -> CoreTime {
         self.machine.core_time()
@@ -39,7 +34,7 @@ impl Board {
     }
 
     /// How long an exception had to wait, from pending and enabled to its handler's entry, since
-    /// [`Board::measure_waits`]: 14 is PendSV, 15 SysTick, 16 + n interrupt line n
+    /// [`Chip::measure_waits`]: 14 is PendSV, 15 SysTick, 16 + n interrupt line n
     /// ([`crate::soc::map::irq`]). Of all others only the entries are counted. All 0 for a number that does
     /// not exist, or when nothing is measured.
     #[must_use]

@@ -1,24 +1,25 @@
 //! What a debug probe sees of the part: memories, registers, the log, and what went wrong.
 
-use super::{Board, Error};
+use super::{Chip, Error};
 use crate::finding::Finding;
 use crate::machine::memory::{FLASH_BASE, RAM_BASE};
 use crate::periph::flash::{Durations, Torn};
+use crate::soc::Circuit;
 use crate::soc::map::Block;
 
-impl Board {
+impl<C: Circuit> Chip<C> {
     /// What the firmware logged over RTT since the last call.
     pub fn take_log(&mut self) -> String {
         self.machine.take_log()
     }
 
-    /// The flash's 128 KiB.
+    /// The flash.
     #[must_use]
     pub fn flash(&self) -> &[u8] {
         self.machine.bus.soc.flash.bytes()
     }
 
-    /// The flash's 128 KiB, to change.
+    /// The flash, to change.
     ///
     /// # Errors
     ///
@@ -71,7 +72,7 @@ impl Board {
         self.machine.bus.soc.flash.changes()
     }
 
-    /// Flash operations started since the board was made.
+    /// Flash operations started since the chip was made.
     #[must_use]
     pub fn flash_operations(&self) -> u64 {
         self.machine.bus.soc.flash.started()
@@ -92,13 +93,13 @@ impl Board {
         self.machine.bus.soc.flash.torn = torn;
     }
 
-    /// The SRAM's 20 KiB.
+    /// The SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
         self.machine.ram()
     }
 
-    /// The SRAM's 20 KiB, to change as a debug probe does: to break something on purpose.
+    /// The SRAM, to change as a debug probe does: to break something on purpose.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         self.machine.ram_mut()
     }
@@ -120,7 +121,7 @@ impl Board {
         self.symbols.get(name).copied()
     }
 
-    /// Everything the firmware did that a real part would not take well, since the board was made.
+    /// Everything the firmware did that a real part would not take well, since the chip was made.
     #[must_use]
     pub fn findings(&self) -> &[Finding] {
         self.machine.bus.findings.as_slice()

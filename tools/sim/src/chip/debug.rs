@@ -1,19 +1,20 @@
-//! The board under a debugger: it halts, looks, changes and goes on. Time passes only in [`Board::run_debugged`]
-//! and [`Board::step_instruction`], as in every other run.
+//! The chip under a debugger: it halts, looks, changes and goes on. Time passes only in [`Chip::run_debugged`]
+//! and [`Chip::step_instruction`], as in every other run.
 
-use super::{Board, Error};
-use crate::machine::memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE};
+use super::{Chip, Error};
+use crate::machine::memory::RAM_BASE;
 use crate::machine::{Limit, Stop};
+use crate::soc::Circuit;
 use crate::time::Time;
 
-impl Board {
-    /// [`Board::run_debugged`] halts before the instruction at `address`. The flash is left alone, so the
+impl<C: Circuit> Chip<C> {
+    /// [`Chip::run_debugged`] halts before the instruction at `address`. The flash is left alone, so the
     /// firmware does not notice. As many removals as additions take it away.
     pub fn add_breakpoint(&mut self, address: u32) {
         self.machine.add_breakpoint(address);
     }
 
-    /// Takes back one [`Board::add_breakpoint`].
+    /// Takes back one [`Chip::add_breakpoint`].
     pub fn remove_breakpoint(&mut self, address: u32) {
         self.machine.remove_breakpoint(address);
     }
@@ -23,7 +24,7 @@ impl Board {
         self.machine.pass_breakpoint();
     }
 
-    /// Runs as [`Board::run_until`] does, or up to a breakpoint; tells whether it has come to one.
+    /// Runs as [`Chip::run_until`] does, or up to a breakpoint; tells whether it has come to one.
     pub fn run_debugged(&mut self, t: Time) -> bool {
         self.run(Limit {
             time: t,
@@ -42,7 +43,7 @@ impl Board {
         self.sync();
     }
 
-    /// Writes a core register, numbered as for [`Board::register`].
+    /// Writes a core register, numbered as for [`Chip::register`].
     ///
     /// # Errors
     ///
@@ -68,15 +69,10 @@ impl Board {
     }
 
     fn byte(&mut self, address: u32) -> Option<u8> {
-        let at = |base: u32| address.checked_sub(base).map(|offset| offset as usize);
-        let flash = if (address as usize) < FLASH_SIZE {
-            at(0)
-        } else {
-            at(FLASH_BASE)
-        };
-        at(RAM_BASE)
-            .and_then(|offset| self.ram().get(offset))
-            .or_else(|| self.flash().get(flash?))
+        let flash = self.machine.bus.flash_offset(address);
+        let ram = address.checked_sub(RAM_BASE);
+        ram.and_then(|offset| self.ram().get(offset as usize))
+            .or_else(|| self.flash().get(flash? as usize))
             .copied()
             .or_else(|| self.machine.system_control(address))
     }

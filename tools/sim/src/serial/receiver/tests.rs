@@ -1,8 +1,8 @@
 //! Good and damaged characters, sampled.
 
 use super::*;
-use crate::line::character::Character;
-use crate::line::settings::Format;
+use crate::serial::Character;
+use crate::serial::Format;
 
 fn settings(baud: u32, format: Format) -> Settings {
     Settings { baud, format }

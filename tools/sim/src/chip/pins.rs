@@ -1,0 +1,93 @@
+//! The part's pins, its crystal and its supply.
+
+use super::{Chip, Error};
+use crate::periph::gpio::Gpio;
+use crate::soc::{Circuit, Pin};
+use crate::time::Time;
+
+impl<C: Circuit> Chip<C> {
+    /// Whether the 8 MHz crystal works.
+    #[must_use]
+    pub fn crystal(&self) -> bool {
+        self.machine.bus.soc.rcc.crystal()
+    }
+
+    /// Lets the crystal die at this instant, or come back: then it starts again where RCC still has it on.
+    pub fn set_crystal(&mut self, works: bool) {
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.set_crystal(works, now);
+    }
+
+    /// The supply of the part, in millivolts.
+    #[must_use]
+    pub fn supply_mv(&self) -> u16 {
+        self.machine.bus.soc.pwr.supply_mv()
+    }
+
+    /// Sets the supply of the part. It stays so over a power cycle.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Range`] outside the part's 2000 to 3600 mV (DS5319 table 9): below them it is reset, for
+    /// which there is [`Chip::power_off`].
+    pub fn set_supply_mv(&mut self, millivolts: u16) -> Result<(), Error> {
+        if !(2000..=3600).contains(&millivolts) {
+            return Err(Error::Range("the supply is 2000 to 3600 mV"));
+        }
+        self.sync();
+        self.machine.bus.soc.pwr.set_supply_mv(millivolts);
+        Ok(())
+    }
+
+    /// Locks the analog filters of I2C1 low, as the rise of the supply may: the part then sees a busy bus until
+    /// both wires have had an edge. It may be done while the power is off.
+    pub fn lock_i2c_filters(&mut self) {
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.lock_i2c_filters(now);
+    }
+
+    /// Disturbs the wires of I2C1 at this instant with what looks like a start condition. Returns whether a byte
+    /// was under way, which makes it a bus error.
+    pub fn disturb_i2c(&mut self) -> bool {
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.disturb_i2c(now)
+    }
+
+    /// The level at a pin, as a logic probe sees it: port `'A'` to `'D'`, pin 0 to 15; low for a pin
+    /// that does not exist.
+    #[must_use]
+    pub fn pin(&self, port: char, pin: u8) -> bool {
+        self.look(port, pin)
+            .is_some_and(|(gpio, pin)| gpio.level() >> pin & 1 != 0)
+    }
+
+    /// Whether a pin is an output; false for a pin that does not exist.
+    #[must_use]
+    pub fn is_output(&self, port: char, pin: u8) -> bool {
+        self.look(port, pin)
+            .is_some_and(|(gpio, pin)| gpio.outputs() >> pin & 1 != 0)
+    }
+
+    /// Records the edges of a pin from now on.
+    pub fn watch_pin(&mut self, port: char, pin: u8) {
+        if let Some(pin) = Pin::find(port, pin.into()) {
+            self.machine.bus.soc.gpio[pin.port()].watch(pin.number());
+        }
+    }
+
+    /// The recorded edges of a watched pin: when, and the level after it.
+    #[must_use]
+    pub fn pin_edges(&self, port: char, pin: u8) -> &[(Time, bool)] {
+        self.look(port, pin)
+            .map_or(&[], |(gpio, pin)| gpio.edges(pin))
+    }
+
+    /// The port of a pin, and its number in it.
+    fn look(&self, port: char, pin: u8) -> Option<(&Gpio, usize)> {
+        let pin = Pin::find(port, pin.into())?;
+        Some((&self.machine.bus.soc.gpio[pin.port()], pin.number()))
+    }
+}

@@ -1,0 +1,102 @@
+//! What is connected to the pins of a USART, and how both pass through time together.
+
+use super::{Sent, Usart};
+use crate::peripheral::Peripheral;
+use crate::time::Time;
+
+/// Who drives the TX pin of a USART.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TxPin {
+    /// The USART: the pin is an alternate function output.
+    Usart,
+    /// The pin stands at this level: a plain output, or an input pulled one way. A floating input counts as high.
+    Level(bool),
+}
+
+/// What is connected to the TX and RX pins of a USART.
+pub trait Wire {
+    /// The USART did something to its TX pin. A character is passed when its start bit begins.
+    fn sent(&mut self, _sent: Sent) {}
+
+    /// The TX pin is driven like this from `now` on.
+    fn set_tx_pin(&mut self, _pin: TxPin, _now: Time) {}
+
+    /// Everything on the wire up to `to` happens.
+    fn advance(&mut self, to: Time);
+
+    /// The instant of the last [`Wire::advance`].
+    fn now(&self) -> Time;
+
+    /// Takes the edges at the RX pin that have happened since the last call: when, and the level after each.
+    fn take_edges(&mut self) -> Vec<(Time, bool)> {
+        Vec::new()
+    }
+
+    /// The instant of the next edge at the RX pin, as far as it is known. An edge that has happened and was not
+    /// taken counts as one at [`Wire::now`].
+    fn next_edge(&self) -> Option<Time> {
+        None
+    }
+
+    /// Whether an edge at the RX pin has happened that was not taken.
+    fn has_edges(&self) -> bool {
+        false
+    }
+
+    /// The level at the RX pin.
+    fn rx_level(&self) -> bool {
+        true
+    }
+
+    /// The wire and its USART have reached the same instant.
+    fn caught_up(&mut self, _usart: &Usart) {}
+}
+
+impl Usart {
+    /// Everything up to `now` happens in the USART and on its wire, in order: this takes the place of
+    /// [`Peripheral::advance`]. To be called before each access, before the pins change, and at each event.
+    pub fn exchange(&mut self, wire: &mut dyn Wire, now: Time) {
+        self.pass_sent(wire);
+        loop {
+            // A stalled core lets more than one event pass: take them one by one.
+            let due = self.next_event().filter(|&due| due > wire.now());
+            let to = due.unwrap_or(now).min(now).max(wire.now());
+            wire.advance(to);
+            for (at, level) in wire.take_edges() {
+                self.receive_edge(at, level);
+            }
+            self.advance(to);
+            self.pass_sent(wire);
+            if to >= now {
+                break;
+            }
+        }
+        wire.caught_up(self);
+    }
+
+    fn pass_sent(&mut self, wire: &mut dyn Wire) {
+        for sent in self.take_sent() {
+            wire.sent(sent);
+        }
+    }
+
+    /// The next instant at which something happens in the USART, by itself or because of its wire.
+    #[must_use]
+    pub fn next_exchange(&self, wire: &dyn Wire) -> Option<Time> {
+        let listens = self.awaits_start() || wire.has_edges();
+        let edge = wire.next_edge().filter(|_| listens);
+        [self.next_event(), edge].into_iter().flatten().min()
+    }
+
+    /// Takes the edges at the RX pin since the last call, for a timer that captures the same pin: of the falling
+    /// and of the rising ones the last two, which is all that a timer's registers can show.
+    pub fn take_edges(&mut self) -> Vec<(Time, bool)> {
+        let mut edges: Vec<_> = std::mem::take(&mut self.last_edges)
+            .into_iter()
+            .zip([false, true])
+            .flat_map(|(times, rising)| times.into_iter().flatten().map(move |at| (at, rising)))
+            .collect();
+        edges.sort_unstable();
+        edges
+    }
+}
