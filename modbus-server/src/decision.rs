@@ -2,7 +2,7 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::identification::ReadCode;
-use crate::{Exception, Head, Span};
+use crate::{Exception, Head, Span, Table};
 
 /// The answer to a request, settled but not yet carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,9 +23,9 @@ pub enum Work {
     /// Nothing.
     None,
     /// Read these bits into the body.
-    ReadBits(Span),
+    ReadBits(Table, Span),
     /// Read these words into the body.
-    ReadWords(Span),
+    ReadWords(Table, Span),
     /// Write bits; they are packed in the request from byte `from` on.
     WriteBits {
         /// Where to.

@@ -34,34 +34,18 @@
 //!
 //! ```
 //! use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter};
-//! use modbus_server::{Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Words, WordsOut};
+//! use modbus_server::{Adu, DataModel, Exception, Server, Span, Table, WordsOut};
 //!
-//! /// Ten registers, no bit points.
+//! /// Ten registers to read, by functions 03 and 04 alike.
 //! struct Registers([u16; 10]);
 //!
 //! impl DataModel for Registers {
-//!     fn check_read_bits(&self, _: Span) -> Result<(), Exception> {
-//!         Err(Exception::IllegalDataAddress)
-//!     }
-//!     fn check_write_bits(&self, _: Span, _: Bits<'_>) -> Result<(), Exception> {
-//!         Err(Exception::IllegalDataAddress)
-//!     }
-//!     fn check_read_words(&self, span: Span) -> Result<(), Exception> {
+//!     fn check_read_words(&self, _: Table, span: Span) -> Result<(), Exception> {
 //!         if span.end() <= 10 { Ok(()) } else { Err(Exception::IllegalDataAddress) }
 //!     }
-//!     fn check_write_words(&self, span: Span, _: Words<'_>) -> Result<(), Exception> {
-//!         self.check_read_words(span)
-//!     }
-//!     fn read_bits(&self, _: Span, _: &mut BitsOut<'_>) {}
-//!     fn write_bits(&mut self, _: Span, _: Bits<'_>) {}
-//!     fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
+//!     fn read_words(&self, _: Table, span: Span, out: &mut WordsOut<'_>) {
 //!         for address in span.addresses() {
 //!             out.push(self.0[usize::from(address)]);
-//!         }
-//!     }
-//!     fn write_words(&mut self, span: Span, words: Words<'_>) {
-//!         for (address, word) in span.addresses().zip(words.iter()) {
-//!             self.0[usize::from(address)] = word;
 //!         }
 //!     }
 //! }
@@ -123,6 +107,7 @@ mod model;
 mod pdu;
 mod server;
 mod span;
+mod table;
 mod words;
 
 pub use adu::Adu;
@@ -137,4 +122,5 @@ pub use identification::ReadCode;
 pub use model::DataModel;
 pub use server::Server;
 pub use span::Span;
+pub use table::Table;
 pub use words::{Words, WordsOut};

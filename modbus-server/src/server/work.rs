@@ -2,7 +2,9 @@
 
 use super::Server;
 use crate::diagnostic::Diagnostic;
-use crate::{Adu, Bits, BitsOut, DataModel, Decision, Span, Words, WordsOut, Work, identification};
+use crate::{
+    Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, Work, identification,
+};
 
 /// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
 const NOT_BUSY: [u8; 2] = [0x00, 0x00];
@@ -19,11 +21,11 @@ impl Server {
     pub fn carry_out(&mut self, decision: &Decision, adu: &mut Adu, model: &mut impl DataModel) {
         match decision.work {
             Work::None => {}
-            Work::ReadBits(span) => {
+            Work::ReadBits(table, span) => {
                 let bytes = adu.resize(usize::from(span.count().div_ceil(8)));
-                model.read_bits(span, &mut BitsOut::new(bytes, span.count()));
+                model.read_bits(table, span, &mut BitsOut::new(bytes, span.count()));
             }
-            Work::ReadWords(span) => read_words(span, adu, model),
+            Work::ReadWords(table, span) => read_words(table, span, adu, model),
             Work::WriteBits { span, from } => {
                 model.write_bits(span, Bits::new(adu.from(from), span.count()));
             }
@@ -36,7 +38,7 @@ impl Server {
             }
             Work::WriteThenRead { write, from, read } => {
                 model.write_words(write, words(adu, write, from));
-                read_words(read, adu, model);
+                read_words(Table::HoldingRegisters, read, adu, model);
             }
             Work::ExceptionStatus => body(adu, &[model.exception_status()]),
             Work::Diagnose(Diagnostic::Register) => {
@@ -90,9 +92,9 @@ fn body(adu: &mut Adu, bytes: &[u8]) {
     adu.extend(bytes);
 }
 
-fn read_words(span: Span, adu: &mut Adu, model: &impl DataModel) {
+fn read_words(table: Table, span: Span, adu: &mut Adu, model: &impl DataModel) {
     let mut out = WordsOut::new(adu.resize(usize::from(span.count()) * 2));
-    model.read_words(span, &mut out);
+    model.read_words(table, span, &mut out);
     out.finish();
 }
 

@@ -49,19 +49,25 @@ fn writable(points: &Points, there: usize) -> usize {
     there.min(points.read_only_from as usize)
 }
 
-fn is_bits(function: u8) -> bool {
-    [1, 2, 5, 15].contains(&function)
-}
-
 fn read(points: &Points, function: u8, start: usize, count: usize) -> Result<Vec<u8>, u8> {
-    let bits = is_bits(function);
+    let bits = function < 3;
     if count == 0 || count > if bits { 2000 } else { 125 } {
         return Err(3);
     }
-    let there = if bits {
-        points.bits.len()
+    let bit_table = if function == 2 {
+        &points.input_bits
     } else {
-        points.words.len()
+        &points.bits
+    };
+    let word_table = if function == 4 {
+        &points.input_words
+    } else {
+        &points.words
+    };
+    let there = if bits {
+        bit_table.len()
+    } else {
+        word_table.len()
     };
     if start + count > there {
         return Err(2);
@@ -69,12 +75,12 @@ fn read(points: &Points, function: u8, start: usize, count: usize) -> Result<Vec
     points.state.map_or(Ok(()), |state| Err(state.code()))?;
     let mut data = vec![0; if bits { count.div_ceil(8) } else { count * 2 }];
     for n in 0..count {
-        if bits && points.bits[start + n] {
+        if bits && bit_table[start + n] {
             data[n / 8] += 1 << (n % 8);
         }
         if !bits {
-            data[2 * n] = (points.words[start + n] / 256) as u8;
-            data[2 * n + 1] = (points.words[start + n] % 256) as u8;
+            data[2 * n] = (word_table[start + n] / 256) as u8;
+            data[2 * n + 1] = (word_table[start + n] % 256) as u8;
         }
     }
     Ok([vec![function, data.len() as u8], data].concat())
@@ -124,7 +130,7 @@ fn check_many(points: &Points, pdu: &[u8], bits: bool, limit: usize) -> Result<(
 }
 
 fn write_many(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
-    let bits = is_bits(pdu[0]);
+    let bits = pdu[0] == 15;
     if pdu.len() < 6 {
         return Err(3);
     }
