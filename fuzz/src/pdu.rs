@@ -8,7 +8,7 @@
 //!   script: settings (1: ASCII, the rest: which functions are missing), first read-only point, requests
 //!   request: tag, length, bytes
 //!     tag & 3:  0 a PDU to this unit  1 to all  2 unit and PDU as they come  3 so many bad frames
-//!     tag >> 5: the exception that the device's state calls for, from then on; 0 to 3: none
+//!     tag >> 5: the exception that the device's state calls for, from then on; 0 to 2: none
 //! ```
 
 use std::sync::LazyLock;
@@ -66,7 +66,8 @@ pub fn run(input: &[u8]) {
     };
     while let Some(tag) = script.tag() {
         unit.set_state(match tag >> 5 {
-            0..=3 => None,
+            0..=2 => None,
+            3 => Some(Exception::GatewayPathUnavailable),
             4 => Some(Exception::ServerDeviceFailure),
             5 => Some(Exception::Acknowledge),
             6 => Some(Exception::ServerDeviceBusy),

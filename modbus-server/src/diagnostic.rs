@@ -5,7 +5,7 @@ use crate::line::Framing;
 
 /// A request of function 08 whose form is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Diagnostic {
+pub(crate) enum Diagnostic {
     /// 00: send the data back.
     Echo,
     /// 01: start communication anew, out of listen-only mode too.

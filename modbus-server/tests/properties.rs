@@ -22,6 +22,9 @@ const STATES: &[Exception] = &[
     Exception::Acknowledge,
     Exception::ServerDeviceBusy,
     Exception::NegativeAcknowledge,
+    Exception::MemoryParityError,
+    Exception::GatewayPathUnavailable,
+    Exception::GatewayTargetDeviceFailedToRespond,
 ];
 
 /// Four tables of different lengths, each about as long as one request may ask for.

@@ -136,9 +136,9 @@ impl Device {
     /// Whether this work shows the line's counters, which are to be put into the state before then.
     #[must_use]
     pub const fn shows_counters(work: &Work) -> bool {
-        match work {
-            Work::ReadWords(_, span) | Work::WriteThenRead { read: span, .. } => {
-                matches!(Block::of(*span), Block::State)
+        match work.reads() {
+            Some((Table::HoldingRegisters | Table::InputRegisters, span)) => {
+                matches!(Block::of(span), Block::State)
             }
             _ => false,
         }

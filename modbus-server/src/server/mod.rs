@@ -4,6 +4,7 @@ mod settle;
 mod tally;
 mod work;
 
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
 use crate::line::Framing;
@@ -140,7 +141,7 @@ impl Server {
         let broadcast = unit == BROADCAST;
         let silence = |outcome| Decision {
             reply: None,
-            work: Work::None,
+            work: Work(Job::None),
             outcome,
             broadcast,
         };
@@ -156,12 +157,12 @@ impl Server {
             Ok((head, work)) => (head, work, Outcome::Accepted),
             Err(exception) => {
                 let head = Head::exception(self.unit, function, exception);
-                (head, Work::None, Outcome::Refused(exception))
+                (head, Job::None, Outcome::Refused(exception))
             }
         };
         Decision {
             reply: (hearing == Hearing::Answered).then_some(head),
-            work,
+            work: Work(work),
             outcome,
             broadcast,
         }

@@ -1,13 +1,12 @@
 //! The decision: is the request right, does the model agree, how does the reply begin.
 
 use super::Server;
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::pdu::Request;
-use crate::{
-    DataModel, Exception, Function, Head, Span, Table, Words, WordsOut, Work, identification,
-};
+use crate::{DataModel, Exception, Function, Head, Span, Table, Words, WordsOut, identification};
 
-/// The start of the reply, and the work, of a request that is accepted. `fields` are what follows
+/// The start of the reply, and the work, of an accepted request. `fields` are what follows
 /// the function code `function`.
 ///
 /// # Errors
@@ -17,7 +16,7 @@ pub(super) fn settle(
     function: u8,
     fields: &[u8],
     model: &impl DataModel,
-) -> Result<(Head, Work), Exception> {
+) -> Result<(Head, Job), Exception> {
     let unit = server.unit;
     let plain = Head::plain(unit, function);
     let known = match Function::from_code(function) {
@@ -33,7 +32,7 @@ pub(super) fn settle(
             model.check_read_bits(table, span)?;
             // At most 2000 / 8.
             let head = Head::read(unit, function, span.count().div_ceil(8) as u8);
-            (head, Work::ReadBits(table, span))
+            (head, Job::ReadBits(table, span))
         }
         Request::ReadWords(span) => {
             let table = match known {
@@ -42,22 +41,22 @@ pub(super) fn settle(
             };
             model.check_read_words(table, span)?;
             let head = read_words(unit, function, span);
-            (head, Work::ReadWords(table, span))
+            (head, Job::ReadWords(table, span))
         }
         Request::WriteBits { span, bits, from } => {
             model.check_write_bits(span, bits)?;
             let head = Head::echo(unit, function, first(fields)?);
-            (head, Work::WriteBits { span, from })
+            (head, Job::WriteBits { span, from })
         }
         Request::WriteWords { span, words, from } => {
             model.check_write_words(span, words)?;
             let head = Head::echo(unit, function, first(fields)?);
-            (head, Work::WriteWords { span, from })
+            (head, Job::WriteWords { span, from })
         }
         Request::MaskWord { address, and, or } => {
             let value = masked(address, and, or, model)?;
             let head = Head::masks(unit, function, first(fields)?);
-            (head, Work::WriteMasked { address, value })
+            (head, Job::WriteMasked { address, value })
         }
         Request::WriteThenRead {
             write,
@@ -70,9 +69,9 @@ pub(super) fn settle(
                 model.check_read_words(Table::HoldingRegisters, read),
             )?;
             let head = read_words(unit, function, read);
-            (head, Work::WriteThenRead { write, from, read })
+            (head, Job::WriteThenRead { write, from, read })
         }
-        Request::ExceptionStatus => (plain, Work::ExceptionStatus),
+        Request::ExceptionStatus => (plain, Job::ExceptionStatus),
         Request::Diagnose(fields) => {
             let Server {
                 framing,
@@ -82,15 +81,15 @@ pub(super) fn settle(
             let diagnostic = Diagnostic::decode(fields, framing, can_listen_only)?;
             // The reply begins as the request does; what follows is the request's, or replaces it.
             let head = Head::in_place(unit, function, first(fields)?);
-            (head, Work::Diagnose(diagnostic))
+            (head, Job::Diagnose(diagnostic))
         }
-        Request::EventCounter => (plain, Work::EventCounter),
-        Request::EventLog => (plain, Work::EventLog),
-        Request::ServerId => (plain, Work::ServerId),
+        Request::EventCounter => (plain, Job::EventCounter),
+        Request::EventLog => (plain, Job::EventLog),
+        Request::ServerId => (plain, Job::ServerId),
         Request::Identify(fields) => {
             let (code, object) = identification::decode(fields, model)?;
             let head = Head::before(unit, function, [identification::MEI_TYPE, code as u8]);
-            (head, Work::Identify { code, object })
+            (head, Job::Identify { code, object })
         }
     })
 }

@@ -1,9 +1,10 @@
 //! The work: points and registers written, the body of the reply put together.
 
 use super::Server;
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::{
-    Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, Work, identification,
+    Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, identification,
 };
 
 /// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
@@ -19,47 +20,47 @@ impl Server {
     /// has a body ([`Head::has_body`](crate::Head::has_body)), `adu` holds it
     /// ([`Head::body_in`](crate::Head::body_in)).
     pub fn carry_out(&mut self, decision: &Decision, adu: &mut Adu, model: &mut impl DataModel) {
-        match decision.work {
-            Work::None => {}
-            Work::ReadBits(table, span) => {
+        match decision.work.0 {
+            Job::None => {}
+            Job::ReadBits(table, span) => {
                 let bytes = adu.resize(usize::from(span.count().div_ceil(8)));
                 model.read_bits(table, span, &mut BitsOut::new(bytes, span.count()));
             }
-            Work::ReadWords(table, span) => read_words(table, span, adu, model),
-            Work::WriteBits { span, from } => {
+            Job::ReadWords(table, span) => read_words(table, span, adu, model),
+            Job::WriteBits { span, from } => {
                 model.write_bits(span, Bits::new(adu.from(from), span.count()));
             }
-            Work::WriteWords { span, from } => {
+            Job::WriteWords { span, from } => {
                 model.write_words(span, words(adu, span, from));
             }
-            Work::WriteMasked { address, value } => {
+            Job::WriteMasked { address, value } => {
                 let value = value.to_be_bytes();
                 model.write_words(Span::single(address), Words::new(&value));
             }
-            Work::WriteThenRead { write, from, read } => {
+            Job::WriteThenRead { write, from, read } => {
                 model.write_words(write, words(adu, write, from));
                 read_words(Table::HoldingRegisters, read, adu, model);
             }
-            Work::ExceptionStatus => body(adu, &[model.exception_status()]),
-            Work::Diagnose(Diagnostic::Register) => {
+            Job::ExceptionStatus => body(adu, &[model.exception_status()]),
+            Job::Diagnose(Diagnostic::Register) => {
                 let register = model.diagnostic_register();
                 self.cleared_bits &= register;
                 diagnostic_data(adu, register & !self.cleared_bits);
             }
-            Work::Diagnose(Diagnostic::Clear) => {
+            Job::Diagnose(Diagnostic::Clear) => {
                 self.cleared_bits = model.diagnostic_register();
             }
-            Work::Diagnose(Diagnostic::Counter(index)) => {
+            Job::Diagnose(Diagnostic::Counter(index)) => {
                 let counter = self.counters().as_words().get(usize::from(index)).copied();
                 diagnostic_data(adu, counter.unwrap_or_default());
             }
             // The reply is the request as it is; the rest comes after it.
-            Work::Diagnose(_) => {}
-            Work::EventCounter => {
+            Job::Diagnose(_) => {}
+            Job::EventCounter => {
                 body(adu, &NOT_BUSY);
                 adu.extend(&self.tally.events.to_be_bytes());
             }
-            Work::EventLog => {
+            Job::EventLog => {
                 // Up to 6 + 64.
                 body(adu, &[6 + self.log.count()]);
                 adu.extend(&NOT_BUSY);
@@ -67,7 +68,7 @@ impl Server {
                 adu.extend(&self.counters().bus_messages.to_be_bytes());
                 self.log.append_to(adu);
             }
-            Work::ServerId => {
+            Job::ServerId => {
                 let id = model.server_id();
                 let id = id.get(..MAX_SERVER_ID).unwrap_or(id);
                 // Up to 251.
@@ -75,7 +76,7 @@ impl Server {
                 adu.extend(id);
                 adu.extend(&[if model.is_running() { 0xFF } else { 0x00 }]);
             }
-            Work::Identify { code, object } => identification::fill(code, object, model, adu),
+            Job::Identify { code, object } => identification::fill(code, object, model, adu),
         }
         self.conclude(decision);
     }
