@@ -34,23 +34,12 @@
 //!
 //! ```
 //! use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter};
-//! use modbus_server::{Adu, DataModel, Exception, Server, Span, Table, WordsOut};
+//! use modbus_server::{Adu, Server, Tables};
 //!
-//! /// Ten registers to read, by functions 03 and 04 alike.
-//! struct Registers([u16; 10]);
+//! // The device: ten holding registers. One with rules of its own implements `DataModel`.
+//! let mut registers = [0x1111; 10];
+//! let mut tables = Tables { holding_registers: &mut registers, ..Tables::default() };
 //!
-//! impl DataModel for Registers {
-//!     fn check_read_words(&self, _: Table, span: Span) -> Result<(), Exception> {
-//!         if span.end() <= 10 { Ok(()) } else { Err(Exception::IllegalDataAddress) }
-//!     }
-//!     fn read_words(&self, _: Table, span: Span, out: &mut WordsOut<'_>) {
-//!         for address in span.addresses() {
-//!             out.push(self.0[usize::from(address)]);
-//!         }
-//!     }
-//! }
-//!
-//! let mut registers = Registers([0x1111; 10]);
 //! let mut server = Server::new(17, Framing::Rtu);
 //! let (mut one, mut two) = (Adu::new(), Adu::new());
 //! let mut receiver = Receiver::rtu(17, false);
@@ -66,10 +55,10 @@
 //! assert!(server.answers(closed.adu));
 //! let mut transmitter = Transmitter::open(server.unit(), server.framing());
 //! assert_eq!(transmitter.next(), Next::Byte(0x11)); // goes before anything is decided
-//! let decision = server.decide(closed.adu, &registers);
+//! let decision = server.decide(closed.adu, &tables);
 //! transmitter.head(decision.reply.expect("it is answered"));
 //! server.commit(&decision, &closed.line);
-//! server.carry_out(&decision, closed.adu, &mut registers);
+//! server.carry_out(&decision, closed.adu, &mut tables);
 //! if let Some(adu) = transmitter.body(closed.adu) {
 //!     receiver.give_back(adu); // an exception or an echo has no body
 //! }
@@ -108,6 +97,7 @@ mod pdu;
 mod server;
 mod span;
 mod table;
+mod tables;
 mod words;
 
 pub use adu::Adu;
@@ -121,4 +111,5 @@ pub use model::DataModel;
 pub use server::Server;
 pub use span::Span;
 pub use table::Table;
+pub use tables::Tables;
 pub use words::{Words, WordsOut};

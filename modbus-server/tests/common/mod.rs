@@ -6,7 +6,7 @@
 pub mod hearing;
 mod points;
 pub mod reference;
-mod serving;
+pub mod serving;
 
 use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter, Width};
 use modbus_server::{Counters, Outcome, Server};

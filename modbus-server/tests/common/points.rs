@@ -2,7 +2,7 @@
 
 use modbus_server::{Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut};
 
-/// Four tables from address 0 on; words above `MAX_WORD` are refused.
+/// Four tables from address 0 on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points {
     /// Coils.
@@ -17,6 +17,8 @@ pub struct Points {
     pub lacks: Vec<u8>,
     /// Coils and holding registers from here on cannot be written.
     pub read_only_from: u32,
+    /// Larger words are refused.
+    pub max_word: u16,
     /// If set, everything that has a right address and value is refused with it.
     pub state: Option<Exception>,
     /// Exception status, and the low byte of the diagnostic register.
@@ -48,7 +50,7 @@ pub fn object(id: u8) -> Option<Vec<u8>> {
     }
 }
 
-/// The largest word [`Points`] takes.
+/// The largest word that new [`Points`] take.
 pub const MAX_WORD: u16 = 0xFFF0;
 
 impl Points {
@@ -61,6 +63,7 @@ impl Points {
             input_words: vec![0; words],
             lacks: Vec::new(),
             read_only_from: u32::MAX,
+            max_word: MAX_WORD,
             state: None,
             status: 0x6D,
             server_id: vec![0x42],
@@ -138,7 +141,7 @@ impl DataModel for Points {
 
     fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         assert_eq!(usize::from(span.count()), words.count());
-        let good = words.iter().all(|word| word <= MAX_WORD);
+        let good = words.iter().all(|word| word <= self.max_word);
         self.check(span.end(), self.writable(self.words.len()), good)
     }
 

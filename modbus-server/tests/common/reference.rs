@@ -1,6 +1,6 @@
 //! A second unit, as plain as can be: what one should do, told independently of the crate.
 
-use super::{MAX_WORD, Points, UNIT, framed, lrc};
+use super::{Points, UNIT, framed, lrc};
 use modbus_server::line::Framing;
 
 /// A server and its counters.
@@ -299,9 +299,4 @@ pub fn judge_ascii(inside: &[u8]) -> Option<Vec<u8>> {
         .collect::<Option<Vec<u8>>>()?;
     let check = bytes.pop()?;
     (check == lrc(&bytes)).then_some(bytes)
-}
-
-/// Whether a word may be written.
-pub fn allowed(word: usize) -> bool {
-    word <= usize::from(MAX_WORD)
 }

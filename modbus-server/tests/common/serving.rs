@@ -1,7 +1,7 @@
 //! The reference's reading and writing of points.
 
 use super::Points;
-use super::reference::{allowed, identify};
+use super::reference::identify;
 
 /// Serves the PDU of a request that reads or writes points, or identification.
 pub fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
@@ -29,7 +29,7 @@ pub fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
             let now = usize::from(points.words[at]);
             let [and, or] = [3, 5].map(|from| field(pdu, from));
             let value = (now & and) | (or & (0xFFFF - and));
-            if !allowed(value) {
+            if !allowed(points, value) {
                 return Err(3);
             }
             points.words[at] = value as u16;
@@ -43,6 +43,10 @@ pub fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
 
 fn field(pdu: &[u8], at: usize) -> usize {
     pdu[at] as usize * 256 + pdu[at + 1] as usize
+}
+
+fn allowed(points: &Points, word: usize) -> bool {
+    word <= points.max_word as usize
 }
 
 fn writable(points: &Points, there: usize) -> usize {
@@ -99,7 +103,7 @@ fn write_one(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     if field(pdu, 1) >= writable(points, there) {
         return Err(2);
     }
-    if !bit && !allowed(field(pdu, 3)) {
+    if !bit && !allowed(points, field(pdu, 3)) {
         return Err(3);
     }
     points.state.map_or(Ok(()), |state| Err(state.code()))?;
@@ -136,7 +140,7 @@ fn write_many(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     }
     check_many(points, pdu, bits, if bits { 1968 } else { 123 })?;
     let count = field(pdu, 3);
-    if !bits && (0..count).any(|n| !allowed(field(pdu, 6 + 2 * n))) {
+    if !bits && (0..count).any(|n| !allowed(points, field(pdu, 6 + 2 * n))) {
         return Err(3);
     }
     points.state.map_or(Ok(()), |state| Err(state.code()))?;
