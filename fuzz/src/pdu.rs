@@ -5,10 +5,10 @@
 //! never answered.
 //!
 //! ```text
-//!   script: settings (1: ASCII), first read-only point, requests
+//!   script: settings (1: ASCII, the rest: which functions are missing), first read-only point, requests
 //!   request: tag, length, bytes
 //!     tag & 3:  0 a PDU to this unit  1 to all  2 unit and PDU as they come  3 so many bad frames
-//!     tag >> 5: the exception that the device's state calls for, from then on; 0 to 3: none
+//!     tag >> 5: the exception that the device's state calls for, from then on; 0 to 2: none
 //! ```
 
 use std::sync::LazyLock;
@@ -23,35 +23,51 @@ use crate::serving::serve;
 
 /// More bits than one write may hold, more words than one read may ask for, and ends within reach.
 static POINTS: LazyLock<Points> = LazyLock::new(|| {
-    let mut points = Points::new(2010, 130);
-    let bits = points.bits.iter_mut().zip(0_u32..);
-    bits.for_each(|(bit, n)| *bit = n * n % 7 < 3);
-    let words = points.words.iter_mut().zip(0_u16..);
-    words.for_each(|(word, n)| *word = n.wrapping_mul(0x9E37));
+    let mut points = Points::new(0, 0);
+    // Each table has other values, and other ends.
+    let bits = |count: u32, most| (0..count).map(move |n| n * n % 7 < most).collect();
+    let words = |count: u16, by| (0..count).map(move |n| n.wrapping_mul(by)).collect();
+    points.bits = bits(2010, 3);
+    points.input_bits = bits(2005, 2);
+    points.words = words(130, 0x9E37);
+    points.input_words = words(127, 0x79B9);
     points
 });
 
 /// Target `pdu`.
 pub fn run(input: &[u8]) {
     let mut script = Script::new(input);
-    let framing = if script.byte() & 1 == 0 {
+    let settings = script.byte();
+    let framing = if settings & 1 == 0 {
         Framing::Rtu
     } else {
         Framing::ASCII
     };
+    // The first function that is missing, and how many codes lie between it and the next.
+    let (first, step) = (settings >> 1 & 7, usize::from(settings >> 4));
     let points = Points {
+        lacks: match step {
+            0 => Vec::new(),
+            step => (first..0x30).step_by(step).collect(),
+        },
         read_only_from: u32::from(script.byte()),
         ..POINTS.clone()
     };
+    let server = Server::new(UNIT, framing);
     let mut unit = Unit {
-        server: Server::new(UNIT, framing),
+        server: if points.lacks.contains(&0x08) {
+            server.without_listen_only()
+        } else {
+            server
+        },
         reference: Reference::new(framing, points.clone()),
         line: LineCounters::ZERO,
         points,
     };
     while let Some(tag) = script.tag() {
         unit.set_state(match tag >> 5 {
-            0..=3 => None,
+            0..=2 => None,
+            3 => Some(Exception::GatewayPathUnavailable),
             4 => Some(Exception::ServerDeviceFailure),
             5 => Some(Exception::Acknowledge),
             6 => Some(Exception::ServerDeviceBusy),

@@ -2,7 +2,7 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::identification::ReadCode;
-use crate::{Exception, Head, Span};
+use crate::{Exception, Head, Span, Table};
 
 /// The answer to a request, settled but not yet carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,18 +14,22 @@ pub struct Decision {
     /// How the request fared, for the counters.
     pub outcome: Outcome,
     /// The request was to all units.
-    pub broadcast: bool,
+    pub(crate) broadcast: bool,
 }
 
 /// The second step of serving a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Work {
+pub struct Work(pub(crate) Job);
+
+/// What the second step does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Job {
     /// Nothing.
     None,
     /// Read these bits into the body.
-    ReadBits(Span),
+    ReadBits(Table, Span),
     /// Read these words into the body.
-    ReadWords(Span),
+    ReadWords(Table, Span),
     /// Write bits; they are packed in the request from byte `from` on.
     WriteBits {
         /// Where to.
@@ -76,10 +80,28 @@ pub enum Work {
 }
 
 impl Work {
-    /// Whether it writes points or registers.
+    /// Whether it writes coils or holding registers.
     #[inline]
     #[must_use]
     pub const fn writes(self) -> bool {
+        self.0.writes()
+    }
+
+    /// What it reads from the model's tables into the reply, if anything.
+    #[inline]
+    #[must_use]
+    pub const fn reads(self) -> Option<(Table, Span)> {
+        match self.0 {
+            Job::ReadBits(table, span) | Job::ReadWords(table, span) => Some((table, span)),
+            Job::WriteThenRead { read, .. } => Some((Table::HoldingRegisters, read)),
+            _ => None,
+        }
+    }
+}
+
+impl Job {
+    #[inline]
+    const fn writes(self) -> bool {
         matches!(
             self,
             Self::WriteBits { .. }
@@ -99,6 +121,7 @@ impl Work {
 
 /// How a request fared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Outcome {
     /// For another unit: not looked at, not counted.
     NotForUs,

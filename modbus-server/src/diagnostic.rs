@@ -5,7 +5,7 @@ use crate::line::Framing;
 
 /// A request of function 08 whose form is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Diagnostic {
+pub(crate) enum Diagnostic {
     /// 00: send the data back.
     Echo,
     /// 01: start communication anew, out of listen-only mode too.
@@ -38,9 +38,13 @@ impl Diagnostic {
     /// Decodes what follows the function code.
     ///
     /// # Errors
-    /// 01 for a sub-function that is not there (03 is only in ASCII mode); 03 for data, or a length,
-    /// that it cannot have.
-    pub(crate) fn decode(fields: &[u8], framing: Framing) -> Result<Self, Exception> {
+    /// 01 for a sub-function that is not there: 03 needs ASCII mode, 04 a server that
+    /// `can_listen_only`. 03 for data, or a length, that it cannot have.
+    pub(crate) fn decode(
+        fields: &[u8],
+        framing: Framing,
+        can_listen_only: bool,
+    ) -> Result<Self, Exception> {
         let &[high, sub, ref data @ ..] = fields else {
             return Err(Exception::IllegalDataValue);
         };
@@ -61,7 +65,7 @@ impl Diagnostic {
                 }
                 _ => return Err(Exception::IllegalDataValue),
             },
-            LISTEN_ONLY => Self::ListenOnly,
+            LISTEN_ONLY if can_listen_only => Self::ListenOnly,
             0x0A => Self::Clear,
             FIRST_COUNTER..=0x12 => Self::Counter(sub - FIRST_COUNTER),
             0x14 => Self::ClearOverruns,
@@ -93,7 +97,7 @@ mod tests {
         for sub in 0..=0x20 {
             for data in [[0, 0], [0xFF, 0], [0, 1], [1, 0], [0xFF, 0xFF]] {
                 for fields in [&[0, sub, data[0], data[1]][..], &[0, sub, data[0]]] {
-                    let decoded = Diagnostic::decode(fields, Framing::Rtu);
+                    let decoded = Diagnostic::decode(fields, Framing::Rtu, true);
                     let restarts = matches!(decoded, Ok(Diagnostic::Restart { .. }));
                     assert_eq!(Diagnostic::is_restart(fields), restarts, "{fields:02X?}");
                     assert_eq!(

@@ -37,7 +37,13 @@ impl Event {
     /// A request was dealt with, and answered with this exception, if any.
     pub(crate) const fn sent(exception: Option<Exception>, listening: bool) -> Self {
         let exception = match exception {
-            None => 0,
+            // The standard has a bit for 01 to 07 only.
+            None
+            | Some(
+                Exception::MemoryParityError
+                | Exception::GatewayPathUnavailable
+                | Exception::GatewayTargetDeviceFailedToRespond,
+            ) => 0,
             Some(
                 Exception::IllegalFunction
                 | Exception::IllegalDataAddress
@@ -152,6 +158,9 @@ mod tests {
             (Exception::Acknowledge, 0x44),
             (Exception::ServerDeviceBusy, 0x44),
             (Exception::NegativeAcknowledge, 0x48),
+            (Exception::MemoryParityError, 0x40),
+            (Exception::GatewayPathUnavailable, 0x40),
+            (Exception::GatewayTargetDeviceFailedToRespond, 0x40),
         ] {
             assert_eq!(Event::sent(Some(exception), false), Event(event));
         }

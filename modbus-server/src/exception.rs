@@ -1,8 +1,12 @@
 //! Exception codes.
 
+use core::error::Error;
+use core::fmt;
+
 /// Why a request is refused (V1.1b3 section 7). The reply carries the function code with bit 7 set
 /// and this code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Exception {
     /// 01: the function code is not one this server knows.
@@ -19,6 +23,12 @@ pub enum Exception {
     ServerDeviceBusy = 6,
     /// 07: it cannot be done. In V1.02 appendix A (counted as NAK), no longer in V1.1b3.
     NegativeAcknowledge = 7,
+    /// 08: the memory behind a file record failed its consistency check.
+    MemoryParityError = 8,
+    /// 0A: a gateway could not allocate a path to the unit.
+    GatewayPathUnavailable = 0x0A,
+    /// 0B: the unit behind a gateway did not respond.
+    GatewayTargetDeviceFailedToRespond = 0x0B,
 }
 
 impl Exception {
@@ -26,5 +36,40 @@ impl Exception {
     #[inline]
     pub const fn code(self) -> u8 {
         self as u8
+    }
+}
+
+impl fmt::Display for Exception {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = match self {
+            Self::IllegalFunction => "illegal function",
+            Self::IllegalDataAddress => "illegal data address",
+            Self::IllegalDataValue => "illegal data value",
+            Self::ServerDeviceFailure => "server device failure",
+            Self::Acknowledge => "acknowledge",
+            Self::ServerDeviceBusy => "server device busy",
+            Self::NegativeAcknowledge => "negative acknowledge",
+            Self::MemoryParityError => "memory parity error",
+            Self::GatewayPathUnavailable => "gateway path unavailable",
+            Self::GatewayTargetDeviceFailedToRespond => "gateway target device failed to respond",
+        };
+        write!(f, "exception {:02X}, {name}", self.code())
+    }
+}
+
+impl Error for Exception {}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::boxed::Box;
+    use std::string::ToString;
+
+    use super::*;
+
+    #[test]
+    fn an_exception_is_an_error_with_code_and_name() {
+        let error: Box<dyn Error> = Exception::GatewayPathUnavailable.into();
+        assert_eq!(error.to_string(), "exception 0A, gateway path unavailable");
     }
 }

@@ -2,6 +2,7 @@
 
 /// The functions this server has (V1.1b3 section 6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Function {
     /// 01 (6.1)

@@ -12,7 +12,7 @@ use crate::{Adu, DataModel, Exception};
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum ReadCode {
+pub(crate) enum ReadCode {
     /// 01: objects 00 to 02.
     Basic = 1,
     /// 02: objects 00 to 06.

@@ -34,39 +34,12 @@
 //!
 //! ```
 //! use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter};
-//! use modbus_server::{Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Words, WordsOut};
+//! use modbus_server::{Adu, Server, Tables};
 //!
-//! /// Ten registers, no bit points.
-//! struct Registers([u16; 10]);
+//! // The device: ten holding registers. One with rules of its own implements `DataModel`.
+//! let mut registers = [0x1111; 10];
+//! let mut tables = Tables { holding_registers: &mut registers, ..Tables::default() };
 //!
-//! impl DataModel for Registers {
-//!     fn check_read_bits(&self, _: Span) -> Result<(), Exception> {
-//!         Err(Exception::IllegalDataAddress)
-//!     }
-//!     fn check_write_bits(&self, _: Span, _: Bits<'_>) -> Result<(), Exception> {
-//!         Err(Exception::IllegalDataAddress)
-//!     }
-//!     fn check_read_words(&self, span: Span) -> Result<(), Exception> {
-//!         if span.end() <= 10 { Ok(()) } else { Err(Exception::IllegalDataAddress) }
-//!     }
-//!     fn check_write_words(&self, span: Span, _: Words<'_>) -> Result<(), Exception> {
-//!         self.check_read_words(span)
-//!     }
-//!     fn read_bits(&self, _: Span, _: &mut BitsOut<'_>) {}
-//!     fn write_bits(&mut self, _: Span, _: Bits<'_>) {}
-//!     fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
-//!         for address in span.addresses() {
-//!             out.push(self.0[usize::from(address)]);
-//!         }
-//!     }
-//!     fn write_words(&mut self, span: Span, words: Words<'_>) {
-//!         for (address, word) in span.addresses().zip(words.iter()) {
-//!             self.0[usize::from(address)] = word;
-//!         }
-//!     }
-//! }
-//!
-//! let mut registers = Registers([0x1111; 10]);
 //! let mut server = Server::new(17, Framing::Rtu);
 //! let (mut one, mut two) = (Adu::new(), Adu::new());
 //! let mut receiver = Receiver::rtu(17, false);
@@ -82,10 +55,10 @@
 //! assert!(server.answers(closed.adu));
 //! let mut transmitter = Transmitter::open(server.unit(), server.framing());
 //! assert_eq!(transmitter.next(), Next::Byte(0x11)); // goes before anything is decided
-//! let decision = server.decide(closed.adu, &registers);
+//! let decision = server.decide(closed.adu, &tables);
 //! transmitter.head(decision.reply.expect("it is answered"));
 //! server.commit(&decision, &closed.line);
-//! server.carry_out(&decision, closed.adu, &mut registers);
+//! server.carry_out(&decision, closed.adu, &mut tables);
 //! if let Some(adu) = transmitter.body(closed.adu) {
 //!     receiver.give_back(adu); // an exception or an echo has no body
 //! }
@@ -123,18 +96,20 @@ mod model;
 mod pdu;
 mod server;
 mod span;
+mod table;
+mod tables;
 mod words;
 
 pub use adu::Adu;
 pub use bits::{Bits, BitsOut};
 pub use counters::{Counters, LineCounters};
 pub use decision::{Decision, Outcome, Work};
-pub use diagnostic::Diagnostic;
 pub use exception::Exception;
 pub use function::Function;
 pub use head::Head;
-pub use identification::ReadCode;
 pub use model::DataModel;
 pub use server::{Answered, Committed, Decided, Request, Served, Server};
 pub use span::Span;
+pub use table::Table;
+pub use tables::Tables;
 pub use words::{Words, WordsOut};

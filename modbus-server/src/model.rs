@@ -1,57 +1,93 @@
 //! What the device around the server must bring.
 
-use crate::{Bits, BitsOut, Exception, Span, Words, WordsOut};
+use crate::{Bits, BitsOut, Exception, Function, Span, Table, Words, WordsOut};
 
 /// The points and registers of the device.
 ///
-/// Bits are read alike by functions 01 and 02, words by 03 and 04; function 16 reads a word to write
-/// it, and 17 reads words after writing some. The server has checked quantity,
-/// byte count and the form of values before it asks; a [`Span`] never wraps. The `check_` methods
-/// settle the rest, in the order of V1.1b3: address (02), then value range (03), then the state of
-/// the device (04, 06). They change nothing and may be called for a request that is then not
-/// carried out.
+/// Bits lie in the coils and the discrete inputs, words in the holding registers and the input
+/// registers. The methods that read get the [`Table`]: a model whose coils and discrete inputs are
+/// the same points, or whose holding and input registers are the same words, ignores it. Writes
+/// always go to the coils or the holding registers. Every table is empty until the model says
+/// otherwise: one without bits leaves the methods about bits out.
 ///
-/// The other methods cannot refuse. They are called only after the matching check said yes, but
-/// possibly some time after it: what has become impossible meanwhile is theirs to bear (write what
-/// is still sensible, read what is there). One call is one request: a read sees one moment, a write
-/// is seen as a whole.
+/// The server has checked quantity, byte count and the form of values before it asks; a [`Span`]
+/// never wraps. The `check_` methods decide the rest, in the order of V1.1b3: address (02), then
+/// value range (03), then the state of the device (04, 06). They change nothing and may be called
+/// for a request that is then not carried out. Function 16 reads a holding register to write it;
+/// function 17 writes some and then reads some.
+///
+/// The methods that read and write cannot refuse. They are called only after the matching check
+/// succeeded, but possibly some time later. If the state has changed since the check, write what is
+/// still valid and read what is there. One call is one request: a read sees one moment, a write is
+/// seen as a whole.
 pub trait DataModel {
-    /// May these bits be read (functions 01 and 02; up to 2000)?
+    /// Whether the device has this function. The server answers a function that the device does not
+    /// have with exception 01, before any other check. The default is all functions.
     ///
-    /// # Errors
-    /// The exception to answer with.
-    fn check_read_bits(&self, span: Span) -> Result<(), Exception>;
+    /// A model without function 08 needs a server
+    /// [without listen-only mode](crate::Server::without_listen_only).
+    fn has(&self, function: Function) -> bool {
+        let _ = function;
+        true
+    }
 
-    /// May these words be read (functions 03, 04 and 17; up to 125)?
+    /// Checks whether these bits of `table` can be read (functions 01 and 02; up to 2000).
     ///
     /// # Errors
-    /// The exception to answer with.
-    fn check_read_words(&self, span: Span) -> Result<(), Exception>;
+    /// The exception to answer with. The default is 02 for every span.
+    fn check_read_bits(&self, table: Table, span: Span) -> Result<(), Exception> {
+        let _ = (table, span);
+        Err(Exception::IllegalDataAddress)
+    }
 
-    /// May these bits be written (functions 05 and 0F; up to 1968)? `bits` holds as many as `span`.
+    /// Checks whether these words of `table` can be read (functions 03, 04 and 17; up to 125).
     ///
     /// # Errors
-    /// The exception to answer with; then nothing is written.
-    fn check_write_bits(&self, span: Span, bits: Bits<'_>) -> Result<(), Exception>;
+    /// The exception to answer with. The default is 02 for every span.
+    fn check_read_words(&self, table: Table, span: Span) -> Result<(), Exception> {
+        let _ = (table, span);
+        Err(Exception::IllegalDataAddress)
+    }
 
-    /// May these words be written (functions 06, 10, 16 and 17; up to 123)? `words` holds as many as
-    /// `span`.
+    /// Checks whether these coils can be written (functions 05 and 0F; up to 1968). `bits` holds as
+    /// many as `span`.
     ///
     /// # Errors
-    /// The exception to answer with; then nothing is written.
-    fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception>;
+    /// The exception to answer with; then nothing is written. The default is 02 for every span.
+    fn check_write_bits(&self, span: Span, bits: Bits<'_>) -> Result<(), Exception> {
+        let _ = (span, bits);
+        Err(Exception::IllegalDataAddress)
+    }
+
+    /// Checks whether these holding registers can be written (functions 06, 10, 16 and 17; up to
+    /// 123). `words` holds as many as `span`.
+    ///
+    /// # Errors
+    /// The exception to answer with; then nothing is written. The default is 02 for every span.
+    fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
+        let _ = (span, words);
+        Err(Exception::IllegalDataAddress)
+    }
 
     /// Pushes every bit of `span` in order. What is not pushed reads as 0.
-    fn read_bits(&self, span: Span, out: &mut BitsOut<'_>);
+    fn read_bits(&self, table: Table, span: Span, out: &mut BitsOut<'_>) {
+        let _ = (table, span, out);
+    }
 
     /// Pushes every word of `span` in order. What is not pushed reads as 0.
-    fn read_words(&self, span: Span, out: &mut WordsOut<'_>);
+    fn read_words(&self, table: Table, span: Span, out: &mut WordsOut<'_>) {
+        let _ = (table, span, out);
+    }
 
-    /// Writes every bit of `span`.
-    fn write_bits(&mut self, span: Span, bits: Bits<'_>);
+    /// Writes every coil of `span`.
+    fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
+        let _ = (span, bits);
+    }
 
-    /// Writes every word of `span`.
-    fn write_words(&mut self, span: Span, words: Words<'_>);
+    /// Writes every holding register of `span`.
+    fn write_words(&mut self, span: Span, words: Words<'_>) {
+        let _ = (span, words);
+    }
 
     /// The eight bits of function 07 (V1.1b3 6.7), which are the device's own to name.
     fn exception_status(&self) -> u8 {

@@ -1,8 +1,6 @@
 //! Decoding of request PDUs: quantities, byte counts, lengths and value forms, all of them
 //! exception 03, then the wrap at 16 bits (02). What the addresses mean is the model's business.
 
-use crate::diagnostic::Diagnostic;
-use crate::line::Framing;
 use crate::{Bits, Exception, Function, Span, Words};
 
 /// The most bits one read may ask for (V1.1b3 6.1).
@@ -50,7 +48,8 @@ pub(crate) enum Request<'a> {
         read: Span,
     },
     ExceptionStatus,
-    Diagnose(Diagnostic),
+    /// The sub-function and what follows it. What they mean depends on the server's modes.
+    Diagnose(&'a [u8]),
     EventCounter,
     EventLog,
     ServerId,
@@ -60,16 +59,12 @@ pub(crate) enum Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// Decodes a request by its function code and the bytes after it.
+    /// Decodes a request by its function and the bytes after the function code.
     ///
     /// # Errors
     /// The exception to answer with.
-    pub(crate) fn decode(
-        function: u8,
-        fields: &'a [u8],
-        framing: Framing,
-    ) -> Result<Self, Exception> {
-        match Function::from_code(function).ok_or(Exception::IllegalFunction)? {
+    pub(crate) fn decode(function: Function, fields: &'a [u8]) -> Result<Self, Exception> {
+        match function {
             Function::ReadCoils | Function::ReadDiscreteInputs => {
                 read(fields, MAX_READ_BITS).map(Self::ReadBits)
             }
@@ -82,7 +77,7 @@ impl<'a> Request<'a> {
             Function::WriteMultipleRegisters => write_words(fields),
             Function::MaskWriteRegister => mask_word(fields),
             Function::ReadWriteMultipleRegisters => write_then_read(fields),
-            Function::Diagnostics => Diagnostic::decode(fields, framing).map(Self::Diagnose),
+            Function::Diagnostics => Ok(Self::Diagnose(fields)),
             Function::ReadExceptionStatus => alone(fields, Self::ExceptionStatus),
             Function::GetCommEventCounter => alone(fields, Self::EventCounter),
             Function::GetCommEventLog => alone(fields, Self::EventLog),
@@ -252,7 +247,8 @@ mod tests {
             fields[4] = count * 2;
             fields
         };
-        let decode = |fields: &[u8]| Request::decode(0x10, fields, Framing::Rtu).map(|_| ());
+        let decode =
+            |fields: &[u8]| Request::decode(Function::WriteMultipleRegisters, fields).map(|_| ());
         assert_eq!(decode(&fields(124)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(123)[..5 + 246]), Ok(()));
 
@@ -263,7 +259,9 @@ mod tests {
             fields[8] = count * 2;
             fields
         };
-        let decode = |fields: &[u8]| Request::decode(0x17, fields, Framing::Rtu).map(|_| ());
+        let decode = |fields: &[u8]| {
+            Request::decode(Function::ReadWriteMultipleRegisters, fields).map(|_| ())
+        };
         assert_eq!(decode(&fields(122)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(121)[..9 + 242]), Ok(()));
     }
@@ -274,7 +272,7 @@ mod tests {
         let [single, multiple] = [SINGLE_FROM, MULTIPLE_FROM].map(|from| usize::from(from) - 2);
         let fields = [0, 9, 0xFF, 0x00];
         let Ok(Request::WriteWords { span, words, from }) =
-            Request::decode(0x06, &fields, Framing::Rtu)
+            Request::decode(Function::WriteSingleRegister, &fields)
         else {
             panic!("function 06");
         };
@@ -282,7 +280,7 @@ mod tests {
         assert!(words.iter().eq(Words::new(&fields[single..]).iter()));
         let fields = [0, 9, 0, 2, 1, 0b10];
         let Ok(Request::WriteBits { bits, from, .. }) =
-            Request::decode(0x0F, &fields, Framing::Rtu)
+            Request::decode(Function::WriteMultipleCoils, &fields)
         else {
             panic!("function 0F");
         };
@@ -290,7 +288,7 @@ mod tests {
         assert!(bits.iter().eq([false, true]));
         let fields = [0, 9, 0, 2, 0, 7, 0, 1, 2, 0x12, 0x34];
         let Ok(Request::WriteThenRead { words, from, .. }) =
-            Request::decode(0x17, &fields, Framing::Rtu)
+            Request::decode(Function::ReadWriteMultipleRegisters, &fields)
         else {
             panic!("function 17");
         };

@@ -4,7 +4,7 @@ mod common;
 
 use common::{MAX_WORD, Points, UNIT, Unit, pack, pdu, write_bits, write_words};
 use modbus_server::line::Framing;
-use modbus_server::{Adu, Bits, BitsOut, DataModel, Exception, Server, Span, Words, WordsOut};
+use modbus_server::{Adu, BitsOut, DataModel, Exception, Server, Span, Table, WordsOut};
 
 /// As many points as there are addresses.
 fn full() -> Unit {
@@ -15,10 +15,10 @@ fn full() -> Unit {
 fn bits_are_packed_the_first_lowest_and_the_padding_is_zero() {
     for function in [0x01, 0x02] {
         let mut unit = full();
-        unit.points.bits[20..31].copy_from_slice(&[
+        unit.points.bits_of(function)[20..31].copy_from_slice(&[
             true, false, true, true, false, false, true, true, true, true, false,
         ]);
-        unit.points.bits[31] = true; // not asked for: must not show up in the padding
+        unit.points.bits_of(function)[31] = true; // not asked for: must not show up in the padding
         let reply = unit.request(&pdu(function, &[20, 11])).unwrap();
         assert_eq!(reply, [function, 2, 0b1100_1101, 0b0000_0011]);
     }
@@ -29,14 +29,14 @@ fn up_to_2000_bits_are_read_at_once() {
     for function in [0x01, 0x02] {
         let mut unit = full();
         unit.points
-            .bits
+            .bits_of(function)
             .iter_mut()
             .skip(1)
             .step_by(3)
             .for_each(|bit| *bit = true);
         let reply = unit.request(&pdu(function, &[0, 2000])).unwrap();
         assert_eq!(reply[..2], [function, 250]);
-        assert_eq!(reply[2..], pack(&unit.points.bits[..2000]));
+        assert_eq!(reply[2..], pack(&unit.points.bits_of(function)[..2000]));
         assert_eq!(unit.refused(&pdu(function, &[0, 2001])), 3);
         assert_eq!(unit.refused(&pdu(function, &[0, 0xFFFF])), 3);
         assert_eq!(unit.refused(&pdu(function, &[0, 0])), 3);
@@ -47,8 +47,8 @@ fn up_to_2000_bits_are_read_at_once() {
 fn words_are_sent_high_byte_first() {
     for function in [0x03, 0x04] {
         let mut unit = full();
-        unit.points.words[0x1234] = 0xABCD;
-        unit.points.words[0x1235] = 0x0102;
+        unit.points.words_of(function)[0x1234] = 0xABCD;
+        unit.points.words_of(function)[0x1235] = 0x0102;
         let reply = unit.request(&pdu(function, &[0x1234, 2])).unwrap();
         assert_eq!(reply, [function, 4, 0xAB, 0xCD, 0x01, 0x02]);
     }
@@ -58,10 +58,10 @@ fn words_are_sent_high_byte_first() {
 fn up_to_125_words_are_read_at_once() {
     for function in [0x03, 0x04] {
         let mut unit = full();
-        (0..125).for_each(|n| unit.points.words[n] = (n * 0x0203) as u16);
+        (0..125).for_each(|n| unit.points.words_of(function)[n] = (n * 0x0203) as u16);
         let reply = unit.request(&pdu(function, &[0, 125])).unwrap();
         assert_eq!(reply[..2], [function, 250]);
-        let bytes = unit.points.words[..125]
+        let bytes = unit.points.words_of(function)[..125]
             .iter()
             .flat_map(|word| word.to_be_bytes());
         assert!(reply[2..].iter().copied().eq(bytes));
@@ -230,27 +230,19 @@ fn a_model_that_gives_too_little_or_too_much_leaks_nothing() {
     /// Two words whatever is asked for, and more bits than fit.
     struct Careless;
     impl DataModel for Careless {
-        fn check_read_bits(&self, _: Span) -> Result<(), Exception> {
+        fn check_read_bits(&self, _: Table, _: Span) -> Result<(), Exception> {
             Ok(())
         }
-        fn check_read_words(&self, _: Span) -> Result<(), Exception> {
+        fn check_read_words(&self, _: Table, _: Span) -> Result<(), Exception> {
             Ok(())
         }
-        fn check_write_bits(&self, _: Span, _: Bits<'_>) -> Result<(), Exception> {
-            Ok(())
-        }
-        fn check_write_words(&self, _: Span, _: Words<'_>) -> Result<(), Exception> {
-            Ok(())
-        }
-        fn read_bits(&self, _: Span, out: &mut BitsOut<'_>) {
+        fn read_bits(&self, _: Table, _: Span, out: &mut BitsOut<'_>) {
             (0..100).for_each(|_| out.push(true));
         }
-        fn read_words(&self, _: Span, out: &mut WordsOut<'_>) {
+        fn read_words(&self, _: Table, _: Span, out: &mut WordsOut<'_>) {
             out.push(0x0101);
             out.push(0x0202);
         }
-        fn write_bits(&mut self, _: Span, _: Bits<'_>) {}
-        fn write_words(&mut self, _: Span, _: Words<'_>) {}
     }
 
     let mut server = Server::new(UNIT, Framing::Rtu);

@@ -82,7 +82,12 @@ fn address_comes_before_value_range() {
 
 #[test]
 fn value_range_comes_before_state() {
-    for state in [Exception::ServerDeviceFailure, Exception::ServerDeviceBusy] {
+    for state in [
+        Exception::ServerDeviceFailure,
+        Exception::ServerDeviceBusy,
+        Exception::MemoryParityError,
+        Exception::GatewayTargetDeviceFailedToRespond,
+    ] {
         let mut unit = ten();
         unit.points.state = Some(state);
         assert_eq!(unit.refused(&pdu(0x06, &[0, MAX_WORD + 1])), 3);

@@ -22,20 +22,31 @@ const STATES: &[Exception] = &[
     Exception::Acknowledge,
     Exception::ServerDeviceBusy,
     Exception::NegativeAcknowledge,
+    Exception::MemoryParityError,
+    Exception::GatewayPathUnavailable,
+    Exception::GatewayTargetDeviceFailedToRespond,
 ];
 
+/// Four tables of different lengths, each about as long as one request may ask for.
 fn points() -> impl Strategy<Value = Points> {
+    let bits = (vec(any::<bool>(), BITS), vec(any::<bool>(), BITS - 5));
+    let words = (vec(any::<u16>(), WORDS), vec(any::<u16>(), WORDS - 3));
+    let lacks = prop_oneof![3 => Just(Vec::new()), 1 => vec(1_u8..=0x2B, 1..20)];
     (
-        vec(any::<bool>(), BITS),
-        vec(any::<u16>(), WORDS),
+        bits,
+        words,
         100_u32..140,
         prop::option::weighted(0.2, prop::sample::select(STATES)),
+        lacks,
     )
-        .prop_map(|(bits, words, read_only_from, state)| Points {
-            bits,
-            words,
+        .prop_map(|(bits, words, read_only_from, state, lacks)| Points {
+            bits: bits.0,
+            input_bits: bits.1,
+            words: words.0,
+            input_words: words.1,
             read_only_from,
             state,
+            lacks,
             ..Points::new(0, 0)
         })
 }
@@ -234,6 +245,7 @@ proptest! {
             prop_assert_eq!(unit.counters().as_words(), counters(&ear.server));
         }
         unit.points.state = None;
+        unit.points.lacks.clear();
         unit.must_answer();
     }
 
@@ -269,7 +281,7 @@ proptest! {
         let count = bits.len() as u16;
         let echo = unit.request(&write_bits(start, &bits));
         prop_assert_eq!(echo, Some(pdu(0x0F, &[start, count])));
-        let reply = unit.request(&pdu(0x02, &[start, count])).unwrap();
+        let reply = unit.request(&pdu(0x01, &[start, count])).unwrap();
         prop_assert_eq!(&reply[2..], pack(&bits));
     }
 }

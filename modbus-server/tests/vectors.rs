@@ -121,24 +121,23 @@ fn the_standard_s_own_examples() {
         prepare(&mut unit.points);
         assert_eq!(unit.request(&hex(request)), Some(hex(reply)), "{request}");
     };
-    let bits = |points: &mut Points, start: usize, bytes: &[u8]| {
-        for (index, bit) in points.bits[start..start + bytes.len() * 8]
-            .iter_mut()
-            .enumerate()
-        {
+    let bits = |table: &mut [bool], start: usize, bytes: &[u8]| {
+        for (index, bit) in table[start..][..bytes.len() * 8].iter_mut().enumerate() {
             *bit = bytes[index / 8] >> (index % 8) & 1 != 0;
         }
     };
     pdus("01 0013 0013", "01 03 CD 6B 05", &|points| {
-        bits(points, 0x13, &[0xCD, 0x6B, 0x05]);
+        bits(&mut points.bits, 0x13, &[0xCD, 0x6B, 0x05]);
     });
     pdus("02 00C4 0016", "02 03 AC DB 35", &|points| {
-        bits(points, 0xC4, &[0xAC, 0xDB, 0x35]);
+        bits(&mut points.input_bits, 0xC4, &[0xAC, 0xDB, 0x35]);
     });
     pdus("03 006B 0003", "03 06 022B 0000 0064", &|points| {
         points.words[0x6B..0x6E].copy_from_slice(&[0x022B, 0, 0x64]);
     });
-    pdus("04 0008 0001", "04 02 000A", &|points| points.words[8] = 10);
+    pdus("04 0008 0001", "04 02 000A", &|points| {
+        points.input_words[8] = 10;
+    });
     pdus("05 00AC FF00", "05 00AC FF00", &|_| ());
     pdus("06 0001 0003", "06 0001 0003", &|_| ());
     pdus("0F 0013 000A 02 CD01", "0F 0013 000A", &|_| ());

@@ -23,7 +23,7 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Words, WordsOut, Work};
+use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Table, Words, WordsOut, Work};
 use modio_drivers::{CHANNELS, ChannelSettings, Kind, Range, Scale};
 use register_map::{codes::Command, configuration, counters, fault, state as state_map};
 
@@ -136,9 +136,9 @@ impl Device {
     /// Whether this work shows the line's counters, which are to be put into the state before then.
     #[must_use]
     pub const fn shows_counters(work: &Work) -> bool {
-        match work {
-            Work::ReadWords(span) | Work::WriteThenRead { read: span, .. } => {
-                matches!(Block::of(*span), Block::State)
+        match work.reads() {
+            Some((Table::HoldingRegisters | Table::InputRegisters, span)) => {
+                matches!(Block::of(span), Block::State)
             }
             _ => false,
         }
@@ -203,12 +203,13 @@ fn check_rules(rules: &'static [register_map::Rule], span: Span) -> Result<(), E
     }
 }
 
+/// Functions 01 and 02 read the same bits, 03 and 04 the same words.
 impl DataModel for Device {
-    fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
+    fn check_read_bits(&self, _: Table, span: Span) -> Result<(), Exception> {
         self.points.check_read_bits(span)
     }
 
-    fn check_read_words(&self, span: Span) -> Result<(), Exception> {
+    fn check_read_words(&self, _: Table, span: Span) -> Result<(), Exception> {
         match Block::of(span) {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
@@ -237,11 +238,11 @@ impl DataModel for Device {
         }
     }
 
-    fn read_bits(&self, span: Span, out: &mut BitsOut<'_>) {
+    fn read_bits(&self, _: Table, span: Span, out: &mut BitsOut<'_>) {
         self.points.read_bits(span, out);
     }
 
-    fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
+    fn read_words(&self, _: Table, span: Span, out: &mut WordsOut<'_>) {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),

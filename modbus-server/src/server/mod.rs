@@ -5,6 +5,7 @@ mod settle;
 mod tally;
 mod work;
 
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
 use crate::line::Framing;
@@ -26,6 +27,8 @@ pub struct Server {
     framing: Framing,
     /// Function 08, sub-function 04, was obeyed, and 01 not since then.
     listen_only: bool,
+    /// Function 08, sub-function 04, can be obeyed.
+    can_listen_only: bool,
     /// The line's counters as last seen, and as they were when they were last cleared.
     line: LineCounters,
     cleared: LineCounters,
@@ -56,11 +59,25 @@ impl Server {
             unit,
             framing,
             listen_only: false,
+            can_listen_only: true,
             line: LineCounters::ZERO,
             cleared: LineCounters::ZERO,
             cleared_bits: 0,
             tally: Tally::ZERO,
             log: EventLog::new(),
+        }
+    }
+
+    /// The same server without listen-only mode (function 08, sub-function 04, which silences the
+    /// unit until sub-function 01 restarts it): the request for it is answered with exception 01.
+    ///
+    /// A server whose model does not [have](DataModel::has) function 08 must be without it:
+    /// [`answers`](Self::answers) does not ask the model, and listen-only mode is never answered.
+    #[must_use]
+    pub const fn without_listen_only(self) -> Self {
+        Self {
+            can_listen_only: false,
+            ..self
         }
     }
 
@@ -111,7 +128,8 @@ impl Server {
         }
         if broadcast {
             Hearing::Broadcast
-        } else if diagnostics && Diagnostic::is_listen_only(request.from(2)) {
+        } else if self.can_listen_only && diagnostics && Diagnostic::is_listen_only(request.from(2))
+        {
             Hearing::Silent
         } else {
             Hearing::Answered
@@ -125,7 +143,7 @@ impl Server {
         let broadcast = unit == BROADCAST;
         let silence = |outcome| Decision {
             reply: None,
-            work: Work::None,
+            work: Work(Job::None),
             outcome,
             broadcast,
         };
@@ -133,20 +151,20 @@ impl Server {
             Hearing::Dismissed(outcome) => return silence(outcome),
             hearing => hearing,
         };
-        let settled = settle::settle(unit, function, request.from(2), self.framing, model);
+        let settled = settle::settle(self, function, request.from(2), model);
         let (head, work, outcome) = match settled {
             Ok((_, work)) if broadcast && !work.can_be_broadcast() => {
                 return silence(Outcome::NoEffect);
             }
             Ok((head, work)) => (head, work, Outcome::Accepted),
             Err(exception) => {
-                let head = Head::exception(unit, function, exception);
-                (head, Work::None, Outcome::Refused(exception))
+                let head = Head::exception(self.unit, function, exception);
+                (head, Job::None, Outcome::Refused(exception))
             }
         };
         Decision {
             reply: (hearing == Hearing::Answered).then_some(head),
-            work,
+            work: Work(work),
             outcome,
             broadcast,
         }

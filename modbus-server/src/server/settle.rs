@@ -1,48 +1,62 @@
 //! The decision: is the request right, does the model agree, how does the reply begin.
 
+use super::Server;
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
-use crate::line::Framing;
 use crate::pdu::Request;
-use crate::{DataModel, Exception, Head, Span, Words, WordsOut, Work, identification};
+use crate::{DataModel, Exception, Function, Head, Span, Table, Words, WordsOut, identification};
 
-/// The start of the reply, and the work, of a request that is accepted. `fields` are what follows
-/// the function code.
+/// The start of the reply, and the work, of an accepted request. `fields` are what follows
+/// the function code `function`.
 ///
 /// # Errors
 /// The exception to answer with.
 pub(super) fn settle(
-    unit: u8,
+    server: &Server,
     function: u8,
     fields: &[u8],
-    framing: Framing,
     model: &impl DataModel,
-) -> Result<(Head, Work), Exception> {
+) -> Result<(Head, Job), Exception> {
+    let unit = server.unit;
     let plain = Head::plain(unit, function);
-    Ok(match Request::decode(function, fields, framing)? {
+    let known = match Function::from_code(function) {
+        Some(known) if model.has(known) => known,
+        _ => return Err(Exception::IllegalFunction),
+    };
+    Ok(match Request::decode(known, fields)? {
         Request::ReadBits(span) => {
-            model.check_read_bits(span)?;
+            let table = match known {
+                Function::ReadCoils => Table::Coils,
+                _ => Table::DiscreteInputs,
+            };
+            model.check_read_bits(table, span)?;
             // At most 2000 / 8.
             let head = Head::read(unit, function, span.count().div_ceil(8) as u8);
-            (head, Work::ReadBits(span))
+            (head, Job::ReadBits(table, span))
         }
         Request::ReadWords(span) => {
-            model.check_read_words(span)?;
-            (read_words(unit, function, span), Work::ReadWords(span))
+            let table = match known {
+                Function::ReadHoldingRegisters => Table::HoldingRegisters,
+                _ => Table::InputRegisters,
+            };
+            model.check_read_words(table, span)?;
+            let head = read_words(unit, function, span);
+            (head, Job::ReadWords(table, span))
         }
         Request::WriteBits { span, bits, from } => {
             model.check_write_bits(span, bits)?;
             let head = Head::echo(unit, function, first(fields)?);
-            (head, Work::WriteBits { span, from })
+            (head, Job::WriteBits { span, from })
         }
         Request::WriteWords { span, words, from } => {
             model.check_write_words(span, words)?;
             let head = Head::echo(unit, function, first(fields)?);
-            (head, Work::WriteWords { span, from })
+            (head, Job::WriteWords { span, from })
         }
         Request::MaskWord { address, and, or } => {
             let value = masked(address, and, or, model)?;
             let head = Head::masks(unit, function, first(fields)?);
-            (head, Work::WriteMasked { address, value })
+            (head, Job::WriteMasked { address, value })
         }
         Request::WriteThenRead {
             write,
@@ -52,33 +66,32 @@ pub(super) fn settle(
         } => {
             first_of(
                 model.check_write_words(write, words),
-                model.check_read_words(read),
+                model.check_read_words(Table::HoldingRegisters, read),
             )?;
             let head = read_words(unit, function, read);
-            (head, Work::WriteThenRead { write, from, read })
+            (head, Job::WriteThenRead { write, from, read })
         }
-        Request::ExceptionStatus => (plain, Work::ExceptionStatus),
-        Request::Diagnose(diagnostic) => diagnose(unit, function, fields, diagnostic)?,
-        Request::EventCounter => (plain, Work::EventCounter),
-        Request::EventLog => (plain, Work::EventLog),
-        Request::ServerId => (plain, Work::ServerId),
+        Request::ExceptionStatus => (plain, Job::ExceptionStatus),
+        Request::Diagnose(fields) => {
+            let Server {
+                framing,
+                can_listen_only,
+                ..
+            } = *server;
+            let diagnostic = Diagnostic::decode(fields, framing, can_listen_only)?;
+            // The reply begins as the request does; what follows is the request's, or replaces it.
+            let head = Head::in_place(unit, function, first(fields)?);
+            (head, Job::Diagnose(diagnostic))
+        }
+        Request::EventCounter => (plain, Job::EventCounter),
+        Request::EventLog => (plain, Job::EventLog),
+        Request::ServerId => (plain, Job::ServerId),
         Request::Identify(fields) => {
             let (code, object) = identification::decode(fields, model)?;
             let head = Head::before(unit, function, [identification::MEI_TYPE, code as u8]);
-            (head, Work::Identify { code, object })
+            (head, Job::Identify { code, object })
         }
     })
-}
-
-/// The reply begins as the request does; what follows is the request's, or is put in its place.
-fn diagnose(
-    unit: u8,
-    function: u8,
-    fields: &[u8],
-    diagnostic: Diagnostic,
-) -> Result<(Head, Work), Exception> {
-    let head = Head::in_place(unit, function, first(fields)?);
-    Ok((head, Work::Diagnose(diagnostic)))
 }
 
 fn read_words(unit: u8, function: u8, span: Span) -> Head {
@@ -101,7 +114,7 @@ fn first<const N: usize>(fields: &[u8]) -> Result<[u8; N], Exception> {
 fn masked(address: u16, and: u16, or: u16, model: &impl DataModel) -> Result<u16, Exception> {
     let span = Span::single(address);
     let mut bytes = [0; 2];
-    if let Err(unreadable) = model.check_read_words(span) {
+    if let Err(unreadable) = model.check_read_words(Table::HoldingRegisters, span) {
         // What would be written is not known, so that only the address can be worse.
         let write = model.check_write_words(span, Words::new(&bytes));
         return Err(match write {
@@ -109,7 +122,8 @@ fn masked(address: u16, and: u16, or: u16, model: &impl DataModel) -> Result<u16
             _ => unreadable,
         });
     }
-    model.read_words(span, &mut WordsOut::new(&mut bytes));
+    let mut out = WordsOut::new(&mut bytes);
+    model.read_words(Table::HoldingRegisters, span, &mut out);
     let value = (u16::from_be_bytes(bytes) & and) | (or & !and);
     model.check_write_words(span, Words::new(&value.to_be_bytes()))?;
     Ok(value)

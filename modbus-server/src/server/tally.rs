@@ -2,9 +2,10 @@
 
 use super::Server;
 use crate::counters::count;
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::events::{Event, EventLog};
-use crate::{Decision, Exception, LineCounters, Outcome, Work};
+use crate::{Decision, Exception, LineCounters, Outcome};
 
 /// The server's own counters.
 #[derive(Debug)]
@@ -49,7 +50,7 @@ impl Server {
         match decision.outcome {
             // "Not incremented for exception responses, poll commands, or fetch event counter
             // commands" (6.9), of which the log is one: its count is that of function 0B (6.10).
-            Outcome::Accepted if matches!(decision.work, Work::EventCounter | Work::EventLog) => {}
+            Outcome::Accepted if matches!(decision.work.0, Job::EventCounter | Job::EventLog) => {}
             Outcome::Accepted => count(&mut tally.events),
             Outcome::Refused(exception) => {
                 count(&mut tally.exceptions);
@@ -92,7 +93,7 @@ impl Server {
             _ => None,
         };
         self.log.push(Event::sent(exception, self.listen_only));
-        let Work::Diagnose(diagnostic) = decision.work else {
+        let Job::Diagnose(diagnostic) = decision.work.0 else {
             return;
         };
         match diagnostic {

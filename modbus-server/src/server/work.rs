@@ -1,8 +1,11 @@
 //! The work: points and registers written, the body of the reply put together.
 
 use super::Server;
+use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
-use crate::{Adu, Bits, BitsOut, DataModel, Decision, Span, Words, WordsOut, Work, identification};
+use crate::{
+    Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, identification,
+};
 
 /// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
 const NOT_BUSY: [u8; 2] = [0x00, 0x00];
@@ -17,47 +20,47 @@ impl Server {
     /// has a body ([`Head::has_body`](crate::Head::has_body)), `adu` holds it
     /// ([`Head::body_in`](crate::Head::body_in)).
     pub fn carry_out(&mut self, decision: &Decision, adu: &mut Adu, model: &mut impl DataModel) {
-        match decision.work {
-            Work::None => {}
-            Work::ReadBits(span) => {
+        match decision.work.0 {
+            Job::None => {}
+            Job::ReadBits(table, span) => {
                 let bytes = adu.resize(usize::from(span.count().div_ceil(8)));
-                model.read_bits(span, &mut BitsOut::new(bytes, span.count()));
+                model.read_bits(table, span, &mut BitsOut::new(bytes, span.count()));
             }
-            Work::ReadWords(span) => read_words(span, adu, model),
-            Work::WriteBits { span, from } => {
+            Job::ReadWords(table, span) => read_words(table, span, adu, model),
+            Job::WriteBits { span, from } => {
                 model.write_bits(span, Bits::new(adu.from(from), span.count()));
             }
-            Work::WriteWords { span, from } => {
+            Job::WriteWords { span, from } => {
                 model.write_words(span, words(adu, span, from));
             }
-            Work::WriteMasked { address, value } => {
+            Job::WriteMasked { address, value } => {
                 let value = value.to_be_bytes();
                 model.write_words(Span::single(address), Words::new(&value));
             }
-            Work::WriteThenRead { write, from, read } => {
+            Job::WriteThenRead { write, from, read } => {
                 model.write_words(write, words(adu, write, from));
-                read_words(read, adu, model);
+                read_words(Table::HoldingRegisters, read, adu, model);
             }
-            Work::ExceptionStatus => body(adu, &[model.exception_status()]),
-            Work::Diagnose(Diagnostic::Register) => {
+            Job::ExceptionStatus => body(adu, &[model.exception_status()]),
+            Job::Diagnose(Diagnostic::Register) => {
                 let register = model.diagnostic_register();
                 self.cleared_bits &= register;
                 diagnostic_data(adu, register & !self.cleared_bits);
             }
-            Work::Diagnose(Diagnostic::Clear) => {
+            Job::Diagnose(Diagnostic::Clear) => {
                 self.cleared_bits = model.diagnostic_register();
             }
-            Work::Diagnose(Diagnostic::Counter(index)) => {
+            Job::Diagnose(Diagnostic::Counter(index)) => {
                 let counter = self.counters().as_words().get(usize::from(index)).copied();
                 diagnostic_data(adu, counter.unwrap_or_default());
             }
             // The reply is the request as it is; the rest comes after it.
-            Work::Diagnose(_) => {}
-            Work::EventCounter => {
+            Job::Diagnose(_) => {}
+            Job::EventCounter => {
                 body(adu, &NOT_BUSY);
                 adu.extend(&self.tally.events.to_be_bytes());
             }
-            Work::EventLog => {
+            Job::EventLog => {
                 // Up to 6 + 64.
                 body(adu, &[6 + self.log.count()]);
                 adu.extend(&NOT_BUSY);
@@ -65,7 +68,7 @@ impl Server {
                 adu.extend(&self.counters().bus_messages.to_be_bytes());
                 self.log.append_to(adu);
             }
-            Work::ServerId => {
+            Job::ServerId => {
                 let id = model.server_id();
                 let id = id.get(..MAX_SERVER_ID).unwrap_or(id);
                 // Up to 251.
@@ -73,7 +76,7 @@ impl Server {
                 adu.extend(id);
                 adu.extend(&[if model.is_running() { 0xFF } else { 0x00 }]);
             }
-            Work::Identify { code, object } => identification::fill(code, object, model, adu),
+            Job::Identify { code, object } => identification::fill(code, object, model, adu),
         }
         self.conclude(decision);
     }
@@ -90,9 +93,9 @@ fn body(adu: &mut Adu, bytes: &[u8]) {
     adu.extend(bytes);
 }
 
-fn read_words(span: Span, adu: &mut Adu, model: &impl DataModel) {
+fn read_words(table: Table, span: Span, adu: &mut Adu, model: &impl DataModel) {
     let mut out = WordsOut::new(adu.resize(usize::from(span.count()) * 2));
-    model.read_words(span, &mut out);
+    model.read_words(table, span, &mut out);
     out.finish();
 }
 

@@ -6,7 +6,7 @@
 pub mod hearing;
 mod points;
 pub mod reference;
-mod serving;
+pub mod serving;
 
 use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter, Width};
 use modbus_server::{Counters, Outcome, Server};
@@ -172,6 +172,11 @@ impl Unit {
         receiver.give_back(Box::leak(Box::default()));
         receiver.give_back(Box::leak(Box::default()));
         assert!(receiver.close().is_none());
+        let server = if points.lacks.contains(&0x08) {
+            server.without_listen_only()
+        } else {
+            server
+        };
         Self {
             receiver,
             server,

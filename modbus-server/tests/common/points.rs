@@ -1,14 +1,24 @@
 //! The device of the tests.
 
-use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Words, WordsOut};
+use modbus_server::{Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut};
 
-/// Bits and words from address 0 on, some of them read-only; words above `MAX_WORD` are refused.
+/// Four tables from address 0 on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points {
+    /// Coils.
     pub bits: Vec<bool>,
+    /// Discrete inputs.
+    pub input_bits: Vec<bool>,
+    /// Holding registers.
     pub words: Vec<u16>,
-    /// Points from here on cannot be written.
+    /// Input registers.
+    pub input_words: Vec<u16>,
+    /// Function codes that the device does not have.
+    pub lacks: Vec<u8>,
+    /// Coils and holding registers from here on cannot be written.
     pub read_only_from: u32,
+    /// Larger words are refused.
+    pub max_word: u16,
     /// If set, everything that has a right address and value is refused with it.
     pub state: Option<Exception>,
     /// Exception status, and the low byte of the diagnostic register.
@@ -40,20 +50,59 @@ pub fn object(id: u8) -> Option<Vec<u8>> {
     }
 }
 
-/// The largest word [`Points`] takes.
+/// The largest word that new [`Points`] take.
 pub const MAX_WORD: u16 = 0xFFF0;
 
 impl Points {
+    /// Coils and discrete inputs, holding and input registers, as many of each kind.
     pub fn new(bits: usize, words: usize) -> Self {
         Self {
             bits: vec![false; bits],
+            input_bits: vec![false; bits],
             words: vec![0; words],
+            input_words: vec![0; words],
+            lacks: Vec::new(),
             read_only_from: u32::MAX,
+            max_word: MAX_WORD,
             state: None,
             status: 0x6D,
             server_id: vec![0x42],
             running: true,
             objects: (0..=255).map(object).collect(),
+        }
+    }
+
+    /// The bits that function 01 or 02 reads.
+    pub fn bits_of(&mut self, function: u8) -> &mut Vec<bool> {
+        match function {
+            1 => &mut self.bits,
+            2 => &mut self.input_bits,
+            _ => panic!("function {function:02X} reads no bits"),
+        }
+    }
+
+    /// The words that function 03 or 04 reads.
+    pub fn words_of(&mut self, function: u8) -> &mut Vec<u16> {
+        match function {
+            3 => &mut self.words,
+            4 => &mut self.input_words,
+            _ => panic!("function {function:02X} reads no words"),
+        }
+    }
+
+    fn table_of_bits(&self, table: Table) -> &[bool] {
+        match table {
+            Table::Coils => &self.bits,
+            Table::DiscreteInputs => &self.input_bits,
+            _ => panic!("{table:?} has no bits"),
+        }
+    }
+
+    fn table_of_words(&self, table: Table) -> &[u16] {
+        match table {
+            Table::HoldingRegisters => &self.words,
+            Table::InputRegisters => &self.input_words,
+            _ => panic!("{table:?} has no words"),
         }
     }
 
@@ -73,12 +122,16 @@ impl Points {
 }
 
 impl DataModel for Points {
-    fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
-        self.check(span.end(), self.bits.len(), true)
+    fn has(&self, function: Function) -> bool {
+        !self.lacks.contains(&function.code())
     }
 
-    fn check_read_words(&self, span: Span) -> Result<(), Exception> {
-        self.check(span.end(), self.words.len(), true)
+    fn check_read_bits(&self, table: Table, span: Span) -> Result<(), Exception> {
+        self.check(span.end(), self.table_of_bits(table).len(), true)
+    }
+
+    fn check_read_words(&self, table: Table, span: Span) -> Result<(), Exception> {
+        self.check(span.end(), self.table_of_words(table).len(), true)
     }
 
     fn check_write_bits(&self, span: Span, bits: Bits<'_>) -> Result<(), Exception> {
@@ -88,19 +141,19 @@ impl DataModel for Points {
 
     fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         assert_eq!(usize::from(span.count()), words.count());
-        let good = words.iter().all(|word| word <= MAX_WORD);
+        let good = words.iter().all(|word| word <= self.max_word);
         self.check(span.end(), self.writable(self.words.len()), good)
     }
 
-    fn read_bits(&self, span: Span, out: &mut BitsOut<'_>) {
+    fn read_bits(&self, table: Table, span: Span, out: &mut BitsOut<'_>) {
         for address in span.addresses() {
-            out.push(self.bits[usize::from(address)]);
+            out.push(self.table_of_bits(table)[usize::from(address)]);
         }
     }
 
-    fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
+    fn read_words(&self, table: Table, span: Span, out: &mut WordsOut<'_>) {
         for address in span.addresses() {
-            out.push(self.words[usize::from(address)]);
+            out.push(self.table_of_words(table)[usize::from(address)]);
         }
     }
 

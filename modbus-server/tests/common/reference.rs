@@ -1,6 +1,6 @@
 //! A second unit, as plain as can be: what one should do, told independently of the crate.
 
-use super::{MAX_WORD, Points, UNIT, framed, lrc};
+use super::{Points, UNIT, framed, lrc};
 use modbus_server::line::Framing;
 
 /// A server and its counters.
@@ -8,6 +8,8 @@ pub struct Reference {
     pub points: Points,
     pub framing: Framing,
     pub listening: bool,
+    /// Listen-only mode can be entered.
+    pub can_listen_only: bool,
     /// In the order of their sub-functions, from 0B on; the gaps last.
     pub counters: [u16; 9],
     pub events: u16,
@@ -32,9 +34,10 @@ pub const GAPS: usize = 8;
 impl Reference {
     pub fn new(framing: Framing, points: Points) -> Self {
         Self {
-            points,
             framing,
             listening: false,
+            can_listen_only: !points.lacks.contains(&8),
+            points,
             counters: [0; 9],
             events: 0,
             log: Vec::new(),
@@ -90,6 +93,7 @@ impl Reference {
                 .iter()
                 .any(|r| r == pdu);
         let hushes = !broadcast && pdu == [8, 0, 4, 0, 0] && !self.listening;
+        let hushes = hushes && self.can_listen_only;
         let obeyed = (1..=127).contains(&pdu[0]) && (!self.listening || restarts);
         let silent = broadcast || hushes || self.listening || !obeyed;
         self.counters[NO_RESPONSE] += u16::from(silent);
@@ -172,6 +176,9 @@ impl Reference {
 
     fn answer(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
         let (events, bus) = (self.events.to_be_bytes(), self.counters[BUS].to_be_bytes());
+        if self.points.lacks.contains(&pdu[0]) {
+            return Err(1);
+        }
         let alone = if pdu.len() == 1 { Ok(()) } else { Err(3) };
         match pdu[0] {
             7 => alone.map(|()| vec![7, self.points.status]),
@@ -216,6 +223,7 @@ impl Reference {
                 let taken = b":\r0123456789ABCDEF";
                 data.len() == 2 && data[1] == 0 && data[0] < 128 && !taken.contains(&data[0])
             }
+            (0, 4) if !self.can_listen_only => return Err(1),
             (0, 2 | 4 | 10..=18 | 20) => data == [0, 0],
             _ => return Err(1),
         };
@@ -291,9 +299,4 @@ pub fn judge_ascii(inside: &[u8]) -> Option<Vec<u8>> {
         .collect::<Option<Vec<u8>>>()?;
     let check = bytes.pop()?;
     (check == lrc(&bytes)).then_some(bytes)
-}
-
-/// Whether a word may be written.
-pub fn allowed(word: usize) -> bool {
-    word <= usize::from(MAX_WORD)
 }

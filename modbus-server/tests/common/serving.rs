@@ -1,7 +1,7 @@
 //! The reference's reading and writing of points.
 
 use super::Points;
-use super::reference::{allowed, identify};
+use super::reference::identify;
 
 /// Serves the PDU of a request that reads or writes points, or identification.
 pub fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
@@ -29,7 +29,7 @@ pub fn answer(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
             let now = usize::from(points.words[at]);
             let [and, or] = [3, 5].map(|from| field(pdu, from));
             let value = (now & and) | (or & (0xFFFF - and));
-            if !allowed(value) {
+            if !allowed(points, value) {
                 return Err(3);
             }
             points.words[at] = value as u16;
@@ -45,23 +45,33 @@ fn field(pdu: &[u8], at: usize) -> usize {
     pdu[at] as usize * 256 + pdu[at + 1] as usize
 }
 
+fn allowed(points: &Points, word: usize) -> bool {
+    word <= points.max_word as usize
+}
+
 fn writable(points: &Points, there: usize) -> usize {
     there.min(points.read_only_from as usize)
 }
 
-fn is_bits(function: u8) -> bool {
-    [1, 2, 5, 15].contains(&function)
-}
-
 fn read(points: &Points, function: u8, start: usize, count: usize) -> Result<Vec<u8>, u8> {
-    let bits = is_bits(function);
+    let bits = function < 3;
     if count == 0 || count > if bits { 2000 } else { 125 } {
         return Err(3);
     }
-    let there = if bits {
-        points.bits.len()
+    let bit_table = if function == 2 {
+        &points.input_bits
     } else {
-        points.words.len()
+        &points.bits
+    };
+    let word_table = if function == 4 {
+        &points.input_words
+    } else {
+        &points.words
+    };
+    let there = if bits {
+        bit_table.len()
+    } else {
+        word_table.len()
     };
     if start + count > there {
         return Err(2);
@@ -69,12 +79,12 @@ fn read(points: &Points, function: u8, start: usize, count: usize) -> Result<Vec
     points.state.map_or(Ok(()), |state| Err(state.code()))?;
     let mut data = vec![0; if bits { count.div_ceil(8) } else { count * 2 }];
     for n in 0..count {
-        if bits && points.bits[start + n] {
+        if bits && bit_table[start + n] {
             data[n / 8] += 1 << (n % 8);
         }
         if !bits {
-            data[2 * n] = (points.words[start + n] / 256) as u8;
-            data[2 * n + 1] = (points.words[start + n] % 256) as u8;
+            data[2 * n] = (word_table[start + n] / 256) as u8;
+            data[2 * n + 1] = (word_table[start + n] % 256) as u8;
         }
     }
     Ok([vec![function, data.len() as u8], data].concat())
@@ -93,7 +103,7 @@ fn write_one(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     if field(pdu, 1) >= writable(points, there) {
         return Err(2);
     }
-    if !bit && !allowed(field(pdu, 3)) {
+    if !bit && !allowed(points, field(pdu, 3)) {
         return Err(3);
     }
     points.state.map_or(Ok(()), |state| Err(state.code()))?;
@@ -124,13 +134,13 @@ fn check_many(points: &Points, pdu: &[u8], bits: bool, limit: usize) -> Result<(
 }
 
 fn write_many(points: &mut Points, pdu: &[u8]) -> Result<Vec<u8>, u8> {
-    let bits = is_bits(pdu[0]);
+    let bits = pdu[0] == 15;
     if pdu.len() < 6 {
         return Err(3);
     }
     check_many(points, pdu, bits, if bits { 1968 } else { 123 })?;
     let count = field(pdu, 3);
-    if !bits && (0..count).any(|n| !allowed(field(pdu, 6 + 2 * n))) {
+    if !bits && (0..count).any(|n| !allowed(points, field(pdu, 6 + 2 * n))) {
         return Err(3);
     }
     points.state.map_or(Ok(()), |state| Err(state.code()))?;

@@ -1,0 +1,141 @@
+//! Four tables, and models that have only some of them or only some functions (V1.1b3 4.3, 4.4).
+
+mod common;
+
+use common::{Points, Unit, frame, pdu, write_bits, write_then_read, write_words};
+use modbus_server::line::Framing;
+use modbus_server::{
+    Adu, DataModel, Exception, Function, Outcome, Server, Span, Table, Words, WordsOut,
+};
+
+/// Every function code the server has.
+const FUNCTIONS: [u8; 16] = [
+    1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x2B,
+];
+
+/// A good request of this function.
+fn good(function: u8) -> Vec<u8> {
+    match function {
+        0x05 => pdu(0x05, &[0, 0xFF00]),
+        0x07 | 0x0B | 0x0C | 0x11 => vec![function],
+        0x0F => write_bits(0, &[true]),
+        0x10 => write_words(0, &[1]),
+        0x16 => pdu(0x16, &[0, 0, 0]),
+        0x17 => write_then_read(0, 1, 0, &[1]),
+        0x2B => vec![0x2B, 0x0E, 1, 0],
+        // For 08 an echo.
+        _ => pdu(function, &[0, 1]),
+    }
+}
+
+#[test]
+fn each_function_uses_the_table_of_its_name() {
+    let mut points = Points::new(1, 1);
+    points.input_bits = vec![true, true];
+    points.words = vec![0x0303; 3];
+    points.input_words = vec![0x0404; 4];
+    let mut unit = Unit::new(points);
+    for (function, len, data) in [
+        (0x01, 1, &[0][..]),
+        (0x02, 2, &[1]),
+        (0x03, 3, &[3, 3]),
+        (0x04, 4, &[4, 4]),
+    ] {
+        let reply = unit.request(&pdu(function, &[len - 1, 1])).unwrap();
+        assert_eq!(reply[2..], *data, "{function:02X}");
+        assert_eq!(unit.refused(&pdu(function, &[len, 1])), 2, "{function:02X}");
+    }
+    assert_eq!(unit.refused(&write_bits(1, &[false])), 2);
+    assert_eq!(unit.refused(&write_words(3, &[1])), 2);
+    assert_eq!(unit.refused(&write_then_read(3, 1, 0, &[1])), 2);
+    unit.request(&write_bits(0, &[true])).unwrap();
+    unit.request(&pdu(0x16, &[2, 0, 0x0505])).unwrap();
+    let reply = unit.request(&write_then_read(1, 2, 1, &[0x0606])).unwrap();
+    assert_eq!(reply[2..], [6, 6, 5, 5]);
+    assert_eq!(unit.points.bits, [true]);
+    assert_eq!(unit.points.words, [0x0303, 0x0606, 0x0505]);
+    assert_eq!(unit.points.input_bits, [true, true]);
+    assert_eq!(unit.points.input_words, [0x0404; 4]);
+}
+
+#[test]
+fn a_function_that_the_model_lacks_returns_illegal_function_before_any_other_check() {
+    for lacked in FUNCTIONS {
+        let mut points = Points::new(1, 1);
+        points.lacks = vec![lacked];
+        // The state of the device comes last.
+        points.state = Some(Exception::ServerDeviceBusy);
+        let mut unit = Unit::new(points);
+        for rest in [&[][..], &[0], &[0, 4, 0, 0], &[0, 1, 0, 0], &[0xFF; 252]] {
+            let request = [&[lacked][..], rest].concat();
+            assert_eq!(unit.refused(&request), 1, "{lacked:02X} {rest:02X?}");
+        }
+        assert_eq!(unit.refused(&good(lacked)), 1, "{lacked:02X}");
+        unit.points.state = None;
+        for other in FUNCTIONS.into_iter().filter(|other| *other != lacked) {
+            let reply = unit.request(&good(other)).expect("a reply");
+            assert_eq!(reply[0], other, "without {lacked:02X}");
+        }
+        let before = unit.points.clone();
+        assert_eq!(unit.raw(&frame(0, &good(lacked))), None);
+        assert_eq!(unit.points, before, "{lacked:02X} as a broadcast");
+    }
+}
+
+#[test]
+fn without_listen_only_mode_its_sub_function_returns_illegal_function() {
+    let mut unit = Unit::new(Points::new(1, 1));
+    unit.server = unit.server.without_listen_only();
+    for data in [0x0000, 0x0001, 0xFF00] {
+        assert_eq!(unit.refused(&pdu(0x08, &[4, data])), 1, "{data:04X}");
+    }
+    assert_eq!(unit.refused(&[0x08, 0, 4]), 1);
+    assert!(!unit.server.is_listen_only());
+    for sub in [0x00, 0x01, 0x0A, 0x0B] {
+        let reply = unit.request(&pdu(0x08, &[sub, 0])).expect("a reply");
+        assert_eq!(reply[0], 0x08);
+    }
+    unit.must_answer();
+}
+
+#[test]
+fn tables_that_a_model_does_not_mention_are_empty() {
+    /// One register to read, as holding and as input register.
+    struct Register;
+    impl DataModel for Register {
+        fn check_read_words(&self, _: Table, span: Span) -> Result<(), Exception> {
+            if span == Span::single(0) {
+                Ok(())
+            } else {
+                Err(Exception::IllegalDataAddress)
+            }
+        }
+        fn read_words(&self, _: Table, _: Span, out: &mut WordsOut<'_>) {
+            out.push(0x1234);
+        }
+    }
+    /// Nothing at all.
+    struct Nothing;
+    impl DataModel for Nothing {}
+
+    let server = Server::new(common::UNIT, Framing::Rtu);
+    let outcome = |model: &dyn Fn(&Adu) -> Outcome, pdu: &[u8]| {
+        let mut adu = Adu::new();
+        adu.push(common::UNIT);
+        assert!(pdu.iter().all(|byte| adu.push(*byte)));
+        model(&adu)
+    };
+    let register = |adu: &Adu| server.decide(adu, &Register).outcome;
+    let nothing = |adu: &Adu| server.decide(adu, &Nothing).outcome;
+    let refused = Outcome::Refused(Exception::IllegalDataAddress);
+    for function in [3, 4] {
+        assert_eq!(outcome(&register, &good(function)), Outcome::Accepted);
+    }
+    for function in [1, 2, 5, 6, 0x0F, 0x10, 0x16, 0x17] {
+        assert_eq!(outcome(&register, &good(function)), refused);
+        assert_eq!(outcome(&nothing, &good(function)), refused);
+    }
+    assert!(Nothing.has(Function::ReadCoils));
+    let mut nothing = Nothing;
+    nothing.write_words(Span::single(0), Words::new(&[0, 1]));
+}
