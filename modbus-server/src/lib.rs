@@ -5,25 +5,22 @@
 //! device around it brings a UART, a timer for the silent times and a [`DataModel`] of its points
 //! and registers.
 //!
-//! A request passes through four hands, each usable and tested by itself:
+//! A [`line::Port`] is a line without hardware: characters and silences go in, the characters of replies come out. A
+//! [`Server`] serves the requests that wait there, at once with [`Server::serve`], or step by step with
+//! [`Server::take`], where each step needs only the port or only the model:
 //!
 //! ```text
-//!  characters   +----------------+   Adu   +----------------+   Head   +-------------------+
-//!  ------------>| line::Receiver |-------->| Server::decide |--------->| line::Transmitter |--->
-//!  silences     +----------------+         +----------------+          +-------------------+
-//!                        ^                         | Decision                ^
-//!                        |                         v                         |
-//!                        |               +-------------------+   Adu (body)  |
-//!                        +---------------| Server::carry_out |---------------+
-//!                           give_back    +-------------------+
+//!  characters   +-------------------------+   take, answer, finish   +--------+   decide, carry out   +-----------+
+//!  ------------>|       line::Port        |<------------------------>| Server |<--------------------->| DataModel |
+//!  <------------| Receiver -- Transmitter |                          +--------+                       +-----------+
+//!  silences     +-------------------------+
 //! ```
 //!
-//! Serving has three steps so that the reply starts at once, however long the request.
-//! [`Server::answers`] looks at a few bytes and tells whether there will be a reply: its first byte,
-//! the unit address, may go. [`Server::decide`] then settles *which* reply it will be and how it
-//! begins, without touching anything, and [`Server::carry_out`] does the work, both while those
-//! bytes are already on the wire. The buffers ([`Adu`]) move by ownership from hand to hand;
-//! nothing is copied.
+//! The steps let a reply start at once, however long the request: its first byte, the unit address, may go when the
+//! request is taken, and its beginning when it is decided upon, which touches nothing; the work is done while those
+//! bytes are on the wire. The buffers ([`Adu`]) move by ownership from hand to hand; nothing is copied.
+//!
+//! A caller without a timer for the silences has [`line::TimedPort`].
 //!
 //! RTU and ASCII mode differ in the [line](mod@line) alone: one [`line::Receiver`] and one
 //! [`line::Transmitter`] speak both.
@@ -33,7 +30,7 @@
 //! units of a line.
 //!
 //! ```
-//! use modbus_server::line::{Faults, Framing, Next, Receiver, Transmitter};
+//! use modbus_server::line::{Faults, Framing, Next, Port, Receiver};
 //! use modbus_server::{Adu, Server, Tables};
 //!
 //! // The device: ten holding registers. One with rules of its own implements `DataModel`.
@@ -41,36 +38,23 @@
 //! let mut tables = Tables { holding_registers: &mut registers, ..Tables::default() };
 //!
 //! let mut server = Server::new(17, Framing::Rtu);
-//! let (mut one, mut two) = (Adu::new(), Adu::new());
-//! let mut receiver = Receiver::rtu(17, false);
-//! receiver.give_back(&mut one);
-//! receiver.give_back(&mut two);
+//! let mut buffers = [Adu::new(), Adu::new()];
+//! let mut port = Port::new(Receiver::rtu(17, false), &mut buffers);
 //!
-//! receiver.close(); // the line has been silent: the receiver listens from here on
+//! port.long_silence(0); // the line has been silent: the port listens from here on
 //! for byte in [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B] {
-//!     receiver.character(byte, Faults::NONE);
+//!     port.received(byte, Faults::NONE);
 //! }
-//! let closed = receiver.close().expect("a good frame for this unit");
-//!
-//! assert!(server.answers(closed.adu));
-//! let mut transmitter = Transmitter::open(server.unit(), server.framing());
-//! assert_eq!(transmitter.next(), Next::Byte(0x11)); // goes before anything is decided
-//! let decision = server.decide(closed.adu, &tables);
-//! transmitter.head(decision.reply.expect("it is answered"));
-//! server.commit(&decision, &closed.line);
-//! server.carry_out(&decision, closed.adu, &mut tables);
-//! if let Some(adu) = transmitter.body(closed.adu) {
-//!     receiver.give_back(adu); // an exception or an echo has no body
+//! if port.long_silence(0) {
+//!     server.serve(&mut port, 0, &mut tables);
 //! }
 //!
-//! let mut reply = vec![0x11];
-//! while let Next::Byte(byte) = transmitter.next() {
+//! let mut reply: Vec<u8> = port.start().into_iter().collect(); // turn the driver on
+//! while let Next::Byte(byte) = port.next() {
 //!     reply.push(byte);
 //! }
+//! port.sent(); // turn the driver off
 //! assert_eq!(reply, [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB]);
-//! if let Some(adu) = transmitter.take_buffer() {
-//!     receiver.give_back(adu);
-//! }
 //! ```
 //!
 //! "V1.02" in the comments is *Modbus over Serial Line, Specification and Implementation Guide

@@ -1,48 +1,17 @@
 //! A port and its server: when a reply starts, what becomes of it, and where the buffers go.
 
 use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Width};
-use modbus_server::{
-    Adu, Bits, BitsOut, Counters, DataModel, Exception, Outcome, Server, Span, Words, WordsOut,
-};
+use modbus_server::{Adu, Counters, Outcome, Server, Tables};
 
 /// Holding registers at 0 to 9.
 #[derive(Default)]
 struct Registers([u16; 10]);
 
-impl DataModel for Registers {
-    fn check_read_bits(&self, _: Span) -> Result<(), Exception> {
-        Err(Exception::IllegalDataAddress)
-    }
-
-    fn check_write_bits(&self, _: Span, _: Bits<'_>) -> Result<(), Exception> {
-        Err(Exception::IllegalDataAddress)
-    }
-
-    fn check_read_words(&self, span: Span) -> Result<(), Exception> {
-        if span.end() <= 10 {
-            Ok(())
-        } else {
-            Err(Exception::IllegalDataAddress)
-        }
-    }
-
-    fn check_write_words(&self, span: Span, _: Words<'_>) -> Result<(), Exception> {
-        self.check_read_words(span)
-    }
-
-    fn read_bits(&self, _: Span, _: &mut BitsOut<'_>) {}
-
-    fn write_bits(&mut self, _: Span, _: Bits<'_>) {}
-
-    fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
-        for address in span.addresses() {
-            out.push(self.0[usize::from(address)]);
-        }
-    }
-
-    fn write_words(&mut self, span: Span, words: Words<'_>) {
-        for (address, word) in span.addresses().zip(words.iter()) {
-            self.0[usize::from(address)] = word;
+impl Registers {
+    fn tables(&mut self) -> Tables<'_> {
+        Tables {
+            holding_registers: &mut self.0,
+            ..Tables::default()
         }
     }
 }
@@ -92,7 +61,7 @@ impl<'a> Unit<'a> {
 
     fn serve(&mut self, delay: u16) -> Option<Outcome> {
         self.server
-            .serve(&mut self.port, delay, &mut self.registers)
+            .serve(&mut self.port, delay, &mut self.registers.tables())
     }
 
     /// What leaves the unit of a reply that may start; its end included.
@@ -145,7 +114,7 @@ fn the_first_byte_leaves_before_anything_is_decided() {
     assert_eq!(unit.port.start(), None, "it has started");
     assert_eq!(unit.port.next(), Next::Wait);
     let answered = request
-        .decide(&unit.server, &unit.registers)
+        .decide(&unit.server, &unit.registers.tables())
         .answer(&mut unit.port);
     assert_eq!(unit.port.next(), Next::Byte(3));
     assert_eq!(unit.port.next(), Next::Byte(2));
@@ -153,7 +122,7 @@ fn the_first_byte_leaves_before_anything_is_decided() {
     let committed = answered.commit(&mut unit.server);
     assert_eq!(committed.ended(), 1234);
     assert_eq!(unit.server.counters().unit_messages, 1);
-    let served = committed.carry_out(&mut unit.server, &mut unit.registers);
+    let served = committed.carry_out(&mut unit.server, &mut unit.registers.tables());
     served.finish(&mut unit.port);
     for byte in &REPLY[3..] {
         assert_eq!(unit.port.next(), Next::Byte(*byte));
@@ -255,10 +224,10 @@ fn a_reply_that_is_cut_off_before_it_is_served_takes_no_body() {
     assert_eq!(unit.port.start(), Some(UNIT));
     unit.port.sent();
     request
-        .decide(&unit.server, &unit.registers)
+        .decide(&unit.server, &unit.registers.tables())
         .answer(&mut unit.port)
         .commit(&mut unit.server)
-        .carry_out(&mut unit.server, &mut unit.registers)
+        .carry_out(&mut unit.server, &mut unit.registers.tables())
         .finish(&mut unit.port);
     assert!(!unit.port.is_replying());
     unit.is_well();
@@ -294,13 +263,17 @@ fn an_ascii_request_is_taken_at_the_short_silence_and_is_too_late_at_the_long_on
             }
             if late {
                 assert!(!port.long_silence(0));
-                assert!(server.serve(&mut port, 0, &mut registers).is_none());
+                assert!(
+                    server
+                        .serve(&mut port, 0, &mut registers.tables())
+                        .is_none()
+                );
                 assert_eq!(port.counters().dropped, round + 1);
                 continue;
             }
             assert!(port.short_silence(0));
             server
-                .serve(&mut port, 0, &mut registers)
+                .serve(&mut port, 0, &mut registers.tables())
                 .expect("it waits");
             let mut sent = vec![port.start().expect("it is answered")];
             while let Next::Byte(byte) = port.next() {
