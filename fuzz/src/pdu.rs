@@ -31,6 +31,7 @@ static POINTS: LazyLock<Points> = LazyLock::new(|| {
     points.input_bits = bits(2005, 2);
     points.words = words(130, 0x9E37);
     points.input_words = words(127, 0x79B9);
+    points.custom = Some(0x41);
     points
 });
 

@@ -77,6 +77,8 @@ pub(crate) enum Job {
         /// The first of them, if it is known.
         object: u8,
     },
+    /// Let the model serve a user-defined function.
+    Custom,
 }
 
 impl Work {

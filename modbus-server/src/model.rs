@@ -1,6 +1,6 @@
 //! What the device around the server must bring.
 
-use crate::{Bits, BitsOut, Exception, Function, Span, Table, Words, WordsOut};
+use crate::{Adu, Bits, BitsOut, Exception, Function, Span, Table, Words, WordsOut};
 
 /// The points and registers of the device.
 ///
@@ -108,6 +108,12 @@ pub trait DataModel {
         &[]
     }
 
+    /// The additional data of function 11, after the run indicator (V1.1b3 6.13). What does not fit
+    /// 250 bytes together with the identity is cut off.
+    fn additional_data(&self) -> &[u8] {
+        &[]
+    }
+
     /// The run indicator of function 11: FF, or 00 for a device that is not doing its work.
     fn is_running(&self) -> bool {
         true
@@ -122,5 +128,25 @@ pub trait DataModel {
     fn identification(&self, object: u8) -> Option<&[u8]> {
         let _ = object;
         None
+    }
+
+    /// Checks a request with a function code that is no [`Function`]: a user-defined one, 65 to 72
+    /// and 100 to 110 (V1.1b3 5.1), or one of the standard's that the server does not have. `data`
+    /// is what follows the function code.
+    ///
+    /// # Errors
+    /// The exception to answer with. The default is 01: there is no such function.
+    fn check_custom(&self, code: u8, data: &[u8]) -> Result<(), Exception> {
+        let _ = (code, data);
+        Err(Exception::IllegalFunction)
+    }
+
+    /// Serves a request that [`check_custom`](Self::check_custom) accepted; a broadcast is not
+    /// served. `adu` holds the unit address, the function code and the data of the request. Replace
+    /// all of it by the data of the reply, with [`Adu::clear`] and [`Adu::push`]: up to 252 bytes;
+    /// what is beyond is cut off.
+    fn serve_custom(&mut self, code: u8, adu: &mut Adu) {
+        let _ = code;
+        adu.clear();
     }
 }

@@ -322,4 +322,11 @@ fn the_server_tells_its_identity_and_whether_it_runs() {
     assert_eq!(reply[252], 0x00);
     unit.points.server_id = vec![];
     assert_eq!(unit.request(&[0x11]), Some(vec![0x11, 1, 0x00]));
+    unit.points.additional_data = b"more".to_vec();
+    let reply = [&[0x11, 5, 0x00][..], b"more"].concat();
+    assert_eq!(unit.request(&[0x11]), Some(reply));
+    unit.points.server_id = vec![7; 248];
+    let reply = unit.request(&[0x11]).expect("a reply");
+    assert_eq!((reply.len(), reply[1]), (253, 251));
+    assert_eq!(reply[250..], [0x00, b'm', b'o']);
 }

@@ -16,6 +16,9 @@ use proptest::prelude::*;
 const BITS: usize = 2010;
 const WORDS: usize = 130;
 
+/// A function of the device.
+const CUSTOM: u8 = 0x41;
+
 /// What may keep the device from doing what is right otherwise.
 const STATES: &[Exception] = &[
     Exception::ServerDeviceFailure,
@@ -47,6 +50,8 @@ fn points() -> impl Strategy<Value = Points> {
             read_only_from,
             state,
             lacks,
+            additional_data: vec![0xA5; usize::from(read_only_from as u8 % 4)],
+            custom: Some(CUSTOM),
             ..Points::new(0, 0)
         })
 }
@@ -90,9 +95,10 @@ fn request() -> BoxedStrategy<Vec<u8>> {
     let echo = vec(any::<u8>(), 0..250).prop_map(|data| [&[0x08, 0, 0][..], &data].concat());
     let object = prop_oneof![0_u8..9, 0x7E_u8..0x88];
     let identify = (0_u8..6, object).prop_map(|(code, id)| vec![0x2B, 0x0E, code, id]);
+    let custom = vec(any::<u8>(), 0..100).prop_map(|data| [&[CUSTOM][..], &data].concat());
     let shaped = prop_oneof![
         3 => read, 2 => write, 2 => bits, 2 => words, 1 => many, 1 => mask, 2 => both,
-        2 => alone, 4 => diagnose, 1 => echo, 2 => identify,
+        2 => alone, 4 => diagnose, 1 => echo, 2 => identify, 1 => custom,
     ]
     .boxed();
     let bent = (shaped.clone(), any::<prop::sample::Index>(), any::<u8>());

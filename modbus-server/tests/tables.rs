@@ -139,3 +139,21 @@ fn tables_that_a_model_does_not_mention_are_empty() {
     let mut nothing = Nothing;
     nothing.write_words(Span::single(0), Words::new(&[0, 1]));
 }
+
+#[test]
+fn a_function_of_the_model_is_served_and_its_reply_is_cut_off_at_252_bytes() {
+    let mut unit = Unit::new(Points::new(1, 1));
+    unit.points.custom = Some(0x41);
+    let reply = unit.request(&[0x41, 1, 2]);
+    assert_eq!(reply, Some(vec![0x41, 2, 1, 2, 1, 2, 1]));
+    assert_eq!(unit.points.kept, [1, 2]);
+    assert_eq!(unit.refused(&[0x41]), 3);
+    assert_eq!(unit.refused(&[0x42, 1]), 1);
+    assert_eq!(
+        unit.request(&[0x41; 253]).map(|reply| reply.len()),
+        Some(253)
+    );
+    unit.raw(&frame(0, &[0x41, 9]));
+    assert_eq!(unit.points.kept, [0x41; 252], "a broadcast is not served");
+    unit.must_answer();
+}

@@ -21,7 +21,11 @@ pub(super) fn settle(
     let plain = Head::plain(unit, function);
     let known = match Function::from_code(function) {
         Some(known) if model.has(known) => known,
-        _ => return Err(Exception::IllegalFunction),
+        Some(_) => return Err(Exception::IllegalFunction),
+        None => {
+            model.check_custom(function, fields)?;
+            return Ok((plain, Job::Custom));
+        }
     };
     Ok(match Request::decode(known, fields)? {
         Request::ReadBits(span) => {

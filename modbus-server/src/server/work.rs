@@ -9,9 +9,10 @@ use crate::{
 
 /// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
 const NOT_BUSY: [u8; 2] = [0x00, 0x00];
-/// The longest identity of function 11 in a PDU of 253 bytes, beside function code, byte count and
-/// run indicator.
-const MAX_SERVER_ID: usize = 250;
+/// The longest data of a reply in a PDU of 253 bytes, beside the function code.
+const MAX_CUSTOM: usize = 252;
+/// The longest identity and additional data of function 11, beside its byte count and run indicator.
+const MAX_SERVER_ID: usize = MAX_CUSTOM - 2;
 /// Where the data of function 08 begin in its request, counted from the unit address.
 const DIAGNOSTIC_DATA: u8 = 4;
 
@@ -71,12 +72,19 @@ impl Server {
             Job::ServerId => {
                 let id = model.server_id();
                 let id = id.get(..MAX_SERVER_ID).unwrap_or(id);
+                let more = model.additional_data();
+                let more = more.get(..MAX_SERVER_ID - id.len()).unwrap_or(more);
                 // Up to 251.
-                body(adu, &[id.len() as u8 + 1]);
+                body(adu, &[(id.len() + more.len()) as u8 + 1]);
                 adu.extend(id);
                 adu.extend(&[if model.is_running() { 0xFF } else { 0x00 }]);
+                adu.extend(more);
             }
             Job::Identify { code, object } => identification::fill(code, object, model, adu),
+            Job::Custom => {
+                model.serve_custom(adu.get(1), adu);
+                adu.cut(adu.len().saturating_sub(MAX_CUSTOM));
+            }
         }
         self.conclude(decision);
     }

@@ -1,6 +1,8 @@
 //! The device of the tests.
 
-use modbus_server::{Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut};
+use modbus_server::{
+    Adu, Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut,
+};
 
 /// Four tables from address 0 on.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +27,11 @@ pub struct Points {
     pub status: u8,
     pub server_id: Vec<u8>,
     pub running: bool,
+    pub additional_data: Vec<u8>,
+    /// A function that the server does not know: it keeps its data, and answers with them backwards,
+    /// three times. Without data it is refused.
+    pub custom: Option<u8>,
+    pub kept: Vec<u8>,
     /// Device identification by object.
     pub objects: Vec<Option<Vec<u8>>>,
 }
@@ -68,6 +75,9 @@ impl Points {
             status: 0x6D,
             server_id: vec![0x42],
             running: true,
+            additional_data: Vec::new(),
+            custom: None,
+            kept: Vec::new(),
             objects: (0..=255).map(object).collect(),
         }
     }
@@ -181,6 +191,30 @@ impl DataModel for Points {
 
     fn server_id(&self) -> &[u8] {
         &self.server_id
+    }
+
+    fn additional_data(&self) -> &[u8] {
+        &self.additional_data
+    }
+
+    fn check_custom(&self, code: u8, data: &[u8]) -> Result<(), Exception> {
+        if self.custom != Some(code) {
+            Err(Exception::IllegalFunction)
+        } else if data.is_empty() {
+            Err(Exception::IllegalDataValue)
+        } else {
+            Ok(())
+        }
+    }
+
+    fn serve_custom(&mut self, code: u8, adu: &mut Adu) {
+        assert_eq!(self.custom, Some(code));
+        assert_eq!(adu.as_slice()[..2], [super::UNIT, code]);
+        self.kept = adu.as_slice()[2..].to_vec();
+        adu.clear();
+        for byte in self.kept.repeat(3).iter().rev() {
+            adu.push(*byte);
+        }
     }
 
     fn is_running(&self) -> bool {

@@ -199,7 +199,18 @@ impl Reference {
                 alone?;
                 let mut body = self.points.server_id.clone();
                 body.push(if self.points.running { 255 } else { 0 });
+                body.extend(&self.points.additional_data);
                 Ok([vec![17, body.len() as u8], body].concat())
+            }
+            code if self.points.custom == Some(code) => {
+                let data = &pdu[1..];
+                if data.is_empty() {
+                    return Err(3);
+                }
+                self.points.kept = data.to_vec();
+                let backwards: Vec<u8> = data.iter().rev().copied().collect();
+                let reply = [vec![code], backwards.repeat(3)].concat();
+                Ok(reply.into_iter().take(253).collect())
             }
             _ => super::serving::answer(&mut self.points, pdu),
         }
