@@ -22,7 +22,7 @@ pub struct Layout {
     pub name: &'static str,
     /// Its part.
     pub part: Part,
-    /// Its slots; the one that is meant when none is named comes first.
+    /// Its slots. The first one is meant where no port is named.
     pub slots: &'static [SlotPins],
     /// SW01, position 1 first. ON = low.
     pub switch: [Pin; 8],

@@ -23,7 +23,7 @@ impl Board {
     /// # Errors
     ///
     /// [`Error::Image`] when the image does not fit the flash or `config.flash` has another size, [`Error::Slot`]
-    /// when the board lacks a slot that `config.slots` names.
+    /// when `config.slots` names a slot that the board does not have.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
         let ports = config.layout.slots.iter().map(|slot| slot.port);
         let mut named = config.slots.iter().map(|&(port, _)| port);
