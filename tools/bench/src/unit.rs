@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use register_map::codes::Mode;
 use register_map::{Module, configuration, record};
-use sim::board::PART;
+use sim::board::MODIO_02;
 use sim::line::{Format, Settings};
 use sim::machine::memory::FLASH_BASE;
 use sim::{Board, Config, Corner, Image, Time};
@@ -73,7 +73,7 @@ impl Unit {
             (configuration::MODE, mode.code()),
             (configuration::MODULE_SLOT, module.code()),
         ];
-        let mut flash = vec![0xFF; PART.flash_size];
+        let mut flash = vec![0xFF; MODIO_02.part.flash_size];
         let page = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
         // It fits: three pairs in a page of a kilobyte.
         record::encode_page(1, &pairs, &mut flash[page..page + 1024]);

@@ -39,7 +39,7 @@ const USART1: u32 = 0x4001_3800;
 pub struct BluePill {
     led: bool,
     terminal: Terminal,
-    /// What has happened, in order.
+    /// The events so far, in order.
     pub events: Vec<(Time, String)>,
 }
 

@@ -1,10 +1,10 @@
-//! A simulated STM32F103 with a circuit around it, and the virtual modio-02, a board built on it, running the real
+//! A simulated STM32F103 with a circuit around it, and the virtual modio boards, which are built on it and run the real
 //! firmware image.
 //!
-//! A [`Chip`] is the part in a [`Circuit`](soc::Circuit), which is connected to its pins; [`Board`] is the part on the
-//! modio-02, with what is plugged into its slot, its switch and its RS-485 line. A chip has no clock but its own: time
-//! passes only while a caller runs it, the same calls give the same run to the instruction, and nothing here reads the
-//! wall clock. What the firmware does that no real part would take well is collected as [`finding::Finding`]s.
+//! A [`Chip`] is the part in a [`Circuit`](soc::Circuit), which is connected to its pins; [`Board`] is the part on a
+//! modio board, with what is plugged into its slots, its switch and its RS-485 line. A chip has no clock but its own:
+//! time passes only while a caller runs it, the same calls give the same run to the instruction, and nothing here reads
+//! the wall clock. What the firmware does that no real part would take well is collected as [`finding::Finding`]s.
 //!
 //! The part knows nothing of any board:
 //!
@@ -17,7 +17,7 @@
 //! The board knows the part by its pins:
 //!
 //! ```text
-//! board      the modio-02                        line   the RS-485 bus and its frames
+//! board      the modio-02 and the modio-08       line   the RS-485 bus and its frames
 //! exact_line the protocol by which a client      slot   what is plugged in, and the world outside it
 //!            lets time pass
 //! ```

@@ -1,4 +1,4 @@
-//! Virtual time: whole picoseconds since the board was made.
+//! Virtual time: whole picoseconds since the chip was made.
 //!
 //! A picosecond divides every clock of the part finely enough that an instant computed from a whole
 //! number of cycles is off by less than one picosecond, and it never drifts as long as it is computed
@@ -10,12 +10,12 @@ use core::ops::{Add, AddAssign, Mul, Sub, SubAssign};
 /// Picoseconds in a second.
 const PS_PER_S: u64 = 1_000_000_000_000;
 
-/// An instant (since the board was made) or a span, in picoseconds.
+/// An instant (since the chip was made) or a span, in picoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Time(u64);
 
 impl Time {
-    /// The instant the board was made; an empty span.
+    /// The instant the chip was made; an empty span.
     pub const ZERO: Self = Self(0);
     /// Later than anything that happens: 213 days.
     pub const MAX: Self = Self(u64::MAX);

@@ -1,4 +1,4 @@
-//! The options of the virtual modio-02, a package of their own so that `cargo xtask sim` can refuse a
+//! The options of the virtual boards, a package of their own so that `cargo xtask sim` can refuse a
 //! wrong one at once, before it builds the image and the simulator, without depending on either.
 
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -15,9 +15,19 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub dip: u8,
 
-    /// What is plugged into the slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// Which board to simulate: modio-02 or modio-08. The modio-08 has no firmware to build yet, so it needs --elf
+    #[arg(long, value_name = "NAME", default_value = "modio-02", value_parser = ["modio-02", "modio-08"])]
+    #[arg(requires_if("modio-08", "elf"))]
+    pub board: String,
+
+    /// What is plugged into the board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[arg(long, value_name = "NAME", default_value = "4di")]
     pub module: Module,
+
+    /// What is plugged into the slot at a port, such as 3=4do; may be repeated, and overrides --module for the first
+    /// slot
+    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = slot)]
+    pub slots: Vec<(u8, Module)>,
 
     /// Corner of the part, its clocks and what its instructions cost: nominal, slow or fast
     #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
@@ -76,6 +86,17 @@ impl Options {
     pub fn preset(&self) -> bool {
         !self.no_preset
     }
+}
+
+/// `PORT=MODULE` as the number of a port and a module.
+fn slot(text: &str) -> Result<(u8, Module), String> {
+    let wrong = || format!("{text:?} is no port and module such as 3=4do");
+    let (port, module) = text.split_once('=').ok_or_else(wrong)?;
+    let port = port.parse().map_err(|_| wrong())?;
+    let module = module
+        .parse()
+        .map_err(|why| format!("'{module}' is {why}"))?;
+    Ok((port, module))
 }
 
 /// `RATE,FORMAT` as a rate and the name of a format.
@@ -159,6 +180,17 @@ mod tests {
     }
 
     #[test]
+    fn slots_are_named_by_their_ports() {
+        assert_eq!(parse(&[]).unwrap().board, "modio-02");
+        let options = parse(&[
+            "--board", "modio-08", "--elf", "x", "--slot", "1=4do", "--slot", "4=none",
+        ])
+        .unwrap();
+        assert_eq!(options.board, "modio-08");
+        assert_eq!(options.slots, [(1, Module::Do4), (4, Module::None)]);
+    }
+
+    #[test]
     fn the_later_of_preset_and_no_preset_counts() {
         assert!(!parse(&["--no-preset"]).unwrap().preset());
         assert!(parse(&["--no-preset", "--preset"]).unwrap().preset());
@@ -205,6 +237,11 @@ mod tests {
                 &["--exact-line", "127.0.0.1:0", "--gdb", "127.0.0.1:0"][..],
                 "cannot be used with",
             ),
+            (&["--board", "modio-04"][..], "modio-02, modio-08"),
+            (&["--board", "modio-08"][..], "--elf <FILE>"),
+            (&["--slot", "4do"][..], "3=4do"),
+            (&["--slot", "x=4do"][..], "3=4do"),
+            (&["--slot", "3=8di"][..], "one of none, 4di"),
             (&["--pty"][..], "--pty <LINK>"),
             (&["--line", "9600"][..], "9600,7N2"),
             (&["--line", "9600,7N1"][..], "9600,7N2"),

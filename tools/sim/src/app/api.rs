@@ -8,6 +8,7 @@
 //! | `POST /api/dip` | `{"value":n}`: moves the switch |
 //! | `POST /api/power` | `{"on":bool}` or `{"cycle":true}` |
 //! | `POST /api/module` | `{"name":...}`: plugs a module, with the power off |
+//! | `POST /api/slots/PORT/...` | `channels/N` or `module` of the slot at PORT; without it, of the first slot |
 //!
 //! A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
 
@@ -53,6 +54,7 @@ impl From<Error> for Reply {
     fn from(error: Error) -> Self {
         let status = match error {
             Error::Powered | Error::Channel => 409,
+            Error::Slot(_) => 404,
             _ => 400,
         };
         Self::error(status, error.to_string())
@@ -74,20 +76,36 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
             .map(|k| frames::json(bench.board.line(), k)),
         Some("dip") => changing(bench, request, set_dip),
         Some("power") => changing(bench, request, set_power),
-        Some("module") => changing(bench, request, set_module),
-        Some(rest) => match rest.strip_prefix("channels/").map(channel_number) {
-            Some(Some(number)) => changing(bench, request, |bench, body| {
-                set_channel(bench, number, body)
-            }),
-            Some(None) => Err(Reply::error(404, "channels are numbered 1 to 4")),
-            None => Err(Reply::error(404, format!("there is no {path}"))),
-        },
+        Some(rest) => of_slot(bench, request, rest)
+            .unwrap_or_else(|| Err(Reply::error(404, format!("there is no {path}")))),
         None => Err(Reply::error(404, format!("there is no {path}"))),
     };
     match answered {
         Ok(body) => Reply { status: 200, body },
         Err(refusal) => refusal,
     }
+}
+
+/// What concerns a slot, the first one unless `path` names a port; `None` when `path` is none of these.
+fn of_slot(bench: &mut Bench, request: &Request, path: &str) -> Option<Result<Value, Reply>> {
+    let (port, rest) = match path.strip_prefix("slots/") {
+        Some(path) => path.split_once('/')?,
+        None => ("", path),
+    };
+    let port = if port.is_empty() {
+        bench.board.layout().slots[0].port
+    } else {
+        port.parse().ok()?
+    };
+    if rest == "module" {
+        let change = |bench: &mut Bench, body: &Map<_, _>| set_module(bench, port, body);
+        return Some(changing(bench, request, change));
+    }
+    let Some(number) = channel_number(rest.strip_prefix("channels/")?) else {
+        return Some(Err(Reply::error(404, "channels are numbered 1 to 4")));
+    };
+    let change = |bench: &mut Bench, body: &Map<_, _>| set_channel(bench, port, number, body);
+    Some(changing(bench, request, change))
 }
 
 fn reading(request: &Request) -> Outcome {
@@ -157,16 +175,25 @@ fn channel_number(text: &str) -> Option<usize> {
         .map(|position| position + 1)
 }
 
-fn set_channel(bench: &mut Bench, number_of: usize, body: &Map<String, Value>) -> Outcome {
+fn set_channel(bench: &mut Bench, port: u8, channel: usize, body: &Map<String, Value>) -> Outcome {
     let (key, value) = only(body)?;
     let board = &mut bench.board;
-    match key {
-        "energised" => board.set_energised(number_of, boolean(key, value)?)?,
-        "manual" => board.set_manual(number_of, boolean(key, value)?)?,
-        "millivolts" => board.set_millivolts(number_of, number(key, value, 3300)?)?,
+    let done = match key {
+        "energised" => {
+            let on = boolean(key, value)?;
+            board.change_slot(port, |slot| slot.set_energised(channel, on))?
+        }
+        "manual" => {
+            let on = boolean(key, value)?;
+            board.change_slot(port, |slot| slot.set_manual(channel, on))?
+        }
+        "millivolts" => {
+            let millivolts = number(key, value, 3300)?;
+            board.change_slot(port, |slot| slot.set_millivolts(channel, millivolts))?
+        }
         _ => return Err(unknown(key, "`energised`, `manual` or `millivolts`")),
-    }
-    Ok(())
+    };
+    Ok(done.map_err(Error::from)?)
 }
 
 fn set_dip(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
@@ -195,13 +222,13 @@ fn set_power(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
     Ok(())
 }
 
-fn set_module(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
+fn set_module(bench: &mut Bench, port: u8, body: &Map<String, Value>) -> Outcome {
     match only(body)? {
         ("name", Value::String(name)) => {
             let module: Module = name
                 .parse()
                 .map_err(|why| Reply::error(400, format!("`{name}` is {why}")))?;
-            Ok(bench.board.set_module(module)?)
+            Ok(bench.board.set_module_at(port, module)?)
         }
         ("name", _) => Err(Reply::error(400, "`name` is a string")),
         (key, _) => Err(unknown(key, "`name`")),

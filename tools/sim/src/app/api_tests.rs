@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 
 use super::*;
-use crate::app::testing::bench;
+use crate::app::testing::{bench, bench_of};
+use sim::{Config, board};
 
 fn get(bench: &mut Bench, target: &str) -> Reply {
     ask(bench, "GET", target, "")
@@ -189,4 +190,59 @@ fn anything_ill_formed_is_refused_and_changes_nothing() {
         assert!(!error.is_empty());
     }
     assert_eq!(state(&mut bench), before);
+}
+
+#[test]
+fn slots_of_a_larger_board_are_addressed_by_their_ports() {
+    let mut bench = bench_of(Config {
+        layout: &board::MODIO_08,
+        slots: vec![(3, Module::Relay2)],
+        ..Config::default()
+    });
+    let first = state(&mut bench);
+    let slots = first["slots"].as_array().expect("a list");
+    let ports: Vec<_> = slots.iter().map(|slot| &slot["port"]).collect();
+    assert_eq!(ports, [1, 2, 3, 4]);
+    let modules: Vec<_> = slots.iter().map(|slot| &slot["module"]).collect();
+    assert_eq!(modules, ["4di", "none", "2relay", "none"]);
+    assert_eq!(first["module"], "4di");
+    assert_eq!(first["channels"], slots[0]["channels"]);
+
+    let reply = post(&mut bench, "/api/slots/3/channels/2", r#"{"manual":true}"#);
+    assert_eq!(reply.status, 200);
+    assert_eq!(reply.body["slots"][2]["channels"][1]["manual"], true);
+    let reply = post(&mut bench, "/api/channels/4", r#"{"energised":true}"#);
+    assert_eq!(reply.body["slots"][0]["channels"][3]["energised"], true);
+
+    let plug = |bench: &mut Bench| post(bench, "/api/slots/4/module", r#"{"name":"4ai"}"#);
+    assert_eq!(plug(&mut bench).status, 409);
+    post(&mut bench, "/api/power", r#"{"on":false}"#);
+    assert_eq!(plug(&mut bench).body["slots"][3]["module"], "4ai");
+    for (path, status) in [
+        ("/api/slots/5/module", 404),
+        ("/api/slots/5/channels/1", 404),
+        ("/api/slots/x/module", 404),
+        ("/api/slots/3/channels/5", 404),
+        ("/api/slots/3", 404),
+        ("/api/slots/3/dip", 404),
+    ] {
+        let body = if path.ends_with("module") {
+            r#"{"name":"4do"}"#
+        } else {
+            r#"{"manual":true}"#
+        };
+        assert_eq!(post(&mut bench, path, body).status, status, "{path}");
+    }
+}
+
+#[test]
+fn a_board_with_one_slot_has_no_list_of_slots_but_a_port() {
+    let mut bench = bench(Module::Di4);
+    assert_eq!(state(&mut bench).get("slots"), None);
+    let reply = post(
+        &mut bench,
+        "/api/slots/5/channels/1",
+        r#"{"energised":true}"#,
+    );
+    assert_eq!(reply.body["channels"][0]["energised"], true);
 }

@@ -1,6 +1,6 @@
 //! The flash in a file (`--flash`): taken up at the start, and kept up to date while the unit runs.
 //!
-//! The file is the flash's 128 KiB as they are. It is never written in place: the new contents go into a
+//! The file is the flash as it is. It is never written in place: the new contents go into a
 //! file beside it, which then takes its name, so that whoever looks, and whenever the simulator dies, finds
 //! the old contents or the new ones whole.
 
@@ -9,8 +9,6 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use sim::Board;
-
-use super::FLASH_SIZE;
 
 /// The file and what it holds.
 #[derive(Debug)]
@@ -25,21 +23,21 @@ pub struct FlashFile {
 }
 
 impl FlashFile {
-    /// The file at `path`, and its contents when there is one.
+    /// The file at `path` of a flash of `size` bytes, and its contents when there is one.
     ///
     /// # Errors
     ///
     /// In one line: it cannot be read or written, or holds no flash of this part.
-    pub fn open(path: &Path) -> Result<(Self, Option<Vec<u8>>), String> {
+    pub fn open(path: &Path, size: usize) -> Result<(Self, Option<Vec<u8>>), String> {
         let told = |error: &dyn std::fmt::Display| cannot(path, error);
         let (path_to, contents) = match path.metadata() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
             Err(error) => return Err(told(&error)),
             // A pipe or a device would block, or be replaced by a file.
             Ok(metadata) if !metadata.is_file() => return Err(told(&"it is not a file")),
-            Ok(metadata) if metadata.len() != FLASH_SIZE as u64 => {
+            Ok(metadata) if metadata.len() != size as u64 => {
                 return Err(told(&format_args!(
-                    "it has {} bytes, the flash {FLASH_SIZE}",
+                    "it has {} bytes, the flash {size}",
                     metadata.len()
                 )));
             }
@@ -120,6 +118,8 @@ fn cannot(path: &Path, why: &dyn std::fmt::Display) -> String {
 mod tests {
     use super::super::testing;
     use super::*;
+
+    const FLASH_SIZE: usize = sim::board::MODIO_02.part.flash_size;
     use register_map::Module;
 
     fn entries(directory: &Path) -> usize {
@@ -131,7 +131,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("flash");
         let mut board = testing::bench(Module::Di4).board;
-        let (mut file, contents) = FlashFile::open(&path).unwrap();
+        let (mut file, contents) = FlashFile::open(&path, FLASH_SIZE).unwrap();
         assert_eq!(contents, None);
         file.keep(&board).unwrap();
         assert_eq!(fs::read(&path).unwrap(), board.flash());
@@ -144,7 +144,7 @@ mod tests {
         file.keep(&board).unwrap();
         assert_eq!(fs::read(&path).unwrap(), board.flash());
         assert_eq!(entries(directory.path()), 1, "nothing is left beside it");
-        let (_, contents) = FlashFile::open(&path).unwrap();
+        let (_, contents) = FlashFile::open(&path, FLASH_SIZE).unwrap();
         assert_eq!(contents.as_deref(), Some(board.flash()));
     }
 
@@ -152,7 +152,7 @@ mod tests {
     fn what_is_no_flash_is_refused_in_one_line() {
         let directory = tempfile::tempdir().unwrap();
         let refused = |path: &Path, part: &str| {
-            let text = FlashFile::open(path).unwrap_err();
+            let text = FlashFile::open(path, FLASH_SIZE).unwrap_err();
             assert!(text.contains(part) && !text.contains('\n'), "{text}");
             assert!(text.contains(path.to_str().unwrap()), "{text}");
         };
@@ -171,7 +171,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("missing").join("flash");
         let board = testing::bench(Module::Di4).board;
-        let (mut file, _) = FlashFile::open(&path).unwrap();
+        let (mut file, _) = FlashFile::open(&path, FLASH_SIZE).unwrap();
         let text = file.keep(&board).unwrap_err();
         assert!(
             text.contains("missing") && text.contains("No such file"),
@@ -193,7 +193,7 @@ mod tests {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
         symlink(&path, &link).unwrap();
         let board = testing::bench(Module::Di4).board;
-        let (mut file, _) = FlashFile::open(&link).unwrap();
+        let (mut file, _) = FlashFile::open(&link, FLASH_SIZE).unwrap();
         file.keep(&board).unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&path).unwrap(), board.flash());

@@ -18,6 +18,7 @@ use std::sync::mpsc;
 
 use ::exact_line::Request;
 use register_map::{Module, record};
+use sim::board::{Layout, MODIO_02};
 use sim::line::{Format, Settings};
 use sim::{Board, Config, Image, Time};
 use sim_options::Options;
@@ -41,8 +42,7 @@ mod testing;
 use bench::Bench;
 use flash_file::FlashFile;
 
-/// Flash of the STM32F103CB, in bytes, and where it begins.
-const FLASH_SIZE: usize = sim::board::PART.flash_size;
+/// Where the flash begins.
 const FLASH_BASE: u32 = 0x0800_0000;
 
 /// So long the board has been on when the endpoints are announced: its start-up and the first silence on
@@ -69,11 +69,16 @@ enum Event {
 ///
 /// In one line: what keeps it from starting, or the flash's file from being written at the end.
 pub fn run(options: &Options) -> Result<(), String> {
-    let (mut flash, stored) = match options.flash.as_deref().map(FlashFile::open) {
+    let layout = Layout::named(&options.board).ok_or("the simulator does not know this board")?;
+    let opened = options
+        .flash
+        .as_deref()
+        .map(|path| FlashFile::open(path, layout.part.flash_size));
+    let (mut flash, stored) = match opened {
         Some(opened) => opened.map(|(file, stored)| (Some(file), stored))?,
         None => (None, None),
     };
-    let mut bench = Bench::new(board(options, stored)?);
+    let mut bench = Bench::new(board(layout, options, stored)?);
     if let Some((baud, format)) = &options.line {
         let format = Format::named(format).ok_or("the simulator does not know this format")?;
         bench.fix_line(Settings {
@@ -140,23 +145,36 @@ pub fn run(options: &Options) -> Result<(), String> {
 }
 
 /// The board, over the flash that a file held, with the image written over its own pages of it.
-fn board(options: &Options, stored: Option<Vec<u8>>) -> Result<Board, String> {
+fn board(
+    layout: &'static Layout,
+    options: &Options,
+    stored: Option<Vec<u8>>,
+) -> Result<Board, String> {
     let elf = options.elf.as_deref().ok_or(
         "no image to run: give one with --elf FILE, or use `cargo xtask sim`, which builds one",
     )?;
     let image = image(elf)?;
-    let mut flash = stored.unwrap_or_else(|| vec![0xFF; FLASH_SIZE]);
-    if options.preset() {
-        write_preset(&mut flash, options.module);
+    let mut flash = stored.unwrap_or_else(|| vec![0xFF; layout.part.flash_size]);
+    let first = layout.slots[0].port;
+    let named = options.slots.iter().rfind(|(port, _)| *port == first);
+    let module = named.map_or(options.module, |&(_, module)| module);
+    // Where the configuration of another board is stored is not defined yet.
+    if options.preset() && layout.name == MODIO_02.name {
+        write_preset(&mut flash, module);
     }
     let config = Config {
+        layout,
         dip: options.dip,
-        module: options.module,
+        module,
+        slots: options.slots.clone(),
         corner: options.corner.parse()?,
         flash: Some(flash),
         ..Config::default()
     };
-    Board::new(&image, config).map_err(|error| format!("{}: {error}", elf.display()))
+    Board::new(&image, config).map_err(|error| match error {
+        sim::Error::Slot(_) => format!("{}: {error}", layout.name),
+        _ => format!("{}: {error}", elf.display()),
+    })
 }
 
 fn image(elf: &Path) -> Result<Image, String> {
@@ -179,6 +197,8 @@ fn write_preset(flash: &mut [u8], module: Module) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const FLASH_SIZE: usize = MODIO_02.part.flash_size;
 
     #[test]
     fn a_preset_is_stored_only_where_nothing_is() {

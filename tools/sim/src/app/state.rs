@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use sim::Channel;
+use sim::slot::Slot;
 
 use super::bench::Bench;
 
@@ -12,8 +13,7 @@ pub fn json(bench: &mut Bench) -> Value {
     let (to_unit, from_unit) = line.frame_counts();
     let board = &bench.board;
     let leds = board.leds();
-    let channels = [1, 2, 3, 4].map(|number| channel(board.channel(number)));
-    json!({
+    let mut state = json!({
         "virtual_ms": board.now().as_ms(),
         "powered": board.powered(),
         "dip": board.dip(),
@@ -26,9 +26,28 @@ pub fn json(bench: &mut Bench) -> Value {
             "rx_frames": to_unit,
             "tx_frames": from_unit,
         },
-        "channels": channels,
+        "channels": channels(board.slot()),
         "log_tail": bench.log_tail().collect::<Vec<_>>(),
+    });
+    if board.slots().count() > 1 {
+        state["slots"] = board
+            .slots()
+            .map(|(port, slot)| one_slot(port, slot))
+            .collect();
+    }
+    state
+}
+
+fn one_slot(port: u8, slot: &Slot) -> Value {
+    json!({
+        "port": port,
+        "module": slot.module().name(),
+        "channels": channels(slot),
     })
+}
+
+fn channels(slot: &Slot) -> [Value; 4] {
+    [1, 2, 3, 4].map(|number| channel(slot.channel(number)))
 }
 
 fn channel(channel: Channel) -> Value {

@@ -10,10 +10,14 @@ const LOOP: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0x
 
 /// A bench whose board has this module plugged, and its power on.
 pub fn bench(module: Module) -> Bench {
-    let image = Image::from_bytes(&LOOP).expect("a vector table and an instruction");
-    let config = Config {
+    bench_of(Config {
         module,
         ..Config::default()
-    };
+    })
+}
+
+/// A bench with a board like this.
+pub fn bench_of(config: Config) -> Bench {
+    let image = Image::from_bytes(&LOOP).expect("a vector table and an instruction");
     Bench::new(Board::new(&image, config).expect("it fits"))
 }

@@ -1,13 +1,4 @@
-//! What is connected to the pins of the part on the modio-02.
-//!
-//! ```text
-//! PA0-3  slot lines 1-4, ADC1 IN0-3     PA9    USART1 TX -> RS-485 driver
-//! PA4-7  SW01 positions 1-4             PA10   RS-485 receiver -> USART1 RX, TIM1 CH3
-//! PA8    driver enable                  PB6-7  I2C1 -> the slot's DAC
-//! PB8-9  LEDs, PC13 LED                 PB12-15 SW01 positions 5-8
-//! ```
-
-use register_map::Module;
+//! What is connected to the pins of the part on a modio board.
 
 use crate::line::Line;
 use crate::periph::gpio::{Drive, Gpio};
@@ -17,88 +8,101 @@ use crate::slot::Slot;
 use crate::soc::{Circuit, Pin, Pins};
 use crate::time::Time;
 
-/// The driver enable on port A.
-const DRIVER_ENABLE: usize = 8;
+use super::{Config, Layout};
+
+/// The driver enable of the RS-485 line.
+const DRIVER_ENABLE: Pin = Pin::new('A', 8);
+/// The line's transmitter.
 const TX: Pin = Pin::new('A', 9);
+/// The bus of the modules' DACs.
 const SCL: Pin = Pin::new('B', 6);
 const SDA: Pin = Pin::new('B', 7);
-/// Lines from the slot, on PA0 and up.
-const LINES: usize = 4;
-/// SW01, position 1 first.
-const SWITCH: [Pin; 8] = [
-    Pin::new('A', 4),
-    Pin::new('A', 5),
-    Pin::new('A', 6),
-    Pin::new('A', 7),
-    Pin::new('B', 12),
-    Pin::new('B', 13),
-    Pin::new('B', 14),
-    Pin::new('B', 15),
-];
 
-/// The modio-02 without its part.
+/// A modio board without its part.
 #[derive(Debug)]
 pub struct Modio {
+    /// Which board it is.
+    pub layout: &'static Layout,
     /// The RS-485 bus.
     pub line: Line,
-    /// The slot and what is plugged into it.
-    pub slot: Slot,
+    /// The slots and what is plugged into them, in the order of [`Layout::slots`].
+    pub slots: Vec<Slot>,
     /// SW01: bit 0 = position 1, a set bit = ON = connected to ground.
     pub dip: u8,
+    /// The slot whose DAC has acknowledged its address.
+    addressed: Option<usize>,
 }
 
 impl Modio {
-    /// A board with `module` in its slot, whose switch stands at `dip`.
+    /// A board fitted as `config` says.
     #[must_use]
-    pub fn new(module: Module, dip: u8) -> Self {
+    pub fn new(config: &Config) -> Self {
+        let slots = config.layout.slots.iter().enumerate().map(|(n, pins)| {
+            let module = config.slots.iter().rfind(|(port, _)| *port == pins.port);
+            let module = module.map(|&(_, module)| module);
+            let unnamed = if n == 0 {
+                config.module
+            } else {
+                register_map::Module::None
+            };
+            Slot::new(module.unwrap_or(unnamed)).with_dac_at(pins.dac_address)
+        });
         Self {
+            layout: config.layout,
             line: Line::default(),
-            slot: Slot::new(module),
-            dip,
+            slots: slots.collect(),
+            dip: config.dip,
+            addressed: None,
         }
     }
 }
 
 impl Circuit for Modio {
     fn drive(&self, pins: &mut Pins) {
-        for line in 0..LINES {
-            let (drive, ohms) = (self.slot.drive(line + 1), self.slot.source_ohms(line + 1));
-            pins.drive_from(Pin::new('A', line), drive, ohms);
+        for (slot, slot_pins) in self.slots.iter().zip(self.layout.slots) {
+            for (&pin, line) in slot_pins.lines.iter().zip(1..) {
+                pins.drive_from(pin, slot.drive(line), slot.source_ohms(line));
+            }
         }
-        for (n, pin) in SWITCH.into_iter().enumerate() {
+        for (n, pin) in self.layout.switch.into_iter().enumerate() {
             let on = self.dip >> n & 1 != 0;
             pins.drive(pin, if on { Drive::Low } else { Drive::Floating });
         }
-        let held = self.slot.held();
+        let held = self.held();
         for (pin, free) in [(SCL, held.scl), (SDA, held.sda)] {
             pins.drive(pin, if free { Drive::PullUp } else { Drive::Low });
         }
     }
 
     fn port_changed(&mut self, port: char, gpio: &Gpio, now: Time) -> bool {
-        match port {
-            'A' => {
-                let on = gpio.level() >> DRIVER_ENABLE & 1 != 0;
-                self.line.set_driver(on, now);
-                let high = gpio.outputs() & gpio.level();
-                for line in 0..LINES {
-                    self.slot.set_line(line + 1, high >> line & 1 != 0);
-                }
-                false
-            }
-            'B' => {
-                let low = gpio.pulled_low();
-                self.slot.set_pins(Wires {
-                    scl: low >> SCL.number() & 1 == 0,
-                    sda: low >> SDA.number() & 1 == 0,
-                })
-            }
-            _ => false,
+        if port == DRIVER_ENABLE.port() {
+            let on = gpio.level() >> DRIVER_ENABLE.number() & 1 != 0;
+            self.line.set_driver(on, now);
         }
+        let high = gpio.outputs() & gpio.level();
+        for (slot, slot_pins) in self.slots.iter_mut().zip(self.layout.slots) {
+            for (pin, line) in slot_pins.lines.iter().zip(1..) {
+                if pin.port() == port {
+                    slot.set_line(line, high >> pin.number() & 1 != 0);
+                }
+            }
+        }
+        if port != SCL.port() {
+            return false;
+        }
+        let low = gpio.pulled_low();
+        let pins = Wires {
+            scl: low >> SCL.number() & 1 == 0,
+            sda: low >> SDA.number() & 1 == 0,
+        };
+        let slots = self.slots.iter_mut();
+        slots.fold(false, |changed, slot| slot.set_pins(pins) | changed)
     }
 
     fn set_power(&mut self, on: bool, now: Time) {
-        self.slot.set_power(on, now);
+        for slot in &mut self.slots {
+            slot.set_power(on, now);
+        }
     }
 
     fn wire(&mut self, tx: Pin) -> Option<&mut dyn Wire> {
@@ -106,10 +110,61 @@ impl Circuit for Modio {
     }
 
     fn i2c(&mut self, scl: Pin) -> Option<&mut dyn Bus> {
-        (scl == SCL).then_some(&mut self.slot as &mut dyn Bus)
+        (scl == SCL).then_some(self as &mut dyn Bus)
     }
 
     fn take_findings(&mut self) -> Vec<(Time, &'static str)> {
         self.line.take_findings()
     }
+}
+
+impl Modio {
+    /// What the modules do to the I2C wires: each of them can hold one low.
+    fn held(&self) -> Wires {
+        all(self.slots.iter().map(Slot::held))
+    }
+}
+
+/// The DACs of all slots on one I2C bus.
+impl Bus for Modio {
+    fn wires(&self) -> Wires {
+        all(self.slots.iter().map(Bus::wires))
+    }
+
+    fn address(&mut self, byte: u8, now: Time) -> bool {
+        self.addressed = None;
+        for (n, slot) in self.slots.iter_mut().enumerate() {
+            // Every DAC sees the address, so that the others ignore what follows.
+            if slot.address(byte, now) {
+                self.addressed = Some(n);
+            }
+        }
+        self.addressed.is_some()
+    }
+
+    fn write(&mut self, byte: u8, now: Time) -> bool {
+        let slots = self.slots.iter_mut();
+        slots.fold(false, |taken, slot| slot.write(byte, now) | taken)
+    }
+
+    fn read(&mut self, now: Time) -> u8 {
+        match self.addressed {
+            Some(n) => self.slots[n].read(now),
+            None => 0xFF,
+        }
+    }
+
+    fn stop(&mut self, now: Time) {
+        for slot in &mut self.slots {
+            slot.stop(now);
+        }
+    }
+}
+
+/// Wires that are high only where all of these are.
+fn all(wires: impl Iterator<Item = Wires>) -> Wires {
+    wires.fold(Wires::FREE, |a, b| Wires {
+        scl: a.scl && b.scl,
+        sda: a.sda && b.sda,
+    })
 }

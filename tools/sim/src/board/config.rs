@@ -1,8 +1,8 @@
-//! How a modio-02 is fitted.
+//! How a modio board is fitted.
 
 use register_map::Module;
 
-use super::PART;
+use super::{Layout, MODIO_02};
 use crate::chip::{self, Error};
 use crate::corner::Corner;
 use crate::slot;
@@ -12,14 +12,18 @@ use crate::slot;
 pub struct Config {
     /// SW01, bit 0 = position 1, a set bit = ON.
     pub dip: u8,
-    /// What is plugged into the slot.
+    /// Which board it is.
+    pub layout: &'static Layout,
+    /// What is plugged into the first slot, unless `slots` names it.
     pub module: Module,
+    /// What is plugged into other slots, by the numbers of their ports. A slot that is not named is empty.
+    pub slots: Vec<(u8, Module)>,
     /// The corner that the part is at.
     pub corner: Corner,
     /// Whether the 8 MHz crystal works. Without it HSERDY never comes. It can die later as well
     /// ([`crate::Board::set_crystal`]).
     pub crystal: bool,
-    /// The flash's 128 KiB before the image is written into it, which erases the pages that it needs;
+    /// The flash's contents before the image is written into it, which erases the pages that it needs;
     /// erased when `None`.
     pub flash: Option<Vec<u8>>,
     /// The 96-bit unique identity, as its bytes stand at 0x1FFF_F7E8 (RM0008 30.2).
@@ -45,7 +49,9 @@ impl Default for Config {
         } = chip::Config::default();
         Self {
             dip: 1,
+            layout: &MODIO_02,
             module: Module::Di4,
+            slots: Vec::new(),
             corner,
             crystal,
             flash,
@@ -60,7 +66,7 @@ impl Config {
     /// What of it concerns the part.
     pub(super) fn chip(self) -> chip::Config {
         chip::Config {
-            part: &PART,
+            part: &self.layout.part,
             corner: self.corner,
             crystal: self.crystal,
             flash: self.flash,

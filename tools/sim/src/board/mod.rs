@@ -1,22 +1,20 @@
-//! The modio-02: an STM32F103CB with an RS-485 line, a slot, a switch and LEDs. What is connected to which pin is in
-//! [`circuit`], what a person or a test does to the board in [`outside`].
+//! The modio boards: an STM32F103 with an RS-485 line, slots, a switch and LEDs. Which pins a board uses is in
+//! [`layout`], what is connected to them in [`circuit`], what a person or a test does to the board in [`outside`].
 
 mod circuit;
 mod config;
+mod layout;
 mod outside;
 
 pub use circuit::Modio;
 pub use config::Config;
+pub use layout::{Layout, MODIO_02, MODIO_08, SlotPins};
 pub use outside::Leds;
 
 use crate::chip::{Chip, Error};
 use crate::image::Image;
-use crate::part::{Part, STM32F103CB};
 
-/// The part of the modio-02.
-pub const PART: Part = STM32F103CB;
-
-/// The virtual modio-02.
+/// A virtual modio board.
 pub type Board = Chip<Modio>;
 
 impl Board {
@@ -24,9 +22,15 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// [`Error::Image`] when `config.flash` is not 128 KiB.
+    /// [`Error::Image`] when the image does not fit the flash or `config.flash` has another size, [`Error::Slot`]
+    /// when `config.slots` names a slot that the board does not have.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
-        let circuit = Modio::new(config.module, config.dip);
+        let ports = config.layout.slots.iter().map(|slot| slot.port);
+        let mut named = config.slots.iter().map(|&(port, _)| port);
+        if let Some(port) = named.find(|port| !ports.clone().any(|known| known == *port)) {
+            return Err(Error::Slot(port));
+        }
+        let circuit = Modio::new(&config);
         Self::in_circuit(image, config.chip(), circuit)
     }
 }

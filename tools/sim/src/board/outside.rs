@@ -1,8 +1,8 @@
-//! What surrounds the part on a modio-02: the switch, the slot, the LEDs and the line.
+//! What surrounds the part on a modio board: the switch, the slots, the LEDs and the line.
 
 use register_map::Module;
 
-use super::{Board, Error};
+use super::{Board, Error, Layout};
 use crate::line::Line;
 use crate::slot::{BusFault, Channel, Slot};
 
@@ -29,23 +29,37 @@ impl Board {
         self.change(|circuit| circuit.dip = dip);
     }
 
-    /// What is plugged into the slot.
+    /// Which board it is.
+    #[must_use]
+    pub fn layout(&self) -> &'static Layout {
+        self.circuit().layout
+    }
+
+    /// What is plugged into the first slot.
     #[must_use]
     pub fn module(&self) -> Module {
         self.slot().module()
     }
 
-    /// Plugs another module, a new one.
+    /// Plugs another module, a new one, into the first slot.
     ///
     /// # Errors
     ///
     /// [`Error::Powered`] while the power is on.
     pub fn set_module(&mut self, module: Module) -> Result<(), Error> {
+        self.set_module_at(self.layout().slots[0].port, module)
+    }
+
+    /// Plugs another module, a new one, into the slot at `port`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Powered`] while the power is on, [`Error::Slot`] when the board has no such slot.
+    pub fn set_module_at(&mut self, port: u8, module: Module) -> Result<(), Error> {
         if self.powered() {
             return Err(Error::Powered);
         }
-        self.with_slot(|slot| slot.set_module(module));
-        Ok(())
+        self.change_slot(port, |slot| slot.set_module(module))
     }
 
     /// Energises the digital input on channel `ch` (1 to 4) or takes the voltage away.
@@ -89,20 +103,44 @@ impl Board {
         self.with_slot(|slot| slot.set_bus_fault(fault));
     }
 
-    /// Channel `ch` (1 to 4) of the plugged module; [`Channel::None`] for any other number.
+    /// Channel `ch` (1 to 4) of the module in the first slot; [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
         self.slot().channel(ch)
     }
 
-    /// The slot, to look at.
+    /// The first slot, to look at.
     #[must_use]
     pub fn slot(&self) -> &Slot {
-        &self.circuit().slot
+        &self.circuit().slots[0]
+    }
+
+    /// The slots with the numbers of their ports, the first one first.
+    pub fn slots(&self) -> impl Iterator<Item = (u8, &Slot)> {
+        let ports = self.layout().slots.iter().map(|pins| pins.port);
+        ports.zip(&self.circuit().slots)
+    }
+
+    /// Does something to the slot at `port` at this instant; the part sees it immediately.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Slot`] when the board has no such slot.
+    pub fn change_slot<T>(
+        &mut self,
+        port: u8,
+        action: impl FnOnce(&mut Slot) -> T,
+    ) -> Result<T, Error> {
+        let slots = self.layout().slots.iter();
+        let n = slots
+            .map(|pins| pins.port)
+            .position(|known| known == port)
+            .ok_or(Error::Slot(port))?;
+        Ok(self.change(|circuit| action(&mut circuit.slots[n])))
     }
 
     fn with_slot<T>(&mut self, action: impl FnOnce(&mut Slot) -> T) -> T {
-        self.change(|circuit| action(&mut circuit.slot))
+        self.change(|circuit| action(&mut circuit.slots[0]))
     }
 
     /// The LEDs.

@@ -55,6 +55,8 @@ pub enum Error {
     Powered,
     /// No such channel, or nothing of that kind on it.
     Channel,
+    /// The board has no slot with this port.
+    Slot(u8),
     /// A value out of range: what it may be.
     Range(&'static str),
 }
@@ -65,6 +67,7 @@ impl fmt::Display for Error {
             Self::Image(text) => f.write_str(text),
             Self::Powered => f.write_str("only while the power is off"),
             Self::Channel => f.write_str("the plugged module has no such input on that channel"),
+            Self::Slot(port) => write!(f, "the board has no slot at port {port}"),
             Self::Range(text) => write!(f, "out of range: {text}"),
         }
     }

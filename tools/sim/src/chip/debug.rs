@@ -24,7 +24,7 @@ impl<C: Circuit> Chip<C> {
         self.machine.pass_breakpoint();
     }
 
-    /// Runs as [`Chip::run_until`] does, or up to a breakpoint; tells whether it has come to one.
+    /// Runs as [`Chip::run_until`] does, or up to a breakpoint; returns whether it has come to one.
     pub fn run_debugged(&mut self, t: Time) -> bool {
         self.run(Limit {
             time: t,

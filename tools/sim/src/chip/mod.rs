@@ -115,7 +115,7 @@ impl<C: Circuit> Chip<C> {
         });
     }
 
-    /// Runs until the instruction at `address` is next, or until `limit`; tells whether it got there. From
+    /// Runs until the instruction at `address` is next, or until `limit`; returns whether it got there. From
     /// that very instruction it runs on to the next time.
     pub fn run_until_pc(&mut self, address: u32, limit: Time) -> bool {
         self.run(Limit {

@@ -74,7 +74,7 @@ impl<C: Circuit> Chip<C> {
     /// Records the edges of a pin from now on.
     pub fn watch_pin(&mut self, port: char, pin: u8) {
         if let Some(pin) = Pin::find(port, pin.into()) {
-            self.machine.bus.soc.gpio[pin.port()].watch(pin.number());
+            self.machine.bus.soc.gpio[pin.port_index()].watch(pin.number());
         }
     }
 
@@ -88,6 +88,6 @@ impl<C: Circuit> Chip<C> {
     /// The port of a pin, and its number in it.
     fn look(&self, port: char, pin: u8) -> Option<(&Gpio, usize)> {
         let pin = Pin::find(port, pin.into())?;
-        Some((&self.machine.bus.soc.gpio[pin.port()], pin.number()))
+        Some((&self.machine.bus.soc.gpio[pin.port_index()], pin.number()))
     }
 }

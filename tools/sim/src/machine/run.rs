@@ -64,7 +64,7 @@ pub enum Stop {
 }
 
 impl<C: Circuit> Machine<C> {
-    /// Runs to `limit`. With the power off, time passes for the board's other parts.
+    /// Runs to `limit`. With the power off, time passes for the circuit around the part.
     pub fn run(&mut self, limit: Limit) -> Stop {
         let address = limit.pc.map(|pc| u64::from(pc & !1));
         if let Some(address) = address {

@@ -1,6 +1,6 @@
 //! Alternate-function I/O, RM0008 section 9.4: which port an EXTI line listens to, and the debug port's pins.
 //!
-//! Pin remapping is not modelled: every peripheral the board uses is on its default pins.
+//! Pin remapping is not modelled: every peripheral is on its default pins.
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;

@@ -39,7 +39,7 @@ impl Peripheral for Dbgmcu {
     }
 
     fn reset(&mut self, _now: Time) {
-        // DBGMCU_CR is reset by power-on alone (RM0008 31.16.3): the board makes a new one then.
+        // DBGMCU_CR is reset by power-on alone (RM0008 31.16.3): the machine makes a new one then.
     }
 }
 

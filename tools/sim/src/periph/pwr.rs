@@ -1,12 +1,12 @@
 //! Power control, RM0008 chapter 5: the voltage detector (PVD) that compares the supply with a threshold.
 //!
 //! Stop and standby, and the PVD's interrupt (EXTI line 16), are not modelled. A supply below 2.0 V is a
-//! power-down, for which the board has its own call.
+//! power-down, for which the chip has its own call.
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-/// The board's supply, in millivolts.
+/// The supply, in millivolts.
 pub const NOMINAL_MV: u16 = 3300;
 
 const CR_PVDE: u32 = 1 << 4;

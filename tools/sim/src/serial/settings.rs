@@ -170,7 +170,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// 9600 8N2, the factory default of the modio boards.
+    /// 9600 8N2.
     fn default() -> Self {
         Self {
             baud: 9600,

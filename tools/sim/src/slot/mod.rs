@@ -58,6 +58,7 @@ pub struct Slot {
     /// The levels the part's pins give the lines.
     driven: [bool; 4],
     dac: Mcp4728,
+    dac_address: u8,
     fault: BusFault,
     /// The I2C pins as the part drives them by hand.
     pins: Wires,
@@ -82,8 +83,19 @@ impl Slot {
             source_ohms: [SOURCE_OHMS; 4],
             driven: [false; 4],
             dac: Mcp4728::default(),
+            dac_address: mcp4728::ADDRESS,
             fault: BusFault::None,
             pins: Wires::FREE,
+        }
+    }
+
+    /// The same slot, whose modules have their DAC at `address`, 0x60 to 0x67.
+    #[must_use]
+    pub fn with_dac_at(self, address: u8) -> Self {
+        Self {
+            dac: self.dac.at(address),
+            dac_address: address,
+            ..self
         }
     }
 
@@ -97,7 +109,7 @@ impl Slot {
     pub fn set_module(&mut self, module: Module) {
         *self = Self {
             powered: self.powered,
-            ..Self::new(module)
+            ..Self::new(module).with_dac_at(self.dac_address)
         };
     }
 

@@ -42,9 +42,14 @@ impl Pin {
         }
     }
 
-    /// Its port: 0 = A.
+    /// Its port, `'A'` to `'D'`.
     #[must_use]
-    pub const fn port(self) -> usize {
+    pub const fn port(self) -> char {
+        (b'A' + self.port as u8) as char
+    }
+
+    /// Its port as a number: 0 = A.
+    pub(crate) const fn port_index(self) -> usize {
         self.port
     }
 

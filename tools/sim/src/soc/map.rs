@@ -12,9 +12,9 @@ pub enum Block {
     Tim4,
     /// Independent watchdog.
     Iwdg,
-    /// USART3: the radio line.
+    /// USART3.
     Usart3,
-    /// I2C1: the analog-output module.
+    /// I2C1.
     I2c1,
     /// Alternate-function I/O.
     Afio,
@@ -32,7 +32,7 @@ pub enum Block {
     Adc1,
     /// Advanced timer 1.
     Tim1,
-    /// USART1: the RS-485 line.
+    /// USART1.
     Usart1,
     /// Reset and clock control.
     Rcc,

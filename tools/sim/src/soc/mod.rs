@@ -312,7 +312,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// Passes on what a block has done: to other blocks and the board, to the interrupt lines, to the
+    /// Passes on what a block has done: to other blocks and the circuit, to the interrupt lines, to the
     /// memory of what happens next.
     fn settle(&mut self, block: Block, now: Time) {
         self.wire(block, now);

@@ -4,7 +4,7 @@ use super::map::{Block, irq};
 use super::{Circuit, Soc};
 
 impl<C: Circuit> Soc<C> {
-    /// Forgets which interrupt lines were told: all that are high will be told again.
+    /// Forgets which interrupt lines were reported: all that are high are reported again.
     pub fn repeat_lines(&mut self) {
         self.changed_lines = self.levels;
     }

@@ -25,7 +25,7 @@ pub(super) struct Serial {
 impl Serial {
     /// The port of its pins.
     pub(super) const fn port(&self) -> Block {
-        GPIO[self.tx.port()]
+        GPIO[self.tx.port_index()]
     }
 }
 
@@ -109,7 +109,7 @@ impl<C: Circuit> Soc<C> {
 
     /// A USART receives nothing through a pin that is no input.
     fn check_receiver(&mut self, serial: &Serial, now: Time) {
-        let port = &self.gpio[serial.rx.port()];
+        let port = &self.gpio[serial.rx.port_index()];
         let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;
         let (usart, wire) = self.usart(serial);
         if closed && wire.is_some() && usart.awaits_start() {
@@ -127,14 +127,17 @@ impl<C: Circuit> Soc<C> {
         } else {
             Drive::Low
         };
-        self.gpio[serial.rx.port()].drive(serial.rx.number(), drive, now);
-        self.wire_port(serial.rx.port(), now);
+        self.gpio[serial.rx.port_index()].drive(serial.rx.number(), drive, now);
+        self.wire_port(serial.rx.port_index(), now);
     }
 
     /// What the part does to the pins of a port: to its wires and to the circuit.
     fn wire_gpio(&mut self, port: usize, now: Time) {
         let gpio = &self.gpio[port];
-        for serial in SERIALS.iter().filter(|serial| serial.tx.port() == port) {
+        for serial in SERIALS
+            .iter()
+            .filter(|serial| serial.tx.port_index() == port)
+        {
             let tx = serial.tx.number();
             let pin = if gpio.alternate_outputs() >> tx & 1 != 0 {
                 TxPin::Usart
@@ -145,14 +148,17 @@ impl<C: Circuit> Soc<C> {
                 wire.set_tx_pin(pin, now);
             }
         }
-        if port == SCL.port() {
+        if port == SCL.port_index() {
             self.wire_i2c_pins(now);
         }
         let name = char::from(b'A' + port as u8);
         if self.circuit.port_changed(name, &self.gpio[port], now) {
             self.refresh(now);
         }
-        for serial in SERIALS.iter().filter(|serial| serial.tx.port() == port) {
+        for serial in SERIALS
+            .iter()
+            .filter(|serial| serial.tx.port_index() == port)
+        {
             self.note_due(serial.usart);
         }
         self.wire_port(port, now);
@@ -179,7 +185,7 @@ impl<C: Circuit> Soc<C> {
     /// PB6 and PB7: the I2C block's, or moved by hand, to free a stuck bus.
     fn wire_i2c_pins(&mut self, now: Time) {
         const PINS: u16 = 1 << SCL.number() | 1 << SDA.number();
-        let port = &self.gpio[SCL.port()];
+        let port = &self.gpio[SCL.port_index()];
         let connected = port.alternate_open_drains() & PINS == PINS;
         self.i2c1.set_connected(connected, now);
         let by_hand = port.pulled_low() & PINS;

@@ -141,6 +141,42 @@ fn refused(arguments: &[&str], parts: &[&str]) {
 }
 
 #[test]
+fn a_slot_that_the_board_lacks_and_a_board_without_an_image_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let elf = elf.to_str().unwrap();
+    refused(&["--board", "modio-08"], &["--elf"]);
+    refused(&["--elf", elf, "--slot", "1=4do"], &["modio-02", "port 1"]);
+    let larger = ["--elf", elf, "--board", "modio-08", "--slot", "5=4do"];
+    refused(&larger, &["modio-08", "port 5"]);
+}
+
+#[test]
+fn a_board_with_several_slots_shows_them_over_http() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    let mut running = Running::start(&[
+        "--elf",
+        elf.to_str().unwrap(),
+        "--board",
+        "modio-08",
+        "--module",
+        "4do",
+        "--slot",
+        "3=4ai",
+        "--http",
+        "127.0.0.1:0",
+    ]);
+    running.endpoint("pty: ");
+    let http = running.endpoint("http: http://");
+    let state = state(&http);
+    let modules = [0, 1, 2, 3].map(|n| state["slots"][n]["module"].clone());
+    assert_eq!(modules, ["4do", "none", "4ai", "none"]);
+    running.signal("-TERM");
+    assert_eq!(running.end().0, Some(0));
+}
+
+#[test]
 fn signals_end_it_well_and_remove_the_link() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());

@@ -10,6 +10,7 @@ mod measure;
 mod parts;
 mod regs;
 mod resets;
+mod slots;
 mod wires;
 
 use asm::Asm;

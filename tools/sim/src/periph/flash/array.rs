@@ -14,7 +14,7 @@ use crate::part::Part;
 /// What an interrupted operation leaves. The part promises nothing; each choice is the same in every run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Torn {
-    /// Each cell that was to change has its own speed, drawn from its place and the board's seed. Cells that
+    /// Each cell that was to change has its own speed, drawn from its place and the part's seed. Cells that
     /// are far from the threshold read as the old or as the new bit; those near it read differently from
     /// read to read.
     #[default]

@@ -2,7 +2,9 @@
 
 use register_map::Module;
 
+use super::bits::{offset, sr2};
 use super::*;
+use crate::peripheral::Peripheral;
 use crate::slot::{BusFault, Channel, Slot};
 
 const HZ: u32 = 36_000_000;

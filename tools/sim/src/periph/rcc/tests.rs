@@ -1,6 +1,7 @@
 //! RCC against RM0008 chapter 7.
 
 use super::*;
+use crate::peripheral::Peripheral;
 
 fn at(rcc: &mut Rcc, us: u64) -> Time {
     let now = Time::from_us(us);

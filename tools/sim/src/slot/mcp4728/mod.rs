@@ -11,7 +11,7 @@ mod tests;
 
 use crate::time::Time;
 
-/// Its address on the bus, 7 bits.
+/// Its address on the bus, 7 bits, unless the factory gave it another of the eight from here on.
 pub const ADDRESS: u8 = 0x60;
 
 /// How long an EEPROM write takes: 25 ms typical (section 1.0, at most 50 ms).
@@ -85,6 +85,7 @@ enum Write {
 /// The chip.
 #[derive(Clone, Debug)]
 pub struct Mcp4728 {
+    address: u8,
     registers: [Setting; 4],
     eeprom: [Setting; 4],
     /// The EEPROM is being written until then.
@@ -107,6 +108,7 @@ impl Mcp4728 {
     #[must_use]
     pub const fn new(eeprom: [Setting; 4]) -> Self {
         Self {
+            address: ADDRESS,
             registers: eeprom,
             eeprom,
             busy_until: Time::ZERO,
@@ -114,6 +116,12 @@ impl Mcp4728 {
             expect: Expect::Nothing,
             cursor: 0,
         }
+    }
+
+    /// The same chip at `address`, 0x60 to 0x67.
+    #[must_use]
+    pub const fn at(self, address: u8) -> Self {
+        Self { address, ..self }
     }
 
     /// The input registers, which the outputs follow.
@@ -152,10 +160,10 @@ impl Mcp4728 {
         self.cursor = 0;
         self.expect = match byte {
             0 => Expect::GeneralCall,
-            _ if byte >> 1 == ADDRESS && byte & 1 == 0 => Expect::Command,
+            _ if byte >> 1 == self.address && byte & 1 == 0 => Expect::Command,
             _ => Expect::Nothing,
         };
-        byte == 0 || byte >> 1 == ADDRESS
+        byte == 0 || byte >> 1 == self.address
     }
 
     /// A data byte from the master; tells whether it is acknowledged.
@@ -192,7 +200,7 @@ impl Mcp4728 {
         let ready = u8::from(now >= self.busy_until);
         match at % 3 {
             // RDY/BSY, POR (powered), DAC1 DAC0, 0, A2 A1 A0.
-            0 => ready << 7 | 1 << 6 | (channel as u8) << 4,
+            0 => ready << 7 | 1 << 6 | (channel as u8) << 4 | self.address & 7,
             n => setting.to_bytes()[n - 1],
         }
     }

@@ -1,0 +1,109 @@
+//! The boards, as data.
+
+use crate::part::{Part, STM32F103CB, STM32F103RC};
+use crate::slot::mcp4728;
+use crate::soc::Pin;
+
+/// A slot of a board.
+#[derive(Clone, Copy, Debug)]
+pub struct SlotPins {
+    /// The number of its port.
+    pub port: u8,
+    /// Its lines 1 to 4.
+    pub lines: [Pin; 4],
+    /// The I2C address of the DAC of a module in it.
+    pub dac_address: u8,
+}
+
+/// A board. The RS-485 line (PA8 to PA10), I2C1 (PB6, PB7) and the LEDs (PB8, PB9, PC13) are the same on all.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    /// Its name.
+    pub name: &'static str,
+    /// Its part.
+    pub part: Part,
+    /// Its slots. The first one is meant where no port is named.
+    pub slots: &'static [SlotPins],
+    /// SW01, position 1 first. ON = low.
+    pub switch: [Pin; 8],
+}
+
+/// The modio-02: one slot.
+pub const MODIO_02: Layout = Layout {
+    name: "modio-02",
+    part: STM32F103CB,
+    slots: &[SlotPins {
+        port: 5,
+        lines: pins([('A', 0), ('A', 1), ('A', 2), ('A', 3)]),
+        dac_address: mcp4728::ADDRESS,
+    }],
+    switch: pins([
+        ('A', 4),
+        ('A', 5),
+        ('A', 6),
+        ('A', 7),
+        ('B', 12),
+        ('B', 13),
+        ('B', 14),
+        ('B', 15),
+    ]),
+};
+
+/// The modio-08: four slots.
+pub const MODIO_08: Layout = Layout {
+    name: "modio-08",
+    part: STM32F103RC,
+    slots: &[
+        SlotPins {
+            port: 1,
+            lines: pins([('A', 0), ('A', 1), ('A', 2), ('A', 3)]),
+            dac_address: mcp4728::ADDRESS,
+        },
+        SlotPins {
+            port: 2,
+            lines: pins([('A', 4), ('A', 5), ('A', 6), ('A', 7)]),
+            dac_address: mcp4728::ADDRESS + 1,
+        },
+        SlotPins {
+            port: 3,
+            lines: pins([('C', 0), ('C', 1), ('C', 2), ('C', 3)]),
+            dac_address: mcp4728::ADDRESS + 2,
+        },
+        SlotPins {
+            port: 4,
+            lines: pins([('B', 0), ('B', 1), ('C', 4), ('C', 5)]),
+            dac_address: mcp4728::ADDRESS + 3,
+        },
+    ],
+    switch: pins([
+        ('C', 6),
+        ('C', 7),
+        ('C', 8),
+        ('C', 9),
+        ('B', 12),
+        ('B', 13),
+        ('B', 14),
+        ('B', 15),
+    ]),
+};
+
+impl Layout {
+    /// All boards.
+    pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
+
+    /// The board with this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        Self::ALL.into_iter().find(|layout| layout.name == name)
+    }
+}
+
+const fn pins<const N: usize>(names: [(char, usize); N]) -> [Pin; N] {
+    let mut pins = [Pin::new('A', 0); N];
+    let mut n = 0;
+    while n < N {
+        pins[n] = Pin::new(names[n].0, names[n].1);
+        n += 1;
+    }
+    pins
+}
