@@ -7,7 +7,7 @@ mod line;
 use std::io;
 
 use line::Line;
-use modbus_server::{DataModel, Exception, Function, Span, Table, Words, WordsOut};
+use modbus_server::{DataModel, Exception, Function, Span, Table, TextOut, Words, WordsOut};
 use serial2::SerialPort;
 
 fn main() -> io::Result<()> {
@@ -73,12 +73,13 @@ impl DataModel for Thermostat {
         self.setpoint = words.get(0).unwrap_or(self.setpoint);
     }
 
-    fn identification(&self, object: u8) -> Option<&[u8]> {
-        Some(match object {
-            0x00 => b"Example company",
-            0x01 => b"Thermostat",
-            0x02 => b"1.0",
-            _ => return None,
-        })
+    fn identification(&self, object: u8, text: &mut TextOut<'_>) -> bool {
+        match object {
+            0x00 => text.extend(b"Example company"),
+            0x01 => text.extend(b"Thermostat"),
+            0x02 => text.extend(env!("CARGO_PKG_VERSION").as_bytes()),
+            _ => return false,
+        }
+        true
     }
 }

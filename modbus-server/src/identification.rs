@@ -7,7 +7,7 @@
 //!  +----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
 //! ```
 
-use crate::{Adu, DataModel, Exception};
+use crate::{Adu, DataModel, Exception, TextOut};
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +73,7 @@ impl ReadCode {
 /// function code is validated first (V1.1b3 4.5). 03 for another length or a code that is not 01 to
 /// 04; 02 for one object that is not there.
 pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode, u8), Exception> {
-    if model.identification(0).is_none() {
+    if !exists(0, model) {
         return Err(Exception::IllegalFunction);
     }
     let (code, object) = match *fields {
@@ -82,7 +82,7 @@ pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode,
         _ => return Err(Exception::IllegalFunction),
     };
     let code = ReadCode::from_code(code).ok_or(Exception::IllegalDataValue)?;
-    let known = object <= code.last() && value(object, model).is_some();
+    let known = object == 0 || (object <= code.last() && exists(object, model));
     match code {
         ReadCode::One if !known => Err(Exception::IllegalDataAddress),
         // A stream that cannot begin there begins at the beginning.
@@ -99,18 +99,15 @@ pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut 
     while let Some(object) = next
         && object <= code.last()
     {
-        if let Some(value) = value(object, model) {
-            if adu.len() + OBJECT + value.len() > MAX_BODY {
+        match append(object, model, adu) {
+            Some(true) => count += 1,
+            Some(false) => {
                 adu.set(MORE_FOLLOWS, 0xFF);
                 adu.set(NEXT_OBJECT, object);
                 break;
             }
-            // It fits 250 bytes.
-            adu.extend(&[object, value.len() as u8]);
-            adu.extend(value);
-            count += 1;
-        } else if object >= FIRST_EXTENDED {
-            break;
+            None if object >= FIRST_EXTENDED => break,
+            None => {}
         }
         next = match object {
             _ if code == ReadCode::One => None,
@@ -121,18 +118,38 @@ pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut 
     adu.set(COUNT, count);
 }
 
-/// The value of an object, as far as it fits a reply.
-fn value(object: u8, model: &impl DataModel) -> Option<&[u8]> {
-    if (LAST_REGULAR + 1..FIRST_EXTENDED).contains(&object) {
-        return None;
+/// Appends an object with its length and its value, which is cut off where it fits no reply. `None`
+/// if there is no such object, `Some(false)` if this reply has no room left for it.
+fn append(object: u8, model: &impl DataModel, adu: &mut Adu) -> Option<bool> {
+    let start = adu.len();
+    let bytes = adu.resize(MAX_BODY);
+    let mut text = TextOut::new(bytes.get_mut(start + OBJECT..).unwrap_or_default());
+    let exists = is_known(object) && model.identification(object, &mut text);
+    let len = text.len().min(MAX_VALUE);
+    let end = start + OBJECT + len;
+    let fits = exists && end <= MAX_BODY;
+    adu.resize(if fits { end } else { start });
+    if fits {
+        // Both are below 250.
+        adu.set(start as u8, object);
+        adu.set(start as u8 + 1, len as u8);
     }
-    let value = model.identification(object)?;
-    Some(value.get(..MAX_VALUE).unwrap_or(value))
+    exists.then_some(fits)
+}
+
+/// Whether there is such an object.
+fn exists(object: u8, model: &impl DataModel) -> bool {
+    is_known(object) && model.identification(object, &mut TextOut::new(&mut []))
+}
+
+/// Whether the number is not one of the reserved ones.
+const fn is_known(object: u8) -> bool {
+    object <= LAST_REGULAR || object >= FIRST_EXTENDED
 }
 
 /// Which objects there are at all, and that each can be asked for by itself (bit 7).
 fn conformity(model: &impl DataModel) -> u8 {
-    let there = |object| model.identification(object).is_some();
+    let there = |object| exists(object, model);
     let level = if there(FIRST_EXTENDED) {
         ReadCode::Extended
     } else if (ReadCode::Basic.last() + 1..=LAST_REGULAR).any(there) {

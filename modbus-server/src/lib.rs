@@ -20,6 +20,7 @@ mod server;
 mod span;
 mod table;
 mod tables;
+mod text;
 mod words;
 
 pub use adu::Adu;
@@ -34,4 +35,5 @@ pub use server::{Answered, Committed, Decided, Request, Served, Server};
 pub use span::Span;
 pub use table::Table;
 pub use tables::Tables;
+pub use text::TextOut;
 pub use words::{Words, WordsOut};

@@ -1,6 +1,6 @@
 //! What the device around the server must bring.
 
-use crate::{Adu, Bits, BitsOut, Exception, Function, Span, Table, Words, WordsOut};
+use crate::{Adu, Bits, BitsOut, Exception, Function, Span, Table, TextOut, Words, WordsOut};
 
 /// The points and registers of the device.
 ///
@@ -119,15 +119,16 @@ pub trait DataModel {
         true
     }
 
-    /// An object of the device identification, function 2B/0E (V1.1b3 6.21): 00 vendor, 01 product
-    /// code, 02 revision, all or none of them; 03 URL, 04 product, 05 model, 06 application, if
-    /// there are; from 80 on the device's own, without a gap. Never asked for 07 to 7F. Up to 244
-    /// bytes of text; what is beyond is cut off.
+    /// Appends an object of the device identification to `text` and returns `true`; returns `false`
+    /// if there is no such object. Function 2B/0E (V1.1b3 6.21): 00 vendor, 01 product code, 02
+    /// revision, all or none of them; 03 URL, 04 product, 05 model, 06 application, if they exist;
+    /// from 80 on the device's own, without a gap. Never asked for 07 to 7F. Up to 244 bytes of
+    /// text; what is beyond is cut off.
     ///
-    /// Without object 00 the device has no such function.
-    fn identification(&self, object: u8) -> Option<&[u8]> {
-        let _ = object;
-        None
+    /// A device without object 00 does not have the function.
+    fn identification(&self, object: u8, text: &mut TextOut<'_>) -> bool {
+        let _ = (object, text);
+        false
     }
 
     /// Checks a request with a function code that is no [`Function`]: a user-defined one, 65 to 72

@@ -23,7 +23,9 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-use modbus_server::{Bits, BitsOut, DataModel, Exception, Span, Table, Words, WordsOut, Work};
+use modbus_server::{
+    Bits, BitsOut, DataModel, Exception, Span, Table, TextOut, Words, WordsOut, Work,
+};
 use modio_drivers::{CHANNELS, ChannelSettings, Kind, Range, Scale};
 use register_map::{codes::Command, configuration, counters, fault, state as state_map};
 
@@ -294,8 +296,10 @@ impl DataModel for Device {
         !self.comm_watchdog.has_tripped()
     }
 
-    fn identification(&self, object: u8) -> Option<&[u8]> {
-        identification::object(object, self.state.serial(), self.config.slot().module)
+    fn identification(&self, object: u8, text: &mut TextOut<'_>) -> bool {
+        let value = identification::object(object, self.state.serial(), self.config.slot().module);
+        text.extend(value.unwrap_or_default());
+        value.is_some()
     }
 }
 

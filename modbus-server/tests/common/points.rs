@@ -1,7 +1,7 @@
 //! The device of the tests.
 
 use modbus_server::{
-    Adu, Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut,
+    Adu, Bits, BitsOut, DataModel, Exception, Function, Span, Table, TextOut, Words, WordsOut,
 };
 
 /// Four tables from address 0 on.
@@ -221,8 +221,15 @@ impl DataModel for Points {
         self.running
     }
 
-    fn identification(&self, object: u8) -> Option<&[u8]> {
+    fn identification(&self, object: u8, text: &mut TextOut<'_>) -> bool {
         assert!(!(0x07..=0x7F).contains(&object), "{object:02X} is reserved");
-        self.objects[usize::from(object)].as_deref()
+        let value = self.objects[usize::from(object)].as_deref();
+        // In two parts, for a model that makes its text may need several.
+        let (front, back) = value
+            .unwrap_or(b"none")
+            .split_at(value.map_or(0, |v| v.len() / 2));
+        text.extend(front);
+        text.extend(back);
+        value.is_some()
     }
 }
