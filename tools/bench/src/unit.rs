@@ -199,10 +199,14 @@ impl Unit {
             }
             let on = self.board.driver_enable();
             if exception == BYTE {
-                handler.driving |= handler.instructions == 0 && driving;
+                if handler.instructions == 0 {
+                    handler.driving = driving;
+                    handler.entry = address;
+                }
                 handler.instructions += retired;
                 handler.out |= self.board.line_bytes_written() > written;
-                if self.exception() != BYTE {
+                // One that is pending again is entered at once, without a return to the program.
+                if self.exception() != BYTE || self.board.pc() == handler.entry {
                     handler.end(on, &mut cost);
                 }
             }
@@ -254,6 +258,8 @@ impl Expiry {
 /// A run of the byte handler.
 #[derive(Default)]
 struct Handler {
+    /// Where it starts.
+    entry: u32,
     instructions: u32,
     /// The reply has begun: nothing comes in any more.
     out: bool,
