@@ -1,5 +1,5 @@
-//! Tells the code which commit it is built from, and for the image gives the linker the memory layout and
-//! cortex-m-rt's script.
+//! Gives the code the commit that it is built from. For the image, also gives the linker the memory layout and the
+//! script of cortex-m-rt.
 
 use std::{env, fs, path::PathBuf, process::Command};
 

@@ -37,7 +37,7 @@ impl<'a> Unit<'a> {
             registers: Registers([0x1111; 10]),
             now: 0,
         };
-        // What comes before the first silence is nobody's.
+        // The port ignores characters until the line has been silent once.
         assert!(!unit.silence());
         unit
     }

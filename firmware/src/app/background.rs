@@ -22,7 +22,7 @@ pub struct Background {
 }
 
 impl Background {
-    /// Does what there is to do.
+    /// Brings the DAC, the store, the LEDs and the log up to date.
     pub fn run(
         &mut self,
         device: &mut impl Mutex<T = &'static mut Device>,

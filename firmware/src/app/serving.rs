@@ -54,7 +54,7 @@ impl Serving {
 
     fn delay_ms(&self, device: &mut impl Mutex<T = &'static mut Device>) -> u16 {
         if self.server.unit() == LOADER_UNIT {
-            // The loader mode is to be found by a master with any time-out.
+            // A master must find a unit in loader mode, however short the master's time-out is.
             0
         } else {
             device.lock(|device| device.config.response_delay_ms())

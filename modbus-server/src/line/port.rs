@@ -5,7 +5,7 @@ use crate::{Adu, Head, LineCounters};
 
 /// One serial line of a server, without UART, timer or clock.
 ///
-/// Its caller has the hardware, and tells it what happens there:
+/// The caller drives the hardware and calls these methods:
 ///
 /// | what happens | call | then |
 /// |---|---|---|

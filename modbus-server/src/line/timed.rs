@@ -48,7 +48,8 @@ pub struct TimedPort<'a> {
 }
 
 impl<'a> TimedPort<'a> {
-    /// From tick `now` on. What comes before the first long silence may be the rest of a frame.
+    /// Starts in tick `now`. On an RTU line, characters before the first long silence are ignored: they may be the rest
+    /// of a frame that began earlier.
     #[must_use]
     pub const fn new(port: Port<'a>, silences: Silences, now: u32) -> Self {
         Self {

@@ -2,7 +2,7 @@
 
 use super::Server;
 use crate::line::{Framing, Port};
-use crate::{Adu, DataModel, Decision, LineCounters, Outcome, Work};
+use crate::{Adu, DataModel, Decision, LineCounters, Outcome};
 
 /// A request that was taken from its port. The unit address of its reply may be on its way.
 #[must_use = "its buffer is the port's"]
@@ -115,13 +115,6 @@ impl<'a> Committed<'a> {
     #[must_use]
     pub const fn decision(&self) -> &Decision {
         &self.0.decision
-    }
-
-    /// What is to be done.
-    #[inline]
-    #[must_use]
-    pub const fn work(&self) -> Work {
-        self.0.decision.work
     }
 
     /// The tick in which the request ended.

@@ -64,6 +64,18 @@ pub fn corner() -> Corner {
     name.map_or(Corner::Nominal, |name| name.parse().expect("MODIO_CORNER"))
 }
 
+/// A time that depends on what instructions cost: at most this long at the nominal corner, and at the slow one.
+pub struct Most(pub Time, pub Time);
+
+impl Most {
+    pub const fn of(&self, corner: Corner) -> Time {
+        match corner {
+            Corner::Nominal | Corner::Fast => self.0,
+            Corner::Slow => self.1,
+        }
+    }
+}
+
 /// A frequency that is `hz` from an exact crystal, from the crystal of the corner.
 pub fn on_crystal(hz: u32) -> u32 {
     scaled(hz, corner().oscillators().hse)
@@ -163,6 +175,11 @@ impl Bench {
     /// The length of a bit on the line.
     pub fn bit(&self) -> Time {
         self.settings.rate().bits(1)
+    }
+
+    /// By how much the unit's receiver may misjudge an instant on the line: a sixteenth of a bit.
+    pub fn sixteenth(&self) -> Time {
+        self.settings.rate().sixteenths(1)
     }
 
     /// t3.5 on the line.

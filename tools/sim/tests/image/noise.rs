@@ -11,15 +11,18 @@ use std::time::{Duration, Instant};
 
 use fastrand::Rng;
 use register_map::configuration::{BAUD, FORMAT, STRICT_T15};
-use sim::{Channel, Corner, Module, Time};
+use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, adu, corner, crc};
+use crate::bench::{Bench, Most, adu, corner, crc};
 use damage::{Damaged, KINDS};
 use traffic::Outputs;
 
 /// Frames of each test, unless there is another number in the environment.
 const FRAMES: usize = 10_000;
 const VARIABLE: &str = "MODIO_SOAK_FRAMES";
+
+/// How long an interrupt of the line may have to wait.
+const WAIT: Most = Most(Time::from_us(6), Time::from_us(11));
 
 /// The lines of the soak: BAUD, FORMAT, `STRICT_T15`.
 const LINES: [[u16; 3]; 4] = [[96, 0, 0], [192, 1, 1], [1152, 3, 0], [9216, 2, 1]];
@@ -137,11 +140,7 @@ impl Soak {
     fn round(&mut self, bench: &mut Bench, rng: &mut Rng, outputs: &mut Outputs) {
         // A receiver that has lost its place may take the end of a damaged frame for a character that ends almost a
         // character later. The unit measures its silence from the interrupt, which may have to wait.
-        let wait = match corner() {
-            Corner::Nominal | Corner::Fast => Time::from_us(6),
-            Corner::Slow => Time::from_us(11),
-        };
-        let silence = bench.t35() + bench.characters(1) + wait;
+        let silence = bench.t35() + bench.characters(1) + WAIT.of(corner());
         let mut at = bench.board.now();
         let mut before = Vec::new();
         for _ in 0..rng.usize(0..4) {

@@ -66,7 +66,7 @@ fn turnaround(bench: &mut Bench, end: Time) -> Option<Time> {
 /// The latest that a reply begins without pulses, after the end of its request. The receiver may see that end a
 /// sixteenth of a bit late.
 fn latest(bench: &Bench) -> Time {
-    bench.t35() + Time::from_ps(bench.bit().as_ps() / 16) + Time::from_us(60)
+    bench.t35() + bench.sixteenth() + Time::from_us(60)
 }
 
 fn assert_prompt(bench: &mut Bench, end: Time, what: &str) {

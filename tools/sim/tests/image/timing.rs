@@ -1,22 +1,10 @@
 //! When the unit speaks, and how long it holds the bus.
 
 use register_map::{codes::Baud, configuration};
-use sim::{Corner, Module, Time, line::Direction};
+use sim::{Module, Time, line::Direction};
 
 use crate::ascii::ascii;
-use crate::bench::{Bench, adu, corner};
-
-/// A time that depends on what instructions cost: at most this long at the nominal corner, and at the slow one.
-struct Most(Time, Time);
-
-impl Most {
-    const fn of(&self, corner: Corner) -> Time {
-        match corner {
-            Corner::Nominal | Corner::Fast => self.0,
-            Corner::Slow => self.1,
-        }
-    }
-}
+use crate::bench::{Bench, Most, adu, corner};
 
 /// From t3.5 to the first byte in the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(13), Time::from_us(24));
@@ -31,7 +19,7 @@ const GAP: Most = Most(Time::from_us(16), Time::from_us(30));
 #[ignore = "needs the image: cargo xtask test"]
 fn the_reply_starts_at_t35_and_the_driver_is_on_just_as_long_as_needed() {
     let mut bench = Bench::new(Module::Di4, 1);
-    let bit = bench.bit();
+    let (bit, sixteenth) = (bench.bit(), bench.sixteenth());
     for _ in 0..10 {
         let now = bench.board.now();
         let end = bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
@@ -45,7 +33,7 @@ fn the_reply_starts_at_t35_and_the_driver_is_on_just_as_long_as_needed() {
         assert!(turnaround >= Settings::T35, "{turnaround:?} is before t3.5");
         let late = turnaround - Settings::T35;
         // The receiver sees the end of the request up to a sixteenth of a bit early, which t3.5 allows for.
-        let most = bit + Time::from_ps(bit.as_ps() / 16) + LATE.of(corner());
+        let most = bit + sixteenth + LATE.of(corner());
         assert!(late <= most, "{late:?} after t3.5");
 
         let edges: Vec<_> = line.driver_edges().collect();
