@@ -1,31 +1,87 @@
-//! Gives the code the commit that it is built from. For the image, also gives the linker the memory layout and the
+//! Gives the code the commit that it is built from, and the self-description of each board. For the image, also gives the linker the memory layout and the
 //! script of cortex-m-rt.
 
-use std::{env, fs, path::PathBuf, process::Command};
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use modio_description::{FILE, HEAD, PORT_BYTES, checksum};
+use register_map::{Board, Module};
 
 /// What the image is made of, beside the lock file: with a change in any of it the commit does not say what is in the
 /// image.
-const SOURCES: [&str; 6] = [
+const SOURCES: [&str; 7] = [
     "../firmware",
     "../board-support",
     "../modio-drivers",
     "../modbus-server",
     "../register-map",
+    "../tools/description",
     "../Cargo.lock",
 ];
 
 fn main() {
     tell_commit();
-    println!("cargo::rerun-if-changed=memory.x");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    fs::write(out.join("self_description.rs"), self_descriptions())
+        .expect("cargo's directory can be written to");
+    println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=build.rs");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
-    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    fs::copy("memory.x", out.join("memory.x")).expect("memory.x can be copied");
+    if let Some(layout) = layout() {
+        fs::write(out.join("memory.x"), layout).expect("cargo's directory can be written to");
+    }
     println!("cargo::rustc-link-search={}", out.display());
     println!("cargo::rustc-link-arg-bins=--nmagic");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
+}
+
+/// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which the
+/// firmware puts in.
+fn self_descriptions() -> String {
+    let mut rows = String::new();
+    for board in Board::ALL {
+        let document =
+            modio_description::describe(board, env!("CARGO_PKG_VERSION"), |_| Module::None)
+                .encode();
+        let ports = usize::from(board.slots) * PORT_BYTES;
+        let fixed = &document[..document.len() - ports];
+        let (code, crc) = (board.code, checksum(fixed));
+        rows += &format!("    Fixed {{ board: {code}, bytes: &{fixed:?}, crc: {crc:#06X} }},\n");
+    }
+    format!(
+        "/// The number of the file.
+const FILE: u16 = {FILE};
+/// Records in front of the document.
+const HEAD: u16 = {HEAD};
+/// Bytes of a port at the end of the document.
+const PORT_BYTES: usize = {PORT_BYTES};
+/// The fixed part of each board's document.
+const BOARDS: [Fixed; {}] = [
+{rows}];
+",
+        Board::ALL.len()
+    )
+}
+
+/// The linker's script for the board that was chosen, if one was: a feature is named like the board's file in
+/// `memory`.
+fn layout() -> Option<String> {
+    let files = fs::read_dir("memory").expect("the directory can be read");
+    let chosen = files
+        .filter_map(|file| Some(file.ok()?.path()))
+        .find(|file| {
+            let name = file.file_stem().unwrap_or_default().to_string_lossy();
+            // Cargo tells the chosen features as variables.
+            let feature = name.to_uppercase().replace('-', "_");
+            env::var_os(format!("CARGO_FEATURE_{feature}")).is_some()
+        })?;
+    let read = |path: &Path| fs::read_to_string(path).expect("the file can be read");
+    Some(read(&chosen) + &read(Path::new("memory/sections.x")))
 }
 
 /// Sets MODIO_COMMIT to the commit's first eight digits, and MODIO_CHANGED when the sources are not those of the

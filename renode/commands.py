@@ -3,31 +3,51 @@
 #   modio_inputs DIP     drives every input pin until the next reset: SW01 to DIP, a number from 0 to 255,
 #                        and the other inputs as with nothing connected. Every reset drives $dip again, so
 #                        set $dip to move the switch.
-#   modio_preset MODULE  stores that MODULE is in the slot, when nothing is stored yet
+#   modio_board NAME     says which board the machine is: modio-02 or modio-08
+#   modio_input PORT CHANNEL LEVEL
+#                        drives a line of a slot: false energises an input of a 4DI
+#   modio_preset MODULE  stores that MODULE is in the first slot, when nothing is stored yet; several slots as
+#                        "1=4di,3=4ao"
 #   modio_log            shows the firmware's log, as much of it as its buffer holds
 #   modio_quiet          keeps warnings that mean nothing out of Renode's log
 
-# SW01, position 1 first: port and pin.
-MODIO_SW01 = [
-    ("A", 4), ("A", 5), ("A", 6), ("A", 7),
-    ("B", 12), ("B", 13), ("B", 14), ("B", 15),
-]
-
-# Inputs that are high with nothing connected: the slot's lines, RX, and the radio's AUX.
-MODIO_PULLED_UP = [("A", 0), ("A", 1), ("A", 2), ("A", 3), ("A", 10), ("B", 5)]
-
-# The start of the store's first page, for each module: a sealed record of one setting, MODULE of port 5.
-MODIO_PRESETS = {
-    "none": "6f6b6d6f0101000000000000e9a2942e00000000",
-    "4di": "6f6b6d6f0101000000000100140101006a52ca9500000000",
-    "4do": "6f6b6d6f010100000000010014010200a901e7be00000000",
-    "2relay": "6f6b6d6f010100000000010014010300e830fca700000000",
-    "4ai": "6f6b6d6f0101000000000100140104002fa6bde800000000",
-    "4ao": "6f6b6d6f0101000000000100140105006e97a6f100000000",
-    "2ai2ao": "6f6b6d6f010100000000010014010600adc48bda00000000",
+# What differs from board to board. sw01: position 1 first, port and pin. lines: those of the slots, by port. store:
+# the address of the configuration's first page, and the bytes of both.
+MODIO_BOARDS = {
+    "modio-02": {
+        "sw01": [("A", 4), ("A", 5), ("A", 6), ("A", 7), ("B", 12), ("B", 13), ("B", 14), ("B", 15)],
+        "lines": {5: [("A", 0), ("A", 1), ("A", 2), ("A", 3)]},
+        "aux": ("B", 5),
+        "store": (0x0800F800, 2048),
+    },
+    "modio-08": {
+        "sw01": [("C", 6), ("C", 7), ("C", 8), ("C", 9), ("B", 12), ("B", 13), ("B", 14), ("B", 15)],
+        "lines": {
+            1: [("A", 0), ("A", 1), ("A", 2), ("A", 3)],
+            2: [("A", 4), ("A", 5), ("A", 6), ("A", 7)],
+            3: [("C", 0), ("C", 1), ("C", 2), ("C", 3)],
+            4: [("B", 0), ("B", 1), ("C", 4), ("C", 5)],
+        },
+        "aux": ("C", 12),
+        "store": (0x0803F000, 4096),
+    },
 }
 
-MODIO_STORE = 0x0800F800
+# The codes of the modules.
+MODIO_MODULES = ["none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"]
+
+# The board that the machine is.
+MODIO_MACHINE = {"board": "modio-02"}
+
+
+def modio_board():
+    return MODIO_BOARDS[MODIO_MACHINE["board"]]
+
+
+def mc_modio_board(board):
+    if str(board) not in MODIO_BOARDS:
+        raise ValueError("there is no board %s, but %s" % (board, ", ".join(sorted(MODIO_BOARDS))))
+    MODIO_MACHINE["board"] = str(board)
 
 
 def modio_drive(place, high):
@@ -35,22 +55,66 @@ def modio_drive(place, high):
 
 
 def mc_modio_inputs(dip):
-    for bit, place in enumerate(MODIO_SW01):
+    board = modio_board()
+    for bit, place in enumerate(board["sw01"]):
         # ON pulls the pin low.
         modio_drive(place, int(dip) >> bit & 1 == 0)
-    for place in MODIO_PULLED_UP:
-        modio_drive(place, True)
+    # High with nothing connected: RX, the radio's AUX, the lines of the slots.
+    modio_drive(("A", 10), True)
+    modio_drive(board["aux"], True)
+    for lines in board["lines"].values():
+        for place in lines:
+            modio_drive(place, True)
 
 
-def mc_modio_preset(module):
+def mc_modio_input(port, channel, high):
+    lines = modio_board()["lines"]
+    if int(port) not in lines or not 1 <= int(channel) <= 4:
+        raise ValueError("there is no channel %s of port %s" % (channel, port))
+    modio_drive(lines[int(port)][int(channel) - 1], str(high).lower() == "true")
+
+
+def modio_slots(modules):
+    # Modules by port: the first slot's alone, or each as PORT=MODULE.
+    ports = sorted(modio_board()["lines"])
+    slots = {}
+    for part in str(modules).split(","):
+        port, module = (part.split("=") if "=" in part else (ports[0], part))
+        if module not in MODIO_MODULES:
+            raise ValueError("there is no module %s, but %s" % (module, ", ".join(MODIO_MODULES)))
+        if int(port) not in ports:
+            raise ValueError("there is no slot at port %s" % port)
+        slots[int(port)] = MODIO_MODULES.index(module)
+    return slots
+
+
+def modio_crc32(values):
+    crc = 0xFFFFFFFF
+    for value in values:
+        crc ^= value
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
+    return crc ^ 0xFFFFFFFF
+
+
+def modio_halves(values):
+    # Bytes of half-words, the low one first.
+    return [value >> shift & 0xFF for value in values for shift in (0, 8)]
+
+
+def mc_modio_preset(modules):
+    # A sealed record of the settings MODULE (register-map/src/record). An empty slot is the default.
+    slots = modio_slots(modules)
+    pairs = [(0x010F + port, slots[port]) for port in sorted(slots) if slots[port]]
+    record = modio_halves([0x6F6D, 0x0101, 0, 0, len(pairs)] + [half for pair in pairs for half in pair])
+    crc = modio_crc32(record)
+    page = modio_halves([0x6B6F]) + record + modio_halves([crc & 0xFFFF, crc >> 16, 0, 0])
     sysbus = monitor.Machine["sysbus"]
-    record = MODIO_PRESETS.get(str(module))
-    if record is None:
-        raise ValueError("there is no module %s, but %s" % (module, ", ".join(sorted(MODIO_PRESETS))))
-    if any(sysbus.ReadDoubleWord(MODIO_STORE + at) != 0xFFFFFFFF for at in range(0, 2048, 4)):
+    store, size = modio_board()["store"]
+    if any(sysbus.ReadDoubleWord(store + at) != 0xFFFFFFFF for at in range(0, size, 4)):
         return
-    for at in range(len(record) // 2):
-        sysbus.WriteByte(MODIO_STORE + at, int(record[2 * at:2 * at + 2], 16))
+    for at in range(len(page)):
+        sysbus.WriteByte(store + at, int(page[at]))
 
 
 def mc_modio_quiet():

@@ -3,7 +3,7 @@
 #
 #   exact_line PORT   a command of the monitor: listens on TCP port PORT of 127.0.0.1
 #
-# Include this file after board.resc, and do not `start` the emulation. modio-02-exact.resc does both right.
+# Include this file after board.resc, and do not `start` the emulation. line-exact.resc does both right.
 #
 # A byte reaches the unit when its last stop bit ends. Renode 1.16.1 delivers a byte at the instant of
 # WriteChar; later versions deliver it 10 bits later, whatever the format. LineUnit finds out which one runs.
@@ -319,7 +319,7 @@ class LineRequests(object):
         if not line_number(words[0], 999999999999):
             raise LineError("%s is no version of the protocol, such as 1" % line_shown(words[0]))
         settings = "line=%d,%s" % (self.unit.rate, self.unit.format)
-        return ["version=1", settings, "abilities=line,power,reset", "name=modio-02 in Renode"]
+        return ["version=1", settings, "abilities=line,power,reset", "name=modio in Renode"]
 
     def send(self, words):
         if not words:

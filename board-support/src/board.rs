@@ -1,5 +1,7 @@
 //! The board as one struct of named devices.
 
+use core::array;
+
 use cortex_m::peripheral::SCB;
 use stm32f1xx_hal::{
     gpio::{GpioExt, IOPinSpeed, OutputSpeed, PinState},
@@ -8,13 +10,16 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, ScanTimer, Slot, Watchdog, clock,
+    ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, Sampler, ScanTimer, Slot, Watchdog,
+    boards::{BOARD, SLOTS},
+    clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
     dip,
     fault::{self, FaultRecord},
     gap::LineTimes,
     i2c::BusPins,
-    port, rs485,
+    pin::Port,
+    rs485,
     uart::LineSettings,
     unique_id, vectors, wait,
 };
@@ -35,10 +40,12 @@ pub struct Board {
     pub dip: u8,
     /// The chip's unique number, half-words in the order of their addresses (RM0008 30.2).
     pub unique_id: [u16; 6],
-    /// The lines of the slot.
-    pub slot: Slot,
-    /// The bus to the DAC of the analog-output modules, its pins floating until it is used.
-    pub dac: DacBus,
+    /// The slots, in the order of their ports.
+    pub slots: [Slot; SLOTS],
+    /// The converter of the slots' analog lines.
+    pub sampler: Sampler,
+    /// The bus to the DACs of the analog-output modules, its pins floating until it is used.
+    pub dacs: DacBus,
     /// The pages that survive a power cycle.
     pub flash: Flash,
     /// The status LEDs, all off.
@@ -71,12 +78,12 @@ impl LineOff {
         let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
         // TX, too, needs no steeper edges than those of 10 MHz.
-        port::a().crh().modify(|_, w| w.mode9().output());
+        Port::A.registers().crh().modify(|_, w| w.mode9().output());
         Some((line, gap))
     }
 }
 
-/// Brings the board up, with interrupts disabled. Outputs of the slot are still floating, as after the reset.
+/// Brings the board up, with interrupts disabled. Lines of the slots are still floating, as after the reset.
 ///
 /// `masked` is BASEPRI while flash is erased or programmed: what it lets through must run from RAM.
 #[must_use]
@@ -102,14 +109,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     let rx = a.pa10.into_pull_up_input(&mut a.crh);
 
     // SW01: one side of each switch is on ground.
-    a.pa4.into_pull_up_input(&mut a.crl);
-    a.pa5.into_pull_up_input(&mut a.crl);
-    a.pa6.into_pull_up_input(&mut a.crl);
-    a.pa7.into_pull_up_input(&mut a.crl);
-    b.pb12.into_pull_up_input(&mut b.crh);
-    b.pb13.into_pull_up_input(&mut b.crh);
-    b.pb14.into_pull_up_input(&mut b.crh);
-    b.pb15.into_pull_up_input(&mut b.crh);
+    BOARD.switch.iter().for_each(|pin| pin.pull_up());
     cortex_m::asm::delay(DIP_SETTLE_CYCLES);
     let kept = fault::kept_dip().filter(|_| reset_cause & POWER_ON == 0);
     let dip = kept
@@ -132,8 +132,9 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         faults,
         dip,
         unique_id: unique_id::read(),
-        slot: Slot::new((a.pa0, a.pa1, a.pa2, a.pa3), a.crl, device.ADC1),
-        dac: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
+        slots: array::from_fn(|index| Slot::new(&BOARD.slots[index])),
+        sampler: Sampler::new(device.ADC1),
+        dacs: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
         flash: Flash::new(device.FLASH, device.PWR, masked),
         leds,
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
@@ -156,8 +157,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
 
 /// Reads SW01 at this instant.
 fn read_dip() -> u8 {
-    let (levels_a, levels_b) = (port::a().idr().read(), port::b().idr().read());
-    dip::number(levels_a.bits(), levels_b.bits())
+    dip::number(&BOARD.switch, Port::levels())
 }
 
 /// Reads the reset flags and takes them back, so that the next start sees only its own.

@@ -25,7 +25,11 @@ pub const ADC_SETTLING_US: u32 = 2;
 /// The longest wait for the ADC's calibration, in us: 83 cycles take 8 at 10 MHz (DS5319 table 46).
 pub const ADC_CALIBRATION_US: u32 = 100;
 
-/// SCL of the DAC's bus, in Hz: fast mode, so that the 13 bytes for four outputs take 0.4 ms and the
+/// How often a conversion is looked at before it is given up: at least twice what it needs. A look takes four cycles
+/// or more.
+pub const ADC_LOOKS: u32 = 2 * 68 * (SYSCLK_ON_HSE_HZ / ADCCLK_ON_HSE_HZ) / 4;
+
+/// SCL of the DACs' bus, in Hz: fast mode, so that the 13 bytes for four outputs take 0.4 ms and the
 /// communication watchdog brings them to SAFE in time. Less than its 400 kHz, because nobody knows the
 /// module's pull-ups: the 2.2 us that SCL is low are enough for 10 kOhm and 200 pF. Fast mode also
 /// has no trouble with the repeated start, as standard mode has above 88 kHz (errata sheet of the
@@ -39,13 +43,6 @@ pub const I2C_STEP_US: u32 = 225;
 
 /// Half a period of SCL when the bus is clocked by hand, in us.
 pub const I2C_HALF_PERIOD_US: u32 = 6;
-
-/// The pages of the flash that keep what survives a power cycle: the last two of the smallest part,
-/// the 64 KiB one (DS5319 table 2). The linker keeps the program out of them.
-pub const STORE_PAGES: [u32; 2] = [0x0800_F800, 0x0800_FC00];
-
-/// A page of flash, in bytes (medium density, PM0075 2.1).
-pub const PAGE_BYTES: u32 = 1024;
 
 /// The longest wait for a half-word to be programmed, in us: 70 at most (DS5319 table 28).
 pub const FLASH_PROGRAM_US: u32 = 500;
@@ -148,6 +145,4 @@ const _: () = {
     assert!(WATCHDOG_START_MS * 40 / WATCHDOG_START_DIVIDER <= 4096);
     assert!(I2C_HZ > 100_000 && I2C_HZ <= 400_000);
     assert!(I2C_STEP_US > 2 * 9 * 1_000_000 / I2C_HZ);
-    assert!(STORE_PAGES[0] + PAGE_BYTES == STORE_PAGES[1]);
-    assert!(STORE_PAGES[1] + PAGE_BYTES == 0x0801_0000);
 };

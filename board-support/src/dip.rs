@@ -3,12 +3,18 @@
 //! A reset by the watchdog, by software or by the pin alone does not read it again: an address that changed in
 //! service would be a surprise to the master. The map says "read once at power-on".
 
-use crate::design::{DIP_POLLS, DIP_STABLE_POLLS};
+use crate::{
+    design::{DIP_POLLS, DIP_STABLE_POLLS},
+    pin::Pin,
+};
 
-/// The switch as a number 0 to 255, from the levels of ports A and B: position 1 is bit 0, and ON pulls
-/// its pin low. Positions 1 to 4 are on PA4 to PA7, 5 to 8 on PB12 to PB15.
-pub(crate) const fn number(a: u32, b: u32) -> u8 {
-    !((a >> 4 & 0x0F) | (b >> 8 & 0xF0)) as u8
+/// The switch as a number 0 to 255, from the levels of ports A, B and C: position 1 is bit 0, and ON pulls
+/// its pin low.
+pub(crate) fn number(switch: &[Pin; 8], levels: [u32; 3]) -> u8 {
+    let positions = switch.iter().rev();
+    positions.fold(0, |number, pin| {
+        number << 1 | u8::from(!pin.is_high_in(levels))
+    })
 }
 
 /// The switch once it has read the same [`DIP_STABLE_POLLS`] times more, with `wait` in between; as it was last when
@@ -51,6 +57,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::boards::{modio_02, modio_08};
 
     /// The value read from these readings, the last of which goes on for ever, and how many were taken.
     fn read(readings: &[u8]) -> (u8, usize) {
@@ -104,16 +111,21 @@ mod tests {
 
     #[test]
     fn every_position_is_its_own_bit_and_other_pins_do_not_count() {
-        assert_eq!(number(0xFFFF, 0xFFFF), 0, "all open");
+        const ALL: u32 = 0xFFFF;
+        let modio_02 = |a, b| number(&modio_02::BOARD.switch, [a, b, ALL]);
+        let modio_08 = |b, c| number(&modio_08::BOARD.switch, [ALL, b, c]);
+        assert_eq!((modio_02(ALL, ALL), modio_08(ALL, ALL)), (0, 0), "all open");
         for position in 0..4 {
-            assert_eq!(
-                number(0xFFFF & !(1 << (4 + position)), 0xFFFF),
-                1 << position
-            );
+            assert_eq!(modio_02(ALL & !(1 << (4 + position)), ALL), 1 << position);
+            assert_eq!(modio_08(ALL, ALL & !(1 << (6 + position))), 1 << position);
             let upper = 1 << (4 + position);
-            assert_eq!(number(0xFFFF, 0xFFFF & !(1 << (12 + position))), upper);
+            assert_eq!(modio_02(ALL, ALL & !(1 << (12 + position))), upper);
+            assert_eq!(modio_08(ALL & !(1 << (12 + position)), ALL), upper);
         }
-        assert_eq!(number(0xFF0F, 0x0FFF), 255, "all closed");
-        assert_eq!(number(0x00F0, 0xF000), 0);
+        assert_eq!(
+            (modio_02(0xFF0F, 0x0FFF), modio_08(0x0FFF, 0xFC3F)),
+            (255, 255)
+        );
+        assert_eq!((modio_02(0x00F0, 0xF000), modio_08(0xF000, 0x03C0)), (0, 0));
     }
 }

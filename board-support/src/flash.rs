@@ -1,4 +1,4 @@
-//! The flash: what the program is in, and the two pages at its end that keep what survives a power
+//! The flash: what the program is in, and the two pages that keep what survives a power
 //! cycle (RM0008 3.3, PM0075 2.3).
 //!
 //! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page. Code in RAM goes on:
@@ -8,7 +8,7 @@
 //! Programming needs a supply of 2.0 V (DS5319 table 28). The voltage detector is looked at before every
 //! operation, and no operation begins while the supply is below its threshold ([`PVD_LEVEL`]).
 
-use core::ptr;
+use core::{ptr, slice};
 
 use cortex_m::{
     asm,
@@ -16,25 +16,24 @@ use cortex_m::{
 };
 use stm32f1xx_hal::pac;
 
-use crate::design::{
-    FLASH_ERASE_US, FLASH_PROGRAM_US, PAGE_BYTES, PVD_LEVEL, STORE_PAGES, SYSCLK_ON_HSE_HZ,
+use crate::{
+    boards::BOARD,
+    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ},
 };
 
-/// Where the flash of the smallest part ends: 64 KiB (DS5319 table 2).
-const END: u32 = 0x0801_0000;
-const START: u32 = 0x0800_0000;
+/// The addresses of the store's pages.
+const STORE_PAGES: [u32; 2] = BOARD.store;
+/// Bytes of each.
+const PAGE_BYTES: u32 = BOARD.page_bytes;
 /// What unlocks the controller (PM0075 2.3.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
 const ERASED: u16 = 0xFFFF;
 
-/// A page's bytes.
-pub type Page = [u8; PAGE_BYTES as usize];
-
 /// Why an operation was refused or failed. The address is the one that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
-    /// Not on the [store's pages](STORE_PAGES), or not at the start of a half-word or page. A mistake
+    /// Not on the store's pages, or not at the start of a half-word or page. A mistake
     /// of the caller's.
     Address(u32),
     /// The half-word is not erased, and only 0 can be programmed over what it holds. Erase first.
@@ -52,18 +51,6 @@ pub enum FlashError {
     LowSupply,
     /// What was programmed or erased does not read back: the page is worn out.
     Worn(u32),
-}
-
-/// `N` bytes at an address, or `None` when they are not all in the first 64 KiB.
-#[must_use]
-pub fn read<const N: usize>(address: u32) -> Option<[u8; N]> {
-    let length = u32::try_from(N).ok()?;
-    if address < START || address.checked_add(length)? > END {
-        return None;
-    }
-    // SAFETY: the range was just checked to be flash, which is always readable and never written
-    // while this runs. Volatile, because a programmer may have changed what the linker placed here.
-    Some(unsafe { ptr::read_volatile(address as *const [u8; N]) })
 }
 
 /// The store's pages, and the controller that changes them.
@@ -155,13 +142,15 @@ impl Flash {
         self.power.csr().read().pvdo().bit_is_clear()
     }
 
-    /// The bytes of the [store's pages](STORE_PAGES).
+    /// The bytes of the store's pages, in the order of the [descriptor](crate::boards::Descriptor::store).
     #[must_use]
-    pub fn pages(&self) -> [&Page; 2] {
+    pub fn pages(&self) -> [&[u8]; 2] {
         // SAFETY: a page of flash is readable at any time, of bytes, and changed by nothing but this
         // value's `&mut` methods, which the borrow keeps from being called. Those end in a barrier
         // that the compiler takes as a change of any memory.
-        STORE_PAGES.map(|address| unsafe { &*(address as *const Page) })
+        STORE_PAGES.map(|address| unsafe {
+            slice::from_raw_parts(address as *const u8, PAGE_BYTES as usize)
+        })
     }
 
     /// Programs an erased half-word, or any with 0.

@@ -4,7 +4,7 @@ use stm32f1xx_hal::gpio::{
     Cr, IOPinSpeed, Output, OutputSpeed, PB8, PB9, PC13, PinState, PushPull,
 };
 
-use crate::port;
+use crate::pin::Port;
 
 /// PC13's bit in the registers of port C.
 const RUN: u32 = 1 << 13;
@@ -37,7 +37,8 @@ impl Leds {
             _run: run,
         };
         leds.set_run(false);
-        port::c()
+        Port::C
+            .registers()
             .crh()
             .modify(|_, w| w.mode13().output2().cnf13().push_pull());
         leds
@@ -57,6 +58,9 @@ impl Leds {
     pub fn set_run(&mut self, on: bool) {
         let bits = if on { RUN << 16 } else { RUN };
         // SAFETY: changes PC13 alone, which this value owns, in one store (RM0008 9.2.5).
-        port::c().bsrr().write(|w| unsafe { w.bits(bits) });
+        Port::C
+            .registers()
+            .bsrr()
+            .write(|w| unsafe { w.bits(bits) });
     }
 }

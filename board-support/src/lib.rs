@@ -1,17 +1,18 @@
-//! The modio-02 board: an STM32F103CB (or a bare "Blue Pill" with a transceiver) as named devices.
+//! The boards, each an STM32F103 with what hangs on its pins, as named devices.
 //!
 //! `board::setup` brings the clocks up, reads the DIP switch and returns one `Board` whose fields are
-//! the devices. This is the only crate that names the HAL; a port to another board is a new module
-//! beside `board`. What needs no hardware ([`design`], [`uart`], [`tolerance`], [`gap`], the logic of [`fault`] and of
+//! the devices. This is the only crate that names the HAL; a port to another board is a descriptor in [`boards`]. What needs no hardware ([`design`], [`uart`], [`tolerance`], [`gap`], the logic of [`fault`] and of
 //! freeing an I2C bus) is built and tested on the host.
 
 #![no_std]
 
+pub mod boards;
 pub mod design;
 pub mod fault;
 pub mod gap;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
+mod pin;
 pub mod tolerance;
 pub mod uart;
 
@@ -31,8 +32,6 @@ mod gap_timer;
 mod leds;
 #[cfg(target_os = "none")]
 mod mem;
-#[cfg(target_os = "none")]
-mod port;
 #[cfg(target_os = "none")]
 mod rs485;
 #[cfg(target_os = "none")]
@@ -55,9 +54,8 @@ mod wait;
 mod watchdog;
 
 #[cfg(target_os = "none")]
-#[cfg(target_os = "none")]
 pub use {
-    adc::{AdcError, AnalogInputs},
+    adc::{AnalogInputs, NotCalibrated, Sampler},
     clock::ClockSource,
     flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},

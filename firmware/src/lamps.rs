@@ -4,7 +4,8 @@
 //! |---|---|
 //! | running | blinks once a second |
 //! | activity | lights for 50 ms after a request for this unit |
-//! | fault | blinks five times in two seconds: SW01 is no unit address; steady: the slot's module does not answer; a short flash every two seconds: no crystal |
+//! | all three | blink together for 10 s after COMMAND 6, identify, in place of all else |
+//! | fault | blinks five times in two seconds: SW01 is no unit address; steady: a module does not answer; a short flash every two seconds: no crystal |
 
 use crate::start_up::Address;
 
@@ -15,6 +16,8 @@ const PERIOD: u16 = 2000 / TICK_MS;
 const BLINK: u16 = 200 / TICK_MS;
 const RUN: u16 = 500 / TICK_MS;
 const FLASH: u16 = 100 / TICK_MS;
+/// How long the LEDs blink after [`Lamps::identify`].
+const IDENTIFY: u16 = 10_000 / TICK_MS;
 const ACTIVITY: u8 = (50 / TICK_MS) as u8;
 
 /// The worst thing wrong, worst first.
@@ -22,7 +25,7 @@ const ACTIVITY: u8 = (50 / TICK_MS) as u8;
 pub enum Trouble {
     /// SW01 shows no unit address: the line is not served.
     NoAddress,
-    /// The slot's module does not answer.
+    /// A module does not answer.
     Module,
     /// The crystal does not run: the clock is 2.5 % off at worst.
     NoCrystal,
@@ -67,6 +70,8 @@ pub struct Lit {
 pub struct Lamps {
     tick: u16,
     activity: u8,
+    /// Ticks for which all LEDs still blink.
+    identify: u16,
 }
 
 impl Lamps {
@@ -76,7 +81,13 @@ impl Lamps {
         Self {
             tick: 0,
             activity: 0,
+            identify: 0,
         }
+    }
+
+    /// Makes all LEDs blink together for 10 s from now on, then show the state of the device again.
+    pub const fn identify(&mut self) {
+        self.identify = IDENTIFY;
     }
 
     /// What is lit for the next [`TICK_MS`]; `request` says that one has come since the last tick.
@@ -88,6 +99,16 @@ impl Lamps {
         };
         let tick = self.tick;
         self.tick = if tick + 1 < PERIOD { tick + 1 } else { 0 };
+        if let Some(left) = self.identify.checked_sub(1) {
+            self.identify = left;
+            // On for the first 200 ms, dark for the last 200 ms.
+            let lit = !(left / BLINK).is_multiple_of(2);
+            return Lit {
+                activity: lit,
+                fault: lit,
+                run: lit,
+            };
+        }
         Lit {
             activity: self.activity > 0,
             fault: match trouble {
@@ -126,6 +147,43 @@ mod tests {
         assert_eq!(measure(Trouble::Module, |l| l.fault), (2000, 0));
         assert_eq!(measure(Trouble::NoCrystal, |l| l.fault), (100, 1));
         assert_eq!(measure(Trouble::None, |l| l.run), (1000, 2));
+    }
+
+    #[test]
+    fn identify_makes_all_leds_blink_together_for_ten_seconds() {
+        let mut lamps = Lamps::new();
+        lamps.tick(false, Trouble::Module);
+        lamps.identify();
+        let mut lit = 0;
+        for tick in 0..IDENTIFY {
+            let on = (tick / BLINK).is_multiple_of(2);
+            let expected = Lit {
+                activity: on,
+                fault: on,
+                run: on,
+            };
+            assert_eq!(lamps.tick(false, Trouble::Module), expected, "tick {tick}");
+            lit += u16::from(on);
+        }
+        assert_eq!(lit * TICK_MS, 5000);
+        let after = lamps.tick(false, Trouble::Module);
+        assert!(
+            after.fault && !after.activity,
+            "the module's fault is shown again"
+        );
+    }
+
+    #[test]
+    fn identify_while_the_leds_blink_begins_the_ten_seconds_anew() {
+        let mut lamps = Lamps::new();
+        lamps.identify();
+        for _ in 0..IDENTIFY - 1 {
+            lamps.tick(false, Trouble::None);
+        }
+        lamps.identify();
+        let mut blinking = (0..IDENTIFY).map(|_| lamps.tick(false, Trouble::None).fault);
+        assert_eq!(blinking.by_ref().filter(|fault| *fault).count(), 500);
+        assert!(!lamps.tick(false, Trouble::None).fault);
     }
 
     #[test]

@@ -9,5 +9,6 @@ mod built;
 pub mod config;
 pub mod device;
 pub mod lamps;
+pub mod line;
 pub mod start_up;
 pub mod store;

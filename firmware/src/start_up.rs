@@ -1,6 +1,6 @@
 //! What the device decides once, when it starts.
 
-use crate::config::Line;
+use crate::config::LineConfig;
 
 /// What the DIP switch SW01 asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,10 +42,10 @@ impl Address {
 /// What the line is set to: as configured, or as the factory set it in the loader mode and while
 /// there is no address.
 #[must_use]
-pub const fn line(address: Address, configured: Line) -> Line {
+pub const fn line(address: Address, configured: LineConfig) -> LineConfig {
     match address {
         Address::Unit(_) => configured,
-        Address::Loader | Address::Invalid => Line::FACTORY,
+        Address::Loader | Address::Invalid => LineConfig::FACTORY,
     }
 }
 
@@ -68,11 +68,11 @@ mod tests {
 
     #[test]
     fn the_loader_mode_has_the_factorys_line_whatever_is_configured() {
-        let configured = Line {
+        let configured = LineConfig {
             baud: register_map::codes::Baud::B115200,
-            ..Line::FACTORY
+            ..LineConfig::FACTORY
         };
         assert_eq!(line(Address::Unit(1), configured), configured);
-        assert_eq!(line(Address::Loader, configured), Line::FACTORY);
+        assert_eq!(line(Address::Loader, configured), LineConfig::FACTORY);
     }
 }

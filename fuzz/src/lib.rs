@@ -3,8 +3,8 @@
 //!
 //! | target | what it plays | the model |
 //! |---|---|---|
-//! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers that are away | [`heard`] |
-//! | `pdu` | requests of any content to one server, and their replies | the reference of modbus-server's tests |
+//! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers that are away | [`modbus_reference::Receiver`] |
+//! | `pdu` | requests of any content to one server, and their replies | [`modbus_reference::Server`] |
 //! | `store` | flash pages of any content, saves, starts, power cuts, wear | [`pages`], and: what was saved last is found |
 //!
 //! Every target takes any bytes. The seeds in `corpus/` are written by `examples/seeds.rs`.
@@ -15,7 +15,6 @@ pub mod common;
 #[path = "../../firmware/tests/store/flash.rs"]
 #[allow(missing_docs, dead_code)] // as above
 mod flash;
-pub mod heard;
 pub mod pages;
 pub mod pdu;
 pub mod receiver;
@@ -23,5 +22,7 @@ pub mod receiver;
 #[allow(missing_docs, dead_code)] // as above
 mod running;
 pub mod script;
-pub mod serving;
 pub mod store;
+
+/// Bytes of a page of the store.
+const PAGE_SIZE: usize = register_map::board::MODIO_02.store.bytes as usize;

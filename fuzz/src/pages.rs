@@ -3,8 +3,10 @@
 use std::fmt;
 
 use firmware::config::Settings;
-use register_map::record::{BEGINNING, PAGE_SIZE, SEALS};
+use register_map::board::MODIO_02;
+use register_map::record::{BEGINNING, SEALS};
 
+use crate::PAGE_SIZE;
 use crate::running::random_settings;
 use crate::script::Script;
 
@@ -165,7 +167,7 @@ fn records(page: &[u8]) -> Vec<(u32, bool, Found)> {
             continue;
         }
         let pairs = (at + 10..end).step_by(4).map(|at| (half(at), half(at + 2)));
-        let (settings, rejected) = Settings::load(pairs);
+        let (settings, rejected) = Settings::load(&MODIO_02, pairs);
         let invalid = false;
         let settings = Found {
             settings,

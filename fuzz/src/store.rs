@@ -15,8 +15,9 @@
 
 use firmware::config::Settings;
 use firmware::store::{Loaded, Page, Store, StoreError};
-use register_map::record::PAGE_SIZE;
+use register_map::board::MODIO_02;
 
+use crate::PAGE_SIZE;
 use crate::flash::{Mess, MockFlash};
 use crate::pages::{self, Found};
 use crate::running::{fullest_settings, random_settings, save};
@@ -87,7 +88,7 @@ impl Life {
             }
             6 => {
                 let [a, b] = [0; 2].map(|_| (0x0100 | u16::from(script.byte()), script.half()));
-                self.save(&Settings::load([a, b].into_iter()).0);
+                self.save(&Settings::load(&MODIO_02, [a, b].into_iter()).0);
             }
             _ => {
                 self.start();
@@ -113,10 +114,10 @@ impl Life {
         while self.store.is_none() {
             let mut store = Store::open(&self.flash);
             // A start that is cut short decides nothing.
-            self.check(store.load(&self.flash));
+            self.check(store.load(&MODIO_02, &self.flash));
             let prepared = store.prepare(&mut self.flash);
             if prepared.is_ok() {
-                let found = self.check(store.load(&self.flash));
+                let found = self.check(store.load(&MODIO_02, &self.flash));
                 self.decide(found);
             }
             self.store = Some(store);

@@ -5,7 +5,7 @@
 /// CRC included; an ASCII frame holds at most 255).
 ///
 /// As a request it holds the unit address and the PDU; the CRC or LRC is cut off once it has been
-/// found good. As a reply it holds what follows the [`Head`](crate::Head).
+/// found good. As a reply it holds what follows the head.
 #[derive(Debug)]
 pub struct Adu {
     bytes: [u8; Adu::CAPACITY],

@@ -6,14 +6,15 @@ use crc::{CRC_16_MODBUS, Crc, Table};
 static TABLE: [u16; 256] = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS).table()[0];
 
 /// The register before the first byte.
-pub(crate) const START: u16 = 0xFFFF;
+pub const START: u16 = 0xFFFF;
 
 /// The register after a whole good frame: its own CRC, low byte first, always leads here.
 pub(crate) const GOOD: u16 = 0;
 
 /// The register after one more byte.
 #[inline]
-pub(crate) const fn step(register: u16, byte: u8) -> u16 {
+#[must_use]
+pub const fn step(register: u16, byte: u8) -> u16 {
     let [low, _] = register.to_le_bytes();
     // A byte cannot index beyond 256 entries: no bounds check is left.
     (register >> 8) ^ TABLE[(low ^ byte) as usize]

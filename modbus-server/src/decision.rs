@@ -1,20 +1,30 @@
 //! What the server has decided about a request.
 
 use crate::diagnostic::Diagnostic;
+use crate::head::Head;
 use crate::identification::ReadCode;
-use crate::{Exception, Head, Span, Table};
+use crate::{Exception, Span, Table};
 
-/// The answer to a request, settled but not yet carried out.
+/// The answer to a request, decided but not yet carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// The first bytes of the reply; they may go out at once. `None`: silence.
-    pub reply: Option<Head>,
-    /// What is left to do, by [`Server::carry_out`](crate::Server::carry_out).
+    /// The first bytes of the reply. `None`: silence.
+    pub(crate) reply: Option<Head>,
+    /// What is left to do, by [`Committed::carry_out`](crate::Committed::carry_out).
     pub work: Work,
     /// How the request fared, for the counters.
     pub outcome: Outcome,
     /// The request was to all units.
     pub(crate) broadcast: bool,
+}
+
+impl Decision {
+    /// Whether a reply is sent.
+    #[inline]
+    #[must_use]
+    pub const fn is_answered(&self) -> bool {
+        self.reply.is_some()
+    }
 }
 
 /// The second step of serving a request.
@@ -60,6 +70,10 @@ pub(crate) enum Job {
         /// What to read then.
         read: Span,
     },
+    /// Read file records into the body.
+    ReadFile,
+    /// Write file records; the request is the body.
+    WriteFile,
     /// Put the exception status into the body.
     ExceptionStatus,
     /// Do what function 08 asks for.
@@ -82,7 +96,7 @@ pub(crate) enum Job {
 }
 
 impl Work {
-    /// Whether it writes coils or holding registers.
+    /// Whether it writes coils or holding registers; file records do not count.
     #[inline]
     #[must_use]
     pub const fn writes(self) -> bool {
@@ -117,7 +131,13 @@ impl Job {
     /// request for data is none, even if it writes as well (17), and one unit's diagnostics are no
     /// business of all.
     pub(crate) const fn can_be_broadcast(self) -> bool {
-        self.writes() && !matches!(self, Self::WriteThenRead { .. })
+        matches!(
+            self,
+            Self::WriteBits { .. }
+                | Self::WriteWords { .. }
+                | Self::WriteMasked { .. }
+                | Self::WriteFile
+        )
     }
 }
 
@@ -125,8 +145,6 @@ impl Job {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// For another unit: not looked at, not counted.
-    NotForUs,
     /// A function code no request can have (00, 80 and above): silence, counted as unanswered.
     NoRequest,
     /// The unit only listens (function 08, sub-function 04): silence, counted as unanswered.

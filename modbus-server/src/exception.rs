@@ -59,6 +59,19 @@ impl fmt::Display for Exception {
 
 impl Error for Exception {}
 
+/// Of two verdicts the exception that comes first in the order of checks: address 02, value 03,
+/// then state, 04 and above. That is the order of the codes.
+pub(crate) fn first_of(
+    one: Result<(), Exception>,
+    other: Result<(), Exception>,
+) -> Result<(), Exception> {
+    match (one, other) {
+        (Err(one), Err(other)) if other.code() < one.code() => Err(other),
+        (Ok(()), other) => other,
+        (one, _) => one,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;

@@ -31,6 +31,10 @@ pub enum Function {
     WriteMultipleRegisters = 0x10,
     /// 11 (6.13)
     ReportServerId = 0x11,
+    /// 14 (6.14)
+    ReadFileRecord = 0x14,
+    /// 15 (6.15)
+    WriteFileRecord = 0x15,
     /// 16 (6.16)
     MaskWriteRegister = 0x16,
     /// 17 (6.17)
@@ -60,6 +64,8 @@ impl Function {
             0x0F => Self::WriteMultipleCoils,
             0x10 => Self::WriteMultipleRegisters,
             0x11 => Self::ReportServerId,
+            0x14 => Self::ReadFileRecord,
+            0x15 => Self::WriteFileRecord,
             0x16 => Self::MaskWriteRegister,
             0x17 => Self::ReadWriteMultipleRegisters,
             0x2B => Self::EncapsulatedInterface,

@@ -1,13 +1,13 @@
 //! The start of a reply, as it is settled by the decision.
 
-use crate::{Adu, Exception, Function};
+use crate::{Exception, Function};
 
 /// The start of a reply: all of it for an exception or the echo of a write; unit, function and as
 /// much as is known at once for all others, whose body follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 // Whole words: copied with every reply, without a call of memcpy.
 #[repr(align(4))]
-pub struct Head {
+pub(crate) struct Head {
     bytes: [u8; Head::CAPACITY],
     len: u8,
     /// Where in its buffer the body begins; `NO_BODY` for none.
@@ -35,27 +35,10 @@ impl Head {
         self.bytes.get(index).copied().unwrap_or_default()
     }
 
-    /// The bytes of the head, without CRC.
-    #[inline]
-    pub fn as_slice(&self) -> &[u8] {
-        self.bytes.get(..usize::from(self.len)).unwrap_or_default()
-    }
-
     /// Whether a body follows; if not, the head is the whole reply.
     #[inline]
-    pub const fn has_body(&self) -> bool {
+    pub(crate) const fn has_body(&self) -> bool {
         self.body != NO_BODY
-    }
-
-    /// The body in the buffer that [`Server::carry_out`](crate::Server::carry_out) has filled;
-    /// empty, if there is none.
-    #[inline]
-    pub fn body_in<'a>(&self, adu: &'a Adu) -> &'a [u8] {
-        if self.has_body() {
-            adu.from(self.body)
-        } else {
-            &[]
-        }
     }
 
     /// Where the body begins, if there is one.

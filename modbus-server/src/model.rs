@@ -18,8 +18,8 @@ use crate::{Adu, Bits, BitsOut, Exception, Function, Span, Table, TextOut, Words
 ///
 /// The methods that read and write cannot refuse. They are called only after the matching check
 /// succeeded, but possibly some time later. If the state has changed since the check, write what is
-/// still valid and read what is there. One call is one request: a read sees one moment, a write is
-/// seen as a whole.
+/// still valid and read what is there. One call is one request, but for the groups of file records: a read sees one
+/// moment, a write is seen as a whole.
 pub trait DataModel {
     /// Whether the device has this function. The server answers a function that the device does not
     /// have with exception 01, before any other check. The default is all functions.
@@ -87,6 +87,50 @@ pub trait DataModel {
     /// Writes every holding register of `span`.
     fn write_words(&mut self, span: Span, words: Words<'_>) {
         let _ = (span, words);
+    }
+
+    /// Whether the device has files. The server of a device without files answers functions 14 and 15 with exception 01,
+    /// before any other check. The default is no files.
+    fn has_files(&self) -> bool {
+        false
+    }
+
+    /// Checks whether these records of a file can be read (function 14, V1.1b3 6.14). A record is a word; a request may
+    /// have several groups of records, each checked by a call, up to 124 words in all.
+    ///
+    /// `file` is 1 or more, and no record is above 9999: the server answers all else with exception 02.
+    ///
+    /// # Errors
+    /// The exception to answer with: besides those of the tables 08, if the memory of the file is damaged. The default is
+    /// 02 for every record.
+    fn check_read_file(&self, file: u16, records: Span) -> Result<(), Exception> {
+        let _ = (file, records);
+        Err(Exception::IllegalDataAddress)
+    }
+
+    /// Checks whether these records of a file can be written (function 15, V1.1b3 6.15), as
+    /// [`check_read_file`](Self::check_read_file) does; up to 122 words. `words` holds as many as `records`.
+    ///
+    /// # Errors
+    /// The exception to answer with; then nothing of the request is written. The default is 02 for every record.
+    fn check_write_file(
+        &self,
+        file: u16,
+        records: Span,
+        words: Words<'_>,
+    ) -> Result<(), Exception> {
+        let _ = (file, records, words);
+        Err(Exception::IllegalDataAddress)
+    }
+
+    /// Pushes every word of `records` in order. What is not pushed reads as 0. Called for each group of a request.
+    fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
+        let _ = (file, records, out);
+    }
+
+    /// Writes every word of `records`. Called for each group of a request, in order, after all of them were checked.
+    fn write_file(&mut self, file: u16, records: Span, words: Words<'_>) {
+        let _ = (file, records, words);
     }
 
     /// The eight bits of function 07 (V1.1b3 6.7), which are the device's own to name.

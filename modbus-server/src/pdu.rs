@@ -47,6 +47,10 @@ pub(crate) enum Request<'a> {
         from: u8,
         read: Span,
     },
+    /// What follows the function code. The model decides first: a device without files has neither function 14 nor 15.
+    ReadFile(&'a [u8]),
+    /// As for [`ReadFile`](Self::ReadFile).
+    WriteFile(&'a [u8]),
     ExceptionStatus,
     /// The sub-function and what follows it. What they mean depends on the server's modes.
     Diagnose(&'a [u8]),
@@ -77,6 +81,8 @@ impl<'a> Request<'a> {
             Function::WriteMultipleRegisters => write_words(fields),
             Function::MaskWriteRegister => mask_word(fields),
             Function::ReadWriteMultipleRegisters => write_then_read(fields),
+            Function::ReadFileRecord => Ok(Self::ReadFile(fields)),
+            Function::WriteFileRecord => Ok(Self::WriteFile(fields)),
             Function::Diagnostics => Ok(Self::Diagnose(fields)),
             Function::ReadExceptionStatus => alone(fields, Self::ExceptionStatus),
             Function::GetCommEventCounter => alone(fields, Self::EventCounter),

@@ -1,13 +1,13 @@
-//! The data model of a device that is nothing more than its tables.
+//! The data model of a device that is nothing more than its tables and files.
 
 use crate::{Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut};
 
-/// Four tables in slices: the [`DataModel`] of a device without checks and identification of its
+/// Four tables and some files in slices: the [`DataModel`] of a device without checks and identification of its
 /// own.
 ///
 /// Each table begins at address 0 and ends with its slice; beyond that is exception 02. An empty
 /// table is one that the device does not have: the functions that need it are exception 01. Every
-/// coil and every holding register can be written with any value.
+/// coil, every holding register and every record of a file can be written with any value.
 ///
 /// Bits are `bool`, one in a byte. Packed, 2000 of them would save 1750 bytes, but the program would
 /// need a function for each access. A device with more bits implements [`DataModel`] over its
@@ -36,6 +36,9 @@ pub struct Tables<'a> {
     pub holding_registers: &'a mut [u16],
     /// Function 04.
     pub input_registers: &'a mut [u16],
+    /// Functions 14 and 15: the first is file 1, and each begins with record 0. A file ends with its slice; records above
+    /// 9999 cannot be reached.
+    pub files: &'a mut [&'a mut [u16]],
 }
 
 impl Tables<'_> {
@@ -54,6 +57,20 @@ impl Tables<'_> {
             Table::Coils | Table::DiscreteInputs => &[],
         }
     }
+
+    /// The records of a file; none, if there is no such file.
+    fn file(&self, file: u16) -> &[u16] {
+        self.files
+            .get(place(file))
+            .map(|file| &**file)
+            .unwrap_or_default()
+    }
+}
+
+/// The place of a file.
+fn place(file: u16) -> usize {
+    // A request for file 0 is refused.
+    usize::from(file).wrapping_sub(1)
 }
 
 /// The points of `span`, if all of them exist.
@@ -83,6 +100,10 @@ impl DataModel for Tables<'_> {
             Function::ReadInputRegisters => !self.input_registers.is_empty(),
             _ => true,
         }
+    }
+
+    fn has_files(&self) -> bool {
+        !self.files.is_empty()
     }
 
     fn check_read_bits(&self, table: Table, span: Span) -> Result<(), Exception> {
@@ -117,5 +138,23 @@ impl DataModel for Tables<'_> {
 
     fn write_words(&mut self, span: Span, words: Words<'_>) {
         write(self.holding_registers, span, words.iter());
+    }
+    fn check_read_file(&self, file: u16, records: Span) -> Result<(), Exception> {
+        points(self.file(file), records).map(|_| ())
+    }
+
+    fn check_write_file(&self, file: u16, records: Span, _: Words<'_>) -> Result<(), Exception> {
+        points(self.file(file), records).map(|_| ())
+    }
+
+    fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
+        let words = points(self.file(file), records).unwrap_or_default();
+        words.iter().for_each(|word| out.push(*word));
+    }
+
+    fn write_file(&mut self, file: u16, records: Span, words: Words<'_>) {
+        if let Some(file) = self.files.get_mut(place(file)) {
+            write(file, records, words.iter());
+        }
     }
 }

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{Points, UNIT, Unit, frame, pdu, write_words};
-use modbus_server::line::Framing;
-use modbus_server::{Adu, Outcome, Server};
+use modbus_server::line::{Faults, Framing, Next, Port, Receiver, UnitSet};
+use modbus_server::{Adu, Outcome, Server, Tables};
 
 fn unit() -> Unit {
     Unit::new(Points::new(64, 64))
@@ -79,21 +79,86 @@ fn other_units_broken_traffic_makes_the_unit_neither_deaf_nor_talkative() {
 }
 
 #[test]
-fn the_server_itself_looks_at_the_address_too() {
-    let server = Server::new(UNIT, Framing::Rtu);
-    let points = Points::new(4, 4);
-    for (bytes, outcome) in [
-        (&[][..], Outcome::NotForUs),
-        (&[UNIT], Outcome::NotForUs),
-        (&[UNIT + 1, 0x06, 0, 0, 0, 1], Outcome::NotForUs),
-        (&[UNIT, 0x00], Outcome::NoRequest),
-        (&[0, 0x03, 0, 0, 0, 1], Outcome::NoEffect),
-    ] {
-        let mut adu = Adu::new();
-        assert!(bytes.iter().all(|byte| adu.push(*byte)));
-        let decision = server.decide(&adu, &points);
-        assert_eq!(decision.outcome, outcome, "{bytes:02X?}");
-        assert_eq!(decision.reply, None);
-        assert!(!decision.work.writes() && decision.work.reads().is_none());
+fn set_of_units_is_served_under_each_of_its_addresses() {
+    const UNITS: UnitSet = UnitSet::new(&[1, 17, 255]);
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut port = Port::new(Receiver::rtu(UNITS, false), &mut adus);
+    port.long_silence(0);
+    let mut server = Server::new(Framing::Rtu);
+    // A virtual unit for each address: its register 0 holds the address at first.
+    let mut registers: Vec<u16> = (0..256).collect();
+    let mut exchange = |to: u8, pdu: &[u8]| {
+        for byte in frame(to, pdu) {
+            port.received(byte, Faults::NONE);
+        }
+        assert_eq!(port.long_silence(0), port.waiting().is_some());
+        let unit = port.waiting()?;
+        assert_eq!(unit, to);
+        // A broadcast is for all of them.
+        let mut register = [registers[usize::from(unit)]];
+        let mut tables = Tables {
+            holding_registers: &mut register,
+            ..Tables::default()
+        };
+        assert_eq!(
+            server.serve(&mut port, 0, &mut tables),
+            Some(Outcome::Accepted)
+        );
+        for address in [1, 17, 255] {
+            if [0, address].contains(&unit) {
+                registers[usize::from(address)] = register[0];
+            }
+        }
+        let mut reply: Vec<u8> = port.start().into_iter().collect();
+        while let Next::Byte(byte) = port.next() {
+            reply.push(byte);
+        }
+        port.sent();
+        (!reply.is_empty()).then_some(reply)
+    };
+    let read = pdu(0x03, &[0, 1]);
+    for to in 1..=255 {
+        let expected = [1, 17, 255]
+            .contains(&to)
+            .then(|| frame(to, &[3, 2, 0, to]));
+        assert_eq!(exchange(to, &read), expected, "unit {to}");
+    }
+    let write = pdu(0x06, &[0, 0x1234]);
+    assert_eq!(exchange(17, &write), Some(frame(17, &write)));
+    assert_eq!(exchange(17, &read), Some(frame(17, &[3, 2, 0x12, 0x34])));
+    assert_eq!(exchange(1, &read), Some(frame(1, &[3, 2, 0, 1])));
+    assert_eq!(exchange(0, &pdu(0x06, &[0, 7])), None);
+    assert_eq!(exchange(255, &read), Some(frame(255, &[3, 2, 0, 7])));
+    // One event counter for all of them.
+    let events = exchange(1, &[0x0B]);
+    assert_eq!(events, Some(frame(1, &[0x0B, 0, 0, 0, 8])));
+}
+
+#[test]
+fn listen_only_mode_of_one_address_silences_all_and_each_ends_it() {
+    let units = UnitSet::new(&[1, 17]);
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut port = Port::new(Receiver::rtu(units, false), &mut adus);
+    port.long_silence(0);
+    let mut server = Server::new(Framing::Rtu);
+    let mut tables = Tables::default();
+    let mut outcome = |to: u8, fields: &[u16]| {
+        for byte in frame(to, &pdu(0x08, fields)) {
+            port.received(byte, Faults::NONE);
+        }
+        port.long_silence(0);
+        let outcome = server.serve(&mut port, 0, &mut tables);
+        let answered = port.start().is_some();
+        port.sent();
+        (outcome, answered)
+    };
+    assert_eq!(outcome(1, &[0, 7]), (Some(Outcome::Accepted), true));
+    assert_eq!(outcome(1, &[4, 0]), (Some(Outcome::Accepted), false));
+    for unit in [1, 17] {
+        assert_eq!(outcome(unit, &[0, 7]), (Some(Outcome::NotObeyed), false));
+    }
+    assert_eq!(outcome(17, &[1, 0]), (Some(Outcome::Accepted), false));
+    for unit in [1, 17] {
+        assert_eq!(outcome(unit, &[0, 7]), (Some(Outcome::Accepted), true));
     }
 }

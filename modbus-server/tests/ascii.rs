@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{Points, UNIT, Unit, ascii_frame, framed, pdu, write_words};
-use modbus_server::line::{Faults, Framing, Width};
+use common::{Points, UNIT, Unit, ascii_frame, pdu, port, write_words};
+use modbus_server::line::{Faults, Framing, Port, Receiver, Width};
 
 fn unit() -> Unit {
     Unit::ascii(Width::Eight, Points::new(0x100, 0x100))
@@ -43,8 +43,7 @@ fn a_request_is_answered_in_kind() {
 fn the_lrc_example_of_the_standard() {
     // V1.02 6.2.1 has none with numbers; this is the sum it describes.
     assert_eq!(common::lrc(&[0x02, 0x07]), 0xF7);
-    let framing = Framing::ASCII;
-    assert_eq!(framed(framing, 2, &[7]), b":0207F7\r\n");
+    assert_eq!(ascii_frame(2, &[7], b'\n'), b":0207F7\r\n");
 }
 
 #[test]
@@ -164,7 +163,7 @@ fn a_second_of_silence_ends_a_frame_badly() {
 fn short_silences_mean_nothing() {
     let mut unit = unit();
     for character in request() {
-        unit.receiver.pause();
+        unit.pause();
         unit.character(character, Faults::NONE);
     }
     assert!(unit.silence().is_some());
@@ -298,57 +297,48 @@ fn others_frames_and_broadcasts_are_as_in_rtu_mode() {
     );
 }
 
+/// A port whose ASCII line is not silent yet.
+fn busy(characters: &[u8]) -> Port<'static> {
+    let mut port = port(Receiver::ascii(UNIT, Width::Eight));
+    receive(&mut port, characters);
+    port
+}
+
+fn receive(port: &mut Port<'_>, characters: &[u8]) {
+    for character in characters {
+        port.received(*character, Faults::NONE);
+    }
+}
+
 #[test]
 fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_colon_alone() {
-    let mut unit = unit();
-    let characters = |unit: &mut Unit, characters: &[u8]| {
-        characters
-            .iter()
-            .for_each(|c| unit.receiver.character(*c, Faults::NONE));
-    };
-    characters(&mut unit, &request());
-    assert!(unit.receiver.is_over());
-    characters(&mut unit, b"\n\r\x001");
-    unit.receiver.character(0, Faults::FRAMING);
-    assert!(unit.receiver.is_over());
-    assert!(unit.receiver.close().is_some());
-    characters(&mut unit, b":0103");
-    assert!(unit.receiver.close().is_none());
+    let mut port = busy(&request());
+    receive(&mut port, b"\n\r\x001");
+    port.received(0, Faults::FRAMING);
+    assert!(port.short_silence(0));
+    receive(&mut port, b":0103");
+    assert!(!port.short_silence(0) && !port.long_silence(0));
     // A colon takes its place, and no buffer is lost.
     for _ in 0..5 {
-        characters(&mut unit, &request());
+        receive(&mut port, &request());
     }
-    assert!(unit.receiver.is_over());
-    assert!(unit.receiver.close().is_some());
+    assert!(port.short_silence(0));
+    assert_eq!(port.counters().dropped, 5);
 }
 
 #[test]
 fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
-    let good = [
-        (UNIT, [1, 0, 0, 1, 1]),
-        (0, [1, 0, 0, 1, 1]),
-        (UNIT + 1, [1, 0, 0, 0, 0]),
-    ];
+    let good = [(UNIT, [1, 1]), (0, [1, 1]), (UNIT + 1, [1, 0])];
     for (to, expected) in good {
-        let mut unit = unit();
         // Complete with CR LF, but the next frame begins before the line is free for a reply.
-        for character in ascii_frame(to, &pdu(0x06, &[0, 7]), b'\n') {
-            unit.receiver.character(character, Faults::NONE);
-        }
-        assert!(unit.receiver.is_over());
-        unit.receiver.character(b':', Faults::NONE);
-        assert!(unit.receiver.close().is_none());
-        let counters = unit.counters();
-        let counted = [
-            counters.bus_messages,
-            // The second colon, which the time-out ended.
-            counters.communication_errors - 1,
-            counters.busy,
-            counters.unit_messages,
-            counters.no_response,
-        ];
+        let mut port = busy(&ascii_frame(to, &pdu(0x06, &[0, 7]), b'\n'));
+        receive(&mut port, b":");
+        assert!(!port.long_silence(0));
+        assert_eq!(port.waiting(), None);
+        let counters = port.counters();
+        // The second colon, which the time-out ended.
+        assert_eq!(counters.communication_errors, 1);
+        let counted = [counters.bus_messages, counters.dropped];
         assert_eq!(counted, expected, "to {to}");
-        assert_eq!(unit.points.words[0], 0, "not carried out");
-        unit.must_answer();
     }
 }

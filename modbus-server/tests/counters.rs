@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::{Points, UNIT, Unit, frame, pdu};
-use modbus_server::line::{Faults, Framing, Receiver};
-use modbus_server::{Adu, Counters, Exception, Server};
+use common::{Points, UNIT, Unit, frame, pdu, send};
+use modbus_server::line::{Faults, Receiver};
+use modbus_server::{Adu, Counters, Exception};
 
 fn unit() -> Unit {
     Unit::new(Points::new(4, 4))
@@ -54,7 +54,7 @@ fn each_request_moves_the_counters_it_should() {
         (Exception::NegativeAcknowledge, 1, 0),
         (Exception::ServerDeviceBusy, 0, 1),
     ] {
-        unit.points.state = Some(state);
+        unit.points.state = Some(state.code());
         unit.raw(&frame(UNIT, &good));
         expected.bus_messages += 1;
         expected.unit_messages += 1;
@@ -65,7 +65,7 @@ fn each_request_moves_the_counters_it_should() {
     }
 
     // On a broadcast neither was returned.
-    unit.points.state = Some(Exception::ServerDeviceBusy);
+    unit.points.state = Some(Exception::ServerDeviceBusy.code());
     unit.raw(&frame(0, &pdu(0x06, &[0, 1])));
     expected.bus_messages += 1;
     expected.unit_messages += 1;
@@ -79,7 +79,7 @@ fn counters_wrap() {
     let mut unit = unit();
     for _ in 0..0x1_0002 {
         unit.character(0, Faults::OVERRUN);
-        unit.receiver.pause();
+        unit.pause();
         unit.character(0, Faults::NONE);
         assert_eq!(unit.silence(), None);
         unit.must_answer();
@@ -139,14 +139,7 @@ fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     let closed = receiver.close().expect("a buffer again");
     assert_eq!(closed.adu.as_slice(), &ours[..6]);
 
-    let mut server = Server::new(UNIT, Framing::Rtu);
-    let decision = server.decide(closed.adu, &Points::new(4, 4));
-    server.commit(&decision, &closed.line);
-    let counters = server.counters();
-    assert_eq!(
-        (counters.busy, counters.no_response, counters.unit_messages),
-        (0, 1, 2)
-    );
+    assert_eq!(closed.line.dropped, 1);
 }
 
 #[test]
@@ -214,34 +207,32 @@ fn a_third_buffer_does_not_disturb_a_frame() {
 
 #[test]
 fn counters_read_while_a_request_is_pending_do_not_wrap() {
-    let mut receiver = receiver();
-    receiver.give_back(buffer());
-    receiver.give_back(buffer());
-    let mut points = Points::new(4, 4);
-    let mut server = Server::new(UNIT, Framing::Rtu);
-    hear(&mut receiver, &frame(UNIT, &[0x0C]));
-    let pending = receiver.close().expect("a request");
+    let mut unit = unit();
+    let at_port = |unit: &Unit| unit.counters().as_words();
+    unit.characters(&frame(UNIT, &[0x0C]));
+    assert!(unit.port.long_silence(0));
+    let pending = unit.server.take(&mut unit.port, 0).expect("a request");
     // A bad frame while the request is pending.
-    hear(&mut receiver, &[0x55; 5]);
-    assert!(receiver.close().is_none());
-    let counters = server.counters_at(receiver.counters());
-    assert_eq!(counters.as_words(), [1, 1, 0, 0, 0, 0, 0, 0, 0]);
-
-    let decision = server.decide(pending.adu, &points);
-    server.commit(&decision, &pending.line);
-    server.carry_out(&decision, pending.adu, &mut points);
+    unit.characters(&[0x55; 5]);
+    assert!(!unit.port.long_silence(0));
+    assert_eq!(at_port(&unit), [1, 1, 0, 0, 0, 0, 0, 0, 0]);
+    let mut reply: Vec<u8> = unit.port.start().into_iter().collect();
+    let answered = pending
+        .decide(&unit.server, &unit.points)
+        .answer(&mut unit.port);
+    let committed = answered.commit(&mut unit.server);
+    let served = committed.carry_out(&mut unit.server, &mut unit.points);
+    served.finish(&mut unit.port);
+    send(&mut unit.port, &mut reply);
+    unit.port.sent();
     // Byte count, status, event count, message count, events.
-    assert_eq!(pending.adu.as_slice(), [7, 0, 0, 0, 0, 0, 1, 0x80]);
-    assert_eq!(server.counters().as_words(), [1, 0, 0, 1, 0, 0, 0, 0, 0]);
-    let counters = server.counters_at(receiver.counters());
-    assert_eq!(counters.as_words(), [1, 1, 0, 1, 0, 0, 0, 0, 0]);
+    let expected = [0x0C, 7, 0, 0, 0, 0, 0, 1, 0x80];
+    assert_eq!(reply, frame(UNIT, &expected));
+    let at_request = unit.server.counters().as_words();
+    assert_eq!(at_request, [1, 0, 0, 1, 0, 0, 0, 0, 0]);
+    assert_eq!(at_port(&unit), [1, 1, 0, 1, 0, 0, 0, 0, 0]);
 
-    receiver.give_back(pending.adu);
-    hear(&mut receiver, &frame(UNIT, &[0x0C]));
-    let next = receiver.close().expect("a request");
-    let decision = server.decide(next.adu, &points);
-    server.commit(&decision, &next.line);
-    server.carry_out(&decision, next.adu, &mut points);
-    let expected = [10, 0, 0, 0, 0, 0, 2, 0x80, 0x82, 0x40, 0x80];
-    assert_eq!(next.adu.as_slice(), expected);
+    let reply = unit.request(&[0x0C]).expect("a reply");
+    let expected = [0x0C, 10, 0, 0, 0, 0, 0, 2, 0x80, 0x82, 0x40, 0x80];
+    assert_eq!(reply, expected);
 }

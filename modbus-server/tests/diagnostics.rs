@@ -131,11 +131,11 @@ fn every_counter_can_be_asked_for() {
     for _ in 0..7 {
         unit.raw(&frame(0, &write_words(0, &[1]))); // 7 without reply
     }
-    unit.points.state = Some(Exception::NegativeAcknowledge);
+    unit.points.state = Some(Exception::NegativeAcknowledge.code());
     for _ in 0..8 {
         unit.refused(&pdu(0x03, &[0, 1])); // 8 NAK
     }
-    unit.points.state = Some(Exception::ServerDeviceBusy);
+    unit.points.state = Some(Exception::ServerDeviceBusy.code());
     for _ in 0..9 {
         unit.refused(&pdu(0x03, &[0, 1])); // 9 busy
     }
@@ -188,7 +188,7 @@ fn the_log_tells_what_happened_the_newest_first() {
     assert_eq!(log(&mut unit), (0, 0, 1, vec![0x80]), "its own reception");
     unit.must_answer();
     unit.refused(&[0x63]);
-    unit.points.state = Some(Exception::ServerDeviceFailure);
+    unit.points.state = Some(Exception::ServerDeviceFailure.code());
     unit.refused(&pdu(0x03, &[0, 1]));
     unit.points.state = None;
     unit.raw(&[UNIT, 1, 2]);

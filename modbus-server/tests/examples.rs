@@ -5,6 +5,9 @@
 #[path = "../examples/ascii.rs"]
 #[allow(dead_code)] // its `main`
 mod ascii;
+#[path = "../examples/bare_metal.rs"]
+#[allow(dead_code)] // its `main`
+mod bare_metal;
 mod common;
 #[path = "../examples/rtu.rs"]
 #[allow(dead_code)] // its `main`
@@ -16,7 +19,7 @@ mod two_lines;
 use std::thread;
 use std::time::Duration;
 
-use common::{framed, pdu, unframed, write_words};
+use common::{delimiter, framed, pdu, unframed, write_words};
 use modbus_server::line::Framing;
 use serial2::SerialPort;
 
@@ -45,7 +48,7 @@ impl Master {
     /// yet, or the machine may have been too slow to send a frame without a silence in it.
     fn ask(&self, pdu: &[u8]) -> Vec<u8> {
         for _ in 0..5 {
-            let request = framed(self.framing, self.unit, pdu);
+            let request = framed(delimiter(self.framing), self.unit, pdu);
             self.port.write_all(&request).unwrap();
             if let Some(reply) = self.reply() {
                 return reply;
@@ -61,7 +64,7 @@ impl Master {
             self.port.read_exact(&mut byte).ok()?;
             reply.push(byte[0]);
         }
-        let [unit, pdu @ ..] = &unframed(self.framing, &reply)[..] else {
+        let [unit, pdu @ ..] = &unframed(delimiter(self.framing), &reply)[..] else {
             panic!("an empty reply");
         };
         assert_eq!(*unit, self.unit);
@@ -92,6 +95,16 @@ fn the_rtu_example_serves_its_tables() {
     assert_eq!(master.ask(&pdu(0x02, &[0, 1])), [0x82, 1], "no such table");
     let served = master.ask(&pdu(0x04, &[0, 1]));
     assert!(served[3] >= 7, "{served:02X?}");
+}
+
+#[test]
+fn the_bare_metal_example_serves_its_registers() {
+    let (master, unit) = Master::new(Framing::Rtu, 17);
+    thread::spawn(|| bare_metal::run(unit));
+    assert_eq!(master.ask(&pdu(0x03, &[4, 1])), [0x03, 2, 0x11, 0x11]);
+    master.ask(&write_words(4, &[7, 8]));
+    assert_eq!(master.ask(&pdu(0x03, &[4, 2])), [0x03, 4, 0, 7, 0, 8]);
+    assert_eq!(master.ask(&pdu(0x03, &[9, 2])), [0x83, 2], "past the end");
 }
 
 #[test]

@@ -201,10 +201,9 @@ fn power_up_in_the_middle_of_traffic_waits_for_silence() {
 fn silence_without_a_frame_is_nothing() {
     let mut unit = unit();
     for _ in 0..3 {
-        unit.receiver.pause();
-        assert!(unit.receiver.close().is_none());
+        assert_eq!(unit.silence(), None);
     }
-    assert_eq!(*unit.receiver.counters(), Default::default());
+    assert_eq!(*unit.port.counters(), Default::default());
     unit.must_answer();
 }
 
@@ -213,7 +212,7 @@ fn a_gap_above_t15_is_counted_and_tolerated() {
     let mut unit = unit();
     for (index, byte) in request().into_iter().enumerate() {
         if index > 0 {
-            unit.receiver.pause();
+            unit.pause();
         }
         unit.character(byte, Faults::NONE);
     }
@@ -227,7 +226,7 @@ fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
     for at in 1..request().len() {
         let mut unit = Unit::with(UNIT, true, Points::new(64, 64));
         unit.characters(&request()[..at]);
-        unit.receiver.pause();
+        unit.pause();
         unit.characters(&request()[at..]);
         assert_eq!(unit.silence(), None);
         let counters = unit.counters();
@@ -248,12 +247,12 @@ fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
     let mut unit = unit();
     let first = frame(UNIT, &pdu(0x06, &[1, 0x0BAD]));
     unit.characters(&first);
-    unit.receiver.pause();
-    unit.receiver.pause();
+    unit.pause();
+    unit.pause();
     let whole = [&first[..], &[0x99]].concat();
     let end = crc(&whole);
     unit.characters(&[0x99]);
-    unit.receiver.pause();
+    unit.pause();
     unit.characters(&end);
     let reply = unit.silence().expect("a good CRC");
     assert_eq!(
@@ -269,7 +268,7 @@ fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
 fn a_frame_of_256_bytes_that_goes_on_is_too_long() {
     let mut unit = unit();
     unit.characters(&frame(UNIT, &[&[0x63][..], &[0x55; 252]].concat()));
-    unit.receiver.pause();
+    unit.pause();
     unit.characters(&[0]);
     assert_eq!(unit.silence(), None);
     assert_eq!(unit.counters().communication_errors, 1);
@@ -280,16 +279,16 @@ fn a_frame_of_256_bytes_that_goes_on_is_too_long() {
 fn t35_alone_closes_a_frame() {
     let mut unit = unit();
     unit.characters(&request());
-    let closed = unit.receiver.close().expect("closed");
-    assert_eq!(closed.adu.as_slice(), &request()[..6]);
-    assert_eq!(closed.line.bus_messages, 1);
+    assert!(unit.port.long_silence(0));
+    assert_eq!(unit.port.waiting(), Some(UNIT));
+    assert_eq!(unit.port.counters().bus_messages, 1);
 }
 
 #[test]
 fn after_its_own_reply_the_unit_listens_at_once() {
     let mut unit = unit();
     unit.characters(&[0x55, 0x55]); // the echo of what it sent itself, if the receiver was late
-    unit.receiver.resume();
+    unit.port.sent();
     unit.must_answer();
     assert_eq!(unit.counters().communication_errors, 0);
 }

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{MAX_WORD, Points, UNIT, Unit, pack, pdu, write_bits, write_words};
-use modbus_server::line::Framing;
-use modbus_server::{Adu, BitsOut, DataModel, Exception, Server, Span, Table, WordsOut};
+use modbus_server::line::{Framing, Receiver};
+use modbus_server::{BitsOut, DataModel, Exception, Span, Table, WordsOut};
 
 /// As many points as there are addresses.
 fn full() -> Unit {
@@ -245,20 +245,14 @@ fn a_model_that_gives_too_little_or_too_much_leaks_nothing() {
         }
     }
 
-    let mut server = Server::new(UNIT, Framing::Rtu);
+    let mut unit = Unit::over(Receiver::rtu(UNIT, false), Framing::Rtu, Careless);
     for (function, quantity, body) in [
         (0x03, 1, &[1, 1][..]),
         (0x03, 4, &[1, 1, 2, 2, 0, 0, 0, 0]),
         (0x01, 3, &[0b111]),
     ] {
-        let mut adu = Adu::new();
-        let request = [&[UNIT][..], &pdu(function, &[0xFFF0, quantity])].concat();
-        request.iter().for_each(|byte| assert!(adu.push(*byte)));
-        let decision = server.decide(&adu, &Careless);
-        let head = decision.reply.unwrap();
-        assert_eq!(head.as_slice(), [UNIT, function, body.len() as u8]);
-        assert!(head.has_body());
-        server.carry_out(&decision, &mut adu, &mut Careless);
-        assert_eq!(head.body_in(&adu), body);
+        let reply = unit.request(&pdu(function, &[0xFFF0, quantity]));
+        let expected = [&[function, body.len() as u8], body].concat();
+        assert_eq!(reply, Some(expected));
     }
 }

@@ -46,7 +46,7 @@ fn a_mask_is_checked_as_the_write_that_it_is() {
     );
     assert!(unit.request(&pdu(0x16, &[9, 0xFF00, 0xEF])).is_some());
     assert_eq!(unit.points.words[9], 0xFFEF);
-    unit.points.state = Some(Exception::ServerDeviceBusy);
+    unit.points.state = Some(Exception::ServerDeviceBusy.code());
     assert_eq!(unit.refused(&pdu(0x16, &[9, 0xFFFF, 0])), 6);
     assert_eq!(
         unit.refused(&pdu(0x16, &[9, 0xFF00, 0xFFFF])),
@@ -148,7 +148,7 @@ fn both_ranges_and_the_values_are_checked_before_anything_is_written() {
         unit.refused(&write_then_read(0xFFFF, 126, 0xFFFF, &[1, 1])),
         3
     );
-    unit.points.state = Some(Exception::ServerDeviceFailure);
+    unit.points.state = Some(Exception::ServerDeviceFailure.code());
     assert_eq!(unit.refused(&write_then_read(0, 1, 9, &[beyond])), 3);
     assert_eq!(unit.refused(&write_then_read(0, 1, 9, &[1])), 4);
     assert_eq!(unit.refused(&write_then_read(20, 1, 9, &[1])), 2);

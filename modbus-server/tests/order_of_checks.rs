@@ -89,7 +89,7 @@ fn value_range_comes_before_state() {
         Exception::GatewayTargetDeviceFailedToRespond,
     ] {
         let mut unit = ten();
-        unit.points.state = Some(state);
+        unit.points.state = Some(state.code());
         assert_eq!(unit.refused(&pdu(0x06, &[0, MAX_WORD + 1])), 3);
         assert_eq!(unit.refused(&pdu(0x06, &[10, 1])), 2);
         for request in [

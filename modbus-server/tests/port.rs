@@ -33,7 +33,7 @@ impl<'a> Unit<'a> {
     fn rtu(adus: &'a mut [Adu; 2]) -> Self {
         let mut unit = Self {
             port: Port::new(Receiver::rtu(UNIT, false), adus),
-            server: Server::new(UNIT, Framing::Rtu),
+            server: Server::new(Framing::Rtu),
             registers: Registers([0x1111; 10]),
             now: 0,
         };
@@ -253,7 +253,7 @@ fn what_gets_silence_starts_no_reply() {
 fn an_ascii_request_is_taken_at_the_short_silence_and_is_too_late_at_the_long_one() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut port = Port::new(Receiver::ascii(UNIT, Width::Eight), &mut adus);
-    let mut server = Server::new(UNIT, Framing::ASCII);
+    let mut server = Server::new(Framing::ASCII);
     let mut registers = Registers([0x1111; 10]);
     for round in 0..3 {
         for late in [false, true] {

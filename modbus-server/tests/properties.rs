@@ -3,10 +3,11 @@
 
 mod common;
 
-use common::hearing::Ear;
-use common::reference::Reference;
-use common::{Points, UNIT, Unit, framed, pack, pdu, write_bits, write_then_read, write_words};
-use modbus_server::Exception;
+use common::{
+    Device, Points, UNIT, Unit, delimiter, framed, pack, pdu, read_files, write_bits, write_files,
+    write_then_read, write_words,
+};
+use modbus_reference::Server;
 use modbus_server::line::{Faults, Framing, Width};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -20,40 +21,37 @@ const WORDS: usize = 130;
 const CUSTOM: u8 = 0x41;
 
 /// What may keep the device from doing what is right otherwise.
-const STATES: &[Exception] = &[
-    Exception::ServerDeviceFailure,
-    Exception::Acknowledge,
-    Exception::ServerDeviceBusy,
-    Exception::NegativeAcknowledge,
-    Exception::MemoryParityError,
-    Exception::GatewayPathUnavailable,
-    Exception::GatewayTargetDeviceFailedToRespond,
-];
+const STATES: &[u8] = &[4, 5, 6, 7, 8, 0x0A, 0x0B];
 
 /// Four tables of different lengths, each about as long as one request may ask for.
-fn points() -> impl Strategy<Value = Points> {
+fn points() -> impl Strategy<Value = Device> {
     let bits = (vec(any::<bool>(), BITS), vec(any::<bool>(), BITS - 5));
     let words = (vec(any::<u16>(), WORDS), vec(any::<u16>(), WORDS - 3));
+    let files = prop_oneof![1 => Just(Vec::new()), 3 => vec(vec(any::<u16>(), 0..150), 1..4)];
     let lacks = prop_oneof![3 => Just(Vec::new()), 1 => vec(1_u8..=0x2B, 1..20)];
     (
         bits,
         words,
+        files,
         100_u32..140,
         prop::option::weighted(0.2, prop::sample::select(STATES)),
         lacks,
     )
-        .prop_map(|(bits, words, read_only_from, state, lacks)| Points {
-            bits: bits.0,
-            input_bits: bits.1,
-            words: words.0,
-            input_words: words.1,
-            read_only_from,
-            state,
-            lacks,
-            additional_data: vec![0xA5; usize::from(read_only_from as u8 % 4)],
-            custom: Some(CUSTOM),
-            ..Points::new(0, 0)
-        })
+        .prop_map(
+            |(bits, words, files, read_only_from, state, lacks)| Device {
+                bits: bits.0,
+                input_bits: bits.1,
+                words: words.0,
+                input_words: words.1,
+                files,
+                read_only_from,
+                state,
+                lacks,
+                additional_data: vec![0xA5; usize::from(read_only_from as u8 % 4)],
+                custom: Some(CUSTOM),
+                ..Device::new(0, 0)
+            },
+        )
 }
 
 /// An address that exists, the end of the points, or the end of all addresses.
@@ -93,11 +91,18 @@ fn request() -> BoxedStrategy<Vec<u8>> {
     let data = prop_oneof![4 => Just(0_u16), 1 => Just(0xFF00), 1 => 0x2000_u16..0x4000, 1 => any::<u16>()];
     let diagnose = (0_u16..0x17, data).prop_map(|(sub, data)| pdu(0x08, &[sub, data]));
     let echo = vec(any::<u8>(), 0..250).prop_map(|data| [&[0x08, 0, 0][..], &data].concat());
+    let group = (0_u16..5, address(), quantity());
+    let read_file = vec(group, 0..5).prop_map(|groups| read_files(&groups));
+    let one_word = (0_u16..4, 0_u16..90, Just(1_u16));
+    let read_records = vec(one_word, 30..=35).prop_map(|groups| read_files(&groups));
+    let group = (0_u16..5, address(), vec(0_u16..0xFFF8, 0..60));
+    let write_file = vec(group, 0..5).prop_map(|groups| write_files(&groups));
     let object = prop_oneof![0_u8..9, 0x7E_u8..0x88];
     let identify = (0_u8..6, object).prop_map(|(code, id)| vec![0x2B, 0x0E, code, id]);
     let custom = vec(any::<u8>(), 0..100).prop_map(|data| [&[CUSTOM][..], &data].concat());
     let shaped = prop_oneof![
         3 => read, 2 => write, 2 => bits, 2 => words, 1 => many, 1 => mask, 2 => both,
+        2 => read_file, 1 => read_records, 2 => write_file,
         2 => alone, 4 => diagnose, 1 => echo, 2 => identify, 1 => custom,
     ]
     .boxed();
@@ -132,7 +137,7 @@ enum Event {
 fn traffic(framing: Framing) -> BoxedStrategy<Vec<Event>> {
     let unit = prop_oneof![6 => Just(UNIT), 2 => Just(0), 1 => any::<u8>()];
     let whole = (unit, request())
-        .prop_map(move |(unit, pdu)| framed(framing, unit, &pdu))
+        .prop_map(move |(unit, pdu)| framed(delimiter(framing), unit, &pdu))
         .boxed();
     let flipped = (whole.clone(), any::<prop::sample::Index>()).prop_map(|(mut bytes, bit)| {
         let bit = bit.index(bytes.len() * 8);
@@ -160,16 +165,13 @@ fn traffic(framing: Framing) -> BoxedStrategy<Vec<Event>> {
         .boxed()
 }
 
-fn unit_and_framing(ascii: bool, strict: bool, points: Points) -> (Unit, Framing) {
+fn unit_and_framing(ascii: bool, strict: bool, device: Device) -> (Unit, Option<u8>) {
+    let points = Points(device);
     if ascii {
-        (Unit::ascii(Width::Eight, points), Framing::ASCII)
+        (Unit::ascii(Width::Eight, points), Some(b'\n'))
     } else {
-        (Unit::with(UNIT, strict, points), Framing::Rtu)
+        (Unit::with(UNIT, strict, points), None)
     }
-}
-
-fn counters(reference: &Reference) -> [u16; 9] {
-    reference.counters
 }
 
 proptest! {
@@ -185,17 +187,17 @@ proptest! {
         ascii in any::<bool>(),
         requests in vec((prop::bool::weighted(0.1), request()), 1..12),
     ) {
-        let (mut unit, framing) = unit_and_framing(ascii, false, start.clone());
-        let mut reference = Reference::new(framing, start);
+        let (mut unit, end) = unit_and_framing(ascii, false, start.clone());
+        let mut reference = Server::new(end, start);
         for (broadcast, pdu) in requests {
             let to = if broadcast { 0 } else { UNIT };
-            let reply = unit.raw(&framed(reference.framing, to, &pdu));
+            let reply = unit.raw(&framed(reference.delimiter, to, &pdu));
             prop_assert_eq!(reply, reference.good(to, &pdu, false), "{:02X?}", pdu);
-            prop_assert_eq!(&unit.points, &reference.points, "{:02X?}", pdu);
-            prop_assert_eq!(unit.server.framing(), reference.framing);
+            prop_assert_eq!(&unit.points.0, &reference.device, "{:02X?}", pdu);
+            prop_assert_eq!(delimiter(unit.server.framing()), reference.delimiter);
             prop_assert_eq!(unit.server.is_listen_only(), reference.listening);
             if !reference.listening {
-                prop_assert_eq!(unit.counters().as_words(), counters(&reference));
+                prop_assert_eq!(unit.counters().as_words(), reference.counters);
             }
         }
     }
@@ -209,8 +211,8 @@ proptest! {
             (Just(ascii), traffic(framing))
         }),
     ) {
-        let (mut unit, framing) = unit_and_framing(ascii, strict, start.clone());
-        let mut ear = Ear::new(framing, start, strict);
+        let (mut unit, end) = unit_and_framing(ascii, strict, start.clone());
+        let mut reference = modbus_reference::Unit::new(end, start, strict);
         let mut replies = (Vec::new(), Vec::new());
         for event in traffic {
             match event {
@@ -218,37 +220,37 @@ proptest! {
                     for byte in bytes {
                         unit.character(byte, Faults::NONE);
                         replies.0.extend(unit.take_said());
-                        replies.1.extend(ear.character(byte, 0));
+                        replies.1.extend(reference.character(byte, 0));
                     }
                 }
                 Event::Faulty(byte, faults) => {
                     unit.character(byte, Faults::from_bits(faults));
                     replies.0.extend(unit.take_said());
-                    replies.1.extend(ear.character(byte, faults));
+                    replies.1.extend(reference.character(byte, faults));
                 }
                 Event::Pause => {
-                    unit.receiver.pause();
-                    ear.pause();
+                    unit.port.short_silence(0);
+                    reference.pause();
                 }
                 Event::Silence => {
                     replies.0.extend(unit.silence());
-                    replies.1.extend(ear.silence());
+                    replies.1.extend(reference.silence());
                 }
             }
             prop_assert_eq!(&replies.0, &replies.1);
         }
-        prop_assert_eq!(unit.silence(), ear.silence());
-        prop_assert_eq!(&unit.points, &ear.server.points);
+        prop_assert_eq!(unit.silence(), reference.silence());
+        prop_assert_eq!(&unit.points.0, &reference.server.device);
         // One request more, for the counters are told with requests; a restart, if nothing else is
         // obeyed. The log tells of all that went before.
         let mut last = vec![vec![0x0C]];
-        if ear.server.listening {
+        if reference.server.listening {
             last.insert(0, vec![0x08, 0x00, 0x01, 0x00, 0x00]);
         }
         for pdu in last {
-            let reply = unit.raw(&framed(ear.server.framing, UNIT, &pdu));
-            prop_assert_eq!(reply, ear.server.good(UNIT, &pdu, false));
-            prop_assert_eq!(unit.counters().as_words(), counters(&ear.server));
+            let reply = unit.raw(&framed(reference.server.delimiter, UNIT, &pdu));
+            prop_assert_eq!(reply, reference.server.good(UNIT, &pdu, false));
+            prop_assert_eq!(unit.counters().as_words(), reference.server.counters);
         }
         unit.points.state = None;
         unit.points.lacks.clear();
@@ -261,11 +263,11 @@ proptest! {
         noise in vec(vec(any::<u8>(), 0..300), 0..20),
     ) {
         // A chance of 2^-16 apiece is left that noise has a good CRC; the reference would agree.
-        let (mut unit, framing) = unit_and_framing(ascii, false, Points::new(BITS, WORDS));
-        let mut ear = Ear::new(framing, unit.points.clone(), false);
+        let (mut unit, end) = unit_and_framing(ascii, false, Device::new(BITS, WORDS));
+        let mut reference = modbus_reference::Unit::new(end, Device::new(BITS, WORDS), false);
         for bytes in noise {
-            let mut reply = bytes.iter().find_map(|byte| ear.character(*byte, 0));
-            reply = reply.or(ear.silence());
+            let mut reply = bytes.iter().find_map(|byte| reference.character(*byte, 0));
+            reply = reply.or(reference.silence());
             prop_assert_eq!(unit.raw(&bytes), reply);
         }
         unit.must_answer();

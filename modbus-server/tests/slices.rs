@@ -1,32 +1,30 @@
-//! The model made of four slices, beside the reference.
+//! The model made of slices, beside the reference.
 
 mod common;
 
-use common::serving::answer;
-use common::{Points, UNIT, pdu, write_bits, write_then_read, write_words};
-use modbus_server::line::Framing;
-use modbus_server::{Adu, Server, Tables};
+use common::{
+    Device, UNIT, Unit, answer, pdu, read_files, write_bits, write_files, write_then_read,
+    write_words,
+};
+use modbus_server::Tables;
+use modbus_server::line::{Framing, Receiver};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// The reply's PDU.
-fn ask(server: &mut Server, tables: &mut Tables<'_>, pdu: &[u8]) -> Vec<u8> {
-    let mut adu = Adu::new();
-    assert!(adu.push(UNIT) && pdu.iter().all(|byte| adu.push(*byte)));
-    let decision = server.decide(&adu, tables);
-    server.carry_out(&decision, &mut adu, tables);
-    let head = decision.reply.expect("a request to this unit");
-    [&head.as_slice()[1..], head.body_in(&adu)].concat()
+fn unit(tables: Tables<'_>) -> Unit<Tables<'_>> {
+    Unit::over(Receiver::rtu(UNIT, false), Framing::Rtu, tables)
 }
 
 /// The functions that need a table.
 const FUNCTIONS: [&[u8]; 4] = [&[1, 5, 15], &[2], &[3, 6, 16, 22, 23], &[4]];
 
 /// Tables that may be empty, with a limit on nothing.
-fn points() -> impl Strategy<Value = Points> {
+fn points() -> impl Strategy<Value = Device> {
     let bits = || prop_oneof![1 => Just(vec![]), 4 => vec(any::<bool>(), 1..20)];
     let words = || prop_oneof![1 => Just(vec![]), 4 => vec(any::<u16>(), 1..20)];
-    (bits(), bits(), words(), words()).prop_map(|(bits, input_bits, words, input_words)| {
+    let files = vec(vec(any::<u16>(), 0..20), 0..3);
+    let tables = (bits(), bits(), words(), words(), files);
+    tables.prop_map(|(bits, input_bits, words, input_words, files)| {
         let empty = [
             bits.is_empty(),
             input_bits.is_empty(),
@@ -35,15 +33,16 @@ fn points() -> impl Strategy<Value = Points> {
         ];
         let lacks = empty.iter().zip(FUNCTIONS);
         let lacks = lacks.filter_map(|(empty, functions)| empty.then_some(functions));
-        Points {
+        Device {
             bits,
             input_bits,
             words,
             input_words,
+            files,
             max_word: u16::MAX,
             lacks: lacks.collect::<Vec<_>>().concat(),
             objects: vec![None; 256],
-            ..Points::new(0, 0)
+            ..Device::new(0, 0)
         }
     })
 }
@@ -61,6 +60,8 @@ fn request() -> impl Strategy<Value = Vec<u8>> {
         1 => (address(), any::<u16>(), any::<u16>()).prop_map(|(a, b, c)| pdu(0x16, &[a, b, c])),
         1 => (address(), quantity(), address(), words())
             .prop_map(|(a, q, b, w)| write_then_read(a, q, b, &w)),
+        1 => vec((0_u16..4, address(), quantity()), 1..4).prop_map(|g| read_files(&g)),
+        1 => vec((0_u16..4, address(), words()), 1..4).prop_map(|g| write_files(&g)),
         1 => vec(any::<u8>(), 0..3).prop_map(|rest| [&[0x2B][..], &rest].concat()),
     ]
 }
@@ -78,23 +79,28 @@ proptest! {
         requests in vec(request(), 1..12),
     ) {
         let mut start = points.clone();
-        let mut tables = Tables {
+        let mut files: Vec<&mut [u16]> = start.files.iter_mut().map(|f| &mut f[..]).collect();
+        let mut unit = unit(Tables {
             coils: &mut start.bits,
             discrete_inputs: &mut start.input_bits,
             holding_registers: &mut start.words,
             input_registers: &mut start.input_words,
-        };
-        let mut server = Server::new(UNIT, Framing::Rtu);
+            files: &mut files,
+        });
         for pdu in requests {
             // Without objects there is no function 2B.
             let lacks = points.lacks.contains(&pdu[0]) || pdu[0] == 0x2B;
             let expected = if lacks { Err(1) } else { answer(&mut points, &pdu) };
             let expected = expected.unwrap_or_else(|code| vec![pdu[0] | 0x80, code]);
-            prop_assert_eq!(ask(&mut server, &mut tables, &pdu), expected, "{:02X?}", pdu);
+            prop_assert_eq!(unit.request(&pdu), Some(expected), "{:02X?}", pdu);
+            let tables = &unit.points;
             prop_assert_eq!(&*tables.coils, &points.bits[..]);
             prop_assert_eq!(&*tables.discrete_inputs, &points.input_bits[..]);
             prop_assert_eq!(&*tables.holding_registers, &points.words[..]);
             prop_assert_eq!(&*tables.input_registers, &points.input_words[..]);
+            for (file, expected) in tables.files.iter().zip(&points.files) {
+                prop_assert_eq!(&**file, &expected[..]);
+            }
         }
     }
 }
@@ -102,15 +108,14 @@ proptest! {
 #[test]
 fn a_table_of_all_addresses_is_served_to_its_last_one() {
     let mut words = vec![0; 0x1_0000];
-    let mut tables = Tables {
+    let mut unit = unit(Tables {
         input_registers: &mut words,
         ..Tables::default()
-    };
-    tables.input_registers[0xFFFF] = 0x1234;
-    let mut server = Server::new(UNIT, Framing::Rtu);
-    let reply = ask(&mut server, &mut tables, &pdu(0x04, &[0xFFFF, 1]));
-    assert_eq!(reply, [0x04, 2, 0x12, 0x34]);
+    });
+    unit.points.input_registers[0xFFFF] = 0x1234;
+    let reply = unit.request(&pdu(0x04, &[0xFFFF, 1]));
+    assert_eq!(reply, Some(vec![0x04, 2, 0x12, 0x34]));
     // The functions that need no table are there.
-    assert_eq!(ask(&mut server, &mut tables, &[0x07]), [0x07, 0]);
-    assert_eq!(ask(&mut server, &mut tables, &[0x11]), [0x11, 1, 0xFF]);
+    assert_eq!(unit.request(&[0x07]), Some(vec![0x07, 0]));
+    assert_eq!(unit.request(&[0x11]), Some(vec![0x11, 1, 0xFF]));
 }

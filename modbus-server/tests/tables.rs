@@ -2,15 +2,15 @@
 
 mod common;
 
-use common::{Points, Unit, frame, pdu, write_bits, write_then_read, write_words};
-use modbus_server::line::Framing;
-use modbus_server::{
-    Adu, DataModel, Exception, Function, Outcome, Server, Span, Table, Words, WordsOut,
+use common::{
+    Points, Unit, frame, pdu, read_files, write_bits, write_files, write_then_read, write_words,
 };
+use modbus_server::line::{Framing, Receiver};
+use modbus_server::{DataModel, Exception, Function, Span, Table, Words, WordsOut};
 
 /// Every function code the server has.
-const FUNCTIONS: [u8; 16] = [
-    1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x2B,
+const FUNCTIONS: [u8; 18] = [
+    1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x2B,
 ];
 
 /// A good request of this function.
@@ -20,6 +20,8 @@ fn good(function: u8) -> Vec<u8> {
         0x07 | 0x0B | 0x0C | 0x11 => vec![function],
         0x0F => write_bits(0, &[true]),
         0x10 => write_words(0, &[1]),
+        0x14 => read_files(&[(1, 0, 1)]),
+        0x15 => write_files(&[(1, 0, vec![1])]),
         0x16 => pdu(0x16, &[0, 0, 0]),
         0x17 => write_then_read(0, 1, 0, &[1]),
         0x2B => vec![0x2B, 0x0E, 1, 0],
@@ -62,9 +64,10 @@ fn each_function_uses_the_table_of_its_name() {
 fn a_function_that_the_model_lacks_returns_illegal_function_before_any_other_check() {
     for lacked in FUNCTIONS {
         let mut points = Points::new(1, 1);
+        points.files = vec![vec![0]];
         points.lacks = vec![lacked];
         // The state of the device comes last.
-        points.state = Some(Exception::ServerDeviceBusy);
+        points.state = Some(Exception::ServerDeviceBusy.code());
         let mut unit = Unit::new(points);
         for rest in [&[][..], &[0], &[0, 4, 0, 0], &[0, 1, 0, 0], &[0xFF; 252]] {
             let request = [&[lacked][..], rest].concat();
@@ -118,22 +121,23 @@ fn tables_that_a_model_does_not_mention_are_empty() {
     struct Nothing;
     impl DataModel for Nothing {}
 
-    let server = Server::new(common::UNIT, Framing::Rtu);
-    let outcome = |model: &dyn Fn(&Adu) -> Outcome, pdu: &[u8]| {
-        let mut adu = Adu::new();
-        adu.push(common::UNIT);
-        assert!(pdu.iter().all(|byte| adu.push(*byte)));
-        model(&adu)
-    };
-    let register = |adu: &Adu| server.decide(adu, &Register).outcome;
-    let nothing = |adu: &Adu| server.decide(adu, &Nothing).outcome;
-    let refused = Outcome::Refused(Exception::IllegalDataAddress);
+    let receiver = || Receiver::rtu(common::UNIT, false);
+    let mut register = Unit::over(receiver(), Framing::Rtu, Register);
+    let mut nothing = Unit::over(receiver(), Framing::Rtu, Nothing);
+    let refused = |function: u8, code| Some(vec![function | 0x80, code]);
     for function in [3, 4] {
-        assert_eq!(outcome(&register, &good(function)), Outcome::Accepted);
+        let reply = register.request(&good(function));
+        assert_eq!(reply, Some(vec![function, 2, 0x12, 0x34]));
     }
     for function in [1, 2, 5, 6, 0x0F, 0x10, 0x16, 0x17] {
-        assert_eq!(outcome(&register, &good(function)), refused);
-        assert_eq!(outcome(&nothing, &good(function)), refused);
+        let reply = register.request(&good(function));
+        assert_eq!(reply, refused(function, 2), "one register");
+        let reply = nothing.request(&good(function));
+        assert_eq!(reply, refused(function, 2), "nothing");
+    }
+    for function in [0x14, 0x15] {
+        let reply = nothing.request(&good(function));
+        assert_eq!(reply, refused(function, 1), "no files");
     }
     assert!(Nothing.has(Function::ReadCoils));
     let mut nothing = Nothing;

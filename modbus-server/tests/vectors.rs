@@ -42,7 +42,7 @@ fn an_actuator_is_read() {
 #[test]
 fn an_actuator_that_fails_says_so() {
     let mut unit = unit(1);
-    unit.points.state = Some(Exception::ServerDeviceFailure);
+    unit.points.state = Some(Exception::ServerDeviceFailure.code());
     exchange(&mut unit, "01 03 00 D3 00 01 75 F3", "01 83 04 40 F3");
     exchange(&mut unit, "01 06 00 CD 03 E8 18 8B", "01 86 04 43 A3");
 }

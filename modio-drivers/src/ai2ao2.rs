@@ -4,7 +4,7 @@
 use crate::analog_inputs::AnalogInputs;
 use crate::ao4::{health, output_code};
 use crate::{
-    AnalogSource, CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError,
+    AnalogSource, CHANNELS, ChannelSettings, Channels, Code, DacLink, IoModule, Kind, ModuleError,
 };
 
 /// Two filtered analog inputs and two analog outputs.
@@ -54,8 +54,8 @@ impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
         let [third, fourth] = &self.outputs;
         self.link.post([
-            0,
-            0,
+            Code::default(),
+            Code::default(),
             output_code(channels, 2, third),
             output_code(channels, 3, fourth),
         ]);

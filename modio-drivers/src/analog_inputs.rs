@@ -2,12 +2,12 @@
 
 use crate::low_pass::{LOW_PASS_DEFAULT, LowPass};
 use crate::{
-    AnalogSource, CHANNELS, ChannelSettings, ChannelStatus, Channels, Kind, ModuleError, Scale,
-    input_status, scale::Measured,
+    AnalogSource, CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, ModuleError,
+    Scale, input_status, scale::Measured,
 };
 
 /// The calls of [`AnalogSource::read`] a module makes in one scan at most, for all its lines together.
-/// A conversion of the F103 takes some 6 us, about 20 calls.
+/// A converter that converts on demand may take some 20 calls for each.
 pub const POLLS_PER_SCAN: u8 = 64;
 
 /// Scans in a row without any answer from the converter after which all its lines count as failed.
@@ -113,7 +113,7 @@ impl Input {
     };
 
     fn configure(&mut self, settings: &ChannelSettings) {
-        if settings.range != self.settings.range {
+        if settings.signal != self.settings.signal {
             // The other range's status says nothing about this one, not even as hysteresis.
             self.status = ChannelStatus::Good;
         }
@@ -121,7 +121,7 @@ impl Input {
         self.settings = *settings;
     }
 
-    fn sample(&mut self, code: u16) {
+    fn sample(&mut self, code: Code) {
         self.failed = false;
         self.filter.sample(code);
     }
@@ -137,7 +137,7 @@ impl Input {
             let measured = Measured::of(code, &self.settings);
             self.status = input_status::judge(code, measured, self.status);
             let word = match self.settings.scale {
-                Scale::Raw => code,
+                Scale::Raw => code.get(),
                 Scale::Engineering => measured.word(),
             };
             channels.set_word(channel, word);

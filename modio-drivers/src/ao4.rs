@@ -2,7 +2,8 @@
 //! MCP4728 whose full scale is 10 V or 20 mA.
 
 use crate::{
-    CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError, scale::output_to_raw,
+    CHANNELS, ChannelSettings, Channels, Code, DacLink, IoModule, Kind, ModuleError,
+    scale::output_to_raw,
 };
 
 /// Four analog outputs.
@@ -47,7 +48,7 @@ impl IoModule for Ao4<'_> {
 
     /// Leaves the codes in the link; an error of all channels while they do not get through.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
-        let mut codes = [0; CHANNELS];
+        let mut codes = [Code::default(); CHANNELS];
         for (channel, (code, settings)) in codes.iter_mut().zip(&self.settings).enumerate() {
             *code = output_code(channels, channel, settings);
         }
@@ -57,8 +58,8 @@ impl IoModule for Ao4<'_> {
 }
 
 /// The DAC's code for a channel's word.
-pub(crate) fn output_code(channels: &Channels, channel: usize, settings: &ChannelSettings) -> u16 {
-    output_to_raw(channels.word(channel), settings.range, settings.scale)
+pub(crate) fn output_code(channels: &Channels, channel: usize, settings: &ChannelSettings) -> Code {
+    output_to_raw(channels.word(channel), settings.signal, settings.scale)
 }
 
 /// What the worker says of the DAC that serves these channels, channel 1 in bit 0.
@@ -75,7 +76,7 @@ mod tests {
     extern crate std;
 
     use super::*;
-    use crate::{Range, Scale};
+    use crate::{Scale, Signal};
 
     fn words(words: [u16; 4]) -> Channels {
         let mut channels = Channels::new();
@@ -85,9 +86,9 @@ mod tests {
         channels
     }
 
-    fn settings(range: Range, scale: Scale) -> ChannelSettings {
+    fn settings(signal: Signal, scale: Scale) -> ChannelSettings {
         ChannelSettings {
-            range,
+            signal,
             scale,
             ..ChannelSettings::default_for(Kind::WordOutput)
         }
@@ -100,7 +101,7 @@ mod tests {
         assert_eq!(module.kinds(), [Kind::WordOutput; 4]);
         assert_eq!(link.wanted(), None, "nothing before the first scan");
         module.drive_outputs(&words([0, 1, 4095, 4096])).unwrap();
-        assert_eq!(link.wanted(), Some([0, 1, 4095, 4095]));
+        assert_eq!(link.wanted(), Some([0, 1, 4095, 4095].map(Code::new)));
     }
 
     #[test]
@@ -108,18 +109,24 @@ mod tests {
         let link = DacLink::new();
         let mut module = Ao4::new(&link);
         module.configure(&[
-            settings(Range::Volts, Scale::Engineering),
-            settings(Range::Current, Scale::Engineering),
-            settings(Range::Volts, Scale::Raw),
-            settings(Range::Current, Scale::Raw),
+            settings(Signal::Voltage, Scale::Engineering),
+            settings(Signal::Current, Scale::Engineering),
+            settings(Signal::Voltage, Scale::Raw),
+            settings(Signal::Current, Scale::Raw),
         ]);
         let channels = words([5_000, 12_000, 2_000, 819]);
         module.drive_outputs(&channels).unwrap();
-        assert_eq!(link.wanted(), Some([2_048, 2_457, 2_000, 819]));
+        assert_eq!(
+            link.wanted(),
+            Some([2_048, 2_457, 2_000, 819].map(Code::new))
+        );
 
-        module.configure(&[settings(Range::Volts, Scale::Raw); 4]);
+        module.configure(&[settings(Signal::Voltage, Scale::Raw); 4]);
         module.drive_outputs(&channels).unwrap();
-        assert_eq!(link.wanted(), Some([4_095, 4_095, 2_000, 819]));
+        assert_eq!(
+            link.wanted(),
+            Some([4_095, 4_095, 2_000, 819].map(Code::new))
+        );
     }
 
     #[test]
@@ -132,7 +139,7 @@ mod tests {
         assert_eq!(module.drive_outputs(&channels), failed);
         assert_eq!(module.read_inputs(&mut channels), failed);
         assert_eq!(channels, words([1, 2, 3, 4]));
-        assert_eq!(link.wanted(), Some([1, 2, 3, 4]));
+        assert_eq!(link.wanted(), Some([1, 2, 3, 4].map(Code::new)));
         link.set_failed(false);
         assert_eq!(module.drive_outputs(&channels), Ok(()));
         assert_eq!(module.read_inputs(&mut channels), Ok(()));

@@ -15,9 +15,9 @@
 use embedded_hal::i2c::{ErrorKind, I2c, NoAcknowledgeSource};
 use mcp4728::{Channel, ChannelState, Error, MCP4728, OutputEnableMode, VoltageReferenceMode};
 
-use crate::{CHANNELS, DacLink, scale::CODE_MAX};
+use crate::{CHANNELS, Code, DacLink};
 
-/// The DAC's address on its bus.
+/// The lowest address that a DAC can be ordered with, and the most usual one (DS22187E, 5.3); the highest is 0x67.
 pub const DAC_ADDRESS: u8 = 0x60;
 
 /// Calls from one transfer to the next when nothing has changed: 100 ms at a call every 10 ms. By
@@ -61,12 +61,13 @@ impl DacError {
     }
 }
 
-/// Brings what a [`DacLink`] wants to the DAC.
+/// Brings what a [`DacLink`] wants to one DAC. Several of them, with an address each, may share a bus.
 #[derive(Debug)]
-pub struct DacWorker<I2C> {
-    i2c: I2C,
+pub struct DacWorker {
+    /// The DAC's address on its bus, 7 bits.
+    address: u8,
     /// What the DAC has, as far as is known.
-    sent: Option<[u16; CHANNELS]>,
+    sent: Option<[Code; CHANNELS]>,
     until_refresh: u8,
     /// Failures in a row.
     failures: u8,
@@ -74,11 +75,12 @@ pub struct DacWorker<I2C> {
     pause: u8,
 }
 
-impl<I2C: I2c> DacWorker<I2C> {
-    /// Takes over a bus, every one of whose transfers must end within a bounded time.
-    pub const fn new(i2c: I2C) -> Self {
+impl DacWorker {
+    /// For the DAC at this address, 0x60 to 0x67.
+    #[must_use]
+    pub const fn new(address: u8) -> Self {
         Self {
-            i2c,
+            address,
             sent: None,
             until_refresh: 0,
             failures: 0,
@@ -86,21 +88,17 @@ impl<I2C: I2c> DacWorker<I2C> {
         }
     }
 
-    /// The bus, to free it after [`DacError::Bus`].
-    pub const fn bus(&mut self) -> &mut I2C {
-        &mut self.i2c
-    }
-
     /// To be called every 10 ms, or as soon as codes have been posted as well. Makes one transfer of
     /// 13 bytes, 0.3 ms at 400 kHz, when codes have changed, when it is time to refresh, or when a
     /// failed transfer is to be tried again: at the next call, then after 1, 2, 4, 8 and 16 calls left
-    /// out. Returns whether it made one. Before the first post it leaves the DAC alone.
+    /// out. Returns whether it made one. Before the first post it leaves the DAC alone. Every transfer of the bus must end
+    /// within a bounded time.
     ///
     /// # Errors
     ///
     /// [`DacError`] when a transfer was tried and failed; from the second in a row on, until one
     /// succeeds, [`DacLink::failed`] says so too.
-    pub fn work(&mut self, link: &DacLink) -> Result<bool, DacError> {
+    pub fn work(&mut self, bus: &mut impl I2c, link: &DacLink) -> Result<bool, DacError> {
         if self.pause > 0 {
             self.pause -= 1;
             return Ok(false);
@@ -112,7 +110,7 @@ impl<I2C: I2c> DacWorker<I2C> {
         if self.sent == Some(wanted) && self.until_refresh > 0 {
             return Ok(false);
         }
-        let result = self.transfer(wanted);
+        let result = self.transfer(bus, wanted);
         if result.is_ok() {
             self.sent = Some(wanted);
             self.until_refresh = REFRESH_CALLS;
@@ -126,14 +124,14 @@ impl<I2C: I2c> DacWorker<I2C> {
         result.map(|()| true)
     }
 
-    fn transfer(&mut self, codes: [u16; CHANNELS]) -> Result<(), DacError> {
+    fn transfer(&self, bus: &mut impl I2c, codes: [Code; CHANNELS]) -> Result<(), DacError> {
         let [a, b, c, d] = codes.map(|code| {
-            // The crate does not check this: a larger code would reach into the gain bit.
+            // A larger code would reach into the gain bit: the crate does not check.
             ChannelState::new()
                 .voltage_reference_mode(VoltageReferenceMode::External)
-                .value(code.min(CODE_MAX))
+                .value(code.get())
         });
-        MCP4728::new(&mut self.i2c, DAC_ADDRESS)
+        MCP4728::new(bus, self.address)
             .multi_write(&[
                 (Channel::A, OutputEnableMode::Update, a),
                 (Channel::B, OutputEnableMode::Update, b),

@@ -3,7 +3,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::SeqCst};
 
-use crate::CHANNELS;
+use crate::{CHANNELS, Code};
 
 /// A mailbox with the codes wanted on the four DAC channels one way and the DAC's health the other.
 /// Made to be a `static`. One driver posts, one worker collects.
@@ -43,14 +43,14 @@ impl DacLink {
     }
 
     /// The codes each channel is to have, A to D.
-    pub(crate) fn post(&self, wanted: [u16; CHANNELS]) {
+    pub(crate) fn post(&self, wanted: [Code; CHANNELS]) {
         let same = self.codes.iter().zip(wanted);
-        if self.posted.load(SeqCst) && same.into_iter().all(|(c, w)| c.load(SeqCst) == w) {
+        if self.posted.load(SeqCst) && same.into_iter().all(|(c, w)| c.load(SeqCst) == w.get()) {
             return;
         }
         self.posts.fetch_add(1, SeqCst);
         for (code, wanted) in self.codes.iter().zip(wanted) {
-            code.store(wanted, SeqCst);
+            code.store(wanted.get(), SeqCst);
         }
         self.posts.fetch_add(1, SeqCst);
         self.posted.store(true, SeqCst);
@@ -58,12 +58,12 @@ impl DacLink {
 
     /// What was posted last; none before the first post, or in the unlikely case that posts came in
     /// between at every attempt.
-    pub(crate) fn wanted(&self) -> Option<[u16; CHANNELS]> {
+    pub(crate) fn wanted(&self) -> Option<[Code; CHANNELS]> {
         self.collect(|| ())
     }
 
     /// Collects, calling `interrupt` before each code, where a post may come in.
-    fn collect(&self, mut interrupt: impl FnMut()) -> Option<[u16; CHANNELS]> {
+    fn collect(&self, mut interrupt: impl FnMut()) -> Option<[Code; CHANNELS]> {
         if !self.posted.load(SeqCst) {
             return None;
         }
@@ -71,7 +71,7 @@ impl DacLink {
             let before = self.posts.load(SeqCst);
             let codes = self.codes.each_ref().map(|code| {
                 interrupt();
-                code.load(SeqCst)
+                Code::new(code.load(SeqCst))
             });
             if before.is_multiple_of(2) && self.posts.load(SeqCst) == before {
                 return Some(codes);
@@ -102,11 +102,15 @@ mod tests {
     fn what_was_posted_last_is_wanted_and_nothing_before_that() {
         let link = DacLink::new();
         assert_eq!(link.wanted(), None);
-        link.post([0; 4]);
-        assert_eq!(link.wanted(), Some([0; 4]), "zeros are a post too");
-        link.post([1, 2, 3, 4]);
-        link.post([1, 2, 3, 4]);
-        assert_eq!(link.wanted(), Some([1, 2, 3, 4]));
+        link.post([0; 4].map(Code::new));
+        assert_eq!(
+            link.wanted(),
+            Some([0; 4].map(Code::new)),
+            "zeros are a post too"
+        );
+        link.post([1, 2, 3, 4].map(Code::new));
+        link.post([1, 2, 3, 4].map(Code::new));
+        assert_eq!(link.wanted(), Some([1, 2, 3, 4].map(Code::new)));
         assert_eq!(link.posts.load(SeqCst), 4, "the same again is no post");
         assert!(!link.failed());
         link.set_failed(true);
@@ -116,38 +120,42 @@ mod tests {
     #[test]
     fn a_post_that_is_not_finished_is_not_collected() {
         let link = DacLink::new();
-        link.post([7; 4]);
+        link.post([7; 4].map(Code::new));
         link.posts.fetch_add(1, SeqCst);
         assert_eq!(link.wanted(), None);
         link.posts.fetch_add(1, SeqCst);
-        assert_eq!(link.wanted(), Some([7; 4]));
+        assert_eq!(link.wanted(), Some([7; 4].map(Code::new)));
     }
 
     #[test]
     fn a_post_that_comes_in_anywhere_is_collected_whole() {
         for place in 0..CHANNELS {
             let link = DacLink::new();
-            link.post([1; 4]);
+            link.post([1; 4].map(Code::new));
             let mut calls = 0;
             let collected = link.collect(|| {
                 if calls == place {
-                    link.post([2; 4]);
+                    link.post([2; 4].map(Code::new));
                 }
                 calls += 1;
             });
-            assert_eq!(collected, Some([2; 4]), "before code {place}");
+            assert_eq!(
+                collected,
+                Some([2; 4].map(Code::new)),
+                "before code {place}"
+            );
         }
 
         let link = DacLink::new();
-        link.post([0; 4]);
+        link.post([0; 4].map(Code::new));
         let mut calls = 0;
         let collected = link.collect(|| {
             calls += 1;
-            link.post([calls; 4]);
+            link.post([calls; 4].map(Code::new));
         });
         assert_eq!(collected, None, "posts come in all the time");
         assert_eq!(calls, u16::from(ATTEMPTS) * 4);
-        assert_eq!(link.wanted(), Some([calls; 4]));
+        assert_eq!(link.wanted(), Some([calls; 4].map(Code::new)));
     }
 
     #[test]
@@ -155,8 +163,8 @@ mod tests {
         static LINK: DacLink = DacLink::new();
         static DONE: AtomicBool = AtomicBool::new(false);
         let poster = thread::spawn(|| {
-            for n in (0..u16::MAX).cycle() {
-                LINK.post([n; 4]);
+            for n in (0..4095).cycle() {
+                LINK.post([n; 4].map(Code::new));
                 if DONE.load(SeqCst) {
                     return n;
                 }
@@ -173,6 +181,6 @@ mod tests {
         }
         DONE.store(true, SeqCst);
         let last = poster.join().unwrap();
-        assert_eq!(LINK.wanted(), Some([last; 4]));
+        assert_eq!(LINK.wanted(), Some([last; 4].map(Code::new)));
     }
 }

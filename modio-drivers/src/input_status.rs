@@ -4,8 +4,8 @@
 //! Every threshold has a second one a little further in, at which the status goes away again, so that
 //! noise on a threshold does not make it flap.
 
-use crate::scale::{CODE_MAX, Measured};
-use crate::{ChannelStatus, ntc};
+use crate::scale::Measured;
+use crate::{ChannelStatus, Code, ntc};
 
 /// A 4-20 mA loop below this many uA is under range: a transmitter signals a failure of its own with
 /// 3.6 mA or less, and measures down to 3.8 mA (NAMUR NE 43).
@@ -21,7 +21,7 @@ pub const HYSTERESIS_UA: u16 = 100;
 /// A voltage or current at this code is over range: the converter is at its end, so the signal can be
 /// anything from here up. Full scale itself, 10 V or 20 mA, counts with it, since nothing tells them
 /// apart.
-pub const OVER_RANGE_CODE: u16 = CODE_MAX;
+pub const OVER_RANGE_CODE: u16 = Code::MAX.get();
 
 /// A thermistor at this code or below is shorted: 39 ohm, a quarter of what the steepest one has at
 /// 125 degC, and more than wires have.
@@ -29,7 +29,7 @@ pub const SHORT_CIRCUIT_CODE: u16 = 16;
 
 /// A thermistor at this code or above is missing: 2.5 Mohm, more than twice what the steepest one has
 /// at -40 degC.
-pub const OPEN_CIRCUIT_CODE: u16 = CODE_MAX - 16;
+pub const OPEN_CIRCUIT_CODE: u16 = Code::MAX.get() - 16;
 
 /// How far a code must come back from one of the thresholds above: two to three times the noise of
 /// the F103's converter.
@@ -41,7 +41,7 @@ pub const HYSTERESIS_TENTHS: i16 = 10;
 /// The status of an input with this code, which has been found to mean so much, after it had the
 /// status `before` in the same range.
 #[must_use]
-pub fn judge(code: u16, measured: Measured, before: ChannelStatus) -> ChannelStatus {
+pub fn judge(code: Code, measured: Measured, before: ChannelStatus) -> ChannelStatus {
     match measured {
         Measured::Millivolts(_) => saturation(code, before),
         Measured::Microamps(ua) => current(code, ua, before),
@@ -49,16 +49,16 @@ pub fn judge(code: u16, measured: Measured, before: ChannelStatus) -> ChannelSta
     }
 }
 
-fn saturation(code: u16, before: ChannelStatus) -> ChannelStatus {
+fn saturation(code: Code, before: ChannelStatus) -> ChannelStatus {
     let over = OVER_RANGE_CODE - back_off(before == ChannelStatus::OverRange, HYSTERESIS_CODE);
-    if code >= over {
+    if code.get() >= over {
         ChannelStatus::OverRange
     } else {
         ChannelStatus::Good
     }
 }
 
-fn current(code: u16, ua: u16, before: ChannelStatus) -> ChannelStatus {
+fn current(code: Code, ua: u16, before: ChannelStatus) -> ChannelStatus {
     use ChannelStatus::{OpenCircuit, UnderRange};
     let was_open = before == OpenCircuit;
     let was_under = was_open || before == UnderRange;
@@ -71,14 +71,14 @@ fn current(code: u16, ua: u16, before: ChannelStatus) -> ChannelStatus {
     }
 }
 
-fn thermistor(code: u16, tenths: i16, before: ChannelStatus) -> ChannelStatus {
+fn thermistor(code: Code, tenths: i16, before: ChannelStatus) -> ChannelStatus {
     use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
     let short = SHORT_CIRCUIT_CODE + back_off(before == ShortCircuit, HYSTERESIS_CODE);
     let open = OPEN_CIRCUIT_CODE - back_off(before == OpenCircuit, HYSTERESIS_CODE);
-    if code <= short {
+    if code.get() <= short {
         return ShortCircuit;
     }
-    if code >= open {
+    if code.get() >= open {
         return OpenCircuit;
     }
     let was_cold = matches!(before, UnderRange | OpenCircuit);
@@ -100,12 +100,12 @@ const fn back_off(active: bool, hysteresis: u16) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ChannelSettings, Kind, Range};
+    use crate::{ChannelSettings, Kind, Signal};
     use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
 
-    fn settings(range: Range) -> ChannelSettings {
+    fn settings(signal: Signal) -> ChannelSettings {
         ChannelSettings {
-            range,
+            signal,
             ..ChannelSettings::default_for(Kind::WordInput)
         }
     }
@@ -115,6 +115,7 @@ mod tests {
         settings: &ChannelSettings,
         before: Option<ChannelStatus>,
     ) -> ChannelStatus {
+        let code = Code::new(code);
         judge(
             code,
             Measured::of(code, settings),
@@ -124,13 +125,13 @@ mod tests {
 
     /// Sweeps the codes and returns each status with the code at which it began.
     fn sweep(
-        range: Range,
+        signal: Signal,
         beta: u16,
         codes: impl Iterator<Item = u16>,
     ) -> [(u16, ChannelStatus); 5] {
         let settings = ChannelSettings {
             beta,
-            ..settings(range)
+            ..settings(signal)
         };
         let mut seen = [(u16::MAX, Good); 5];
         let (mut count, mut before) = (0, None);
@@ -149,16 +150,16 @@ mod tests {
 
     #[test]
     fn a_voltage_is_over_range_at_the_converters_end_alone() {
-        let up = sweep(Range::Volts, 3950, 0..=4095);
+        let up = sweep(Signal::Voltage, 3950, 0..=4095);
         assert_eq!(up, [(0, Good), (4095, OverRange), NEVER, NEVER, NEVER]);
-        let down = sweep(Range::Volts, 3950, (0..=4095).rev());
+        let down = sweep(Signal::Voltage, 3950, (0..=4095).rev());
         assert_eq!(down, [(4095, OverRange), (4086, Good), NEVER, NEVER, NEVER]);
     }
 
     #[test]
     fn a_loop_is_open_then_under_range_then_good_then_over_range() {
         let code = |ua: f64| (ua * 4095.0 / 20_000.0).ceil() as u16;
-        let up = sweep(Range::Current, 3950, 0..=4095);
+        let up = sweep(Signal::Current, 3950, 0..=4095);
         let expected = [
             (0, OpenCircuit),
             (code(1_100.0 - 0.5), UnderRange),
@@ -167,7 +168,7 @@ mod tests {
             NEVER,
         ];
         assert_eq!(up, expected);
-        let down = sweep(Range::Current, 3950, (0..=4095).rev());
+        let down = sweep(Signal::Current, 3950, (0..=4095).rev());
         let expected = [
             (4095, OverRange),
             (4086, Good),
@@ -183,10 +184,10 @@ mod tests {
         for beta in (ntc::BETA_MIN..=ntc::BETA_MAX).step_by(50) {
             let first = |limit: i16| {
                 (0..=4095)
-                    .find(|&code| ntc::tenths_celsius(code, beta) <= limit)
+                    .find(|&code| ntc::tenths_celsius(Code::new(code), beta) <= limit)
                     .unwrap()
             };
-            let up = sweep(Range::Ntc, beta, 0..=4095);
+            let up = sweep(Signal::Ntc, beta, 0..=4095);
             let expected = [
                 (0, ShortCircuit),
                 (25, OverRange),
@@ -195,7 +196,7 @@ mod tests {
                 (4079, OpenCircuit),
             ];
             assert_eq!(up, expected, "beta {beta}");
-            let down = sweep(Range::Ntc, beta, (0..=4095).rev());
+            let down = sweep(Signal::Ntc, beta, (0..=4095).rev());
             let expected = [
                 (4095, OpenCircuit),
                 (4070, UnderRange),
@@ -209,7 +210,7 @@ mod tests {
 
     #[test]
     fn a_jump_out_of_a_break_or_a_short_has_the_hysteresis_of_what_it_jumps_over() {
-        let loop_ = settings(Range::Current);
+        let loop_ = settings(Signal::Current);
         let ua = |ua: u32| (ua * 4095 / 20_000) as u16;
         for (before, expected) in [
             (OpenCircuit, UnderRange),
@@ -219,10 +220,10 @@ mod tests {
         ] {
             assert_eq!(judge_code(ua(3_650), &loop_, Some(before)), expected);
         }
-        let settings = settings(Range::Ntc);
+        let settings = settings(Signal::Ntc);
         let code = |tenths| {
             (0..4095)
-                .find(|&code| ntc::tenths_celsius(code, settings.beta) <= tenths)
+                .find(|&code| ntc::tenths_celsius(Code::new(code), settings.beta) <= tenths)
                 .unwrap()
         };
         let (hot, cold) = (code(1_245), code(-395));
@@ -240,16 +241,16 @@ mod tests {
 
     #[test]
     fn noise_within_the_hysteresis_changes_a_status_once() {
-        for range in [Range::Volts, Range::Current, Range::Ntc] {
+        for signal in [Signal::Voltage, Signal::Current, Signal::Ntc] {
             for middle in 0..=4095_u16 {
                 let (mut changes, mut before) = (0, None);
                 for i in 0..20_u16 {
                     let code = (middle + i % 2 * 3).min(4095);
-                    let status = judge_code(code, &settings(range), before);
+                    let status = judge_code(code, &settings(signal), before);
                     changes += u8::from(before.is_some_and(|before| before != status));
                     before = Some(status);
                 }
-                assert!(changes <= 1, "{range:?} around {middle}: {changes}");
+                assert!(changes <= 1, "{signal:?} around {middle}: {changes}");
             }
         }
     }

@@ -1,24 +1,4 @@
-//! Drivers of the plug-in I/O modules.
-//!
-//! A module has four channels. Its driver implements [`IoModule`]: once a millisecond it brings what
-//! its inputs show into [`Channels`] and drives its outputs as [`Channels`] says, in the way
-//! [`ChannelSettings`] asks for. That is all the rest of the device sees of a module, so a new module
-//! is one new file here.
-//!
-//! | module | driver | over |
-//! |---|---|---|
-//! | none | [`Absent`] | - |
-//! | 4DI | [`Di4`] | [`InputPin`](embedded_hal::digital::InputPin) |
-//! | 4DO | [`Do4`] | [`OutputPin`](embedded_hal::digital::OutputPin) |
-//! | 2Relay | [`Relay2`] | both |
-//! | 4AI | [`Ai4`] | [`AnalogSource`] |
-//! | 4AO | [`Ao4`] | [`DacLink`], served by a [`DacWorker`] over [`I2c`](embedded_hal::i2c::I2c) |
-//! | 2AI2AO | [`Ai2Ao2`] | both of these |
-//!
-//! Drivers know nothing of Modbus or of the board, do no floating point, cannot panic and wait for
-//! nothing: what is slow or can stall, the DAC's bus, is left to [`DacWorker`], which a background
-//! task runs.
-
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -28,6 +8,7 @@ mod analog_inputs;
 mod analog_source;
 mod ao4;
 mod channels;
+mod code;
 mod dac;
 mod dac_link;
 mod debounce;
@@ -47,6 +28,7 @@ pub use analog_inputs::{POLLS_PER_SCAN, STALLED_SCANS};
 pub use analog_source::AnalogSource;
 pub use ao4::Ao4;
 pub use channels::{CHANNELS, ChannelStatus, Channels, Kind};
+pub use code::Code;
 pub use dac::{DAC_ADDRESS, DacError, DacWorker};
 pub use dac_link::DacLink;
 pub use debounce::{DEBOUNCE_DEFAULT_MS, DEBOUNCE_MAX_MS};
@@ -55,4 +37,4 @@ pub use do4::Do4;
 pub use io_module::{Absent, IoModule, ModuleError};
 pub use low_pass::{LOW_PASS_DEFAULT, LOW_PASS_MAX};
 pub use relay2::{JUMPER_DEBOUNCE_MS, Relay2};
-pub use settings::{ChannelSettings, Range, Scale};
+pub use settings::{ChannelSettings, Scale, Signal};

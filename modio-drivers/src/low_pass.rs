@@ -5,6 +5,8 @@
 //! so another n changes the speed and not the value. Dropping bits of the difference leaves the state
 //! at most 2^n - 1 of 65536 below a steady input, so that the rounded code settles exactly.
 
+use crate::Code;
+
 /// n of every analog input until told otherwise.
 pub const LOW_PASS_DEFAULT: u16 = 4;
 
@@ -13,8 +15,6 @@ pub const LOW_PASS_MAX: u16 = 8;
 
 /// Bits after the point. With the 12 bits of a code that makes 28, so differences fit an `i32`.
 const FRACTION: u32 = 16;
-
-const CODE_MAX: u16 = crate::scale::CODE_MAX;
 
 /// A low-pass over 12-bit codes.
 #[derive(Clone, Copy, Debug)]
@@ -39,19 +39,20 @@ impl LowPass {
         self.state = None;
     }
 
-    /// Takes a sample; a code above 4095 counts as 4095.
-    pub(crate) fn sample(&mut self, code: u16) {
-        let input = i32::from(code.min(CODE_MAX)) << FRACTION;
+    /// Takes a sample.
+    pub(crate) fn sample(&mut self, code: Code) {
+        let input = i32::from(code.get()) << FRACTION;
         self.state = Some(match self.state {
             Some(state) => state + ((input - state) >> self.n),
             None => input,
         });
     }
 
-    /// The filtered code, 0 to 4095; none before the first sample.
-    pub(crate) fn code(&self) -> Option<u16> {
+    /// The filtered code; none before the first sample.
+    pub(crate) fn code(&self) -> Option<Code> {
         const HALF: i32 = 1 << (FRACTION - 1);
-        self.state.map(|state| ((state + HALF) >> FRACTION) as u16)
+        self.state
+            .map(|state| Code::new(((state + HALF) >> FRACTION) as u16))
     }
 }
 
@@ -61,20 +62,24 @@ mod tests {
 
     fn settled(n: u16, code: u16) -> LowPass {
         let mut filter = LowPass::new(n);
-        filter.sample(code);
+        filter.sample(Code::new(code));
         filter
+    }
+
+    fn shown(filter: &LowPass) -> Option<u16> {
+        filter.code().map(Code::get)
     }
 
     #[test]
     fn the_first_sample_is_taken_as_it_is() {
         for n in 0..=LOW_PASS_MAX {
-            assert_eq!(LowPass::new(n).code(), None);
-            assert_eq!(settled(n, 4095).code(), Some(4095));
+            assert_eq!(shown(&LowPass::new(n)), None);
+            assert_eq!(shown(&settled(n, 4095)), Some(4095));
             let mut filter = settled(n, 4095);
             filter.reset();
-            assert_eq!(filter.code(), None);
-            filter.sample(17);
-            assert_eq!(filter.code(), Some(17));
+            assert_eq!(shown(&filter), None);
+            filter.sample(Code::new(17));
+            assert_eq!(shown(&filter), Some(17));
         }
     }
 
@@ -85,10 +90,10 @@ mod tests {
                 let mut filter = settled(n, from);
                 let keep = 1.0 - 1.0 / f64::from(1 << n);
                 for k in 1..=3000 {
-                    filter.sample(to);
+                    filter.sample(Code::new(to));
                     let step = f64::from(from) - f64::from(to);
                     let exact = f64::from(to) + step * keep.powi(k);
-                    let code = f64::from(filter.code().unwrap());
+                    let code = f64::from(shown(&filter).unwrap());
                     assert!(
                         (code - exact).abs() <= 0.51,
                         "n {n}, {from} to {to}, sample {k}: {code} for {exact}"
@@ -105,8 +110,8 @@ mod tests {
                 for from in [0, 4095] {
                     let mut filter = settled(n, from);
                     // 12 bits of step and one of rounding take 13 ln 2 = 9.01 time constants.
-                    (0..10 << n).for_each(|_| filter.sample(code));
-                    assert_eq!(filter.code(), Some(code), "n {n} from {from}");
+                    (0..10 << n).for_each(|_| filter.sample(Code::new(code)));
+                    assert_eq!(shown(&filter), Some(code), "n {n} from {from}");
                 }
             }
         }
@@ -115,20 +120,15 @@ mod tests {
     #[test]
     fn another_n_does_not_move_the_value() {
         let mut filter = settled(8, 0);
-        (0..100).for_each(|_| filter.sample(4000));
-        let before = filter.code();
+        (0..100).for_each(|_| filter.sample(Code::new(4000)));
+        let before = shown(&filter);
         for n in [0, 8, 3, u16::MAX] {
             filter.set_n(n);
-            assert_eq!(filter.code(), before);
+            assert_eq!(shown(&filter), before);
         }
         assert_eq!(filter.n, LOW_PASS_MAX);
         filter.set_n(0);
-        filter.sample(4000);
-        assert_eq!(filter.code(), Some(4000));
-    }
-
-    #[test]
-    fn a_code_beyond_the_converter_counts_as_its_last() {
-        assert_eq!(settled(0, u16::MAX).code(), Some(4095));
+        filter.sample(Code::new(4000));
+        assert_eq!(shown(&filter), Some(4000));
     }
 }

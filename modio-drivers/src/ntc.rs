@@ -17,6 +17,8 @@
 //! 125 degC. With the rounding to a tenth, the test finds 0.06 degC at most for any B and any code
 //! between -40 and 125 degC.
 
+use crate::Code;
+
 /// The smallest B constant, in K.
 pub const BETA_MIN: u16 = 2000;
 
@@ -48,15 +50,14 @@ const LOG2: [u32; SEGMENTS + 1] = log2_table();
 /// [`BETA_MAX`]. Within 0.1 degC of the formula between -40 and 125 degC; far outside it saturates, at
 /// 300 degC above.
 #[must_use]
-pub fn tenths_celsius(code: u16, beta: u16) -> i16 {
+pub fn tenths_celsius(code: Code, beta: u16) -> i16 {
     /// Numerator and denominator are in 1/256 K; 2981.5 is T0 in tenths of a kelvin.
     const T0_TENTHS: u32 = 29_815 * 256 / 10;
     /// T0 * ln 2 in the denominator's unit, 298.15 * 0.693147 * 256, with 8 bits more.
     const T0_LN2: i64 = 13_543_789;
 
-    let Some(low) = crate::scale::CODE_MAX.checked_sub(code) else {
-        return FROZEN;
-    };
+    let code = code.get();
+    let low = Code::MAX.get() - code;
     let (Some(upper), Some(lower)) = (log2(code), log2(low)) else {
         return if code == 0 { SATURATED } else { FROZEN };
     };
@@ -150,7 +151,7 @@ mod tests {
             let (mut near, mut wide) = (0.0_f64, 0.0_f64);
             for &(code, logarithm) in &codes {
                 let exact = exact(logarithm, beta);
-                let error = (f64::from(tenths_celsius(code, beta)) / 10.0 - exact).abs();
+                let error = (f64::from(tenths_celsius(Code::new(code), beta)) / 10.0 - exact).abs();
                 if (-20.0..=80.0).contains(&exact) {
                     near = near.max(error);
                 }
@@ -171,13 +172,14 @@ mod tests {
     #[test]
     fn a_higher_code_is_never_a_higher_temperature_and_the_ends_saturate() {
         for beta in [0, BETA_MIN, BETA_DEFAULT, BETA_MAX, u16::MAX] {
-            assert_eq!(tenths_celsius(0, beta), SATURATED);
-            assert_eq!(tenths_celsius(1, beta), SATURATED);
-            for end in [4095, 4096, u16::MAX] {
-                assert_eq!(tenths_celsius(end, beta), FROZEN);
-            }
+            assert_eq!(tenths_celsius(Code::new(0), beta), SATURATED);
+            assert_eq!(tenths_celsius(Code::new(1), beta), SATURATED);
+            assert_eq!(tenths_celsius(Code::MAX, beta), FROZEN);
             for code in 1..=4095 {
-                assert!(tenths_celsius(code, beta) <= tenths_celsius(code - 1, beta));
+                assert!(
+                    tenths_celsius(Code::new(code), beta)
+                        <= tenths_celsius(Code::new(code - 1), beta)
+                );
             }
         }
     }

@@ -7,10 +7,7 @@
 //! least current in uA. A raw code is free, so that an output can be left without current
 //! ([`output_from_raw`] then says 0 uA), and every code comes back from its units unchanged.
 
-use crate::{ChannelSettings, Range, Scale, ntc};
-
-/// The largest code of the converters: 12 bits.
-pub const CODE_MAX: u16 = 4095;
+use crate::{ChannelSettings, Code, Scale, Signal, ntc};
 
 /// 10 V in mV.
 pub const FULL_SCALE_MV: u16 = 10_000;
@@ -21,7 +18,7 @@ pub const FULL_SCALE_UA: u16 = 20_000;
 /// The least current an output may be commanded in uA.
 pub const OUTPUT_MIN_UA: u16 = 4_000;
 
-/// What an analog input measures, in the units of its range.
+/// What an analog input measures, in the units of its signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measured {
     /// 0 to 10000 mV.
@@ -33,14 +30,13 @@ pub enum Measured {
 }
 
 impl Measured {
-    /// What a code of the converter means under these settings; a code above 4095 counts as 4095.
+    /// What a code of the converter means under these settings.
     #[must_use]
-    pub fn of(code: u16, settings: &ChannelSettings) -> Self {
-        let code = code.min(CODE_MAX);
-        match settings.range {
-            Range::Volts => Self::Millivolts(units_from_code(code, FULL_SCALE_MV)),
-            Range::Current => Self::Microamps(units_from_code(code, FULL_SCALE_UA)),
-            Range::Ntc => Self::TenthsCelsius(ntc::tenths_celsius(code, settings.beta)),
+    pub fn of(code: Code, settings: &ChannelSettings) -> Self {
+        match settings.signal {
+            Signal::Voltage => Self::Millivolts(units_from_code(code, FULL_SCALE_MV)),
+            Signal::Current => Self::Microamps(units_from_code(code, FULL_SCALE_UA)),
+            Signal::Ntc => Self::TenthsCelsius(ntc::tenths_celsius(code, settings.beta)),
         }
     }
 
@@ -55,64 +51,75 @@ impl Measured {
     }
 }
 
-/// The least and the largest word an output may be commanded: 0-4095 raw, 0-10000 mV, 4000-20000 uA.
+/// The least and the largest value that the word of an input shows: 0-4095 raw, 0-10000 mV, 0-20000 uA, -400 to 1250 in
+/// 0.1 degC.
 #[must_use]
-pub const fn output_limits(range: Range, scale: Scale) -> (u16, u16) {
-    match (scale, range) {
-        (Scale::Raw, _) => (0, CODE_MAX),
-        (Scale::Engineering, Range::Volts | Range::Ntc) => (0, FULL_SCALE_MV),
-        (Scale::Engineering, Range::Current) => (OUTPUT_MIN_UA, FULL_SCALE_UA),
+pub const fn input_limits(signal: Signal, scale: Scale) -> (i16, i16) {
+    match (scale, signal) {
+        (Scale::Raw, _) => (0, Code::MAX.get() as i16),
+        (Scale::Engineering, Signal::Voltage) => (0, FULL_SCALE_MV as i16),
+        (Scale::Engineering, Signal::Current) => (0, FULL_SCALE_UA as i16),
+        (Scale::Engineering, Signal::Ntc) => (ntc::MIN_TENTHS, ntc::MAX_TENTHS),
     }
 }
 
-/// The word that stands for a code of the DAC; a code above 4095 counts as 4095.
+/// The least and the largest word an output may be commanded: 0-4095 raw, 0-10000 mV, 4000-20000 uA.
 #[must_use]
-pub const fn output_from_raw(code: u16, range: Range, scale: Scale) -> u16 {
-    let code = if code > CODE_MAX { CODE_MAX } else { code };
-    match full_scale(range, scale) {
+pub const fn output_limits(signal: Signal, scale: Scale) -> (u16, u16) {
+    match (scale, signal) {
+        (Scale::Raw, _) => (0, Code::MAX.get()),
+        (Scale::Engineering, Signal::Voltage | Signal::Ntc) => (0, FULL_SCALE_MV),
+        (Scale::Engineering, Signal::Current) => (OUTPUT_MIN_UA, FULL_SCALE_UA),
+    }
+}
+
+/// The word that stands for a code of the DAC.
+#[must_use]
+pub const fn output_from_raw(code: Code, signal: Signal, scale: Scale) -> u16 {
+    match full_scale(signal, scale) {
         Some(full_scale) => units_from_code(code, full_scale),
-        None => code,
+        None => code.get(),
     }
 }
 
 /// The DAC's code for a word; one above full scale counts as full scale.
 #[must_use]
-pub const fn output_to_raw(word: u16, range: Range, scale: Scale) -> u16 {
-    let full_scale = match full_scale(range, scale) {
+pub const fn output_to_raw(word: u16, signal: Signal, scale: Scale) -> Code {
+    let full_scale = match full_scale(signal, scale) {
         Some(full_scale) => full_scale,
-        None => CODE_MAX,
+        None => Code::MAX.get(),
     };
     let word = if word > full_scale { full_scale } else { word };
-    rescale(word, CODE_MAX, full_scale)
+    Code::new(rescale(word, Code::MAX.get(), full_scale))
 }
 
-/// An output's word under new settings: the same when range and scale have not changed, otherwise
+/// An output's word under new settings: the same when signal and scale have not changed, otherwise
 /// what stands for the same code, so that changing them does not move the output.
 #[must_use]
 pub const fn output_rescaled(word: u16, from: &ChannelSettings, to: &ChannelSettings) -> u16 {
-    if from.range as u8 == to.range as u8 && from.scale as u8 == to.scale as u8 {
+    if from.signal as u8 == to.signal as u8 && from.scale as u8 == to.scale as u8 {
         word
     } else {
         output_from_raw(
-            output_to_raw(word, from.range, from.scale),
-            to.range,
+            output_to_raw(word, from.signal, from.scale),
+            to.signal,
             to.scale,
         )
     }
 }
 
 /// The units at code 4095, none for raw.
-const fn full_scale(range: Range, scale: Scale) -> Option<u16> {
-    match (scale, range) {
+const fn full_scale(signal: Signal, scale: Scale) -> Option<u16> {
+    match (scale, signal) {
         (Scale::Raw, _) => None,
-        (Scale::Engineering, Range::Volts | Range::Ntc) => Some(FULL_SCALE_MV),
-        (Scale::Engineering, Range::Current) => Some(FULL_SCALE_UA),
+        (Scale::Engineering, Signal::Voltage | Signal::Ntc) => Some(FULL_SCALE_MV),
+        (Scale::Engineering, Signal::Current) => Some(FULL_SCALE_UA),
     }
 }
 
-/// Units for a code of at most 4095.
-const fn units_from_code(code: u16, full_scale: u16) -> u16 {
-    rescale(code, full_scale, CODE_MAX)
+/// Units for a code.
+const fn units_from_code(code: Code, full_scale: u16) -> u16 {
+    rescale(code.get(), full_scale, Code::MAX.get())
 }
 
 /// `value * to / from` to the nearest, for a value of at most `from`; at most 20000 * 4095, which
@@ -132,12 +139,16 @@ mod tests {
     use super::*;
     use crate::Kind;
 
-    const RANGES: [Range; 3] = [Range::Volts, Range::Current, Range::Ntc];
+    const SIGNALS: [Signal; 3] = [Signal::Voltage, Signal::Current, Signal::Ntc];
     const SCALES: [Scale; 2] = [Scale::Raw, Scale::Engineering];
 
-    fn settings(range: Range, scale: Scale) -> ChannelSettings {
+    fn codes() -> impl Iterator<Item = Code> {
+        (0..=Code::MAX.get()).map(Code::new)
+    }
+
+    fn settings(signal: Signal, scale: Scale) -> ChannelSettings {
         ChannelSettings {
-            range,
+            signal,
             scale,
             ..ChannelSettings::default_for(Kind::WordInput)
         }
@@ -145,68 +156,68 @@ mod tests {
 
     #[test]
     fn voltage_and_current_are_the_nearest_for_every_code() {
-        for code in 0..=CODE_MAX {
-            for (range, full_scale) in [(Range::Volts, 10_000.0), (Range::Current, 20_000.0)] {
-                let exact = (f64::from(code) * full_scale / 4095.0).round() as u16;
-                let measured = Measured::of(code, &settings(range, Scale::Engineering));
-                assert_eq!(measured.word(), exact, "{range:?} {code}");
-                assert_eq!(output_from_raw(code, range, Scale::Engineering), exact);
+        for code in codes() {
+            for (signal, full_scale) in [(Signal::Voltage, 10_000.0), (Signal::Current, 20_000.0)] {
+                let exact = (f64::from(code.get()) * full_scale / 4095.0).round() as u16;
+                let measured = Measured::of(code, &settings(signal, Scale::Engineering));
+                assert_eq!(measured.word(), exact, "{signal:?} {code:?}");
+                assert_eq!(output_from_raw(code, signal, Scale::Engineering), exact);
             }
         }
     }
 
     #[test]
     fn a_temperature_is_in_twos_complement_and_stays_within_what_is_measured() {
-        let settings = settings(Range::Ntc, Scale::Engineering);
-        let word = |code| Measured::of(code, &settings).word();
+        let settings = settings(Signal::Ntc, Scale::Engineering);
+        let word = |code| Measured::of(Code::new(code), &settings).word();
         assert_eq!(word(2048), 250, "10 k is 25 degC");
         assert_eq!(word(3160), (-1_i16) as u16);
         assert_eq!(word(0), 1250);
         assert_eq!(word(4095), (-400_i16) as u16);
-        assert_eq!(word(u16::MAX), (-400_i16) as u16);
     }
 
     #[test]
     fn a_commanded_word_becomes_the_nearest_code() {
-        for (range, full_scale) in [(Range::Volts, 10_000.0), (Range::Current, 20_000.0)] {
-            let (min, max) = output_limits(range, Scale::Engineering);
+        for (signal, full_scale) in [(Signal::Voltage, 10_000.0), (Signal::Current, 20_000.0)] {
+            let (min, max) = output_limits(signal, Scale::Engineering);
             for word in min..=max {
                 let exact = (f64::from(word) * 4095.0 / full_scale).round() as u16;
-                assert_eq!(output_to_raw(word, range, Scale::Engineering), exact);
+                let code = output_to_raw(word, signal, Scale::Engineering);
+                assert_eq!(code.get(), exact);
             }
         }
-        let current = |ua| output_to_raw(ua, Range::Current, Scale::Engineering);
+        let current = |ua| output_to_raw(ua, Signal::Current, Scale::Engineering).get();
         assert_eq!([4_000, 12_000, 20_000].map(current), [819, 2457, 4095]);
     }
 
     #[test]
     fn every_code_comes_back_from_its_word_and_limits_are_within_full_scale() {
-        for range in RANGES {
+        for signal in SIGNALS {
             for scale in SCALES {
-                for code in 0..=CODE_MAX {
-                    let word = output_from_raw(code, range, scale);
-                    assert_eq!(output_to_raw(word, range, scale), code);
+                for code in codes() {
+                    let word = output_from_raw(code, signal, scale);
+                    assert_eq!(output_to_raw(word, signal, scale), code);
                 }
-                let (min, max) = output_limits(range, scale);
+                let (min, max) = output_limits(signal, scale);
                 assert!(min < max);
-                assert_eq!(output_to_raw(max, range, scale), CODE_MAX);
+                assert_eq!(output_to_raw(max, signal, scale), Code::MAX);
                 for beyond in [max, max + 1, u16::MAX] {
-                    assert_eq!(output_to_raw(beyond, range, scale), CODE_MAX);
+                    assert_eq!(output_to_raw(beyond, signal, scale), Code::MAX);
                 }
-                assert_eq!(output_from_raw(u16::MAX, range, scale), max);
+                assert_eq!(output_from_raw(Code::MAX, signal, scale), max);
             }
         }
     }
 
     #[test]
     fn new_settings_keep_the_output_where_it_is() {
-        let all = RANGES.map(|range| SCALES.map(|scale| settings(range, scale)));
+        let all = SIGNALS.map(|signal| SCALES.map(|scale| settings(signal, scale)));
         for from in all.iter().flatten() {
             for to in all.iter().flatten() {
-                for code in 0..=CODE_MAX {
-                    let word = output_from_raw(code, from.range, from.scale);
+                for code in codes() {
+                    let word = output_from_raw(code, from.signal, from.scale);
                     let new = output_rescaled(word, from, to);
-                    assert_eq!(output_to_raw(new, to.range, to.scale), code);
+                    assert_eq!(output_to_raw(new, to.signal, to.scale), code);
                 }
             }
             let odd = 5_001;

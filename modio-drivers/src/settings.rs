@@ -12,7 +12,7 @@ pub struct ChannelSettings {
     /// The thermistor's B constant in kelvin, [`ntc::BETA_MIN`] to [`ntc::BETA_MAX`].
     pub beta: u16,
     /// The signal of an analog channel, as its jumper says.
-    pub range: Range,
+    pub signal: Signal,
     /// What an analog channel's word is in.
     pub scale: Scale,
 }
@@ -29,7 +29,7 @@ impl ChannelSettings {
                 Kind::None | Kind::BitOutput | Kind::WordOutput => 0,
             },
             beta: ntc::BETA_DEFAULT,
-            range: Range::Volts,
+            signal: Signal::Voltage,
             scale: Scale::Raw,
         }
     }
@@ -38,29 +38,29 @@ impl ChannelSettings {
 /// The signal of an analog channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Range {
+pub enum Signal {
     /// 0 to 10 V.
     #[default]
-    Volts = 0,
+    Voltage = 0,
     /// 4 to 20 mA.
     Current = 1,
-    /// A 10 k thermistor. Inputs only; an output counts it as [`Volts`](Self::Volts).
+    /// A 10 k thermistor. Inputs only; an output counts it as [`Volts`](Self::Voltage).
     Ntc = 2,
 }
 
-impl Range {
-    /// The range with this code, or `None` above 2.
+impl Signal {
+    /// The signal with this code, or `None` above 2.
     #[must_use]
     pub const fn from_code(code: u16) -> Option<Self> {
         match code {
-            0 => Some(Self::Volts),
+            0 => Some(Self::Voltage),
             1 => Some(Self::Current),
             2 => Some(Self::Ntc),
             _ => None,
         }
     }
 
-    /// The code of this range, 0 to 2.
+    /// The code of this signal, 0 to 2.
     #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
@@ -74,7 +74,7 @@ pub enum Scale {
     /// The converter's code, 0 to 4095.
     #[default]
     Raw = 0,
-    /// mV, uA or 0.1 degC, by [`Range`].
+    /// mV, uA or 0.1 degC, by [`Signal`].
     Engineering = 1,
 }
 
@@ -103,12 +103,12 @@ mod tests {
     #[test]
     fn codes_lead_back_to_what_they_stand_for() {
         for code in 0..=2 {
-            assert_eq!(Range::from_code(code).map(Range::code), Some(code));
+            assert_eq!(Signal::from_code(code).map(Signal::code), Some(code));
         }
         for code in 0..=1 {
             assert_eq!(Scale::from_code(code).map(Scale::code), Some(code));
         }
-        assert_eq!((Range::from_code(3), Scale::from_code(2)), (None, None));
+        assert_eq!((Signal::from_code(3), Scale::from_code(2)), (None, None));
     }
 
     #[test]
@@ -121,7 +121,7 @@ mod tests {
             ChannelSettings {
                 filter: 4,
                 beta: 3950,
-                range: Range::Volts,
+                signal: Signal::Voltage,
                 scale: Scale::Raw
             }
         );

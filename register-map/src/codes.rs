@@ -1,4 +1,29 @@
-//! Registers whose values are codes: one enum for each, with the code and a name for every value.
+//! Registers whose values are codes: one enum for each, with the code and a name for every value. Those that are about
+//! a module's channels are modio-drivers' own, and their names stand here.
+
+pub use modio_drivers::{ChannelStatus, Scale, Signal};
+
+/// RANGE: every code of a [`Signal`] with its name.
+pub const SIGNAL_NAMES: &[(u16, &str)] = &[
+    (Signal::Voltage.code(), "0-10 V"),
+    (Signal::Current.code(), "4-20 mA"),
+    (Signal::Ntc.code(), "NTC"),
+];
+
+/// SCALE: every code of a [`Scale`] with its name.
+pub const SCALE_NAMES: &[(u16, &str)] = &[
+    (Scale::Raw.code(), "raw 12-bit"),
+    (Scale::Engineering.code(), "engineering units"),
+];
+
+/// Every code of a [`ChannelStatus`] with its name.
+pub const CHANNEL_STATUS_NAMES: &[(u16, &str)] = &[
+    (ChannelStatus::Good.code(), "good"),
+    (ChannelStatus::UnderRange.code(), "under range"),
+    (ChannelStatus::OverRange.code(), "over range"),
+    (ChannelStatus::OpenCircuit.code(), "open circuit"),
+    (ChannelStatus::ShortCircuit.code(), "short circuit"),
+];
 
 /// Declares an enum of codes; the name of a value is its documentation, too.
 macro_rules! codes {
@@ -107,8 +132,8 @@ codes! {
 codes! {
     /// STRICT_T15: what becomes of a frame with a gap above t1.5 in it.
     GapRule {
-        Count = 0 "count gaps above t1.5, keep the frame",
-        Drop = 1 "drop the frame",
+        Count = 0 "keep and count",
+        Drop = 1 "drop",
     }
 }
 
@@ -119,7 +144,8 @@ codes! {
         Restart = 2 "restart",
         LoadDefaults = 3 "load defaults",
         DropChanges = 4 "drop unsaved changes",
-        ClearWatchdogFlag = 5 "clear the communication-watchdog flag",
+        ClearWatchdogFlag = 5 "clear the watchdog flag",
+        Identify = 6 "identify",
         EnterLoader = 0xB007 "enter the loader",
     }
 }
@@ -155,23 +181,6 @@ codes! {
 }
 
 codes! {
-    /// RANGE: the signal of an analog point.
-    Signal {
-        Voltage = 0 "0-10 V",
-        Current = 1 "4-20 mA",
-        Ntc = 2 "NTC",
-    }
-}
-
-codes! {
-    /// SCALE: how an analog point is counted.
-    Scale {
-        Raw = 0 "raw 12-bit",
-        Engineering = 1 "engineering units",
-    }
-}
-
-codes! {
     /// How a module fares.
     ModuleState {
         Good = 0 "good",
@@ -182,24 +191,13 @@ codes! {
 }
 
 codes! {
-    /// How a channel fares.
-    ChannelStatus {
-        Good = 0 "good",
-        UnderRange = 1 "under range",
-        OverRange = 2 "over range",
-        OpenCircuit = 3 "open circuit",
-        ShortCircuit = 4 "short circuit",
-    }
-}
-
-codes! {
     /// What went wrong before the last fault's reset.
     FaultKind {
         None = 0 "none",
         Panic = 1 "panic",
         HardFault = 2 "hard fault",
-        Watchdog = 3 "the watchdog bit",
-        Crystal = 4 "the crystal failed while running",
+        Watchdog = 3 "watchdog reset",
+        Crystal = 4 "crystal failure",
         StackOverflow = 5 "stack overflow",
     }
 }

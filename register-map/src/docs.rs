@@ -1,12 +1,14 @@
 //! `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
 
 use core::fmt::{Result, Write};
+use core::ops::Range;
 
-use crate::block::{Block, Text};
-use crate::points::PointKind;
+use crate::block::{Block, Scope, Text};
+use crate::points::Kind;
 use crate::rule::{InForce, Rule};
+use crate::value::{Unit, Value};
 use crate::values::Values;
-use crate::{BLOCKS, Module, configuration, counters, points, record};
+use crate::{BLOCKS, Board, Module, codes, configuration, counters, points};
 
 const INTRODUCTION: &str = "\
 # Register map, version 1
@@ -37,6 +39,9 @@ const CONFIGURATION_NOTES: &str = "
 - The response to COMMAND is out before the command acts. While a save runs another save is exception 06, a
   restart waits for it, and a change made meanwhile is not part of it. Status bit 3 clears when the save is
   complete. Saving what is stored already writes nothing to the flash.
+- The lock closes 60 s after the last configuration write.
+- Identify (6): all LEDs blink together for 10 s, and show the state of the device again after that. Another
+  identify begins the 10 s anew.
 - Load defaults (3) and drop (4) change the settings as if they had been written: save to make them last.
 - A setting by point takes the values of the kind of point that MODULE, as last written, makes it; where a
   point has no use for it, any value of the register. A change of MODULE from one module to another puts the
@@ -44,8 +49,13 @@ const CONFIGURATION_NOTES: &str = "
 - Until the restart a \"now\" setting that does not suit the module in force counts as its default.
 ";
 
+const COUNTER_NOTES: &str = "
+A counter wraps. A write of 0 to both registers of a point in one request clears the counter. Any other write is exception 03.
+";
+
 const FAULT_NOTES: &str = "
-The record outlives every reset but a loss of power; a new fault takes its place.
+The record outlives every reset but a loss of power; a new fault takes its place. Line repairs begin at 0 with each
+start and stop at 65535.
 ";
 
 /// Writes the whole document.
@@ -70,6 +80,8 @@ pub fn write_markdown(out: &mut impl Write) -> Result {
             write_store(out)?;
         } else if block.first == crate::fault::BLOCK.first {
             out.write_str(FAULT_NOTES)?;
+        } else if block.first == counters::BLOCK.first {
+            out.write_str(COUNTER_NOTES)?;
         }
     }
     Ok(())
@@ -92,10 +104,25 @@ fn write_registers(block: &Block, out: &mut impl Write) -> Result {
                 InForce::Now => "now",
                 InForce::Restart => "restart",
             };
-            write!(out, " | {} | {in_force} | ", text.unit)?;
+            write!(out, " | {}", text.value.unit())?;
+            if let (Some(value), Some(narrower)) = (text.narrower, rule.narrower) {
+                let unit = value.unit();
+                write!(out, "; {} ", plural(narrower.kind))?;
+                if unit == Unit::NONE {
+                    out.write_str("none")?;
+                } else {
+                    write!(out, "{unit}")?;
+                }
+            }
+            write!(out, " | {in_force} | ")?;
         } else {
-            write!(out, "{} | ", text.unit)?;
+            write!(out, "{} | ", text.value.unit())?;
         }
+        out.write_str(match text.scope(rule.count) {
+            Scope::Unit => "",
+            Scope::Port => "By port. ",
+            Scope::Point => "By point. ",
+        })?;
         write_about(text, out)?;
         out.write_str(" |\n")?;
     }
@@ -151,45 +178,62 @@ fn write_range(min: u16, max: u16, out: &mut impl Write) -> Result {
 
 fn write_about(text: &Text, out: &mut impl Write) -> Result {
     out.write_str(text.about.trim())?;
-    for (i, (code, name)) in text.codes.iter().enumerate() {
-        out.write_str(if i == 0 { ": " } else { ", " })?;
-        match code {
-            0..=0xFF => write!(out, "{code} = {name}")?,
-            _ => write!(out, "{code:#06X} = {name}")?,
+    let separator = |i| if i == 0 { ": " } else { ", " };
+    match text.value {
+        Value::Codes(codes) => {
+            for (i, (code, name)) in codes.iter().enumerate() {
+                out.write_str(separator(i))?;
+                match code {
+                    0..=0xFF => write!(out, "{code} = {name}")?,
+                    _ => write!(out, "{code:#06X} = {name}")?,
+                }
+            }
         }
+        Value::Bits(bits) => {
+            for (i, (bit, name)) in bits.iter().enumerate() {
+                write!(out, "{}bit {bit} {name}", separator(i))?;
+            }
+        }
+        Value::Number(_) | Value::Long(_) | Value::Opaque => {}
     }
     Ok(())
 }
 
-fn plural(kind: PointKind) -> &'static str {
+fn plural(kind: Kind) -> &'static str {
     match kind {
-        PointKind::None => "absent points",
-        PointKind::BitInput => "bit inputs",
-        PointKind::BitOutput => "bit outputs",
-        PointKind::WordInput => "analog inputs",
-        PointKind::WordOutput => "analog outputs",
+        Kind::None => "absent points",
+        Kind::BitInput => "bit inputs",
+        Kind::BitOutput => "bit outputs",
+        Kind::WordInput => "analog inputs",
+        Kind::WordOutput => "analog outputs",
     }
 }
 
 fn write_points(out: &mut impl Write) -> Result {
-    let slot = points::SLOT_PORT;
-    let first = points::SLOT_FIRST;
-    let last = first + points::CHANNELS - 1;
-    writeln!(
-        out,
-        "`address = (port - 1) * 4 + (channel - 1)`, for bits and words alike. The modio-02 has port {slot} alone: \
-         {first:#06X}-{last:04X}. Points of\nother ports, and those a module does not have, are exception 02.\n\n\
-         | code | module | channel 1 | 2 | 3 | 4 |\n|---|---|---|---|---|---|"
+    out.write_str(
+        "`address = (port - 1) * 4 + (channel - 1)`, for bits and words alike. Points of ports without a slot, and those \
+         a module\ndoes not have, are exception 02. The boards have slots at these ports:\n\n\
+         | board | ports | points |\n|---|---|---|\n",
     )?;
+    for board in Board::ALL {
+        let (ports, points) = (board.ports(), board.points());
+        let last = |range: &Range<u16>| range.end.wrapping_sub(1);
+        write!(out, "| {board} | {}", ports.start)?;
+        if board.slots > 1 {
+            write!(out, "-{}", last(&ports))?;
+        }
+        writeln!(out, " | {:#06X}-{:04X} |", points.start, last(&points))?;
+    }
+    out.write_str("\n| code | module | channel 1 | 2 | 3 | 4 |\n|---|---|---|---|---|---|\n")?;
     for module in Module::ALL {
         write!(out, "| {} | {module} |", module.code())?;
         for kind in module.points() {
             let kind = match kind {
-                PointKind::None => "-",
-                PointKind::BitInput => "bit, read",
-                PointKind::BitOutput => "bit, read and write",
-                PointKind::WordInput => "word, read",
-                PointKind::WordOutput => "word, read and write",
+                Kind::None => "-",
+                Kind::BitInput => "bit, read",
+                Kind::BitOutput => "bit, read and write",
+                Kind::WordInput => "word, read",
+                Kind::WordOutput => "word, read and write",
             };
             write!(out, " {kind} |")?;
         }
@@ -197,10 +241,11 @@ fn write_points(out: &mut impl Write) -> Result {
     }
     out.write_str(
         "\nThe bits of 2relay: 1 and 2 are the mode jumpers of relays 1 and 2 (1 = manual), 3 and 4 their coils. \
-         An output reads back\nwhat was commanded. A word is raw, 0-4095, or in engineering units, as SCALE says: \
-         0-10 V in mV (0-10000),\n4-20 mA in uA (0-20000 in, 4000-20000 out), NTC in 0.1 degC (two's complement). \
-         Other values are exception 03.\n",
+         An output reads back\nwhat was commanded. RANGE and SCALE of a point say what its word means. Values below 0 are \
+         in two's complement. A write of\nanother value to an output is exception 03.\n\n",
     )?;
+    write_readings(out)?;
+    out.write_str("\n")?;
     writeln!(
         out,
         "The pulse counter of a point is at {:#06X} + 2 * address.",
@@ -208,13 +253,50 @@ fn write_points(out: &mut impl Write) -> Result {
     )
 }
 
+/// Writes what the words of analog points mean.
+fn write_readings(out: &mut impl Write) -> Result {
+    out.write_str(
+        "| RANGE | SCALE | unit | analog input | analog output |\n|---|---|---|---|---|\n",
+    )?;
+    for input in points::readings(Kind::WordInput) {
+        let name = |names: &[(u16, &'static str)], code: u16| {
+            let named = names.iter().find(|named| named.0 == code);
+            named.map_or("", |named| named.1)
+        };
+        let (range, scale) = (input.signal.code(), input.scale.code());
+        write!(
+            out,
+            "| {range} = {} | {scale} = {} | {} | {} to {} | ",
+            name(codes::SIGNAL_NAMES, range),
+            name(codes::SCALE_NAMES, scale),
+            input.unit,
+            input.min,
+            input.max
+        )?;
+        let mut outputs = points::readings(Kind::WordOutput).iter();
+        match outputs.find(|output| (output.signal, output.scale) == (input.signal, input.scale)) {
+            Some(output) => writeln!(out, "{} to {} |", output.min, output.max)?,
+            None => out.write_str("- |\n")?,
+        }
+    }
+    Ok(())
+}
+
 fn write_store(out: &mut impl Write) -> Result {
-    let [first, second] = record::PAGE_ADDRESSES;
+    out.write_str("\nA save goes to two flash pages: ")?;
+    for (i, board) in Board::ALL.iter().enumerate() {
+        let [first, second] = board.store.addresses();
+        let separator = if i == 0 { "" } else { "; " };
+        write!(
+            out,
+            "{separator}on the {board} those at {first:#010X} and {second:#010X}"
+        )?;
+    }
     writeln!(
         out,
-        "\nA save goes to the flash pages at {first:#010X} and {second:#010X}, as a record of the settings that \
-         differ from their defaults,\nwith a CRC-32. A setting that this firmware does not know is passed over, and one \
-         whose stored value it does not\nallow has its default: status bit 1 then says so, as when nothing good was found."
+        ".\nIt is a record of the settings that differ from their defaults, with a CRC-32. A setting that this \
+         firmware does not know\nis passed over, and one whose stored value it does not allow has its default: status \
+         bit 1 then says so, as when nothing\ngood was found."
     )
 }
 

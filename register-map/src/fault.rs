@@ -4,30 +4,34 @@
 use crate::block::block;
 use crate::codes::FaultKind;
 use crate::rule::Rule;
+use crate::value::Value;
 
 const READ: Rule = Rule::read_only();
+
+/// The bits of MISSING_TASKS with their names.
+const TASKS: &[(u8, &str)] = &[(0, "line"), (1, "serve"), (2, "scan"), (3, "background")];
 
 block! {
     "Fault record", 0x0260..=0x026F;
 
-    /// What the last fault since power-on was
-    KIND "fault kind": 0x0260 x 1, "", READ, FaultKind::NAMES;
+    /// Last fault since power-on
+    KIND "fault kind": 0x0260 x 1, Value::Codes(FaultKind::NAMES), READ;
     /// Faults since power-on
-    COUNT "faults": 0x0261 x 1, "", READ, &[];
-    /// Program counter at the fault, high word first; 0 = not known
-    PROGRAM_COUNTER "program counter": 0x0262 x 2, "", READ, &[];
-    /// Link register at the fault, high word first; 0 = not known
-    LINK_REGISTER "link register": 0x0264 x 2, "", READ, &[];
-    /// Configurable fault status register of the core (CFSR), high word first
-    STATUS "CFSR": 0x0266 x 2, "", READ, &[];
-    /// Address whose access failed (BFAR or MMFAR), high word first; 0 = not known
-    FAULT_ADDRESS "fault address": 0x0268 x 2, "", READ, &[];
-    /// Uptime at the fault, high word first
-    UPTIME "uptime at the fault": 0x026A x 2, "s", READ, &[];
-    /// The tasks that had not begun, or not ended, when the watchdog bit: those that hung or were kept from running. 0 = only idle. Bit 0 line, 1 serve, 2 scan, 3 background
-    MISSING_TASKS "missing tasks": 0x026C x 1, "", READ, &[];
-    /// How often since the start the line was set up again, because its UART or timer had lost their settings or a reply did not end; 65535 = that often or more
-    LINE_REPAIRS "line repairs": 0x026D x 1, "", READ, &[];
-    /// Reserved, reads 0
-    RESERVED "reserved": 0x026E x 2, "", READ, &[];
+    COUNT "faults": 0x0261 x 1, Value::NUMBER, READ;
+    /// At the fault; 0 = not known
+    PROGRAM_COUNTER "program counter": 0x0262 x 2, Value::Opaque, READ;
+    /// At the fault; 0 = not known
+    LINK_REGISTER "link register": 0x0264 x 2, Value::Opaque, READ;
+    /// Configurable fault status register
+    STATUS "CFSR": 0x0266 x 2, Value::Opaque, READ;
+    /// Address whose access failed; 0 = not known
+    FAULT_ADDRESS "fault address": 0x0268 x 2, Value::Opaque, READ;
+    /// At the fault
+    UPTIME "uptime at the fault": 0x026A x 2, Value::long("s"), READ;
+    /// Tasks that hung before a watchdog reset; 0 = only idle
+    MISSING_TASKS "missing tasks": 0x026C x 1, Value::Bits(TASKS), READ;
+    /// Restarts of the line after lost settings or endless replies
+    LINE_REPAIRS "line repairs": 0x026D x 1, Value::NUMBER, READ;
+    /// Reads 0
+    RESERVED "reserved": 0x026E x 2, Value::NUMBER, READ;
 }

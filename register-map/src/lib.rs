@@ -5,7 +5,7 @@
 //!
 //! Each block of registers is a module with a constant for every address, `RULES`, the numbers that
 //! hold for them ([`Rule`]), and `BLOCK`, the same with the words for people ([`Block`], [`Text`]). The
-//! firmware uses the numbers alone, so the words are not in its image. [`codes`] has an enum for each
+//! firmware uses the numbers alone: its image has the words in the self-description only. [`codes`] has an enum for each
 //! register that holds codes, [`record`] the form in which a configuration is stored in flash, and
 //! [`docs`] writes `docs/register-map.md`.
 //!
@@ -18,13 +18,14 @@
 //!
 //! let mut registers = BLOCKS.iter().flat_map(|block| block.registers());
 //! let (rule, text) = registers.find(|(_, text)| text.name == "BETA").unwrap();
-//! assert_eq!((rule.first, rule.default, text.unit), (0x0160, 3950, "K"));
+//! assert_eq!((rule.first, rule.default, text.value.unit().code), (0x0160, 3950, "K"));
 //! ```
 
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod block;
+pub mod board;
 pub mod codes;
 pub mod configuration;
 pub mod counters;
@@ -35,11 +36,14 @@ pub mod points;
 pub mod record;
 mod rule;
 pub mod state;
+mod value;
 mod values;
 
-pub use block::{Block, Text};
+pub use block::{Block, Scope, Text};
+pub use board::Board;
 pub use module::{Module, UnknownModule};
 pub use rule::{Access, InForce, Narrower, Rule, Run, Runs, rule_at, runs};
+pub use value::{Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.

@@ -1,7 +1,7 @@
 //! What holds for a register, in numbers: all the firmware needs of it.
 
-use crate::points::PointKind;
 use crate::values::Values;
+use modio_drivers::Kind;
 
 /// What a master may do with a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub enum InForce {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Narrower {
     /// The kind of point.
-    pub kind: PointKind,
+    pub kind: Kind,
     /// Its values: some of the rule's.
     pub values: Values,
     /// Its default.
@@ -37,7 +37,7 @@ pub struct Narrower {
 impl Narrower {
     /// What holds for points of this kind.
     #[must_use]
-    pub const fn new(kind: PointKind, values: Values, default: u16) -> Self {
+    pub const fn new(kind: Kind, values: Values, default: u16) -> Self {
         Self {
             kind,
             values,
@@ -138,7 +138,7 @@ impl Rule {
     /// Which values it takes for a point of this kind.
     #[inline]
     #[must_use]
-    pub fn values_for(&self, kind: PointKind) -> Values {
+    pub fn values_for(&self, kind: Kind) -> Values {
         match self.narrower {
             Some(narrower) if narrower.kind == kind => narrower.values,
             _ => self.values,
@@ -148,7 +148,7 @@ impl Rule {
     /// The default for a point of this kind.
     #[inline]
     #[must_use]
-    pub fn default_for(&self, kind: PointKind) -> u16 {
+    pub fn default_for(&self, kind: Kind) -> u16 {
         match self.narrower {
             Some(narrower) if narrower.kind == kind => narrower.default,
             _ => self.default,

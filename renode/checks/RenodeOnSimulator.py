@@ -22,6 +22,21 @@ from terminal_tester import TerminalTester
 
 ROBOT_LIBRARY_SCOPE = "GLOBAL"
 
+# The lines of the slots by port: the part's port and pin.
+LINES = {
+    "modio-02": {5: ["A0", "A1", "A2", "A3"]},
+    "modio-08": {
+        1: ["A0", "A1", "A2", "A3"],
+        2: ["A4", "A5", "A6", "A7"],
+        3: ["C0", "C1", "C2", "C3"],
+        4: ["B0", "B1", "C4", "C5"],
+    },
+}
+# The converter's first channel of each of the part's ports.
+ANALOG = {"A": 0, "B": 8, "C": 10}
+# The output data registers.
+OUTPUTS = {0x4001080C: "A", 0x40010C0C: "B", 0x4001100C: "C"}
+
 # Where the log is read from: a control block of RTT made up of the simulator's output.
 _BLOCK = 0x20002000
 _BUFFER = 0x20003000
@@ -30,8 +45,14 @@ _BUFFER = 0x20003000
 class _Board:
     """The simulator with a board in it."""
 
-    def __init__(self, program, elf, dip, module):
-        command = [program, "--elf", elf, "--dip", str(dip), "--module", module]
+    def __init__(self, program, board, elf, dip, modules):
+        command = [program, "--board", board, "--elf", elf, "--dip", str(dip)]
+        if "=" in modules:
+            command += ["--module", "none"]
+            command += [option for slot in modules.split(",") for option in ("--slot", slot)]
+        else:
+            command += ["--module", modules]
+        self.lines = LINES[board]
         command += ["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.log = []
@@ -81,6 +102,13 @@ class _Board:
 
     def state(self):
         return self.get("state")
+
+    def channels(self):
+        """The channels of every slot by its port."""
+        state = self.state()
+        if "slots" in state:
+            return {slot["port"]: slot["channels"] for slot in state["slots"]}
+        return {port: state["channels"] for port in self.lines}
 
     def post(self, path, **what):
         request = urllib.request.Request(self.api + path, json.dumps(what).encode(), method="POST")
@@ -172,13 +200,14 @@ class RenodeOnSimulator:
         number = r"(0x[0-9A-Fa-f]+|\d+)"
         return [
             (r'\$(\w+)="?([^"]*)"?', self._set),
-            (r"include @.*/board\.resc", self._start),
+            (r"include @.*/(modio-\d\d)-board\.resc", self._start),
             (r"emulation SetGlobalAdvanceImmediately true", lambda: ""),
             (r'emulation RunFor "([\d.]+)"', self._run_for),
             (r'sysbus GetSymbolAddress "_SEGGER_RTT"', lambda: f"{_BLOCK:#010X}\n"),
             (rf"sysbus ReadDoubleWord {number}", lambda at: f"{self._read(int(at, 0)):#010X}\n"),
             (rf"sysbus WriteDoubleWord {number} {number}", lambda at, to: self._write(int(at, 0), int(to, 0))),
-            (r"sysbus\.gpioPortA OnGPIO ([0-3]) (true|false)", self._drive),
+            (r"sysbus\.gpioPort(A) OnGPIO ([0-3]) (true|false)", self._drive),
+            (r"modio_input (\d) ([1-4]) (true|false)", self._drive_channel),
             (r"modio_inputs (\d+)", self._inputs),
             (r"sysbus\.sram ZeroAll", lambda: ""),
             (r"machine Reset", self._reset),
@@ -188,10 +217,10 @@ class RenodeOnSimulator:
         self._variables[name] = value
         return ""
 
-    def _start(self):
+    def _start(self, board):
         program = BuiltIn().get_variable_value("${SIMULATOR}")
         elf = BuiltIn().get_variable_value("${ELF}")
-        self._board = _Board(program, elf, self._variables["dip"], self._variables["module"])
+        self._board = _Board(program, board, elf, self._variables["dip"], self._variables["module"])
         return ""
 
     def _run_for(self, seconds):
@@ -204,12 +233,21 @@ class RenodeOnSimulator:
         self._board.run_for(float(seconds))
         return ""
 
-    def _drive(self, pin, level):
-        high = level == "true"
-        channel = self._board.state()["channels"][int(pin)]
-        what = {"di": "energised", "relay": "manual"}[channel["kind"]]
-        self._board.post(f"channels/{int(pin) + 1}", **{what: not high})
+    def _drive(self, port, pin, level):
+        [(slot, channel)] = [place for place, line in self._lines() if line == port + pin]
+        return self._drive_channel(slot, channel, level)
+
+    def _drive_channel(self, slot, channel, level):
+        kind = self._board.channels()[int(slot)][int(channel) - 1]["kind"]
+        what = {"di": "energised", "relay": "manual"}[kind]
+        self._board.post(f"slots/{slot}/channels/{channel}", **{what: level == "false"})
         return ""
+
+    def _lines(self):
+        """Every line: the slot's port and the channel, and the pin."""
+        for slot, pins in self._board.lines.items():
+            for channel, pin in enumerate(pins, start=1):
+                yield (slot, channel), pin
 
     def _inputs(self, dip):
         self._board.post("dip", value=int(dip))
@@ -229,21 +267,27 @@ class RenodeOnSimulator:
             at = address - _BUFFER
             text = "".join(self._board.log).encode()[at : at + 4]
             return int.from_bytes(text.ljust(4, b"\0"), "little")
-        state = self._board.state()
-        channels = state["channels"]
-        if address == 0x4001080C:
-            on = [c.get("on", False) for c in channels]
+        if address in OUTPUTS:
+            return self._outputs(OUTPUTS[address])
+        slot, output = divmod(address - 0x40005500, 0x20)
+        return self._board.channels()[min(self._board.lines) + slot][output // 4]["code"]
+
+    def _outputs(self, port):
+        leds = self._board.state()["leds"]
+        levels = {"B8": leds["activity"], "B9": leds["fault"]}
+        for slot, channels in self._board.channels().items():
+            on = [channel.get("on", False) for channel in channels]
             # The coils of relays 1 and 2 are on lines 3 and 4.
-            coils = [c.get("energised", False) and c["kind"] == "relay" for c in channels[:2]]
-            return sum(bit << n for n, bit in enumerate(on)) | sum(bit << n + 2 for n, bit in enumerate(coils))
-        if address == 0x40010C0C:
-            return state["leds"]["activity"] << 8 | state["leds"]["fault"] << 9
-        return channels[(address - 0x40005500) // 4]["code"]
+            coils = [channel.get("energised", False) and channel["kind"] == "relay" for channel in channels[:2]]
+            for pin, level in zip(self._board.lines[slot], [on[0], on[1], on[2] or coils[0], on[3] or coils[1]]):
+                levels[pin] = level
+        return sum(level << int(pin[1:]) for pin, level in levels.items() if pin[0] == port)
 
     def _write(self, address, value):
-        if 0x40012500 <= address < 0x40012510:
-            channel = (address - 0x40012500) // 4 + 1
-            self._board.post(f"channels/{channel}", millivolts=round(value * 3300 / 4095))
+        if 0x40012500 <= address < 0x40012548:
+            number = (address - 0x40012500) // 4
+            [(slot, channel)] = [place for place, pin in self._lines() if ANALOG[pin[0]] + int(pin[1:]) == number]
+            self._board.post(f"slots/{slot}/channels/{channel}", millivolts=round(value * 3300 / 4095))
         else:
             assert address == 0x400213F0, "the flags of the next reset; power is cut here anyway"
         return ""

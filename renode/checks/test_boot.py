@@ -3,7 +3,7 @@ Cortex-M3, with renode/peripherals where board.resc puts them, ports that behave
 (STM32F1GPIOPort.cs), and registers that just keep what is written for the timers and the UART.
 
 There are no interrupts, so this ends where the tasks begin: clocks, switch, flash store, module and
-watchdog are set up by then. To be called with the image's path.
+watchdog are set up by then. To be called with the board's name and the image's path.
 """
 
 import struct
@@ -16,6 +16,8 @@ from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
 from unicorn.arm_const import UC_ARM_REG_PC, UC_ARM_REG_SP, UC_CPU_ARM_CORTEX_M3
 
 FLASH, RAM = 0x08000000, 0x20000000
+# Bytes of flash, of a page, of RAM; the first slot's port.
+PARTS = {"modio-02": (0x20000, 0x400, 0x5000, 5), "modio-08": (0x40000, 0x800, 0xC000, 1)}
 WFI = b"\x30\xbf"
 SECONDS = 60
 
@@ -72,13 +74,14 @@ class Tag:
 class Board:
     """The part, with the image in its flash."""
 
-    def __init__(self, elf, module, dip):
+    def __init__(self, board, elf, module, dip):
+        self.flash_size, _, self.ram_size, _ = PARTS[board]
         self.core = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         self.core.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M3)
-        self.core.mem_map(FLASH, 0x20000)
-        self.core.mem_map(RAM, 0x5000)
+        self.core.mem_map(FLASH, self.flash_size)
+        self.core.mem_map(RAM, self.ram_size)
         self.core.mem_map(0x1FFFF000, 0x1000)
-        self.core.mem_write(FLASH, b"\xff" * 0x20000)
+        self.core.mem_write(FLASH, b"\xff" * self.flash_size)
         self._load(elf)
         self.erased, self.watchdog, self.widths, self.unknown = [], [], {}, set()
         ports = {name: Port() for name in "ABC"}
@@ -95,7 +98,10 @@ class Board:
         self._map(0x40000000, 0x24000, self._block)
         self._map(0x42000000, 0x2000000, self._bit)
         self._map(0xE0000000, 0x100000, lambda offset, size: (self.system, offset))
+        for address, value in writes(board):
+            self.blocks[address & ~0x3FF].write(address & 0x3FF, value)
         run = commands(machine, [])
+        run.mc_modio_board(board)
         run.mc_modio_preset(module)
         run.mc_modio_inputs(dip)
 
@@ -160,14 +166,14 @@ class Board:
                 reached.append(address)
                 core.emu_stop()
 
-        self.core.hook_add(UC_HOOK_CODE, look, begin=FLASH, end=FLASH + 0x20000)
+        self.core.hook_add(UC_HOOK_CODE, look, begin=FLASH, end=FLASH + self.flash_size)
         stack, entry = struct.unpack("<II", self.core.mem_read(FLASH, 8))
         self.core.reg_write(UC_ARM_REG_SP, stack)
         self.core.emu_start(entry, 0, timeout=SECONDS * 1_000_000)
         return bool(reached)
 
     def log(self):
-        ram = bytes(self.core.mem_read(RAM, 0x5000))
+        ram = bytes(self.core.mem_read(RAM, self.ram_size))
         block = ram.find(b"SEGGER RTT")
         buffer, _, written = struct.unpack_from("<3I", ram, block + 28)
         return ram[buffer - RAM : buffer - RAM + written].decode()
@@ -180,8 +186,16 @@ def models():
             yield file, address
 
 
+def writes(board):
+    """What the board's script writes into the models."""
+    for line in (RENODE / f"{board}-board.resc").read_text(encoding="utf-8").splitlines():
+        if line.startswith("sysbus WriteDoubleWord "):
+            address, value = line.split()[2:]
+            yield int(address, 0), int(value, 0)
+
+
 class Boot(unittest.TestCase):
-    ELF = None
+    BOARD = ELF = None
     _boards = {}
 
     def board(self, module="4di", dip=1, crystal=1):
@@ -191,8 +205,11 @@ class Boot(unittest.TestCase):
             self._boards[how] = self._started(*how)
         return self._boards[how]
 
+    def port(self):
+        return PARTS[self.BOARD][3]
+
     def _started(self, module, dip, crystal):
-        board = Board(self.ELF, module, dip)
+        board = Board(self.BOARD, self.ELF, module, dip)
         board.blocks[0x40021000].write(0x3F4, crystal)
         where = lambda: hex(board.core.reg_read(UC_ARM_REG_PC))
         self.assertTrue(board.run(), f"it hangs at {where()}")
@@ -207,7 +224,7 @@ class Boot(unittest.TestCase):
         self.assertEqual(rcc.read(0x04) >> 2 & 3, 2, "SWS: the PLL")
         self.assertTrue(rcc.read(0x00) & 1 << 17, "HSERDY")
         self.assertEqual(rcc.read(0x24) >> 26, 0, "the reset flags were taken")
-        for line in ("reset: power-on", "reset: pin", "unit address 1", "slot 5: 4di"):
+        for line in ("reset: power-on", "reset: pin", "unit address 1", f"slot {self.port()}: 4di"):
             self.assertIn(line, board.log())
         self.assertNotIn("damaged", board.log())
 
@@ -220,11 +237,21 @@ class Boot(unittest.TestCase):
 
     def test_every_module_is_set_up(self):
         for module in ("none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"):
-            self.assertIn(f"slot 5: {module}\n", self.board(module).log())
+            self.assertIn(f"slot {self.port()}: {module}\n", self.board(module).log())
+
+    def test_every_slot_is_set_up(self):
+        if self.BOARD != "modio-08":
+            self.skipTest("the board has one slot")
+        log = self.board("1=4do,2=4ao,3=4ai,4=4di").log()
+        for line in ("slot 1: 4do", "slot 2: 4ao", "slot 3: 4ai", "slot 4: 4di"):
+            self.assertIn(f"{line}\n", log)
 
     def test_the_store_makes_its_spare_page_ready(self):
         # The second page has no mark yet; the first holds the preset.
-        self.assertEqual(self.board().erased, [(0xFC00, 0x400)])
+        size, page, _, _ = PARTS[self.BOARD]
+        # The modio-02 stores where the smaller part of 64 KiB has its last pages.
+        end = 0x10000 if self.BOARD == "modio-02" else size
+        self.assertEqual(self.board().erased, [(end - page, page)])
 
     def test_the_watchdog_is_started_by_half_words(self):
         board = self.board()
@@ -242,5 +269,5 @@ class Boot(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    Boot.ELF = Path(sys.argv.pop(1))
+    Boot.BOARD, Boot.ELF = sys.argv.pop(1), Path(sys.argv.pop(1))
     unittest.main()

@@ -7,8 +7,20 @@ import unittest
 from renode_fake import Machine, Memory, commands
 
 
+SWITCH = {
+    "modio-02": ["PA4", "PA5", "PA6", "PA7", "PB12", "PB13", "PB14", "PB15"],
+    "modio-08": ["PC6", "PC7", "PC8", "PC9", "PB12", "PB13", "PB14", "PB15"],
+}
+PULLED_UP = {
+    "modio-02": ["PA0", "PA1", "PA2", "PA3", "PA10", "PB5"],
+    "modio-08": ["PA0", "PA1", "PA2", "PA3", "PA4", "PA5", "PA6", "PA7", "PC0", "PC1", "PC2", "PC3", "PB0", "PB1", "PC4",
+                 "PC5", "PA10", "PC12"],
+}
+
+
 class Commands(unittest.TestCase):
-    def test_the_switch_and_what_is_pulled_up(self):
+    def levels(self, act):
+        """The levels that `act`, given the commands, drives onto pins."""
         levels = {}
 
         class Port:
@@ -18,14 +30,39 @@ class Commands(unittest.TestCase):
             def OnGPIO(self, pin, high):
                 levels[f"P{self.name}{pin}"] = high
 
-        machine = Machine({f"sysbus.gpioPort{name}": Port(name) for name in "AB"})
-        commands(machine, []).mc_modio_inputs(0b1001_0110)
-        switch = [levels[pin] for pin in ("PA4", "PA5", "PA6", "PA7", "PB12", "PB13", "PB14", "PB15")]
-        # ON is low.
-        self.assertEqual(switch, [True, False, False, True, False, True, True, False])
-        for pin in ("PA0", "PA1", "PA2", "PA3", "PA10", "PB5"):
-            self.assertIs(levels[pin], True, pin)
-        self.assertEqual(len(levels), 14)
+        act(commands(Machine({f"sysbus.gpioPort{name}": Port(name) for name in "ABC"}), []))
+        return levels
+
+    def test_the_switch_and_what_is_pulled_up(self):
+        for board in SWITCH:
+
+            def act(run):
+                run.mc_modio_board(board)
+                run.mc_modio_inputs(0b1001_0110)
+
+            levels = self.levels(act)
+            # ON is low.
+            on = [True, False, False, True, False, True, True, False]
+            self.assertEqual([levels[pin] for pin in SWITCH[board]], on)
+            for pin in PULLED_UP[board]:
+                self.assertIs(levels[pin], True, pin)
+            self.assertEqual(len(levels), 8 + len(PULLED_UP[board]))
+
+    def test_lines_are_driven_by_port_and_channel(self):
+        def act(run):
+            run.mc_modio_board("modio-08")
+            run.mc_modio_input(4, 3, "false")
+            run.mc_modio_input(2, 1, True)
+            for port, channel in ((5, 1), (1, 0), (1, 5)):
+                with self.assertRaisesRegex(ValueError, "no channel"):
+                    run.mc_modio_input(port, channel, True)
+
+        self.assertEqual(self.levels(act), {"PC4": False, "PA4": True})
+        self.assertEqual(self.levels(lambda run: run.mc_modio_input(5, 2, False)), {"PA1": False})
+
+    def test_board_that_is_not_known_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "modio-02, modio-08"):
+            commands(Machine(), []).mc_modio_board("modio-04")
 
     class Bus(dict):
         """Memory by address, 0xFF where nothing was written."""
@@ -57,6 +94,8 @@ class Commands(unittest.TestCase):
         self.assertEqual(len(bus), 1)
         with self.assertRaisesRegex(ValueError, "4di, 4do"):
             run.mc_modio_preset("5di")
+        with self.assertRaisesRegex(ValueError, "no slot at port 1"):
+            run.mc_modio_preset("1=4di")
 
     def test_the_log_is_shown(self):
         bus, printed = self.Bus(), []
@@ -87,20 +126,23 @@ class Commands(unittest.TestCase):
 
 class Presets(unittest.TestCase):
     def test_they_are_those_of_the_register_map(self):
-        """PRESETS is what the crate register-map makes of every module, in JSON."""
+        """PRESETS is, in JSON, what the crate register-map makes of modules: board, modules, address, bytes."""
         if PRESETS is None:
             self.skipTest("`cargo xtask test` gives them")
-        for name, wanted in PRESETS.items():
+        self.assertGreater(len(PRESETS), 8)
+        for board, modules, address, wanted in PRESETS:
             bus = Commands.Bus()
-            commands(Machine({"sysbus": bus}), []).mc_modio_preset(name)
-            stored = bytes(bus.ReadByte(0x0800F800 + n) for n in range(len(wanted) // 2))
-            self.assertEqual(stored.hex(), wanted, name)
-            self.assertLessEqual(len(bus), len(stored))
+            run = commands(Machine({"sysbus": bus}), [])
+            run.mc_modio_board(board)
+            run.mc_modio_preset(modules)
+            stored = bytes(bus.ReadByte(address + n) for n in range(len(wanted) // 2))
+            self.assertEqual(stored.hex(), wanted, (board, modules))
+            self.assertEqual(len(bus), len(stored))
 
 
 PRESETS = None
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1 and sys.argv[1].startswith("{"):
+    if len(sys.argv) > 1 and sys.argv[1].startswith("["):
         PRESETS = json.loads(sys.argv.pop(1))
     unittest.main()

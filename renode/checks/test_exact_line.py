@@ -108,7 +108,7 @@ class Requests(Served):
         reply = self.start().ask("hello 1")
         self.assertEqual(
             reply,
-            "ok 500000.000 version=1 line=9600,8N2 abilities=line,power,reset name=modio-02 in Renode",
+            "ok 500000.000 version=1 line=9600,8N2 abilities=line,power,reset name=modio in Renode",
         )
 
     def test_hello_of_a_newer_client_reports_version_1(self):

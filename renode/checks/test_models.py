@@ -158,6 +158,23 @@ class Flash(unittest.TestCase):
         self.assertEqual(self.erased(), [])
         self.assertEqual(self.flash.read(self.SR), 0)
 
+    def test_flash_of_256_kib_has_pages_of_2_kib(self):
+        self.memory = Memory(0x40000)
+        self.memory.data[:] = bytes(0x40000)
+        self.flash = Peripheral("flash.py", Machine({"sysbus.flash": self.memory}))
+        self.flash.write(0x3F4, 256)
+        self.flash.reset()
+        self.unlock()
+        self.erase(0x0803F800)
+        self.assertEqual([at for at, byte in enumerate(self.memory.data) if byte], list(range(0x3F800, 0x40000)))
+        self.erase(0x0803F7FE)
+        self.assertEqual(self.memory.data.count(0xFF), 4096)
+        self.erase(0x08040000)
+        self.assertEqual(len(self.flash.warnings), 1)
+        self.flash.write(self.CR, self.MER)
+        self.flash.modify(self.CR, self.STRT)
+        self.assertEqual(self.memory.data.count(0xFF), 0x40000)
+
     def test_a_mass_erase_takes_all(self):
         self.unlock()
         self.flash.write(self.CR, self.MER)
@@ -242,8 +259,8 @@ class Dac(unittest.TestCase):
         self.assertFalse(self.bus.read(self.CR1) & self.STOP, "made at once")
         self.assertFalse(self.bus.read(self.SR2) & self.BUSY)
 
-    def transfer(self, data):
-        flags = self.start(0x60)
+    def transfer(self, data, address=0x60):
+        flags = self.start(address)
         self.assertTrue(flags & self.ADDR)
         self.assertFalse(flags & (self.AF | self.SB))
         self.assertTrue(self.bus.read(self.SR2) & self.BUSY)
@@ -254,8 +271,8 @@ class Dac(unittest.TestCase):
         self.assertTrue(self.bus.read(self.SR1) & self.BTF)
         self.stop()
 
-    def outputs(self):
-        return [self.bus.read(0x100 + 4 * n) for n in range(4)]
+    def outputs(self, dac=0):
+        return [self.bus.read(0x100 + 0x20 * dac + 4 * n) for n in range(4)]
 
     @staticmethod
     def multi_write(codes, hold=False):
@@ -270,6 +287,20 @@ class Dac(unittest.TestCase):
         self.transfer(self.multi_write([(2, 0x456)]))
         self.assertEqual(self.outputs(), [0xABC, 0, 0x456, 0x123])
         self.assertEqual(self.bus.read(0x114), 2)
+
+    def test_four_dacs_have_their_own_addresses_and_outputs(self):
+        for dac in (1, 2, 3):
+            self.assertTrue(self.start(0x60 + dac) & self.AF, "not plugged yet")
+            self.bus.modify(self.SR1, 0, self.AF)
+            self.stop()
+            self.bus.write(0x110 + 0x20 * dac, 1)
+        for dac in range(4):
+            self.transfer(self.multi_write((n, 100 * dac + n) for n in range(4)), 0x60 + dac)
+        self.bus.reset()
+        for dac in range(4):
+            self.assertEqual(self.outputs(dac), [100 * dac + n for n in range(4)])
+        self.bus.write(self.CR1, self.PE)
+        self.assertTrue(self.start(0x64) & self.AF)
 
     def test_with_udac_set_outputs_wait(self):
         self.transfer(self.multi_write([(0, 0xABC)], hold=True))

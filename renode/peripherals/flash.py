@@ -4,6 +4,8 @@
 #
 # Beside the part's registers, for scripts and tests:
 #   0x3F0  pages erased since power-on, mass erases among them
+#   0x3F4  KiB of flash, 128 from the start; with more, a page has 2 KiB and not 1 (PM0075 2.1)
+# Both stay across resets.
 #
 # Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
 # emulation, and can save numbers and dictionaries only.
@@ -13,6 +15,7 @@ if request.IsInit:
         erased = erased
     except NameError:
         erased = 0
+        kib = 128
     acr = 0x30
     cr = 0x80
     sr = 0
@@ -39,6 +42,8 @@ elif request.IsRead:
         request.Value = 0xFFFFFFFF
     elif offset == 0x3F0:
         request.Value = erased
+    elif offset == 0x3F4:
+        request.Value = kib
     else:
         request.Value = 0
 elif request.IsWrite:
@@ -61,18 +66,22 @@ elif request.IsWrite:
         sr &= ~(value & 0x34)
     elif offset == 0x14:
         address = value
+    elif offset == 0x3F4:
+        kib = value
     elif offset == 0x10 and cr & 0x80:
         self.WarningLog("FLASH_CR is locked: 0x%X is not taken" % value)
     elif offset == 0x10:
         # PG, PER, MER, OPTPG, OPTER, OPTWRE and the interrupt enables are kept.
         cr = value & 0x1637
         if value & 0x40 and value & 0x06:
-            page = (address - 0x08000000) & ~0x3FF
             count = 0x400
+            if kib > 128:
+                count = 0x800
+            page = (address - 0x08000000) & ~(count - 1)
             if value & 0x04:
                 page = 0
-                count = 0x20000
-            if 0 <= page < 0x20000:
+                count = kib * 1024
+            if 0 <= page < kib * 1024:
                 try:
                     memory = self.GetMachine()["sysbus.flash"]
                 except AttributeError:

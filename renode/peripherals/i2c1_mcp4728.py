@@ -1,12 +1,13 @@
-# I2C1 as a master (RM0008 26.6), with the DAC of the analog-output modules on it: an MCP4728 at
-# address 0x60 (Microchip DS22187E). Every byte takes no time. Its outputs follow Multi-Write and Fast
-# Write; writes to the EEPROM are not modelled, and a read is not acknowledged.
+# I2C1 as a master (RM0008 26.6), with the DACs of the analog-output modules on it: an MCP4728 (Microchip
+# DS22187E) at each of the addresses 0x60 to 0x63. Every byte takes no time. Its outputs follow Multi-Write
+# and Fast Write; writes to the EEPROM are not modelled, and a read is not acknowledged.
 #
-# Beside the part's registers, for scripts and tests:
-#   0x100 + 4 n  the code at output n, 0 = A to 3 = D
-#   0x110        whether the module is plugged: 0 and nobody acknowledges; 1 from the start
-#   0x114        transfers to the DAC that a stop condition or a repeated start has ended
-# All three stay across resets, as the DAC does.
+# Beside the part's registers, for scripts and tests, with d = 0 to 3 for the DAC at address 0x60 + d:
+#   0x100 + 0x20 d + 4 n  the code at output n, 0 = A to 3 = D
+#   0x110 + 0x20 d        whether that module is plugged: with 0 the address is not acknowledged. From the
+#                         start it is 1 for the first DAC and 0 for the others
+#   0x114                 transfers to any DAC that a stop condition or a repeated start has ended
+# All of them stay across resets, as the DACs do.
 #
 # Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
 # emulation, and can save numbers and dictionaries only.
@@ -15,8 +16,9 @@ if request.IsInit:
     try:
         outputs = outputs
     except NameError:
-        outputs = {0: 0, 1: 0, 2: 0, 3: 0}
-        plugged = 1
+        # By the offset of the register.
+        outputs = {}
+        plugged = {0: 1}
         transfers = 0
     registers = {}
     cr1 = 0
@@ -28,6 +30,8 @@ if request.IsInit:
     count = 0
     command = 0
     first = 0
+    # The DAC that is written to.
+    dac = 0
 elif request.IsRead:
     offset = int(request.Offset)
     if offset == 0x00:
@@ -40,12 +44,12 @@ elif request.IsRead:
         request.Value = sr2
         # ADDR goes with a read of SR2 after one of SR1.
         sr1 &= ~0x02
-    elif 0x100 <= offset <= 0x10C:
-        request.Value = outputs[(offset - 0x100) // 4]
-    elif offset == 0x110:
-        request.Value = plugged
     elif offset == 0x114:
         request.Value = transfers
+    elif 0x100 <= offset < 0x180 and offset & 0x10:
+        request.Value = plugged.get((offset - 0x100) // 0x20, 0)
+    elif 0x100 <= offset < 0x180:
+        request.Value = outputs.get(offset, 0)
     else:
         request.Value = registers.get(offset, 0)
 elif request.IsWrite:
@@ -73,7 +77,8 @@ elif request.IsWrite:
                 state = 1
     elif offset == 0x10 and state == 1:
         sr1 &= ~0x01
-        if value & 0xFF == 0xC0 and plugged:
+        dac = value >> 1 & 3
+        if value & 0xF9 == 0xC0 and plugged.get(dac, 0):
             # ADDR and TXE; TRA.
             sr1 |= 0x82
             sr2 |= 0x04
@@ -91,7 +96,7 @@ elif request.IsWrite:
         if command & 0xC0 == 0x00 and count:
             # Fast Write: two bytes a channel, from A on.
             if count & 1:
-                outputs[count // 2 & 3] = (first & 0x0F) << 8 | value
+                outputs[0x100 + 0x20 * dac + 4 * (count // 2 & 3)] = (first & 0x0F) << 8 | value
             first = value
         elif count % 3 == 0:
             # The command byte of Multi-Write, which comes before every channel; of others the only.
@@ -101,15 +106,15 @@ elif request.IsWrite:
         elif command & 0xF8 == 0x40:
             # UDAC = 0: the output follows at the last byte.
             if count % 3 == 2 and not command & 0x01:
-                outputs[command >> 1 & 3] = (first & 0x0F) << 8 | value
+                outputs[0x100 + 0x20 * dac + 4 * (command >> 1 & 3)] = (first & 0x0F) << 8 | value
             first = value
         count += 1
     elif offset == 0x14:
         # rc_w0: a 0 takes an error back.
         sr1 &= value | ~0xDF00
-    elif 0x100 <= offset <= 0x10C:
-        outputs[(offset - 0x100) // 4] = value & 0xFFF
-    elif offset == 0x110:
-        plugged = value & 1
+    elif 0x100 <= offset < 0x180 and offset & 0x10:
+        plugged[(offset - 0x100) // 0x20] = value & 1
+    elif 0x100 <= offset < 0x180:
+        outputs[offset] = value & 0xFFF
     else:
         registers[offset] = value

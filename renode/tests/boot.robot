@@ -9,13 +9,13 @@ Answers Half A Second After Power-On
     Unit Answers
 
 Tells What It Is
-    # Product code, and board 1.
+    # Product code, and board.
     Request Gives    03 0200 0002    03 04 2383 5860
-    Request Gives    03 0205 0001    03 02 0001
+    Request Gives    03 0205 0001    03 02 ${BOARD_CODE}
 
 Knows Its Own Number
     [Tags]    renode-only
-    # Six half-words of 0x1FFFF7E8, as modio-02.repl has them.
+    # Six half-words of 0x1FFFF7E8, as modio.repl has them.
     Request Gives    03 0220 0006    03 0C 1100 3322 5544 7766 1908 3B2A
 
 Tells A Power-On By The Reset Flags
@@ -33,10 +33,10 @@ Keeps Quiet While It Starts
 
 Writes A Log
     ${log}=    Read Log
-    Should Contain    ${log}    on modio-02, 9600 8N2
+    Should Contain    ${log}    on ${BOARD_NAME}, 9600 8N2
     Should Contain    ${log}    reset: power-on
     Should Contain    ${log}    unit address 1
-    Should Contain    ${log}    slot 5: 4di
+    Should Contain    ${log}    slot ${PORT}: 4di
 
 Starts Without A Crystal
     [Tags]    renode-only

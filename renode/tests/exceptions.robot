@@ -12,17 +12,17 @@ Every Refusal Has Its Code
     63                                  E3 01
     41 0000                             C1 01
     # Quantities, byte counts and values.
-    01 0010 0000                        81 03
-    01 0010 07D1                        81 03
+    01 ${P}0 0000                        81 03
+    01 ${P}0 07D1                        81 03
     03 0200 007E                        83 03
-    05 0010 1234                        85 03
-    0F 0010 0004 02 0F00                8F 03
+    05 ${P}0 1234                        85 03
+    0F ${P}0 0004 02 0F00                8F 03
     10 0104 0001 01 00                  90 03
     # A bad quantity at a bad address is the quantity's.
     03 F000 0000                        83 03
     # Addresses: nothing there, one past the end, around the end, not to be written.
-    01 0014 0001                        81 02
-    01 0010 0005                        81 02
+    01 ${BEHIND} 0001                        81 02
+    01 ${P}0 0005                        81 02
     03 FFFF 0002                        83 02
     06 0200 0000                        86 02
     # A value out of range, locked or not.
@@ -36,17 +36,17 @@ Every Refusal Has Its Code
     2B 0E 04 55                         AB 02
 
 What Is Refused Changes Nothing
-    Request Gives    0F 0010 0005 01 1F    8F 02
-    Request Gives    05 0010 1234    85 03
-    Request Gives    01 0010 0004    01 01 00
+    Request Gives    0F ${P}0 0005 01 1F    8F 02
+    Request Gives    05 ${P}0 1234    85 03
+    Request Gives    01 ${P}0 0004    01 01 00
     Pin Should Be    ${ODR_A}    0    0
 
 A Wrong CRC Gets Silence
-    ${frame}=    Frame    1    05 0010 FF00
+    ${frame}=    Frame    1    05 ${P}0 FF00
     ${frame}=    Damaged    ${frame}
     Send And Wait    ${frame}
     Nothing Has Come
-    Request Gives    01 0010 0001    01 01 00
+    Request Gives    01 ${P}0 0001    01 01 00
 
 Noise Gets Silence And The Next Request Its Answer
     FOR    ${noise}    IN    00    FF FF    01 03 02

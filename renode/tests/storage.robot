@@ -43,25 +43,25 @@ What Is Not Saved Is Gone After A Restart
 Another Module Is In Force After The Restart
     Unlock
     # 4DI
-    Request Is Echoed    06 0114 0001
-    Request Is Echoed    05 0010 0000
+    Request Is Echoed    06 ${MODULE} 0001
+    Request Is Echoed    05 ${P}0 0000
     Save
     Restart
-    Request Gives    03 0214 0001    03 02 0001
+    Request Gives    03 ${IN_FORCE} 0001    03 02 0001
     # An input cannot be written.
-    Request Gives    05 0010 0000    85 02
+    Request Gives    05 ${P}0 0000    85 02
 
 Saves Go On When A Page Is Full
-    # A record takes some 20 bytes of a page's 1024: both pages are written through.
+    # A record takes some 25 bytes of a page's 1024 or 2048.
     Unlock
-    FOR    ${n}    IN RANGE    1    101
+    FOR    ${n}    IN RANGE    1    ${{$SAVES + 1}}
         ${value}=    Evaluate    '%04X' % $n
         # LORA_ADDRESS, which changes nothing else.
         Request Is Echoed    06 0141 ${value}
         Request Is Echoed    06 0108 0001
     END
     Restart
-    Request Gives    03 0141 0001    03 02 0064
+    Request Gives    03 0141 0001    03 02 ${SAVES_WORD}
 
 Defaults Come Back
     Change The Response Delay

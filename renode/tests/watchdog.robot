@@ -6,14 +6,14 @@ Test Setup          Start Board    4do
 
 *** Test Cases ***
 Off It Never Trips
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     Run For    5
     Pin Should Be    ${ODR_A}    0    1
 
 Outputs Go To SAFE When The Line Falls Silent
     [Tags]    exact-time
     Arm
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     # The request was followed by 0.1 s of silence already.
     Run For    0.85
     Pin Should Be    ${ODR_A}    0    1
@@ -21,11 +21,11 @@ Outputs Go To SAFE When The Line Falls Silent
     Pin Should Be    ${ODR_A}    0    0
     # Tripped, changed and not saved, unlocked.
     Request Gives    03 020A 0001    03 02 0029
-    Request Gives    01 0010 0004    01 01 00
+    Request Gives    01 ${P}0 0004    01 01 00
 
 Requests And Broadcasts Keep It From Tripping
     Arm
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     FOR    ${_}    IN RANGE    4
         Run For    0.6
         Unit Answers
@@ -37,7 +37,7 @@ Requests And Broadcasts Keep It From Tripping
 Another Unit's Requests Do Not Keep It From Tripping
     [Tags]    exact-time
     Arm
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     FOR    ${_}    IN RANGE    2
         Run For    0.45
         Request Gets Silence    03 0204 0001    2
@@ -46,11 +46,11 @@ Another Unit's Requests Do Not Keep It From Tripping
 
 Outputs Stay There Until Written To And The Flag Until Cleared
     Arm
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     Run For    1.5
     Unit Answers
     Pin Should Be    ${ODR_A}    0    0
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     Pin Should Be    ${ODR_A}    0    1
     Request Gives    03 020A 0001    03 02 0029
     Request Is Echoed    06 0108 0005
@@ -59,16 +59,16 @@ Outputs Stay There Until Written To And The Flag Until Cleared
 SAFE Can Be On
     Unlock
     # SAFE of the port's first point.
-    Request Is Echoed    06 01D0 0001
+    Request Is Echoed    06 ${SAFE} 0001
     Request Is Echoed    06 0104 000A
     Run For    1.5
     Pin Should Be    ${ODR_A}    0    1
 
 SAFE Can Hold
     Unlock
-    Request Is Echoed    06 01D0 FFFF
+    Request Is Echoed    06 ${SAFE} FFFF
     Request Is Echoed    06 0104 000A
-    Request Is Echoed    05 0010 FF00
+    Request Is Echoed    05 ${P}0 FF00
     Run For    1.5
     Pin Should Be    ${ODR_A}    0    1
     Request Gives    03 020A 0001    03 02 0029

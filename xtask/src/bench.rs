@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+use register_map::Board;
 use serde_json::Value;
 
 use crate::toolchain::{Need, TARGET};
@@ -16,17 +17,23 @@ mod footprint;
 mod share;
 mod table;
 
-/// The figures of the last release, relative to the root.
-const BASELINE: &str = "tools/bench/baseline.json";
+/// The file with the figures of a board's last release.
+fn baseline(workspace: &Workspace, board: &Board) -> PathBuf {
+    let name = format!("baseline-{board}.json");
+    workspace.root().join("tools/bench").join(name)
+}
 
 /// The servers on other crates: a workspace of its own.
 pub const RIVALS: &str = "tools/bench/rivals/Cargo.toml";
 const RIVAL_NAMES: [&str; 2] = ["rmodbus", "modbus-core"];
 
-/// How to tell.
+/// What to measure and how to report it.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
+    #[command(flatten)]
+    build: build::Options,
+
     /// Print JSON instead of tables
     #[arg(long)]
     json: bool,
@@ -43,14 +50,15 @@ pub struct Options {
 /// When something does not build, the image does not serve a request, or a figure is over its budget, or worse
 /// than the baseline by more than its tolerance.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let elf = build::image(workspace, &build::Options::release())?.elf;
-    let report = measure(workspace, &elf)?;
+    let board = options.build.board;
+    let elf = build::image(workspace, board)?.elf;
+    let report = measure(workspace, &elf, board)?;
     if options.json {
         say!("{report:#}");
     } else {
         say!("{}", table::of(&report).trim_end());
     }
-    let file = workspace.root().join(BASELINE);
+    let file = baseline(workspace, board);
     if options.bless {
         return baseline::write(&file, &report);
     }
@@ -72,14 +80,14 @@ fn within_budgets(report: &Value) -> Result<()> {
 /// # Errors
 ///
 /// As [`run`].
-pub fn check(workspace: &mut Workspace, elf: &Path) -> Result<()> {
-    let report = measure(workspace, elf)?;
+pub fn check(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<()> {
+    let report = measure(workspace, elf, board)?;
     say!("{}", table::of(&report).trim_end());
     within_budgets(&report)?;
-    baseline::hold(&workspace.root().join(BASELINE), &report)
+    baseline::hold(&baseline(workspace, board), &report)
 }
 
-fn measure(workspace: &mut Workspace, elf: &Path) -> Result<Value> {
+fn measure(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<Value> {
     let rivals = rivals(workspace)?;
     let mut cargo = workspace.cargo("run");
     // The simulator's core, crate rigless, declares a newer rustc than it needs.
@@ -90,12 +98,13 @@ fn measure(workspace: &mut Workspace, elf: &Path) -> Result<Value> {
         "bench",
         "--",
     ]);
-    cargo.arg(elf).arg("--rivals").args(rivals);
+    cargo.arg(elf).args(["--board", board.name, "--rivals"]);
+    cargo.args(rivals);
     let text = command::read(&mut cargo)?;
     let mut report: Value = serde_json::from_str(&text)
         .map_err(|error| Failure::new(format!("the bench's report is broken: {error}")))?;
     share::add(&mut report, elf)?;
-    report["image"] = size::report(elf)?;
+    report["image"] = size::report(elf, board)?;
     footprint::add(&mut report, elf)?;
     Ok(report)
 }

@@ -5,6 +5,10 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use register_map::Board;
+use register_map::board::MODIO_02;
+
+use crate::board::Hardware;
 use crate::toolchain::{Need, TARGET};
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command, image};
@@ -12,31 +16,13 @@ use crate::{Failure, Result, command, image};
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
 
-/// A board the firmware runs on.
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Board {
-    /// The modio-02 carrier, or a Blue Pill with an RS-485 transceiver.
-    #[value(name = "modio-02")]
-    Modio02,
-}
-
 /// What to build.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    /// The board to build for
-    #[arg(long, value_enum, default_value_t = Board::Modio02)]
-    pub board: Board,
-}
-
-impl Options {
-    /// The image as released: for the modio-02.
-    #[must_use]
-    pub const fn release() -> Self {
-        Self {
-            board: Board::Modio02,
-        }
-    }
+    /// The board to build for: modio-02 or modio-08
+    #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
+    pub board: &'static Board,
 }
 
 /// A built image.
@@ -54,7 +40,7 @@ pub struct Image {
 ///
 /// When there is no toolchain for the target, or the image does not build.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let image = image(workspace, options)?;
+    let image = image(workspace, options.board)?;
     say!("{}", image.elf.display());
     say!("{}", image.bin.display());
     Ok(())
@@ -65,8 +51,8 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// # Errors
 ///
 /// When there is no toolchain for the target, the image does not build, it could panic, or its code in RAM needs flash.
-pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
-    linked(workspace, options, None)
+pub fn image(workspace: &mut Workspace, board: &Board) -> Result<Image> {
+    linked(workspace, board, None)
 }
 
 /// The same, with the linker's map in a file.
@@ -74,12 +60,12 @@ pub fn image(workspace: &mut Workspace, options: &Options) -> Result<Image> {
 /// # Errors
 ///
 /// As [`image()`].
-pub fn image_with_map(workspace: &mut Workspace, options: &Options, map: &Path) -> Result<Image> {
-    linked(workspace, options, Some(map))
+pub fn image_with_map(workspace: &mut Workspace, board: &Board, map: &Path) -> Result<Image> {
+    linked(workspace, board, Some(map))
 }
 
-fn linked(workspace: &mut Workspace, options: &Options, map: Option<&Path>) -> Result<Image> {
-    let Board::Modio02 = options.board;
+fn linked(workspace: &mut Workspace, board: &Board, map: Option<&Path>) -> Result<Image> {
+    let target = target(workspace.target(), board);
     // Only `cargo rustc` has options for the linker that the packages below are not built anew for.
     let subcommand = if map.is_some() { "rustc" } else { "build" };
     let mut cargo = workspace.target_cargo(Need::Build, subcommand)?;
@@ -91,21 +77,32 @@ fn linked(workspace: &mut Workspace, options: &Options, map: Option<&Path>) -> R
         "--bin",
         "modio",
     ]);
-    cargo.args(["--features", "board"]);
+    cargo.args(["--features", board.name, "--target-dir"]);
+    cargo.arg(&target);
     if let Some(map) = map {
         cargo.arg("--").arg(map_argument(map));
     }
     command::run(&mut cargo)?;
 
-    let elf = workspace.target().join(TARGET).join(PROFILE).join("modio");
+    let elf = target.join(TARGET).join(PROFILE).join("modio");
     let bin = elf.with_extension("bin");
     let bytes = image::read(&elf)?;
-    check_panics(&bytes)?;
+    let flash = image::flat(&bytes, Hardware::of(board).part.flash).map_err(Failure::new)?;
+    check_panics(&bytes, &flash)?;
     check_ram_code(&bytes)?;
-    let bytes = image::flat(&bytes).map_err(Failure::new)?;
-    fs::write(&bin, bytes)
+    fs::write(&bin, flash)
         .map_err(|error| Failure::new(format!("cannot write {}: {error}", bin.display())))?;
     Ok(Image { elf, bin })
+}
+
+/// The target directory of a board. The image of every board has the same name, so that each has a directory of its
+/// own: a build for the one board neither replaces the image of the other nor compiles anything of it anew.
+pub(crate) fn target(directory: &Path, board: &Board) -> PathBuf {
+    if *board == MODIO_02 {
+        directory.to_owned()
+    } else {
+        directory.join(board.name)
+    }
 }
 
 fn map_argument(map: &Path) -> OsString {
@@ -122,14 +119,14 @@ fn check_ram_code(image: &[u8]) -> Result<()> {
     }
     Err(Failure::new(format!(
         "code in RAM calls functions in flash, which cannot run during a save: add them to .ram_code in \
-         firmware/memory.x\n  {}",
+         firmware/memory/sections.x\n  {}",
         called.join("\n  ")
     )))
 }
 
 /// Refuses an image into which something is linked that panics.
-fn check_panics(image: &[u8]) -> Result<()> {
-    let panics = image::panics::linked(image).map_err(Failure::new)?;
+fn check_panics(image: &[u8], flash: &[u8]) -> Result<()> {
+    let panics = image::panics::linked(image, flash).map_err(Failure::new)?;
     if panics.is_empty() {
         return Ok(());
     }
@@ -142,4 +139,20 @@ fn check_panics(image: &[u8]) -> Result<()> {
         text.push_str(&format!("\n  {}, called by {callers}", panic.name));
     }
     Err(Failure::new(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn every_board_has_a_target_directory_of_its_own_and_the_modio_02_the_workspaces() {
+        let directory = Path::new("/x/target");
+        assert_eq!(target(directory, &MODIO_02), directory);
+        let all = Board::ALL.map(|board| target(directory, board));
+        assert!(all.iter().all(|path| path.starts_with(directory)));
+        assert_eq!(BTreeSet::from(all).len(), Board::ALL.len());
+    }
 }

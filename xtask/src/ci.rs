@@ -4,6 +4,8 @@
 
 use std::process::Command;
 
+use register_map::Board;
+
 use crate::steps::Steps;
 use crate::toolchain::Need;
 use crate::workspace::Workspace;
@@ -38,12 +40,14 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
     steps.run("lints, host", || {
         command::run(&mut host_lints(workspace.cargo("clippy"))).into()
     });
-    steps.run("lints, target", || {
-        let cargo = workspace.target_cargo(Need::Lint, "clippy");
-        cargo
-            .and_then(|cargo| command::run(&mut target_lints(cargo)))
-            .into()
-    });
+    for board in Board::ALL {
+        steps.run(&format!("lints, target, {board}"), || {
+            let cargo = workspace.target_cargo(Need::Lint, "clippy");
+            cargo
+                .and_then(|cargo| command::run(&mut target_lints(cargo, board)))
+                .into()
+        });
+    }
     steps.run("lints, fuzz targets", || {
         let mut cargo = workspace.cargo("clippy");
         cargo.args(["--locked", "--target-dir"]);
@@ -69,22 +73,26 @@ pub fn run(workspace: &mut Workspace) -> Result<()> {
     steps.run("documentation, host", || {
         command::run(&mut host_documentation(workspace.cargo("doc"))).into()
     });
-    steps.run("documentation, target", || {
-        let cargo = workspace.target_cargo(Need::Lint, "doc");
-        cargo
-            .and_then(|cargo| command::run(&mut target_documentation(cargo)))
-            .into()
-    });
-    let image = test::add(workspace, &mut steps, true);
-    test::add_corners(workspace, &mut steps, image.as_deref());
-    steps.run("instructions and bytes", || {
-        test::on(image.as_deref(), |elf| bench::check(workspace, elf).into())
-    });
-    steps.run("Renode's suites in simulation", || {
-        test::on(image.as_deref(), |elf| {
-            renode::checks::on_simulator(workspace, elf, true)
-        })
-    });
+    for board in Board::ALL {
+        steps.run(&format!("documentation, target, {board}"), || {
+            let cargo = workspace.target_cargo(Need::Lint, "doc");
+            cargo
+                .and_then(|cargo| command::run(&mut target_documentation(cargo, board)))
+                .into()
+        });
+    }
+    let images = test::add(workspace, &mut steps, true);
+    test::add_corners(workspace, &mut steps, &images);
+    for board in Board::ALL {
+        steps.run(&format!("instructions and bytes, {board}"), || {
+            images.step(board, |elf| bench::check(workspace, elf, board).into())
+        });
+        steps.run(&format!("Renode's suites in simulation, {board}"), || {
+            images.step(board, |elf| {
+                renode::checks::on_simulator(workspace, board, elf, true)
+            })
+        });
+    }
     steps.run("servers of cargo xtask peers, briefly", || {
         peers::step(workspace)
     });
@@ -103,13 +111,19 @@ fn host_lints(mut cargo: Command) -> Command {
     cargo
 }
 
-fn target_lints(mut cargo: Command) -> Command {
-    cargo.args(["--profile", build::PROFILE, "--features", "firmware/board"]);
+fn target_lints(mut cargo: Command, board: &Board) -> Command {
+    for_target(&mut cargo, board);
     for package in TARGET_PACKAGES {
         cargo.args(["--package", package]);
     }
     cargo.args(["--", "-Dwarnings"]);
     cargo
+}
+
+/// What is compiled for a board.
+fn for_target(cargo: &mut Command, board: &Board) {
+    cargo.args(["--profile", build::PROFILE]);
+    cargo.args(["--features", &format!("firmware/{board}")]);
 }
 
 /// Of a workspace of its own.
@@ -126,8 +140,8 @@ fn host_documentation(mut cargo: Command) -> Command {
     cargo
 }
 
-fn target_documentation(mut cargo: Command) -> Command {
-    cargo.args(["--profile", build::PROFILE, "--features", "firmware/board"]);
+fn target_documentation(mut cargo: Command, board: &Board) -> Command {
+    for_target(&mut cargo, board);
     cargo.args(["--package", "board-support", "--package", "firmware"]);
     documentation(&mut cargo);
     cargo
@@ -142,6 +156,8 @@ fn documentation(cargo: &mut Command) {
 
 #[cfg(test)]
 mod tests {
+    use register_map::board::MODIO_02;
+
     use super::*;
 
     fn arguments(command: &Command) -> Vec<String> {
@@ -155,13 +171,16 @@ mod tests {
     fn warnings_are_errors_everywhere() {
         for lints in [
             host_lints(Command::new("cargo")),
-            target_lints(Command::new("cargo")),
+            target_lints(Command::new("cargo"), &MODIO_02),
             other_lints(Command::new("cargo"), fuzz::MANIFEST),
         ] {
             assert_eq!(arguments(&lints).last().unwrap(), "-Dwarnings");
         }
         let cargo = || Command::new("cargo");
-        for documentation in [host_documentation(cargo()), target_documentation(cargo())] {
+        for documentation in [
+            host_documentation(cargo()),
+            target_documentation(cargo(), &MODIO_02),
+        ] {
             let mut variables = documentation.get_envs();
             let flags = variables.find(|(name, _)| *name == "RUSTDOCFLAGS");
             let flags = flags.unwrap().1.unwrap();
@@ -171,9 +190,12 @@ mod tests {
 
     #[test]
     fn every_package_of_the_image_is_linted_for_the_target() {
-        let lints = arguments(&target_lints(Command::new("cargo")));
-        for package in TARGET_PACKAGES {
-            assert!(lints.contains(&package.to_owned()), "{package}");
+        for board in Board::ALL {
+            let lints = arguments(&target_lints(Command::new("cargo"), board));
+            assert!(lints.contains(&format!("firmware/{board}")));
+            for package in TARGET_PACKAGES {
+                assert!(lints.contains(&package.to_owned()), "{package}");
+            }
         }
     }
 }

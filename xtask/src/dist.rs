@@ -1,12 +1,15 @@
 //! `cargo xtask dist`: all files of a release in one directory.
 //!
-//! | file | for |
+//! | file, for each board | for |
 //! |---|---|
-//! | `modio.elf` | a debugger, probe-rs, the simulator |
-//! | `modio.bin`, `modio.hex` | a programmer |
-//! | `modio.map` | finding what an address is, what takes how much |
-//! | `modio.cdx.json` | the crates in the image, as a CycloneDX bill of materials |
-//! | `SHA256SUMS` | `sha256sum --check SHA256SUMS` |
+//! | `modio-02.elf` | a debugger, probe-rs, the simulator |
+//! | `modio-02.bin`, `modio-02.hex` | a programmer |
+//! | `modio-02.map` | finding what an address is, what takes how much |
+//! | `modio-02.cdx.json` | the crates in the image, as a CycloneDX bill of materials |
+//!
+//! Beside them stands `modioctl-TARGET`, the host tool for machines like this one.
+//!
+//! `SHA256SUMS` has the check sums of all of them: `sha256sum --check SHA256SUMS`.
 //!
 //! The same sources and toolchain give the same .bin, .hex and bill in whatever directory and at whatever time.
 
@@ -14,6 +17,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use register_map::Board;
 use sha2::{Digest as _, Sha256};
 
 use crate::workspace::Workspace;
@@ -21,14 +25,12 @@ use crate::{Failure, Result, build, image};
 
 mod hex;
 mod sbom;
+mod tool;
 
 /// What to build, and where it goes.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    #[command(flatten)]
-    build: build::Options,
-
     /// The directory for the files [default: target/dist]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -36,6 +38,10 @@ pub struct Options {
     /// Build only if this is the tag of the version that the sources have
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
+
+    /// Only the host tool, for machines like this one
+    #[arg(long)]
+    tool: bool,
 }
 
 /// The tag of this version; all packages have the workspace's.
@@ -56,34 +62,51 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     };
     fs::create_dir_all(&out)
         .map_err(|error| Failure::new(format!("cannot make {}: {error}", out.display())))?;
-    let map = out.join("modio.map");
+    let mut names = Vec::new();
+    if !options.tool {
+        for board in Board::ALL {
+            names.extend(files(workspace, board, &out)?);
+        }
+    }
+    let (file, name) = tool::build(workspace)?;
+    fs::copy(&file, out.join(&name))
+        .map_err(|error| Failure::new(format!("cannot copy {}: {error}", file.display())))?;
+    names.push(name);
+    write(&out.join("SHA256SUMS"), sums(&out, &names)?.as_bytes())?;
+    for name in &names {
+        say!("{}", out.join(name).display());
+    }
+    say!("{}", out.join("SHA256SUMS").display());
+    Ok(())
+}
+
+/// Makes the files of a board. Returns their names in alphabetical order.
+fn files(workspace: &mut Workspace, board: &Board, out: &Path) -> Result<Vec<String>> {
+    let named = |extension: &str| format!("{board}.{extension}");
+    let map = out.join(named("map"));
     // A linker that writes none must not leave that of another image.
     let _ = fs::remove_file(&map);
-    let built = build::image_with_map(workspace, &options.build, &map)?;
+    let built = build::image_with_map(workspace, board, &map)?;
     if !map.is_file() {
         return Err(Failure::new("the linker has written no map"));
     }
     let elf = image::read(&built.elf)?;
     let flash = image::read(&built.bin)?;
     let entry = image::entry(&elf).map_err(Failure::new)?;
-    let bill = sbom::of_image(workspace, &elf, &sha256(&flash))?;
-    let mut names = vec!["modio.map"];
-    for (name, content) in [
-        ("modio.elf", elf),
-        ("modio.bin", flash.clone()),
-        ("modio.hex", hex::file(&flash, entry)?.into_bytes()),
-        ("modio.cdx.json", format!("{bill:#}\n").into_bytes()),
+    let bill = sbom::of_image(workspace, board, &elf, &sha256(&flash))?;
+    let hex = hex::file(&flash, entry)?;
+    let mut names = vec![named("map")];
+    for (extension, content) in [
+        ("elf", elf),
+        ("bin", flash),
+        ("hex", hex.into_bytes()),
+        ("cdx.json", format!("{bill:#}\n").into_bytes()),
     ] {
-        write(&out.join(name), &content)?;
-        names.push(name);
+        write(&out.join(named(extension)), &content)?;
+        names.push(named(extension));
     }
     names.sort_unstable();
-    write(&out.join("SHA256SUMS"), sums(&out, &names)?.as_bytes())?;
-    for name in names {
-        say!("{}", out.join(name).display());
-    }
-    say!("{}", out.join("SHA256SUMS").display());
-    Ok(())
+    Ok(names)
 }
 
 fn check_tag(tag: Option<&str>) -> Result<()> {
@@ -102,7 +125,7 @@ fn write(path: &Path, content: &[u8]) -> Result<()> {
 }
 
 /// The sums of these files, as `sha256sum` writes them.
-fn sums(directory: &Path, names: &[&str]) -> Result<String> {
+fn sums(directory: &Path, names: &[String]) -> Result<String> {
     let mut text = String::new();
     for name in names {
         let content = fs::read(directory.join(name))
@@ -136,10 +159,10 @@ mod tests {
     fn sums_are_those_of_sha256sum() {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join("a"), "abc").unwrap();
-        let text = sums(directory.path(), &["a"]).unwrap();
+        let text = sums(directory.path(), &["a".to_owned()]).unwrap();
         // FIPS 180-4's example.
         let sum = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(text, format!("{sum}  a\n"));
-        assert!(sums(directory.path(), &["b"]).is_err());
+        assert!(sums(directory.path(), &["b".to_owned()]).is_err());
     }
 }

@@ -3,11 +3,9 @@
 use std::path::PathBuf;
 use std::process::Command;
 
+use crate::board::{Hardware, Memory};
 use crate::workspace::Workspace;
 use crate::{Failure, Result, build, command, image};
-
-/// The part on the modio-02 board as probe-rs calls it.
-const CHIP: &str = "STM32F103CB";
 
 /// What to write, and through which probe.
 #[derive(clap::Args, Clone, Debug)]
@@ -31,8 +29,10 @@ pub struct Options {
 ///
 /// When probe-rs or a probe is missing, the image does not build or is broken, or writing fails.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    let part = Hardware::of(options.build.board).part;
     let probe_rs = ProbeRs {
         program: "probe-rs".into(),
+        part,
         probe: options.probe.clone(),
     };
     // Before the build: without a probe there is nothing to build for.
@@ -40,10 +40,10 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let elf = match &options.elf {
         Some(elf) => {
             let broken = |why| Failure::asked(format!("{}: {why}", elf.display()));
-            image::flat(&image::read(elf)?).map_err(broken)?;
+            image::flat(&image::read(elf)?, part.flash).map_err(broken)?;
             elf.clone()
         }
-        None => build::image(workspace, &options.build)?.elf,
+        None => build::image(workspace, options.build.board)?.elf,
     };
     probe_rs.write(&elf)?;
     say!("written, verified and started: {}", elf.display());
@@ -53,13 +53,15 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// The program probe-rs with the options that each of its commands gets.
 struct ProbeRs {
     program: PathBuf,
+    /// The part on the board.
+    part: Memory,
     probe: Option<String>,
 }
 
 impl ProbeRs {
     fn command(&self, subcommand: &str) -> Command {
         let mut command = Command::new(&self.program);
-        command.args([subcommand, "--chip", CHIP]);
+        command.args([subcommand, "--chip", self.part.name]);
         if let Some(probe) = &self.probe {
             command.args(["--probe", probe]);
         }
@@ -108,6 +110,7 @@ mod tests {
         let text = format!("echo \"$@\" >> '{}'\n{script}", log.display());
         ProbeRs {
             program: program(directory, "probe-rs", &text),
+            part: Hardware::of(&register_map::board::MODIO_02).part,
             probe: None,
         }
     }
@@ -171,6 +174,7 @@ mod tests {
     fn no_probe_rs_is_told_with_how_to_install_it() {
         let probe_rs = ProbeRs {
             program: "/nowhere/probe-rs".into(),
+            part: Hardware::of(&register_map::board::MODIO_02).part,
             probe: None,
         };
         let text = probe_rs.check().unwrap_err().to_string();

@@ -15,9 +15,6 @@ use crate::{Failure, Result};
 /// Where flash begins.
 pub const FLASH_BASE: u32 = 0x0800_0000;
 
-/// Flash of the STM32F103CB of the modio-02 board, in bytes.
-pub const FLASH_SIZE: u32 = 128 * 1024;
-
 /// Where RAM begins.
 pub const RAM_BASE: u32 = 0x2000_0000;
 
@@ -59,15 +56,15 @@ pub fn entry(bytes: &[u8]) -> std::result::Result<u32, String> {
 ///
 /// # Errors
 ///
-/// When it is no ELF file, loads nothing, or loads something outside the 128 KiB of flash.
-pub fn flat(bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
+/// When it is no ELF file, loads nothing, or loads something outside a flash of `size` bytes.
+pub fn flat(bytes: &[u8], size: u32) -> std::result::Result<Vec<u8>, String> {
     let elf = parse(bytes)?;
     let endian = elf.endian();
     let mut flash = Vec::new();
     for segment in elf.elf_program_headers() {
         let segment: &object::elf::ProgramHeader32<Endianness> = segment;
-        let size = segment.p_filesz(endian);
-        if segment.p_type(endian) != PT_LOAD || size == 0 {
+        let length = segment.p_filesz(endian);
+        if segment.p_type(endian) != PT_LOAD || length == 0 {
             continue;
         }
         // The load address: initial values of variables stand in flash, too.
@@ -77,9 +74,9 @@ pub fn flat(bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
             .map_err(|()| format!("the segment at {address:#010x} is cut short"))?;
         let start = address
             .checked_sub(FLASH_BASE)
-            .filter(|start| start.checked_add(size).is_some_and(|end| end <= FLASH_SIZE))
-            .ok_or_else(|| format!("{size} bytes at {address:#010x} are not in flash"))?;
-        let range = start as usize..(start + size) as usize;
+            .filter(|start| start.checked_add(length).is_some_and(|end| end <= size))
+            .ok_or_else(|| format!("{length} bytes at {address:#010x} are not in flash"))?;
+        let range = start as usize..(start + length) as usize;
         if flash.len() < range.end {
             flash.resize(range.end, 0xFF);
         }
@@ -99,6 +96,12 @@ pub(crate) mod sample;
 mod tests {
     use super::sample::Segment;
     use super::*;
+
+    const FLASH_SIZE: u32 = 128 * 1024;
+
+    fn flat(bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
+        super::flat(bytes, FLASH_SIZE)
+    }
 
     fn elf(segments: &[Segment]) -> Vec<u8> {
         sample::elf(segments, &[])

@@ -16,6 +16,7 @@ macro_rules! say {
 }
 
 pub mod bench;
+pub mod board;
 pub mod build;
 pub mod ci;
 pub mod command;
@@ -132,12 +133,14 @@ mod tests {
 
     #[test]
     fn a_board_that_is_not_ours_is_refused_with_the_list() {
-        let error = Cli::try_parse_from(["xtask", "build", "--board", "nucleo"]).unwrap_err();
-        let text = sim_options::one_line(&error);
-        assert!(
-            text.contains("'nucleo'") && text.contains("modio-02"),
-            "{text}"
-        );
+        for command in ["build", "flash", "size", "bench", "sim", "renode"] {
+            let error = Cli::try_parse_from(["xtask", command, "--board", "nucleo"]).unwrap_err();
+            let text = sim_options::one_line(&error);
+            assert!(
+                text.contains("'nucleo'") && text.contains("one of modio-02, modio-08"),
+                "{command}: {text}"
+            );
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 //!
 //! The test is `matrix` of `tools/conformance/tests/image`, which `cargo xtask test` runs with chosen cases.
 
+use register_map::board::MODIO_02;
+
 use crate::workspace::Workspace;
 use crate::{Result, build, command};
 
@@ -14,7 +16,7 @@ const VARIABLE: &str = "MODIO_MATRIX";
 ///
 /// When image or simulator cannot be built, or a case fails at a rate and format.
 pub fn run(workspace: &mut Workspace) -> Result<()> {
-    let elf = build::image(workspace, &build::Options::release())?.elf;
+    let elf = build::image(workspace, &MODIO_02)?.elf;
     let mut cargo = workspace.cargo("test");
     // The simulator's core, crate rigless, declares a newer rustc than it needs.
     cargo.args(["--quiet", "--ignore-rust-version", "--package"]);

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use register_map::Module;
+use register_map::{Board, Module};
 
 use crate::steps::{Outcome, Steps};
 use crate::workspace::Workspace;
@@ -37,6 +37,9 @@ const PORT: u16 = 3456;
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
+    #[command(flatten)]
+    build: build::Options,
+
     /// The program renode, or the directory it is in [default: $RENODE, the PATH, the usual places]
     #[arg(long, value_name = "PATH")]
     renode: Option<PathBuf>,
@@ -49,7 +52,7 @@ pub struct Options {
     #[arg(long)]
     interactive: bool,
 
-    /// What is in the slot of --interactive: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// What is in the first slot of --interactive: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[arg(
         long,
         value_name = "NAME",
@@ -82,11 +85,15 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
             return Err(Failure::asked(what));
         }
         Some(elf) => absolute(elf)?,
-        None => build::image(workspace, &build::Options::release())?.elf,
+        None => build::image(workspace, options.build.board)?.elf,
     };
     let bench = Bench {
         directory: workspace.root().join(DIRECTORY),
-        output: workspace.target().join("renode"),
+        output: workspace
+            .target()
+            .join("renode")
+            .join(options.build.board.name),
+        board: options.build.board,
         renode,
         elf,
     };
@@ -103,6 +110,7 @@ struct Bench {
     directory: PathBuf,
     /// Where results go.
     output: PathBuf,
+    board: &'static Board,
     renode: Renode,
     elf: PathBuf,
 }

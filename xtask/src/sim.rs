@@ -28,7 +28,7 @@ pub fn run(
             )));
         }
         Some(_) => None,
-        None => Some(build::image(workspace, &build::Options::release())?.elf),
+        None => Some(build::image(workspace, options.board)?.elf),
     };
     let mut simulator = Command::new(simulator(workspace)?);
     simulator.args(arguments);

@@ -3,8 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use register_map::Board;
 use serde_json::{Value, json};
 
+use crate::board::{Hardware, Memory};
 use crate::workspace::Workspace;
 use crate::{Failure, Result, build, image};
 
@@ -17,34 +19,6 @@ pub use measure::{Bytes, Sizes, measure};
 pub use source::Source;
 
 const KIB: u32 = 1024;
-
-/// What there is at most, for a name.
-#[derive(Clone, Copy, Debug)]
-struct Limit {
-    name: &'static str,
-    flash: u32,
-    ram: u32,
-}
-
-/// The parts the firmware runs on (STM32F103x8 and xB data sheet), and what the application allows
-/// itself, so that the rest is there for the stack, the configuration store and a loader.
-const LIMITS: [Limit; 3] = [
-    Limit {
-        name: "STM32F103C8",
-        flash: 64 * KIB,
-        ram: 20 * KIB,
-    },
-    Limit {
-        name: "STM32F103CB",
-        flash: 128 * KIB,
-        ram: 20 * KIB,
-    },
-    Limit {
-        name: "budget",
-        flash: 47 * KIB,
-        ram: 8 * KIB,
-    },
-];
 
 /// What to measure and how to tell.
 #[derive(clap::Args, Clone, Debug)]
@@ -70,41 +44,42 @@ pub struct Options {
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let elf = match &options.elf {
         Some(elf) => elf.clone(),
-        None => build::image(workspace, &options.build)?.elf,
+        None => build::image(workspace, options.build.board)?.elf,
     };
     let sizes = of(&elf)?;
+    let hardware = Hardware::of(options.build.board);
     if options.json {
-        say!("{:#}", as_json(&sizes));
+        say!("{:#}", as_json(&sizes, hardware));
     } else {
-        say!("{}", as_table(&sizes).trim_end());
+        say!("{}", as_table(&sizes, hardware).trim_end());
     }
-    within_limits(&sizes)
+    within_limits(&sizes, hardware)
 }
 
-/// Whether an image fits the parts and the budget.
+/// Whether an image fits the parts and the budget of a board.
 ///
 /// # Errors
 ///
 /// When it does not, or is no image.
-pub fn check(elf: &Path) -> Result<()> {
-    within_limits(&of(elf)?)
+pub fn check(elf: &Path, board: &Board) -> Result<()> {
+    within_limits(&of(elf)?, Hardware::of(board))
 }
 
-/// The figures of an image as JSON.
+/// The figures of an image for a board as JSON.
 ///
 /// # Errors
 ///
 /// When it is no image.
-pub fn report(elf: &Path) -> Result<Value> {
-    of(elf).map(|sizes| as_json(&sizes))
+pub fn report(elf: &Path, board: &Board) -> Result<Value> {
+    of(elf).map(|sizes| as_json(&sizes, Hardware::of(board)))
 }
 
 fn of(elf: &Path) -> Result<Sizes> {
     measure(&image::read(elf)?).map_err(|why| Failure::asked(format!("{}: {why}", elf.display())))
 }
 
-fn within_limits(sizes: &Sizes) -> Result<()> {
-    match exceeded(sizes) {
+fn within_limits(sizes: &Sizes, hardware: &Hardware) -> Result<()> {
+    match exceeded(sizes, hardware) {
         Some(limit) => Err(Failure::new(format!(
             "the image takes {} bytes of flash and {} of RAM: more than {} has ({} and {})",
             sizes.total.flash, sizes.total.ram, limit.name, limit.flash, limit.ram
@@ -114,9 +89,9 @@ fn within_limits(sizes: &Sizes) -> Result<()> {
 }
 
 /// The part or budget that the image exceeds.
-fn exceeded(sizes: &Sizes) -> Option<&'static Limit> {
-    LIMITS
-        .iter()
+fn exceeded(sizes: &Sizes, hardware: &Hardware) -> Option<Memory> {
+    hardware
+        .limits()
         .find(|limit| sizes.total.flash > limit.flash || sizes.total.ram > limit.ram)
 }
 
@@ -125,13 +100,13 @@ fn left(limit: u32, taken: u32) -> i64 {
     i64::from(limit) - i64::from(taken)
 }
 
-fn as_json(sizes: &Sizes) -> Value {
+fn as_json(sizes: &Sizes, hardware: &Hardware) -> Value {
     let rows = |rows: &[(String, Bytes)]| -> Vec<Value> {
         let row = |(name, taken): &(String, Bytes)| json!({ "name": name, "flash": taken.flash, "ram": taken.ram });
         rows.iter().map(row).collect()
     };
-    let limits: Vec<Value> = LIMITS
-        .iter()
+    let limits: Vec<Value> = hardware
+        .limits()
         .map(|limit| {
             json!({
                 "name": limit.name,
@@ -149,7 +124,7 @@ fn as_json(sizes: &Sizes) -> Value {
     })
 }
 
-fn as_table(sizes: &Sizes) -> String {
+fn as_table(sizes: &Sizes, hardware: &Hardware) -> String {
     let mut lines = Vec::new();
     let mut row = |name: &str, flash: String, ram: String| {
         lines.push(format!("{name:<32} {flash:>10} {ram:>10}\n"));
@@ -171,7 +146,7 @@ fn as_table(sizes: &Sizes) -> String {
         "flash".to_owned(),
         "RAM".to_owned(),
     );
-    for limit in LIMITS {
+    for limit in hardware.limits() {
         let size = format!(
             "{} ({} KiB / {} KiB)",
             limit.name,
@@ -196,6 +171,8 @@ fn as_table(sizes: &Sizes) -> String {
 
 #[cfg(test)]
 mod tests {
+    use register_map::board::{MODIO_02, MODIO_08};
+
     use super::*;
 
     fn sizes(flash: u32, ram: u32) -> Sizes {
@@ -209,31 +186,43 @@ mod tests {
 
     #[test]
     fn what_is_left_is_told_for_parts_and_budget() {
-        let json = as_json(&sizes(30_000, 5_000));
+        let hardware = Hardware::of(&MODIO_02);
+        let json = as_json(&sizes(30_000, 5_000), hardware);
         assert_eq!(json["limits"][0]["flash"]["left"], 65_536 - 30_000);
         assert_eq!(json["limits"][1]["flash"]["left"], 131_072 - 30_000);
         assert_eq!(json["limits"][2]["ram"]["left"], 8_192 - 5_000);
         assert_eq!(json["crates"][0]["name"], "firmware");
-        let table = as_table(&sizes(30_000, 5_000));
+        let table = as_table(&sizes(30_000, 5_000), hardware);
         assert!(table.contains("budget (47 KiB / 8 KiB)"), "{table}");
         assert!(table.lines().all(|line| line.trim_end() == line), "{table}");
     }
 
     #[test]
     fn an_image_that_is_too_large_is_found_out() {
-        let limit = |flash, ram| exceeded(&sizes(flash, ram)).map(|limit| limit.name);
+        let hardware = Hardware::of(&MODIO_02);
+        let limit = |flash, ram| exceeded(&sizes(flash, ram), hardware).map(|limit| limit.name);
         assert_eq!(limit(47 * KIB, 8 * KIB), None);
         assert_eq!(limit(47 * KIB + 1, 0), Some("budget"));
         assert_eq!(limit(0, 8 * KIB + 1), Some("budget"));
         assert_eq!(limit(64 * KIB + 1, 0), Some("STM32F103C8"));
         assert_eq!(limit(0, 20 * KIB + 1), Some("STM32F103C8"));
-        let failure = within_limits(&sizes(70_000, 9_000))
+        let failure = within_limits(&sizes(70_000, 9_000), hardware)
             .unwrap_err()
             .to_string();
         assert!(
             failure.contains("70000") && failure.contains("STM32F103C8"),
             "{failure}"
         );
-        assert!(as_table(&sizes(48 * KIB, 0)).contains("1024 over"));
+        assert!(as_table(&sizes(48 * KIB, 0), hardware).contains("1024 over"));
+    }
+
+    #[test]
+    fn every_board_has_limits_of_its_own() {
+        let hardware = Hardware::of(&MODIO_08);
+        let limit = |flash, ram| exceeded(&sizes(flash, ram), hardware).map(|limit| limit.name);
+        assert_eq!(limit(47 * KIB, 12 * KIB), None);
+        assert_eq!(limit(0, 12 * KIB + 1), Some("budget"));
+        assert_eq!(limit(256 * KIB + 1, 0), Some("STM32F103RC"));
+        assert_eq!(limit(0, 48 * KIB + 1), Some("STM32F103RC"));
     }
 }

@@ -2,6 +2,8 @@
 //!
 //! The test is `noise` of `tools/sim/tests/image`, which `cargo xtask test` runs with fewer frames.
 
+use register_map::board::MODIO_02;
+
 use crate::workspace::Workspace;
 use crate::{Result, build, command, test};
 
@@ -36,7 +38,7 @@ fn corner(name: &str) -> std::result::Result<String, String> {
 ///
 /// When image or simulator cannot be built, or the image loses a good frame or takes a bad one.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let elf = build::image(workspace, &build::Options::release())?.elf;
+    let elf = build::image(workspace, &MODIO_02)?.elf;
     let mut cargo = workspace.cargo("test");
     // The simulator's core, crate rigless, declares a newer rustc than it needs.
     cargo.args(["--quiet", "--ignore-rust-version", "--package", "sim"]);

@@ -17,8 +17,8 @@ pub enum DacBusError {
     Timeout,
     /// Somebody holds a wire low and could not be brought to let go.
     Held(Held),
-    /// A read of no bytes, which the peripheral cannot do.
-    NothingToRead,
+    /// A transaction that reads: not supported.
+    Reads,
 }
 
 impl Error for DacBusError {
@@ -27,7 +27,7 @@ impl Error for DacBusError {
             Self::NoAcknowledge(source) => ErrorKind::NoAcknowledge(*source),
             Self::ArbitrationLost => ErrorKind::ArbitrationLoss,
             Self::Misplaced | Self::Held(_) => ErrorKind::Bus,
-            Self::Timeout | Self::NothingToRead => ErrorKind::Other,
+            Self::Timeout | Self::Reads => ErrorKind::Other,
         }
     }
 }

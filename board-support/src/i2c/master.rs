@@ -1,8 +1,5 @@
 //! The bus's master: RM0008 26.3.3, polled.
 
-use core::mem;
-
-use cortex_m::interrupt;
 use embedded_hal::i2c::{ErrorType, I2c, NoAcknowledgeSource, Operation, SevenBitAddress};
 use stm32f1xx_hal::pac;
 
@@ -18,18 +15,10 @@ mod flag {
     pub const SB: u16 = 1 << 0;
     pub const ADDR: u16 = 1 << 1;
     pub const BTF: u16 = 1 << 2;
-    pub const RXNE: u16 = 1 << 6;
     pub const TXE: u16 = 1 << 7;
     pub const BERR: u16 = 1 << 8;
     pub const ARLO: u16 = 1 << 9;
     pub const AF: u16 = 1 << 10;
-}
-
-/// How a group of bytes in one direction ends.
-#[derive(Clone, Copy)]
-enum End {
-    Stop,
-    Restart,
 }
 
 /// What the peripheral is to be told of its clock.
@@ -130,48 +119,26 @@ impl DacBus {
         result
     }
 
-    fn transfer(
+    /// Writes bytes to a slave, from start condition to stop condition.
+    fn write_all<'a>(
         &mut self,
         address: SevenBitAddress,
-        operations: &mut [Operation<'_>],
+        bytes: impl Iterator<Item = &'a u8>,
     ) -> Result<(), DacBusError> {
         self.i2c.cr1().modify(|_, w| w.start().set_bit());
-        let mut rest = operations;
-        // Operations in one direction make one run of bytes (embedded-hal's contract).
-        while let Some(first) = rest.first() {
-            let reads = is_read(first);
-            let count = rest.iter().take_while(|it| is_read(it) == reads).count();
-            let Some((group, after)) = mem::take(&mut rest).split_at_mut_checked(count) else {
-                break;
-            };
-            let end = if after.is_empty() {
-                End::Stop
-            } else {
-                End::Restart
-            };
-            self.call(address, reads)?;
-            if reads {
-                self.read_group(group, end)?;
-            } else {
-                self.write_bytes(group.iter().flat_map(written), end)?;
-            }
-            rest = after;
-        }
+        self.call(address)?;
+        self.write_bytes(bytes)?;
         self.wait_for_stop()
     }
 
-    /// Once the start condition is made, calls a slave, which is to acknowledge.
-    fn call(&self, address: SevenBitAddress, reads: bool) -> Result<(), DacBusError> {
+    /// Once the start condition is made, calls a slave that is to be written, and that is to acknowledge.
+    fn call(&self, address: SevenBitAddress) -> Result<(), DacBusError> {
         self.wait_for(flag::SB, NoAcknowledgeSource::Unknown)?;
-        self.put(address << 1 | u8::from(reads));
+        self.put(address << 1);
         self.wait_for(flag::ADDR, NoAcknowledgeSource::Address)
     }
 
-    fn write_bytes<'a>(
-        &self,
-        bytes: impl Iterator<Item = &'a u8>,
-        end: End,
-    ) -> Result<(), DacBusError> {
+    fn write_bytes<'a>(&self, bytes: impl Iterator<Item = &'a u8>) -> Result<(), DacBusError> {
         self.clear_addr();
         let mut sent = false;
         for byte in bytes {
@@ -182,82 +149,13 @@ impl DacBus {
         if sent {
             self.wait_for(flag::BTF, NoAcknowledgeSource::Data)?;
         }
-        self.end(end);
+        self.stop();
         Ok(())
     }
 
-    /// The last bytes take care (26.3.3, "closing the communication"): what is to follow the last must
-    /// be said before the one before it is taken. Where the peripheral does not wait for that by itself,
-    /// no interrupt may come between; those stretches are a few instructions long.
-    fn read_group(&mut self, group: &mut [Operation<'_>], end: End) -> Result<(), DacBusError> {
-        let mut left: usize = group.iter().map(length).sum();
-        let mut places = group.iter_mut().flat_map(filled);
-        let mut take = |bus: &Self| {
-            let byte = bus.i2c.dr().read().dr().bits();
-            if let Some(place) = places.next() {
-                *place = byte;
-            }
-        };
-        match left {
-            0 => return Err(DacBusError::NothingToRead),
-            1 => {
-                self.i2c
-                    .cr1()
-                    .modify(|_, w| w.ack().clear_bit().pos().clear_bit());
-                interrupt::free(|_| {
-                    self.clear_addr();
-                    self.end(end);
-                });
-                self.wait_for(flag::RXNE, NoAcknowledgeSource::Unknown)?;
-                take(self);
-            }
-            2 => {
-                // POS: ACK rules the second byte instead of the first.
-                self.i2c
-                    .cr1()
-                    .modify(|_, w| w.ack().set_bit().pos().set_bit());
-                interrupt::free(|_| {
-                    self.clear_addr();
-                    self.i2c.cr1().modify(|_, w| w.ack().clear_bit());
-                });
-                self.wait_for(flag::BTF, NoAcknowledgeSource::Unknown)?;
-                interrupt::free(|_| {
-                    self.end(end);
-                    take(self);
-                });
-                take(self);
-            }
-            _ => {
-                self.i2c
-                    .cr1()
-                    .modify(|_, w| w.ack().set_bit().pos().clear_bit());
-                self.clear_addr();
-                while left > 3 {
-                    self.wait_for(flag::RXNE, NoAcknowledgeSource::Unknown)?;
-                    take(self);
-                    left -= 1;
-                }
-                // Two bytes are there and the clock is stretched: the third is to come.
-                self.wait_for(flag::BTF, NoAcknowledgeSource::Unknown)?;
-                self.i2c.cr1().modify(|_, w| w.ack().clear_bit());
-                interrupt::free(|_| {
-                    take(self);
-                    self.end(end);
-                    take(self);
-                });
-                self.wait_for(flag::RXNE, NoAcknowledgeSource::Unknown)?;
-                take(self);
-            }
-        }
-        Ok(())
-    }
-
-    /// Asks for a stop condition, or for a start that goes on.
-    fn end(&self, end: End) {
-        self.i2c.cr1().modify(|_, w| match end {
-            End::Stop => w.stop().set_bit(),
-            End::Restart => w.start().set_bit(),
-        });
+    /// Asks for a stop condition.
+    fn stop(&self) {
+        self.i2c.cr1().modify(|_, w| w.stop().set_bit());
     }
 
     fn put(&self, byte: u8) {
@@ -301,7 +199,7 @@ impl DacBus {
     /// Ends a transfer that was not acknowledged, as any other is ended.
     fn stop_after_no_acknowledge(&mut self) -> Result<(), DacBusError> {
         self.i2c.sr1().modify(|_, w| w.af().clear_bit());
-        self.end(End::Stop);
+        self.stop();
         self.wait_for_stop()
     }
 }
@@ -310,51 +208,29 @@ impl ErrorType for DacBus {
     type Error = DacBusError;
 }
 
+/// Writes alone: the DACs are never read. A transaction that reads is refused with [`DacBusError::Reads`].
 impl I2c for DacBus {
     fn transaction(
         &mut self,
         address: SevenBitAddress,
         operations: &mut [Operation<'_>],
     ) -> Result<(), DacBusError> {
+        let reads = |operation: &Operation<'_>| matches!(operation, Operation::Read(_));
+        if operations.iter().any(reads) {
+            return Err(DacBusError::Reads);
+        }
         if operations.is_empty() {
             return Ok(());
         }
-        self.on_bus(|bus| bus.transfer(address, operations))
+        // Operations in one direction make one run of bytes (embedded-hal's contract).
+        let bytes = operations.iter().flat_map(|operation| match operation {
+            Operation::Write(bytes) => *bytes,
+            Operation::Read(_) => &[],
+        });
+        self.on_bus(|bus| bus.write_all(address, bytes))
     }
 
-    /// As a transaction of this one write, by a shorter way: it is all that the DAC's driver needs, and
-    /// whoever never reads is to have no code for that.
     fn write(&mut self, address: SevenBitAddress, bytes: &[u8]) -> Result<(), DacBusError> {
-        self.on_bus(|bus| {
-            bus.i2c.cr1().modify(|_, w| w.start().set_bit());
-            bus.call(address, false)?;
-            bus.write_bytes(bytes.iter(), End::Stop)?;
-            bus.wait_for_stop()
-        })
-    }
-}
-
-fn is_read(operation: &Operation<'_>) -> bool {
-    matches!(operation, Operation::Read(_))
-}
-
-fn length(operation: &Operation<'_>) -> usize {
-    match operation {
-        Operation::Read(bytes) => bytes.len(),
-        Operation::Write(bytes) => bytes.len(),
-    }
-}
-
-fn written<'a>(operation: &'a Operation<'_>) -> &'a [u8] {
-    match operation {
-        Operation::Write(bytes) => bytes,
-        Operation::Read(_) => &[],
-    }
-}
-
-fn filled<'a>(operation: &'a mut Operation<'_>) -> &'a mut [u8] {
-    match operation {
-        Operation::Read(bytes) => bytes,
-        Operation::Write(_) => &mut [],
+        self.on_bus(|bus| bus.write_all(address, bytes.iter()))
     }
 }

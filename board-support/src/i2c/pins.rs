@@ -3,7 +3,7 @@
 use stm32f1xx_hal::gpio::{Cr, PB6, PB7};
 
 use super::freeing::Wires;
-use crate::{design::I2C_HALF_PERIOD_US, port, wait::delay_us};
+use crate::{design::I2C_HALF_PERIOD_US, pin::Port, wait::delay_us};
 
 const SCL: u16 = 1 << 6;
 const SDA: u16 = 1 << 7;
@@ -40,7 +40,7 @@ impl BusPins {
 
     /// The slowest slopes, 2 MHz: SCL is far below that.
     fn configure(&mut self, peripheral: bool) {
-        port::b().crl().modify(|_, w| {
+        Port::B.registers().crl().modify(|_, w| {
             w.mode6().output2().mode7().output2();
             if peripheral {
                 w.cnf6().alt_open_drain().cnf7().alt_open_drain()
@@ -58,7 +58,10 @@ impl BusPins {
         };
         // SAFETY: changes the pins whose bits are set and no other, in one store, and this value alone
         // owns them.
-        port::b().bsrr().write(|w| unsafe { w.bits(bits) });
+        Port::B
+            .registers()
+            .bsrr()
+            .write(|w| unsafe { w.bits(bits) });
     }
 }
 
@@ -72,11 +75,11 @@ impl Wires for BusPins {
     }
 
     fn scl(&self) -> bool {
-        port::b().idr().read().bits() & u32::from(SCL) != 0
+        Port::B.registers().idr().read().bits() & u32::from(SCL) != 0
     }
 
     fn sda(&self) -> bool {
-        port::b().idr().read().bits() & u32::from(SDA) != 0
+        Port::B.registers().idr().read().bits() & u32::from(SDA) != 0
     }
 
     fn wait(&mut self) {

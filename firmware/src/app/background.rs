@@ -1,11 +1,11 @@
 //! What may be late at no cost: DAC transfers, configuration store, LEDs, log.
 
 use board_support::stack;
-use firmware::device::Device;
 use heapless::spsc::Consumer;
 use rtic::Mutex;
 
 use crate::{
+    board::Device,
     installed::AnalogOutputs,
     log::{Event, Log},
     orders::Orders,
@@ -15,14 +15,14 @@ use crate::{
 
 /// What the background works on.
 pub struct Background {
-    pub analog_outputs: Option<AnalogOutputs>,
+    pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
     pub signals: Signals,
     pub log: Log,
 }
 
 impl Background {
-    /// Brings the DAC, the store, the LEDs and the log up to date.
+    /// Brings the DACs, the store, the LEDs and the log up to date.
     pub fn run(
         &mut self,
         device: &mut impl Mutex<T = &'static mut Device>,
@@ -30,11 +30,13 @@ impl Background {
         orders: &mut impl Mutex<T = Orders>,
         logged: &mut Consumer<'static, Event>,
     ) {
-        if let Some(outputs) = &mut self.analog_outputs {
-            outputs.work();
-        }
+        self.analog_outputs.work();
 
-        let Orders { save, restart } = orders.lock(core::mem::take);
+        let Orders {
+            save,
+            restart,
+            identify,
+        } = orders.lock(core::mem::take);
         if save {
             self.persistence.begin(device);
         }
@@ -46,10 +48,13 @@ impl Background {
         }
         self.persistence.erase();
 
+        if identify {
+            self.signals.identify();
+        }
         let free = stack::free_low_water();
         let (failing, millis) = device.lock(|device| {
             device.state.stack_free = free;
-            (device.points.failing() != 0, device.state.millis())
+            (device.points.any_fails(), device.state.millis())
         });
         self.signals
             .show(millis, failing, || activity.lock(core::mem::take));

@@ -1,15 +1,15 @@
-//! The board's converter as the drivers take it.
+//! A slot's analog lines as the drivers take them.
 
-use board_support::{AdcError, AnalogInputs};
-use modio_drivers::AnalogSource;
+use board_support::{AnalogInputs, NotCalibrated};
+use modio_drivers::{AnalogSource, Code};
 
-/// The analog lines of the slot.
+/// The analog lines of a slot.
 pub struct Converter(pub AnalogInputs);
 
 impl AnalogSource for Converter {
-    type Error = AdcError;
+    type Error = NotCalibrated;
 
-    fn read(&mut self, line: u8) -> nb::Result<u16, AdcError> {
-        self.0.read(line)
+    fn read(&mut self, line: u8) -> nb::Result<Code, NotCalibrated> {
+        self.0.read(line).map(Code::new)
     }
 }

@@ -1,6 +1,6 @@
-//! The module in the slot, whichever it is.
+//! The modules in the slots, whichever they are.
 
-use board_support::{AnalogLines, DacBus, Slot, SlotInput, SlotOutput};
+use board_support::{AnalogLines, DacBus, Sampler, Slot, SlotInput, SlotOutput, boards::SLOTS};
 use modio_drivers::{
     Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, DacError, DacLink, DacWorker,
     Di4, Do4, IoModule, Kind, ModuleError, Relay2,
@@ -9,8 +9,9 @@ use register_map::Module;
 
 use crate::converter::Converter;
 
-/// Between the scan, which commands analog outputs, and the background, which brings them to the DAC.
-static DAC_LINK: DacLink = DacLink::new();
+/// Between the scan, which commands analog outputs, and the background, which brings them to the DACs: one for each
+/// slot.
+static DAC_LINKS: [DacLink; SLOTS] = [const { DacLink::new() }; SLOTS];
 
 /// A module with its slot's lines set up for it.
 pub enum Installed {
@@ -24,8 +25,13 @@ pub enum Installed {
 }
 
 impl Installed {
-    /// Sets the slot up for a module.
-    pub fn new(module: Module, slot: Slot) -> Self {
+    /// Sets the slot up for a module. The slot's DAC, if it has one, is at the other end of the link.
+    fn new(module: Module, slot: Slot, sampler: &mut Sampler, link: &'static DacLink) -> Self {
+        let mut analog = |slot: Slot, lines| {
+            let inputs = slot.into_analog(lines);
+            sampler.serve(&inputs);
+            Converter(inputs)
+        };
         match module {
             Module::None => Self::None(Absent),
             Module::Di4 => Self::Di4(Di4::new(slot.into_inputs())),
@@ -34,12 +40,9 @@ impl Installed {
                 let (jumpers, coils) = slot.into_relay();
                 Self::Relay2(Relay2::new(jumpers, coils))
             }
-            Module::Ai4 => Self::Ai4(Ai4::new(Converter(slot.into_analog(AnalogLines::Four)))),
-            Module::Ao4 => Self::Ao4(Ao4::new(&DAC_LINK)),
-            Module::Ai2Ao2 => {
-                let inputs = Converter(slot.into_analog(AnalogLines::Two));
-                Self::Ai2Ao2(Ai2Ao2::new(inputs, &DAC_LINK))
-            }
+            Module::Ai4 => Self::Ai4(Ai4::new(analog(slot, AnalogLines::Four))),
+            Module::Ao4 => Self::Ao4(Ao4::new(link)),
+            Module::Ai2Ao2 => Self::Ai2Ao2(Ai2Ao2::new(analog(slot, AnalogLines::Two), link)),
         }
     }
 
@@ -86,24 +89,47 @@ impl IoModule for Installed {
     }
 }
 
-/// The slow side of a module with analog outputs.
-pub struct AnalogOutputs(DacWorker<DacBus>);
+/// The slow side of the modules with analog outputs.
+pub struct AnalogOutputs {
+    bus: DacBus,
+    /// By slot; none where the module has no DAC.
+    workers: [Option<DacWorker>; SLOTS],
+}
 
 impl AnalogOutputs {
-    /// The DAC of this module, if it has one.
-    pub fn of(module: Module, bus: DacBus) -> Option<Self> {
-        match module {
-            Module::Ao4 | Module::Ai2Ao2 => Some(Self(DacWorker::new(bus))),
-            Module::None | Module::Di4 | Module::Do4 | Module::Relay2 | Module::Ai4 => None,
-        }
-    }
-
-    /// Brings to the DAC what is to be brought.
+    /// Brings to the DACs what is to be brought.
     pub fn work(&mut self) {
-        match self.0.work(&DAC_LINK) {
-            Ok(_) => {}
-            // The bus frees itself before its next transfer.
-            Err(DacError::NotAnswering(_) | DacError::Bus(_)) => {}
+        for (worker, link) in self.workers.iter_mut().zip(&DAC_LINKS) {
+            let Some(worker) = worker else {
+                continue;
+            };
+            match worker.work(&mut self.bus, link) {
+                Ok(_) => {}
+                // The bus frees itself before its next transfer.
+                Err(DacError::NotAnswering(_) | DacError::Bus(_)) => {}
+            }
         }
     }
+}
+
+/// Sets every slot up for its module.
+pub fn install(
+    modules: [Module; SLOTS],
+    slots: [Slot; SLOTS],
+    sampler: &mut Sampler,
+    bus: DacBus,
+) -> ([Installed; SLOTS], AnalogOutputs) {
+    let mut workers = [const { None }; SLOTS];
+    let mut installed = [const { Installed::None(Absent) }; SLOTS];
+    let plugged = modules.into_iter().zip(slots).zip(&DAC_LINKS);
+    for (((module, slot), link), (place, worker)) in
+        plugged.zip(installed.iter_mut().zip(&mut workers))
+    {
+        *worker = match module {
+            Module::Ao4 | Module::Ai2Ao2 => Some(DacWorker::new(slot.dac_address())),
+            Module::None | Module::Di4 | Module::Do4 | Module::Relay2 | Module::Ai4 => None,
+        };
+        *place = Installed::new(module, slot, sampler, link);
+    }
+    (installed, AnalogOutputs { bus, workers })
 }

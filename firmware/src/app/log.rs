@@ -1,25 +1,25 @@
 //! The log: lines on RTT channel 0, for a probe or the simulator. When nobody reads, what no longer
 //! fits is left out; nothing ever waits.
 
-use board_support::{ClockSource, design::CRYSTAL_FAULTS, fault, tolerance, uart};
+use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault, tolerance, uart};
 use firmware::{config, start_up::Address};
 use heapless::Vec;
 use modio_drivers::ModuleError;
 use register_map::{
     Module,
-    codes::{Format, Mode},
+    codes::{FaultKind, Format, Mode},
 };
 use rtt_target::UpChannel;
 
-use crate::rtt;
+use crate::{board::BOARD, rtt};
 
 /// What can happen while the device runs.
 #[derive(Clone, Copy)]
 pub enum Event {
-    /// The slot's module began to fail.
-    ModuleFails(ModuleError),
-    /// The slot's module works again.
-    ModuleGood,
+    /// The module in this port's slot began to fail.
+    ModuleFails(u16, ModuleError),
+    /// The module in this port's slot works again.
+    ModuleGood(u16),
     /// The communication watchdog has tripped.
     CommunicationLost,
     /// The configuration is stored.
@@ -36,10 +36,11 @@ pub enum Event {
 pub struct Start {
     pub address: Address,
     pub dip: u8,
-    pub line: config::Line,
+    pub line: config::LineConfig,
     /// The same, as the UART has it.
     pub on_wire: uart::LineSettings,
-    pub module: Module,
+    /// By slot.
+    pub modules: [Module; SLOTS],
     pub clock: ClockSource,
     pub reset_cause: u8,
     pub faults: fault::FaultRecord,
@@ -57,13 +58,13 @@ const CAUSES: [&str; 6] = [
 ];
 
 /// Bytes of the longest line, its end included; what is longer is cut.
-const LINE: usize = 80;
+const LONGEST: usize = 80;
 
 /// A line in the making. Pieced together by hand: `core::fmt` is large and can panic, and what takes its
 /// place in other firmware expands into code of its own at every line.
-struct Line(Vec<u8, LINE>);
+struct Text(Vec<u8, LONGEST>);
 
-impl Line {
+impl Text {
     fn of(text: &str) -> Self {
         let mut line = Self(Vec::new());
         line.text(text);
@@ -96,6 +97,13 @@ impl Line {
     }
 }
 
+/// A line about the slot of a port.
+fn slot(port: u16) -> Text {
+    let mut line = Text::of("slot ");
+    line.number(port.into()).text(": ");
+    line
+}
+
 /// The log's writer.
 pub struct Log(Option<UpChannel>);
 
@@ -117,16 +125,16 @@ impl Log {
             Format::F7N2 => "7N2",
         };
         let baud = start.line.baud.bits_per_second();
-        let version = concat!("modio ", env!("CARGO_PKG_VERSION"), " on modio-02, ");
         let mode = match start.line.mode {
             Mode::Rtu => "",
             Mode::Ascii => " ASCII",
         };
-        let mut line = Line::of(version);
+        let mut line = Text::of(concat!("modio ", env!("CARGO_PKG_VERSION"), " on "));
+        line.text(BOARD.name).text(", ");
         self.write(line.number(baud).text(" ").text(format).text(mode));
         for (bit, cause) in CAUSES.iter().enumerate() {
             if start.reset_cause & (1 << bit) != 0 {
-                self.write(Line::of("reset: ").text(cause));
+                self.write(Text::of("reset: ").text(cause));
             }
         }
         let fault = match start.faults.fault.kind {
@@ -138,7 +146,7 @@ impl Log {
             fault::Kind::StackOverflow => Some("stack overflow"),
         };
         if let Some(fault) = fault {
-            let mut line = Line::of("last fault: ");
+            let mut line = Text::of("last fault: ");
             self.write(line.text(fault));
         }
         if start.clock == ClockSource::Internal {
@@ -147,52 +155,71 @@ impl Log {
             } else {
                 "the crystal failed twice: internal oscillator until power-on"
             };
-            self.write(&mut Line::of(text));
+            self.write(&mut Text::of(text));
             if !tolerance::internal_oscillator_serves(start.on_wire) {
                 let text = "warning: too fast for the internal oscillator at all temperatures";
-                self.write(&mut Line::of(text));
+                self.write(&mut Text::of(text));
             }
         }
         match start.address {
-            Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
-            Address::Loader => self.write(&mut Line::of("unit address 255 (loader mode)")),
+            Address::Unit(unit) => self.write(Text::of("unit address ").number(unit.into())),
+            Address::Loader => self.write(&mut Text::of("unit address 255 (loader mode)")),
             Address::Invalid => {
                 let text = ", which is no unit address: the line stays silent";
-                self.write(Line::of("SW01 shows ").number(start.dip.into()).text(text));
+                self.write(Text::of("SW01 shows ").number(start.dip.into()).text(text));
             }
         }
         if start.config_invalid {
             let text = "configuration: what was stored is damaged, defaults are in force";
-            self.write(&mut Line::of(text));
+            self.write(&mut Text::of(text));
         }
-        self.write(Line::of("slot 5: ").text(start.module.name()));
+        for (port, module) in BOARD.ports().zip(start.modules) {
+            self.write(slot(port).text(module.name()));
+        }
     }
 
     /// Something happened.
     pub fn event(&mut self, event: Event) {
         let text = match event {
-            Event::ModuleFails(error) => match error.first_line() {
-                Some(channel) => {
-                    let mut line = Line::of("slot 5: channel ");
-                    return self.write(line.number(channel as u32 + 1).text(" fails"));
-                }
-                None => "slot 5: the module does not answer",
-            },
-            Event::ModuleGood => "slot 5: the module works again",
+            Event::ModuleFails(port, error) => {
+                let mut line = slot(port);
+                return self.write(match error.first_line() {
+                    Some(channel) => {
+                        let channel = channel as u32 + 1;
+                        line.text("channel ").number(channel).text(" fails")
+                    }
+                    None => line.text("the module does not answer"),
+                });
+            }
+            Event::ModuleGood(port) => {
+                return self.write(slot(port).text("the module works again"));
+            }
             Event::CommunicationLost => "communication lost: outputs go to SAFE",
             Event::Saved => "configuration saved",
             Event::SaveFailed => "configuration: the flash does not take it",
             Event::LineRepaired => "line: set up again after a disturbance",
             Event::LowSupply => "configuration: the supply is too low, the flash has to wait",
         };
-        self.write(&mut Line::of(text));
+        self.write(&mut Text::of(text));
     }
 
     /// Ends a line and writes it whole, or leaves it out when it does not fit.
-    fn write(&mut self, line: &mut Line) {
+    fn write(&mut self, line: &mut Text) {
         if let Some(channel) = &mut self.0 {
             channel.write(&line.text("\n").0);
         }
+    }
+}
+
+/// What the fault's register calls it.
+const fn kind_of(kind: fault::Kind) -> FaultKind {
+    match kind {
+        fault::Kind::None => FaultKind::None,
+        fault::Kind::Panic => FaultKind::Panic,
+        fault::Kind::HardFault => FaultKind::HardFault,
+        fault::Kind::Watchdog => FaultKind::Watchdog,
+        fault::Kind::Crystal => FaultKind::Crystal,
+        fault::Kind::StackOverflow => FaultKind::StackOverflow,
     }
 }
 
@@ -208,7 +235,7 @@ pub fn fault_words(record: &fault::FaultRecord) -> [u16; 16] {
         crystal_faults: _,
     } = *record;
     [
-        fault.kind as u16,
+        kind_of(fault.kind).code(),
         count,
         high(fault.pc),
         low(fault.pc),

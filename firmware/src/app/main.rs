@@ -22,6 +22,7 @@
 #![no_main]
 
 mod background;
+mod board;
 mod clock;
 mod converter;
 mod every;
@@ -43,16 +44,13 @@ mod app {
     use core::mem::MaybeUninit;
 
     use board_support::{ScanTimer, Watchdog, fault, pac::Interrupt};
-    use firmware::{
-        alive::{self, Task},
-        device::Device,
-    };
+    use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
 
     use crate::{
-        background::Background, clock, line::Line, log::Event, orders::Orders, scanning::Scanning,
-        serving::Serving, signals::Signals, start,
+        background::Background, board::Device, clock, line::Line, log::Event, orders::Orders,
+        scanning::Scanning, serving::Serving, signals::Signals, start,
     };
 
     #[shared]
@@ -88,7 +86,6 @@ mod app {
         let (events, logged) = cx.local.queue.split();
         started.scan_timer.start();
         started.watchdog.arm();
-        let settings = *started.device.points.settings();
         (
             Shared {
                 line: started.line,
@@ -98,8 +95,8 @@ mod app {
             },
             Local {
                 scan_timer: started.scan_timer,
-                serving: Serving::new(started.server, started.frame_gap_ms),
-                scanning: Scanning::new(started.module, settings),
+                serving: Serving::new(started.server, started.unit, started.frame_gap_ms),
+                scanning: started.scanning,
                 events,
                 background_work: Background {
                     analog_outputs: started.analog_outputs,
@@ -139,10 +136,10 @@ mod app {
     #[task(binds = TIM2, priority = 4, shared = [line])]
     fn gap(mut cx: gap::Context) {
         alive::begin(fault::marks(), Task::Line);
-        let waits = cx
-            .shared
-            .line
-            .lock(|line| line.as_mut().is_some_and(Line::on_gap));
+        let waits = cx.shared.line.lock(|line| {
+            line.as_mut()
+                .is_some_and(|line| line.on_gap(clock::millis()))
+        });
         if waits {
             rtic::pend(Interrupt::EXTI3);
         }

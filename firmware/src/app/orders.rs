@@ -1,8 +1,9 @@
 //! What requests order of the background.
 
-/// A save and a restart may be ordered before the background takes either: neither replaces the other.
+/// Several orders may arrive before the background takes them: none replaces another.
 #[derive(Default)]
 pub struct Orders {
     pub save: bool,
     pub restart: bool,
+    pub identify: bool,
 }

@@ -1,25 +1,15 @@
 //! The board's flash as the store takes it.
 
-use board_support::{
-    design::STORE_PAGES,
-    flash::{Flash, FlashError},
-};
+use board_support::flash::{Flash, FlashError};
 use firmware::store::{self, Page};
-use register_map::record::{PAGE_ADDRESSES, PAGE_SIZE};
 
-const _: () = {
-    let ([a, b], [first, second]) = (STORE_PAGES, PAGE_ADDRESSES);
-    assert!(
-        a == first && b == second,
-        "board and map mean the same pages"
-    );
-};
+use crate::board::BOARD;
 
 /// The store's two pages.
 pub struct Pages(pub Flash);
 
 const fn address(page: Page) -> u32 {
-    let [first, second] = PAGE_ADDRESSES;
+    let [first, second] = BOARD.store.addresses();
     match page {
         Page::First => first,
         Page::Second => second,
@@ -36,7 +26,7 @@ impl Pages {
 impl store::Flash for Pages {
     type Error = FlashError;
 
-    fn page(&self, page: Page) -> &[u8; PAGE_SIZE] {
+    fn page(&self, page: Page) -> &[u8] {
         let [first, second] = self.0.pages();
         match page {
             Page::First => first,

@@ -6,12 +6,15 @@
 use board_support::flash::FlashError;
 use firmware::{
     config::Settings,
-    device::Device,
     store::{Operation, Saving, Store, StoreError},
 };
 use rtic::Mutex;
 
-use crate::{log::Event, pages::Pages};
+use crate::{
+    board::{BOARD, Device},
+    log::Event,
+    pages::Pages,
+};
 
 /// The store, and a save under way.
 pub struct Persistence {
@@ -124,7 +127,7 @@ impl Persistence {
             self.end(device);
             Event::Saved
         } else {
-            let stored = self.store.load(&self.pages).settings;
+            let stored = self.store.load(BOARD, &self.pages).settings;
             device.lock(|device| device.config.save_failed(stored));
             Event::SaveFailed
         })

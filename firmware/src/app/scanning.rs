@@ -1,31 +1,47 @@
 //! A scan: inputs into the device, outputs out of it, its time-outs.
 
-use board_support::{fault, pac::Interrupt};
-use firmware::{device::Device, lamps::TICK_MS};
+use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
+use firmware::{device::IoPort, lamps::TICK_MS};
 use heapless::spsc::Producer;
-use modio_drivers::{ChannelSettings, IoModule, ModuleError};
+use modio_drivers::{IoModule, ModuleError};
 use rtic::Mutex;
 
-use crate::{clock, every::Every, installed::Installed, line::Line, log::Event};
+use crate::{
+    board::{BOARD, Device},
+    clock,
+    every::Every,
+    installed::Installed,
+    line::Line,
+    log::Event,
+};
 
 /// Scans between two beats of the background, and between two proofs of life.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
 const SCANS_PER_PROOF: u8 = 100;
 
-/// The module, and what its scans are about.
+/// The modules, and what their scans are about.
 pub struct Scanning {
-    module: Installed,
-    settings: [ChannelSettings; 4],
+    modules: [Installed; SLOTS],
+    /// Of the settings that the modules were configured with.
+    revision: u16,
+    sampler: Sampler,
     background_beat: Every,
     proof_beat: Every,
 }
 
 impl Scanning {
-    /// The module has been configured with these settings.
-    pub const fn new(module: Installed, settings: [ChannelSettings; 4]) -> Self {
+    /// Configures the modules and drives their outputs for the first time. The sampler serves their analog lines.
+    pub fn new(mut modules: [Installed; SLOTS], sampler: Sampler, device: &Device) -> Self {
+        let ports = device.points.ports();
+        for (module, port) in modules.iter_mut().zip(ports) {
+            module.configure(port.settings());
+            // A module that cannot be driven is told by the first scan.
+            let _ = module.drive_outputs(port.channels());
+        }
         Self {
-            module,
-            settings,
+            modules,
+            revision: device.config.revision(),
+            sampler,
             background_beat: Every::new(SCANS_PER_BACKGROUND),
             proof_beat: Every::new(SCANS_PER_PROOF),
         }
@@ -39,47 +55,63 @@ impl Scanning {
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
-        let (mut channels, wanted, uptime_s, beat, tripped) = device.lock(|device| {
+        // Filled where they stand: a lock that returns them copies them once more, in every scan.
+        let mut settings = None;
+        let (mut channels, revision, uptime_s, beat, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
-            let tripped = passed > 0 && device.tick(passed);
-            let wanted = *device.points.settings();
-            let uptime_s = device.state.uptime_s();
-            (
-                *device.points.channels(),
-                wanted,
-                uptime_s,
-                passed > 0,
-                tripped,
-            )
+            let beat = passed > 0;
+            let tripped = beat && device.tick(passed);
+            let ports = device.points.ports().each_ref();
+            let channels = ports.map(|port| *port.channels());
+            // Together with the words, which are in the units that these settings say.
+            let revision = device.config.revision();
+            if revision != self.revision {
+                settings = Some(ports.map(|port| *port.settings()));
+            }
+            (channels, revision, device.state.uptime_s(), beat, tripped)
         });
-        if self.settings != wanted {
-            self.settings = wanted;
-            self.module.configure(&self.settings);
+        self.revision = revision;
+        if let Some(settings) = settings {
+            for (module, settings) in self.modules.iter_mut().zip(&settings) {
+                module.configure(settings);
+            }
         }
-        let mut result = self.module.drive_outputs(&channels);
+
+        let mut results = [Ok(()); SLOTS];
+        let modules = self.modules.iter_mut().zip(&channels);
+        for ((module, channels), result) in modules.zip(&mut results) {
+            *result = module.drive_outputs(channels);
+        }
         if beat {
-            result = ModuleError::in_either(result, self.module.read_inputs(&mut channels));
+            self.sampler.run();
+            let modules = self.modules.iter_mut().zip(&mut channels);
+            for ((module, channels), result) in modules.zip(&mut results) {
+                *result = ModuleError::in_either(*result, module.read_inputs(channels));
+            }
         }
         let changed = device.lock(|device| {
-            if beat {
-                device.points.scanned(&channels, &self.settings);
+            let words = self.revision == device.config.revision();
+            let mut changed = [false; SLOTS];
+            let ports = device.points.ports_mut().iter_mut().zip(&mut changed);
+            for ((port, changed), (channels, result)) in ports.zip(channels.iter().zip(&results)) {
+                if beat {
+                    port.scanned(channels, words);
+                }
+                *changed = take_failures(port, *result, beat);
             }
-            let was_failing = device.points.failing();
-            let failed = result.map_or_else(ModuleError::channels, |()| 0);
-            // Only a whole scan shows that all is well.
-            let is_failing = if beat { failed } else { failed | was_failing };
-            device.points.set_failing(is_failing);
-            is_failing != was_failing
+            changed
         });
 
-        if changed {
-            tell(
-                events,
-                match result {
-                    Ok(()) => Event::ModuleGood,
-                    Err(error) => Event::ModuleFails(error),
-                },
-            );
+        for ((port, changed), result) in BOARD.ports().zip(changed).zip(results) {
+            if changed {
+                tell(
+                    events,
+                    match result {
+                        Ok(()) => Event::ModuleGood(port),
+                        Err(error) => Event::ModuleFails(port, error),
+                    },
+                );
+            }
         }
         if tripped {
             tell(events, Event::CommunicationLost);
@@ -116,6 +148,16 @@ impl Scanning {
             rtic::pend(Interrupt::EXTI3);
         }
     }
+}
+
+/// Takes note of the channels that failed. Whether others did before.
+fn take_failures(port: &mut IoPort, result: Result<(), ModuleError>, beat: bool) -> bool {
+    let before = port.failing();
+    let failed = result.map_or_else(ModuleError::channels, |()| 0);
+    // Only a whole scan shows that all is well.
+    let now = if beat { failed } else { failed | before };
+    port.set_failing(now);
+    now != before
 }
 
 fn tell(events: &mut Producer<'static, Event>, event: Event) {

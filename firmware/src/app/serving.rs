@@ -8,25 +8,28 @@
 //! Between the phases no lock is held, and in the line's no more is done than has to be: its interrupts wait.
 
 use board_support::pac::Interrupt;
-use firmware::{device::Device, start_up::LOADER_UNIT};
+use firmware::start_up::LOADER_UNIT;
 use modbus_server::{Outcome, Request, Server};
 use register_map::codes::Command;
 use rtic::Mutex;
 
-use crate::{line::Line, orders::Orders};
+use crate::{board::Device, line::Line, orders::Orders};
 
 /// The server of a line.
 pub struct Serving {
     server: Server,
+    /// The unit address.
+    unit: u8,
     /// The silence that ends a frame, in ms, rounded up.
     frame_gap_ms: u32,
 }
 
 impl Serving {
     /// `frame_gap_ms`: the silence that ends a frame, rounded up.
-    pub const fn new(server: Server, frame_gap_ms: u32) -> Self {
+    pub const fn new(server: Server, unit: u8, frame_gap_ms: u32) -> Self {
         Self {
             server,
+            unit,
             frame_gap_ms,
         }
     }
@@ -53,7 +56,7 @@ impl Serving {
     }
 
     fn delay_ms(&self, device: &mut impl Mutex<T = &'static mut Device>) -> u16 {
-        if self.server.unit() == LOADER_UNIT {
+        if self.unit == LOADER_UNIT {
             // A master must find a unit in loader mode, however short the master's time-out is.
             0
         } else {
@@ -88,7 +91,7 @@ impl Serving {
         line.lock(|line| line.as_mut().map(|line| line.finish(served)));
         if decision.work.writes() {
             rtic::pend(Interrupt::EXTI1);
-            if decision.reply.is_none() {
+            if !decision.is_answered() {
                 // No reply to wait for: an order is carried out now.
                 rtic::pend(Interrupt::EXTI3);
             }
@@ -110,6 +113,7 @@ fn pass_order_on(
         orders.lock(|orders| match order {
             Command::Save => orders.save = true,
             Command::Restart => orders.restart = true,
+            Command::Identify => orders.identify = true,
             _ => {}
         });
         rtic::pend(Interrupt::EXTI0);

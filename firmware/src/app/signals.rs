@@ -23,6 +23,11 @@ impl Signals {
         }
     }
 
+    /// COMMAND 6: all LEDs blink for a while.
+    pub const fn identify(&mut self) {
+        self.lamps.identify();
+    }
+
     /// Sets them, if it is time. `request`, asked then alone: has one been served since?
     pub fn show(&mut self, millis: u32, module_fails: bool, request: impl FnOnce() -> bool) {
         if millis.wrapping_sub(self.set_at) < u32::from(TICK_MS) {

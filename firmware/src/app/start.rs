@@ -8,7 +8,7 @@ use board_support::{
 use cortex_m::peripheral::SCB;
 use firmware::{
     config::{self, Config},
-    device::{Device, Identity},
+    device::Identity,
     lamps::Trouble,
     start_up::{self, Address},
     store::{Store, StoreError},
@@ -21,11 +21,13 @@ use modio_drivers::IoModule;
 use register_map::codes::{Format, GapRule, Mode};
 
 use crate::{
-    installed::{AnalogOutputs, Installed},
-    line::Line,
+    board::{BOARD, DESCRIPTION, Device},
+    installed::{AnalogOutputs, install},
+    line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
     pages::Pages,
     persistence::Persistence,
+    scanning::Scanning,
 };
 
 /// The highest priority of a task whose code is in flash.
@@ -34,12 +36,14 @@ const SERVE_PRIORITY: u8 = 3;
 /// What start-up brings about.
 pub struct Started {
     pub line: Option<Line>,
+    /// The unit address.
+    pub unit: u8,
     /// The silence that ends a frame, in ms, rounded up.
     pub frame_gap_ms: u32,
     pub server: Server,
     pub device: &'static mut Device,
-    pub module: Installed,
-    pub analog_outputs: Option<AnalogOutputs>,
+    pub scanning: Scanning,
+    pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
@@ -63,14 +67,18 @@ pub fn up(
 
     let mut pages = Pages(board.flash);
     let mut store = Store::open(&pages);
-    let loaded = store.load(&pages);
-    let config = Config::new(loaded.settings, loaded.invalid || loaded.rejected > 0);
-    let slot = config.slot();
+    let loaded = store.load(BOARD, &pages);
+    let config = Config::new(
+        BOARD,
+        loaded.settings,
+        loaded.invalid || loaded.rejected > 0,
+    );
+    let installed = config.ports().map(|port| port.module);
     let settings = start_up::line(address, config.line());
     let on_wire = wire_settings(settings);
 
-    let mut module = Installed::new(slot.module, board.slot);
-    let analog_outputs = AnalogOutputs::of(slot.module, board.dac);
+    let mut sampler = board.sampler;
+    let (modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
@@ -78,17 +86,16 @@ pub fn up(
         fault: log::fault_words(&board.faults),
         internal_oscillator: !board.clock.is_crystal(),
     };
-    let device = place.write(Device::new(module.kinds(), config, identity));
-    module.configure(device.points.settings());
-    // A module that cannot be driven is told by the first scan.
-    let _ = module.drive_outputs(device.points.channels());
+    let kinds = modules.each_ref().map(IoModule::kinds);
+    let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
+    let scanning = Scanning::new(modules, sampler, device);
 
     log.start(&log::Start {
         address,
         dip: board.dip,
         line: settings,
         on_wire,
-        module: slot.module,
+        modules: installed,
         clock: board.clock,
         reset_cause: board.reset_cause,
         faults: board.faults,
@@ -134,15 +141,17 @@ pub fn up(
         let (uart, gap) = board.line.start(on_wire, times)?;
         // The count may begin just before a beat.
         let longest_ms = (limit_us / 1000) as u16 + 2;
-        Some(Line::new(uart, gap, Port::new(receiver, adus), longest_ms))
+        let port = Port::new(receiver, adus);
+        Some(Line::new(Rs485Uart(uart), Rs485Gap(gap), port, longest_ms))
     });
 
     Started {
         line,
         frame_gap_ms: t35.div_ceil(1_000_000),
-        server: Server::new(identity.unit, framing),
+        unit: identity.unit,
+        server: Server::new(framing),
         device,
-        module,
+        scanning,
         analog_outputs,
         persistence: Persistence::new(store, pages, erase),
         scan_timer: board.scan_timer,
@@ -167,7 +176,7 @@ fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     us + us / 50 + 500
 }
 
-fn wire_settings(line: config::Line) -> uart::LineSettings {
+fn wire_settings(line: config::LineConfig) -> uart::LineSettings {
     uart::LineSettings {
         baud: line.baud.bits_per_second(),
         format: match line.format {

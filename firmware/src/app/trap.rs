@@ -9,7 +9,7 @@
 //! | NMI | crystal failed: the clock security system is all that raises it (RM0008 7.2.7, table 63) |
 //! | an interrupt without a handler | hard fault with CFSR 0 |
 //!
-//! Safe is: the slot's lines floating and the RS-485 driver off. An analog module's DAC is out of reach
+//! Safe is: the lines of all slots floating and the RS-485 driver off. An analog module's DAC is out of reach
 //! and keeps its last codes until the next start writes them.
 
 use core::{arch::naked_asm, panic::PanicInfo, ptr};

@@ -1,15 +1,16 @@
 //! The settings as the rest of the device takes them: typed, and those in force.
 
+use modio_drivers::{ChannelSettings, Scale, Signal};
 use register_map::Module;
-use register_map::codes::{AirRate, Baud, Format, GapRule, Mode, Power, Scale, Signal};
+use register_map::codes::{Baud, Format, GapRule, Mode};
 use register_map::configuration as at;
-use register_map::points::{CHANNELS, PointKind, SLOT_FIRST, SLOT_PORT};
+use register_map::points::{self, CHANNELS};
 
 use super::Settings;
 
 /// The RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Line {
+pub struct LineConfig {
     /// Speed.
     pub baud: Baud,
     /// Parity and stop bits.
@@ -22,7 +23,7 @@ pub struct Line {
     pub gap_rule: GapRule,
 }
 
-impl Line {
+impl LineConfig {
     /// As the factory sets it: 9600 8N2 RTU. The loader mode has this whatever is stored.
     pub const FACTORY: Self = Self {
         baud: Baud::B9600,
@@ -44,84 +45,51 @@ impl Line {
     }
 }
 
-/// The LoRa line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lora {
-    /// Address of the LoRa module.
-    pub address: u16,
-    /// Channel: 410 MHz + n, 0 to 31.
-    pub channel: u8,
-    /// Speed on the air.
-    pub air_rate: AirRate,
-    /// Power on the air.
-    pub power: Power,
-    /// Silence that ends a frame, in ms, 5 to 500.
-    pub frame_gap_ms: u16,
-}
-
-impl Lora {
-    /// `None`: the line is off.
-    #[must_use]
-    pub fn of(settings: &Settings) -> Option<Self> {
-        let get = |address| settings.get(address);
-        (get(at::LORA) != 0).then(|| Self {
-            address: get(at::LORA_ADDRESS),
-            channel: get(at::LORA_CHANNEL).to_le_bytes()[0],
-            air_rate: AirRate::from_code(get(at::LORA_AIR_RATE)).unwrap_or(AirRate::K2d4),
-            power: Power::from_code(get(at::LORA_POWER)).unwrap_or(Power::Dbm20),
-            frame_gap_ms: get(at::LORA_FRAME_GAP),
-        })
-    }
-}
-
-/// A point of the slot, for the module in force.
+/// The settings by point of one point, for the module in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Point {
-    /// What the module makes of it.
-    pub kind: PointKind,
-    /// A bit input's debounce in ms, 0 to 1000; an analog input's low-pass over 2^n samples, n 0 to 8.
-    pub filter: u16,
-    /// NTC constant in K, 2000 to 5000.
-    pub beta: u16,
-    /// Its signal; never NTC for an output.
-    pub signal: Signal,
-    /// How it is counted.
-    pub scale: Scale,
+    /// How its channel is read or driven.
+    pub settings: ChannelSettings,
     /// Output when the line falls silent: 0 or 1 for a bit, 0 to 4095 raw for a word; `None`: hold.
     pub safe: Option<u16>,
 }
 
 impl Point {
-    pub(super) fn of(settings: &Settings, channel: u16) -> Self {
-        let point = SLOT_FIRST.wrapping_add(channel);
+    /// Of a point, 0 to 31.
+    pub(super) fn of(settings: &Settings, point: u16) -> Self {
         let get = |first: u16| settings.get(first.wrapping_add(point));
         Self {
-            kind: settings.kind(point),
-            filter: get(at::FILTER),
-            beta: get(at::BETA),
-            signal: Signal::from_code(get(at::RANGE)).unwrap_or(Signal::Voltage),
-            scale: Scale::from_code(get(at::SCALE)).unwrap_or(Scale::Raw),
+            settings: ChannelSettings {
+                filter: get(at::FILTER),
+                beta: get(at::BETA),
+                signal: Signal::from_code(get(at::RANGE)).unwrap_or_default(),
+                scale: Scale::from_code(get(at::SCALE)).unwrap_or_default(),
+            },
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
         }
     }
 }
 
-/// The slot's module and its outputs at power-on.
+/// A port's module and its outputs at power-on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slot {
+pub struct PortConfig {
     /// The module.
     pub module: Module,
     /// START by channel: 0 or 1 for a bit, 0 to 4095 raw for a word.
     pub start: [u16; CHANNELS as usize],
 }
 
-impl Slot {
-    pub(super) fn of(settings: &Settings) -> Self {
-        let module = settings.module(SLOT_PORT);
+impl PortConfig {
+    /// Of a port, 1 to 8.
+    pub(super) fn of(settings: &Settings, port: u16) -> Self {
+        let first = points::of_port(port);
         let mut start = [0; CHANNELS as usize];
-        for (point, start) in (SLOT_FIRST..).zip(&mut start) {
+        for (point, start) in (first..).zip(&mut start) {
             *start = settings.get(at::START.wrapping_add(point));
         }
-        Self { module, start }
+        Self {
+            module: settings.module(port),
+            start,
+        }
     }
 }

@@ -21,24 +21,27 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+use core::array;
+
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::Command;
 use register_map::configuration::{
-    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, MODE, RESPONSE_DELAY, RULES,
+    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, MODE, MODULE, RESPONSE_DELAY, RULES,
 };
-use register_map::points::{CHANNELS, PointKind, SLOT_FIRST, SLOT_PORT};
+use register_map::points::{self, CHANNELS};
 use register_map::state::status;
-use register_map::{Run, runs};
+use register_map::{Board, Run, runs};
 
-pub use in_force::{Line, Lora, Point, Slot};
+pub use in_force::{LineConfig, Point, PortConfig};
 use lock::Lock;
 pub use settings::RestartValues;
 pub use settings::Settings;
-use settings::{RESTARTS, format_suits_mode};
+use settings::{RESTARTS, format_suits_mode, takes_module};
 
-/// The configuration of a running device.
+/// The configuration of a running device on a board with so many slots.
 #[derive(Debug)]
-pub struct Config {
+pub struct Config<const SLOTS: usize> {
+    board: &'static Board,
     edited: Settings,
     /// What is stored, or what is just being stored.
     saved: Settings,
@@ -47,33 +50,37 @@ pub struct Config {
     /// A save was ordered and is not complete.
     saving: bool,
     lock: Lock,
-    line: Line,
-    slot: Slot,
+    line: LineConfig,
+    /// Of the ports with slots.
+    ports: [PortConfig; SLOTS],
     /// The settings that need a restart, as they were at the start.
     started: [u16; RESTARTS],
     /// What was stored at the start was not good, or not all of it.
     invalid: bool,
     /// A saved change waits for a restart.
     waiting: bool,
-    /// The slot's MODULE has been another than the one in force since the start, or since changes were
-    /// last dropped.
-    left: bool,
+    /// Ports whose MODULE has been another than the one in force since the start, or since changes were
+    /// last dropped; the board's first port in bit 0.
+    left: u8,
     revision: u16,
 }
 
-impl Config {
-    /// The configuration at the start. `invalid`: what was stored is not good, or a part of it, and has
-    /// defaults in its place.
+impl<const SLOTS: usize> Config<SLOTS> {
+    /// The configuration at the start, on a board with `SLOTS` slots. `invalid`: what was stored is not good, or a
+    /// part of it, and has defaults in its place.
     #[must_use]
     #[inline(never)]
-    pub fn new(stored: Settings, invalid: bool) -> Self {
+    pub fn new(board: &'static Board, stored: Settings, invalid: bool) -> Self {
         let mut started = [0; RESTARTS];
         for (place, value) in started.iter_mut().zip(stored.restart_values()) {
             *place = value;
         }
         Self {
-            line: Line::of(&stored),
-            slot: Slot::of(&stored),
+            board,
+            line: LineConfig::of(&stored),
+            ports: array::from_fn(|index| {
+                PortConfig::of(&stored, board.first_port.wrapping_add(index as u16))
+            }),
             edited: stored.clone(),
             saved: stored,
             differences: 0,
@@ -82,7 +89,7 @@ impl Config {
             started,
             invalid,
             waiting: false,
-            left: false,
+            left: 0,
             revision: 0,
         }
     }
@@ -120,12 +127,10 @@ impl Config {
         let runs = runs(RULES, span.start(), span.count());
         let runs = runs.ok_or(Exception::IllegalDataAddress)?;
         let mut values = words;
-        let kinds = self.edited.module(SLOT_PORT).points();
         for run in runs {
             let of_run = values.slice(0, run.count);
             values = values.slice(run.count, u16::MAX);
-            if !run.rule.values.allow_all(of_run.iter()) || !suit_the_slot(kinds, run, span, words)
-            {
+            if !run.rule.values.allow_all(of_run.iter()) || !self.suits_the_ports(run, of_run) {
                 return Err(Exception::IllegalDataValue);
             }
         }
@@ -138,6 +143,29 @@ impl Config {
             return Err(Exception::ServerDeviceBusy);
         }
         Ok(())
+    }
+
+    /// Whether values for points are such as their ports' modules allow, and values for MODULE such as the board's
+    /// slots allow.
+    fn suits_the_ports(&self, run: Run, words: Words<'_>) -> bool {
+        if run.rule.first == MODULE {
+            return (run.index..)
+                .zip(words.iter())
+                .all(|(index, code)| takes_module(self.board, index.wrapping_add(1), code));
+        }
+        let Some(narrower) = run.rule.narrower else {
+            return true;
+        };
+        // Points of ports without a slot have no module that could ask for less.
+        self.board.ports().all(|port| {
+            let kinds = self.edited.module(port).points();
+            (points::of_port(port)..).zip(kinds).all(|(point, kind)| {
+                kind != narrower.kind
+                    || words
+                        .get(point.wrapping_sub(run.index))
+                        .is_none_or(|word| narrower.values.allow(word))
+            })
+        })
     }
 
     /// Whether FORMAT and MODE can be used together once these values are written.
@@ -199,7 +227,12 @@ impl Config {
     fn edited_anew(&mut self) {
         self.differences = self.edited.differences(&self.saved);
         self.revision = self.revision.wrapping_add(1);
-        self.left |= self.edited.module(SLOT_PORT) != self.slot.module;
+        for (index, port) in self.ports.iter().enumerate() {
+            let number = self.board.first_port.wrapping_add(index as u16);
+            if self.edited.module(number) != port.module {
+                self.left |= 1 << (index & 7);
+            }
+        }
     }
 
     /// COMMAND 3: every setting to its default. Saved are they not.
@@ -211,7 +244,7 @@ impl Config {
     /// COMMAND 4: every setting to what is saved.
     pub fn drop_changes(&mut self) {
         self.edited.clone_from(&self.saved);
-        self.left = false;
+        self.left = 0;
         self.edited_anew();
     }
 
@@ -239,7 +272,7 @@ impl Config {
     /// [`Settings::needs_restart`].
     pub const fn end_save(&mut self, changed: bool) {
         self.saving = false;
-        self.waiting = self.left || changed;
+        self.waiting = self.left != 0 || changed;
     }
 
     /// The save did not succeed; `stored` is what is stored, as before.
@@ -280,22 +313,32 @@ impl Config {
 
     /// The RS-485 line in force.
     #[must_use]
-    pub const fn line(&self) -> Line {
+    pub const fn line(&self) -> LineConfig {
         self.line
     }
 
-    /// The slot's module in force and its outputs at power-on.
+    /// The board.
     #[must_use]
-    pub const fn slot(&self) -> Slot {
-        self.slot
+    pub const fn board(&self) -> &'static Board {
+        self.board
     }
 
-    /// The settings of the slot's points in force, by channel. `None` once MODULE has been changed, up
-    /// to the restart, even if it was changed back: the settings by point went to the new module's
-    /// defaults, and for what runs those hold that were given here last.
+    /// The modules in force and their outputs at power-on, of every port that has a slot, in the order of the ports.
     #[must_use]
-    pub fn points(&self) -> Option<impl Iterator<Item = Point>> {
-        (!self.left).then(|| (0..CHANNELS).map(|channel| Point::of(&self.edited, channel)))
+    pub const fn ports(&self) -> &[PortConfig; SLOTS] {
+        &self.ports
+    }
+
+    /// The settings in force of a port's points, by channel; `index` counts the ports that have a slot. `None` once
+    /// the port's MODULE has been changed, up to the restart, even if it was changed back: the settings by point went
+    /// to the new module's defaults, and for what runs those hold that were given here last.
+    #[must_use]
+    pub fn points(&self, index: usize) -> Option<impl Iterator<Item = Point>> {
+        let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
+        let in_force = self.left >> (index & 7) & 1 == 0;
+        in_force.then(|| {
+            (first..first.wrapping_add(CHANNELS)).map(|point| Point::of(&self.edited, point))
+        })
     }
 
     /// COMM_TIMEOUT in milliseconds, up to an hour; `None`: the communication watchdog is off.
@@ -310,25 +353,4 @@ impl Config {
     pub fn response_delay_ms(&self) -> u16 {
         self.edited.get(RESPONSE_DELAY)
     }
-}
-
-/// Whether the values for the slot's points are such as its module allows. No other port has a slot,
-/// so none of their points has a narrower rule.
-fn suit_the_slot(
-    kinds: [PointKind; CHANNELS as usize],
-    run: Run,
-    span: Span,
-    words: Words<'_>,
-) -> bool {
-    let Some(narrower) = run.rule.narrower else {
-        return true;
-    };
-    (SLOT_FIRST..)
-        .zip(kinds)
-        .filter(|(point, kind)| *kind == narrower.kind && point.wrapping_sub(run.index) < run.count)
-        .all(|(point, _)| {
-            let address = run.rule.first.wrapping_add(point);
-            let word = words.get(address.wrapping_sub(span.start()));
-            word.is_none_or(|word| narrower.values.allow(word))
-        })
 }

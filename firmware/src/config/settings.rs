@@ -2,8 +2,8 @@
 
 use register_map::codes::{Format, Mode};
 use register_map::configuration::{self, BY_POINT, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
-use register_map::points::{self, PointKind};
-use register_map::{InForce, Module, Rule, rule_at};
+use register_map::points::{self, Kind};
+use register_map::{Board, InForce, Module, Rule, rule_at};
 
 /// The high byte of every configuration address; the low byte is the place in [`Settings`].
 const PAGE: u16 = KEY >> 8;
@@ -28,17 +28,17 @@ impl Settings {
     #[must_use]
     pub fn defaults() -> Self {
         let mut settings = Self { values: [0; 256] };
-        for (rule, address) in Held::from(KEY) {
+        for (rule, address) in Addresses::from(KEY) {
             settings.put(address, rule.default);
         }
         settings
     }
 
     /// The settings that a record's pairs of address and value amount to, in whatever order they come,
-    /// and how many values were not allowed and have their default instead. Addresses not known here
+    /// and how many values were not allowed on this board and have their default instead. Addresses not known here
     /// are passed over.
     #[must_use]
-    pub fn load(pairs: impl Iterator<Item = (u16, u16)> + Clone) -> (Self, u16) {
+    pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)> + Clone) -> (Self, u16) {
         let mut settings = Self::defaults();
         let mut rejected: u16 = 0;
         // What a setting by point may be depends on the modules, so these come first.
@@ -48,10 +48,13 @@ impl Settings {
                 else {
                     continue;
                 };
-                if port_of(address).is_some() != modules {
+                let port = port_of(address);
+                if port.is_some() != modules {
                     continue;
                 }
-                if rule.values_for(settings.kind_at(address)).allow(value) {
+                let allowed = rule.values_for(settings.kind_at(address)).allow(value)
+                    && port.is_none_or(|port| takes_module(board, port, value));
+                if allowed {
                     settings.set(address, value);
                 } else {
                     rejected = rejected.saturating_add(1);
@@ -86,10 +89,10 @@ impl Settings {
 
     /// What the modules make of a point, 0 to 31.
     #[must_use]
-    pub fn kind(&self, point: u16) -> PointKind {
+    pub fn kind(&self, point: u16) -> Kind {
         let kinds = self.module(point / points::CHANNELS + 1).points();
         let channel = usize::from(point % points::CHANNELS);
-        kinds.get(channel).copied().unwrap_or(PointKind::None)
+        kinds.get(channel).copied().unwrap_or(Kind::None)
     }
 
     /// Every setting that differs from its default, from this address on, in ascending order.
@@ -97,7 +100,7 @@ impl Settings {
     pub const fn changed_from(&self, first: u16) -> Changed<'_> {
         Changed {
             settings: self,
-            held: Held::from(first),
+            held: Addresses::from(first),
         }
     }
 
@@ -140,20 +143,20 @@ impl Settings {
 
     /// The settings that count only after a restart, in the order of their addresses.
     pub(super) fn restart_values(&self) -> impl Iterator<Item = u16> {
-        Held::from(KEY)
+        Addresses::from(KEY)
             .filter(|(rule, _)| rule.in_force == InForce::Restart)
             .map(|(_, address)| self.get(address))
     }
 
     /// The kind of the point that a setting is for; none for what is no setting by point.
-    fn kind_at(&self, address: u16) -> PointKind {
-        configuration::point_of(address).map_or(PointKind::None, |point| self.kind(point))
+    fn kind_at(&self, address: u16) -> Kind {
+        configuration::point_of(address).map_or(Kind::None, |point| self.kind(point))
     }
 
     /// From one module to another, the points' settings go to the defaults: what suited the one could
     /// switch something on at the other. From none, those made in advance are kept if they suit.
     fn choose_module(&mut self, port: u16, code: u16) {
-        let first = port.wrapping_sub(1).wrapping_mul(points::CHANNELS);
+        let first = points::of_port(port);
         let before = self.module(port);
         let after = Module::from_code(code).unwrap_or(Module::None);
         if after == before {
@@ -192,6 +195,11 @@ pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
     }
 }
 
+/// Whether a port's MODULE may have this value: without a slot, it has no module.
+pub(super) const fn takes_module(board: &Board, port: u16, code: u16) -> bool {
+    code == 0 || board.has_slot(port)
+}
+
 /// The port, 1 to 8, whose MODULE stands at this address.
 pub(super) fn port_of(address: u16) -> Option<u16> {
     let index = address.wrapping_sub(MODULE);
@@ -204,12 +212,12 @@ const fn holds(rule: &Rule) -> bool {
 }
 
 /// Every address that holds a setting, with its rule, in ascending order.
-struct Held {
+struct Addresses {
     rules: &'static [Rule],
     from: u16,
 }
 
-impl Held {
+impl Addresses {
     const fn from(first: u16) -> Self {
         Self {
             rules: RULES,
@@ -218,7 +226,7 @@ impl Held {
     }
 }
 
-impl Iterator for Held {
+impl Iterator for Addresses {
     type Item = (&'static Rule, u16);
 
     // Start-up and every save go through it in several places: one copy for all.
@@ -239,7 +247,7 @@ impl Iterator for Held {
 /// The settings that differ from their defaults, from [`Settings::changed_from`].
 pub struct Changed<'a> {
     settings: &'a Settings,
-    held: Held,
+    held: Addresses,
 }
 
 impl Iterator for Changed<'_> {
@@ -280,18 +288,20 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use register_map::board::{MODIO_02, MODIO_08};
     use register_map::configuration::{
-        BAUD, FILTER, HOLD, LORA_ADDRESS, MODULE_SLOT, RANGE, SAFE, START,
+        BAUD, FILTER, HOLD, LORA_ADDRESS, RANGE, SAFE, START, module_of,
     };
 
-    const SLOT: u16 = points::SLOT_FIRST;
+    const SLOT: u16 = points::first(5);
+    const MODULE_SLOT: u16 = module_of(5);
 
     fn changed(settings: &Settings) -> Vec<(u16, u16)> {
         settings.changed_from(0).collect()
     }
 
     fn loaded(pairs: &[(u16, u16)]) -> (Settings, u16) {
-        Settings::load(pairs.iter().copied())
+        Settings::load(&MODIO_02, pairs.iter().copied())
     }
 
     #[test]
@@ -352,6 +362,20 @@ mod tests {
         ]);
         assert_eq!(rejected, 3, "BAUD, MODULE of port 1, SAFE of a bit");
         assert_eq!(changed(&settings), [(MODULE_SLOT, 2), (SAFE + SLOT + 1, 1)]);
+    }
+
+    #[test]
+    fn modules_are_kept_on_the_ports_that_the_board_has_slots_for() {
+        let pairs = (1..=8).map(|port| (module_of(port), 2));
+        let ports = |board| {
+            let (settings, rejected) = Settings::load(board, pairs.clone());
+            let ports: Vec<_> = (1..=8)
+                .filter(|port| settings.module(*port) == Module::Do4)
+                .collect();
+            (ports, rejected)
+        };
+        assert_eq!(ports(&MODIO_02), (std::vec![5], 7));
+        assert_eq!(ports(&MODIO_08), (std::vec![1, 2, 3, 4], 4));
     }
 
     #[test]

@@ -1,10 +1,6 @@
 //! Who the device says it is: functions 11 and 2B/0E (V1.1b3 6.13, 6.21).
 
-use register_map::{Module, state};
-
-/// The identity of function 11: the board, as its register has it. Masters that take a single byte
-/// for the identity find the run indicator where they look for it.
-pub const SERVER_ID: [u8; 1] = [state::BOARD_MODIO_02 as u8];
+use crate::config::Config;
 
 /// Hexadecimal digits of the unique identity.
 pub const SERIAL_LEN: usize = 24;
@@ -23,41 +19,68 @@ pub fn serial(unique_id: [u16; 6]) -> [u8; SERIAL_LEN] {
     text
 }
 
+/// The object that names the module of the first slot; those of the other slots follow.
+const FIRST_MODULE: u8 = 0x81;
+
 /// An object of the device identification: 00 to 06 as the standard has them; 80, the unique
-/// identity; 81, the module in the slot.
+/// identity; from 81 on, the module of each slot.
 #[must_use]
-pub const fn object(id: u8, serial: &[u8; SERIAL_LEN], module: Module) -> Option<&[u8]> {
+pub fn object<'a, const SLOTS: usize>(
+    id: u8,
+    serial: &'a [u8; SERIAL_LEN],
+    config: &Config<SLOTS>,
+) -> Option<&'a [u8]> {
+    let board = config.board();
     Some(match id {
         0x00 => b"modio",
         0x01 => b"23835860",
         0x02 => env!("CARGO_PKG_VERSION").as_bytes(),
         0x03 => env!("CARGO_PKG_REPOSITORY").as_bytes(),
-        0x04 => b"modio-02",
-        0x05 => b"LLD-ModbusIO-02",
+        0x04 => board.name.as_bytes(),
+        0x05 => board.model.as_bytes(),
         0x06 => b"Modbus I/O",
         0x80 => serial,
-        0x81 => module.name().as_bytes(),
-        _ => return None,
+        _ => {
+            let slot = usize::from(id.checked_sub(FIRST_MODULE)?);
+            config.ports().get(slot)?.module.name().as_bytes()
+        }
     })
 }
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::configuration::module_of;
+
     use super::*;
+    use crate::config::Settings;
 
     #[test]
     fn the_product_code_is_that_of_the_registers() {
-        extern crate std;
-        let code = std::format!("{:08X}", state::PRODUCT);
-        assert_eq!(object(1, &[0; 24], Module::None), Some(code.as_bytes()));
+        let config = Config::<1>::new(&MODIO_02, Settings::defaults(), false);
+        let code = std::format!("{:08X}", register_map::state::PRODUCT);
+        assert_eq!(object(1, &[0; 24], &config), Some(code.as_bytes()));
+        assert_eq!(object(4, &[0; 24], &config), Some(&b"modio-02"[..]));
     }
 
     #[test]
     fn the_serial_number_is_the_unique_identity() {
+        let config = Config::<1>::new(&MODIO_02, Settings::defaults(), false);
         let serial = serial([0x0123, 0x4567, 0x89AB, 0xCDEF, 0x0000, 0xFFFF]);
         assert_eq!(&serial, b"0123456789ABCDEF0000FFFF");
-        assert_eq!(object(0x80, &serial, Module::Di4), Some(&serial[..]));
-        assert_eq!(object(0x81, &serial, Module::Di4), Some(&b"4di"[..]));
-        assert_eq!(object(0x82, &serial, Module::Di4), None);
+        assert_eq!(object(0x80, &serial, &config), Some(&serial[..]));
+    }
+
+    #[test]
+    fn every_slot_has_an_object_for_its_module() {
+        let pairs = [(module_of(1), 1), (module_of(4), 5)];
+        let (settings, _) = Settings::load(&MODIO_08, pairs.into_iter());
+        let config = Config::<4>::new(&MODIO_08, settings, false);
+        let modules = (0x81..=0x84).map(|id| object(id, &[0; 24], &config));
+        assert!(modules.eq([&b"4di"[..], b"none", b"none", b"4ao"].map(Some)));
+        assert_eq!(object(0x85, &[0; 24], &config), None);
+        assert_eq!(object(0x7F, &[0; 24], &config), None);
     }
 }

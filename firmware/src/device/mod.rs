@@ -16,8 +16,10 @@
 //! consistent state.
 
 mod comm_watchdog;
+mod description;
 mod identification;
 mod points;
+mod port;
 mod state;
 
 #[cfg(test)]
@@ -26,27 +28,29 @@ mod tests;
 use modbus_server::{
     Bits, BitsOut, DataModel, Exception, Span, Table, TextOut, Words, WordsOut, Work,
 };
-use modio_drivers::{CHANNELS, ChannelSettings, Kind, Range, Scale};
+use modio_drivers::{CHANNELS, Kind};
 use register_map::{codes::Command, configuration, counters, fault, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
+use description::Description;
+pub use description::Fixed;
 pub use points::Points;
+pub use port::IoPort;
 pub use state::{Identity, State};
 
 use crate::config::Config;
 
-/// The device behind the line.
+/// The device behind the line, on a board with so many slots.
 #[derive(Debug)]
-pub struct Device {
+pub struct Device<const SLOTS: usize> {
     /// The process image.
-    pub points: Points,
+    pub points: Points<SLOTS>,
     /// The settings.
-    pub config: Config,
+    pub config: Config<SLOTS>,
     /// Identity and health.
     pub state: State,
+    description: Description,
     comm_watchdog: CommWatchdog,
-    /// SAFE in force, by channel; `None`: hold.
-    safe: [Option<u16>; CHANNELS],
     /// What a request has ordered, to be carried out when its reply is out.
     ordered: Option<Command>,
     /// Of the configuration, when the points' settings were last taken from it.
@@ -78,44 +82,49 @@ impl Block {
     }
 }
 
-impl Device {
-    /// A device with these settings whose slot has channels of these kinds; its outputs stand at
-    /// START.
+impl<const SLOTS: usize> Device<SLOTS> {
+    /// A device with these settings whose slots have channels of these kinds, in the order of the ports; its outputs
+    /// stand at START. `description` is that of the board.
     #[must_use]
     #[inline(never)]
-    pub fn new(kinds: [Kind; CHANNELS], config: Config, identity: Identity) -> Self {
-        let start = config.slot().start;
+    pub fn new(
+        kinds: [[Kind; CHANNELS]; SLOTS],
+        config: Config<SLOTS>,
+        identity: Identity,
+        description: &'static Fixed,
+    ) -> Self {
         let mut device = Self {
-            points: Points::new(kinds),
-            state: State::new(identity),
+            points: Points::new(config.board().points().start, kinds),
+            state: State::new(config.board(), identity),
+            description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
-            safe: [None; CHANNELS],
             ordered: None,
             revision: config.revision(),
             config,
         };
         device.configure_points();
-        device.points.command_raw(start.map(Some));
+        let ports = device.points.ports_mut().iter_mut();
+        for (port, config) in ports.zip(device.config.ports()) {
+            port.command_raw(config.start.map(Some));
+        }
         device
     }
 
     /// Brings the points to the settings in force, after these may have changed.
     fn configure_points(&mut self) {
         self.revision = self.config.revision();
-        let Some(points) = self.config.points() else {
-            return;
-        };
-        let mut settings = *self.points.settings();
-        for ((settings, safe), point) in settings.iter_mut().zip(&mut self.safe).zip(points) {
-            *settings = ChannelSettings {
-                filter: point.filter,
-                beta: point.beta,
-                range: Range::from_code(point.signal.code()).unwrap_or_default(),
-                scale: Scale::from_code(point.scale.code()).unwrap_or_default(),
+        for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
+            let Some(points) = self.config.points(index) else {
+                continue;
             };
-            *safe = point.safe;
+            let mut settings = *port.settings();
+            let mut safe = [None; CHANNELS];
+            for ((settings, safe), point) in settings.iter_mut().zip(&mut safe).zip(points) {
+                *settings = point.settings;
+                *safe = point.safe;
+            }
+            port.configure(settings, safe);
         }
-        self.points.configure(settings);
     }
 
     /// Lets `ms` milliseconds pass. Returns whether outputs went to SAFE.
@@ -125,7 +134,7 @@ impl Device {
         let timeout_ms = self.config.comm_timeout_ms();
         let tripped = self.comm_watchdog.look(self.state.millis(), timeout_ms);
         if tripped {
-            self.points.command_raw(self.safe);
+            self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
         }
         tripped
     }
@@ -152,18 +161,20 @@ impl Device {
     }
 
     /// Carries out what of an order needs nothing but memory; the reply is out. Gives back what is
-    /// left to do: a save that has begun, a restart, or the loader.
+    /// left to do: a save that has begun, a restart, identify, or the loader.
     pub fn carry_out(&mut self, order: Command) -> Option<Command> {
         match order {
             Command::LoadDefaults => self.config.load_defaults(),
             Command::DropChanges => self.config.drop_changes(),
             Command::ClearWatchdogFlag => self.comm_watchdog.clear(),
             Command::Save => self.config.begin_save(),
-            Command::Restart | Command::EnterLoader => {}
+            Command::Restart | Command::Identify | Command::EnterLoader => {}
         }
         self.settings_may_have_changed();
         match order {
-            Command::Save | Command::Restart | Command::EnterLoader => Some(order),
+            Command::Save | Command::Restart | Command::Identify | Command::EnterLoader => {
+                Some(order)
+            }
             Command::LoadDefaults | Command::DropChanges | Command::ClearWatchdogFlag => None,
         }
     }
@@ -190,9 +201,8 @@ impl Device {
     fn state_word(&self, address: u16) -> u16 {
         match address {
             state_map::STATUS => self.status(),
-            address => self
-                .state
-                .word(address, &self.points, self.config.slot().module),
+            state_map::DESCRIPTION_CRC => self.description.crc(),
+            address => self.state.word(address, &self.points, &self.config),
         }
     }
 }
@@ -206,7 +216,7 @@ fn check_rules(rules: &'static [register_map::Rule], span: Span) -> Result<(), E
 }
 
 /// Functions 01 and 02 read the same bits, 03 and 04 the same words.
-impl DataModel for Device {
+impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     fn check_read_bits(&self, _: Table, span: Span) -> Result<(), Exception> {
         self.points.check_read_bits(span)
     }
@@ -277,6 +287,20 @@ impl DataModel for Device {
         }
     }
 
+    /// The self-description is a file.
+    fn has_files(&self) -> bool {
+        true
+    }
+
+    fn check_read_file(&self, file: u16, records: Span) -> Result<(), Exception> {
+        self.description.check_read::<SLOTS>(file, records)
+    }
+
+    /// File 1, the only one.
+    fn read_file(&self, _: u16, records: Span, out: &mut WordsOut<'_>) {
+        self.description.read(&self.config, records, out);
+    }
+
     /// The low byte of the status register.
     fn exception_status(&self) -> u8 {
         self.status().to_le_bytes()[0]
@@ -288,7 +312,7 @@ impl DataModel for Device {
     }
 
     fn server_id(&self) -> &[u8] {
-        &identification::SERVER_ID
+        self.state.server_id()
     }
 
     /// Not while the communication watchdog has taken the outputs.
@@ -297,7 +321,7 @@ impl DataModel for Device {
     }
 
     fn identification(&self, object: u8, text: &mut TextOut<'_>) -> bool {
-        let value = identification::object(object, self.state.serial(), self.config.slot().module);
+        let value = identification::object(object, self.state.serial(), &self.config);
         text.extend(value.unwrap_or_default());
         value.is_some()
     }

@@ -1,17 +1,13 @@
 //! Identity and health: the registers to read at 0x0200 and the fault record at 0x0260.
 
 use modbus_server::Counters;
-use register_map::{
-    Module,
-    codes::ModuleState,
-    fault,
-    points::{PORTS, SLOT_PORT},
-    state as at,
-};
+use register_map::{Board, Module, codes::ModuleState, fault, points::PORTS, state as at};
 
 use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
+use super::port::IoPort;
 use crate::built;
+use crate::config::Config;
 
 /// What is known of the device when it starts, and never changes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,6 +48,9 @@ pub struct State {
     identity: Identity,
     /// The unique identity as text.
     serial: [u8; SERIAL_LEN],
+    /// The identity of function 11: the code of the board. Masters that take a single byte for the identity find the
+    /// run indicator where they look for it.
+    server_id: [u8; 1],
     /// Milliseconds since the start, wrapping.
     millis: u32,
     /// Milliseconds of the second that has begun.
@@ -68,8 +67,9 @@ pub struct State {
 impl State {
     /// The state at the start.
     #[must_use]
-    pub fn new(identity: Identity) -> Self {
+    pub fn new(board: &Board, identity: Identity) -> Self {
         Self {
+            server_id: [board.code as u8],
             serial: identification::serial(identity.unique_id),
             identity,
             millis: 0,
@@ -96,6 +96,11 @@ impl State {
         &self.serial
     }
 
+    /// The identity of function 11.
+    pub(super) const fn server_id(&self) -> &[u8] {
+        &self.server_id
+    }
+
     /// Milliseconds since the start, wrapping after 49 days.
     #[must_use]
     pub const fn millis(&self) -> u32 {
@@ -115,7 +120,12 @@ impl State {
     }
 
     /// A register that exists, but for the status; 0 for one that does not.
-    pub(super) fn word(&self, address: u16, points: &Points, module: Module) -> u16 {
+    pub(super) fn word<const SLOTS: usize>(
+        &self,
+        address: u16,
+        points: &Points<SLOTS>,
+        config: &Config<SLOTS>,
+    ) -> u16 {
         let [product_high, product_low] = words_of(at::PRODUCT);
         let [uptime_high, uptime_low] = words_of(self.uptime_s);
         let [commit_high, commit_low] = words_of(built::COMMIT);
@@ -126,7 +136,7 @@ impl State {
             at::FIRMWARE_VERSION => version,
             at::FIRMWARE_PATCH => patch,
             at::MAP_VERSION => at::MAP_VERSION_VALUE,
-            at::BOARD => at::BOARD_MODIO_02,
+            at::BOARD => config.board().code,
             at::UNIT_ADDRESS => self.identity.unit.into(),
             at::RESET_CAUSE => self.identity.reset_cause.into(),
             at::UPTIME => uptime_high,
@@ -135,31 +145,31 @@ impl State {
             at::COMMIT => commit_high,
             0x020D => commit_low,
             at::BUILD => built::FLAGS,
-            at::MODULE_IN_FORCE.. => self.by_index(address, points, module),
+            at::MODULE_IN_FORCE.. => self.by_index(address, points, config),
             _ => 0,
         }
     }
 
     /// The registers that stand in rows.
-    fn by_index(&self, address: u16, points: &Points, module: Module) -> u16 {
-        let slot = SLOT_PORT - 1;
+    fn by_index<const SLOTS: usize>(
+        &self,
+        address: u16,
+        points: &Points<SLOTS>,
+        config: &Config<SLOTS>,
+    ) -> u16 {
         let nth = |words: &[u16], first: u16| {
             let index = usize::from(address.wrapping_sub(first));
             words.get(index).copied().unwrap_or_default()
         };
+        let slot = |index: u16| usize::from((index + 1).wrapping_sub(config.board().first_port));
         match address.wrapping_sub(at::MODULE_IN_FORCE) {
-            port if port < PORTS => {
-                let module = if port == slot { module } else { Module::None };
-                module.code()
+            index if index < PORTS => {
+                let port = config.ports().get(slot(index));
+                port.map_or(Module::None, |port| port.module).code()
             }
-            port if port < 2 * PORTS => {
-                let is_slot = port - PORTS == slot;
-                let state = if is_slot {
-                    points.module_state()
-                } else {
-                    ModuleState::None
-                };
-                state.code()
+            index if index < 2 * PORTS => {
+                let port = points.ports().get(slot(index - PORTS));
+                port.map_or(ModuleState::None, IoPort::module_state).code()
             }
             _ if address < at::BUS_MESSAGES => nth(&self.identity.unique_id, at::UNIQUE_ID),
             _ if address < at::CHANNEL_STATUS => nth(&self.counters.as_words(), at::BUS_MESSAGES),

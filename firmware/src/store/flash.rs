@@ -1,13 +1,11 @@
 //! What the store needs of a flash.
 
-use register_map::record::PAGE_SIZE;
-
 /// One of the store's two pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Page {
-    /// At [`register_map::record::PAGE_ADDRESSES`]`[0]`.
+    /// At the lower address.
     First,
-    /// At [`register_map::record::PAGE_ADDRESSES`]`[1]`.
+    /// At the higher address.
     Second,
 }
 
@@ -30,8 +28,8 @@ pub trait Flash {
     /// Why an operation was refused or failed.
     type Error;
 
-    /// The bytes of a page as they are.
-    fn page(&self, page: Page) -> &[u8; PAGE_SIZE];
+    /// The bytes of a page as they are. Both pages have as many, 1024 or more.
+    fn page(&self, page: Page) -> &[u8];
 
     /// Programs a half-word, which must be erased unless `half` is 0, at an even offset: 40 to 70 us
     /// during which nothing else runs from this flash.

@@ -37,7 +37,8 @@ mod operation;
 mod saving;
 mod survey;
 
-use register_map::record::{Encoder, FIRST_OFFSET, PAGE_SIZE, SCHEMA, pair_of};
+use register_map::Board;
+use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
 
 use crate::config::Settings;
 pub use flash::{Flash, Page, StoreError};
@@ -84,24 +85,25 @@ impl Store {
         }
     }
 
-    /// The stored configuration.
+    /// The stored configuration, as far as this board allows it. [`Self::prepare`] goes by the same record.
     #[must_use]
-    pub fn load(&self, flash: &impl Flash) -> Loaded {
-        let newest = self.newest();
-        match newest.and_then(|newest| record_at(flash.page(newest.page), newest.found.offset)) {
-            Some(record) => {
-                let (settings, rejected) = Settings::load(record.pairs());
-                Loaded {
+    pub fn load(&mut self, board: &Board, flash: &impl Flash) -> Loaded {
+        while let Some(Newest { page, found }) = self.newest() {
+            if let Some(record) = record_at(flash.page(page), found.offset) {
+                let (settings, rejected) = Settings::load(board, record.pairs());
+                return Loaded {
                     settings,
                     invalid: false,
                     rejected,
-                }
+                };
             }
-            None => Loaded {
-                settings: Settings::defaults(),
-                invalid: self.first.written || self.second.written,
-                rejected: 0,
-            },
+            // It has no seal, and cells of it that a power cut left do not read as they did a moment ago.
+            self.survey_mut(page).newest = None;
+        }
+        Loaded {
+            settings: Settings::defaults(),
+            invalid: self.first.written || self.second.written,
+            rejected: 0,
         }
     }
 
@@ -113,8 +115,9 @@ impl Store {
     ///
     /// When the flash fails. What is stored is still good, and saves are still tried.
     pub fn prepare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+        // The survey that decided what is in force decides here, too. A second look could find another record: a seal
+        // whose program was cut off may read differently every time.
         let sealed = self.seal_again(flash);
-        self.look_again(flash);
         // Where a seal is worn out, the record is moved, as from any page that takes no more.
         if let Err(StoreError::Flash(..)) = sealed {
             return sealed;
@@ -193,7 +196,7 @@ impl Store {
         let sequence = found.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
         // Version 0.1 left no room for seals.
-        if encoder.size() > PAGE_SIZE.saturating_sub(FIRST_OFFSET) {
+        if encoder.size() > flash.page(to).len().saturating_sub(FIRST_OFFSET) {
             return Ok(());
         }
         let mut writing = Writing::new(to, FIRST_OFFSET, encoder);
@@ -261,10 +264,7 @@ impl Store {
 
     /// Keeps records off a page that has failed, until the next start.
     const fn avoid(&mut self, page: Page) {
-        match page {
-            Page::First => self.first.clean = false,
-            Page::Second => self.second.clean = false,
-        }
+        self.survey_mut(page).clean = false;
     }
 
     fn newest(&self) -> Option<Newest> {
@@ -283,6 +283,13 @@ impl Store {
         match page {
             Page::First => &self.first,
             Page::Second => &self.second,
+        }
+    }
+
+    const fn survey_mut(&mut self, page: Page) -> &mut Survey {
+        match page {
+            Page::First => &mut self.first,
+            Page::Second => &mut self.second,
         }
     }
 

@@ -1,7 +1,7 @@
 //! What is on a page.
 
 use register_map::record::{
-    FIRST_OFFSET, PAGE_MARK, PAGE_SIZE, Record, SEALS, is_newer, is_vacant, records,
+    FIRST_OFFSET, PAGE_MARK, Record, SEALS, is_newer, is_vacant, records, used,
 };
 
 /// A good record's place on its page.
@@ -17,7 +17,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    fn new(page: &[u8; PAGE_SIZE], offset: usize, record: Record<'_>) -> Self {
+    fn new(page: &[u8], offset: usize, record: Record<'_>) -> Self {
         let seals = offset.saturating_add(record.size());
         let sealed = match page.get(seals..).and_then(<[u8]>::first_chunk) {
             Some([0, 0, 0, 0]) => 2,
@@ -48,7 +48,7 @@ impl Found {
 pub(super) struct Survey {
     /// The good record that counts.
     pub(super) newest: Option<Found>,
-    /// The page was erased completely, and behind its sealed records, if any, it still is.
+    /// The page was erased completely, and behind its sealed records, used, if any, it still is.
     pub(super) clean: bool,
     /// It has the mark of a complete erase.
     pub(super) marked: bool,
@@ -58,20 +58,24 @@ pub(super) struct Survey {
     pub(super) written: bool,
     /// Where the next record goes on a clean page.
     pub(super) end: usize,
+    /// Bytes of the page.
+    size: usize,
     /// Good records.
     pub(super) records: usize,
 }
 
 impl Survey {
-    pub(super) fn of(page: &[u8; PAGE_SIZE]) -> Self {
+    pub(super) fn of(page: &[u8]) -> Self {
+        let used = used(page);
         let marked = page.first_chunk() == Some(&PAGE_MARK.to_le_bytes());
         let mut survey = Self {
             newest: None,
             clean: marked,
             marked,
-            blank: page.iter().all(|byte| *byte == 0xFF),
-            written: !is_vacant(page),
+            blank: used == 0,
+            written: !is_vacant(page.get(..used).unwrap_or_default()),
             end: FIRST_OFFSET,
+            size: page.len(),
             records: 0,
         };
         for (offset, record) in records(page) {
@@ -86,8 +90,7 @@ impl Survey {
                 survey.newest = Some(found);
             }
         }
-        let behind = page.get(survey.end..).unwrap_or_default();
-        survey.clean &= behind.iter().all(|byte| *byte == 0xFF);
+        survey.clean &= used <= survey.end;
         survey
     }
 
@@ -99,7 +102,7 @@ impl Survey {
     /// Bytes free on a clean page.
     pub(super) const fn room(&self) -> usize {
         if self.clean {
-            PAGE_SIZE.saturating_sub(self.end)
+            self.size.saturating_sub(self.end)
         } else {
             0
         }
@@ -107,15 +110,16 @@ impl Survey {
 }
 
 /// The record at an offset of a page.
-pub(super) fn record_at(page: &[u8; PAGE_SIZE], offset: usize) -> Option<Record<'_>> {
+pub(super) fn record_at(page: &[u8], offset: usize) -> Option<Record<'_>> {
     Record::decode(page.get(offset..)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use register_map::Module;
-    use register_map::record::{encode_page, module_in_slot};
+    use register_map::record::encode_page;
+
+    const PAGE_SIZE: usize = 1024;
 
     fn page(bytes: &[u8]) -> [u8; PAGE_SIZE] {
         let mut page = [0xFF; PAGE_SIZE];
@@ -159,7 +163,7 @@ mod tests {
 
     #[test]
     fn unsealed_record_counts_only_when_no_record_is_sealed() {
-        let newest = |bytes| {
+        let newest = |bytes: [u8; PAGE_SIZE]| {
             Survey::of(&bytes)
                 .newest
                 .map(|found| (found.sequence, found.sealed))
@@ -181,17 +185,18 @@ mod tests {
 
     #[test]
     fn a_page_with_something_behind_its_records_takes_no_more() {
-        let preset = module_in_slot(Module::Di4);
-        let mut bytes = page(&preset);
+        let mut bytes = page(&[]);
+        let size = encode_page(0, &[(0x0114, 1)], &mut bytes).unwrap();
         assert!(Survey::of(&bytes).clean);
-        bytes[preset.len() + 10] = 0;
+        bytes[size + 10] = 0;
         let survey = Survey::of(&bytes);
         assert!(!survey.clean && survey.newest.map(|found| found.offset) == Some(2));
     }
 
     #[test]
     fn the_newest_counts_wherever_it_stands_and_across_the_wrap() {
-        let mut bytes = page(&module_in_slot(Module::Di4));
+        let mut bytes = page(&[]);
+        encode_page(0, &[(0x0114, 1)], &mut bytes).unwrap();
         let mut put = |offset: usize, sequence| {
             let mut other = [0xFF; PAGE_SIZE];
             let size = encode_page(sequence, &[], &mut other).unwrap() - 2;

@@ -5,6 +5,7 @@
 use firmware::config::Settings;
 use firmware::store::Operation;
 
+use crate::PAGE_SIZE;
 use crate::flash::{MESSES, Mess, MockFlash};
 use crate::running::{fullest_settings, random_settings, save, settings, start, start_well};
 
@@ -115,6 +116,9 @@ fn cut_everywhere(flash: MockFlash, first: &Settings, life: &[Event]) -> usize {
     places.len()
 }
 
+/// How much more fits on a page than on one of 1 KiB.
+const PAGES_OF_1_KIB: usize = PAGE_SIZE / 1024;
+
 fn saves(sizes: impl IntoIterator<Item = usize>) -> Vec<Event> {
     let settings = (1..).zip(sizes);
     settings
@@ -142,7 +146,7 @@ fn in_a_save_of_every_setting() {
 
 #[test]
 fn in_saves_that_fill_both_pages_without_a_start_between() {
-    let life = saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2));
+    let life = saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB));
     let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     let erases = places
         .iter()
@@ -160,7 +164,7 @@ fn in_saves_that_fill_both_pages_without_a_start_between() {
 #[test]
 fn in_the_erases_between_saves_which_then_never_have_to() {
     let mut life = Vec::new();
-    for save in saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2)) {
+    for save in saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB)) {
         life.extend([save, Spare]);
     }
     let places = live(MockFlash::erased(), &Settings::defaults(), &life);
@@ -187,7 +191,7 @@ fn in_the_erases_between_saves_which_then_never_have_to() {
 
 #[test]
 fn in_the_compaction_and_the_erases_of_a_start() {
-    let mut life = saves([25; 6]);
+    let mut life = saves(vec![25; 9 * PAGES_OF_1_KIB - 3]);
     life.push(Restart);
     life.extend(saves([25, 25]));
     life.push(Restart);
@@ -248,7 +252,7 @@ fn in_the_start_after_a_cut() {
 fn a_setting_that_never_changes_survives_any_number_of_compactions() {
     let mut flash = MockFlash::erased();
     let (_, mut store) = start_well(&mut flash);
-    for round in 0..200 {
+    for round in 0..200 * PAGES_OF_1_KIB as u16 {
         let now = settings(&[(0x0141, 0xBEEF), (0x0160, 2000 + round)]);
         save(&mut store, &mut flash, &now).unwrap();
         if round % 7 == 0 {

@@ -1,8 +1,11 @@
 //! A flash that insists on the rules of RM0008 3.3, and whose power can be cut in the middle of any
 //! operation.
 
+use std::cell::Cell;
+
 use firmware::store::{Flash, Operation, Page};
-use register_map::record::PAGE_SIZE;
+
+use crate::PAGE_SIZE;
 
 /// What a cut leaves of the operation it hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +53,18 @@ struct Torn {
     mess: Mess,
 }
 
+impl Torn {
+    /// What it reads as: always the same with the same number of the look.
+    fn read(&self, look: u64) -> [u8; 2] {
+        let cells = match self.mess {
+            Mess::Nearly if !look.is_multiple_of(2) => 1 << self.before.trailing_zeros(),
+            Mess::Nearly => 0,
+            _ => Noise(look << 16 ^ self.offset as u64).next() as u16,
+        };
+        (self.half | self.before & cells).to_le_bytes()
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowerCut;
 
@@ -63,6 +78,9 @@ pub struct MockFlash {
     pub unsteady: [bool; 2],
     /// Half-words whose program was cut off.
     torn: Vec<Torn>,
+    /// The pages as every second look finds them: half-words whose program was cut off read differently.
+    other: [[u8; PAGE_SIZE]; 2],
+    looks: Cell<u64>,
     /// Times the power has come back.
     starts: u64,
     /// The power is cut in the operation after so many more.
@@ -88,6 +106,8 @@ impl MockFlash {
             weak: [false; 2],
             unsteady: [false; 2],
             torn: Vec::new(),
+            other: pages,
+            looks: Cell::new(0),
             starts: 0,
             cut: None,
             off: false,
@@ -114,21 +134,9 @@ impl MockFlash {
     pub fn power_on(&mut self) {
         (self.off, self.cut) = (false, None);
         self.starts += 1;
-        for &Torn {
-            page,
-            offset,
-            before,
-            half,
-            mess,
-        } in &self.torn
-        {
-            let cells = match mess {
-                Mess::Nearly if !self.starts.is_multiple_of(2) => 1 << before.trailing_zeros(),
-                Mess::Nearly => 0,
-                _ => Noise(self.starts << 16 ^ offset as u64).next() as u16,
-            };
-            let read = half | before & cells;
-            self.pages[page][offset..offset + 2].copy_from_slice(&read.to_le_bytes());
+        for torn in &self.torn {
+            let read = torn.read(self.starts);
+            self.pages[torn.page][torn.offset..][..2].copy_from_slice(&read);
         }
         for index in 0..2 {
             if self.unsteady[index] {
@@ -138,6 +146,16 @@ impl MockFlash {
                     self.pages[index][bit / 8] ^= 1 << (bit % 8);
                 }
             }
+            self.look_otherwise(index);
+        }
+    }
+
+    /// Brings what every second look finds on a page up to date.
+    fn look_otherwise(&mut self, page: usize) {
+        self.other[page] = self.pages[page];
+        for torn in self.torn.iter().filter(|torn| torn.page == page) {
+            let read = torn.read(self.starts + 1);
+            self.other[page][torn.offset..][..2].copy_from_slice(&read);
         }
     }
 
@@ -173,8 +191,15 @@ impl MockFlash {
 impl Flash for MockFlash {
     type Error = PowerCut;
 
-    fn page(&self, page: Page) -> &[u8; PAGE_SIZE] {
-        &self.pages[page as usize]
+    fn page(&self, page: Page) -> &[u8] {
+        let index = page as usize;
+        let look = self.looks.get();
+        self.looks.set(look + 1);
+        if look.is_multiple_of(2) || self.torn.iter().all(|torn| torn.page != index) {
+            &self.pages[index]
+        } else {
+            &self.other[index]
+        }
     }
 
     fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), PowerCut> {
@@ -224,6 +249,7 @@ impl Flash for MockFlash {
                 mess,
             });
         }
+        self.look_otherwise(index);
         if self.off { Err(PowerCut) } else { Ok(()) }
     }
 
@@ -251,6 +277,7 @@ impl Flash for MockFlash {
                 bytes.fill_with(|| noise.next() as u8);
             }
         }
+        self.look_otherwise(index);
         if self.off { Err(PowerCut) } else { Ok(()) }
     }
 }

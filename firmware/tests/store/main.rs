@@ -6,3 +6,6 @@ mod model;
 mod running;
 mod vectors;
 mod wear;
+
+/// Bytes of a page of the STM32F103CB.
+const PAGE_SIZE: usize = 1024;

@@ -2,17 +2,21 @@
 
 use firmware::config::Settings;
 use firmware::store::{Loaded, Progress, Saving, Store, StoreError};
-use register_map::configuration::{COMMAND, KEY, MODULE_SLOT, RULES};
+use register_map::board::MODIO_02;
+use register_map::configuration::{COMMAND, KEY, RULES, module_of};
 use register_map::rule_at;
 
 use crate::flash::{MockFlash, Noise, PowerCut};
+
+/// MODULE of the board's port.
+const MODULE_SLOT: u16 = module_of(5);
 
 pub type Failure = StoreError<PowerCut>;
 
 /// Starts: what was loaded, and the store made ready.
 pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {
     let mut store = Store::open(flash);
-    let loaded = store.load(flash);
+    let loaded = store.load(&MODIO_02, flash);
     let prepared = store.prepare(flash);
     (loaded, prepared.map(|()| store))
 }
@@ -43,7 +47,7 @@ pub fn save(
 }
 
 pub fn settings(pairs: &[(u16, u16)]) -> Settings {
-    let (settings, rejected) = Settings::load(pairs.iter().copied());
+    let (settings, rejected) = Settings::load(&MODIO_02, pairs.iter().copied());
     assert_eq!(rejected, 0, "{pairs:?}");
     settings
 }
@@ -62,7 +66,7 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
             pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
         }
     }
-    Settings::load(pairs.into_iter()).0
+    Settings::load(&MODIO_02, pairs.into_iter()).0
 }
 
 /// Settings of which none that can be changed is the default.
@@ -77,7 +81,7 @@ pub fn fullest_settings(seed: u64) -> Settings {
             pairs.extend(some_value(address, &mut noise).map(|value| (address, value)));
         }
     }
-    Settings::load(pairs.into_iter()).0
+    Settings::load(&MODIO_02, pairs.into_iter()).0
 }
 
 /// An allowed value that is not the default, if there is any among some.

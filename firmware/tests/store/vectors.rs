@@ -3,8 +3,11 @@
 use firmware::config::Settings;
 use firmware::store::{Page, Saving, Store};
 use register_map::Module;
-use register_map::record::{PAGE_SIZE, SEALS, encode_page, module_in_slot, records};
+use register_map::board::MODIO_02;
+use register_map::configuration::modules;
+use register_map::record::{SEALS, encode_page, records};
 
+use crate::PAGE_SIZE;
 use crate::flash::MockFlash;
 use crate::running::{save, settings, start_well};
 
@@ -150,7 +153,10 @@ fn another_layout_is_reported_and_left_alone_until_something_is_saved() {
 #[test]
 fn a_preset_is_a_stored_configuration() {
     for module in Module::ALL {
-        let mut flash = MockFlash::with(&module_in_slot(module), &[]);
+        let mut page = [0xFF; PAGE_SIZE];
+        let pairs: Vec<_> = modules([(5_u16, module)]).collect();
+        let size = encode_page(0, &pairs, &mut page).unwrap();
+        let mut flash = MockFlash::with(page.get(..size).unwrap(), &[]);
         let (loaded, _) = start_well(&mut flash);
         assert_eq!(loaded.settings.module(5), module);
         assert!(!loaded.invalid && loaded.rejected == 0);
@@ -176,5 +182,5 @@ fn what_is_stored_is_the_documented_record() {
     saving.finish(&mut store, &flash).unwrap();
     let bytes = firmware::store::Flash::page(&flash, Page::First);
     assert_eq!(bytes[..SEALED.len()], SEALED);
-    assert!(Store::open(&flash).load(&flash).settings == settings);
+    assert!(Store::open(&flash).load(&MODIO_02, &flash).settings == settings);
 }

@@ -2,6 +2,7 @@
 
 use firmware::config::Settings;
 use firmware::store::{Page, StoreError};
+use register_map::board::MODIO_02;
 
 use crate::flash::{MockFlash, Noise};
 use crate::running::{fullest_settings, random_settings, save, settings, start, start_well};
@@ -102,7 +103,7 @@ fn a_worn_half_word_costs_a_save_but_never_what_is_stored() {
                     failures += 1;
                     assert_eq!(error, StoreError::Worn(page, offset));
                     // The second seal is programmed when the record counts already.
-                    let stored = store.load(&flash).settings;
+                    let stored = store.load(&MODIO_02, &flash).settings;
                     assert!(stored == old || stored == new);
                     save(&mut store, &mut flash, &new).expect("elsewhere");
                 }

@@ -1,7 +1,6 @@
 //! Traffic, for the receivers: `modio_fuzz::receiver` has the form.
 
-use modbus_server::line::Framing;
-use modio_fuzz::common::{UNIT, framed};
+use modbus_reference::{UNIT, framed};
 
 use crate::{Seed, string};
 
@@ -42,9 +41,9 @@ fn printed() -> impl Iterator<Item = Vec<u8>> {
 }
 
 /// What is the same in both modes.
-fn both(framing: Framing) -> Vec<(String, Vec<u8>)> {
+fn both(delimiter: Option<u8>) -> Vec<(String, Vec<u8>)> {
     let read = [0x03, 0, 0, 0, 1];
-    let frame = framed(framing, UNIT, &read);
+    let frame = framed(delimiter, UNIT, &read);
     let (front, back) = frame.split_at(frame.len() / 2);
     let longest = [&[0x08, 0, 0][..], &[0x55; 250]].concat();
     let mut damaged = frame.clone();
@@ -194,7 +193,7 @@ fn both(framing: Framing) -> Vec<(String, Vec<u8>)> {
 /// Seeds of target `receiver_rtu`.
 pub fn rtu() -> Vec<Seed> {
     let mut seeds: Vec<Seed> = Vec::new();
-    for (name, events) in both(Framing::Rtu) {
+    for (name, events) in both(None) {
         if ["a-gap-within", "joined"].contains(&name.as_str()) {
             seeds.push((format!("strict-{name}"), [&[1], &events[..]].concat()));
         }
@@ -208,10 +207,10 @@ pub fn rtu() -> Vec<Seed> {
 /// Seeds of target `receiver_ascii`.
 pub fn ascii() -> Vec<Seed> {
     let mut seeds: Vec<Seed> = Vec::new();
-    for (name, events) in both(Framing::ASCII) {
+    for (name, events) in both(Some(b'\n')) {
         seeds.push((name, [&[1, 0], &events[..]].concat()));
     }
-    let frame = framed(Framing::ASCII, UNIT, &[0x03, 0, 0, 0, 1]);
+    let frame = framed(Some(b'\n'), UNIT, &[0x03, 0, 0, 0, 1]);
     let lower = frame.to_ascii_lowercase();
     let high: Vec<u8> = frame.iter().map(|byte| byte | 0x80).collect();
     for (name, settings, text) in [
@@ -224,7 +223,7 @@ pub fn ascii() -> Vec<Seed> {
         let events = [characters(text), vec![T35]].concat();
         seeds.push((name.into(), [&settings, &events[..]].concat()));
     }
-    let delimiter = framed(Framing::Ascii { delimiter: b'@' }, UNIT, &[0x07]);
+    let delimiter = framed(Some(b'@'), UNIT, &[0x07]);
     let events = [vec![1, b'@'], characters(&delimiter), vec![T35]].concat();
     seeds.push(("its-own-delimiter".into(), events));
     let two_colons = [b"::", &frame[1..]].concat();
@@ -232,7 +231,7 @@ pub fn ascii() -> Vec<Seed> {
     seeds.push(("two-colons".into(), events));
     let all = printed().flat_map(|rtu| {
         let body = &rtu[..rtu.len() - 2];
-        let text = framed(Framing::ASCII, body[0], &body[1..]);
+        let text = framed(Some(b'\n'), body[0], &body[1..]);
         [characters(&text), vec![T35]].concat()
     });
     seeds.push(("printed".into(), [1, 0].into_iter().chain(all).collect()));

@@ -1,6 +1,8 @@
 //! Requests, for the server: `modio_fuzz::pdu` has the form.
 
-use modio_fuzz::common::{UNIT, pdu, write_bits, write_then_read, write_words};
+use modbus_reference::{
+    UNIT, pdu, read_files, write_bits, write_files, write_then_read, write_words,
+};
 
 use crate::{Seed, string};
 
@@ -70,6 +72,29 @@ pub fn requests() -> Vec<(String, Vec<u8>)> {
     add("17-apart".into(), write_then_read(0, 3, 20, &[0xAAAA]));
     add("17-beyond".into(), write_then_read(129, 2, 0, &[1]));
     add("17-refused".into(), write_then_read(0, 1, 0, &[1, 0xFFFF]));
+    for (name, groups) in [
+        ("1", &[(1, 0, 1)][..]),
+        ("124", &[(1, 1, 124)]),
+        ("125", &[(1, 0, 125)]),
+        ("most-groups", &[(3, 9_999, 1); 35]),
+        ("beyond", &[(1, 0, 1), (1, 124, 2)]),
+        ("10000", &[(3, 9_999, 2)]),
+        ("no-file", &[(0, 0, 1)]),
+        ("empty-file", &[(2, 0, 1)]),
+        ("no-records", &[(1, 0, 0)]),
+        ("none", &[]),
+    ] {
+        let words = |(file, record, count): &(u16, u16, u16)| {
+            (*file, *record, vec![7; usize::from((*count).min(122))])
+        };
+        let writes: Vec<_> = groups.iter().take(20).map(words).collect();
+        add(format!("14-{name}"), read_files(groups));
+        add(format!("15-{name}"), write_files(&writes));
+    }
+    add(
+        "15-refused".into(),
+        write_files(&[(1, 0, vec![1]), (3, 0, vec![0xFFFF])]),
+    );
     for function in [0x07, 0x0B, 0x0C, 0x11, 0x00, 0x63, 0x80, 0x83, 0xFF] {
         add(format!("{function:02x}"), vec![function]);
         add(format!("{function:02x}-long"), vec![function, 0]);

@@ -32,7 +32,7 @@ impl Line {
             short: SILENCE,
             long: SILENCE,
         };
-        let server = Server::new(unit, Framing::Rtu);
+        let server = Server::new(Framing::Rtu);
         Self::new(serial, Receiver::rtu(unit, false), silences, server)
     }
 
@@ -42,7 +42,7 @@ impl Line {
             short: SILENCE,
             long: TIME_OUT,
         };
-        let server = Server::new(unit, Framing::ASCII);
+        let server = Server::new(Framing::ASCII);
         Self::new(
             serial,
             Receiver::ascii(unit, Width::Eight),

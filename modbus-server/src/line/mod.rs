@@ -2,9 +2,8 @@
 //! (V1.02 2.5).
 //!
 //! RTU frames are bytes, set apart by silence and closed by a CRC. ASCII frames are pairs of
-//! hexadecimal digits between a colon and an end mark, closed by an LRC. [`Receiver`] and
-//! [`Transmitter`] speak either, as they are told at the start; all that comes after them is the
-//! same.
+//! hexadecimal digits between a colon and an end mark, closed by an LRC. A [`Port`] speaks either, as
+//! its [`Receiver`] is made; all that comes after them is the same.
 
 mod ascii;
 mod faults;
@@ -15,6 +14,7 @@ mod receiver;
 mod state;
 mod timed;
 mod transmitter;
+mod units;
 
 pub use ascii::Width;
 pub use faults::Faults;
@@ -23,4 +23,6 @@ pub use gaps::Gaps;
 pub use port::Port;
 pub use receiver::{Closed, Receiver};
 pub use timed::{Silences, TimedPort};
-pub use transmitter::{Next, Transmitter};
+pub use transmitter::Next;
+pub(crate) use transmitter::Transmitter;
+pub use units::{UnitSet, Units};

@@ -1,7 +1,8 @@
 //! A line as its server has it: characters and silences in, requests out; replies in, characters out.
 
-use super::{Closed, Faults, Framing, Next, Receiver, Transmitter};
-use crate::{Adu, Head, LineCounters};
+use super::{Closed, Faults, Framing, Next, Receiver, Transmitter, Units};
+use crate::head::Head;
+use crate::{Adu, LineCounters};
 
 /// One serial line of a server, without UART, timer or clock.
 ///
@@ -25,8 +26,8 @@ use crate::{Adu, Head, LineCounters};
 /// A tick is any unit of time, the same for the delay of a reply and for the end of a request; it never has to be fine,
 /// for silences are the caller's to measure.
 #[derive(Debug)]
-pub struct Port<'a> {
-    receiver: Receiver<'a>,
+pub struct Port<'a, U = u8> {
+    receiver: Receiver<'a, U>,
     transmitter: Transmitter<'a>,
     request: Option<Closed<'a>>,
     /// The tick in which the request ended.
@@ -49,9 +50,9 @@ enum Reply {
     Sending,
 }
 
-impl<'a> Port<'a> {
+impl<'a, U: Units> Port<'a, U> {
     /// A port that receives into these buffers.
-    pub fn new(mut receiver: Receiver<'a>, adus: &'a mut [Adu; 2]) -> Self {
+    pub fn new(mut receiver: Receiver<'a, U>, adus: &'a mut [Adu; 2]) -> Self {
         adus.iter_mut().for_each(|adu| receiver.give_back(adu));
         Self {
             receiver,
@@ -179,6 +180,12 @@ impl<'a> Port<'a> {
         self.receiver.is_idle()
     }
 
+    /// The unit address of the request that waits to be served, if any; 0 for a broadcast.
+    #[must_use]
+    pub fn waiting(&self) -> Option<u8> {
+        self.request.as_ref().map(|closed| closed.adu.get(0))
+    }
+
     /// What the line has counted so far.
     #[must_use]
     pub const fn counters(&self) -> &LineCounters {
@@ -234,7 +241,7 @@ impl<'a> Port<'a> {
         self.receiver.counters().bus_messages
     }
 
-    #[inline]
+    #[inline(always)]
     fn give_up(&mut self) {
         self.reply = Reply::None;
         if let Some(adu) = self.transmitter.take_buffer() {

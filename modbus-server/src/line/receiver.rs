@@ -5,7 +5,7 @@ use super::state::{
     ASCII, ASCII_ENDED, ASCII_IDLE, DEAF, IDLE, NOT_ENDED, OVERRUN, PAUSED, RTU, SPOILED, TORN,
     UNKEPT,
 };
-use super::{Faults, Framing};
+use super::{Faults, Framing, Units};
 use crate::counters::count;
 use crate::server::BROADCAST;
 use crate::{Adu, LineCounters, crc};
@@ -22,15 +22,19 @@ pub struct Closed<'a> {
 
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///
+/// A program makes it for its [`Port`](super::Port), which calls all other methods.
+///
 /// In RTU mode it starts deaf: whatever arrives before the first t3.5 of silence belongs to a frame
 /// whose start was missed. In ASCII mode nothing counts that comes before a colon.
 ///
 /// It needs two buffers ([`give_back`](Self::give_back)): one to fill, and a spare to go on with
 /// while the first is away with a request. Without a spare the next frame is followed to its end,
 /// and counted, but not kept.
+///
+/// `U` is a `u8` for a single unit address, or a [`UnitSet`](super::UnitSet).
 #[derive(Debug)]
-pub struct Receiver<'a> {
-    unit: u8,
+pub struct Receiver<'a, U = u8> {
+    units: U,
     strict_t15: bool,
     state: u16,
     /// The first byte of a frame that is not kept: the unit address.
@@ -46,22 +50,22 @@ pub struct Receiver<'a> {
     reader: Reader,
 }
 
-impl<'a> Receiver<'a> {
-    /// A receiver of an RTU line, without buffers, for unit address `unit`. `strict_t15`: drop a
+impl<'a, U: Units> Receiver<'a, U> {
+    /// A receiver of an RTU line, without buffers, for requests to `units`. `strict_t15`: drop a
     /// frame with a gap above t1.5 in it, as the standard asks for; otherwise only count the gap.
-    pub const fn rtu(unit: u8, strict_t15: bool) -> Self {
-        Self::new(unit, strict_t15, Width::Eight, DEAF | UNKEPT)
+    pub const fn rtu(units: U, strict_t15: bool) -> Self {
+        Self::new(units, strict_t15, Width::Eight, DEAF | UNKEPT)
     }
 
-    /// A receiver of an ASCII line, without buffers, for unit address `unit`. Frames end with CR
+    /// A receiver of an ASCII line, without buffers, for requests to `units`. Frames end with CR
     /// LF, until [`set_framing`](Self::set_framing).
-    pub const fn ascii(unit: u8, width: Width) -> Self {
-        Self::new(unit, false, width, ASCII | IDLE | UNKEPT)
+    pub const fn ascii(units: U, width: Width) -> Self {
+        Self::new(units, false, width, ASCII | IDLE | UNKEPT)
     }
 
-    const fn new(unit: u8, strict_t15: bool, width: Width, state: u16) -> Self {
+    const fn new(units: U, strict_t15: bool, width: Width, state: u16) -> Self {
         Self {
-            unit,
+            units,
             strict_t15,
             state,
             address: 0,
@@ -156,7 +160,7 @@ impl<'a> Receiver<'a> {
 
     /// The unit has been sending, with its receiver off, and is done: the next character starts a
     /// frame.
-    #[inline]
+    #[inline(always)]
     pub fn resume(&mut self) {
         self.state = IDLE | (self.state & ASCII);
         self.check = if self.state & ASCII == 0 {
@@ -203,7 +207,7 @@ impl<'a> Receiver<'a> {
             return None;
         }
         count(&mut self.counters.bus_messages);
-        let is_for_us = address == self.unit || address == BROADCAST;
+        let is_for_us = address == BROADCAST || self.units.contains(address);
         if !is_for_us {
             return None;
         }

@@ -1,6 +1,6 @@
 //! A port whose silences are measured by a clock that is looked at now and then.
 
-use super::{Faults, Gaps, Port};
+use super::{Faults, Gaps, Port, Units};
 
 /// The silences that end a frame, in ticks of the caller's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,8 +38,8 @@ impl Silences {
 /// [`received`](Self::received) is called after its end, so that it should be called at each
 /// [`deadline`](Self::deadline), and at least once in half a round of the count.
 #[derive(Debug)]
-pub struct TimedPort<'a> {
-    port: Port<'a>,
+pub struct TimedPort<'a, U = u8> {
+    port: Port<'a, U>,
     silences: Silences,
     /// When the silence began that is being measured.
     since: Option<u32>,
@@ -47,11 +47,11 @@ pub struct TimedPort<'a> {
     short_has_passed: bool,
 }
 
-impl<'a> TimedPort<'a> {
+impl<'a, U: Units> TimedPort<'a, U> {
     /// Starts in tick `now`. On an RTU line, characters before the first long silence are ignored: they may be the rest
     /// of a frame that began earlier.
     #[must_use]
-    pub const fn new(port: Port<'a>, silences: Silences, now: u32) -> Self {
+    pub const fn new(port: Port<'a, U>, silences: Silences, now: u32) -> Self {
         Self {
             port,
             silences,
@@ -61,7 +61,7 @@ impl<'a> TimedPort<'a> {
     }
 
     /// The port, to serve its request and to send its reply.
-    pub const fn port(&mut self) -> &mut Port<'a> {
+    pub const fn port(&mut self) -> &mut Port<'a, U> {
         &mut self.port
     }
 

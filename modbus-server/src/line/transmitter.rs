@@ -1,15 +1,16 @@
 //! The reply on its way out: head, body, and the CRC or LRC made as they leave.
 
 use super::{Framing, ascii};
-use crate::{Adu, Head, crc};
+use crate::head::Head;
+use crate::{Adu, crc};
 
 /// What the line driver has to do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
     /// Send this character.
     Byte(u8),
-    /// The rest is not here yet: ask again once it has been handed over ([`Transmitter::head`],
-    /// [`Transmitter::body`]).
+    /// The rest is not here yet: ask again once the reply has been [answered](crate::Decided::answer) or
+    /// [finished](crate::Served::finish).
     Wait,
     /// The frame is complete: release the line after the last stop bit.
     Done,
@@ -17,7 +18,7 @@ pub enum Next {
 
 /// Gives out one reply character by character.
 #[derive(Debug)]
-pub struct Transmitter<'a> {
+pub(crate) struct Transmitter<'a> {
     framing: Framing,
     stage: Stage,
     /// In RTU mode: how many bytes of the head have gone. In ASCII mode: `ELSEWHERE`.
@@ -54,7 +55,7 @@ enum Stage {
 
 impl<'a> Transmitter<'a> {
     /// Nothing to send.
-    pub const fn idle() -> Self {
+    pub(crate) const fn idle() -> Self {
         Self {
             stage: Stage::Over,
             sent: ELSEWHERE,
@@ -65,7 +66,7 @@ impl<'a> Transmitter<'a> {
     /// A reply of `unit`, of which no more is known yet. Its first byte, the unit address, is ready
     /// at once.
     #[inline]
-    pub const fn open(unit: u8, framing: Framing) -> Self {
+    pub(crate) const fn open(unit: u8, framing: Framing) -> Self {
         let (stage, sent, check) = match framing {
             Framing::Rtu => (Stage::Bytes, 0, crc::START),
             Framing::Ascii { .. } => (Stage::Start, ELSEWHERE, 0),
@@ -83,18 +84,17 @@ impl<'a> Transmitter<'a> {
         }
     }
 
-    /// Hands over what [`Server::decide`](crate::Server::decide) says the reply is, once.
+    /// Hands over how the reply begins, once.
     #[inline]
-    pub const fn head(&mut self, head: Head) {
+    pub(crate) const fn head(&mut self, head: Head) {
         self.head = head;
     }
 
-    /// Hands over the body, after the head: what [`Server::carry_out`](crate::Server::carry_out)
-    /// has left in the buffer. A buffer that is not needed, because the head is the whole reply or
+    /// Hands over the body, after the head: what the server has left in the buffer. A buffer that is not needed, because the head is the whole reply or
     /// the body is here already, comes straight back, for the receiver.
     #[inline]
     #[must_use = "a buffer that is not needed belongs back in the receiver"]
-    pub fn body(&mut self, adu: &'a mut Adu) -> Option<&'a mut Adu> {
+    pub(crate) fn body(&mut self, adu: &'a mut Adu) -> Option<&'a mut Adu> {
         if !self.head.has_body() || self.body.is_some() || self.stage == Stage::Over {
             return Some(adu);
         }
@@ -110,11 +110,7 @@ impl<'a> Transmitter<'a> {
     /// The next thing to do. Called at each "transmit register empty"; in the end it is
     /// [`Next::Done`] as often as asked.
     #[inline(always)]
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "not an iterator: it may have to wait"
-    )]
-    pub fn next(&mut self) -> Next {
+    pub(crate) fn next(&mut self) -> Next {
         let byte = if self.sent < self.head.len() {
             let byte = self.head.get(self.sent);
             self.sent += 1;
@@ -205,7 +201,7 @@ impl<'a> Transmitter<'a> {
     /// [`Next::Done`] this cuts the reply short: at most the rest of its head is still sent, and
     /// no CRC or LRC, so that no master accepts it.
     #[inline]
-    pub fn take_buffer(&mut self) -> Option<&'a mut Adu> {
+    pub(crate) fn take_buffer(&mut self) -> Option<&'a mut Adu> {
         self.stage = Stage::Over;
         self.body.take()
     }

@@ -8,22 +8,26 @@ mod work;
 use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
+use crate::head::Head;
 use crate::line::Framing;
-use crate::{Adu, Counters, DataModel, Decision, Function, Head, LineCounters, Outcome, Work};
+use crate::{Adu, Counters, DataModel, Decision, Function, LineCounters, Outcome, Work};
 pub use serving::{Answered, Committed, Decided, Request, Served};
 use tally::Tally;
 
 /// The unit address of a broadcast (V1.02 2.2).
 pub(crate) const BROADCAST: u8 = 0;
 
-/// The server of one unit address on one line.
+/// The server of one line: serves the requests that its [`Port`](crate::line::Port) has received, for one data model.
 ///
-/// For each request: [`decide`](Self::decide), then [`commit`](Self::commit) and
-/// [`carry_out`](Self::carry_out), once each; before them, where every instruction counts until
-/// the reply starts, [`answers`](Self::answers).
+/// [`serve`](Self::serve) serves a request, and [`take`](Self::take) begins to serve one step by step.
+///
+/// A port may have several unit addresses ([`UnitSet`](crate::line::UnitSet)). Its reply has the address of the request.
+/// For the standard's diagnostics they are one unit: counters, event log and listen-only mode belong to all of them
+/// together. A request to any address is counted, one puts all of them into listen-only mode, and one restarts them.
+/// [`Port::waiting`](crate::line::Port::waiting) and [`Request::unit`] say which address a request is for, so that the
+/// caller can give the server a model that depends on it.
 #[derive(Debug)]
 pub struct Server {
-    unit: u8,
     framing: Framing,
     /// Function 08, sub-function 04, was obeyed, and 01 not since then.
     listen_only: bool,
@@ -52,11 +56,9 @@ enum Hearing {
 }
 
 impl Server {
-    /// A server for unit address `unit`: 1-247, or one of 248-255, which the standard leaves to the
-    /// device; on a line that starts with `framing`.
-    pub const fn new(unit: u8, framing: Framing) -> Self {
+    /// A server for a line that starts with `framing`.
+    pub const fn new(framing: Framing) -> Self {
         Self {
-            unit,
             framing,
             listen_only: false,
             can_listen_only: true,
@@ -71,19 +73,14 @@ impl Server {
     /// The same server without listen-only mode (function 08, sub-function 04, which silences the
     /// unit until sub-function 01 restarts it): the request for it is answered with exception 01.
     ///
-    /// A server whose model does not [have](DataModel::has) function 08 must be without it:
-    /// [`answers`](Self::answers) does not ask the model, and listen-only mode is never answered.
+    /// A server whose model does not [have](DataModel::has) function 08 must be without it: whether a request is
+    /// answered at all is decided without the model, and one for listen-only mode never is.
     #[must_use]
     pub const fn without_listen_only(self) -> Self {
         Self {
             can_listen_only: false,
             ..self
         }
-    }
-
-    /// The unit address.
-    pub const fn unit(&self) -> u8 {
-        self.unit
     }
 
     /// How the next reply is to be framed, and how the request after it will be. It changes when a
@@ -100,21 +97,14 @@ impl Server {
     /// Whether `request` (unit address and PDU, without CRC) will be answered at all, be it with an
     /// exception. Takes the same few instructions for every request, where
     /// [`decide`](Self::decide) takes longer the more values there are to check: so the first byte
-    /// of the reply, the unit address, can go out before the rest is decided
-    /// ([`Transmitter::open`](crate::line::Transmitter::open)).
-    pub fn answers(&self, request: &Adu) -> bool {
+    /// of the reply, the unit address, can go out before the rest is decided.
+    fn answers(&self, request: &Adu) -> bool {
         self.hear(request) == Hearing::Answered
     }
 
     fn hear(&self, request: &Adu) -> Hearing {
-        if request.len() < 2 {
-            return Hearing::Dismissed(Outcome::NotForUs);
-        }
         let (unit, function) = (request.get(0), request.get(1));
         let broadcast = unit == BROADCAST;
-        if !broadcast && unit != self.unit {
-            return Hearing::Dismissed(Outcome::NotForUs);
-        }
         if !matches!(function, 1..Function::EXCEPTION) {
             return Hearing::Dismissed(Outcome::NoRequest);
         }
@@ -138,7 +128,7 @@ impl Server {
 
     /// Settles the reply to `request` (unit address and PDU, without CRC): everything that can be
     /// refused is refused here. Changes nothing.
-    pub fn decide(&self, request: &Adu, model: &impl DataModel) -> Decision {
+    fn decide(&self, request: &Adu, model: &impl DataModel) -> Decision {
         let (unit, function) = (request.get(0), request.get(1));
         let broadcast = unit == BROADCAST;
         let silence = |outcome| Decision {
@@ -151,14 +141,14 @@ impl Server {
             Hearing::Dismissed(outcome) => return silence(outcome),
             hearing => hearing,
         };
-        let settled = settle::settle(self, function, request.from(2), model);
+        let settled = settle::settle(self, unit, function, request.from(2), model);
         let (head, work, outcome) = match settled {
             Ok((_, work)) if broadcast && !work.can_be_broadcast() => {
                 return silence(Outcome::NoEffect);
             }
             Ok((head, work)) => (head, work, Outcome::Accepted),
             Err(exception) => {
-                let head = Head::exception(self.unit, function, exception);
+                let head = Head::exception(unit, function, exception);
                 (head, Job::None, Outcome::Refused(exception))
             }
         };
@@ -170,7 +160,7 @@ impl Server {
         }
     }
 
-    /// All counters as they stood at the last [`commit`](Self::commit), less what function 08 has
+    /// All counters as they stood when the last request was [committed](Answered::commit), less what function 08 has
     /// cleared.
     pub const fn counters(&self) -> Counters {
         self.counters_at(&self.line)

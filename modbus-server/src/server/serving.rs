@@ -1,7 +1,7 @@
 //! The steps of serving a request, in the only order there is.
 
 use super::Server;
-use crate::line::{Framing, Port};
+use crate::line::{Framing, Port, Units};
 use crate::{Adu, DataModel, Decision, LineCounters, Outcome};
 
 /// A request that was taken from its port. The unit address of its reply may be on its way.
@@ -48,10 +48,10 @@ impl Server {
     /// [`Request::decide`] (model), [`Decided::answer`] (port), [`Answered::commit`],
     /// [`Committed::carry_out`] (model), [`Served::finish`] (port). [`serve`](Self::serve) does it all at once.
     #[inline]
-    pub fn take<'a>(&self, port: &mut Port<'a>, delay: u16) -> Option<Request<'a>> {
+    pub fn take<'a, U: Units>(&self, port: &mut Port<'a, U>, delay: u16) -> Option<Request<'a>> {
         let (closed, ended) = port.take_request()?;
         if self.answers(closed.adu) {
-            port.open(self.unit(), self.framing(), delay);
+            port.open(closed.adu.get(0), self.framing(), delay);
         }
         Some(Request {
             adu: closed.adu,
@@ -63,7 +63,7 @@ impl Server {
     /// Serves the request that waits at `port`, if any; how it fared.
     pub fn serve(
         &mut self,
-        port: &mut Port<'_>,
+        port: &mut Port<'_, impl Units>,
         delay: u16,
         model: &mut impl DataModel,
     ) -> Option<Outcome> {
@@ -79,6 +79,13 @@ impl Server {
 }
 
 impl<'a> Request<'a> {
+    /// The unit address that the request is for; 0 for a broadcast.
+    #[inline]
+    #[must_use]
+    pub fn unit(&self) -> u8 {
+        self.adu.get(0)
+    }
+
     /// Settles the reply: everything that can be refused is refused here. Changes nothing.
     #[inline]
     pub fn decide(self, server: &Server, model: &impl DataModel) -> Decided<'a> {
@@ -92,7 +99,7 @@ impl<'a> Request<'a> {
 impl<'a> Decided<'a> {
     /// Gives the port the beginning of the reply, if there is one.
     #[inline]
-    pub fn answer(self, port: &mut Port<'a>) -> Answered<'a> {
+    pub fn answer(self, port: &mut Port<'a, impl Units>) -> Answered<'a> {
         if let Some(head) = self.decision.reply {
             port.set_head(head);
         }
@@ -140,7 +147,7 @@ impl<'a> Committed<'a> {
 impl<'a> Served<'a> {
     /// Gives the port the rest of the reply, and the buffer back.
     #[inline]
-    pub fn finish(self, port: &mut Port<'a>) {
+    pub fn finish(self, port: &mut Port<'a, impl Units>) {
         port.finish(self.adu, self.replying, self.framing);
     }
 }

@@ -3,21 +3,23 @@
 use super::Server;
 use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
+use crate::exception::first_of;
+use crate::head::Head;
 use crate::pdu::Request;
-use crate::{DataModel, Exception, Function, Head, Span, Table, Words, WordsOut, identification};
+use crate::{DataModel, Exception, Function, Span, Table, Words, WordsOut, file, identification};
 
-/// The start of the reply, and the work, of an accepted request. `fields` are what follows
+/// The start of the reply of `unit`, and the work, of an accepted request. `fields` are what follows
 /// the function code `function`.
 ///
 /// # Errors
 /// The exception to answer with.
 pub(super) fn settle(
     server: &Server,
+    unit: u8,
     function: u8,
     fields: &[u8],
     model: &impl DataModel,
 ) -> Result<(Head, Job), Exception> {
-    let unit = server.unit;
     let plain = Head::plain(unit, function);
     let known = match Function::from_code(function) {
         Some(known) if model.has(known) => known,
@@ -75,6 +77,18 @@ pub(super) fn settle(
             let head = read_words(unit, function, read);
             (head, Job::WriteThenRead { write, from, read })
         }
+        Request::ReadFile(fields) if model.has_files() => {
+            let bytes = file::check(fields, false, model)?;
+            (Head::read(unit, function, bytes), Job::ReadFile)
+        }
+        Request::WriteFile(fields) if model.has_files() => {
+            file::check(fields, true, model)?;
+            (
+                Head::in_place(unit, function, first(fields)?),
+                Job::WriteFile,
+            )
+        }
+        Request::ReadFile(_) | Request::WriteFile(_) => return Err(Exception::IllegalFunction),
         Request::ExceptionStatus => (plain, Job::ExceptionStatus),
         Request::Diagnose(fields) => {
             let Server {
@@ -131,14 +145,4 @@ fn masked(address: u16, and: u16, or: u16, model: &impl DataModel) -> Result<u16
     let value = (u16::from_be_bytes(bytes) & and) | (or & !and);
     model.check_write_words(span, Words::new(&value.to_be_bytes()))?;
     Ok(value)
-}
-
-/// Of two verdicts the exception that comes first in the order of checks: address 02, value 03,
-/// then state, 04 and above. That is the order of the codes.
-fn first_of(one: Result<(), Exception>, other: Result<(), Exception>) -> Result<(), Exception> {
-    match (one, other) {
-        (Err(one), Err(other)) if other.code() < one.code() => Err(other),
-        (Ok(()), other) => other,
-        (one, _) => one,
-    }
 }

@@ -35,11 +35,8 @@ impl Server {
     /// came with its request: counters and event log include it from here on.
     ///
     /// Requests are committed in the order in which the receiver has closed them.
-    pub fn commit(&mut self, decision: &Decision, line: &LineCounters) {
+    pub(super) fn commit(&mut self, decision: &Decision, line: &LineCounters) {
         self.note_line(line);
-        if decision.outcome == Outcome::NotForUs {
-            return;
-        }
         self.log
             .push(Event::received(decision.broadcast, self.listen_only));
         let tally = &mut self.tally;
@@ -85,9 +82,6 @@ impl Server {
     /// The request has been dealt with: its reply is as good as sent, and what is to happen after
     /// it happens.
     pub(super) fn conclude(&mut self, decision: &Decision) {
-        if decision.outcome == Outcome::NotForUs {
-            return;
-        }
         let exception = match decision.outcome {
             Outcome::Refused(exception) if decision.reply.is_some() => Some(exception),
             _ => None,

@@ -4,7 +4,7 @@ use super::Server;
 use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::{
-    Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, identification,
+    Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, file, identification,
 };
 
 /// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
@@ -18,9 +18,13 @@ const DIAGNOSTIC_DATA: u8 = 4;
 
 impl Server {
     /// Does the work of a decision. `adu` is the request it was made on; afterwards, if the reply
-    /// has a body ([`Head::has_body`](crate::Head::has_body)), `adu` holds it
-    /// ([`Head::body_in`](crate::Head::body_in)).
-    pub fn carry_out(&mut self, decision: &Decision, adu: &mut Adu, model: &mut impl DataModel) {
+    /// has a body, `adu` holds it, from [`Head::body_from`](crate::head::Head::body_from) on.
+    pub(super) fn carry_out(
+        &mut self,
+        decision: &Decision,
+        adu: &mut Adu,
+        model: &mut impl DataModel,
+    ) {
         match decision.work.0 {
             Job::None => {}
             Job::ReadBits(table, span) => {
@@ -42,6 +46,8 @@ impl Server {
                 model.write_words(write, words(adu, write, from));
                 read_words(Table::HoldingRegisters, read, adu, model);
             }
+            Job::ReadFile => file::read(adu, model),
+            Job::WriteFile => file::write(adu, model),
             Job::ExceptionStatus => body(adu, &[model.exception_status()]),
             Job::Diagnose(Diagnostic::Register) => {
                 let register = model.diagnostic_register();

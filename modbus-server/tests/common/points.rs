@@ -1,85 +1,48 @@
 //! The device of the tests.
 
+use std::ops::{Deref, DerefMut};
+
+use modbus_reference::{Device, UNIT};
 use modbus_server::{
     Adu, Bits, BitsOut, DataModel, Exception, Function, Span, Table, TextOut, Words, WordsOut,
 };
 
-/// Four tables from address 0 on.
+/// The reference's device as a data model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Points {
-    /// Coils.
-    pub bits: Vec<bool>,
-    /// Discrete inputs.
-    pub input_bits: Vec<bool>,
-    /// Holding registers.
-    pub words: Vec<u16>,
-    /// Input registers.
-    pub input_words: Vec<u16>,
-    /// Function codes that the device does not have.
-    pub lacks: Vec<u8>,
-    /// Coils and holding registers from here on cannot be written.
-    pub read_only_from: u32,
-    /// Larger words are refused.
-    pub max_word: u16,
-    /// If set, everything that has a right address and value is refused with it.
-    pub state: Option<Exception>,
-    /// Exception status, and the low byte of the diagnostic register.
-    pub status: u8,
-    pub server_id: Vec<u8>,
-    pub running: bool,
-    pub additional_data: Vec<u8>,
-    /// A function that the server does not know: it keeps its data, and answers with them backwards,
-    /// three times. Without data it is refused.
-    pub custom: Option<u8>,
-    pub kept: Vec<u8>,
-    /// Device identification by object.
-    pub objects: Vec<Option<Vec<u8>>>,
-}
+pub struct Points(pub Device);
 
-/// The objects of the device identification in the tests: short ones, an empty one, and some that
-/// do not fit one reply together.
-pub fn object(id: u8) -> Option<Vec<u8>> {
-    let text = |text: &str| Some(text.as_bytes().to_vec());
-    match id {
-        0 => text("Company identification"),
-        1 => text("Product code XX"),
-        2 => text("V2.11"),
-        3 => text("https://example.org/"),
-        4 => text("Product"),
-        5 => text("Model"),
-        6 => text(""),
-        0x80 => Some(vec![b'a'; 180]),
-        0x81 => Some(vec![b'b'; 300]),
-        0x82 => Some(vec![b'c'; 244]),
-        0x83 => Some(vec![b'd'; 120]),
-        0x84 => Some(vec![b'e'; 122]),
-        _ => None,
+impl Deref for Points {
+    type Target = Device;
+
+    fn deref(&self) -> &Device {
+        &self.0
     }
 }
 
-/// The largest word that new [`Points`] take.
-pub const MAX_WORD: u16 = 0xFFF0;
+impl DerefMut for Points {
+    fn deref_mut(&mut self) -> &mut Device {
+        &mut self.0
+    }
+}
+
+/// Every exception by its code.
+const EXCEPTIONS: [Exception; 10] = [
+    Exception::IllegalFunction,
+    Exception::IllegalDataAddress,
+    Exception::IllegalDataValue,
+    Exception::ServerDeviceFailure,
+    Exception::Acknowledge,
+    Exception::ServerDeviceBusy,
+    Exception::NegativeAcknowledge,
+    Exception::MemoryParityError,
+    Exception::GatewayPathUnavailable,
+    Exception::GatewayTargetDeviceFailedToRespond,
+];
 
 impl Points {
     /// Coils and discrete inputs, holding and input registers, as many of each kind.
     pub fn new(bits: usize, words: usize) -> Self {
-        Self {
-            bits: vec![false; bits],
-            input_bits: vec![false; bits],
-            words: vec![0; words],
-            input_words: vec![0; words],
-            lacks: Vec::new(),
-            read_only_from: u32::MAX,
-            max_word: MAX_WORD,
-            state: None,
-            status: 0x6D,
-            server_id: vec![0x42],
-            running: true,
-            additional_data: Vec::new(),
-            custom: None,
-            kept: Vec::new(),
-            objects: (0..=255).map(object).collect(),
-        }
+        Self(Device::new(bits, words))
     }
 
     /// The bits that function 01 or 02 reads.
@@ -123,7 +86,14 @@ impl Points {
         if !value_is_good {
             return Err(Exception::IllegalDataValue);
         }
-        self.state.map_or(Ok(()), Err)
+        let state = |exception: &&Exception| Some(exception.code()) == self.state;
+        EXCEPTIONS.iter().find(state).copied().map_or(Ok(()), Err)
+    }
+
+    /// How many records a file has.
+    fn records(&self, file: u16) -> usize {
+        assert!(file > 0, "no file has the number 0");
+        self.files.get(usize::from(file) - 1).map_or(0, Vec::len)
     }
 
     fn writable(&self, points: usize) -> usize {
@@ -134,6 +104,38 @@ impl Points {
 impl DataModel for Points {
     fn has(&self, function: Function) -> bool {
         !self.lacks.contains(&function.code())
+    }
+
+    fn has_files(&self) -> bool {
+        !self.files.is_empty()
+    }
+
+    fn check_read_file(&self, file: u16, records: Span) -> Result<(), Exception> {
+        self.check(records.end(), self.records(file), true)
+    }
+
+    fn check_write_file(
+        &self,
+        file: u16,
+        records: Span,
+        words: Words<'_>,
+    ) -> Result<(), Exception> {
+        assert_eq!(usize::from(records.count()), words.count());
+        let good = words.iter().all(|word| word <= self.max_word);
+        self.check(records.end(), self.writable(self.records(file)), good)
+    }
+
+    fn read_file(&self, file: u16, records: Span, out: &mut WordsOut<'_>) {
+        for record in records.addresses() {
+            out.push(self.files[usize::from(file) - 1][usize::from(record)]);
+        }
+    }
+
+    fn write_file(&mut self, file: u16, records: Span, words: Words<'_>) {
+        assert_eq!(usize::from(records.count()), words.count());
+        for (record, word) in records.addresses().zip(words.iter()) {
+            self.files[usize::from(file) - 1][usize::from(record)] = word;
+        }
     }
 
     fn check_read_bits(&self, table: Table, span: Span) -> Result<(), Exception> {
@@ -209,7 +211,7 @@ impl DataModel for Points {
 
     fn serve_custom(&mut self, code: u8, adu: &mut Adu) {
         assert_eq!(self.custom, Some(code));
-        assert_eq!(adu.as_slice()[..2], [super::UNIT, code]);
+        assert_eq!(adu.as_slice()[..2], [UNIT, code]);
         self.kept = adu.as_slice()[2..].to_vec();
         adu.clear();
         for byte in self.kept.repeat(3).iter().rev() {

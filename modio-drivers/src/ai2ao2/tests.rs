@@ -4,7 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use super::*;
-use crate::{ChannelStatus, DAC_ADDRESS, DacWorker, Range, Scale};
+use crate::{ChannelStatus, DAC_ADDRESS, DacWorker, Scale, Signal};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
 
@@ -14,19 +14,19 @@ struct Lines([u16; 2], Vec<u8>);
 impl AnalogSource for Lines {
     type Error = ();
 
-    fn read(&mut self, line: u8) -> nb::Result<u16, ()> {
+    fn read(&mut self, line: u8) -> nb::Result<Code, ()> {
         self.1.push(line);
         match self.0.get(usize::from(line)) {
             Some(&u16::MAX) => Err(nb::Error::Other(())),
-            Some(&code) => Ok(code),
+            Some(&code) => Ok(Code::new(code)),
             None => panic!("line {line} is not this module's"),
         }
     }
 }
 
-fn with(range: Range, scale: Scale) -> ChannelSettings {
+fn with(signal: Signal, scale: Scale) -> ChannelSettings {
     ChannelSettings {
-        range,
+        signal,
         scale,
         ..ChannelSettings::default_for(Kind::WordInput)
     }
@@ -63,15 +63,15 @@ fn outputs_are_the_channels_c_and_d_in_their_own_units() {
     let mut module = Ai2Ao2::new(Lines([0, 0], Vec::new()), &link);
     let channels = commanded(4000, 4095);
     module.drive_outputs(&channels).unwrap();
-    assert_eq!(link.wanted(), Some([0, 0, 4000, 4095]));
+    assert_eq!(link.wanted(), Some([0, 0, 4000, 4095].map(Code::new)));
     module.configure(&[
-        with(Range::Ntc, Scale::Engineering),
-        with(Range::Current, Scale::Engineering),
-        with(Range::Current, Scale::Engineering),
-        with(Range::Volts, Scale::Engineering),
+        with(Signal::Ntc, Scale::Engineering),
+        with(Signal::Current, Scale::Engineering),
+        with(Signal::Current, Scale::Engineering),
+        with(Signal::Voltage, Scale::Engineering),
     ]);
     module.drive_outputs(&channels).unwrap();
-    assert_eq!(link.wanted(), Some([0, 0, 819, 1677]));
+    assert_eq!(link.wanted(), Some([0, 0, 819, 1677].map(Code::new)));
 
     let mut channels = channels;
     module.read_inputs(&mut channels).unwrap();
@@ -93,11 +93,11 @@ fn a_dac_that_does_not_answer_fails_the_module_while_its_inputs_are_read() {
         Transaction::write(DAC_ADDRESS, bytes(0, 6)),
     ]);
     let link = DacLink::new();
-    let mut worker = DacWorker::new(&mut bus);
+    let mut worker = DacWorker::new(DAC_ADDRESS);
     let mut module = Ai2Ao2::new(Lines([1, 2], Vec::new()), &link);
     let mut channels = commanded(5, 4095);
     assert_eq!(module.drive_outputs(&channels), Ok(()));
-    assert!(worker.work(&link).is_err() && worker.work(&link).is_err());
+    assert!(worker.work(&mut bus, &link).is_err() && worker.work(&mut bus, &link).is_err());
 
     let failed = Err(ModuleError::chip(0b1100));
     channels.set_word(2, 6);
@@ -109,8 +109,12 @@ fn a_dac_that_does_not_answer_fails_the_module_while_its_inputs_are_read() {
     assert_eq!(both.channels(), 0b1101, "the DAC's channels and the line's");
     assert_eq!(both.first_line(), None);
 
-    assert_eq!(worker.work(&link), Ok(false), "left out after two failures");
-    assert_eq!(worker.work(&link), Ok(true));
+    assert_eq!(
+        worker.work(&mut bus, &link),
+        Ok(false),
+        "left out after two failures"
+    );
+    assert_eq!(worker.work(&mut bus, &link), Ok(true));
     assert_eq!(module.drive_outputs(&channels), Ok(()));
     assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(0)));
     bus.done();

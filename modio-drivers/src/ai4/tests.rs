@@ -4,7 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use super::*;
-use crate::{ChannelStatus, POLLS_PER_SCAN, Range, STALLED_SCANS, Scale};
+use crate::{ChannelStatus, Code, POLLS_PER_SCAN, STALLED_SCANS, Scale, Signal};
 
 /// A converter: what stands on each line, and how often it has to be asked.
 #[derive(Default)]
@@ -23,7 +23,7 @@ struct Converter {
 impl AnalogSource for Converter {
     type Error = &'static str;
 
-    fn read(&mut self, line: u8) -> nb::Result<u16, Self::Error> {
+    fn read(&mut self, line: u8) -> nb::Result<Code, Self::Error> {
         self.calls += 1;
         let under_way = *self.converting.get_or_insert(line);
         assert_eq!(under_way, line, "another line while a conversion goes on");
@@ -36,21 +36,21 @@ impl AnalogSource for Converter {
         if self.broken[usize::from(line)] {
             return Err(nb::Error::Other("broken"));
         }
-        Ok(self.codes[usize::from(line)])
+        Ok(Code::new(self.codes[usize::from(line)]))
     }
 }
 
-fn with(filter: u16, range: Range, scale: Scale) -> ChannelSettings {
+fn with(filter: u16, signal: Signal, scale: Scale) -> ChannelSettings {
     ChannelSettings {
         filter,
-        range,
+        signal,
         scale,
         ..ChannelSettings::default_for(Kind::WordInput)
     }
 }
 
 fn raw(filter: u16) -> [ChannelSettings; 4] {
-    [with(filter, Range::Volts, Scale::Raw); 4]
+    [with(filter, Signal::Voltage, Scale::Raw); 4]
 }
 
 fn words(channels: &Channels) -> [u16; 4] {
@@ -91,10 +91,10 @@ fn each_channel_has_its_own_range_and_scale() {
     };
     let mut module = Ai4::new(&mut converter);
     module.configure(&[
-        with(0, Range::Volts, Scale::Engineering),
-        with(0, Range::Current, Scale::Engineering),
-        with(0, Range::Ntc, Scale::Engineering),
-        with(0, Range::Ntc, Scale::Raw),
+        with(0, Signal::Voltage, Scale::Engineering),
+        with(0, Signal::Current, Scale::Engineering),
+        with(0, Signal::Ntc, Scale::Engineering),
+        with(0, Signal::Ntc, Scale::Raw),
     ]);
     let mut channels = Channels::new();
     let cold = (-1_i16) as u16;
@@ -110,10 +110,10 @@ fn each_channel_has_its_own_range_and_scale() {
 fn status_tells_breaks_and_shorts_and_goes_when_they_go() {
     use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
     let settings = [
-        with(0, Range::Volts, Scale::Engineering),
-        with(0, Range::Current, Scale::Engineering),
-        with(0, Range::Current, Scale::Raw),
-        with(0, Range::Ntc, Scale::Engineering),
+        with(0, Signal::Voltage, Scale::Engineering),
+        with(0, Signal::Current, Scale::Engineering),
+        with(0, Signal::Current, Scale::Raw),
+        with(0, Signal::Ntc, Scale::Engineering),
     ];
     let cases = [
         (
@@ -183,7 +183,7 @@ fn configuring_the_same_again_disturbs_no_filter_and_another_filter_does_not_jum
     module.configure(&raw(8));
     module.read_inputs(&mut channels).unwrap();
     assert!((last..last + 8).contains(&channels.word(3)));
-    module.configure(&[with(8, Range::Volts, Scale::Engineering); 4]);
+    module.configure(&[with(8, Signal::Voltage, Scale::Engineering); 4]);
     module.read_inputs(&mut channels).unwrap();
     let mv = u32::from(last) * 10_000 / 4_095;
     assert!((mv..mv + 40).contains(&channels.word(3).into()));
@@ -193,8 +193,8 @@ fn configuring_the_same_again_disturbs_no_filter_and_another_filter_does_not_jum
 fn another_range_does_not_inherit_a_status() {
     let mut module = Ai4::new(Converter::default());
     let mut channels = Channels::new();
-    let mut show = |range, codes: [u16; 4]| {
-        module.configure(&[with(0, range, Scale::Raw); 4]);
+    let mut show = |signal, codes: [u16; 4]| {
+        module.configure(&[with(0, signal, Scale::Raw); 4]);
         module.inputs.source_mut().codes = codes;
         module.read_inputs(&mut channels).unwrap();
         statuses(&channels)
@@ -202,17 +202,17 @@ fn another_range_does_not_inherit_a_status() {
     use ChannelStatus::{Good, OpenCircuit, OverRange, UnderRange};
     // 3650 uA at code 747, and 4090 of 4095: good, unless it has been worse before.
     let worse = [UnderRange, OpenCircuit, Good, Good];
-    assert_eq!(show(Range::Ntc, [4060, 4090, 2048, 2048]), worse);
+    assert_eq!(show(Signal::Ntc, [4060, 4090, 2048, 2048]), worse);
     assert_eq!(
-        show(Range::Current, [747, 747, 747, 4095]),
+        show(Signal::Current, [747, 747, 747, 4095]),
         [Good, Good, Good, OverRange]
     );
-    assert_eq!(show(Range::Volts, [747, 747, 747, 4090]), [Good; 4]);
+    assert_eq!(show(Signal::Voltage, [747, 747, 747, 4090]), [Good; 4]);
 
     let worse = [UnderRange, OpenCircuit, Good, OverRange];
-    assert_eq!(show(Range::Current, [700, 100, 747, 4095]), worse);
+    assert_eq!(show(Signal::Current, [700, 100, 747, 4095]), worse);
     let still = [UnderRange, UnderRange, Good, OverRange];
-    assert_eq!(show(Range::Current, [747, 747, 747, 4090]), still);
+    assert_eq!(show(Signal::Current, [747, 747, 747, 4090]), still);
 }
 
 #[test]

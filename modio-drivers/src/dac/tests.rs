@@ -13,25 +13,29 @@ const NO_ANSWER: ErrorKind = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Addre
 
 /// Multi-Write of four codes: VDD as reference, gain 1, not powered down, put out at once.
 fn transfer(codes: [u16; 4]) -> Transaction {
+    transfer_to(0x60, codes)
+}
+
+fn transfer_to(address: u8, codes: [u16; 4]) -> Transaction {
     let bytes = (0..4).zip(codes).flat_map(|(channel, code)| {
         let [high, low] = code.to_be_bytes();
         [0b0100_0000 | channel << 1, high, low]
     });
-    Transaction::write(0x60, bytes.collect())
+    Transaction::write(address, bytes.collect())
 }
 
 fn posted(codes: [u16; 4]) -> DacLink {
     let link = DacLink::new();
-    link.post(codes);
+    link.post(codes.map(Code::new));
     link
 }
 
 #[test]
 fn nothing_is_transferred_before_the_first_post() {
     let mut bus = Mock::new(&[]);
-    let mut worker = DacWorker::new(&mut bus);
+    let mut worker = DacWorker::new(DAC_ADDRESS);
     let link = DacLink::new();
-    assert!((0..100).all(|_| worker.work(&link) == Ok(false)));
+    assert!((0..100).all(|_| worker.work(&mut bus, &link) == Ok(false)));
     bus.done();
 }
 
@@ -41,16 +45,22 @@ fn a_transfer_is_one_multi_write_of_codes_and_configuration() {
         0x40, 0x00, 0x00, 0x42, 0x01, 0x23, 0x44, 0x0A, 0xBC, 0x46, 0x0F, 0xFF,
     ];
     let mut bus = Mock::new(&[Transaction::write(0x60, bytes)]);
-    let mut worker = DacWorker::new(&mut bus);
-    assert_eq!(worker.work(&posted([0, 0x123, 0xABC, 0xFFF])), Ok(true));
+    let mut worker = DacWorker::new(DAC_ADDRESS);
+    assert_eq!(
+        worker.work(&mut bus, &posted([0, 0x123, 0xABC, 0xFFF])),
+        Ok(true)
+    );
     bus.done();
 }
 
 #[test]
 fn a_code_beyond_the_dac_does_not_reach_into_its_configuration() {
     let mut bus = Mock::new(&[transfer([0xFFF, 0xFFF, 0xFFF, 1])]);
-    let mut worker = DacWorker::new(&mut bus);
-    assert_eq!(worker.work(&posted([0x1000, 0x8001, 0xFFFF, 1])), Ok(true));
+    let mut worker = DacWorker::new(DAC_ADDRESS);
+    assert_eq!(
+        worker.work(&mut bus, &posted([0x1000, 0x8001, 0xFFFF, 1])),
+        Ok(true)
+    );
     bus.done();
 }
 
@@ -62,14 +72,14 @@ fn a_change_goes_at_the_next_call_and_everything_again_at_every_tenth() {
         transfer([1, 2, 3, 5]),
         transfer([1, 2, 3, 5]),
     ]);
-    let mut worker = DacWorker::new(&mut bus);
+    let mut worker = DacWorker::new(DAC_ADDRESS);
     let link = posted([1, 2, 3, 4]);
-    assert_eq!(worker.work(&link), Ok(true));
-    assert_eq!(worker.work(&link), Ok(false));
-    link.post([1, 2, 3, 5]);
-    assert_eq!(worker.work(&link), Ok(true));
+    assert_eq!(worker.work(&mut bus, &link), Ok(true));
+    assert_eq!(worker.work(&mut bus, &link), Ok(false));
+    link.post([1, 2, 3, 5].map(Code::new));
+    assert_eq!(worker.work(&mut bus, &link), Ok(true));
     let transfers: Vec<_> = (1..=20)
-        .filter(|_| worker.work(&link) == Ok(true))
+        .filter(|_| worker.work(&mut bus, &link) == Ok(true))
         .collect();
     assert_eq!(transfers, [10, 20]);
     bus.done();
@@ -99,8 +109,8 @@ fn failures_are_sorted_by_what_can_be_done() {
         .chain(bus.map(|kind| (kind, DacError::Bus(kind))));
     for (kind, expected) in cases {
         let mut bus = Mock::new(&[transfer([9; 4]).with_error(kind)]);
-        let mut worker = DacWorker::new(&mut bus);
-        assert_eq!(worker.work(&posted([9; 4])), Err(expected));
+        let mut worker = DacWorker::new(DAC_ADDRESS);
+        assert_eq!(worker.work(&mut bus, &posted([9; 4])), Err(expected));
         bus.done();
     }
 }
@@ -114,22 +124,26 @@ fn one_failure_is_noise_and_two_are_a_fault_until_a_transfer_succeeds() {
         transfer([7; 4]).with_error(ErrorKind::Bus),
         transfer([8; 4]),
     ]);
-    let mut worker = DacWorker::new(&mut bus);
+    let mut worker = DacWorker::new(DAC_ADDRESS);
     let link = posted([9; 4]);
-    assert!(worker.work(&link).is_err());
+    assert!(worker.work(&mut bus, &link).is_err());
     assert!(!link.failed());
-    assert_eq!(worker.work(&link), Ok(true));
+    assert_eq!(worker.work(&mut bus, &link), Ok(true));
     assert!(!link.failed());
 
-    link.post([7; 4]);
-    assert!(worker.work(&link).is_err());
+    link.post([7; 4].map(Code::new));
+    assert!(worker.work(&mut bus, &link).is_err());
     assert!(!link.failed());
-    assert!(worker.work(&link).is_err());
+    assert!(worker.work(&mut bus, &link).is_err());
     assert!(link.failed());
-    link.post([8; 4]);
-    assert_eq!(worker.work(&link), Ok(false));
+    link.post([8; 4].map(Code::new));
+    assert_eq!(worker.work(&mut bus, &link), Ok(false));
     assert!(link.failed(), "nothing has been tried");
-    assert_eq!(worker.work(&link), Ok(true), "with what is wanted by now");
+    assert_eq!(
+        worker.work(&mut bus, &link),
+        Ok(true),
+        "with what is wanted by now"
+    );
     assert!(!link.failed());
     bus.done();
 }
@@ -137,10 +151,10 @@ fn one_failure_is_noise_and_two_are_a_fault_until_a_transfer_succeeds() {
 #[test]
 fn tries_thin_out_to_one_in_seventeen_calls_and_never_end() {
     let mut bus = Mock::new(&std::vec![transfer([1; 4]).with_error(NO_ANSWER); 300]);
-    let mut worker = DacWorker::new(&mut bus);
+    let mut worker = DacWorker::new(DAC_ADDRESS);
     let link = posted([1; 4]);
     let tries: Vec<_> = (0..6_000)
-        .filter(|_| worker.work(&link).is_err())
+        .filter(|_| worker.work(&mut bus, &link).is_err())
         .take(300)
         .collect();
     assert_eq!(tries[..8], [0, 1, 3, 6, 11, 20, 37, 54]);
@@ -150,14 +164,6 @@ fn tries_thin_out_to_one_in_seventeen_calls_and_never_end() {
         "far beyond where a counter of 8 bits ends"
     );
     assert!(tries[5..].windows(2).all(|pair| pair[1] - pair[0] == 17));
-    bus.done();
-}
-
-#[test]
-fn the_bus_can_be_freed_by_the_caller() {
-    let mut bus = Mock::new(&[Transaction::write(0x00, std::vec![0x06])]);
-    let mut worker = DacWorker::new(&mut bus);
-    worker.bus().write(0x00, &[0x06]).unwrap();
     bus.done();
 }
 
@@ -226,65 +232,86 @@ impl I2c for Dac {
 
 #[test]
 fn a_dac_with_any_eeprom_is_right_after_one_transfer_and_again_after_a_loss_of_power() {
-    let mut worker = DacWorker::new(Dac::new());
+    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut bus = Dac::new();
     let link = posted([0, 819, 2048, 4095]);
-    assert_eq!(worker.work(&link), Ok(true));
-    assert_eq!(worker.bus().output, [0, 819, 2048, 4095]);
+    assert_eq!(worker.work(&mut bus, &link), Ok(true));
+    assert_eq!(bus.output, [0, 819, 2048, 4095]);
 
     // Too short an absence to be noticed on the bus.
-    worker.bus().power(false);
-    worker.bus().power(true);
-    assert_ne!(worker.bus().output, [0, 819, 2048, 4095]);
+    bus.power(false);
+    bus.power(true);
+    assert_ne!(bus.output, [0, 819, 2048, 4095]);
     for _ in 0..REFRESH_CALLS {
-        worker.work(&link).unwrap();
+        worker.work(&mut bus, &link).unwrap();
     }
-    assert_eq!(worker.bus().output, [0, 819, 2048, 4095]);
+    assert_eq!(bus.output, [0, 819, 2048, 4095]);
 
     // A long one, and other codes meanwhile.
-    worker.bus().power(false);
+    bus.power(false);
     for _ in 0..1000 {
-        let _ = worker.work(&link);
+        let _ = worker.work(&mut bus, &link);
     }
     assert!(link.failed());
-    link.post([1, 2, 3, 4]);
-    worker.bus().power(true);
-    let calls = (1..).find(|_| worker.work(&link) == Ok(true)).unwrap();
+    link.post([1, 2, 3, 4].map(Code::new));
+    bus.power(true);
+    let calls = (1..)
+        .find(|_| worker.work(&mut bus, &link) == Ok(true))
+        .unwrap();
     assert!(calls <= PAUSE_MAX_CALLS + 1, "{calls} calls");
     assert!(!link.failed());
-    assert_eq!(worker.bus().output, [1, 2, 3, 4]);
+    assert_eq!(bus.output, [1, 2, 3, 4]);
 }
 
 #[test]
 fn a_transfer_cut_short_anywhere_is_made_again_whole() {
     for cut_after in 0..12 {
-        let mut worker = DacWorker::new(Dac::new());
+        let mut worker = DacWorker::new(DAC_ADDRESS);
+        let mut bus = Dac::new();
         let link = posted([10, 20, 30, 40]);
-        worker.bus().cut_after = cut_after;
+        bus.cut_after = cut_after;
         assert_eq!(
-            worker.work(&link),
+            worker.work(&mut bus, &link),
             Err(DacError::NotAnswering(NoAcknowledgeSource::Data))
         );
-        worker.bus().cut_after = usize::MAX;
-        assert_eq!(worker.work(&link), Ok(true));
-        assert_eq!(worker.bus().output, [10, 20, 30, 40], "cut {cut_after}");
+        bus.cut_after = usize::MAX;
+        assert_eq!(worker.work(&mut bus, &link), Ok(true));
+        assert_eq!(bus.output, [10, 20, 30, 40], "cut {cut_after}");
     }
 }
 
 #[test]
 fn a_change_that_failed_half_way_is_undone_when_it_is_taken_back() {
-    let mut worker = DacWorker::new(Dac::new());
+    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut bus = Dac::new();
     let link = posted([1; 4]);
-    assert_eq!(worker.work(&link), Ok(true));
-    link.post([2; 4]);
-    worker.bus().cut_after = 6;
-    assert!(worker.work(&link).is_err());
-    assert_eq!(worker.bus().output, [2, 2, 1, 1]);
-    link.post([1; 4]);
-    worker.bus().cut_after = usize::MAX;
+    assert_eq!(worker.work(&mut bus, &link), Ok(true));
+    link.post([2; 4].map(Code::new));
+    bus.cut_after = 6;
+    assert!(worker.work(&mut bus, &link).is_err());
+    assert_eq!(bus.output, [2, 2, 1, 1]);
+    link.post([1; 4].map(Code::new));
+    bus.cut_after = usize::MAX;
     assert_eq!(
-        worker.work(&link),
+        worker.work(&mut bus, &link),
         Ok(true),
         "without waiting for a refresh"
     );
-    assert_eq!(worker.bus().output, [1; 4]);
+    assert_eq!(bus.output, [1; 4]);
+}
+
+#[test]
+fn workers_with_an_address_each_share_a_bus() {
+    let mut bus = Mock::new(&[
+        transfer_to(0x60, [1; 4]).with_error(NO_ANSWER),
+        transfer_to(0x63, [2; 4]),
+        transfer_to(0x60, [1; 4]),
+    ]);
+    let (first, second) = (posted([1; 4]), posted([2; 4]));
+    let (mut near, mut far) = (DacWorker::new(0x60), DacWorker::new(0x63));
+    assert!(near.work(&mut bus, &first).is_err());
+    assert_eq!(far.work(&mut bus, &second), Ok(true));
+    assert_eq!(near.work(&mut bus, &first), Ok(true));
+    assert_eq!(far.work(&mut bus, &second), Ok(false));
+    bus.done();
 }

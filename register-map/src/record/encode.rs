@@ -3,8 +3,6 @@
 use crc::{Digest, NoTable};
 
 use super::{CRC, FIRST_OFFSET, HEAD, MARK, OVERHEAD, PAGE_MARK, SCHEMA, SEALS};
-use crate::Module;
-use crate::configuration::MODULE_SLOT;
 
 /// Brings a record half-word by half-word, the unit in which this flash is programmed.
 #[derive(Clone)]
@@ -91,7 +89,8 @@ impl core::fmt::Debug for Encoder {
 }
 
 /// Writes a page's mark and one record into `page`, and gives how many bytes they take; `None`, and
-/// nothing of use in `page`, when there is not so much room.
+/// nothing of use in `page`, when there is not so much room. At the start of the store's first page, which is erased, it
+/// is what a device that never stored anything starts with: so a simulator or a programmer presets a device.
 pub fn encode_page(sequence: u32, pairs: &[(u16, u16)], page: &mut [u8]) -> Option<usize> {
     let mut encoder = Encoder::new(SCHEMA, sequence, u16::try_from(pairs.len()).ok()?);
     let size = encoder.size().checked_add(FIRST_OFFSET)?;
@@ -112,25 +111,6 @@ pub const BEGINNING: [u8; OVERHEAD + SEALS] = [
     0, 0, 0, 0, // seals
 ];
 
-/// Bytes of [`module_in_slot`].
-pub const PRESET_LEN: usize = FIRST_OFFSET + OVERHEAD + 4 + SEALS;
-
-/// What to put at the start of an erased first page so that the device starts with this module in its
-/// slot and defaults for the rest: what a simulator presets, and a programmer may.
-#[must_use]
-pub fn module_in_slot(module: Module) -> [u8; PRESET_LEN] {
-    let mut page = [0xFF; PRESET_LEN];
-    let pair = [(MODULE_SLOT, module.code())];
-    // An empty slot is the default, and defaults are not stored.
-    let pairs = match module {
-        Module::None => &[],
-        _ => pair.as_slice(),
-    };
-    // It fits: PRESET_LEN is the size with one pair.
-    let _ = encode_page(0, pairs, &mut page);
-    page
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -138,9 +118,10 @@ mod tests {
 
     use super::*;
     use crate::record::records;
+    use crate::{Module, configuration};
 
     /// Worked out by hand but for the CRC, which is that of Python's zlib.crc32.
-    const DI4_IN_SLOT: [u8; PRESET_LEN] = [
+    const DI4_IN_PORT_5: [u8; 24] = [
         0x6F, 0x6B, // page mark
         0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 1, 0, // head: schema 0x0101, sequence 0, one pair
         0x14, 0x01, 0x01, 0x00, // 0x0114 = 1
@@ -150,25 +131,28 @@ mod tests {
 
     #[test]
     fn the_layout_is_as_drawn() {
-        assert_eq!(module_in_slot(Module::Di4), DI4_IN_SLOT);
+        let mut page = [0xFF; 100];
+        assert_eq!(encode_page(0, &[(0x0114, 1)], &mut page), Some(24));
+        assert_eq!(page[..24], DI4_IN_PORT_5);
     }
 
     #[test]
     fn a_preset_is_a_page_with_one_record() {
-        for module in Module::ALL {
-            let bytes = module_in_slot(module);
-            let found: Vec<_> = records(&bytes).collect();
-            let [(FIRST_OFFSET, record)] = found[..] else {
-                panic!("{module}: {found:?}");
-            };
-            let stored = record.pairs().find(|(address, _)| *address == MODULE_SLOT);
-            assert_eq!(stored.map_or(0, |(_, code)| code), module.code());
-        }
+        let modules = [Module::Di4, Module::None, Module::Ai4, Module::Ao4];
+        let mut page = [0xFF; 100];
+        let pairs: Vec<_> = configuration::modules((1_u16..).zip(modules)).collect();
+        encode_page(0, &pairs, &mut page).unwrap();
+        let found: Vec<_> = records(&page).collect();
+        let [(FIRST_OFFSET, record)] = found[..] else {
+            panic!("{found:?}");
+        };
+        let pairs: Vec<_> = record.pairs().collect();
+        assert_eq!(pairs, [(0x0110, 1), (0x0112, 4), (0x0113, 5)]);
     }
 
     #[test]
     fn what_does_not_fit_is_not_written() {
-        assert_eq!(encode_page(0, &[(1, 1)], &mut [0; PRESET_LEN - 1]), None);
+        assert_eq!(encode_page(0, &[(1, 1)], &mut [0; 23]), None);
         assert_eq!(encode_page(0, &[], &mut []), None);
     }
 }

@@ -37,13 +37,7 @@ mod encode;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-pub use encode::{BEGINNING, Encoder, PRESET_LEN, encode_page, module_in_slot};
-
-/// Where the two pages stand: the last two of a 64 KiB part.
-pub const PAGE_ADDRESSES: [u32; 2] = [0x0800_F800, 0x0800_FC00];
-
-/// Bytes of a flash page: what an erase clears (medium density, RM0008 3.3.1).
-pub const PAGE_SIZE: usize = 1024;
+pub use encode::{BEGINNING, Encoder, encode_page};
 
 /// The first half-word of a page that was erased completely.
 pub const PAGE_MARK: u16 = u16::from_le_bytes(*b"ok");
@@ -145,12 +139,35 @@ fn pair([a0, a1, v0, v1]: [u8; 4]) -> (u16, u16) {
     (u16::from_le_bytes([a0, a1]), u16::from_le_bytes([v0, v1]))
 }
 
+/// Bytes of a page up to the last one that is not erased. Erased bytes are passed over by words: a start looks through
+/// whole pages several times.
+#[must_use]
+pub fn used(page: &[u8]) -> usize {
+    let is_used = |byte: &u8| *byte != 0xFF;
+    let (words, rest) = page.as_chunks::<4>();
+    if let Some(last) = rest.iter().rposition(is_used) {
+        return size_of_val(words).saturating_add(last).saturating_add(1);
+    }
+    let Some(word) = words.iter().rposition(|word| *word != [0xFF; 4]) else {
+        return 0;
+    };
+    // Cells whose program was cut off may read as erased this time, and did not a moment ago: then the whole word is.
+    let last = words
+        .get(word)
+        .and_then(|bytes| bytes.iter().rposition(is_used));
+    word.saturating_mul(4)
+        .saturating_add(last.unwrap_or(3))
+        .saturating_add(1)
+}
+
 /// Every good record of a page with its offset, whatever lies between them.
 pub fn records(page: &[u8]) -> impl Iterator<Item = (usize, Record<'_>)> {
     let mut offset = 0;
+    let end = used(page);
     core::iter::from_fn(move || {
-        while let Some(bytes) = page.get(offset..).filter(|bytes| !bytes.is_empty()) {
+        while offset < end {
             let here = offset;
+            let bytes = page.get(offset..)?;
             if let Some(record) = Record::decode(bytes) {
                 offset = offset.saturating_add(record.size());
                 return Some((here, record));
@@ -177,7 +194,8 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::Module;
+
+    const PAGE_SIZE: usize = 1024;
 
     fn encoded(sequence: u32, pairs: &[(u16, u16)]) -> Vec<u8> {
         let mut page = [0xFF; PAGE_SIZE];
@@ -238,13 +256,28 @@ mod tests {
         let mut page = [0xFF; PAGE_SIZE];
         encode_page(1, &[], &mut page);
         assert!(!is_vacant(&page), "defaults that someone has saved");
-        assert!(!is_vacant(&module_in_slot(Module::Di4)));
+        let size = encode_page(0, &[(0x0114, 1)], &mut page).unwrap();
+        assert!(!is_vacant(&page[..size]));
     }
 
     #[test]
     fn sequence_numbers_wrap() {
         assert!(is_newer(1, 0) && is_newer(0, u32::MAX) && is_newer(5, u32::MAX - 5));
         assert!(!is_newer(0, 0) && !is_newer(0, 1) && !is_newer(u32::MAX, 0));
+    }
+
+    #[test]
+    fn a_page_is_used_up_to_its_last_byte_that_is_not_erased() {
+        for size in [0, 3, 4, 1024, 1027] {
+            let mut page = std::vec![0xFF; size];
+            assert_eq!(used(&page), 0);
+            for at in [0, 1, 4, 7, 500, 1023, 1024, 1026] {
+                if let Some(byte) = page.get_mut(at) {
+                    *byte = 0x7F;
+                    assert_eq!(used(&page), at + 1, "{at} of {size}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub mod unit;
 
 use std::collections::BTreeMap;
 
+use register_map::Board;
 use serde::Serialize;
 use sim::{Corner, Image};
 
@@ -53,24 +54,25 @@ pub struct Report {
     pub load: Vec<load::Load>,
 }
 
-/// Measures an image, and rivals by name.
+/// Measures the image of a board, and rivals by name.
 ///
 /// # Errors
 ///
 /// When the image does not serve a request as it should: which, and what it did.
-pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, String> {
+pub fn measure(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Result<Report, String> {
     let mut units: BTreeMap<(&str, u16), Unit> = BTreeMap::new();
     let mut rivals = rivals
         .iter()
         .map(|(name, image)| Ok((name.clone(), Rival::new(image)?)))
         .collect::<Result<Vec<_>, String>>()?;
     let mut requests = Vec::new();
-    for request in requests::all() {
+    for request in requests::all(board) {
         let (module, mode) = (request.module, request.mode);
         let unit = match units.entry((module.name(), mode.code())) {
             std::collections::btree_map::Entry::Occupied(unit) => unit.into_mut(),
             std::collections::btree_map::Entry::Vacant(place) => {
-                place.insert(Unit::new(image, module, Corner::Nominal, 1152, mode)?)
+                let unit = Unit::new(image, board, module, Corner::Nominal, 1152, mode)?;
+                place.insert(unit)
             }
         };
         let cost = unit.measure(&request);
@@ -101,7 +103,7 @@ pub fn measure(image: &Image, rivals: &[(String, Image)]) -> Result<Report, Stri
     for corner in [Corner::Nominal, Corner::Slow] {
         for rate in RATES {
             for long in [false, true] {
-                load.push(load::measure(image, corner, rate, long)?);
+                load.push(load::measure(image, board, corner, rate, long)?);
             }
         }
     }

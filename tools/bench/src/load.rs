@@ -1,9 +1,9 @@
 //! What the line asks of the processor when a master leaves it no rest: requests back to back, each sent
 //! as soon as t3.5 has passed since the last response.
 
-use register_map::Module;
 use register_map::codes::Mode;
 use register_map::configuration::BETA;
+use register_map::{Board, Module};
 use serde::Serialize;
 use sim::{Corner, Image, Time};
 
@@ -45,8 +45,14 @@ pub struct Load {
 /// # Errors
 ///
 /// When it leaves a request unanswered.
-pub fn measure(image: &Image, corner: Corner, hundreds: u16, long: bool) -> Result<Load, String> {
-    let mut unit = Unit::new(image, Module::Di4, corner, hundreds, Mode::Rtu)?;
+pub fn measure(
+    image: &Image,
+    board: &Board,
+    corner: Corner,
+    hundreds: u16,
+    long: bool,
+) -> Result<Load, String> {
+    let mut unit = Unit::new(image, board, Module::Di4, corner, hundreds, Mode::Rtu)?;
     let (name, count) = if long {
         ("03, 125 registers", 125)
     } else {

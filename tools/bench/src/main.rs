@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use register_map::Board;
 use sim::Image;
 
 /// Measures the release image on the virtual board and prints the figures as JSON
@@ -12,6 +13,9 @@ use sim::Image;
 struct Cli {
     /// The image
     elf: PathBuf,
+    /// The board that it is for: modio-02 or modio-08
+    #[arg(long, value_name = "NAME")]
+    board: &'static Board,
     /// Minimal servers on other crates, named after their files
     #[arg(long, value_name = "ELF", num_args = 1..)]
     rivals: Vec<PathBuf>,
@@ -40,7 +44,7 @@ fn run(cli: &Cli) -> Result<(), String> {
             Ok((name.into_owned(), read(path)?))
         })
         .collect::<Result<Vec<_>, String>>()?;
-    let report = bench::measure(&image, &rivals)?;
+    let report = bench::measure(&image, cli.board, &rivals)?;
     let json = serde_json::to_string_pretty(&report).map_err(|error| error.to_string())?;
     println!("{json}");
     Ok(())

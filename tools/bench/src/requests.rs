@@ -3,10 +3,9 @@
 //! The addresses are modio's. A rival has its points from address 0 on, so a request goes to it with
 //! its addresses changed and all else the same.
 
-use register_map::Module;
 use register_map::codes::Mode;
 use register_map::configuration::{BETA, FILTER, KEY, OPENING_KEY};
-use register_map::points::SLOT_FIRST;
+use register_map::{Board, Module};
 
 /// The unit that is asked.
 pub const UNIT: u8 = 1;
@@ -21,7 +20,7 @@ pub struct Request {
     pub name: String,
     /// The transmission mode of the line.
     pub mode: Mode,
-    /// The module in the slot.
+    /// The module in all slots.
     pub module: Module,
     /// What is asked first, not measured: opens the lock where the request needs it.
     pub before: Option<Vec<u8>>,
@@ -54,9 +53,50 @@ fn settings(count: usize) -> Vec<u8> {
     values.take(count).flat_map(u16::to_be_bytes).collect()
 }
 
-/// All of them.
+/// All of them, for a board.
 #[must_use]
-pub fn all() -> Vec<Request> {
+pub fn all(board: &Board) -> Vec<Request> {
+    let mut requests = of_any_board(board.points().start);
+    if board.slots > 1 {
+        requests.extend(of_all_slots(board));
+    }
+    requests
+}
+
+/// Requests for the points of all slots of a board.
+fn of_all_slots(board: &Board) -> Vec<Request> {
+    let points = board.points();
+    let count = points.end - points.start;
+    let request = |name: &str, module, pdu| Request {
+        name: format!("{name}, {count}"),
+        mode: Mode::Rtu,
+        module,
+        before: None,
+        pdu,
+        rival: None,
+    };
+    let read = [points.start, count];
+    let bits = vec![0x55; usize::from(count).div_ceil(8)];
+    let words: Vec<u8> = points.flat_map(|_| 100_u16.to_be_bytes()).collect();
+    vec![
+        request("01 read coils", Module::Do4, pdu(1, &read)),
+        request("02 read discrete inputs", Module::Di4, pdu(2, &read)),
+        request("04 read input registers", Module::Ai4, pdu(4, &read)),
+        request(
+            "0F write multiple coils",
+            Module::Do4,
+            with_data(0x0F, &read, &bits),
+        ),
+        request(
+            "10 write multiple registers, outputs",
+            Module::Ao4,
+            with_data(0x10, &read, &words),
+        ),
+    ]
+}
+
+/// Requests that every board serves, the points from `first` on.
+fn of_any_board(first: u16) -> Vec<Request> {
     let of = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
         name: name.to_owned(),
         mode: Mode::Rtu,
@@ -66,8 +106,7 @@ pub fn all() -> Vec<Request> {
         rival: Some(make(0)),
     };
     let open = || Some(pdu(0x06, &[KEY, OPENING_KEY]));
-    let bits =
-        |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>| of(name, module, make, SLOT_FIRST);
+    let bits = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>| of(name, module, make, first);
     let setting = |name: &str, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
         before: open(),
         ..of(name, Module::Di4, make, address)
@@ -177,6 +216,12 @@ pub fn all() -> Vec<Request> {
         alone("0B get comm event counter", pdu(0x0B, &[])),
         alone("0C get comm event log", pdu(0x0C, &[])),
         alone("11 report server id", pdu(0x11, &[])),
+        alone("14 read file record, 1", {
+            vec![0x14, 7, 6, 0, 1, 0, 0, 0, 1]
+        }),
+        alone("14 read file record, 124", {
+            vec![0x14, 7, 6, 0, 1, 1, 0, 0, 124]
+        }),
         alone(
             "2B/0E device identification, one object",
             vec![0x2B, 0x0E, 4, 0],
@@ -193,15 +238,21 @@ pub fn all() -> Vec<Request> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::framing::{adu, is_adu};
 
     #[test]
     fn requests_are_frames_and_settings_are_allowed() {
-        for request in all() {
-            assert!(request.pdu.len() <= 253, "{}", request.name);
-            let frame = adu(request.mode, &request.pdu);
-            assert!(is_adu(request.mode, &frame), "{}", request.name);
+        for board in Board::ALL {
+            let mut names = BTreeSet::new();
+            for request in all(board) {
+                assert!(request.pdu.len() <= 253, "{}", request.name);
+                let frame = adu(request.mode, &request.pdu);
+                assert!(is_adu(request.mode, &frame), "{}", request.name);
+                assert!(names.insert(request.name.clone()), "{}", request.name);
+            }
         }
         assert_eq!(settings(123).len(), 246);
     }

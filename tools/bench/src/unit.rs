@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use register_map::codes::Mode;
-use register_map::{Module, configuration, record};
-use sim::board::MODIO_02;
+use register_map::{Board as Map, Module, configuration};
+use sim::board::Layout;
 use sim::line::{Format, Settings};
-use sim::machine::memory::FLASH_BASE;
 use sim::{Board, Config, Corner, Image, Time};
 
 use crate::framing::{adu, is_adu};
@@ -56,33 +55,34 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// A board with this module, at a corner of the part, at a rate in units of 100 bit/s in this mode, started.
+    /// A board with this module in all of its slots, at a corner of the part, at a rate in units of 100 bit/s in this
+    /// mode, started.
     ///
     /// # Errors
     ///
     /// When the image does not fit the board.
     pub fn new(
         image: &Image,
+        board: &Map,
         module: Module,
         corner: Corner,
         hundreds: u16,
         mode: Mode,
     ) -> Result<Self, String> {
-        let pairs = [
-            (configuration::BAUD, hundreds),
-            (configuration::MODE, mode.code()),
-            (configuration::MODULE_SLOT, module.code()),
-        ];
-        let mut flash = vec![0xFF; MODIO_02.part.flash_size];
-        let page = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
-        // It fits: three pairs in a page of a kilobyte.
-        record::encode_page(1, &pairs, &mut flash[page..page + 1024]);
-        let config = Config {
-            module,
+        let layout = Layout::of(board).ok_or("the simulator does not know this board")?;
+        let slots = layout.slots.iter().map(|slot| (slot.port, module));
+        let mut config = Config {
+            layout,
+            slots: slots.collect(),
             corner,
-            flash: Some(flash),
             ..Config::default()
         };
+        let mut settings = vec![
+            (configuration::BAUD, hundreds),
+            (configuration::MODE, mode.code()),
+        ];
+        settings.extend(configuration::modules(config.plugged()));
+        config.flash = layout.flash_with(&settings);
         let mut board = Board::new(image, config).map_err(|error| error.to_string())?;
         let settings = Settings {
             baud: u32::from(hundreds) * 100,

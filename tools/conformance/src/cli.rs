@@ -40,10 +40,20 @@ pub struct Cli {
     #[arg(long, value_name = "ELF", group = "endpoint")]
     pub sim: Option<PathBuf>,
 
-    /// What is in the simulated board's slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// The simulated board, for which the image is: modio-02 or modio-08
+    #[cfg(feature = "sim")]
+    #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
+    pub board: &'static register_map::Board,
+
+    /// What is in the simulated board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub module: register_map::Module,
+
+    /// What is in the simulated board's slot at a port, such as 3=4ai; may be repeated
+    #[cfg(feature = "sim")]
+    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim_options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
+    pub slots: Vec<(u8, register_map::Module)>,
 
     /// The simulated board's DIP switch: its unit address
     #[cfg(feature = "sim")]
@@ -199,7 +209,9 @@ impl Cli {
             use crate::endpoint::sim::{Fitting, start};
             return Ok(Box::new(start(&Fitting {
                 elf: elf.clone(),
+                board: self.board,
                 module: self.module,
+                slots: self.slots.clone(),
                 dip: self.dip,
                 line: self.line(),
                 mode,

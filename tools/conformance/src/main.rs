@@ -83,7 +83,10 @@ fn found(target: &Target) -> String {
         .map(|(function, _)| format!("{function:02X}"))
         .collect();
     let what = match target.modio {
-        Some(modio) => format!("a modio with {}", modio.module),
+        Some(modio) => {
+            let board = modio.board.map_or("modio", |board| board.name);
+            format!("a {board} with {modio}")
+        }
         None => "a unit".to_owned(),
     };
     format!(

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use register_map::points::{self, PointKind, output_values};
-use register_map::{BLOCKS, Module, Values, codes, configuration, state};
+use register_map::points::{self, Kind, output_values};
+use register_map::{BLOCKS, Board, Module, Values, codes, configuration, state};
 
 use crate::bench::{Bench, Patience};
 use crate::case::{Check, Stop};
@@ -33,8 +33,8 @@ pub struct Given<'a> {
 const ATTEMPTS: u32 = 4;
 
 /// Every function that cases are about.
-pub const FUNCTIONS: [u8; 16] = [
-    1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x2B,
+pub const FUNCTIONS: [u8; 18] = [
+    1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x2B,
 ];
 
 /// Asks the unit.
@@ -168,6 +168,8 @@ fn harmless(target: &Target, function: u8) -> Result<Vec<u8>, String> {
         7 | 0x0B | 0x0C | 0x11 => vec![function],
         8 => vec![8, 0, 0, 0xA5, 0x37],
         0x0F | 0x10 => vec![function, 0, 0, 0, 0, 0],
+        // A byte count that neither function allows.
+        0x14 | 0x15 => vec![function, 0],
         0x16 => [pdu(function, nowhere()?, 0xFFFF), vec![0, 0]].concat(),
         0x17 => vec![function, 0, 0, 0, 0, 0, 0, 0, 0, 0],
         _ => vec![0x2B, 0x0E, 1, 0],
@@ -184,8 +186,16 @@ fn ping(target: &Target) -> Option<Vec<u8>> {
 
 /// What a modio has, by its own registers; and how much longer than by the standard it may take to answer.
 fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)> {
-    let code = bench.read_word(state::MODULE_IN_FORCE + points::SLOT_PORT - 1)?;
-    let module = Module::from_code(code).unwrap_or(Module::None);
+    let board = Board::from_code(bench.read_word(state::BOARD)?);
+    let codes = bench.read_words(Span {
+        first: state::MODULE_IN_FORCE,
+        last: state::MODULE_IN_FORCE + points::PORTS - 1,
+    })?;
+    let mut modules = [Module::None; points::PORTS as usize];
+    for (module, code) in modules.iter_mut().zip(codes) {
+        *module = Module::from_code(code).unwrap_or(Module::None);
+    }
+    let modio = Modio { board, modules };
     let delay = bench.read_word(configuration::RESPONSE_DELAY)?;
     let gap = bench.read_word(configuration::FRAME_GAP)?;
     let strict = bench.read_word(configuration::STRICT_T15)?;
@@ -193,26 +203,10 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
         Duration::from_millis(u64::from(delay)) + Duration::from_micros(100) * u32::from(gap);
 
     let mut target = bench.target.clone();
-    target.modio = Some(Modio { module });
+    target.modio = Some(modio);
     target.strict_t15 = Some(strict == 1);
-    let kinds = module.points();
-    let run = |wanted: &[PointKind]| {
-        let mut channels = (0_u16..)
-            .zip(kinds)
-            .filter(|(_, kind)| wanted.contains(kind));
-        let first = channels.next()?.0;
-        let last = channels.last().map_or(first, |(channel, _)| channel);
-        Some(Span {
-            first: points::SLOT_FIRST + first,
-            last: points::SLOT_FIRST + last,
-        })
-    };
-    let bits: Vec<Span> = run(&[PointKind::BitInput, PointKind::BitOutput])
-        .into_iter()
-        .collect();
-    let mut registers: Vec<Span> = run(&[PointKind::WordInput, PointKind::WordOutput])
-        .into_iter()
-        .collect();
+    let bits = modio.runs(&[Kind::BitInput, Kind::BitOutput]);
+    let mut registers = modio.runs(&[Kind::WordInput, Kind::WordOutput]);
     for block in BLOCKS.into_iter().skip(1) {
         let mut open: Option<Span> = None;
         for (rule, _) in block.registers() {
@@ -231,9 +225,9 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
         registers.extend(open);
     }
     target.readable = [bits.clone(), bits, registers.clone(), registers];
-    target.bits = run(&[PointKind::BitOutput]);
-    target.words = match run(&[PointKind::WordOutput]) {
-        Some(span) => Some(outputs(bench, span)?),
+    target.bits = modio.runs(&[Kind::BitOutput]).first().copied();
+    target.words = match modio.runs(&[Kind::WordOutput]).first() {
+        Some(span) => Some(outputs(bench, *span)?),
         // A setting that touches no output: the NTC constants.
         None if allow_config => Some(Words {
             span: Span {
@@ -250,14 +244,22 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
     Ok((target, slower))
 }
 
-/// What analog outputs take, by their scale and signal.
+/// What analog outputs take, by their scale and signal: the first of these, and those behind it that take the same.
 fn outputs(bench: &mut Bench<'_>, span: Span) -> Check<Words> {
-    let scale = bench.read_word(configuration::SCALE + span.first)?;
-    let signal = bench.read_word(configuration::RANGE + span.first)?;
-    let values = output_values(
-        codes::Signal::from_code(signal).unwrap_or(codes::Signal::Voltage),
-        codes::Scale::from_code(scale).unwrap_or(codes::Scale::Raw),
-    );
+    let mut of_point = |point: u16| {
+        let scale = bench.read_word(configuration::SCALE + point)?;
+        let signal = bench.read_word(configuration::RANGE + point)?;
+        Check::Ok(output_values(
+            codes::Signal::from_code(signal).unwrap_or(codes::Signal::Voltage),
+            codes::Scale::from_code(scale).unwrap_or(codes::Scale::Raw),
+        ))
+    };
+    let values = of_point(span.first)?;
+    let mut last = span.first;
+    while last < span.last && of_point(last + 1)? == values {
+        last += 1;
+    }
+    let span = Span { last, ..span };
     let (low, high) = match values {
         Values::Range { min, max } => (min + 1, max),
         _ => (1, 4095),

@@ -1,8 +1,10 @@
 //! What the unit under test has, as far as the cases need to know: found by the probe, told by a profile.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
-use register_map::Module;
+use register_map::points::{self, Kind};
+use register_map::{Board, Module};
 
 use crate::frame::Mode;
 
@@ -74,8 +76,66 @@ pub enum Support {
 /// What is known of a modio beyond its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Modio {
-    /// The module in force in its slot.
-    pub module: Module,
+    /// The board, by its register BOARD; `None` for a board that the register map does not know.
+    pub board: Option<&'static Board>,
+    /// The modules in force, port 1 first.
+    pub modules: [Module; points::PORTS as usize],
+}
+
+impl Modio {
+    /// The ports that have a slot, with the modules in force. Of a board that is not known, those that have a module.
+    pub fn slots(&self) -> impl Iterator<Item = (u16, Module)> {
+        let ports = (1..).zip(self.modules);
+        ports.filter(|(port, module)| match self.board {
+            Some(board) => board.has_slot(*port),
+            None => *module != Module::None,
+        })
+    }
+
+    /// The module in the first slot.
+    #[must_use]
+    pub fn module(&self) -> Module {
+        self.slots()
+            .next()
+            .map_or(Module::None, |(_, module)| module)
+    }
+
+    /// The points of all modules with what they are, in ascending order of their addresses.
+    pub fn points(&self) -> impl Iterator<Item = (u16, Kind)> {
+        let of_slot = |(port, module): (u16, Module)| (points::first(port)..).zip(module.points());
+        let points = self.slots().flat_map(of_slot);
+        points.filter(|(_, kind)| *kind != Kind::None)
+    }
+
+    /// The runs of neighbouring points of these kinds.
+    #[must_use]
+    pub fn runs(&self, kinds: &[Kind]) -> Vec<Span> {
+        let mut runs: Vec<Span> = Vec::new();
+        for (address, _) in self.points().filter(|(_, kind)| kinds.contains(kind)) {
+            match runs.last_mut() {
+                Some(run) if run.last + 1 == address => run.last = address,
+                _ => runs.push(Span {
+                    first: address,
+                    last: address,
+                }),
+            }
+        }
+        runs
+    }
+}
+
+impl fmt::Display for Modio {
+    /// The module in its slot, such as `4do`; of a board with several slots all of them, such as `1=4do 2=none`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.slots().count() < 2 {
+            return self.module().fmt(f);
+        }
+        for (n, (port, module)) in self.slots().enumerate() {
+            let separator = if n == 0 { "" } else { " " };
+            write!(f, "{separator}{port}={module}")?;
+        }
+        Ok(())
+    }
 }
 
 /// The unit under test.
@@ -146,6 +206,8 @@ impl Target {
 
 #[cfg(test)]
 mod tests {
+    use register_map::board::{MODIO_02, MODIO_08};
+
     use super::*;
 
     const fn span(first: u16, last: u16) -> Span {
@@ -164,6 +226,34 @@ mod tests {
             modio: None,
             ping: vec![],
         }
+    }
+
+    #[test]
+    fn runs_of_points_go_from_slot_to_slot_and_end_where_the_kind_changes() {
+        let mut modules = [Module::None; 8];
+        modules[..4].copy_from_slice(&[Module::Relay2, Module::Do4, Module::None, Module::Ai2Ao2]);
+        let modio = Modio {
+            board: Some(&MODIO_08),
+            modules,
+        };
+        assert_eq!(modio.runs(&[Kind::BitOutput]), [span(2, 7)]);
+        let bits = [Kind::BitInput, Kind::BitOutput];
+        assert_eq!(modio.runs(&bits), [span(0, 7)]);
+        assert_eq!(modio.runs(&[Kind::WordOutput]), [span(14, 15)]);
+        assert_eq!(modio.to_string(), "1=2relay 2=4do 3=none 4=2ai2ao");
+        assert_eq!((modio.slots().count(), modio.module()), (4, Module::Relay2));
+
+        modules[4] = Module::Di4;
+        let board = Some(&MODIO_02);
+        let modio = Modio { board, modules };
+        assert_eq!(
+            modio.runs(&bits),
+            [span(0x10, 0x13)],
+            "port 5 alone has a slot"
+        );
+        assert_eq!(modio.to_string(), "4di");
+        let board = None;
+        assert_eq!(Modio { board, modules }.slots().count(), 4);
     }
 
     #[test]

@@ -4,10 +4,6 @@
 #[path = "reference/fault.rs"]
 #[allow(dead_code, reason = "the list of faults is for the test of the cases")]
 mod fault;
-#[path = "reference/ident.rs"]
-mod ident;
-#[path = "reference/log.rs"]
-mod log;
 #[path = "reference/modio.rs"]
 #[allow(dead_code, reason = "the unit behind the socket is no modio")]
 mod modio;

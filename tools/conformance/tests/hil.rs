@@ -15,6 +15,7 @@ use conformance::hil::report::Report;
 use conformance::hil::{Plan, run};
 use conformance::line::LineFormat;
 use register_map::Module;
+use register_map::board::MODIO_02;
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -23,7 +24,9 @@ fn the_image_loses_nothing_at_any_rate_and_is_back_at_its_own() {
     let home = LineFormat::default();
     let mut endpoint = start(&Fitting {
         elf: PathBuf::from(elf),
+        board: &MODIO_02,
         module: Module::Do4,
+        slots: Vec::new(),
         dip: 3,
         line: home,
         mode: Mode::Rtu,

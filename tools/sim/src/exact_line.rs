@@ -92,14 +92,27 @@ pub fn begin(board: &mut Board, request: &Request) -> Result<Time, String> {
 }
 
 fn hello(board: &mut Board) -> Hello {
-    let module = board.module();
+    let modules = fitted(board);
     let Settings { baud, format } = board.line().settings();
     Hello {
         baud,
         format: format.name().to_owned(),
         abilities: Ability::ALL.into(),
-        name: format!("the simulator with {module}"),
+        name: format!("the simulator with {modules}"),
     }
+}
+
+/// The module in the slot of a board that has one, such as `4do`; of a board with several slots the modules by port,
+/// such as `1=4do 2=none`.
+fn fitted(board: &Board) -> String {
+    let slots: Vec<_> = board.slots().collect();
+    if let [(_, slot)] = slots[..] {
+        return slot.module().to_string();
+    }
+    let modules = slots
+        .iter()
+        .map(|(port, slot)| format!("{port}={}", slot.module()));
+    modules.collect::<Vec<_>>().join(" ")
 }
 
 /// Puts pieces on the line; returns when the last of them has ended.
@@ -243,6 +256,23 @@ mod tests {
             "{now} version=1 line=19200,8E1 abilities=line,faults,"
         )));
         assert!(hello.ends_with(" name=the simulator with 4do"), "{hello}");
+    }
+
+    #[test]
+    fn a_board_with_several_slots_names_all_its_modules() {
+        let image =
+            Image::from_bytes(&[0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7]);
+        let config = Config {
+            layout: &crate::board::MODIO_08,
+            slots: vec![(3, Module::Ao4)],
+            ..Config::default()
+        };
+        let mut board = Board::new(&image.unwrap(), config).unwrap();
+        let hello = ask(&mut board, "hello 1").unwrap();
+        let name = "the simulator with 1=4di 2=none 3=4ao 4=none";
+        assert!(hello.ends_with(&format!(" name={name}")), "{hello}");
+        let read = Reply::read(&Request::Hello(1), &hello).unwrap();
+        assert!(format!("{read:?}").contains(name), "{read:?}");
     }
 
     #[test]

@@ -98,8 +98,9 @@ pub fn hold(file: &Path, report: &Value) -> Result<()> {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "worse than the baseline by more than {TOLERANCE_PERCENT} % and {TOLERANCE}; if that is \
-         meant, `cargo xtask bench --bless`\n  {}",
+        "worse than the baseline {} by more than {TOLERANCE_PERCENT} % and {TOLERANCE}; if that is meant, \
+         `cargo xtask bench --bless` with the same --board\n  {}",
+        file.display(),
         worse.join("\n  ")
     )))
 }

@@ -15,7 +15,7 @@ const CRATE: &str = "modbus_server";
 /// What a line needs of it, and how many.
 const STRUCTURES: [(&str, u64); 4] = [
     ("Server", 1),
-    ("Receiver", 1),
+    ("Receiver<u8>", 1),
     ("Transmitter", 1),
     ("Adu", 2),
 ];
@@ -58,7 +58,7 @@ mod tests {
     fn a_line_has_two_buffers() {
         let sizes = [
             ("Server", 100),
-            ("Receiver", 40),
+            ("Receiver<u8>", 40),
             ("Transmitter", 30),
             ("Adu", 260),
         ];

@@ -20,9 +20,10 @@ enum Part {
 }
 
 /// Sources and whose they are; the first that fits counts.
-const SOURCES: [(&str, Part); 6] = [
+const SOURCES: [(&str, Part); 7] = [
     ("firmware/src/app/", Part::Driver),
     ("firmware/src/alive.rs", Part::Driver),
+    ("firmware/src/line.rs", Part::Driver),
     ("firmware/src/", Part::Server),
     ("modbus-server/src/", Part::Server),
     ("register-map/src/", Part::Server),
@@ -91,6 +92,7 @@ mod tests {
             ("/m/firmware/src/device/points.rs", Some(Part::Server)),
             ("C:\\m\\firmware\\src\\app\\line.rs", Some(Part::Driver)),
             ("/m/firmware/src/alive.rs", Some(Part::Driver)),
+            ("/m/firmware/src/line.rs", Some(Part::Driver)),
             ("/m/board-support/src/rs485.rs", Some(Part::Driver)),
             ("/m/board-support/src/mem.rs", Some(Part::Server)),
             ("/r/registry/src/index/vcell-0.1.3/src/lib.rs", None),

@@ -9,30 +9,33 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use object::read::{Object as _, ObjectSection as _};
+use register_map::Board;
 use serde_json::{Value, json};
 
 use crate::toolchain::TARGET;
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command, image};
 
-/// The feature that makes package firmware an image.
-const FEATURE: &str = "board";
-
 /// Name and version of a crate.
 type Crate = (String, String);
 
-/// The bill of this image; `flash` is the SHA-256 of its .bin.
+/// The bill of this image for a board; `flash` is the SHA-256 of its .bin.
 ///
 /// # Errors
 ///
 /// When cargo cannot be asked, or what it says does not fit together.
-pub(super) fn of_image(workspace: &Workspace, elf: &[u8], flash: &str) -> Result<Value> {
+pub(super) fn of_image(
+    workspace: &Workspace,
+    board: &Board,
+    elf: &[u8],
+    flash: &str,
+) -> Result<Value> {
     let mut cargo = workspace.cargo("tree");
     cargo.args([
         "--package",
         "firmware",
         "--features",
-        FEATURE,
+        board.name,
         "--target",
         TARGET,
     ]);
@@ -40,13 +43,14 @@ pub(super) fn of_image(workspace: &Workspace, elf: &[u8], flash: &str) -> Result
     let tree = command::read(cargo.args(["--format", "{p}"]))?;
     let mut cargo = workspace.cargo("metadata");
     cargo.args(["--format-version", "1", "--filter-platform", TARGET]);
-    let metadata = command::read(cargo.args(["--features", &format!("firmware/{FEATURE}")]))?;
+    let metadata = command::read(cargo.args(["--features", &format!("firmware/{board}")]))?;
     let metadata = serde_json::from_str(&metadata)
         .map_err(|error| Failure::new(format!("`cargo metadata` gives no JSON: {error}")))?;
     let lock = std::fs::read_to_string(workspace.root().join("Cargo.lock"))
         .map_err(|error| Failure::new(format!("cannot read Cargo.lock: {error}")))?;
     let compiler = compiler(elf).map_err(Failure::new)?;
     bill(
+        board,
         &linked(&tree),
         &metadata,
         &checksums(&lock),
@@ -105,6 +109,7 @@ fn compiler(elf: &[u8]) -> std::result::Result<String, String> {
 }
 
 fn bill(
+    board: &Board,
     linked: &BTreeSet<Crate>,
     metadata: &Value,
     sums: &BTreeMap<Crate, String>,
@@ -138,7 +143,7 @@ fn bill(
     };
     let mut main = component(root, package, sums);
     main["type"] = json!("firmware");
-    main["name"] = json!("modio");
+    main["name"] = json!(board.name);
     main["hashes"] = json!([{ "alg": "SHA-256", "content": flash }]);
     let mut components: Vec<Value> = rest
         .iter()
@@ -206,6 +211,8 @@ fn purl((name, version): &Crate) -> String {
 
 #[cfg(test)]
 mod tests {
+    use register_map::board::MODIO_02;
+
     use super::*;
 
     const TREE: &str = "firmware v0.1.0 (/x/firmware)\ncrc v3.4.0\ncrc v3.4.0 (*)\n\n";
@@ -236,13 +243,14 @@ mod tests {
                     checksum = \"abcd\"\n\n[[package]]\nname = \"firmware\"\nversion = \"0.1.0\"\n";
         let sums = checksums(lock);
         assert_eq!(sums.len(), 1);
-        let bill = bill(&linked(TREE), &metadata(), &sums, "1.95.0", "ef").unwrap();
+        let bill = bill(&MODIO_02, &linked(TREE), &metadata(), &sums, "1.95.0", "ef").unwrap();
         let [crc] = bill["components"].as_array().unwrap().as_slice() else {
             panic!("{bill:#}");
         };
         assert_eq!(crc["purl"], "pkg:cargo/crc@3.4.0");
         assert_eq!(crc["hashes"][0]["content"], "abcd");
         assert_eq!(crc["licenses"][0]["expression"], "MIT OR Apache-2.0");
+        assert_eq!(bill["metadata"]["component"]["name"], "modio-02");
         assert_eq!(bill["metadata"]["component"]["hashes"][0]["content"], "ef");
         assert_eq!(
             bill["dependencies"],
@@ -256,7 +264,8 @@ mod tests {
     #[test]
     fn a_crate_that_is_linked_but_not_known_is_told() {
         let tree = format!("{TREE}stranger v9.0.0\n");
-        let text = bill(&linked(&tree), &metadata(), &BTreeMap::new(), "", "").unwrap_err();
+        let (tree, sums) = (linked(&tree), BTreeMap::new());
+        let text = bill(&MODIO_02, &tree, &metadata(), &sums, "", "").unwrap_err();
         assert_eq!(text, "`cargo metadata` knows no stranger 9.0.0");
     }
 }

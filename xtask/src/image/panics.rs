@@ -6,7 +6,7 @@
 use object::elf::STT_FUNC;
 use object::read::elf::Sym;
 
-use super::{Elf, FLASH_BASE, flat, parse};
+use super::{Elf, FLASH_BASE, parse};
 
 /// A function that panics, and who calls it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,22 +24,21 @@ struct Function {
     size: u32,
 }
 
-/// The panicking functions that are linked into an image.
+/// The panicking functions that are linked into an image, whose flash begins with the bytes of `flash`.
 ///
 /// # Errors
 ///
 /// When it is no image, or has no symbols to tell by.
-pub fn linked(bytes: &[u8]) -> Result<Vec<Panic>, String> {
+pub fn linked(bytes: &[u8], flash: &[u8]) -> Result<Vec<Panic>, String> {
     let functions = functions(&parse(bytes)?)?;
     if functions.is_empty() {
         return Err("the image has no symbols: whether it can panic cannot be told".to_owned());
     }
-    let flash = flat(bytes)?;
     let panics = functions.iter().filter(|function| panics(&function.name));
     Ok(panics
         .map(|panic| Panic {
             name: panic.name.clone(),
-            callers: callers(panic.address, &functions, &flash),
+            callers: callers(panic.address, &functions, flash),
         })
         .collect())
 }
@@ -114,41 +113,42 @@ mod tests {
     /// `main` at the start, a panicking function 0x100 bytes later.
     const PANIC: u32 = FLASH_BASE + 0x100;
 
-    fn image(code: &[u8], panic: &str) -> Vec<u8> {
+    /// What is linked into an image with this code and this panicking function.
+    fn linked_into(code: &[u8], panic: &str) -> Result<Vec<Panic>, String> {
         let mut flash = vec![0; 0x110];
         flash[..code.len()].copy_from_slice(code);
-        sample::elf(
-            &[Segment::at(FLASH_BASE, &flash)],
-            &[("main", FLASH_BASE | 1, 0x20), (panic, PANIC | 1, 8)],
-        )
+        let functions = [("main", FLASH_BASE | 1, 0x20), (panic, PANIC | 1, 8)];
+        let elf = sample::elf(&[Segment::at(FLASH_BASE, &flash)], &functions);
+        linked(&elf, &flash)
     }
 
     #[test]
     fn a_panicking_function_is_found_with_its_callers() {
         // nop; bl +0xFA: assembled with llvm-mc.
         let code = [0x00, 0xBF, 0x00, 0xF0, 0x7D, 0xF8];
-        let found = linked(&image(
-            &code,
-            "_ZN4core9panicking5panic17h0123456789abcdefE",
-        ));
+        let found = linked_into(&code, "_ZN4core9panicking5panic17h0123456789abcdefE");
         let expected = Panic {
             name: "core::panicking::panic".to_owned(),
             callers: vec!["main".to_owned()],
         };
         assert_eq!(found, Ok(vec![expected]));
-        let handler = linked(&image(&[], "rust_begin_unwind")).unwrap();
+        let handler = linked_into(&[], "rust_begin_unwind").unwrap();
         assert_eq!((handler.len(), handler[0].callers.len()), (1, 0));
     }
 
     #[test]
     fn an_image_without_one_is_good() {
-        assert_eq!(linked(&image(&[], "modio::panicking_not")), Ok(Vec::new()));
+        assert_eq!(linked_into(&[], "modio::panicking_not"), Ok(Vec::new()));
     }
 
     #[test]
     fn without_symbols_there_is_no_telling() {
         let stripped = sample::elf(&[Segment::at(FLASH_BASE, &[0; 8])], &[]);
-        assert!(linked(&stripped).unwrap_err().contains("no symbols"));
+        assert!(
+            linked(&stripped, &[0; 8])
+                .unwrap_err()
+                .contains("no symbols")
+        );
     }
 
     #[test]

@@ -16,9 +16,10 @@ use super::processes::Group;
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command};
 
-/// The script that serves the line by the exact-line protocol, and the one that offers it to a person.
-const EXACT: &str = "modio-02-exact.resc";
-const SOCKET: &str = "modio-02.resc";
+/// What follows the board's name in that of the script that serves the line by the exact-line protocol, and of the one
+/// that offers it to a person.
+const EXACT: &str = "-exact.resc";
+const SOCKET: &str = ".resc";
 
 /// How long Renode may take to load the platform, start the board and open the socket.
 const START: Duration = Duration::from_secs(180);
@@ -89,7 +90,7 @@ pub(super) fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Res
         Failure::new(format!("cannot make {}: {error}", bench.output.display()))
     })?;
     let script = write_script(bench, SOCKET, module, dip, port)?;
-    say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the slot");
+    say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the first slot");
     say!("in the monitor: modio_log shows the firmware's log, quit ends it all");
     let mut command = bench.renode.command();
     command.arg("--console").arg(script);
@@ -167,18 +168,12 @@ fn last_line(log: &Path) -> String {
 }
 
 /// Writes the script that sets image and board, and then includes another one.
-fn write_script(
-    bench: &Bench,
-    include: &str,
-    module: Module,
-    dip: u8,
-    port: u16,
-) -> Result<PathBuf> {
+fn write_script(bench: &Bench, kind: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
     let script = bench.output.join("run.resc");
     let text = format!(
         "$elf={}\n$dip={dip}\n$module=\"{module}\"\n$port={port}\ninclude {}\n",
         token(&bench.elf),
-        token(&bench.directory.join(include)),
+        token(&bench.directory.join(format!("{}{kind}", bench.board))),
     );
     fs::write(&script, text)
         .map_err(|error| Failure::new(format!("cannot write {}: {error}", script.display())))?;

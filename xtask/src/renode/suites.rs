@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use register_map::Board;
+
 use super::find::Surroundings;
 use super::processes::Group;
 use super::{Bench, report};
@@ -30,7 +32,10 @@ pub(super) fn run(bench: &Bench) -> Result<()> {
     let mut command = Command::new(tester);
     command.arg("-r").arg(&output);
     command.arg("--variable").arg(format!("ELF:{elf}"));
-    command.args(all(&bench.directory)?);
+    command
+        .arg("--variable")
+        .arg(format!("BOARD_NAME:{}", bench.board));
+    command.args(all(&bench.directory, bench.board)?);
     let status = Group::start(&mut command)?.wait()?;
     // Also when tests failed: what is there is to be read by whatever shows results.
     let told = report::robot_to_junit(
@@ -59,15 +64,20 @@ pub(super) fn run(bench: &Bench) -> Result<()> {
     }
 }
 
-/// The suites, in the order of their names.
+/// The suites for a board, in the order of their names: those in tests are about any board, those in a directory of a
+/// board's name there about that board.
 ///
 /// # Errors
 ///
 /// When there are none.
-pub(super) fn all(directory: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
     let tests = directory.join("tests");
-    let mut suites: Vec<PathBuf> = fs::read_dir(&tests)
-        .map_err(|error| Failure::new(format!("{}: {error}", tests.display())))?
+    let of_any = fs::read_dir(&tests)
+        .map_err(|error| Failure::new(format!("{}: {error}", tests.display())))?;
+    // Not every board has suites of its own.
+    let of_board = fs::read_dir(tests.join(board.name)).into_iter().flatten();
+    let mut suites: Vec<PathBuf> = of_any
+        .chain(of_board)
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| {
             path.extension()

@@ -78,6 +78,7 @@ impl Fake {
         Bench {
             directory: Workspace::open().unwrap().root().join(DIRECTORY),
             output: self.at("output with a space"),
+            board: &register_map::board::MODIO_02,
             renode: self.find().unwrap(),
             elf: self.at("modio"),
         }
@@ -223,6 +224,27 @@ fn suites_run_first_and_then_conformance_against_the_board() {
         "{script}"
     );
     assert!(fake.at("output with a space/robot.xml").is_file());
+}
+
+#[test]
+fn another_board_has_scripts_and_suites_of_its_own() {
+    let fake = Fake::new();
+    let bench = Bench {
+        board: &register_map::board::MODIO_08,
+        ..fake.bench()
+    };
+    fs::create_dir_all(&bench.output).unwrap();
+    assert_eq!(suites::run(&bench), Ok(()));
+    let conformance = fake.at("conformance");
+    let ran = live::conformance(&bench, Module::Do4, &conformance);
+    assert_eq!(ran, Ok(()));
+    let suites = &fake.calls()[0];
+    assert!(suites.contains("modio-08/slots.robot"), "{suites}");
+    assert!(suites.contains("tests/watchdog.robot"), "{suites}");
+    assert!(suites.contains("BOARD_NAME:modio-08"), "{suites}");
+    let script = fs::read_to_string(fake.at("calls.resc")).unwrap();
+    let script = script.trim_end();
+    assert!(script.ends_with("renode/modio-08-exact.resc"), "{script}");
 }
 
 #[test]

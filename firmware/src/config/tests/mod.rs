@@ -8,18 +8,28 @@ use std::vec::Vec;
 
 use super::*;
 use register_map::Module;
+use register_map::board::{MODIO_02, MODIO_08};
 use register_map::codes::{Baud, Format, Scale, Signal};
 use register_map::configuration::*;
+use register_map::points;
 
 const ADDRESS: Result<Option<Command>, Exception> = Err(Exception::IllegalDataAddress);
 const VALUE: Result<Option<Command>, Exception> = Err(Exception::IllegalDataValue);
 const LOCKED: Result<Option<Command>, Exception> = Err(Exception::ServerDeviceBusy);
 const DONE: Result<Option<Command>, Exception> = Ok(None);
 
-const SLOT: u16 = SLOT_FIRST;
+/// On the board with one slot, port 5.
+type Config = super::Config<1>;
+
+const SLOT: u16 = points::first(5);
+const MODULE_SLOT: u16 = module_of(5);
 
 /// Writes as the server does: only what was found good.
-fn write(config: &mut Config, start: u16, values: &[u16]) -> Result<Option<Command>, Exception> {
+fn write<const SLOTS: usize>(
+    config: &mut super::Config<SLOTS>,
+    start: u16,
+    values: &[u16],
+) -> Result<Option<Command>, Exception> {
     let bytes: Vec<u8> = values
         .iter()
         .flat_map(|value| value.to_be_bytes())
@@ -50,9 +60,9 @@ fn all(config: &Config) -> Vec<u16> {
 }
 
 fn config(pairs: &[(u16, u16)]) -> Config {
-    let (settings, rejected) = Settings::load(pairs.iter().copied());
+    let (settings, rejected) = Settings::load(&MODIO_02, pairs.iter().copied());
     assert_eq!(rejected, 0);
-    Config::new(settings, false)
+    Config::new(&MODIO_02, settings, false)
 }
 
 fn unlocked(pairs: &[(u16, u16)]) -> Config {
@@ -120,7 +130,8 @@ fn a_gap_comes_before_a_bad_value_and_that_before_the_lock() {
     assert_eq!(write(&mut config, BAUD, &[97]), VALUE);
     assert_eq!(write(&mut config, BAUD, &[96]), LOCKED);
     assert_eq!(write(&mut config, COMMAND, &[5]), LOCKED);
-    assert_eq!(write(&mut config, COMMAND, &[6]), VALUE);
+    assert_eq!(write(&mut config, COMMAND, &[6]), LOCKED);
+    assert_eq!(write(&mut config, COMMAND, &[7]), VALUE);
     assert_eq!(write(&mut config, KEY, &[0]), VALUE);
     assert_eq!(read(&config, KEY, 1).unwrap(), [0]);
 }
@@ -210,31 +221,31 @@ fn now_is_now_and_restart_is_after_the_restart() {
         (config.comm_timeout_ms(), config.response_delay_ms()),
         (Some(3_600_000), 7)
     );
-    let points: Vec<_> = config.points().unwrap().collect();
-    let [first, second, third, fourth] = points[..].try_into().unwrap();
-    assert_eq!(
-        (first.signal, first.scale, first.filter),
-        (Signal::Current, Scale::Raw, 4)
-    );
-    assert_eq!(
-        (second.signal, second.scale),
-        (Signal::Voltage, Scale::Engineering)
-    );
-    assert_eq!((third.signal, third.safe), (Signal::Current, None));
-    assert_eq!(fourth.safe, Some(7));
-    assert_eq!(config.line(), Line::FACTORY);
-    assert_eq!(config.slot().start, [0; 4]);
+    let points: Vec<_> = config.points(0).unwrap().collect();
+    let signals_and_scales = points
+        .iter()
+        .map(|point| (point.settings.signal, point.settings.scale));
+    assert!(signals_and_scales.eq([
+        (Signal::Current, Scale::Raw),
+        (Signal::Voltage, Scale::Engineering),
+        (Signal::Current, Scale::Raw),
+        (Signal::Voltage, Scale::Raw),
+    ]));
+    assert_eq!(points[0].settings.filter, 4);
+    assert_eq!((points[2].safe, points[3].safe), (None, Some(7)));
+    assert_eq!(config.line(), LineConfig::FACTORY);
+    assert_eq!(config.ports()[0].start, [0; 4]);
 
     save(&mut config);
-    let restarted = Config::new(config.to_save().clone(), false);
+    let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
     let line = restarted.line();
     assert_eq!(
         (line.baud, line.format, line.frame_gap),
         (Baud::B115200, Format::F8E1, Some(5))
     );
-    let lora = Lora::of(restarted.to_save()).unwrap();
-    assert_eq!((lora.address, lora.channel, lora.frame_gap_ms), (2, 3, 50));
-    assert_eq!(restarted.slot().start, [0, 0, 8, 0]);
+    let lora = [LORA, LORA_ADDRESS, LORA_CHANNEL].map(|address| restarted.to_save().get(address));
+    assert_eq!(lora, [1, 2, 3]);
+    assert_eq!(restarted.ports()[0].start, [0, 0, 8, 0]);
     assert_eq!(all(&restarted), all(&config));
 }
 
@@ -321,7 +332,10 @@ fn defaults_are_loaded_and_changes_dropped_as_if_written() {
     let revision = config.revision();
     config.load_defaults();
     assert_ne!(config.revision(), revision);
-    assert_eq!(all(&config), all(&Config::new(Settings::defaults(), false)));
+    assert_eq!(
+        all(&config),
+        all(&Config::new(&MODIO_02, Settings::defaults(), false))
+    );
     assert_eq!(status(&config), status::UNSAVED);
     config.drop_changes();
     assert_eq!(
@@ -348,8 +362,11 @@ fn every_command_is_given_back_and_changes_nothing_itself() {
 #[test]
 fn an_invalid_store_is_reported() {
     assert_eq!(
-        Config::new(Settings::defaults(), true).status(),
+        Config::new(&MODIO_02, Settings::defaults(), true).status(),
         status::STORED_INVALID
     );
-    assert_eq!(Config::new(Settings::defaults(), false).status(), 0);
+    assert_eq!(
+        Config::new(&MODIO_02, Settings::defaults(), false).status(),
+        0
+    );
 }

@@ -34,7 +34,7 @@ fn the_module_as_written_last_says_what_its_points_take() {
         );
         assert_eq!(read(&config, address, 1).unwrap(), [good]);
     }
-    assert_eq!(config.slot().module, Module::Di4, "until the restart");
+    assert_eq!(config.ports()[0].module, Module::Di4, "until the restart");
 }
 
 #[test]
@@ -46,9 +46,48 @@ fn a_port_without_a_slot_has_no_module() {
     assert_eq!(read(&config, MODULE, 8).unwrap(), [0, 0, 0, 0, 6, 0, 0, 0]);
 }
 
+#[test]
+fn every_slot_of_a_board_has_its_own_module_and_settings() {
+    let pairs = [
+        (module_of(1), 1),
+        (module_of(2), 4),
+        (module_of(4), 2),
+        (START + 12, 1),
+    ];
+    let (settings, rejected) = Settings::load(&MODIO_08, pairs.into_iter());
+    assert_eq!(rejected, 0);
+    let mut config = crate::config::Config::<4>::new(&MODIO_08, settings, false);
+    let in_force: Vec<_> = config.ports().iter().map(|port| port.module).collect();
+    assert_eq!(
+        in_force,
+        [Module::Di4, Module::Ai4, Module::None, Module::Do4]
+    );
+    assert_eq!(config.ports()[3].start, [1, 0, 0, 0]);
+
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    // A run over the points of ports 1 to 4: each is judged by its own module.
+    let mut values = [5; 16];
+    assert_eq!(write(&mut config, FILTER, &values), DONE);
+    values[3] = 1000;
+    assert_eq!(write(&mut config, FILTER, &values), DONE, "a debounce");
+    values[4] = 9;
+    assert_eq!(write(&mut config, FILTER, &values), VALUE, "a low-pass");
+    assert_eq!(write(&mut config, FILTER + 3, &[1000, 8]), DONE);
+    assert_eq!(write(&mut config, FILTER + 3, &[1000, 9]), VALUE);
+    assert_eq!(write(&mut config, SAFE + 12, &[2]), VALUE, "an output bit");
+
+    assert_eq!(write(&mut config, module_of(5), &[1]), VALUE);
+    assert_eq!(write(&mut config, MODULE, &[6, 5, 4, 3, 0, 0, 0, 0]), DONE);
+    assert_eq!(write(&mut config, MODULE, &[6, 5, 4, 3, 0, 0, 0, 1]), VALUE);
+    config.drop_changes();
+    assert_eq!(write(&mut config, module_of(2), &[5]), DONE);
+    let left: Vec<_> = (0..4).map(|index| config.points(index).is_none()).collect();
+    assert_eq!(left, [false, true, false, false], "port 2 alone waits");
+}
+
 fn filter(config: &Config) -> Option<u16> {
-    let mut points = config.points()?;
-    points.next().map(|point| point.filter)
+    let mut points = config.points(0)?;
+    points.next().map(|point| point.settings.filter)
 }
 
 #[test]
@@ -72,6 +111,6 @@ fn settings_by_point_wait_with_the_module_they_are_made_for() {
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
     save(&mut config);
     assert_eq!(filter(&config), None);
-    let restarted = Config::new(config.to_save().clone(), false);
+    let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
     assert_eq!(filter(&restarted).unwrap(), 1000);
 }

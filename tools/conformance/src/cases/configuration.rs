@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use register_map::{codes::Command, configuration, state};
+use register_map::{codes::Command, configuration, points, state};
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
@@ -83,13 +83,18 @@ fn wrong_key(bench: &mut Bench<'_>) -> Check {
 }
 
 fn value_first(bench: &mut Bench<'_>) -> Check {
-    for (register, value) in [
+    let mut wrong = vec![
         (configuration::RESPONSE_DELAY, 1001),
         (configuration::FRAME_GAP, 4),
         (configuration::COMM_TIMEOUT, 36_001),
-        (configuration::MODULE, 1),
+        (configuration::MODULE, 7),
         (configuration::BETA, 1999),
-    ] {
+    ];
+    if let Some(board) = bench.target.modio.and_then(|modio| modio.board) {
+        let ports = (1..=points::PORTS).filter(|port| !board.has_slot(*port));
+        wrong.extend(ports.map(|port| (configuration::module_of(port), 1)));
+    }
+    for (register, value) in wrong {
         let before = bench.read_word(register)?;
         bench.exception(&pdu(6, register, value), 3)?;
         let now = bench.read_word(register)?;
@@ -119,7 +124,7 @@ fn read_only(bench: &mut Bench<'_>) -> Check {
 fn command(bench: &mut Bench<'_>) -> Check {
     let now = bench.read_word(configuration::COMMAND)?;
     bench.ensure(now == 0, "0")?;
-    for value in [0, 6, 0xB006, 0xFFFF] {
+    for value in [0, 7, 0xB006, 0xFFFF] {
         bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
     }
     if bench.allow_config {

@@ -208,8 +208,9 @@ fn wrong_settings(bench: &mut Bench<'_>) -> Check {
 }
 
 fn half_written(bench: &mut Bench<'_>) -> Check {
-    use register_map::{counters, points::SLOT_FIRST};
-    let at = counters::of_point(SLOT_FIRST);
+    use register_map::{counters, points};
+    let slot = bench.target.modio.and_then(|modio| modio.slots().next());
+    let at = counters::of_point(slot.map_or(0, |(port, _)| points::first(port)));
     let before = bench.reply(&pdu(3, at, 2))?;
     for request in [
         crate::points::write_words(at, &[0]),

@@ -8,6 +8,7 @@ mod damage;
 mod diagnostics;
 mod dispatch;
 mod events;
+mod files;
 mod framing;
 mod gaps;
 mod hurts;
@@ -35,6 +36,7 @@ pub fn all() -> Vec<Case> {
         write_words::CASES,
         mask::CASES,
         dispatch::CASES,
+        files::CASES,
         identification::CASES,
         events::CASES,
         diagnostics::CASES,

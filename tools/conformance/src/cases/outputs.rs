@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use register_map::configuration::{self, HOLD};
-use register_map::points::{PointKind, SLOT_FIRST};
+use register_map::points::Kind;
 use register_map::state;
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, Stop, case};
 use crate::points::{pdu, words_of, write_bits, write_words};
-use crate::target::Span;
+use crate::target::{Modio, Span};
 
 const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
 
@@ -56,21 +56,21 @@ fn output(bench: &Bench<'_>) -> Check<(u8, u16, u16)> {
 }
 
 fn inputs(bench: &mut Bench<'_>) -> Check {
-    let kinds = bench.target.modio.map(|modio| modio.module.points());
+    let modio = bench.target.modio;
     let mut requests = Vec::new();
-    for (address, kind) in (SLOT_FIRST..).zip(kinds.into_iter().flatten()) {
+    for (address, kind) in modio.iter().flat_map(Modio::points) {
         match kind {
-            PointKind::BitInput => requests.extend([
+            Kind::BitInput => requests.extend([
                 pdu(5, address, 0),
                 pdu(5, address, 0xFF00),
                 write_bits(address, &[true], false),
             ]),
-            PointKind::WordInput => requests.extend([
+            Kind::WordInput => requests.extend([
                 pdu(6, address, 1),
                 write_words(address, &[1]),
                 [pdu(0x16, address, 0), vec![0, 1]].concat(),
             ]),
-            PointKind::None | PointKind::BitOutput | PointKind::WordOutput => {}
+            Kind::None | Kind::BitOutput | Kind::WordOutput => {}
         }
     }
     if requests.is_empty() {

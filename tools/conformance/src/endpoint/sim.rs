@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use ::exact_line::{Reply, Request};
 use register_map::codes::{Baud, Format};
-use register_map::{Module, configuration, record};
+use register_map::{Module, configuration};
+use sim::board::Layout;
 use sim::exact_line::Session;
 use sim::{Board, Config, Image, Time};
 
@@ -12,10 +13,6 @@ use super::Broken;
 use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
 use crate::line::LineFormat;
-
-/// The part's flash, 128 KiB from here.
-const FLASH_BASE: u32 = 0x0800_0000;
-const FLASH_SIZE: usize = 128 * 1024;
 
 /// Time for the unit to start in after power comes on.
 const START: Time = Time::from_ms(150);
@@ -25,8 +22,12 @@ const START: Time = Time::from_ms(150);
 pub struct Fitting {
     /// The firmware's ELF file.
     pub elf: PathBuf,
-    /// What is in the slot.
+    /// The board.
+    pub board: &'static register_map::Board,
+    /// What is in its first slot, unless `slots` names it.
     pub module: Module,
+    /// What is in the slots of these ports. A slot that is not named is empty.
+    pub slots: Vec<(u8, Module)>,
     /// SW01: the unit address.
     pub dip: u8,
     /// The stored rate and format.
@@ -50,12 +51,15 @@ pub struct InProcess {
 /// When the image cannot be read, or the device has no such setting.
 pub fn start(fitting: &Fitting) -> Result<ExactLine<InProcess>, Broken> {
     let image = Image::read(&fitting.elf).map_err(|e| Broken(e.to_string()))?;
-    let config = Config {
+    let unknown = || Broken(format!("the simulator does not know the {}", fitting.board));
+    let mut config = Config {
+        layout: Layout::of(fitting.board).ok_or_else(unknown)?,
         dip: fitting.dip,
         module: fitting.module,
-        flash: Some(flash(fitting)?),
+        slots: fitting.slots.clone(),
         ..Config::default()
     };
+    config.flash = Some(flash(fitting, &config)?);
     let mut board = Board::new(&image, config).map_err(|e| Broken(e.to_string()))?;
     board.run_for(START);
     let mut server = InProcess {
@@ -74,18 +78,15 @@ impl Transport for InProcess {
 }
 
 /// A flash in which these settings are stored.
-fn flash(fitting: &Fitting) -> Result<Vec<u8>, Broken> {
-    let mut pairs = vec![(configuration::MODULE_SLOT, fitting.module.code())];
+fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
+    let mut pairs: Vec<_> = configuration::modules(config.plugged()).collect();
     pairs.extend(line_settings(fitting.line)?);
     if fitting.mode == Mode::Ascii {
         pairs.push((configuration::MODE, 1));
     }
     pairs.extend(&fitting.settings);
-    let mut flash = vec![0xFF; FLASH_SIZE];
-    let at = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
-    record::encode_page(0, &pairs, &mut flash[at..at + record::PAGE_SIZE])
-        .ok_or_else(|| Broken("too many settings for a page of the store".to_owned()))?;
-    Ok(flash)
+    let flash = config.layout.flash_with(&pairs);
+    flash.ok_or_else(|| Broken("too many settings for a page of the store".to_owned()))
 }
 
 /// The registers and values that stand for this rate and format.

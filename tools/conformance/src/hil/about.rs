@@ -5,13 +5,13 @@ use std::path::Path;
 use std::process::Command;
 
 use chrono::{SecondsFormat, Utc};
-use register_map::{Module, state};
+use register_map::state;
 use serde_json::{Value, json};
 use serialport::{SerialPortInfo, SerialPortType};
 
 use crate::bench::Bench;
 use crate::case::Check;
-use crate::target::Span;
+use crate::target::{Modio, Span};
 
 /// First version of the register map that has the registers of [`COMMIT`].
 const MAP_WITH_COMMIT: u16 = 2;
@@ -59,8 +59,8 @@ pub struct Unit {
     pub commit: Option<String>,
     /// Its unique identity, in hexadecimal.
     pub identity: String,
-    /// The module in force in its slot.
-    pub module: Module,
+    /// The modules in force in its slots.
+    pub modules: Modio,
 }
 
 impl About {
@@ -100,7 +100,7 @@ impl About {
             all.push(("firmware", unit.firmware.clone()));
             all.extend(unit.commit.clone().map(|it| ("firmware commit", it)));
             all.push(("identity", unit.identity.clone()));
-            all.push(("module", unit.module.to_string()));
+            all.push(("module", unit.modules.to_string()));
         }
         all
     }
@@ -123,7 +123,7 @@ impl About {
                 "firmware": unit.firmware,
                 "commit": unit.commit,
                 "identity": unit.identity,
-                "module": unit.module.to_string(),
+                "module": unit.modules.to_string(),
             })),
         })
     }
@@ -140,12 +140,12 @@ impl fmt::Display for Adapter {
 }
 
 impl Unit {
-    /// Asks the unit, a modio with this module.
+    /// Asks the unit, a modio with these modules.
     ///
     /// # Errors
     ///
     /// [`Stop::Fail`](crate::case::Stop::Fail) when it does not give its registers, `Stop::Broken`.
-    pub fn ask(bench: &mut Bench<'_>, module: Module) -> Check<Self> {
+    pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
         let mut read = |first, count: u16| {
             bench.read_words(Span {
                 first,
@@ -169,7 +169,7 @@ impl Unit {
             firmware: format!("{}.{}.{patch}", firmware >> 8, firmware & 0xFF),
             commit,
             identity: identity.iter().map(|word| format!("{word:04X}")).collect(),
-            module,
+            modules,
         })
     }
 }
@@ -207,6 +207,9 @@ fn commit(tree: &Path) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use register_map::Module;
+    use register_map::board::MODIO_08;
+
     use super::*;
     use serialport::UsbPortInfo;
 
@@ -255,9 +258,13 @@ mod tests {
             firmware: "1.2.3".to_owned(),
             commit: Some("0123abcd".to_owned()),
             identity: "00AA".to_owned(),
-            module: Module::Do4,
+            modules: Modio {
+                board: Some(&MODIO_08),
+                modules: [Module::Do4; 8],
+            },
         });
-        assert_eq!(about.json()["unit"]["module"], "4do");
+        let modules = "1=4do 2=4do 3=4do 4=4do";
+        assert_eq!(about.json()["unit"]["module"], modules);
         let properties = about.properties();
         assert!(properties.contains(&("firmware commit", "0123abcd".to_owned())));
     }

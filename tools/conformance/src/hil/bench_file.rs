@@ -7,7 +7,7 @@
 //! unit = 1
 //! baud = 9600
 //! format = "8N2"
-//! module = "4do"                       # the run ends if the slot holds another
+//! module = "4do"                       # the run ends if the first slot holds another
 //! power_cmd = "uhubctl -l 1-1 -p 2 -a" # followed by off or on
 //! reset_cmd = "./press-reset"
 //!
@@ -53,7 +53,7 @@ pub struct BenchFile {
     pub baud: Option<u32>,
     /// Format of the line.
     pub format: Option<CharacterFormat>,
-    /// The module that must be in the slot.
+    /// The module that must be in the first slot.
     pub module: Option<Module>,
     /// Switches the unit's power, followed by `off` or `on`.
     pub power_cmd: Option<String>,

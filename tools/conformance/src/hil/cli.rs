@@ -63,7 +63,7 @@ pub struct Cli {
     #[arg(long, value_name = "FORMAT")]
     pub format: Option<CharacterFormat>,
 
-    /// The module that must be in the unit's slot [default: any]
+    /// The module that must be in the unit's first slot [default: any]
     #[arg(long, value_name = "NAME")]
     pub module: Option<Module>,
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use register_map::board::MODIO_02;
 use register_map::configuration::{BAUD, COMMAND, FORMAT, KEY};
 use register_map::{Module, counters, points, state};
 
@@ -34,8 +35,9 @@ impl Unit {
             registers: BTreeMap::from([
                 (state::PRODUCT_CODE, word(0)),
                 (state::PRODUCT_CODE + 1, word(2)),
+                (state::BOARD, MODIO_02.code),
                 (
-                    state::MODULE_IN_FORCE + points::SLOT_PORT - 1,
+                    state::MODULE_IN_FORCE + MODIO_02.first_port - 1,
                     Module::Do4.code(),
                 ),
                 (BAUD, now[0]),

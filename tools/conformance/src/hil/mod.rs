@@ -55,7 +55,7 @@ const UNSETTLED: u16 = 1 << 3 | 1 << 4;
 pub struct Plan {
     /// The unit's address.
     pub unit: u8,
-    /// The module that must be in its slot; `None`: any.
+    /// The module that must be in its first slot; `None`: any.
     pub module: Option<Module>,
     /// How long to wait.
     pub patience: Patience,
@@ -98,7 +98,10 @@ pub fn run(
     };
     let (target, patience) = probe(endpoint, &given)?;
     report.endpoint = endpoint.name();
-    let module = target.modio.map_or(Module::None, |modio| modio.module);
+    let modio = target
+        .modio
+        .ok_or_else(|| format!("unit {} is no modio", plan.unit))?;
+    let module = modio.module();
     if let Some(wanted) = plan.module.filter(|wanted| *wanted != module) {
         return Err(format!(
             "unit {} has the module {module} in force, but the bench has {wanted}",
@@ -106,7 +109,7 @@ pub fn run(
         ));
     }
     let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);
-    report.about.unit = Some(about::Unit::ask(&mut bench, module).map_err(told)?);
+    report.about.unit = Some(about::Unit::ask(&mut bench, modio).map_err(told)?);
     tell(&report.endpoint);
     for (name, value) in report.about.properties() {
         tell(&format!("{name}: {value}"));

@@ -20,10 +20,18 @@ use conformance::line::LineFormat;
 use conformance::probe::{Given, probe};
 use conformance::report::table;
 use conformance::run::{Options, Outcome, Verdict, run};
-use register_map::{Module, configuration};
+use register_map::board::{MODIO_02, MODIO_08};
+use register_map::{Board, Module, configuration};
 
-fn elf() -> PathBuf {
-    PathBuf::from(env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test"))
+/// The image of a board.
+fn elf(board: &Board) -> PathBuf {
+    let name = if *board == MODIO_02 {
+        "MODIO_ELF"
+    } else {
+        "MODIO_ELF_08"
+    };
+    let elf = env::var_os(name);
+    PathBuf::from(elf.unwrap_or_else(|| panic!("{name}: cargo xtask test sets it")))
 }
 
 /// Runs these cases against the unit at `dip`.
@@ -43,7 +51,7 @@ fn outcomes(endpoint: &mut dyn Endpoint, dip: u8, mode: Mode, cases: &[Case]) ->
     run(endpoint, &target, options, cases, |_| {}).expect("the line holds")
 }
 
-/// Runs every case in process; none may fail.
+/// Runs every case in process on a modio-02; none may fail.
 fn conforms(
     module: Module,
     dip: u8,
@@ -51,22 +59,29 @@ fn conforms(
     mode: Mode,
     settings: &[(u16, u16)],
 ) -> Vec<Outcome> {
-    let fitting = Fitting {
-        elf: elf(),
+    fitting_conforms(&Fitting {
+        elf: elf(&MODIO_02),
+        board: &MODIO_02,
         module,
+        slots: Vec::new(),
         dip,
         line,
         mode,
         settings: settings.to_vec(),
-    };
-    let mut endpoint = start(&fitting).expect("the image can be read");
-    let outcomes = outcomes(&mut endpoint, dip, mode, &all());
+    })
+}
+
+/// Runs every case in process; none may fail.
+fn fitting_conforms(fitting: &Fitting) -> Vec<Outcome> {
+    let mut endpoint = start(fitting).expect("the image can be read");
+    let outcomes = outcomes(&mut endpoint, fitting.dip, fitting.mode, &all());
     let failed: Vec<String> = outcomes
         .iter()
         .filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
         .map(table::row)
         .collect();
-    assert!(failed.is_empty(), "{module}:\n{}", failed.join("\n"));
+    let modules = (fitting.module, &fitting.slots);
+    assert!(failed.is_empty(), "{modules:?}:\n{}", failed.join("\n"));
     outcomes
 }
 
@@ -82,7 +97,7 @@ impl Simulator {
             env::var_os("MODIO_SIM").expect("MODIO_SIM names the simulator: cargo xtask test");
         let mut child = Command::new(program)
             .arg("--elf")
-            .arg(elf())
+            .arg(elf(&MODIO_02))
             .args(["--module", module.name(), "--http", "127.0.0.1:0"])
             .args(["--exact-line", "127.0.0.1:0"])
             .stdout(Stdio::piped())
@@ -199,4 +214,49 @@ fn in_ascii_it_conforms() {
 fn in_ascii_with_seven_data_bits_and_even_parity_it_conforms() {
     let line = LineFormat::new(19_200, "7E1".parse().expect("a format"));
     conforms(Module::Relay2, 1, line, Mode::Ascii, &[]);
+}
+
+/// Every case on a modio-08 with these modules in its slots, port 1 first.
+fn modio_08_conforms(modules: [Module; 4], mode: Mode) {
+    let outcomes = fitting_conforms(&Fitting {
+        elf: elf(&MODIO_08),
+        board: &MODIO_08,
+        module: Module::None,
+        slots: (1..).zip(modules).collect(),
+        dip: 1,
+        line: LineFormat::default(),
+        mode,
+        settings: Vec::new(),
+    });
+    let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
+    let passed = passed.count();
+    let least = if mode == Mode::Rtu { 150 } else { 90 };
+    assert!(passed > least, "{passed} cases apply to {modules:?}");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_modio_08_with_four_different_modules_conforms() {
+    let modules = [Module::Di4, Module::Do4, Module::Ai4, Module::Ao4];
+    modio_08_conforms(modules, Mode::Rtu);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_modio_08_with_empty_slots_between_modules_conforms() {
+    let modules = [Module::None, Module::Relay2, Module::None, Module::Ai2Ao2];
+    modio_08_conforms(modules, Mode::Rtu);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_modio_08_with_sixteen_analog_outputs_conforms() {
+    modio_08_conforms([Module::Ao4; 4], Mode::Rtu);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_modio_08_conforms_in_ascii() {
+    let modules = [Module::Do4, Module::Do4, Module::Di4, Module::Di4];
+    modio_08_conforms(modules, Mode::Ascii);
 }

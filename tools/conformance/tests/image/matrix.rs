@@ -15,6 +15,7 @@ use conformance::line::LineFormat;
 use conformance::report::table;
 use conformance::run::Verdict;
 use register_map::Module;
+use register_map::board::MODIO_02;
 use register_map::codes::{self, Baud, Format};
 
 use super::{elf, outcomes};
@@ -76,8 +77,10 @@ fn cases(every: bool, (line, _): Cell) -> Vec<Case> {
 fn failures(cell: Cell, every: bool) -> (Vec<String>, usize) {
     let (line, mode) = cell;
     let mut endpoint = start(&Fitting {
-        elf: elf(),
+        elf: elf(&MODIO_02),
+        board: &MODIO_02,
         module: Module::Do4,
+        slots: Vec::new(),
         dip: 1,
         line,
         mode,

@@ -190,6 +190,14 @@ faults! {
     WritesWhereItReads => ["fc17/two-places"],
     /// Writes in 17 before it checks the address to read.
     WritesBeforeItChecks => ["fc17/address"],
+    /// Answers requests of 14 with a wrong byte count, and those whose reply is too long, with no groups.
+    TakesAnyFileRequest => ["fc14/byte-count", "fc14/length", "fc14/longest-reply"],
+    /// Takes any reference type.
+    TakesAnyReference => ["fc14/reference-type"],
+    /// Takes file 0 for file 1.
+    TakesFile0 => ["fc14/file-0"],
+    /// Takes records above 9999 for record 0.
+    WrapsRecords => ["fc14/record-above-9999"],
     /// Counts one object too many in identification replies.
     CountsObjectsWrong => ["fc2b/basic-stream", "fc2b/regular-stream"],
     /// Gives an object another value when it is asked for alone.

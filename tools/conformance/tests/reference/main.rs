@@ -3,8 +3,6 @@
 
 mod endpoint;
 mod fault;
-mod ident;
-mod log;
 mod modio;
 mod modio_fault;
 mod server;

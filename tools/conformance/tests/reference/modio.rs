@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use conformance::line::LineFormat;
+use modbus_reference::Device;
+use modio_description::{Description, checksum, describe};
+use register_map::board::MODIO_02;
 use register_map::codes::{Baud, Command, Format, Mode};
-use register_map::points::{PointKind, SLOT_FIRST};
+use register_map::points::{self, Kind};
 use register_map::{BLOCKS, Module, configuration as at, counters, rule_at, runs, state};
 
-use super::log::Log;
 use super::modio_fault::ModioFault;
 
 type Answer = Result<Vec<u8>, u8>;
@@ -20,7 +22,9 @@ pub const UNIT: u8 = 1;
 const MODULE: Module = Module::Relay2;
 /// The relays' modes, which are inputs, and the relays, which are outputs.
 const INPUTS: [bool; 2] = [true, false];
-const OUTPUT: u16 = SLOT_FIRST + 2;
+const OUTPUT: u16 = FIRST + 2;
+/// The first point of the slot, port 5.
+const FIRST: u16 = points::first(5);
 const OUTPUTS: usize = 2;
 
 /// Reset causes: power-on or the software, and the pin.
@@ -60,7 +64,7 @@ impl Modio {
             let default = |address| (address, rule.default);
             settings.extend(rule.addresses().map(default));
         }
-        settings.insert(at::MODULE_SLOT, MODULE.code());
+        settings.insert(at::module_of(5), MODULE.code());
         Self {
             fault,
             saved: settings.clone(),
@@ -141,19 +145,58 @@ impl Modio {
         }
     }
 
-    /// Does what a PDU asks for; `None` when the function has nothing to do with points and registers.
-    pub fn answer(&mut self, pdu: &[u8], log: &Log) -> Option<Answer> {
-        let odd = pdu[0] >= 0x80 && self.has(ModioFault::RestartsByOddFrames);
-        if odd {
+    /// A request with a function that no request can have.
+    pub fn odd_request(&mut self) {
+        if self.has(ModioFault::RestartsByOddFrames) {
             self.start(self.now, false);
         }
+    }
+
+    /// Does what a PDU asks for; `None` when the function has nothing to do with points and registers.
+    pub fn answer(&mut self, pdu: &[u8], counters: &[u16; 9]) -> Option<Answer> {
         match pdu[0] {
-            1..=6 | 0x0F | 0x10 | 0x16 | 0x17 => Some(self.points(pdu, log)),
+            1..=6 | 0x0F | 0x10 | 0x16 | 0x17 => Some(self.points(pdu, counters)),
+            0x14 | 0x15 => Some(self.files(pdu)),
             _ => None,
         }
     }
 
-    fn points(&mut self, pdu: &[u8], log: &Log) -> Answer {
+    /// The self-description is file 1, and the only one.
+    fn files(&self, pdu: &[u8]) -> Answer {
+        let mut pdu = pdu.to_vec();
+        if pdu[0] == 0x15 && self.has(ModioFault::EchoesFileWrites) {
+            return Ok(pdu[1..].to_vec());
+        }
+        let file = description().file();
+        let mut words: Vec<u16> = file
+            .as_chunks()
+            .0
+            .iter()
+            .copied()
+            .map(u16::from_be_bytes)
+            .collect();
+        if self.has(ModioFault::ReadsBeyondTheFile) {
+            words.push(0);
+        }
+        if self.has(ModioFault::RefusesLongestGroup) && pdu.get(7..9) == Some(&[0, 124]) {
+            return Err(3);
+        }
+        if self.has(ModioFault::RepeatsFirstGroup) && pdu.len() > 9 {
+            let (first, others) = pdu[2..].split_at_mut(7);
+            others
+                .chunks_exact_mut(7)
+                .for_each(|group| group[3..5].copy_from_slice(&first[3..5]));
+        }
+        let mut device = Device {
+            files: vec![words],
+            read_only_from: 0,
+            ..Device::new(0, 0)
+        };
+        let reply = modbus_reference::answer(&mut device, &pdu)?;
+        Ok(reply[1..].to_vec())
+    }
+
+    fn points(&mut self, pdu: &[u8], counters: &[u16; 9]) -> Answer {
         let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
         let fixed = match pdu[0] {
             1..=6 => Some(5),
@@ -168,7 +211,7 @@ impl Modio {
         let echo = || Ok(pdu[1..5].to_vec());
         match pdu[0] {
             function @ 1..=2 => self.read_bits(function, start, second),
-            function @ 3..=4 => self.read(function, start, second, log),
+            function @ 3..=4 => self.read(function, start, second, counters),
             5 => {
                 let value = match second {
                     0xFF00 => true,
@@ -194,7 +237,7 @@ impl Modio {
                 self.write(start, &words).and_then(|()| echo())
             }
             0x16 => {
-                let before = self.read(3, start, 1, log)?;
+                let before = self.read(3, start, 1, counters)?;
                 let before = u16::from_be_bytes([before[1], before[2]]);
                 let (and, or) = (second, word(5));
                 self.write(start, &[before & and | or & !and])?;
@@ -202,9 +245,9 @@ impl Modio {
             }
             _ => {
                 let words = words(word(7), 121, &pdu[9..])?;
-                self.read(3, start, second, log)?;
+                self.read(3, start, second, counters)?;
                 self.write(word(5), &words)?;
-                self.read(3, start, second, log)
+                self.read(3, start, second, counters)
             }
         }
     }
@@ -214,7 +257,7 @@ impl Modio {
             return Err(3);
         }
         let points = [INPUTS, self.outputs].concat();
-        let from = usize::from(start.checked_sub(SLOT_FIRST).ok_or(2)?);
+        let from = usize::from(start.checked_sub(FIRST).ok_or(2)?);
         let bits = points.get(from..from + usize::from(quantity)).ok_or(2)?;
         let mut data = 0;
         for (n, bit) in bits.iter().enumerate() {
@@ -225,7 +268,7 @@ impl Modio {
         Ok(vec![1, data])
     }
 
-    fn read(&self, function: u8, start: u16, quantity: u16, log: &Log) -> Answer {
+    fn read(&self, function: u8, start: u16, quantity: u16, counters: &[u16; 9]) -> Answer {
         if !(1..=125).contains(&quantity) {
             return Err(3);
         }
@@ -235,13 +278,17 @@ impl Modio {
         let mut data = vec![(quantity * 2) as u8];
         for address in start..=start + (quantity - 1) {
             let hidden = function == 4 && address == at::BAUD && self.has(ModioFault::HidesFrom04);
-            let value = if hidden { 0 } else { self.value(address, log) };
+            let value = if hidden {
+                0
+            } else {
+                self.value(address, counters)
+            };
             data.extend(value.to_be_bytes());
         }
         Ok(data)
     }
 
-    fn value(&self, address: u16, log: &Log) -> u16 {
+    fn value(&self, address: u16, counters: &[u16; 9]) -> u16 {
         const SLOT_MODULE: u16 = state::MODULE_IN_FORCE + 4;
         let open = self.now < self.open_until;
         let uptime = (self.now - self.booted).as_secs() as u32;
@@ -264,16 +311,18 @@ impl Modio {
                 flags.iter().map(|(bit, set)| bit * u16::from(*set)).sum()
             }
             SLOT_MODULE => MODULE.code(),
+            state::DESCRIPTION_CRC if self.has(ModioFault::StaleDescriptionCrc) => 0x1234,
+            state::DESCRIPTION_CRC => checksum(&description().encode()),
             state::BUS_MESSAGES..state::T15_GAPS => {
                 let lag = u16::from(self.has(ModioFault::RegistersLag));
-                log.counter(address - state::BUS_MESSAGES).wrapping_sub(lag)
+                counters[usize::from(address - state::BUS_MESSAGES)].wrapping_sub(lag)
             }
             _ => self.edited.get(&address).copied().unwrap_or(0),
         }
     }
 
     fn write_bits(&mut self, start: u16, bits: &[bool]) -> Result<(), u8> {
-        let inputs = SLOT_FIRST..OUTPUT;
+        let inputs = FIRST..OUTPUT;
         if inputs.contains(&start) && self.has(ModioFault::EchoesInputs) {
             return Ok(());
         }
@@ -339,10 +388,14 @@ impl Modio {
         {
             return true;
         }
+        // Ports 1 to 8; only port 5 has a slot.
+        if (at::MODULE..at::MODULE + 8).contains(&address) && address != at::module_of(5) {
+            return value == 0;
+        }
         let kind = match at::point_of(address) {
-            Some(point) if (OUTPUT..OUTPUT + 2).contains(&point) => PointKind::BitOutput,
-            Some(point) if (SLOT_FIRST..OUTPUT).contains(&point) => PointKind::BitInput,
-            _ => PointKind::None,
+            Some(point) if (OUTPUT..OUTPUT + 2).contains(&point) => Kind::BitOutput,
+            Some(point) if (FIRST..OUTPUT).contains(&point) => Kind::BitInput,
+            _ => Kind::None,
         };
         rule_at(at::RULES, address).is_some_and(|(rule, _)| rule.values_for(kind).allow(value))
     }
@@ -357,6 +410,11 @@ impl Modio {
             _ => {}
         }
     }
+}
+
+/// What the unit says of itself.
+fn description() -> Description {
+    describe(&MODIO_02, "0.1.0", |_| MODULE)
 }
 
 /// The words of a write of `quantity`, at most `most`, after their byte count.

@@ -10,6 +10,16 @@ faults! {
     HidesFrom04 => ["fc04/same-as-03"],
     /// Writes the send event of exception 06 as that of exceptions 01 to 03.
     LogsBusyAsRefused => ["fc0c/busy-exception-sent"],
+    /// Gives another CRC of its self-description in its register.
+    StaleDescriptionCrc => ["files/self-description"],
+    /// Gives the first group of a request for each of its groups.
+    RepeatsFirstGroup => ["files/groups"],
+    /// Refuses the longest group of records.
+    RefusesLongestGroup => ["files/longest-reply"],
+    /// Gives records beyond the end of its file.
+    ReadsBeyondTheFile => ["files/beyond-the-end"],
+    /// Echoes writes to its file.
+    EchoesFileWrites => ["files/read-only"],
     /// Gives the line's counters one too low in its registers.
     RegistersLag => ["counters/registers"],
     /// Sends a byte too many in exceptions.

@@ -1,46 +1,60 @@
-//! A Modbus server small enough to be seen to be right, from V1.1b3 alone; wrong where it is told to be.
+//! The reference server with the tables of this test; wrong where it is told to be.
+
+use modbus_reference::server::{EXCEPTIONS, NAK, NO_RESPONSE, OVERRUNS, UNIT_MESSAGES};
+use modbus_reference::{Device, Server as Reference};
 
 use super::fault::Fault;
-use super::log::{COUNTERS, Log};
 use super::modio::Modio;
 use super::modio_fault::ModioFault;
 
-/// Coils and registers, and where they are.
-pub const COILS: (u16, usize) = (100, 2100);
-pub const INPUTS: (u16, usize) = (0, 19);
-pub const HOLDING: (u16, usize) = (1000, 200);
-pub const INPUT_REGISTERS: (u16, usize) = (50, 10);
+/// Coils and registers: the first address, and how many.
+const COILS: (u16, usize) = (100, 2100);
+const INPUTS: (u16, usize) = (0, 19);
+const HOLDING: (u16, usize) = (1000, 200);
+const INPUT_REGISTERS: (u16, usize) = (50, 10);
 /// Holding registers take values up to this.
-pub const MOST: u16 = 4095;
+const MOST: u16 = 4095;
 
+/// A reply, or an exception code.
 type Answer = Result<Vec<u8>, u8>;
 
-/// No exception code: the unit stays silent.
-pub const SILENT: u8 = 0xFF;
+/// The reference, as this unit has it.
+pub fn reference(delimiter: Option<u8>) -> Reference {
+    let texts = [
+        "reference",
+        "R1",
+        "1.0",
+        "url",
+        "product",
+        "model",
+        "application",
+    ];
+    let object = |id: usize| match id {
+        // Together they take three replies.
+        0x80..=0x84 => Some(vec![b'x'; 120]),
+        _ => texts.get(id).map(|text| text.as_bytes().to_vec()),
+    };
+    let device = Device {
+        bits: vec![false; COILS.1],
+        input_bits: (0..INPUTS.1).map(|n| n.is_multiple_of(3)).collect(),
+        words: vec![1; HOLDING.1],
+        input_words: (0..INPUT_REGISTERS.1 as u16).map(|n| n * 7).collect(),
+        max_word: MOST,
+        files: vec![(0..300).collect()],
+        objects: (0..=255).map(object).collect(),
+        ..Device::new(0, 0)
+    };
+    Reference::new(delimiter, device)
+}
 
-/// The server.
+/// What is in front of the reference: a fault, and what makes it a modio.
 pub struct Server {
     pub fault: Option<Fault>,
-    pub coils: Vec<bool>,
-    pub holding: Vec<u16>,
-    pub log: Log,
-    pub delimiter: u8,
     /// What a modio has in place of coils and registers.
     pub modio: Option<Modio>,
 }
 
 impl Server {
-    pub fn new(fault: Option<Fault>) -> Self {
-        Self {
-            fault,
-            coils: vec![false; COILS.1],
-            holding: vec![1; HOLDING.1],
-            log: Log::new(fault),
-            delimiter: b'\n',
-            modio: None,
-        }
-    }
-
     /// Whether this is a modio with this fault.
     pub fn modio_has(&self, fault: ModioFault) -> bool {
         self.modio.as_ref().is_some_and(|modio| modio.has(fault))
@@ -50,360 +64,320 @@ impl Server {
         self.fault == Some(fault)
     }
 
-    /// Does what a PDU asks for: the reply's data, or an exception code.
-    pub fn answer(&mut self, pdu: &[u8]) -> Answer {
+    /// Serves a request to this unit or to all: the PDU of the reply.
+    pub fn request(
+        &mut self,
+        reference: &mut Reference,
+        broadcast: bool,
+        pdu: &[u8],
+    ) -> Option<Vec<u8>> {
+        if pdu[0] >= 0x80
+            && let Some(modio) = &mut self.modio
+        {
+            modio.odd_request();
+        }
+        let (old_counters, old_count) = (reference.counters, reference.events);
+        let old_log = reference.log.clone();
+        let (delimiter, listening) = (reference.delimiter, reference.listening);
+        let sub = (pdu[0] == 8).then(|| word(pdu, 1));
+        let short = matches!(pdu[0], 7 | 0x0B | 0x0C | 0x11);
+        let mut request = pdu.to_vec();
+        let mut obeys_broadcast = false;
+        match (self.fault, sub) {
+            (Some(Fault::AnswersBroadcasts), _)
+            | (Some(Fault::ObeysBroadcastDiagnostics), Some(_)) => obeys_broadcast = true,
+            (Some(Fault::TalksInListenOnly), _) => reference.listening = false,
+            (Some(Fault::WritesInListenOnly), _) if listening => {
+                // What it does is not told.
+                let _ = self.answer(reference, pdu);
+            }
+            (Some(Fault::IgnoresDiagnosticData), Some(2 | 4 | 0x0A..=0x14)) => {
+                request = vec![8, 0, pdu[2], 0, 0];
+            }
+            (Some(Fault::TakesAnyRestart), Some(1)) => request = vec![8, 0, 1, 0, 0],
+            (Some(Fault::IgnoresSpareBytes), None) if short => request.truncate(1),
+            _ => {}
+        }
+        let obeyed_as_broadcast = broadcast && !obeys_broadcast;
+        let mut reply = reference.request(obeyed_as_broadcast, &request, |reference, pdu| {
+            self.answer(reference, pdu)
+        });
+        let exception = match reply.as_deref() {
+            Some([function, code]) if function & 0x80 != 0 => Some(*code),
+            _ => None,
+        };
+        // The last events.
+        let position = |wanted: fn(&u8) -> bool| reference.log.iter().rposition(wanted);
+        let received = position(|event| event & 0x80 != 0);
+        let sent = position(|event| event & 0xC0 == 0x40);
+        if exception.is_some() && self.modio_has(ModioFault::LongExceptions) {
+            reply.iter_mut().for_each(|reply| reply.push(reply[1]));
+        }
+        if exception == Some(6) && self.modio_has(ModioFault::LogsBusyAsRefused) {
+            sent.into_iter().for_each(|at| reference.log[at] = 0x41);
+        }
+        let Some(fault) = self.fault else {
+            return reply;
+        };
+        let (events, counts) = (&mut reference.log, &mut reference.counters);
+        match (fault, sub) {
+            (Fault::BroadcastsAreNoMessages, _) if broadcast => counts[UNIT_MESSAGES] -= 1,
+            (Fault::BroadcastsUncounted, _) if broadcast => counts[NO_RESPONSE] -= 1,
+            (Fault::CountsNak, _) => counts[NAK] += 1,
+            (Fault::ExceptionsUncounted, _) if exception.is_some() => counts[EXCEPTIONS] -= 1,
+            (Fault::CountsExceptions, _) if exception.is_some() => reference.events += 1,
+            (Fault::OverrunsStay, _) => counts[OVERRUNS] = 3,
+            (Fault::NeverClears, Some(1 | 0x0A)) | (Fault::RestartKeepsCounters, Some(1)) => {
+                (reference.counters, reference.events) = (old_counters, old_count);
+            }
+            (Fault::ClearsOneAlone, Some(1 | 0x0A)) => {
+                counts[1..].copy_from_slice(&old_counters[1..])
+            }
+            (Fault::BroadcastsLoggedAsOthers, _) => {
+                received.into_iter().for_each(|at| events[at] &= !0x40)
+            }
+            (Fault::ExceptionsLoggedAsReplies, _) => {
+                sent.into_iter().for_each(|at| events[at] &= !0x0F)
+            }
+            (Fault::SilenceUnlogged | Fault::RepliesUnlogged, _)
+                if reply.is_some() == (fault == Fault::RepliesUnlogged) =>
+            {
+                if let Some(at) = sent {
+                    events.remove(at);
+                }
+            }
+            (Fault::EntryUnlogged, Some(4)) | (Fault::RestartUnlogged, Some(1)) => {
+                events.pop();
+            }
+            (Fault::ModeUnlogged, _) => events.iter_mut().for_each(|event| *event &= !0x20),
+            (Fault::KeepsLog, Some(1)) => *events = [old_log, vec![0]].concat(),
+            (Fault::KeepsDelimiter, Some(3)) => reference.delimiter = delimiter,
+            (Fault::TalksInListenOnly, Some(1)) => {}
+            (Fault::TalksInListenOnly, _) => reference.listening |= listening,
+            (Fault::ObeysBroadcastDiagnostics, _) if broadcast => reply = None,
+            (Fault::SilentToDelimiter, Some(3)) => reply = None,
+            (Fault::SilentToUnknown, _) if exception == Some(1) => reply = None,
+            (Fault::EchoesShortDiagnostics, Some(_)) if pdu.len() < 3 => reply = Some(pdu.to_vec()),
+            (Fault::EchoesAnySubFunction, Some(_)) if exception == Some(1) => {
+                reply = Some(pdu.to_vec());
+            }
+            (Fault::TakesAnyDelimiter, Some(3)) => reply = Some(pdu.to_vec()),
+            (Fault::ShortEcho, Some(0)) => reply.as_mut()?.truncate(5),
+            (Fault::ShortRegister, Some(2)) => drop(reply.as_mut()?.pop()),
+            // The worked frame with a wrong CRC is a reply.
+            (Fault::IgnoresCrc, _) if pdu[0] > 0x80 => reply = Some(vec![pdu[0], 1]),
+            (Fault::AddsAByte, None) if short => reply.as_mut()?.push(0),
+            (Fault::LogBackwards, _) if pdu[0] == 0x0C => reply.as_mut()?[8..].reverse(),
+            (Fault::LogCountDiffers, _) if pdu[0] == 0x0C => reply.as_mut()?[5] ^= 7,
+            _ => {}
+        }
+        reply
+    }
+
+    /// Does what a PDU asks for: the PDU of the reply, or an exception code.
+    fn answer(&mut self, reference: &mut Reference, pdu: &[u8]) -> Answer {
         let of_modio = self.modio.as_mut();
-        if let Some(answer) = of_modio.and_then(|modio| modio.answer(pdu, &self.log)) {
+        let answer = match of_modio.and_then(|modio| modio.answer(pdu, &reference.counters)) {
+            Some(answer) => answer,
+            None if matches!(pdu[0], 7 | 8 | 0x0B | 0x0C | 0x11) => return reference.answer(pdu),
+            None => self.serve(&mut reference.device, pdu),
+        };
+        answer.map(|data| [vec![pdu[0]], data].concat())
+    }
+
+    /// A request for points or identification: what the fault makes of it, and of its reply.
+    fn serve(&self, device: &mut Device, pdu: &[u8]) -> Answer {
+        let mut request = pdu.to_vec();
+        if let Some(answer) = self.spoil(device, &mut request) {
             return answer;
         }
-        let word = |at: usize| {
-            pdu.get(at..at + 2)
-                .map(|w| u16::from_be_bytes([w[0], w[1]]))
+        let answer = right(device, &request);
+        let (at, value) = (word(pdu, 1), word(pdu, 3));
+        let Some(fault) = self.fault else {
+            return answer;
         };
-        let two = || Ok::<_, u8>((word(1).ok_or(3)?, word(3).ok_or(3)?));
-        let spare = self.has(Fault::IgnoresSpareBytes);
-        let exactly = |length: usize| {
-            let right = pdu.len() == length || (spare && pdu.len() > length);
-            if right { Ok(()) } else { Err(3) }
-        };
-        let adds_a_byte = self.has(Fault::AddsAByte);
-        let status = |mut reply: Vec<u8>| {
-            reply.extend(adds_a_byte.then_some(0));
-            reply
-        };
-        match pdu[0] {
-            function @ 1..=4 => {
-                if !self.has(Fault::IgnoresLength) || pdu.len() < 5 {
-                    exactly(5)?;
-                }
-                let (at, quantity) = two()?;
-                self.read(function, at, quantity)
-            }
-            5 => {
-                exactly(5)?;
-                let (at, value) = two()?;
-                if self.has(Fault::CoilAddressFirst) {
-                    place(COILS, at, 1)?;
-                }
-                let on = match value {
-                    0xFF00 => true,
-                    0 if self.has(Fault::NeverSwitchesOff) => return Ok(pdu[1..].to_vec()),
-                    0 => false,
-                    0x1234 if self.has(Fault::TakesCoil1234) => true,
-                    _ => return Err(3),
-                };
-                if self.has(Fault::EchoesNowhere) && place(COILS, at, 1).is_err() {
-                    return Ok(pdu[1..].to_vec());
-                }
-                let at = place(COILS, at, 1)?;
-                self.coils[at] = on;
+        match (fault, pdu[0], answer) {
+            (Fault::TakesCoil1234, 5, Ok(_)) | (Fault::PlainOr, 0x16, Ok(_)) => {
                 Ok(pdu[1..].to_vec())
             }
-            6 => {
-                exactly(5)?;
-                let (at, value) = two()?;
-                if self.has(Fault::ValueFirst) && value > MOST {
-                    return Err(3);
-                }
-                if self.has(Fault::EchoesNowhere) && place(HOLDING, at, 1).is_err() {
-                    return Ok(pdu[1..].to_vec());
-                }
-                let at = place(HOLDING, at, 1)?;
-                if self.has(Fault::WritesNeighbour) && value <= MOST && at + 1 < HOLDING.1 {
-                    self.holding[at + 1] = value;
-                }
-                if value <= MOST || self.has(Fault::StoresRefused) {
-                    self.holding[at] = value;
-                }
-                if value > MOST {
-                    Err(3)
-                } else {
-                    Ok(pdu[1..].to_vec())
-                }
+            (Fault::EchoesNowhere, 5 | 6 | 0x16, Err(2)) => Ok(pdu[1..].to_vec()),
+            (Fault::EchoesData, 0x0F | 0x10, Ok(_)) => Ok(pdu[1..].to_vec()),
+            (Fault::WritesPadding | Fault::IgnoresOtherByteCounts, 0x0F, Ok(_)) => {
+                Ok(pdu[1..5].to_vec())
             }
-            7 => exactly(1).map(|()| status(vec![0x6D])),
-            8 => self.diagnose(pdu),
-            0x0B => exactly(1).map(|()| status(self.log.event_counter())),
-            0x0C => exactly(1).map(|()| status(self.log.read())),
-            0x0F => self.write_coils(pdu),
-            0x10 => self.write_registers(pdu),
-            0x11 => exactly(1).map(|()| status(vec![2, 0x42, 0xFF])),
-            0x16 => {
-                exactly(7)?;
-                let (at, and) = two()?;
-                let or = word(5).ok_or(3)?;
-                if self.has(Fault::EchoesNowhere) && place(HOLDING, at, 1).is_err() {
-                    return Ok(pdu[1..].to_vec());
+            (Fault::WritesNeighbour, 6, Ok(reply)) => {
+                if let Ok(next) = place(HOLDING, at + 1, 1) {
+                    device.words[next] = value;
                 }
-                let at = place(HOLDING, at, 1)?;
-                let or = if self.has(Fault::PlainOr) {
-                    or
-                } else {
-                    or & !and
-                };
-                let value = (self.holding[at] & and) | or;
-                if value > MOST && !self.has(Fault::MasksBeyondRange) {
-                    return Err(3);
-                }
-                self.holding[at] = value;
-                Ok(pdu[1..].to_vec())
+                Ok(reply)
             }
-            0x17 => self.read_write(pdu),
-            0x2B => super::ident::answer(pdu, self.fault),
-            _ => Err(1),
+            (Fault::StoresRefused, 6, Err(3)) => {
+                if let Ok(at) = place(HOLDING, at, 1) {
+                    device.words[at] = value;
+                }
+                Err(3)
+            }
+            (Fault::DirtyPadding, 1 | 2, Ok(mut reply)) if !value.is_multiple_of(8) => {
+                *reply.last_mut().unwrap() |= 0x80;
+                Ok(reply)
+            }
+            (Fault::CountsRegisters, 3 | 4, Ok(mut reply)) => {
+                reply[0] /= 2;
+                Ok(reply)
+            }
+            (Fault::Mei03, 0x2B, Err(1)) | (Fault::Object03, 0x2B, Err(2)) => Err(3),
+            (Fault::TakesReadCode0, 0x2B, Ok(mut reply)) => {
+                reply[1] = pdu[2];
+                Ok(reply)
+            }
+            (Fault::IndividualDiffers, 0x2B, Ok(mut reply)) if pdu[2] == 4 => {
+                *reply.last_mut().unwrap() ^= 1;
+                Ok(reply)
+            }
+            (Fault::CountsObjectsWrong, 0x2B, Ok(mut reply)) => {
+                reply[5] += 1;
+                Ok(reply)
+            }
+            (Fault::TakesAnyFileRequest, 0x14, Err(3)) => Ok(vec![0]),
+            (Fault::NeverSplits, 0x2B, Ok(mut reply)) if reply[3] != 0 => {
+                let rest = right(device, &[0x2B, 0x0E, pdu[2], reply[4]])?;
+                reply[3..5].fill(0);
+                reply[5] += rest[5];
+                reply.extend(&rest[6..]);
+                Ok(reply)
+            }
+            (_, _, answer) => answer,
         }
     }
 
-    fn read(&self, function: u8, at: u16, quantity: u16) -> Answer {
-        let bits = function <= 2;
-        let most = match bits {
-            true if self.has(Fault::Answers2001) => 2001,
-            true if self.has(Fault::RefusesLongestReads) => 1999,
-            true => 2000,
-            false if self.has(Fault::RefusesLongestReads) => 124,
-            false if self.has(Fault::Answers126) => 126,
-            false => 125,
-        };
-        let table = [COILS, INPUTS, HOLDING, INPUT_REGISTERS][usize::from(function) - 1];
-        if self.has(Fault::AddressFirst) {
-            place(table, at, quantity.max(1))?;
-        }
-        if quantity > most || (quantity == 0 && !self.has(Fault::AnswersQuantity0)) {
-            return Err(3);
-        }
-        let reach = quantity - u16::from(self.has(Fault::ReadsPastTheEnd) && quantity > 1);
-        let start = match place(table, at, reach) {
-            Err(_) if self.has(Fault::Wraps) && at.checked_add(quantity).is_none() => 0,
-            found => found?,
-        };
-        let range = start..start + usize::from(quantity);
-        let mut data = Vec::new();
-        if bits {
-            let bit = |n: usize| {
-                if function == 1 {
-                    self.coils.get(n).copied().unwrap_or(false)
-                } else {
-                    n.is_multiple_of(3)
-                }
-            };
-            data = vec![0_u8; usize::from(quantity).div_ceil(8)];
-            for (n, source) in range.enumerate() {
-                data[n / 8] |= u8::from(bit(source)) << (n % 8);
+    /// Changes a request so that its right reply is the fault's, or gives the answer of a fault that looks at nothing
+    /// else.
+    fn spoil(&self, device: &mut Device, request: &mut Vec<u8>) -> Option<Answer> {
+        let (function, len) = (request[0], request.len());
+        let (at, value) = (word(request, 1), word(request, 3));
+        let bits = function < 3;
+        let whole = usize::from(value).div_ceil(8);
+        let bad_values = |data: &[u8]| data.chunks(2).any(|pair| word(pair, 0) > MOST);
+        let fault = self.fault?;
+        match (fault, function) {
+            (Fault::IgnoresSpareBytes, _) => request.truncate(match function {
+                1..=6 => 5,
+                0x16 => 7,
+                0x2B => 4,
+                _ => len,
+            }),
+            (Fault::IgnoresLength, 1..=4) => request.truncate(5),
+            (Fault::IgnoresSpareData, 0x0F | 0x10) if len > 6 => {
+                request.truncate(6 + usize::from(request[5]));
             }
-            if self.has(Fault::DirtyPadding) && !quantity.is_multiple_of(8) {
-                *data.last_mut().unwrap() |= 0x80;
+            (Fault::FillsTruncated, 0x17) if len > 10 => {
+                request.resize(10 + usize::from(request[9]), 0);
             }
-        } else {
-            for n in range {
-                let word = if function == 3 {
-                    self.holding.get(n).copied().unwrap_or(0)
-                } else {
-                    n as u16 * 7
-                };
-                data.extend(word.to_be_bytes());
+            (Fault::AddressFirst, 1..=4)
+            | (Fault::CoilAddressFirst, 5)
+            | (Fault::AddressFirstInWrites, 0x0F | 0x10) => {
+                let quantity = if function < 5 { value.max(1) } else { 1 };
+                place(table(function), at, quantity).err()?;
+                return Some(Err(2));
             }
-        }
-        let count = if self.has(Fault::CountsRegisters) && !bits {
-            data.len() / 2
-        } else {
-            data.len()
-        };
-        Ok([vec![count as u8], data].concat())
-    }
-
-    /// What 0F and 10 reply.
-    fn written(&self, pdu: &[u8]) -> Answer {
-        let length = if self.has(Fault::EchoesData) {
-            pdu.len()
-        } else {
-            5
-        };
-        Ok(pdu[1..length].to_vec())
-    }
-
-    /// Whether 0F, 10 and 17 write so many points, at most `most`.
-    fn takes(&self, quantity: u16, most: u16) -> bool {
-        let most = most - u16::from(self.has(Fault::RefusesLongestWrites));
-        let least = u16::from(!self.has(Fault::WritesQuantity0));
-        (least..=most).contains(&quantity)
-    }
-
-    /// Where `quantity` points from an address in a request that writes several are in a table, looked up
-    /// before anything else is checked.
-    fn address_first(&self, table: (u16, usize), pdu: &[u8], at: usize) -> Result<(), u8> {
-        let address = pdu.get(at..at + 2);
-        match address.filter(|_| self.has(Fault::AddressFirstInWrites)) {
-            Some(word) => place(table, u16::from_be_bytes([word[0], word[1]]), 1).map(drop),
-            None => Ok(()),
-        }
-    }
-
-    fn write_coils(&mut self, pdu: &[u8]) -> Answer {
-        self.address_first(COILS, pdu, 1)?;
-        let (at, quantity, data) = self.many(pdu)?;
-        let whole = usize::from(quantity).div_ceil(8);
-        let wrong = data.len() != whole && !self.has(Fault::IgnoresOtherByteCounts);
-        if !self.takes(quantity, 1968) || wrong {
-            return Err(3);
-        }
-        let data = [data, &vec![0; whole][..]].concat();
-        if self.has(Fault::WritesCoilsPartly) && place(COILS, at, 1).is_ok() {
-            let first = place(COILS, at, 1)?;
-            for (n, coil) in self.coils[first..]
-                .iter_mut()
-                .take(quantity.into())
-                .enumerate()
+            (Fault::AddressFirstInWrites, 0x17) => {
+                place(HOLDING, word(request, 5), 1).err()?;
+                return Some(Err(2));
+            }
+            (Fault::ValueFirst, 6) if value > MOST => return Some(Err(3)),
+            (Fault::ValueFirst, 0x10) if len > 6 && bad_values(&request[6..]) => {
+                return Some(Err(3));
+            }
+            (Fault::TakesCoil1234, 5) if value == 0x1234 => set(request, 3, 0xFF00),
+            (Fault::NeverSwitchesOff, 5) if value == 0 => return Some(Ok(request[1..].to_vec())),
+            (Fault::PlainOr, 0x16) if len == 7 => {
+                let now = device.words[place(HOLDING, at, 1).ok()?];
+                let result = (now & value) | word(request, 5);
+                set(request, 3, 0);
+                set(request, 5, result);
+            }
+            (Fault::MasksBeyondRange, _) => {
+                device.max_word = if function == 0x16 { u16::MAX } else { MOST };
+            }
+            (Fault::Answers2001, 1 | 2) if value == 2001 => set(request, 3, 2000),
+            (Fault::Answers126, 3 | 4) if value == 126 => set(request, 3, 125),
+            (Fault::AnswersQuantity0, 1..=4) if value == 0 => return Some(Ok(vec![0])),
+            (Fault::RefusesLongestReads, 1..=4) if value >= if bits { 2000 } else { 125 } => {
+                return Some(Err(3));
+            }
+            (Fault::ReadsPastTheEnd, 1..=4)
+                if value > 1 && place(table(function), at, value).is_err() =>
             {
-                *coil = data[n / 8] >> (n % 8) & 1 == 1;
+                set(request, 3, value - 1);
             }
-        }
-        let start = place(COILS, at, quantity)?;
-        let written = if self.has(Fault::WritesPadding) {
-            whole * 8
-        } else {
-            usize::from(quantity)
-        };
-        for n in 0..written {
-            if let Some(coil) = self.coils.get_mut(start + n) {
-                *coil = data[n / 8] >> (n % 8) & 1 == 1;
+            (Fault::Wraps, 1..=4) if at.checked_add(value).is_none() => {
+                set(request, 1, table(function).0);
             }
-        }
-        self.written(pdu)
-    }
-
-    fn write_registers(&mut self, pdu: &[u8]) -> Answer {
-        self.address_first(HOLDING, pdu, 1)?;
-        let quantity = pdu.get(3..5).map(|w| u16::from_be_bytes([w[0], w[1]]));
-        if self.has(Fault::IgnoresByteCount)
-            && let (Some(quantity @ 1..=123), Some(data)) = (quantity, pdu.get(6..))
-        {
-            let at = u16::from_be_bytes([pdu[1], pdu[2]]);
-            let start = place(HOLDING, at, quantity)?;
-            for (n, word) in data.chunks(2).take(usize::from(quantity)).enumerate() {
-                self.holding[start + n] = u16::from_be_bytes([word[0], *word.get(1).unwrap_or(&0)]);
+            (Fault::WritesQuantity0, 0x0F | 0x10) if value == 0 && len == 6 => {
+                return Some(Ok(request[1..5].to_vec()));
             }
-            return Ok(pdu[1..5].to_vec());
-        }
-        let (at, quantity, data) = self.many(pdu)?;
-        if !self.takes(quantity, 123) || data.len() != usize::from(quantity) * 2 {
-            return Err(3);
-        }
-        self.store(at, data)?;
-        self.written(pdu)
-    }
-
-    /// All of it or nothing.
-    fn store(&mut self, at: u16, data: &[u8]) -> Result<(), u8> {
-        let words: Vec<u16> = data
-            .chunks(2)
-            .map(|w| u16::from_be_bytes([w[0], w[1]]))
-            .collect();
-        if self.has(Fault::WritesPartly) {
-            for (address, word) in (at..=u16::MAX).zip(&words) {
-                let at = place(HOLDING, address, 1)?;
-                self.holding[at] = *word;
+            (Fault::WritesQuantity0, 0x17) if len == 10 && word(request, 7) == 0 => {
+                let read = [&[3], &request[1..5]].concat();
+                return Some(right(device, &read));
             }
-            return Ok(());
-        }
-        if self.has(Fault::ValueFirst) && words.iter().any(|word| *word > MOST) {
-            return Err(3);
-        }
-        let start = place(HOLDING, at, words.len() as u16)?;
-        if words.iter().any(|word| *word > MOST) {
-            return Err(3);
-        }
-        self.holding[start..start + words.len()].copy_from_slice(&words);
-        Ok(())
-    }
-
-    fn read_write(&mut self, pdu: &[u8]) -> Answer {
-        self.address_first(HOLDING, pdu, 5)?;
-        let mut pdu = pdu.to_vec();
-        if self.has(Fault::FillsTruncated) && pdu.len() > 10 {
-            let whole = 10 + usize::from(pdu[9]);
-            pdu.resize(whole, 0);
-        }
-        let [_, r1, r0, q1, q0, rest @ ..] = &pdu[..] else {
-            return Err(3);
-        };
-        let (read, quantity) = (
-            u16::from_be_bytes([*r1, *r0]),
-            u16::from_be_bytes([*q1, *q0]),
-        );
-        let (at, written, data) = self
-            .many(&[&[0], rest].concat())
-            .map(|(a, q, d)| (a, q, d.to_vec()))?;
-        let at = if self.has(Fault::WritesWhereItReads) {
-            read
-        } else {
-            at
-        };
-        let fits = data.len() == usize::from(written) * 2
-            || (self.has(Fault::IgnoresOtherByteCounts) && data.len() % 2 == 0);
-        let most = if self.has(Fault::Reads124) { 124 } else { 125 };
-        let wrong = !(1..=most).contains(&quantity) || !self.takes(written, 121) || !fits;
-        if wrong {
-            return Err(3);
-        }
-        if self.has(Fault::WritesBeforeItChecks) {
-            self.store(at, &data)?;
-        }
-        place(HOLDING, read, quantity)?;
-        if self.has(Fault::ReadsFirst) {
-            let reply = self.read(3, read, quantity);
-            return self.store(at, &data).and(reply);
-        }
-        self.store(at, &data)?;
-        self.read(3, read, quantity)
-    }
-
-    fn many<'a>(&self, pdu: &'a [u8]) -> Result<(u16, u16, &'a [u8]), u8> {
-        many(pdu, self.has(Fault::IgnoresSpareData))
-    }
-
-    fn diagnose(&mut self, pdu: &[u8]) -> Answer {
-        let [_, high, low, ref data @ ..] = *pdu else {
-            if self.has(Fault::EchoesShortDiagnostics) {
-                return Ok(pdu[1..].to_vec());
+            (Fault::RefusesLongestWrites, 0x0F) if value == 1968 => return Some(Err(3)),
+            (Fault::RefusesLongestWrites, 0x10) if value == 123 => return Some(Err(3)),
+            (Fault::IgnoresOtherByteCounts, 0x0F) if len > 6 => {
+                request.resize(6 + whole, 0);
+                request[5] = whole as u8;
             }
-            return Err(3);
-        };
-        let sub = u16::from_be_bytes([high, low]);
-        if sub == 0 {
-            let shown = if self.has(Fault::ShortEcho) {
-                pdu.len().min(5)
-            } else {
-                pdu.len()
-            };
-            return Ok(pdu[1..shown].to_vec());
+            (Fault::IgnoresOtherByteCounts, 0x17) if len == 10 + usize::from(request[9]) => {
+                let words = u16::from(request[9] / 2);
+                set(request, 7, words);
+            }
+            (Fault::IgnoresByteCount, 0x10) if len > 6 && (1..=123).contains(&value) => {
+                request.resize(6 + usize::from(value) * 2, 0);
+                request[5] = (value * 2) as u8;
+            }
+            (Fault::WritesPadding, 0x0F) => set(request, 3, whole as u16 * 8),
+            (Fault::WritesCoilsPartly, 0x0F) => {
+                for n in 0..usize::from(value).min(8 * len.saturating_sub(6)) {
+                    if let Ok(coil) = place(COILS, at.saturating_add(n as u16), 1) {
+                        device.bits[coil] = request[6 + n / 8] >> (n % 8) & 1 == 1;
+                    }
+                }
+            }
+            (Fault::WritesPartly, 0x10) if len > 6 => {
+                for (address, pair) in (at..=u16::MAX).zip(request[6..].chunks_exact(2)) {
+                    let one = [&[6], &address.to_be_bytes()[..], pair].concat();
+                    if let refused @ Err(_) = right(device, &one) {
+                        return Some(refused);
+                    }
+                }
+            }
+            (Fault::WritesWhereItReads, 0x17) if len > 10 => set(request, 5, at),
+            (Fault::WritesBeforeItChecks, 0x17) if len > 10 => {
+                let write = [&[0x10], &request[5..]].concat();
+                right(device, &write).err()?;
+            }
+            (Fault::ReadsFirst, 0x17) if len > 10 => {
+                let read = [&[3], &request[1..5]].concat();
+                let reply = right(device, &read);
+                return Some(right(device, request).and(reply));
+            }
+            (Fault::Reads124, 0x17) if value > 124 => return Some(Err(3)),
+            (Fault::TakesAnyReference, 0x14) if len == 9 => request[2] = 6,
+            (Fault::TakesFile0, 0x14) if len == 9 && word(request, 3) == 0 => set(request, 3, 1),
+            (Fault::WrapsRecords, 0x14) if len == 9 && word(request, 5) > 9999 => {
+                set(request, 5, 0);
+            }
+            (Fault::TakesReadCode0, 0x2B) if request.get(2) == Some(&0) => request[2] = 1,
+            (Fault::StreamsFromZero, 0x2B) if len == 4 && request[2] < 4 && request[3] < 0x80 => {
+                request[3] = 0;
+            }
+            (Fault::RefusesUnknownStart, 0x2B)
+                if len == 4 && device.objects[usize::from(request[3])].is_none() =>
+            {
+                return Some(Err(2));
+            }
+            _ => {}
         }
-        if sub == 3 {
-            if self.has(Fault::SilentToDelimiter) {
-                return Err(SILENT);
-            }
-            let [delimiter, low] = *data else {
-                return Err(3);
-            };
-            let digit = delimiter.is_ascii_digit() || (b'A'..=b'F').contains(&delimiter);
-            let wrong = low != 0 || digit || matches!(delimiter, b':' | b'\r');
-            if wrong && !self.has(Fault::TakesAnyDelimiter) {
-                return Err(3);
-            }
-            if !self.has(Fault::KeepsDelimiter) {
-                self.delimiter = delimiter;
-            }
-            return Ok(pdu[1..].to_vec());
-        }
-        let clears = if self.has(Fault::NeverClears) {
-            0
-        } else if self.has(Fault::ClearsOneAlone) {
-            1
-        } else {
-            COUNTERS
-        };
-        self.log
-            .diagnose(sub, data, clears)
-            .map(|value| [vec![high, low], value].concat())
+        None
     }
 }
 
@@ -417,19 +391,44 @@ fn place((first, count): (u16, usize), at: u16, quantity: u16) -> Result<usize, 
     }
 }
 
-/// Address, quantity and as many data bytes as the byte count says. They must be all there are, unless `spare`.
-fn many(pdu: &[u8], spare: bool) -> Result<(u16, u16, &[u8]), u8> {
-    let [_, a1, a0, q1, q0, count, ref data @ ..] = *pdu else {
-        return Err(3);
-    };
-    let count = usize::from(count);
-    if count > data.len() || (count < data.len() && !spare) {
-        return Err(3);
+/// The table that a function uses.
+fn table(function: u8) -> (u16, usize) {
+    match function {
+        1 | 5 | 0x0F => COILS,
+        2 => INPUTS,
+        4 => INPUT_REGISTERS,
+        _ => HOLDING,
     }
-    let data = &data[..count];
-    Ok((
-        u16::from_be_bytes([a1, a0]),
-        u16::from_be_bytes([q1, q0]),
-        data,
-    ))
+}
+
+/// The word at a place of a request; 0 where it ends before that.
+fn word(pdu: &[u8], at: usize) -> u16 {
+    pdu.get(at..at + 2)
+        .map_or(0, |pair| u16::from_be_bytes([pair[0], pair[1]]))
+}
+
+/// Replaces the word at a place of a request, if there is one.
+fn set(request: &mut [u8], at: usize, value: u16) {
+    if let Some(pair) = request.get_mut(at..at + 2) {
+        pair.copy_from_slice(&value.to_be_bytes());
+    }
+}
+
+/// Does what a request asks for, with its addresses.
+fn right(device: &mut Device, pdu: &[u8]) -> Answer {
+    let mut request = pdu.to_vec();
+    let fields: &[usize] = if pdu[0] == 0x17 { &[1, 5] } else { &[1] };
+    for at in fields {
+        let points = pdu[0] < 0x20 && !matches!(pdu[0], 0x14 | 0x15);
+        if let Some(address) = request.get_mut(*at..at + 2).filter(|_| points) {
+            let first = word(pdu, *at).wrapping_sub(table(pdu[0]).0);
+            address.copy_from_slice(&first.to_be_bytes());
+        }
+    }
+    let reply = modbus_reference::answer(device, &request)?;
+    Ok(match pdu[0] {
+        // An echo, with the addresses as they came.
+        5 | 6 | 0x0F | 0x10 | 0x16 => pdu[1..reply.len()].to_vec(),
+        _ => reply[1..].to_vec(),
+    })
 }

@@ -7,10 +7,13 @@ use conformance::endpoint::Heard;
 use conformance::frame::{Mode, crc, lrc};
 use conformance::line::LineFormat;
 
+use modbus_reference::Server as Reference;
+use modbus_reference::server::{BUS, ERRORS};
+
 use super::fault::Fault;
 use super::modio::{self, Modio};
 use super::modio_fault::ModioFault;
-use super::server::{SILENT, Server};
+use super::server::{Server, reference};
 
 /// The unit's address when it is no modio.
 const UNIT: u8 = 9;
@@ -31,6 +34,7 @@ pub struct Sign {
 /// The unit.
 pub struct Unit {
     pub server: Server,
+    reference: Reference,
     pub address: u8,
     pub mode: Mode,
     pub line: LineFormat,
@@ -62,7 +66,8 @@ pub struct Unit {
 impl Unit {
     pub fn new(fault: Option<Fault>, mode: Mode, line: LineFormat) -> Self {
         Self {
-            server: Server::new(fault),
+            server: Server { fault, modio: None },
+            reference: reference((mode == Mode::Ascii).then_some(b'\n')),
             address: UNIT,
             mode,
             line,
@@ -235,7 +240,10 @@ impl Unit {
         };
         if self.open.len() > longest && !self.server.has(Fault::TakesLongFrames) {
             self.open.clear();
-        } else if self.open.ends_with(&[b'\r', self.server.delimiter]) {
+        } else if self
+            .open
+            .ends_with(&[b'\r', self.reference.delimiter.unwrap_or(b'\n')])
+        {
             let frame = std::mem::take(&mut self.open);
             let any = self.server.has(Fault::TakesAnyDigit);
             let digits = frame[1..].iter().map(|byte| {
@@ -305,11 +313,12 @@ impl Unit {
 
     /// A frame is lost to a bad check or a damaged character.
     fn spoilt(&mut self) {
-        if !self.server.has(Fault::ErrorsUncounted) {
-            self.server.log.count(0x0C);
+        self.reference.bad(false);
+        if self.server.has(Fault::ErrorsUncounted) {
+            self.reference.counters[ERRORS] -= 1;
         }
-        if !self.server.has(Fault::ErrorsUnlogged) {
-            self.server.log.received(0x02);
+        if self.server.has(Fault::ErrorsUnlogged) {
+            self.reference.unlogged.0 -= 1;
         }
     }
 
@@ -329,14 +338,14 @@ impl Unit {
             || (unit == self.address ^ 1 && self.server.has(Fault::AnswersNeighbour))
             || (unit >= 248 && self.server.has(Fault::AnswersReserved));
         if mine || !self.server.has(Fault::DeafCounter) {
-            self.server.log.count(0x0B);
+            self.reference.counters[BUS] += 1;
         }
         if self.dead || std::mem::take(&mut self.deaf) {
             return;
         }
         if !mine {
             if self.server.has(Fault::LogsOthers) {
-                self.server.log.received(0);
+                self.reference.log.push(0x80);
             }
             if self.server.has(Fault::RefusesForOthers) && pdu[0] > 0x2B {
                 self.say(&[unit, pdu[0] | 0x80, 1], at);
@@ -364,85 +373,19 @@ impl Unit {
         if let Some(modio) = &mut self.server.modio {
             modio.request(at, broadcast);
         }
-        if !broadcast || !self.server.has(Fault::BroadcastsAreNoMessages) {
-            self.server.log.count(0x0E);
-        }
-        if self.server.has(Fault::CountsNak) {
-            self.server.log.count(0x10);
-        }
-        let silent_before = self.server.log.listen_only;
-        let as_broadcast = broadcast && !self.server.has(Fault::BroadcastsLoggedAsOthers);
-        self.server.log.received(u8::from(as_broadcast) << 6);
-        let restart = pdu[0] == 8 && pdu.get(1..3) == Some(&[0, 1]);
-        if silent_before && !restart && !self.server.has(Fault::TalksInListenOnly) {
-            if self.server.has(Fault::WritesInListenOnly) {
-                // What it does is not told.
-                let _ = self.server.answer(pdu);
-            }
-            self.server.log.count(0x0F);
-            self.server.log.sent(0);
+        if self.silent_to_incomplete_writes && !is_complete(pdu) {
             return;
         }
-        let obeys = !broadcast || pdu[0] != 8 || self.server.has(Fault::ObeysBroadcastDiagnostics);
-        let incomplete = self.silent_to_incomplete_writes && !is_complete(pdu);
-        let answer = if obeys && !incomplete {
-            self.server.answer(pdu)
-        } else {
-            Err(SILENT)
-        };
-        let listens = silent_before || self.server.log.listen_only;
-        let silent = broadcast || (listens && !self.server.has(Fault::TalksInListenOnly));
-        let polls = matches!(pdu[0], 0x0B | 0x0C);
-        match &answer {
-            Ok(_) if !polls => self.server.log.events = self.server.log.events.wrapping_add(1),
-            Ok(_) | Err(SILENT) => {}
-            Err(_) => {
-                if !self.server.has(Fault::ExceptionsUncounted) {
-                    self.server.log.count(0x0D);
-                }
-                if self.server.has(Fault::CountsExceptions) {
-                    self.server.log.events = self.server.log.events.wrapping_add(1);
-                }
+        let reply = self.server.request(&mut self.reference, broadcast, pdu);
+        if let Some(reply) = reply {
+            if self.server.modio_has(ModioFault::RestartsBeforeReply) {
+                self.restart(at);
             }
-        }
-        if silent && !self.server.has(Fault::AnswersBroadcasts) {
-            if !self.server.has(Fault::SilenceUnlogged) {
-                self.server.log.sent(0);
-            }
-            if !self.server.has(Fault::BroadcastsUncounted) {
-                self.server.log.count(0x0F);
-            }
-            return;
-        }
-        let reply = match answer {
-            Ok(data) => [vec![self.address, pdu[0]], data].concat(),
-            Err(1) if self.server.has(Fault::SilentToUnknown) => return,
-            Err(SILENT) => return,
-            Err(code) if self.server.modio_has(ModioFault::LongExceptions) => {
-                vec![self.address, pdu[0] | 0x80, code, code]
-            }
-            Err(code) => vec![self.address, pdu[0] | 0x80, code],
-        };
-        let kind = match reply[..] {
-            _ if self.server.has(Fault::ExceptionsLoggedAsReplies) => 0,
-            [_, function, code] if function & 0x80 != 0 => match code {
-                1..=3 => 0x01,
-                6 if self.server.modio_has(ModioFault::LogsBusyAsRefused) => 0x01,
-                4 => 0x02,
-                5 | 6 => 0x04,
-                _ => 0x08,
-            },
-            _ => 0,
-        };
-        if !self.server.has(Fault::RepliesUnlogged) {
-            self.server.log.sent(kind);
-        }
-        if self.server.modio_has(ModioFault::RestartsBeforeReply) {
+            let delay = self.server.modio.as_ref().map(Modio::response_delay);
+            let body = [vec![self.address], reply].concat();
+            self.say(&body, at + delay.unwrap_or_default());
             self.restart(at);
         }
-        let delay = self.server.modio.as_ref().map(Modio::response_delay);
-        self.say(&reply, at + delay.unwrap_or_default());
-        self.restart(at);
     }
 
     /// A modio starts again when it was told to.

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use register_map::{Module, codes::Format};
+use register_map::{Board, Module, board::MODIO_02, codes::Format};
 
 /// What the simulator is told on its command line.
 #[derive(clap::Args, Clone, Debug, PartialEq, Eq)]
@@ -15,10 +15,9 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub dip: u8,
 
-    /// Which board to simulate: modio-02 or modio-08. The modio-08 has no firmware to build yet, so it needs --elf
-    #[arg(long, value_name = "NAME", default_value = "modio-02", value_parser = ["modio-02", "modio-08"])]
-    #[arg(requires_if("modio-08", "elf"))]
-    pub board: String,
+    /// Which board to simulate: modio-02 or modio-08
+    #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
+    pub board: &'static Board,
 
     /// What is plugged into the board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[arg(long, value_name = "NAME", default_value = "4di")]
@@ -33,7 +32,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
     pub corner: String,
 
-    /// Write the plugged module's code into the stored configuration when nothing is stored yet (default)
+    /// Write the codes of the plugged modules into the stored configuration when nothing is stored yet (default)
     #[arg(long, overrides_with = "no_preset")]
     preset: bool,
 
@@ -81,7 +80,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether to write the plugged module's code into a configuration that holds nothing yet.
+    /// Whether to write the codes of the plugged modules into a configuration that holds nothing yet.
     #[must_use]
     pub fn preset(&self) -> bool {
         !self.no_preset
@@ -89,7 +88,11 @@ impl Options {
 }
 
 /// `PORT=MODULE` as the number of a port and a module.
-fn slot(text: &str) -> Result<(u8, Module), String> {
+///
+/// # Errors
+///
+/// What is wrong with it, in words for the user.
+pub fn slot(text: &str) -> Result<(u8, Module), String> {
     let wrong = || format!("{text:?} is no port and module such as 3=4do");
     let (port, module) = text.split_once('=').ok_or_else(wrong)?;
     let port = port.parse().map_err(|_| wrong())?;
@@ -181,12 +184,10 @@ mod tests {
 
     #[test]
     fn slots_are_named_by_their_ports() {
-        assert_eq!(parse(&[]).unwrap().board, "modio-02");
-        let options = parse(&[
-            "--board", "modio-08", "--elf", "x", "--slot", "1=4do", "--slot", "4=none",
-        ])
-        .unwrap();
-        assert_eq!(options.board, "modio-08");
+        assert_eq!(parse(&[]).unwrap().board.name, "modio-02");
+        let arguments = ["--board", "modio-08", "--slot", "1=4do", "--slot", "4=none"];
+        let options = parse(&arguments).unwrap();
+        assert_eq!(options.board.name, "modio-08");
         assert_eq!(options.slots, [(1, Module::Do4), (4, Module::None)]);
     }
 
@@ -238,7 +239,6 @@ mod tests {
                 "cannot be used with",
             ),
             (&["--board", "modio-04"][..], "modio-02, modio-08"),
-            (&["--board", "modio-08"][..], "--elf <FILE>"),
             (&["--slot", "4do"][..], "3=4do"),
             (&["--slot", "x=4do"][..], "3=4do"),
             (&["--slot", "3=8di"][..], "one of none, 4di"),

@@ -17,8 +17,8 @@ use std::path::Path;
 use std::sync::mpsc;
 
 use ::exact_line::Request;
-use register_map::{Module, record};
-use sim::board::{Layout, MODIO_02};
+use register_map::configuration;
+use sim::board::Layout;
 use sim::line::{Format, Settings};
 use sim::{Board, Config, Image, Time};
 use sim_options::Options;
@@ -41,9 +41,6 @@ mod testing;
 
 use bench::Bench;
 use flash_file::FlashFile;
-
-/// Where the flash begins.
-const FLASH_BASE: u32 = 0x0800_0000;
 
 /// So long the board has been on when the endpoints are announced: its start-up and the first silence on
 /// the line are over then, and it answers.
@@ -69,7 +66,7 @@ enum Event {
 ///
 /// In one line: what keeps it from starting, or the flash's file from being written at the end.
 pub fn run(options: &Options) -> Result<(), String> {
-    let layout = Layout::named(&options.board).ok_or("the simulator does not know this board")?;
+    let layout = Layout::of(options.board).ok_or("the simulator does not know this board")?;
     let opened = options
         .flash
         .as_deref()
@@ -78,7 +75,7 @@ pub fn run(options: &Options) -> Result<(), String> {
         Some(opened) => opened.map(|(file, stored)| (Some(file), stored))?,
         None => (None, None),
     };
-    let mut bench = Bench::new(board(layout, options, stored)?);
+    let mut bench = Bench::new(fitted(layout, options, stored)?);
     if let Some((baud, format)) = &options.line {
         let format = Format::named(format).ok_or("the simulator does not know this format")?;
         bench.fix_line(Settings {
@@ -145,7 +142,7 @@ pub fn run(options: &Options) -> Result<(), String> {
 }
 
 /// The board, over the flash that a file held, with the image written over its own pages of it.
-fn board(
+fn fitted(
     layout: &'static Layout,
     options: &Options,
     stored: Option<Vec<u8>>,
@@ -155,24 +152,20 @@ fn board(
     )?;
     let image = image(elf)?;
     let mut flash = stored.unwrap_or_else(|| vec![0xFF; layout.part.flash_size]);
-    let first = layout.slots[0].port;
-    let named = options.slots.iter().rfind(|(port, _)| *port == first);
-    let module = named.map_or(options.module, |&(_, module)| module);
-    // Where the configuration of another board is stored is not defined yet.
-    if options.preset() && layout.name == MODIO_02.name {
-        write_preset(&mut flash, module);
-    }
-    let config = Config {
+    let mut config = Config {
         layout,
         dip: options.dip,
-        module,
+        module: options.module,
         slots: options.slots.clone(),
         corner: options.corner.parse()?,
-        flash: Some(flash),
         ..Config::default()
     };
+    if options.preset() {
+        write_preset(&config, &mut flash);
+    }
+    config.flash = Some(flash);
     Board::new(&image, config).map_err(|error| match error {
-        sim::Error::Slot(_) => format!("{}: {error}", layout.name),
+        sim::Error::Slot(_) => format!("{}: {error}", options.board),
         _ => format!("{}: {error}", elf.display()),
     })
 }
@@ -181,42 +174,52 @@ fn image(elf: &Path) -> Result<Image, String> {
     Image::read(elf).map_err(|error| format!("cannot run the image {error}"))
 }
 
-/// Stores a configuration that knows which module is plugged, when nothing is stored.
-fn write_preset(flash: &mut [u8], module: Module) {
-    let start = |address| (address - FLASH_BASE) as usize;
-    let page = |address| start(address)..start(address) + record::PAGE_SIZE;
-    let vacant = |address| record::is_vacant(&flash[page(address)]);
-    let [first, second] = record::PAGE_ADDRESSES;
-    if vacant(first) && vacant(second) {
-        let page = &mut flash[page(first)];
-        page.fill(0xFF);
-        page[..record::PRESET_LEN].copy_from_slice(&record::module_in_slot(module));
+/// Stores a configuration that knows which modules are plugged, when nothing is stored.
+fn write_preset(config: &Config, flash: &mut [u8]) {
+    if config.layout.stores_nothing(flash) {
+        // One setting for each port: they fit.
+        let settings: Vec<_> = configuration::modules(config.plugged()).collect();
+        config.layout.store(flash, &settings);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use register_map::{Module, record};
+    use sim::machine::memory::FLASH_BASE;
+
     use super::*;
 
-    const FLASH_SIZE: usize = MODIO_02.part.flash_size;
-
     #[test]
-    fn a_preset_is_stored_only_where_nothing_is() {
-        let mut flash = vec![0xFF; FLASH_SIZE];
-        write_preset(&mut flash, Module::Do4);
-        let at = (record::PAGE_ADDRESSES[0] - FLASH_BASE) as usize;
-        let stored = record::module_in_slot(Module::Do4);
-        assert_eq!(flash[at..at + stored.len()], stored);
-        let written = flash.iter().filter(|byte| **byte != 0xFF).count();
-        assert!(written <= stored.len(), "nothing else is written");
-        let before = flash.clone();
-        write_preset(&mut flash, Module::Di4);
-        assert_eq!(flash, before, "what is stored stays");
-        let mut flash = vec![0xFF; FLASH_SIZE];
-        flash[(record::PAGE_ADDRESSES[1] - FLASH_BASE) as usize + 500] = 0;
-        let before = flash.clone();
-        write_preset(&mut flash, Module::Di4);
-        assert_eq!(flash, before, "even what is damaged");
+    fn a_preset_names_every_plugged_module_and_is_stored_only_where_nothing_is() {
+        for layout in Layout::ALL {
+            let fitted = |module| Config {
+                layout,
+                slots: layout
+                    .slots
+                    .iter()
+                    .map(|slot| (slot.port, module))
+                    .collect(),
+                ..Config::default()
+            };
+            let mut flash = vec![0xFF; layout.part.flash_size];
+            write_preset(&fitted(Module::Do4), &mut flash);
+            let at = (layout.board.store.first - FLASH_BASE) as usize;
+            let page = at..at + layout.board.store.bytes as usize;
+            let (_, record) = record::records(&flash[page]).next().unwrap();
+            let modules = layout.board.ports().map(|port| (0x010F + port, 2));
+            assert!(record.pairs().eq(modules), "{}", layout.board);
+            let before = flash.clone();
+            write_preset(&fitted(Module::Di4), &mut flash);
+            assert_eq!(flash, before, "what is stored stays");
+
+            let mut flash = vec![0xFF; layout.part.flash_size];
+            let [_, second] = layout.board.store.addresses();
+            flash[(second - FLASH_BASE) as usize + 500] = 0;
+            let before = flash.clone();
+            write_preset(&fitted(Module::Di4), &mut flash);
+            assert_eq!(flash, before, "even what is damaged");
+        }
     }
 
     #[test]

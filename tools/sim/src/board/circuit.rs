@@ -37,16 +37,9 @@ impl Modio {
     /// A board fitted as `config` says.
     #[must_use]
     pub fn new(config: &Config) -> Self {
-        let slots = config.layout.slots.iter().enumerate().map(|(n, pins)| {
-            let module = config.slots.iter().rfind(|(port, _)| *port == pins.port);
-            let module = module.map(|&(_, module)| module);
-            let unnamed = if n == 0 {
-                config.module
-            } else {
-                register_map::Module::None
-            };
-            Slot::new(module.unwrap_or(unnamed)).with_dac_at(pins.dac_address)
-        });
+        let slots = config.layout.slots.iter().zip(config.plugged());
+        let slots =
+            slots.map(|(pins, (_, module))| Slot::new(module).with_dac_at(pins.dac_address));
         Self {
             layout: config.layout,
             line: Line::default(),

@@ -63,6 +63,18 @@ impl Default for Config {
 }
 
 impl Config {
+    /// What is plugged into every slot of the board, with the numbers of the ports.
+    #[must_use]
+    pub fn plugged(&self) -> Vec<(u8, Module)> {
+        let ports = self.layout.slots.iter().map(|slot| slot.port);
+        let slots = ports.enumerate().map(|(n, port)| {
+            let named = self.slots.iter().rfind(|(named, _)| *named == port);
+            let unnamed = if n == 0 { self.module } else { Module::None };
+            (port, named.map_or(unnamed, |&(_, module)| module))
+        });
+        slots.collect()
+    }
+
     /// What of it concerns the part.
     pub(super) fn chip(self) -> chip::Config {
         chip::Config {

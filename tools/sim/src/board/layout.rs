@@ -1,5 +1,7 @@
 //! The boards, as data.
 
+use register_map::{Board, board};
+
 use crate::part::{Part, STM32F103CB, STM32F103RC};
 use crate::slot::mcp4728;
 use crate::soc::Pin;
@@ -18,8 +20,8 @@ pub struct SlotPins {
 /// A board. The RS-485 line (PA8 to PA10), I2C1 (PB6, PB7) and the LEDs (PB8, PB9, PC13) are the same on all.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
-    /// Its name.
-    pub name: &'static str,
+    /// Its row of the register map: name, ports and where the configuration is stored.
+    pub board: &'static Board,
     /// Its part.
     pub part: Part,
     /// Its slots. The first one is meant where no port is named.
@@ -30,7 +32,7 @@ pub struct Layout {
 
 /// The modio-02: one slot.
 pub const MODIO_02: Layout = Layout {
-    name: "modio-02",
+    board: &board::MODIO_02,
     part: STM32F103CB,
     slots: &[SlotPins {
         port: 5,
@@ -51,7 +53,7 @@ pub const MODIO_02: Layout = Layout {
 
 /// The modio-08: four slots.
 pub const MODIO_08: Layout = Layout {
-    name: "modio-08",
+    board: &board::MODIO_08,
     part: STM32F103RC,
     slots: &[
         SlotPins {
@@ -91,10 +93,10 @@ impl Layout {
     /// All boards.
     pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
 
-    /// The board with this name.
+    /// The layout of a board.
     #[must_use]
-    pub fn named(name: &str) -> Option<&'static Self> {
-        Self::ALL.into_iter().find(|layout| layout.name == name)
+    pub fn of(board: &Board) -> Option<&'static Self> {
+        Self::ALL.into_iter().find(|layout| layout.board == board)
     }
 }
 
@@ -106,4 +108,24 @@ const fn pins<const N: usize>(names: [(char, usize); N]) -> [Pin; N] {
         n += 1;
     }
     pins
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::memory::FLASH_BASE;
+
+    #[test]
+    fn every_board_of_the_register_map_has_a_layout_with_its_slots_and_its_pages() {
+        for board in Board::ALL {
+            let layout = Layout::of(board).unwrap();
+            let ports = layout.slots.iter().map(|slot| u16::from(slot.port));
+            assert!(ports.eq(board.ports()), "{board}");
+            assert_eq!(layout.part.page_size, board.store.bytes as usize, "{board}");
+            for page in board.store.addresses() {
+                let end = (page + board.store.bytes - FLASH_BASE) as usize;
+                assert!(end <= layout.part.flash_size, "{board}");
+            }
+        }
+    }
 }

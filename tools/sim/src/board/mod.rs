@@ -5,6 +5,7 @@ mod circuit;
 mod config;
 mod layout;
 mod outside;
+mod stored;
 
 pub use circuit::Modio;
 pub use config::Config;

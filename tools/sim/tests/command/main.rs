@@ -141,11 +141,10 @@ fn refused(arguments: &[&str], parts: &[&str]) {
 }
 
 #[test]
-fn a_slot_that_the_board_lacks_and_a_board_without_an_image_are_refused() {
+fn a_slot_that_the_board_lacks_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     let elf = elf.to_str().unwrap();
-    refused(&["--board", "modio-08"], &["--elf"]);
     refused(&["--elf", elf, "--slot", "1=4do"], &["modio-02", "port 1"]);
     let larger = ["--elf", elf, "--board", "modio-08", "--slot", "5=4do"];
     refused(&larger, &["modio-08", "port 5"]);
@@ -294,25 +293,37 @@ fn a_flash_that_is_none_or_cannot_be_kept_is_refused() {
 
 #[test]
 fn the_flash_file_is_made_at_the_start_and_holds_image_and_preset() {
+    assert_preset(&[], &["--module", "4do"], "modio-02", &[(0x0114, 2)]);
+    let board = ["--board", "modio-08"];
+    let fitting = ["--module", "4do", "--slot", "2=4ai", "--slot", "4=4di"];
+    let stored = [(0x0110, 2), (0x0111, 4), (0x0113, 1)];
+    assert_preset(&board, &fitting, "modio-08", &stored);
+}
+
+/// Asserts that a flash file is as large as the flash of this board, that it holds the image alone without a preset,
+/// and these settings with one.
+fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16, u16)]) {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     let flash = directory.path().join("flash");
     let run = |more: &[&str]| {
         let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--for", "10ms"];
         arguments.extend(["--http", "127.0.0.1:0", "--flash", flash.to_str().unwrap()]);
-        arguments.extend(more);
+        arguments.extend(board.iter().chain(more));
         let mut running = Running::start(&arguments);
         assert_eq!(running.end(), (Some(0), String::new()));
         fs::read(&flash).unwrap()
     };
-    let page = (register_map::record::PAGE_ADDRESSES[0] - 0x0800_0000) as usize;
+    let known: &register_map::Board = name.parse().unwrap();
+    let size = if name == "modio-02" { 128 } else { 256 };
     let bare = run(&["--no-preset"]);
-    assert_eq!(bare.len(), 128 * 1024);
+    assert_eq!(bare.len(), size * 1024);
     assert_eq!(bare[..4], [0x00, 0x50, 0x00, 0x20], "the image");
     assert!(bare[16..].iter().all(|byte| *byte == 0xFF), "all else");
-    let preset = register_map::record::module_in_slot(register_map::Module::Do4);
-    let fitted = run(&["--module", "4do"]);
-    assert_eq!(fitted[page..page + preset.len()], preset);
+    let fitted = run(fitting);
+    let page = &fitted[(known.store.first - 0x0800_0000) as usize..];
+    let (_, record) = register_map::record::records(page).next().unwrap();
+    assert!(record.pairs().eq(settings.iter().copied()), "{name}");
     assert_eq!(run(&["--module", "4ai"]), fitted, "what is stored stays");
 }
 

@@ -3,11 +3,10 @@
 use register_map::configuration::{BETA, FILTER, RANGE, SCALE};
 use sim::{Module, Time};
 
-use crate::bench::{Bench, corner};
+use crate::bench::{Bench, PORT, SLOT, corner};
 
-const SLOT: u16 = 0x10;
 const STATUS: u16 = 0x0240 + SLOT;
-const MODULE_STATE: u16 = 0x021C;
+const MODULE_STATE: u16 = 0x0217 + PORT;
 const MODULE_FAULT: u16 = 4;
 
 const VOLTS: u16 = 0;
@@ -226,12 +225,12 @@ fn source_of_50_kohm_reads_right_and_one_of_500_kohm_does_not() {
     bench.board.run_for(Time::from_ms(200));
     // The noise of the converter at a corner is 2 LSB.
     let is_right = |word: u16, right: u16| word.abs_diff(right) <= 2;
-    let read = bench.registers(0x10, 4).unwrap();
+    let read = bench.registers(SLOT, 4).unwrap();
     assert!(is_right(read[0], 0) && is_right(read[1], 4095), "{read:?}");
     assert!(is_right(read[2], 0) && is_right(read[3], 4095), "{read:?}");
     bench.board.set_source_ohms(3, 500_000).unwrap();
     bench.board.run_for(Time::from_ms(200));
-    let read = bench.registers(0x10, 4).unwrap();
+    let read = bench.registers(SLOT, 4).unwrap();
     assert!(is_right(read[0], 0) && is_right(read[1], 4095), "{read:?}");
     assert!(is_right(read[3], 4095), "{read:?}");
     assert!(read[2] > 500, "{}", read[2]);

@@ -3,9 +3,7 @@
 use register_map::configuration::{RANGE, SCALE};
 use sim::{Channel, Module, Time};
 
-use crate::bench::Bench;
-
-const SLOT: u16 = 0x10;
+use crate::bench::{Bench, FIRST, SLOT};
 
 /// The codes on the DAC's outputs of these channels.
 pub fn codes<const N: usize>(bench: &Bench, channels: [usize; N]) -> [u16; N] {
@@ -121,7 +119,7 @@ fn a_2ai2ao_has_its_outputs_on_the_dac_s_last_channels() {
 fn a_write_is_at_the_dac_within_ten_milliseconds() {
     let mut bench = Bench::set_up(Module::Ao4, &[]);
     for code in [4095, 0, 1234, 77] {
-        let frame = crate::bench::adu(&[1, 6, 0, 0x13, (code >> 8) as u8, code as u8]);
+        let frame = crate::bench::adu(&[1, 6, 0, FIRST + 3, (code >> 8) as u8, code as u8]);
         let now = bench.board.now();
         let end = bench.board.line().send(now, &frame);
         bench.board.run_until(end + bench.t35() + Time::from_ms(10));

@@ -4,10 +4,10 @@ use register_map::configuration::{BAUD, COMM_TIMEOUT, FORMAT, FRAME_GAP, MODE};
 use sim::line::{Character, Format, Settings};
 use sim::{Channel, Module, Time};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, FIRST};
 
 /// The four inputs.
-const READ: [u8; 5] = [0x01, 0, 0x10, 0, 4];
+const READ: [u8; 5] = [0x01, 0, FIRST, 0, 4];
 
 /// An ASCII frame of unit 1.
 pub fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
@@ -113,7 +113,7 @@ fn the_communication_watchdog_counts_from_the_request_s_end() {
     let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
     let mut bench = Bench::set_up(Module::Do4, &settings);
     bench.patience = Time::from_ms(60);
-    let on = [0x05, 0, 0x10, 0xFF, 0];
+    let on = [0x05, 0, FIRST, 0xFF, 0];
     assert_eq!(
         bench.exchange(&ascii(&on, "\r\n")),
         ascii(&on, "\r\n"),

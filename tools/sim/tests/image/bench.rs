@@ -1,40 +1,57 @@
 //! A board with the image on it and a master on its line.
 
-use std::{env, path::Path, sync::OnceLock};
+use std::{env, ops::Range, path::Path, sync::OnceLock};
 
-use register_map::{configuration, record};
+use register_map::{configuration, points};
 use sim::{
     Board, Config, Corner, Image, Module, Time,
     line::{Format, Settings},
 };
 
-/// The length of the flash.
-const FLASH: usize = 128 * 1024;
+use crate::{ELF, LAYOUT};
+
+/// The port of the board's first slot.
+pub const PORT: u16 = LAYOUT.board.first_port;
+/// The first point of that slot.
+pub const SLOT: u16 = points::first(PORT);
+/// The same as the low byte of its address; the high byte is 0.
+pub const FIRST: u8 = SLOT as u8;
+/// MODULE of that slot.
+pub const MODULE: u16 = configuration::MODULE + PORT - 1;
+
+/// Bytes of a page of the store.
+pub const PAGE_SIZE: usize = LAYOUT.board.store.bytes as usize;
+/// The addresses of the store's pages.
+pub const PAGE_ADDRESSES: [u32; 2] = LAYOUT.board.store.addresses();
+
+/// Where the store's pages are in the flash.
+pub fn pages() -> [Range<usize>; 2] {
+    PAGE_ADDRESSES.map(|address| {
+        let start = (address - FLASH_START) as usize;
+        start..start + PAGE_SIZE
+    })
+}
+
 const FLASH_START: u32 = 0x0800_0000;
 
 /// The image under test.
 pub fn image() -> &'static Image {
     static IMAGE: OnceLock<Image> = OnceLock::new();
     IMAGE.get_or_init(|| {
-        let path = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
+        let path = env::var_os(ELF).unwrap_or_else(|| panic!("{ELF}: cargo xtask test sets it"));
         Image::read(Path::new(&path)).expect("the image can be read")
     })
 }
 
-/// A flash whose stored configuration knows nothing but the slot's module.
+/// A flash whose stored configuration knows nothing but the first slot's module.
 pub fn flash_with(module: Module) -> Vec<u8> {
-    let mut flash = vec![0xFF; FLASH];
-    let at = (record::PAGE_ADDRESSES[0] - FLASH_START) as usize;
-    flash[at..at + record::PRESET_LEN].copy_from_slice(&record::module_in_slot(module));
-    flash
+    let settings: Vec<_> = configuration::modules([(PORT, module)]).collect();
+    flash_with_settings(&settings)
 }
 
 /// A flash whose stored configuration is these settings: address and value.
 pub fn flash_with_settings(pairs: &[(u16, u16)]) -> Vec<u8> {
-    let mut flash = vec![0xFF; FLASH];
-    let at = (record::PAGE_ADDRESSES[0] - FLASH_START) as usize;
-    record::encode_page(0, pairs, &mut flash[at..at + record::PAGE_SIZE]).expect("they fit");
-    flash
+    LAYOUT.flash_with(pairs).expect("they fit")
 }
 
 /// CRC-16/MODBUS bit by bit, as the standard's appendix B says it: slow, and nobody else's code.
@@ -125,7 +142,7 @@ impl Bench {
 
     /// A board with this module and unit address 1, and settings stored beside that of the module.
     pub fn set_up(module: Module, settings: &[(u16, u16)]) -> Self {
-        let pairs = [&[(configuration::MODULE_SLOT, module.code())], settings].concat();
+        let pairs = [&[(MODULE, module.code())], settings].concat();
         let mut bench = Self::with(Config {
             module,
             flash: Some(flash_with_settings(&pairs)),
@@ -150,6 +167,7 @@ impl Bench {
     pub fn cold(config: Config) -> Self {
         let config = Config {
             corner: corner(),
+            layout: LAYOUT,
             ..config
         };
         Self {
@@ -232,7 +250,7 @@ impl Bench {
 
     /// Asserts that the unit answers an ordinary request.
     pub fn assert_answers(&mut self, unit: u8) {
-        let reply = self.ask(unit, &[1, 0, 0x10, 0, 4]);
+        let reply = self.ask(unit, &[1, 0, FIRST, 0, 4]);
         assert!(
             matches!(reply.as_deref(), Some([1, 1, _])),
             "a good request is answered: {reply:02X?}"

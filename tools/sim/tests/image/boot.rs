@@ -2,19 +2,20 @@
 
 use sim::{Config, Corner, Module, Time};
 
-use crate::bench::{Bench, corner, flash_with, on_crystal};
+use crate::bench::{Bench, FIRST, PORT, corner, flash_with, on_crystal};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn the_log_says_what_the_device_is() {
     let mut bench = Bench::new(Module::Do4, 17);
     let log = bench.board.take_log();
+    let slot = format!("slot {PORT}: 4do");
     for line in [
         "modio ",
         "9600 8N2",
         "reset: power-on",
         "unit address 17",
-        "slot 5: 4do",
+        &slot,
     ] {
         assert!(log.contains(line), "{line:?} in:\n{log}");
     }
@@ -70,7 +71,7 @@ fn a_request_lights_the_activity_led() {
     bench.board.run_for(Time::from_ms(200));
     assert!(!bench.board.leds().activity);
     // Another's request is no activity.
-    bench.ask(2, &[1, 0, 0x10, 0, 4]);
+    bench.ask(2, &[1, 0, FIRST, 0, 4]);
     assert!(!bench.board.leds().activity);
     bench.assert_answers(1);
     assert!(bench.board.leds().activity);
@@ -83,8 +84,8 @@ fn a_request_lights_the_activity_led() {
 fn the_same_inputs_give_the_same_run_to_the_instruction() {
     let run = || {
         let mut bench = Bench::new(Module::Do4, 1);
-        bench.ask(1, &[0x0F, 0, 0x10, 0, 4, 1, 0x05]).unwrap();
-        bench.ask(1, &[1, 0, 0x10, 0, 4]).unwrap();
+        bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x05]).unwrap();
+        bench.ask(1, &[1, 0, FIRST, 0, 4]).unwrap();
         bench.board.run_for(Time::from_us(12_345));
         let ram = bench.board.ram().to_vec();
         (

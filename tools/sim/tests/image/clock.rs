@@ -4,7 +4,7 @@
 
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, adu, flash_with_settings, format, on_crystal, on_hsi};
+use crate::bench::{Bench, MODULE, SLOT, adu, flash_with_settings, format, on_crystal, on_hsi};
 
 /// The status bit for the internal oscillator.
 const INTERNAL: u16 = 1 << 6;
@@ -15,7 +15,7 @@ const CRYSTAL: u16 = 4;
 fn without_crystal(settings: &[(u16, u16)]) -> Bench {
     Bench::with(Config {
         crystal: false,
-        flash: Some(flash_with_settings(&[&[(0x0114, 2)], settings].concat())),
+        flash: Some(flash_with_settings(&[&[(MODULE, 2)], settings].concat())),
         module: Module::Do4,
         ..Config::default()
     })
@@ -55,8 +55,8 @@ fn without_a_crystal_every_rate_is_right() {
             format: format(code),
         });
         assert_rate(&mut bench);
-        bench.write_bits(0x10, &[true, false, true, false]).unwrap();
-        assert_eq!(bench.bits(1, 0x10, 4), Ok(vec![true, false, true, false]));
+        bench.write_bits(SLOT, &[true, false, true, false]).unwrap();
+        assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true, false, true, false]));
         // At every phase of what else the unit does, which is slower on this clock.
         for n in 0..400 {
             bench.board.run_for(Time::from_us(n * 37 % 1_100));
@@ -83,7 +83,7 @@ fn without_a_crystal_a_second_is_a_second() {
 fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
     let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152)]);
     bench.tolerant = true;
-    bench.write_bits(0x10, &[true; 4]).unwrap();
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
     bench.board.watch_pin('A', 0);
     let died = bench.board.now();
     bench.board.set_crystal(false);
@@ -99,7 +99,7 @@ fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
     assert_rate(&mut bench);
     assert_eq!(bench.register(0x0260), CRYSTAL);
     assert_eq!(bench.register(0x0261), 1);
-    assert_eq!(bench.bits(1, 0x10, 4), Ok(vec![false; 4]));
+    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]));
     let log = bench.board.take_log();
     assert!(log.contains("crystal did not start"), "{log}");
     // With a new one it runs on that again.
@@ -114,7 +114,7 @@ fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
 #[ignore = "needs the image: cargo xtask test"]
 fn crystal_that_fails_after_each_start_is_given_up_after_two_faults_until_power_on() {
     // Output 1 is on by START.
-    let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152), (0x01F0, 1)]);
+    let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152), (0x01E0 + SLOT, 1)]);
     bench.tolerant = true;
     assert!(!bench.status(INTERNAL));
     bench.board.watch_pin('A', 0);

@@ -3,9 +3,8 @@
 use register_map::configuration::FILTER;
 use sim::{Module, Time};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, SLOT};
 
-const SLOT: u16 = 0x10;
 const PULSES: u16 = 0x0300 + 2 * SLOT;
 
 fn pulse(bench: &mut Bench, channel: usize, high_us: u64, low_us: u64) {

@@ -5,11 +5,10 @@ use sim::{Module, Time, line::Direction, slot::BusFault};
 
 use crate::{
     analog_outputs::codes,
-    bench::{Bench, adu},
+    bench::{Bench, FIRST, PORT, SLOT, adu},
 };
 
-const SLOT: u16 = 0x10;
-const MODULE_STATE: u16 = 0x021C;
+const MODULE_STATE: u16 = 0x0217 + PORT;
 const MODULE_FAULT: u16 = 4;
 /// A device is taken to be gone, or back, within this time: what a master may count on.
 const NOTICED: Time = Time::from_ms(500);
@@ -128,7 +127,10 @@ fn assert_in_time(bench: &mut Bench) {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_device_without_its_dac_starts_and_finds_it_later() {
-    let mut bench = Bench::set_up(Module::Ao4, &[(0x01F0, 1000), (0x01F3, 4000)]);
+    let mut bench = Bench::set_up(
+        Module::Ao4,
+        &[(0x01E0 + SLOT, 1000), (0x01E0 + SLOT + 3, 4000)],
+    );
     for fault in FAULTS {
         bench.board.power_off();
         bench.board.set_bus_fault(fault);
@@ -146,7 +148,7 @@ fn a_device_without_its_dac_starts_and_finds_it_later() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn locked_filters_of_the_bus_are_freed_at_a_start_and_while_running() {
-    let mut bench = Bench::set_up(Module::Ao4, &[(0x01F0, 1000)]);
+    let mut bench = Bench::set_up(Module::Ao4, &[(0x01E0 + SLOT, 1000)]);
     bench.board.power_off();
     bench.board.lock_i2c_filters();
     bench.board.power_on();
@@ -173,7 +175,7 @@ fn bus_errors_at_any_instant_of_a_transfer_lose_no_value() {
         let now = bench.board.now();
         let end = bench.board.line().send(
             now,
-            &adu(&[&[1, 16, 0, 0x10, 0, 4, 8], &words[..]].concat()),
+            &adu(&[&[1, 16, 0, FIRST, 0, 4, 8], &words[..]].concat()),
         );
         // The transfer begins with the reply.
         bench.board.run_until(end + bench.t35());

@@ -2,7 +2,7 @@
 
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, flash_with};
+use crate::bench::{Bench, FIRST, flash_with};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -12,7 +12,7 @@ fn a_unit_answers_to_its_own_address_alone() {
         bench.assert_answers(dip);
         for other in [dip ^ 1, 248, 254, 255].into_iter().filter(|&o| o != 0) {
             assert_eq!(
-                bench.ask(other, &[1, 0, 0x10, 0, 4]),
+                bench.ask(other, &[1, 0, FIRST, 0, 4]),
                 None,
                 "{dip} hears {other}"
             );
@@ -28,7 +28,7 @@ fn a_unit_answers_to_its_own_address_alone() {
 fn with_all_positions_on_it_is_unit_255_at_9600_8n2() {
     let mut bench = Bench::new(Module::Di4, 255);
     bench.assert_answers(255);
-    assert_eq!(bench.ask(1, &[1, 0, 0x10, 0, 4]), None);
+    assert_eq!(bench.ask(1, &[1, 0, FIRST, 0, 4]), None);
     assert!(!bench.board.leds().fault);
 }
 
@@ -39,7 +39,7 @@ fn without_a_unit_address_it_is_silent_and_blinks() {
         let mut bench = Bench::new(Module::Do4, dip);
         for unit in [0, 1, dip, 255] {
             assert_eq!(
-                bench.ask(unit, &[1, 0, 0x10, 0, 4]),
+                bench.ask(unit, &[1, 0, FIRST, 0, 4]),
                 None,
                 "{dip} hears {unit}"
             );
@@ -63,11 +63,11 @@ fn the_switch_counts_at_power_on_only() {
     bench.board.set_dip(18);
     bench.board.run_for(Time::from_secs(1));
     bench.assert_answers(17);
-    assert_eq!(bench.ask(18, &[1, 0, 0x10, 0, 4]), None);
+    assert_eq!(bench.ask(18, &[1, 0, FIRST, 0, 4]), None);
     bench.board.cycle();
     bench.board.run_for(Time::from_ms(150));
     bench.assert_answers(18);
-    assert_eq!(bench.ask(17, &[1, 0, 0x10, 0, 4]), None);
+    assert_eq!(bench.ask(17, &[1, 0, FIRST, 0, 4]), None);
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn reset_of_any_kind_keeps_the_address_of_power_on() {
     bench.board.patch_code(scan, &was).unwrap();
     bench.started();
     bench.assert_answers(17);
-    assert_eq!(bench.ask(18, &[1, 0, 0x10, 0, 4]), None);
+    assert_eq!(bench.ask(18, &[1, 0, FIRST, 0, 4]), None);
     bench.board.cycle();
     bench.started();
     bench.assert_answers(18);

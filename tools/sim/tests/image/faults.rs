@@ -2,7 +2,7 @@
 
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, FIRST, SLOT, adu};
 
 const HARD_FAULT: u16 = 2;
 const STACK_OVERFLOW: u16 = 5;
@@ -25,14 +25,14 @@ fn bench() -> Bench {
 
 /// Puts `code` in the place of a handler until the device has reset itself because of it.
 fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
-    bench.write_bits(0x10, &[true; 4]).unwrap();
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
     let before = bench.board.resets();
     bench.board.watch_pin('A', 3);
     let address = bench.board.symbol(handler).expect("a handler") & !1;
     let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
     let was = bench.board.patch_code(address, &bytes).unwrap();
     let from = bench.board.now();
-    bench.board.line().send(from, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    bench.board.line().send(from, &adu(&[1, 1, 0, FIRST, 0, 4]));
     let called = bench.board.run_until_pc(address, from + Time::from_ms(120));
     assert!(called, "{handler} runs");
     let called = bench.board.now();
@@ -110,7 +110,7 @@ fn a_stack_that_overflows_harms_nothing_and_is_recorded_as_that() {
     for handler in HANDLERS {
         fault_in(&mut bench, handler, RECURSION);
         assert_eq!(bench.register(0x0260), STACK_OVERFLOW, "{handler}");
-        assert_eq!(bench.write_bits(0x10, &[true; 4]), Ok(()));
+        assert_eq!(bench.write_bits(SLOT, &[true; 4]), Ok(()));
     }
     assert_eq!(bench.register(0x0261), HANDLERS.len() as u16);
 }

@@ -2,9 +2,9 @@
 
 use sim::{Config, Module, Time};
 
-use crate::bench::{Bench, GOOD_MV, LOW_MV, adu, flash_with_settings};
+use crate::bench::{Bench, GOOD_MV, LOW_MV, MODULE, SLOT, adu, flash_with_settings};
 
-const FILTER: u16 = 0x0130;
+const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
 const SAVE: [u16; 1] = [1];
 
@@ -96,7 +96,7 @@ fn save_pauses_when_the_supply_falls_between_two_operations() {
 #[ignore = "needs the image: cargo xtask test"]
 fn start_with_a_low_supply_serves_and_changes_no_flash() {
     let mut bench = Bench::cold(Config {
-        flash: Some(flash_with_settings(&[(0x0114, 1)])),
+        flash: Some(flash_with_settings(&[(MODULE, 1)])),
         ..Config::default()
     });
     bench.board.set_supply_mv(LOW_MV).unwrap();

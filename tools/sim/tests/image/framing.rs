@@ -6,9 +6,9 @@ use sim::{
     line::{Character, Settings},
 };
 
-use crate::bench::{Bench, adu, flash_with};
+use crate::bench::{Bench, FIRST, adu, flash_with};
 
-const READ: [u8; 6] = [1, 1, 0, 0x10, 0, 4];
+const READ: [u8; 6] = [1, 1, 0, FIRST, 0, 4];
 
 /// Sends `bytes` with a silence before the byte at `index`, and what the unit says.
 fn with_gap(bench: &mut Bench, bytes: &[u8], index: usize, gap: Time) -> Vec<u8> {
@@ -108,7 +108,7 @@ fn a_request_too_soon_after_another_joins_it_and_both_are_lost() {
     assert_eq!(with_gap(&mut bench, &two, 8, gap), []);
     assert_eq!(with_gap(&mut bench, &two, 8, Time::ZERO), []);
     // To another unit, and the second to this one.
-    let other = [adu(&[2, 1, 0, 0x10, 0, 4]), adu(&READ)].concat();
+    let other = [adu(&[2, 1, 0, FIRST, 0, 4]), adu(&READ)].concat();
     assert_eq!(with_gap(&mut bench, &other, 8, gap), []);
     // With t3.5 between them the second is answered.
     let gap = bench.t35() + bench.bit();
@@ -119,7 +119,7 @@ fn a_request_too_soon_after_another_joins_it_and_both_are_lost() {
 #[ignore = "needs the image: cargo xtask test"]
 fn silence_of_own_8n1_characters_ends_a_frame_for_the_unit_and_the_record() {
     let mut bench = Bench::set_up(Module::Di4, &[(FORMAT, 3)]);
-    let other = adu(&[2, 1, 0, 0x10, 0, 4]);
+    let other = adu(&[2, 1, 0, FIRST, 0, 4]);
     let two = [other.clone(), adu(&READ)].concat();
     // 36 bits: more than 3.5 characters of 10 bits, less than 3.5 of 11.
     let gap = bench.bit() * 36;
@@ -197,7 +197,7 @@ fn other_units_traffic_makes_it_neither_deaf_nor_talkative() {
     let mut bench = Bench::new(Module::Di4, 1);
     let others: [&[u8]; 6] = [
         &adu(&[2, 3, 0, 0, 0, 2]),
-        &adu(&[2, 3, 4, 1, 1, 0, 0x10]),
+        &adu(&[2, 3, 4, 1, 1, 0, FIRST]),
         &adu(&[2, 0x83, 2]),
         &adu(&[17, 0x41, 9, 9]),
         &[2, 3, 4, 1],
@@ -252,7 +252,7 @@ fn its_own_echo_is_not_taken_for_a_request() {
     let mut bench = Bench::new(Module::Do4, 1);
     bench.board.line().set_echo(true);
     // The reply to a write is the request: taken for one it would be answered for ever.
-    let request = adu(&[1, 5, 0, 0x10, 0xFF, 0]);
+    let request = adu(&[1, 5, 0, FIRST, 0xFF, 0]);
     for _ in 0..20 {
         assert_eq!(bench.exchange(&request), request);
     }

@@ -5,7 +5,7 @@ use sim::{Channel, Module, Time};
 
 use Kind::{BitInput, BitOutput, Nothing, WordInput, WordOutput};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, SLOT};
 
 /// What the manual makes of a point, on its own account: not taken from the firmware's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +17,6 @@ enum Kind {
     WordOutput,
 }
 
-const FIRST: u16 = 0x0010;
 /// Values of word outputs: distinct bits, both ends.
 const CODES: [u16; 6] = [0, 4095, 1, 0x0A5A, 0x05A5, 2048];
 
@@ -41,7 +40,7 @@ impl Points {
 
     /// The points of a span as indices, if they are all there and `will_do`.
     fn span(&self, start: u16, count: u16, will_do: &[Kind]) -> Option<std::ops::Range<usize>> {
-        let first = usize::from(start.checked_sub(FIRST)?);
+        let first = usize::from(start.checked_sub(SLOT)?);
         let range = first..first + usize::from(count);
         let kinds = self.kinds.get(range.clone())?;
         kinds
@@ -51,7 +50,8 @@ impl Points {
     }
 
     fn spans() -> impl Iterator<Item = (u16, u16)> {
-        (FIRST - 2..=FIRST + 4).flat_map(|start| (1..=6).map(move |count| (start, count)))
+        (SLOT.saturating_sub(2)..=SLOT + 4)
+            .flat_map(|start| (1..=6).map(move |count| (start, count)))
     }
 
     fn read_everything(&mut self) {
@@ -123,7 +123,7 @@ impl Points {
             }
             self.outputs_stand(&format!("0F {start:#x}+{count} {bits:?}"));
         }
-        for address in FIRST - 1..=FIRST + 4 {
+        for address in SLOT.saturating_sub(1)..=SLOT + 4 {
             for (value, good) in [(0xFF00, true), (0x0001, false), (0, true), (0xFF01, false)] {
                 let range = self.span(address, 1, &[BitOutput]);
                 let expected = match (good, &range) {
@@ -167,7 +167,7 @@ impl Points {
             }
             self.outputs_stand(&format!("10 {start:#x} {words:?}"));
         }
-        for address in FIRST - 1..=FIRST + 4 {
+        for address in SLOT.saturating_sub(1)..=SLOT + 4 {
             for value in [0, 4096, 4095, 0xFFFF, 1234] {
                 let range = self.span(address, 1, &[WordOutput]);
                 let expected = match &range {

@@ -7,7 +7,7 @@
 
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, adu, corner};
+use crate::bench::{Bench, FIRST, SLOT, adu, corner};
 
 /// 500 ms at 40 kHz, by the LSI there is, and a proof more.
 fn limit() -> Time {
@@ -28,7 +28,7 @@ const RETURN: u16 = 0x4770;
 fn bench() -> Bench {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     bench.tolerant = true;
-    bench.write_bits(0x10, &[true; 4]).unwrap();
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
     bench.board.run_for(Time::from_ms(1_230));
     bench
 }
@@ -36,7 +36,7 @@ fn bench() -> Bench {
 /// Writes `code` over the program at `address` until the device is reset, with requests coming in, and
 /// checks what a hang must lead to. The tasks whose marks were missing.
 fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
-    bench.write_bits(0x10, &[true; 4]).unwrap();
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
     let faults = bench.register(0x0261);
     let before = bench.board.resets();
     (0..4).for_each(|pin| bench.board.watch_pin('A', pin));
@@ -47,7 +47,7 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
         .unwrap();
     let from = bench.board.now();
     // The timers' and the line's handlers need a request to be called.
-    bench.board.line().send(from, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    bench.board.line().send(from, &adu(&[1, 1, 0, FIRST, 0, 4]));
     while bench.board.resets() == before {
         assert!(bench.board.now() < from + limit(), "{what}: no reset");
         bench.board.run_for(Time::from_us(100));
@@ -96,7 +96,7 @@ fn every_task_that_spins_is_bitten_out_of_it() {
 fn within(bench: &mut Bench, handler: &str) -> u32 {
     let entry = bench.board.symbol(handler).expect("the task's handler") & !1;
     let now = bench.board.now();
-    bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    bench.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
     assert!(bench.board.run_until_pc(entry, now + Time::from_ms(50)));
     // The number of the exception, the rest are flags (PM0056 2.1.3).
     let exception = |bench: &Bench| bench.board.register(16).map(|xpsr| xpsr & 0x1FF);

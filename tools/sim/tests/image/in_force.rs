@@ -3,7 +3,7 @@
 use register_map::codes::Baud;
 use sim::{Module, Time, line::Settings};
 
-use crate::bench::{Bench, adu, format};
+use crate::bench::{Bench, FIRST, SLOT, adu, format};
 
 const BAUD: u16 = 0x0101;
 const FORMAT: u16 = 0x0102;
@@ -13,7 +13,7 @@ const STRICT_T15: u16 = 0x0107;
 
 /// How long after the request's end the reply to a read begins.
 fn turnaround(bench: &mut Bench) -> Time {
-    bench.bits(1, 0x10, 4).unwrap();
+    bench.bits(1, SLOT, 4).unwrap();
     let sent = bench.sent;
     let line = bench.board.line();
     line.frames().next_back().expect("a reply").start - sent
@@ -40,14 +40,14 @@ fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
         bench.configure(BAUD, &[baud.code(), code]);
         assert_eq!(bench.registers(BAUD, 2), Ok(vec![baud.code(), code]));
         bench.save();
-        assert_eq!(bench.bits(1, 0x10, 4), Ok(vec![false; 4]), "still the old");
+        assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]), "still the old");
         assert_eq!(bench.status(16), settings != before, "waits for a restart");
 
         // The response to the restart goes out under the old settings: `restart` checks it.
         bench.restart();
         if settings != before {
             // The old master is not understood, nor spoken to.
-            let heard = bench.exchange(&adu(&[1, 1, 0, 0x10, 0, 4]));
+            let heard = bench.exchange(&adu(&[1, 1, 0, FIRST, 0, 4]));
             assert_eq!(heard, [], "{settings:?}");
             bench.board.run_for(Time::from_ms(50));
         }
@@ -103,7 +103,7 @@ fn a_response_delay_counts_at_once() {
 
 /// Sends a read with a pause of `gap` in its middle; whether it is answered.
 fn answered_with_gap(bench: &mut Bench, gap: Time) -> bool {
-    let frame = adu(&[1, 1, 0, 0x10, 0, 4]);
+    let frame = adu(&[1, 1, 0, FIRST, 0, 4]);
     let now = bench.board.now();
     let end = bench.board.line().send(now, &frame[..4]);
     let end = bench.board.line().send(end + gap, &frame[4..]);
@@ -130,7 +130,7 @@ fn a_longer_frame_gap_counts_after_the_restart() {
     assert!(answered_with_gap(&mut bench, Time::from_us(9_500)));
     assert!(!answered_with_gap(&mut bench, Time::from_us(10_500)));
     let now = bench.board.now();
-    let end = bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
+    let end = bench.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
     bench.board.run_until(end + Time::from_ms(11));
     assert!(!bench.answer_after(end).is_empty());
     let start = bench.board.line().frames().next_back().unwrap().start - end;
@@ -179,14 +179,14 @@ fn no_frame_gap_is_too_short_to_be_understood() {
 #[ignore = "needs the image: cargo xtask test"]
 fn a_delayed_response_stays_away_when_the_bus_has_gone_on_without_it() {
     let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 300)]);
-    let read = adu(&[1, 1, 0, 0x10, 0, 4]);
+    let read = adu(&[1, 1, 0, FIRST, 0, 4]);
     let others = adu(&[&[2, 3, 200], &[0x55; 200][..]].concat());
     bench.patience = Time::from_ms(400);
     for (other, from_ms, answered) in [
         // Under way when the delay is over; rubbish, and a good frame, long over by then.
         (&others[..], 200, false),
         (&others[..30], 20, true),
-        (&adu(&[2, 1, 0, 0x10, 0, 4])[..], 20, false),
+        (&adu(&[2, 1, 0, FIRST, 0, 4])[..], 20, false),
     ] {
         let now = bench.board.now();
         let end = bench.board.line().send(now, &read);

@@ -1,15 +1,25 @@
 //! The real release image on the virtual board: what a master on the line, and a person at the board,
 //! get to see.
 //!
-//! The image comes from `MODIO_ELF`, which `cargo xtask test` sets after building it.
+//! The image comes from `MODIO_ELF`, which `cargo xtask test` sets after building it. It is that of the modio-02. The
+//! tests of the modio-08's image are in `tests/image_08`; they use most of the files here as well, which name the
+//! board's first slot by [`bench::PORT`], [`bench::SLOT`] and [`bench::MODULE`].
 //!
 //! | what | where |
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
+//! | the description | `self_description` |
 //! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip` |
-//! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters` |
+//! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults` |
+
+use sim::board::{Layout, MODIO_02};
+
+/// The board that the image is for.
+const LAYOUT: &Layout = &MODIO_02;
+/// The variable that names the image.
+const ELF: &str = "MODIO_ELF";
 
 mod analog_inputs;
 mod analog_outputs;
@@ -26,6 +36,7 @@ mod flash_faults;
 mod framing;
 mod functions;
 mod hung_task;
+mod identify;
 mod in_force;
 mod lock;
 mod module_choice;
@@ -38,6 +49,7 @@ mod ranges;
 mod refusals;
 mod registers;
 mod saving;
+mod self_description;
 mod standard_functions;
 mod storing;
 mod timing;

@@ -1,11 +1,10 @@
 //! MODULE: another module needs a setting and a restart, and no other firmware.
 
-use register_map::configuration::{FILTER, MODULE_SLOT, RANGE, SAFE, SCALE, START};
+use register_map::configuration::{FILTER, RANGE, SAFE, SCALE, START};
 use sim::{Module, Time};
 
-use crate::bench::Bench;
-
-const SLOT: u16 = 0x10;
+use crate::LAYOUT;
+use crate::bench::{Bench, MODULE, PORT, SLOT};
 
 /// What the points of a module answer to a read of bits and of words.
 fn assert_points(bench: &mut Bench, module: Module) {
@@ -17,10 +16,10 @@ fn assert_points(bench: &mut Bench, module: Module) {
     assert_eq!(bench.bits(1, SLOT, 4).is_ok(), bits, "{module:?}");
     assert_eq!(bench.registers(SLOT, 4).is_ok(), words, "{module:?}");
     let mut in_force = [0; 8];
-    in_force[4] = module.code();
+    in_force[usize::from(PORT) - 1] = module.code();
     assert_eq!(bench.registers(0x0210, 8), Ok(in_force.to_vec()));
     let mut state = [1; 8];
-    state[4] = u16::from(module == Module::None);
+    state[usize::from(PORT) - 1] = u16::from(module == Module::None);
     assert_eq!(bench.registers(0x0218, 8), Ok(state.to_vec()), "{module:?}");
 }
 
@@ -40,9 +39,9 @@ fn every_module_can_follow_every_other() {
         // Hierholzer's choice is not needed: what is left over is reached by a step that repeats.
         let next = pairs.iter().position(|(from, _)| *from == last);
         let (_, module) = next.map_or((last, pairs[0].0), |at| pairs.remove(at));
-        bench.configure(MODULE_SLOT, &[module.code()]);
+        bench.configure(MODULE, &[module.code()]);
         assert_eq!(
-            bench.register(0x0214),
+            bench.register(0x020F + PORT),
             last.code(),
             "in force after the restart"
         );
@@ -63,23 +62,23 @@ fn every_module_can_follow_every_other() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn only_the_slot_s_port_takes_a_module() {
+fn only_ports_with_a_slot_take_a_module() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.unlock();
-    for port in (1..=8).filter(|port| *port != 5) {
+    for port in (1..=8).filter(|port| !LAYOUT.board.has_slot(*port)) {
         let address = 0x0110 + port - 1;
         assert_eq!(bench.write(address, &[1]), Err(3), "port {port}");
         assert_eq!(bench.write(address, &[0]), Ok(()), "port {port}");
     }
-    assert_eq!(bench.write(MODULE_SLOT, &[7]), Err(3));
-    assert_eq!(
-        bench.write(0x0110, &[0, 0, 0, 0, 2, 0, 0, 1]),
-        Err(3),
-        "all or nothing"
-    );
-    assert_eq!(bench.register(MODULE_SLOT), 1);
-    assert_eq!(bench.write(0x0110, &[0, 0, 0, 0, 2, 0, 0, 0]), Ok(()));
-    assert_eq!(bench.register(MODULE_SLOT), 2);
+    assert_eq!(bench.write(MODULE, &[7]), Err(3));
+    let mut modules = [0; 8];
+    modules[usize::from(PORT) - 1] = 2;
+    modules[7] = 1;
+    assert_eq!(bench.write(0x0110, &modules), Err(3), "all or nothing");
+    assert_eq!(bench.register(MODULE), 1);
+    modules[7] = 0;
+    assert_eq!(bench.write(0x0110, &modules), Ok(()));
+    assert_eq!(bench.register(MODULE), 2);
 }
 
 #[test]
@@ -95,7 +94,7 @@ fn settings_made_for_one_module_switch_nothing_on_at_another() {
     ] {
         bench.configure(first + SLOT, &[value; 4]);
     }
-    bench.configure(MODULE_SLOT, &[Module::Do4.code()]);
+    bench.configure(MODULE, &[Module::Do4.code()]);
     for (first, default) in [(FILTER, 5), (RANGE, 0), (SCALE, 0), (SAFE, 0), (START, 0)] {
         assert_eq!(
             bench.registers(first + SLOT, 4),
@@ -120,7 +119,7 @@ fn settings_for_the_next_module_do_not_disturb_the_one_in_force() {
     // A running 4DO, told that a 4AO comes next, with a SAFE no bit has.
     let mut bench = Bench::set_up(Module::Do4, &[]);
     bench.write_bits(SLOT, &[true; 4]).unwrap();
-    bench.configure(MODULE_SLOT, &[Module::Ao4.code()]);
+    bench.configure(MODULE, &[Module::Ao4.code()]);
     bench.write(SAFE + SLOT, &[4095; 4]).unwrap();
     bench.write(0x0104, &[1]).unwrap();
     bench.board.run_for(Time::from_ms(200));

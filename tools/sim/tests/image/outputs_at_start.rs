@@ -3,9 +3,11 @@
 use register_map::configuration::START;
 use sim::{Module, Time};
 
-use crate::{analog_outputs::codes, bench::Bench};
+use crate::{
+    analog_outputs::codes,
+    bench::{Bench, SLOT},
+};
 
-const SLOT: u16 = 0x10;
 /// From reset to outputs that stand at START: what a plant may count on.
 const SOON: Time = Time::from_ms(50);
 

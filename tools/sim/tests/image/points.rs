@@ -2,7 +2,7 @@
 
 use sim::{Channel, Module, Time};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, FIRST, adu};
 
 /// What a channel's output is.
 fn on(bench: &Bench, channel: usize) -> bool {
@@ -23,9 +23,9 @@ fn four_inputs_follow_the_outside_by_both_functions() {
         }
         bench.board.run_for(Time::from_ms(8));
         for function in [1, 2] {
-            let all = bench.ask(1, &[function, 0, 0x10, 0, 4]);
+            let all = bench.ask(1, &[function, 0, FIRST, 0, 4]);
             assert_eq!(all.as_deref(), Some(&[function, 1, pattern][..]));
-            let middle = bench.ask(1, &[function, 0, 0x11, 0, 2]);
+            let middle = bench.ask(1, &[function, 0, FIRST + 1, 0, 2]);
             assert_eq!(
                 middle.as_deref(),
                 Some(&[function, 1, pattern >> 1 & 3][..])
@@ -38,7 +38,7 @@ fn four_inputs_follow_the_outside_by_both_functions() {
 #[ignore = "needs the image: cargo xtask test"]
 fn an_input_is_debounced_for_five_milliseconds() {
     let mut bench = Bench::new(Module::Di4, 1);
-    let read = |bench: &mut Bench| bench.ask(1, &[2, 0, 0x10, 0, 1]).unwrap()[2];
+    let read = |bench: &mut Bench| bench.ask(1, &[2, 0, FIRST, 0, 1]).unwrap()[2];
     bench.board.set_energised(1, true).unwrap();
     bench.board.run_for(Time::from_ms(3));
     bench.board.set_energised(1, false).unwrap();
@@ -68,11 +68,11 @@ fn four_outputs_do_as_they_are_told_and_read_back() {
     }
 
     // Several at once; what is beyond the quantity in the byte does not count.
-    let reply = bench.ask(1, &[0x0F, 0, 0x11, 0, 3, 1, 0b1111_0011]);
-    assert_eq!(reply.as_deref(), Some(&[0x0F, 0, 0x11, 0, 3][..]));
+    let reply = bench.ask(1, &[0x0F, 0, FIRST + 1, 0, 3, 1, 0b1111_0011]);
+    assert_eq!(reply.as_deref(), Some(&[0x0F, 0, FIRST + 1, 0, 3][..]));
     assert_eq!(states(&bench), [false, true, true, false]);
     for function in [1, 2] {
-        let reply = bench.ask(1, &[function, 0, 0x10, 0, 4]);
+        let reply = bench.ask(1, &[function, 0, FIRST, 0, 4]);
         assert_eq!(reply.as_deref(), Some(&[function, 1, 0b0110][..]));
     }
 }
@@ -86,7 +86,7 @@ fn a_write_reaches_its_output_before_the_reply_is_out() {
     let end = bench
         .board
         .line()
-        .send(now, &adu(&[1, 5, 0, 0x10, 0xFF, 0]));
+        .send(now, &adu(&[1, 5, 0, FIRST, 0xFF, 0]));
     bench.answer_after(end);
     let edges = bench.board.pin_edges('A', 0);
     assert_eq!(edges.len(), 1, "{edges:?}");
@@ -104,7 +104,7 @@ fn a_write_to_several_outputs_is_whole_or_not_at_all() {
         bench.board.watch_pin('A', pin);
     }
     // The fifth does not exist.
-    let reply = bench.ask(1, &[0x0F, 0, 0x10, 0, 5, 1, 0x1F]);
+    let reply = bench.ask(1, &[0x0F, 0, FIRST, 0, 5, 1, 0x1F]);
     assert_eq!(reply.as_deref(), Some(&[0x8F, 2][..]));
     let reply = bench.ask(1, &[0x0F, 0, 0x0F, 0, 2, 1, 0x03]);
     assert_eq!(reply.as_deref(), Some(&[0x8F, 2][..]));
@@ -112,7 +112,7 @@ fn a_write_to_several_outputs_is_whole_or_not_at_all() {
         assert_eq!(bench.board.pin_edges('A', pin), []);
     }
     // And one that is good moves all its pins together.
-    bench.ask(1, &[0x0F, 0, 0x10, 0, 4, 1, 0x0F]).unwrap();
+    bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x0F]).unwrap();
     let at = |pin| bench.board.pin_edges('A', pin)[0].0;
     assert!(at(3) - at(0) < Time::from_us(20), "within one scan");
 }
@@ -121,19 +121,19 @@ fn a_write_to_several_outputs_is_whole_or_not_at_all() {
 #[ignore = "needs the image: cargo xtask test"]
 fn a_broadcast_is_done_in_silence() {
     let mut bench = Bench::new(Module::Do4, 1);
-    assert_eq!(bench.ask(0, &[5, 0, 0x11, 0xFF, 0]), None);
+    assert_eq!(bench.ask(0, &[5, 0, FIRST + 1, 0xFF, 0]), None);
     assert!(on(&bench, 2));
-    assert_eq!(bench.ask(0, &[0x0F, 0, 0x10, 0, 4, 1, 0b1001]), None);
+    assert_eq!(bench.ask(0, &[0x0F, 0, FIRST, 0, 4, 1, 0b1001]), None);
     assert_eq!(
         [1, 2, 3, 4].map(|c| on(&bench, c)),
         [true, false, false, true]
     );
     // A read, an exception and nonsense are silence too, and change nothing.
     for pdu in [
-        &[1, 0, 0x10, 0, 4][..],
+        &[1, 0, FIRST, 0, 4][..],
         &[5, 0, 0x20, 0xFF, 0],
         &[0x55],
-        &[5, 0, 0x10, 0x12, 0x34],
+        &[5, 0, FIRST, 0x12, 0x34],
     ] {
         assert_eq!(bench.ask(0, pdu), None, "{pdu:02X?}");
     }
@@ -159,11 +159,11 @@ fn outputs_are_off_from_the_first_instant_and_after_every_power_on() {
     for pin in 0..4 {
         assert_eq!(bench.board.pin_edges('A', pin), [], "no click at power-up");
     }
-    bench.ask(1, &[0x0F, 0, 0x10, 0, 4, 1, 0x0F]).unwrap();
+    bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x0F]).unwrap();
     assert!(on(&bench, 1));
     bench.board.cycle();
     bench.board.run_for(Time::from_ms(150));
     assert_eq!([1, 2, 3, 4].map(|c| on(&bench, c)), [false; 4]);
-    let reply = bench.ask(1, &[1, 0, 0x10, 0, 4]);
+    let reply = bench.ask(1, &[1, 0, FIRST, 0, 4]);
     assert_eq!(reply.as_deref(), Some(&[1, 1, 0][..]));
 }

@@ -2,12 +2,13 @@
 //! under traffic. The configuration is the old or the new one, whole, and the device lives on.
 
 use fastrand::Rng;
-use register_map::record::{PAGE_ADDRESSES, PAGE_SIZE};
 use sim::{Channel, Module, Time, periph::flash::Torn};
 
-use crate::bench::{Bench, GOOD_MV, LOW_MV, adu};
+use crate::bench::{
+    Bench, FIRST, GOOD_MV, LOW_MV, PAGE_ADDRESSES, PAGE_SIZE, PORT, SLOT, adu, pages,
+};
 
-const FILTER: u16 = 0x0130;
+const FILTER: u16 = 0x0120 + SLOT;
 const INVALID: u16 = 2;
 /// How far an operation is when the power goes. Each leaves other cells unsteady.
 const FRACTIONS: [f64; 4] = [0.0, 0.5, 0.75, 1.0];
@@ -49,8 +50,8 @@ fn save(bench: &mut Bench, values: [u16; 4]) {
 /// Erased bytes at the end of each of the store's pages.
 fn rooms(bench: &Bench) -> [usize; 2] {
     let flash = bench.board.flash();
-    [0xF800, 0xFC00].map(|page| {
-        let bytes = flash[page..page + PAGE_SIZE].iter().rev();
+    pages().map(|page| {
+        let bytes = flash[page].iter().rev();
         bytes.take_while(|byte| **byte == 0xFF).count()
     })
 }
@@ -64,7 +65,7 @@ fn after_cut(bench: &mut Bench, sets: [[u16; 4]; 2], what: &str) -> usize {
         let values = bench.registers(FILTER, 4).unwrap();
         assert!(!bench.status(INVALID), "{what}: the store is not damaged");
         assert_eq!(bench.registers(0x0101, 2), Ok(vec![1152, 0]), "{what}");
-        assert_eq!(bench.register(0x0214), 1, "{what}");
+        assert_eq!(bench.register(0x020F + PORT), 1, "{what}");
         assert_eq!(
             first.get_or_insert_with(|| values.clone()),
             &values,
@@ -125,7 +126,7 @@ fn fill(bench: &mut Bench, round: &mut u16) {
         save(bench, set(*round));
     }
     assert!(
-        rooms(bench).iter().max() >= Some(&1000),
+        rooms(bench).iter().max() >= Some(&(PAGE_SIZE - 24)),
         "{:?}",
         rooms(bench)
     );
@@ -160,7 +161,7 @@ fn at_any_operation_of_a_save_that_has_to_erase() {
         bench.board.set_supply_mv(LOW_MV).unwrap();
         let spare = rooms(bench)
             .iter()
-            .position(|room| *room >= 1000)
+            .position(|room| *room >= PAGE_SIZE - 24)
             .expect("a spare page");
         let old = [0; PAGE_SIZE];
         bench.board.patch_code(PAGE_ADDRESSES[spare], &old).unwrap();
@@ -272,12 +273,12 @@ fn at_any_instant_under_traffic_and_it_answers_again() {
                 .collect();
             let save = rng.bool();
             let requests: &[Vec<u8>] = &[
-                [&[1, 15, 0, 0x10, 0, 4, 1], &[rng.u8(0..16)][..]].concat(),
-                [&[1, 16, 1, 0xF0, 0, 4, 8], &words[..]].concat(),
+                [&[1, 15, 0, FIRST, 0, 4, 1], &[rng.u8(0..16)][..]].concat(),
+                [&[1, 16, 1, 0xE0 + FIRST, 0, 4, 8], &words[..]].concat(),
                 if save {
                     vec![1, 6, 1, 8, 0, 1]
                 } else {
-                    vec![1, 1, 0, 0x10, 0, 4]
+                    vec![1, 1, 0, FIRST, 0, 4]
                 },
                 vec![1, 3, 1, 0xE0, 0, 32],
             ];
@@ -299,12 +300,12 @@ fn at_any_instant_under_traffic_and_it_answers_again() {
         bench.board.run_for(Time::from_us(rng.u64(1..50_000)));
         bench.board.power_on();
         bench.started();
-        let start = bench.registers(0x01F0, 4).unwrap();
+        let start = bench.registers(0x01E0 + SLOT, 4).unwrap();
         let known = candidates.iter().find(|set| set[..] == start);
         stored =
             *known.unwrap_or_else(|| panic!("round {round}: {start:?}, not of {candidates:?}"));
         let on: Vec<bool> = stored.iter().map(|value| *value != 0).collect();
-        assert_eq!(bench.bits(1, 0x10, 4), Ok(on), "round {round}: START");
+        assert_eq!(bench.bits(1, SLOT, 4), Ok(on), "round {round}: START");
         assert!(!bench.status(INVALID), "round {round}");
         assert!(!bench.board.locked_up());
     }

@@ -4,10 +4,10 @@
 use register_map::{codes::Baud, configuration};
 use sim::{Module, Time};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, FIRST, adu};
 
 /// A read of the four inputs.
-const REQUEST: [u8; 6] = [1, 2, 0, 0x10, 0, 4];
+const REQUEST: [u8; 6] = [1, 2, 0, FIRST, 0, 4];
 
 /// Rates of pulses, in pulses a second.
 const PULSE_RATES: [u32; 6] = [10, 100, 333, 1000, 10_000, 100_000];

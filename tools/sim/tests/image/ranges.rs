@@ -5,12 +5,15 @@
 
 use register_map::{
     Module, Rule, Values,
-    configuration::{COMMAND, FORMAT, KEY, LORA, MODULE_SLOT, RESPONSE_DELAY, RULES, point_of},
-    points::{PointKind, SLOT_FIRST},
+    configuration::{
+        COMMAND, FORMAT, KEY, LORA, MODULE as MODULES, RESPONSE_DELAY, RULES, point_of,
+    },
+    points::{Kind, PORTS},
 };
 use sim::Time;
 
-use crate::bench::Bench;
+use crate::LAYOUT;
+use crate::bench::{Bench, SLOT};
 
 /// Allowed by the map, but refused as a value until the firmware can do it: the LoRa line.
 const NOT_YET: [(u16, u16); 1] = [(LORA, 1)];
@@ -32,7 +35,7 @@ fn ends(values: Values) -> (Vec<u16>, Vec<u16>) {
 
 /// The registers of a rule to try: all of a few, the first, the slot's and the last of those by point.
 fn some(rule: &Rule) -> Vec<u16> {
-    let slot = rule.first + SLOT_FIRST;
+    let slot = rule.first + SLOT;
     match point_of(rule.first) {
         Some(_) => vec![
             rule.first,
@@ -54,15 +57,20 @@ fn try_every_register(module: Module) {
         .filter(|rule| ![KEY, COMMAND].contains(&rule.first))
     {
         for address in some(rule) {
-            // MODULE itself is for `module_choice`: it changes what others take.
-            if address == MODULE_SLOT {
+            // MODULE of a slot is for `module_choice`: it changes what others take.
+            let port = (address.wrapping_sub(MODULES) < PORTS).then(|| address - MODULES + 1);
+            if port.is_some_and(|port| LAYOUT.board.has_slot(port)) {
                 continue;
             }
             let kind = point_of(address)
-                .and_then(|point| point.checked_sub(SLOT_FIRST))
+                .and_then(|point| point.checked_sub(SLOT))
                 .and_then(|channel| module.points().get(usize::from(channel)).copied())
-                .unwrap_or(PointKind::None);
-            let (inside, outside) = ends(rule.values_for(kind));
+                .unwrap_or(Kind::None);
+            let (inside, outside) = ends(match port {
+                // Without a slot there is no module.
+                Some(_) => Values::only(0),
+                None => rule.values_for(kind),
+            });
             let stored = bench.register(address);
             bench.unlock();
             // What it says of itself counts at once.
@@ -131,7 +139,7 @@ fn key_and_command_take_what_they_name_alone() {
         assert_eq!(bench.write_single(6, KEY, value), Err(3), "KEY {value:#x}");
     }
     // 0xB007 is refused until there is a loader.
-    for value in [0, 6, 0xB006, 0xB007, 0xB008, 0xFFFF] {
+    for value in [0, 7, 0xB006, 0xB007, 0xB008, 0xFFFF] {
         assert_eq!(
             bench.write_single(6, COMMAND, value),
             Err(3),
@@ -139,7 +147,7 @@ fn key_and_command_take_what_they_name_alone() {
         );
     }
     assert_eq!(bench.register(COMMAND), 0);
-    for value in [3, 4, 5, 1] {
+    for value in [3, 4, 5, 6, 1] {
         bench.write_single(6, COMMAND, value).unwrap();
         bench.board.run_for(Time::from_ms(100));
         assert_eq!(bench.register(COMMAND), 0, "it reads 0");

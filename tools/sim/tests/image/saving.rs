@@ -1,11 +1,11 @@
 //! Saving while the line is busy: at 115200, each request t3.5 behind the last reply, none is lost.
 
-use register_map::{codes::Baud, configuration, record::PAGE_SIZE};
+use register_map::{codes::Baud, configuration};
 use sim::{Corner, Module, Time, periph::flash::Durations};
 
-use crate::bench::{Bench, adu, corner};
+use crate::bench::{Bench, FIRST, PAGE_SIZE, SLOT, adu, corner, pages};
 
-const FILTER: u16 = 0x0130;
+const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
 
 /// The slowest flash there is (DS5319 table 28).
@@ -14,12 +14,22 @@ const SLOWEST: Durations = Durations {
     program: Time::from_us(70),
 };
 
-/// Settings whose record has 400 bytes: two fill a page, so the third goes to the other, and a start
-/// makes room.
+/// Settings by point, with a value that is not the default: the register of the first point and the value.
+const BLOCKS: [(u16, u16); 6] = [
+    (0x0160, 4000),
+    (0x01A0, 1),
+    (0x01C0, 1),
+    (0x0120, 7),
+    (0x0180, 1),
+    (0x01E0, 1),
+];
+
+/// Settings whose record fills two fifths of a page: the third record goes to the other page, and a start makes room.
 fn large() -> Vec<(u16, u16)> {
-    let blocks = [(0x0160, 4000), (0x01A0, 1), (0x01C0, 1)];
-    let pairs = blocks.map(|(first, value)| (0..32).map(move |n| (first + n, value)));
-    pairs.into_iter().flatten().collect()
+    // Three blocks are 400 bytes, six 800.
+    let blocks = BLOCKS.iter().take(3 * PAGE_SIZE / 1024);
+    let pairs = blocks.map(|&(first, value)| (0..32).map(move |n| (first + n, value)));
+    pairs.flatten().collect()
 }
 
 /// A master that asks without a pause, and keeps count.
@@ -91,7 +101,7 @@ impl Master {
         let from = self.asked;
         loop {
             // Short and long ones, reads and writes.
-            self.ask(&[1, 0, 0x10, 0, 4]);
+            self.ask(&[1, 0, FIRST, 0, 4]);
             self.ask(&[3, 1, 0x20, 0, 32]);
             self.ask(&[16, 3, 0x30, 0, 2, 4, 0, 0, 0, 0]);
             let status = self.ask(&[3, 0x02, 0x0A, 0, 1]);
@@ -156,23 +166,18 @@ fn no_request_goes_unanswered_when_pages_change_over() {
     let mut master = Master::new(Module::Di4, &large());
     for round in 0..3 {
         master.write(0x0100, 0x5A17);
-        let pages = |master: &Master| {
+        let used = |master: &Master| {
             let flash = master.bench.board.flash();
-            [0xF800, 0xFC00].map(|page| {
-                flash[page..page + PAGE_SIZE]
-                    .iter()
-                    .filter(|b| **b != 0xFF)
-                    .count()
-            })
+            pages().map(|page| flash[page].iter().filter(|b| **b != 0xFF).count())
         };
-        let before = pages(&master);
+        let before = used(&master);
         let mut changed_over = false;
         for n in 0..2 {
             master.write(FILTER, 100 * round + n);
             let operations = master.bench.board.flash_operations();
             master.save();
             assert!(master.bench.board.flash_operations() > operations + 190);
-            let now = pages(&master);
+            let now = used(&master);
             changed_over |= (0..2).any(|page| before[page] <= 2 && now[page] > 2);
         }
         assert!(changed_over || round == 0, "{before:?}: no change-over");
@@ -303,7 +308,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
     let mut master = Master::new(Module::Do4, &settings);
     master.write(0x0100, 0x5A17);
     let bench = &mut master.bench;
-    bench.write_bits(0x10, &[true; 4]).unwrap();
+    bench.write_bits(SLOT, &[true; 4]).unwrap();
     // Waits until the uptime shows another second. Gives the time, some 20 ms late, and that second.
     let next_second = |bench: &mut Bench| {
         bench.patience = Time::ZERO;
@@ -318,7 +323,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
     let (from, first) = next_second(bench);
     let spare = |bench: &Bench| {
         let flash = bench.board.flash();
-        [0xF800, 0xFC00].map(|page| flash[page + 2..page + PAGE_SIZE].iter().all(|b| *b == 0xFF))
+        pages().map(|page| flash[page][2..].iter().all(|b| *b == 0xFF))
     };
     let mut erases = 0;
     bench.patience = Time::from_ms(50);
@@ -330,7 +335,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
         for _ in 0..6 {
             let next = bench.sent + Time::from_ms(90);
             bench.board.run_until(next);
-            assert!(bench.ask(1, &[1, 0, 0x10, 0, 4]).is_some());
+            assert!(bench.ask(1, &[1, 0, FIRST, 0, 4]).is_some());
         }
         erases += u32::from(spare(bench) != before);
     }

@@ -2,7 +2,7 @@
 
 use sim::{Channel, Module, Time};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, FIRST};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -51,11 +51,11 @@ fn while_it_only_listens_its_outputs_fall_to_safe() {
     let mut bench = Bench::new(Module::Do4, 1);
     bench.unlock();
     bench.write(0x0104, &[2]).unwrap();
-    bench.ask(1, &[0x05, 0, 0x10, 0xFF, 0]).expect("a reply");
+    bench.ask(1, &[0x05, 0, FIRST, 0xFF, 0]).expect("a reply");
     assert_eq!(bench.ask(1, &[0x08, 0, 4, 0, 0]), None);
     assert_eq!(bench.board.channel(1), Channel::Do { on: true });
     for _ in 0..10 {
-        assert_eq!(bench.ask(1, &[0x05, 0, 0x11, 0xFF, 0]), None);
+        assert_eq!(bench.ask(1, &[0x05, 0, FIRST + 1, 0xFF, 0]), None);
         bench.board.run_for(Time::from_ms(30));
     }
     assert_eq!(bench.board.channel(1), Channel::Do { on: false });

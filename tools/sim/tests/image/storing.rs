@@ -5,12 +5,10 @@ use sim::{
     line::{Format, Settings},
 };
 
-use crate::bench::Bench;
+use crate::bench::{Bench, MODULE, PORT, SLOT, pages};
 
-const FILTER: u16 = 0x0130;
+const FILTER: u16 = 0x0120 + SLOT;
 const INVALID: u16 = 2;
-/// Where the store's pages are in the flash.
-const PAGES: std::ops::Range<usize> = 0xF800..0x1_0000;
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -21,7 +19,7 @@ fn what_is_saved_survives_and_what_is_not_does_not() {
     bench.write(FILTER, &[1, 2, 3, 4]).unwrap();
     bench.power_cycle();
     assert_eq!(bench.registers(FILTER, 4), Ok(vec![50, 60, 70, 80]));
-    assert_eq!(bench.register(0x0114), 1);
+    assert_eq!(bench.register(MODULE), 1);
     // Thirty saves and some restarts: pages fill and are made room in.
     for n in 0..30 {
         bench.configure(FILTER, &[100 + n]);
@@ -96,7 +94,8 @@ fn saving_what_is_stored_already_wears_nothing() {
 fn a_damaged_store_leaves_defaults_and_says_so_until_something_is_saved() {
     let mut bench = Bench::set_up(Module::Di4, &[(0x0104, 77)]);
     bench.board.power_off();
-    for byte in &mut bench.board.flash_mut().unwrap()[PAGES] {
+    let [first, second] = pages();
+    for byte in &mut bench.board.flash_mut().unwrap()[first.start..second.end] {
         *byte = byte.wrapping_mul(31).wrapping_add(7);
     }
     bench.board.power_on();
@@ -104,15 +103,15 @@ fn a_damaged_store_leaves_defaults_and_says_so_until_something_is_saved() {
         bench.started();
         assert!(bench.status(INVALID));
         assert_eq!(bench.registers(0x0101, 4), Ok(vec![96, 0, 0, 0]));
-        assert_eq!(bench.register(0x0214), 0);
+        assert_eq!(bench.register(0x020F + PORT), 0);
         bench.board.cycle();
     }
     bench.started();
-    bench.configure(0x0114, &[1]);
+    bench.configure(MODULE, &[1]);
     bench.save();
     bench.power_cycle();
     assert!(!bench.status(INVALID));
-    assert_eq!(bench.register(0x0214), 1);
+    assert_eq!(bench.register(0x020F + PORT), 1);
 }
 
 #[test]
@@ -146,7 +145,7 @@ fn writing_outputs_over_and_over_programs_no_flash() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     let operations = bench.board.flash_operations();
     for n in 0..500_u16 {
-        bench.write_bit(0x10 + n % 4, n % 3 == 0).unwrap();
+        bench.write_bit(SLOT + n % 4, n % 3 == 0).unwrap();
     }
     assert_eq!(bench.board.flash_operations(), operations);
     assert!(!bench.status(8), "nothing waits to be saved");

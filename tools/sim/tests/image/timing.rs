@@ -4,7 +4,7 @@ use register_map::{codes::Baud, configuration};
 use sim::{Module, Time, line::Direction};
 
 use crate::ascii::ascii;
-use crate::bench::{Bench, Most, adu, corner};
+use crate::bench::{Bench, FIRST, Most, adu, corner};
 
 /// From t3.5 to the first byte in the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(13), Time::from_us(24));
@@ -12,6 +12,9 @@ const LATE: Most = Most(Time::from_us(13), Time::from_us(24));
 const ON: Most = Most(Time::from_us(1), Time::from_us(1));
 /// From the last stop bit to the driver's switching off.
 const OFF: Most = Most(Time::from_ns(1_250), Time::from_ns(2_300));
+/// The same when another interrupt of the line, the 1 kHz beat as a rule, has just come: the longest waits that
+/// `cargo xtask bench` allows, 5.0 and 8.5 us, and the handler.
+const OFF_BEHIND: Most = Most(Time::from_ns(6_250), Time::from_ns(10_800));
 /// Between the first byte, which does not depend on the request, and the second. t1.5 is 750 us.
 const GAP: Most = Most(Time::from_us(16), Time::from_us(30));
 
@@ -22,7 +25,7 @@ fn the_reply_starts_at_t35_and_the_driver_is_on_just_as_long_as_needed() {
     let (bit, sixteenth) = (bench.bit(), bench.sixteenth());
     for _ in 0..10 {
         let now = bench.board.now();
-        let end = bench.board.line().send(now, &adu(&[1, 1, 0, 0x10, 0, 4]));
+        let end = bench.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
         bench.answer_after(end);
 
         let line = bench.board.line();
@@ -70,7 +73,7 @@ impl Settings {
 fn nothing_leaves_the_unit_but_replies() {
     let mut bench = Bench::new(Module::Di4, 1);
     for unit in [1, 2, 1, 0, 1] {
-        bench.exchange(&adu(&[unit, 1, 0, 0x10, 0, 4]));
+        bench.exchange(&adu(&[unit, 1, 0, FIRST, 0, 4]));
     }
     let line = bench.board.line();
     let (from_master, from_unit) = line.frame_counts();
@@ -85,7 +88,7 @@ fn nothing_leaves_the_unit_but_replies() {
 #[ignore = "needs the image: cargo xtask test"]
 fn requests_back_to_back_at_t35_are_all_answered() {
     let mut bench = Bench::new(Module::Di4, 1);
-    let request = adu(&[1, 1, 0, 0x10, 0, 4]);
+    let request = adu(&[1, 1, 0, FIRST, 0, 4]);
     let mut replies = 0;
     for _ in 0..200 {
         let now = bench.board.now();
@@ -103,7 +106,8 @@ fn requests_back_to_back_at_t35_are_all_answered() {
 }
 
 /// The driver is off within a bit up to 460800 bit/s, and within two at 921600 bit/s, where a bit is 1.085 us: what
-/// the interrupt takes counts there.
+/// the interrupt takes counts there. In a few replies of a thousand the beat comes just before: then it is off within
+/// some microseconds, which is within a bit up to 115200 bit/s.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
@@ -127,6 +131,7 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
                 0 => adu(&[1, 3, 1, 0, 0, 9]),
                 _ => ascii(&[3, 1, 0, 0, 9], "\r\n"),
             };
+            let mut least = u64::MAX;
             for _ in 0..2 {
                 bench.exchange(&request);
                 let character = bench.characters(1);
@@ -150,19 +155,23 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
                 // The end is the master's: its clock and the unit's differ by 100 ppm, and the divider by half a
                 // cycle a bit.
                 let clocks = Time::from_ps(character.as_ps() / 10_000) + Time::from_ns(80);
-                let most = OFF.of(corner()) + clocks;
-                assert!(
-                    held.is_some_and(|held| held <= most.as_ps()),
-                    "{baud:?}, format {format}: off {off:?}, end {:?}",
-                    frame.end
-                );
-                let bit_or_less = *baud == Baud::B921600 || held <= Some(bit.as_ps());
-                assert!(bit_or_less, "{baud:?}: {held:?} of {bit:?}");
+                let most = OFF_BEHIND.of(corner()) + clocks;
+                let held = held.filter(|held| *held <= most.as_ps());
+                let held = held.unwrap_or_else(|| {
+                    panic!(
+                        "{baud:?}, format {format}: off {off:?}, end {:?}",
+                        frame.end
+                    )
+                });
+                least = least.min(held.saturating_sub(clocks.as_ps()));
                 // At the highest rates the values are put together while the first bytes leave.
                 let gap = frame.longest_gap;
                 let most = character.max(GAP.of(corner()));
                 assert!(gap <= most, "{baud:?}: gap of {gap:?}");
             }
+            assert!(least <= OFF.of(corner()).as_ps(), "{baud:?}: {least} ps");
+            let bit_or_less = *baud == Baud::B921600 || least <= bit.as_ps();
+            assert!(bit_or_less, "{baud:?}: {least} ps of {bit:?}");
         }
     }
 }

@@ -5,7 +5,7 @@ use register_map::{codes::Baud, configuration, fault};
 use sim::soc::map::Block;
 use sim::{Module, Time};
 
-use crate::bench::{Bench, adu};
+use crate::bench::{Bench, FIRST, adu};
 
 /// Registers that are disturbed: block, offset, bits, and the name for messages. RM0008 27.6 (USART),
 /// 14.4 (TIM1), 15.4 (TIM2).
@@ -104,7 +104,7 @@ fn survives(bench: &mut Bench, after: Time, block: Block, offset: u32, mask: u32
         }
     }
     bench.board.line().take_received();
-    let reply = bench.exchange(&adu(&[1, 2, 0, 0x10, 0, 4]));
+    let reply = bench.exchange(&adu(&[1, 2, 0, FIRST, 0, 4]));
     bench.board.resets() == resets && reply == adu(&[1, 2, 1, 0])
 }
 
@@ -152,7 +152,7 @@ fn a_reply_whose_end_is_never_reported_is_cut_off_by_the_second_clock_too() {
 fn stays_within_the_bound(bench: &mut Bench, more: impl FnOnce(&mut Bench)) {
     bench.tolerant = true;
     let now = bench.board.now();
-    bench.board.line().send(now, &adu(&[1, 2, 0, 0x10, 0, 4]));
+    bench.board.line().send(now, &adu(&[1, 2, 0, FIRST, 0, 4]));
     while !bench.board.driver_enable() {
         bench.board.run_for(Time::from_us(1));
     }

@@ -8,13 +8,13 @@ from simulator import AsciiLine, OnSimulator
 
 FIRST = 0x0010
 KEY, COMM_TIMEOUT, COMMAND, FILTER = 0x0100, 0x0104, 0x0108, 0x0130
-VERSION, STATUS, UNIQUE_ID = 0x0202, 0x020A, 0x0220
+VERSION, STATUS, DESCRIPTION_CRC, UNIQUE_ID = 0x0202, 0x020A, 0x020F, 0x0220
 CLEAR_FLAG = 5
 TRIPPED, UNSAVED, UNLOCKED = 1, 8, 32
 
 
 class Rtu(OnSimulator):
-    """Everything pymodbus has of functions 07, 08, 0B, 0C, 11, 16, 17 and 2B/0E."""
+    """Everything pymodbus has of functions 07, 08, 0B, 0C, 11, 14, 16, 17 and 2B/0E."""
 
     def setUp(self):
         super().setUp()
@@ -107,9 +107,21 @@ class Rtu(OnSimulator):
         self.refused(self.master.diag_read_iop_overrun_count(), 1)
         self.refused(self.master.diag_getclear_modbus_response(), 1)
         self.refused(self.master.read_fifo_queue(address=FIRST), 1)
-        record = FileRecord(file_number=1, record_data=b"\x00\x01")
-        self.refused(self.master.read_file_record([record]), 1)
-        self.refused(self.master.write_file_record([record]), 1)
+        record = FileRecord(file_number=2, record_data=b"\x00\x01")
+        self.refused(self.master.read_file_record([record]), 2)
+        self.refused(self.master.write_file_record([record]), 2)
+
+    def test_14_reads_the_self_description(self):
+        # pymodbus counts the bytes of a group.
+        wanted = [
+            FileRecord(file_number=1, record_number=0, record_length=4),
+            FileRecord(file_number=1, record_number=2, record_length=2),
+        ]
+        head, document = self.good(self.master.read_file_record(wanted)).records
+        crc = self.registers(DESCRIPTION_CRC, 1)[0].to_bytes(2, "big")
+        self.assertEqual(head.record_data[2:], crc)
+        # A CBOR array of three items, the first of which is the format version 1.
+        self.assertEqual(document.record_data, b"\x83\x01")
 
     def test_0b_counts_what_went_well(self):
         before = self.good(self.master.diag_get_comm_event_counter())

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use register_map::Board;
+
 use crate::renode::DIRECTORY;
 use crate::workspace::Workspace;
 
@@ -30,9 +32,23 @@ pub(super) fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The entries of modio-02.repl, by name.
-pub(super) fn entries() -> BTreeMap<String, Entry> {
-    let text = read(&root().join(DIRECTORY).join("modio-02.repl"));
+/// The entries of a board's platform, by name: its own, and those of the file for all boards. Of an entry that is in
+/// both, the lines of both.
+pub(super) fn entries(board: &Board) -> BTreeMap<String, Entry> {
+    let mut entries = of_file("modio.repl");
+    for (name, entry) in of_file(&format!("{board}.repl")) {
+        let of_both = entries.entry(name.clone()).or_default();
+        assert!(of_both.kind.is_none() || entry.kind.is_none(), "{name}");
+        of_both.kind = of_both.kind.take().or(entry.kind);
+        of_both.place += &entry.place;
+        of_both.lines.extend(entry.lines);
+    }
+    entries
+}
+
+/// The entries of a file, by name.
+fn of_file(file: &str) -> BTreeMap<String, Entry> {
+    let text = read(&root().join(DIRECTORY).join(file));
     let mut entries: BTreeMap<String, Entry> = BTreeMap::new();
     let mut current = String::new();
     let mut open = false;

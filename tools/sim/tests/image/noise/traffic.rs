@@ -2,8 +2,7 @@
 
 use fastrand::Rng;
 
-/// The first of the slot's points.
-const FIRST: u8 = 0x10;
+use crate::bench::FIRST;
 
 /// The outputs of unit 1, as they must be.
 #[derive(Clone, Debug, Default)]

@@ -1,0 +1,26 @@
+//! The modio-02: an STM32F103CB, or a C8 on a bare "Blue Pill" with a transceiver. One slot, port 5.
+
+use super::{Descriptor, SlotPins};
+use crate::pin::Pin;
+
+/// The modio-02.
+pub const BOARD: Descriptor = Descriptor {
+    name: "modio-02",
+    slots: &[SlotPins {
+        lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
+        dac_address: 0x60,
+    }],
+    switch: [
+        Pin::a(4),
+        Pin::a(5),
+        Pin::a(6),
+        Pin::a(7),
+        Pin::b(12),
+        Pin::b(13),
+        Pin::b(14),
+        Pin::b(15),
+    ],
+    // The last two pages of the smaller part, the 64 KiB one (DS5319 table 2), so that one image fits both.
+    store: [0x0800_F800, 0x0800_FC00],
+    page_bytes: 1024,
+};

@@ -1,0 +1,40 @@
+//! The modio-08: an STM32F103RC. Four slots, ports 1 to 4.
+
+use super::{Descriptor, SlotPins};
+use crate::pin::Pin;
+
+/// The modio-08.
+pub const BOARD: Descriptor = Descriptor {
+    name: "modio-08",
+    slots: &[
+        SlotPins {
+            lines: [Pin::a(0), Pin::a(1), Pin::a(2), Pin::a(3)],
+            dac_address: 0x60,
+        },
+        SlotPins {
+            lines: [Pin::a(4), Pin::a(5), Pin::a(6), Pin::a(7)],
+            dac_address: 0x61,
+        },
+        SlotPins {
+            lines: [Pin::c(0), Pin::c(1), Pin::c(2), Pin::c(3)],
+            dac_address: 0x62,
+        },
+        SlotPins {
+            lines: [Pin::b(0), Pin::b(1), Pin::c(4), Pin::c(5)],
+            dac_address: 0x63,
+        },
+    ],
+    switch: [
+        Pin::c(6),
+        Pin::c(7),
+        Pin::c(8),
+        Pin::c(9),
+        Pin::b(12),
+        Pin::b(13),
+        Pin::b(14),
+        Pin::b(15),
+    ],
+    // The last two pages of 256 KiB (DS5792 table 2; pages of 2 KiB: PM0075 2.1).
+    store: [0x0803_F000, 0x0803_F800],
+    page_bytes: 2048,
+};

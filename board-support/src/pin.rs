@@ -1,0 +1,184 @@
+//! Pins as data, and what can be done with one through its port's registers.
+//!
+//! The HAL has a type for every pin, so that a board's pins would be spread over the code as types. Here they stand in
+//! the board's [descriptor](crate::boards::Descriptor).
+//!
+//! A configuration register (CRL, CRH) is changed by a read and a write. A change that another context made in between
+//! would be lost, so each register is changed by one context at a time:
+//!
+//! | register | changed by |
+//! |---|---|
+//! | all, for slots, SW01, LEDs and the line | `board::setup`, `Slot` and `LineOff`: in `init`, before the first interrupt |
+//! | port B CRL, for the DACs' bus | `BusPins`: in `init` and later by the background task alone |
+//! | the slots' | `outputs_off`, from fault handlers, after which the interrupted program does not run again |
+//!
+//! Output bits are changed through BSRR, a single store that leaves all other pins alone.
+
+/// A port of pins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Port {
+    /// GPIOA.
+    A = 0,
+    /// GPIOB.
+    B = 1,
+    /// GPIOC.
+    C = 2,
+}
+
+/// A pin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pin {
+    port: Port,
+    /// 0 to 15.
+    number: u8,
+}
+
+impl Pin {
+    /// A pin of port A.
+    #[must_use]
+    pub const fn a(number: u8) -> Self {
+        Self::new(Port::A, number)
+    }
+
+    /// A pin of port B.
+    #[must_use]
+    pub const fn b(number: u8) -> Self {
+        Self::new(Port::B, number)
+    }
+
+    /// A pin of port C.
+    #[must_use]
+    pub const fn c(number: u8) -> Self {
+        Self::new(Port::C, number)
+    }
+
+    const fn new(port: Port, number: u8) -> Self {
+        assert!(number < 16, "a port has pins 0 to 15");
+        Self { port, number }
+    }
+
+    /// The input of ADC1 on this pin, if there is one (DS5319 table 5, DS5792 table 5).
+    #[must_use]
+    pub const fn adc_input(self) -> Option<u8> {
+        match (self.port, self.number) {
+            (Port::A, 0..=7) => Some(self.number),
+            (Port::B, 0..=1) => Some(8 + self.number),
+            (Port::C, 0..=5) => Some(10 + self.number),
+            _ => None,
+        }
+    }
+
+    /// Whether it is high, given the input registers (IDR) of ports A, B and C.
+    #[cfg(any(target_os = "none", test))]
+    #[must_use]
+    pub(crate) const fn is_high_in(self, levels: [u32; 3]) -> bool {
+        let [a, b, c] = levels;
+        let level = match self.port {
+            Port::A => a,
+            Port::B => b,
+            Port::C => c,
+        };
+        level >> self.number & 1 != 0
+    }
+}
+
+/// What a pin is: its four bits in a configuration register (RM0008 9.2.1 and 9.2.2).
+#[cfg(target_os = "none")]
+#[derive(Clone, Copy)]
+#[repr(u32)]
+pub(crate) enum Mode {
+    /// A floating input, as after a reset.
+    Floating = 0b0100,
+    /// An input pulled up or down, as its output bit says.
+    Pulled = 0b1000,
+    /// An analog input.
+    Analog = 0b0000,
+    /// A push-pull output with the slowest edges, 2 MHz.
+    Output = 0b0010,
+}
+
+#[cfg(target_os = "none")]
+mod registers {
+    use stm32f1xx_hal::pac::{GPIOA, GPIOB, GPIOC, gpioa::RegisterBlock};
+
+    use super::{Mode, Pin, Port};
+
+    impl Port {
+        /// The port's registers. The caller must own the pins that it changes.
+        pub(crate) fn registers(self) -> &'static RegisterBlock {
+            // All three blocks have the same layout; the crate makes them one type.
+            let block = match self {
+                Self::A => GPIOA::ptr(),
+                Self::B => GPIOB::ptr(),
+                Self::C => GPIOC::ptr(),
+            };
+            // SAFETY: the registers are there for ever, and no access to them can break memory.
+            unsafe { &*block }
+        }
+
+        /// The input registers of ports A, B and C.
+        pub(crate) fn levels() -> [u32; 3] {
+            [Self::A, Self::B, Self::C].map(|port| port.registers().idr().read().bits())
+        }
+    }
+
+    impl Pin {
+        /// Makes it an input, or an output that is low.
+        pub(crate) fn configure(self, mode: Mode) {
+            if matches!(mode, Mode::Output) {
+                self.set(false);
+            }
+            let registers = self.port.registers();
+            let shift = u32::from(self.number % 8) * 4;
+            let with = |bits: u32| bits & !(0b1111 << shift) | (mode as u32) << shift;
+            if self.number < 8 {
+                let bits = with(registers.crl().read().bits());
+                // SAFETY: the pin's own four bits, which are one of the modes; the others stay.
+                registers.crl().write(|w| unsafe { w.bits(bits) });
+            } else {
+                let bits = with(registers.crh().read().bits());
+                // SAFETY: as above.
+                registers.crh().write(|w| unsafe { w.bits(bits) });
+            }
+        }
+
+        /// Makes it an input with its pull-up.
+        pub(crate) fn pull_up(self) {
+            self.set(true);
+            self.configure(Mode::Pulled);
+        }
+
+        /// Sets its output bit.
+        #[inline]
+        pub(crate) fn set(self, high: bool) {
+            let bit = 1 << self.number;
+            let bits = if high { bit } else { bit << 16 };
+            // SAFETY: changes this pin alone, in one store (RM0008 9.2.5).
+            self.port
+                .registers()
+                .bsrr()
+                .write(|w| unsafe { w.bits(bits) });
+        }
+
+        /// Whether it is high.
+        #[inline]
+        pub(crate) fn is_high(self) -> bool {
+            self.port.registers().idr().read().bits() >> self.number & 1 != 0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adc_inputs_are_where_the_data_sheet_has_them() {
+        let inputs = (0..16).filter_map(|n| Pin::a(n).adc_input());
+        let inputs = inputs.chain((0..16).filter_map(|n| Pin::b(n).adc_input()));
+        let inputs = inputs.chain((0..16).filter_map(|n| Pin::c(n).adc_input()));
+        assert!(inputs.eq(0..16));
+        assert_eq!(Pin::c(4).adc_input(), Some(14));
+    }
+}

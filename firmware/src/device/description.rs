@@ -1,0 +1,134 @@
+//! The self-description, file 1: what the registers of this unit mean, as CBOR.
+//!
+//! ```text
+//!  record    0         1      2 ...
+//!         +--------+-------+----------------------+---------------+
+//!         | length | CRC   | fixed part, in flash | ports, made   |
+//!         |        |       | by the build script  | when read     |
+//!         +--------+-------+----------------------+---------------+
+//! ```
+//!
+//! Only the modules in force differ from unit to unit, and the document has them at its end. So the document is never
+//! in RAM, and its CRC goes on from that of the fixed part. docs/self-description.md has the format.
+
+use core::array;
+
+use modbus_server::{Exception, Span, WordsOut, crc};
+use register_map::Board;
+
+use crate::config::Config;
+
+include!(concat!(env!("OUT_DIR"), "/self_description.rs"));
+
+/// The part of a document that is the same for all units with this firmware.
+#[derive(Clone, Copy, Debug)]
+pub struct Fixed {
+    /// The code of the board.
+    board: u16,
+    /// The document up to its ports.
+    bytes: &'static [u8],
+    /// The CRC of these bytes.
+    crc: u16,
+}
+
+impl Fixed {
+    /// Returns the one for this board.
+    ///
+    /// # Panics
+    ///
+    /// When the register map does not have the board. Call this function in a constant.
+    #[must_use]
+    pub const fn of(board: &Board) -> Self {
+        let mut rest: &[Self] = &BOARDS;
+        while let [first, others @ ..] = rest {
+            if first.board == board.code {
+                return *first;
+            }
+            rest = others;
+        }
+        panic!("the build script describes every board of the register map")
+    }
+}
+
+/// The document of a unit.
+#[derive(Debug)]
+pub(super) struct Description {
+    fixed: &'static Fixed,
+    crc: u16,
+}
+
+impl Description {
+    pub(super) fn new<const SLOTS: usize>(fixed: &'static Fixed, config: &Config<SLOTS>) -> Self {
+        let ports = ports(config);
+        let crc = ports.as_flattened().iter();
+        let crc = crc.fold(fixed.crc, |crc, byte| crc::step(crc, *byte));
+        Self { fixed, crc }
+    }
+
+    /// The CRC of the whole document: register 0x020F.
+    pub(super) const fn crc(&self) -> u16 {
+        self.crc
+    }
+
+    /// Checks whether these records of a file can be read.
+    ///
+    /// # Errors
+    ///
+    /// 02 for another file and for records beyond the end.
+    pub(super) fn check_read<const SLOTS: usize>(
+        &self,
+        file: u16,
+        records: Span,
+    ) -> Result<(), Exception> {
+        let end = usize::from(HEAD) + self.length::<SLOTS>().div_ceil(2);
+        if file == FILE && records.end() as usize <= end {
+            Ok(())
+        } else {
+            Err(Exception::IllegalDataAddress)
+        }
+    }
+
+    /// Pushes records that [`Self::check_read`] allows.
+    pub(super) fn read<const SLOTS: usize>(
+        &self,
+        config: &Config<SLOTS>,
+        records: Span,
+        out: &mut WordsOut<'_>,
+    ) {
+        let head = [self.length::<SLOTS>() as u16, self.crc].map(u16::to_be_bytes);
+        let ports = ports(config);
+        let parts = [head.as_flattened(), self.fixed.bytes, ports.as_flattened()];
+        for record in records.addresses() {
+            let at = usize::from(record) * 2;
+            out.push(u16::from_be_bytes([byte(&parts, at), byte(&parts, at + 1)]));
+        }
+    }
+
+    /// Bytes of the document.
+    const fn length<const SLOTS: usize>(&self) -> usize {
+        self.fixed.bytes.len() + PORT_BYTES * SLOTS
+    }
+}
+
+/// Returns a byte of the file, whose parts these are; 0 after the end. Not inlined: a word has two bytes.
+#[inline(never)]
+fn byte(parts: &[&[u8]; 3], mut at: usize) -> u8 {
+    for part in parts {
+        if let Some(byte) = part.get(at) {
+            return *byte;
+        }
+        at = at.wrapping_sub(part.len());
+    }
+    0
+}
+
+/// The end of the document: number and module of each port with a slot.
+#[inline(never)]
+fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS] {
+    let (first, ports) = (config.board().first_port, config.ports());
+    array::from_fn(|index| {
+        let module = ports.get(index).map_or(0, |port| port.module.code());
+        let [high, low] = module.to_be_bytes();
+        [first.wrapping_add(index as u16) as u8, high, low]
+    })
+}

@@ -1,0 +1,168 @@
+//! The points of one port: what its module's channels are, and the pulse counters of its digital inputs.
+
+use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, scale};
+use register_map::codes::ModuleState;
+
+/// The points of one port.
+#[derive(Debug)]
+pub struct IoPort {
+    kinds: [Kind; CHANNELS],
+    settings: [ChannelSettings; CHANNELS],
+    /// Inputs as last scanned, outputs as commanded, words as their SCALE says.
+    pub(super) channels: Channels,
+    /// SAFE in force, by channel; `None`: hold.
+    safe: [Option<u16>; CHANNELS],
+    pulses: [u32; CHANNELS],
+    /// Inputs have been scanned once: from then on a rising edge counts.
+    scanned: bool,
+    /// Channels that cannot be read or driven, channel 1 in bit 0.
+    failing: u8,
+}
+
+impl IoPort {
+    /// The points of a port whose channels are of these kinds, everything off.
+    #[must_use]
+    pub fn new(kinds: [Kind; CHANNELS]) -> Self {
+        Self {
+            kinds,
+            settings: kinds.map(ChannelSettings::default_for),
+            channels: Channels::new(),
+            safe: [None; CHANNELS],
+            pulses: [0; CHANNELS],
+            scanned: false,
+            failing: 0,
+        }
+    }
+
+    /// Takes new settings and values of SAFE. Outputs stay where they are: a commanded word is brought to the new scale.
+    pub fn configure(
+        &mut self,
+        settings: [ChannelSettings; CHANNELS],
+        safe: [Option<u16>; CHANNELS],
+    ) {
+        for (channel, (from, to)) in self.settings.iter().zip(&settings).enumerate() {
+            if self.kinds.get(channel) == Some(&Kind::WordOutput) {
+                let word = scale::output_rescaled(self.channels.word(channel), from, to);
+                self.channels.set_word(channel, word);
+            }
+        }
+        self.settings = settings;
+        self.safe = safe;
+    }
+
+    /// The settings last taken.
+    #[must_use]
+    pub const fn settings(&self) -> &[ChannelSettings; CHANNELS] {
+        &self.settings
+    }
+
+    /// What stands in the port's channels, for the scan to take its outputs from.
+    #[must_use]
+    pub const fn channels(&self) -> &Channels {
+        &self.channels
+    }
+
+    /// Takes the inputs a scan has brought. Outputs stay as commanded, which may have happened during the scan. So may
+    /// a change of settings: then words, which were made under the settings before, are not taken (`words` is false).
+    pub fn scanned(&mut self, scanned: &Channels, words: bool) {
+        for (channel, (kind, pulses)) in self.kinds.iter().zip(&mut self.pulses).enumerate() {
+            match kind {
+                Kind::BitInput => {
+                    let now = scanned.bit(channel);
+                    if self.scanned && now && !self.channels.bit(channel) {
+                        *pulses = pulses.wrapping_add(1);
+                    }
+                    self.channels.set_bit(channel, now);
+                }
+                Kind::WordInput if words => {
+                    self.channels.set_word(channel, scanned.word(channel));
+                    self.channels.set_status(channel, scanned.status(channel));
+                }
+                Kind::WordInput | Kind::None | Kind::BitOutput | Kind::WordOutput => {}
+            }
+        }
+        self.scanned = true;
+    }
+
+    /// Takes note of the channels that cannot be read or driven, channel 1 in bit 0.
+    pub const fn set_failing(&mut self, channels: u8) {
+        self.failing = channels;
+    }
+
+    /// The channels that cannot be read or driven, channel 1 in bit 0.
+    #[must_use]
+    pub const fn failing(&self) -> u8 {
+        self.failing
+    }
+
+    /// Commands outputs by raw values, as SAFE and START have them: 0 or 1 for a bit, 0 to 4095 for a
+    /// word, none to leave it as it is.
+    pub fn command_raw(&mut self, values: [Option<u16>; CHANNELS]) {
+        let settings = self.settings.iter().zip(&self.kinds);
+        for (channel, (value, (settings, kind))) in values.into_iter().zip(settings).enumerate() {
+            match (kind, value) {
+                (Kind::BitOutput, Some(value)) => self.channels.set_bit(channel, value != 0),
+                (Kind::WordOutput, Some(value)) => self.channels.set_word(
+                    channel,
+                    scale::output_from_raw(Code::new(value), settings.signal, settings.scale),
+                ),
+                _ => {}
+            }
+        }
+    }
+
+    /// Commands the outputs to SAFE.
+    pub fn go_safe(&mut self) {
+        self.command_raw(self.safe);
+    }
+
+    /// How the module fares.
+    #[must_use]
+    pub fn module_state(&self) -> ModuleState {
+        if self.kinds == [Kind::None; CHANNELS] {
+            ModuleState::None
+        } else if self.failing != 0 {
+            ModuleState::NotAnswering
+        } else if (0..CHANNELS).any(|c| self.channels.status(c) != ChannelStatus::Good) {
+            ModuleState::OutOfRange
+        } else {
+            ModuleState::Good
+        }
+    }
+
+    /// Whether the module has a fault: it does not answer, or a channel is out of range.
+    #[must_use]
+    pub fn has_fault(&self) -> bool {
+        match self.module_state() {
+            ModuleState::NotAnswering | ModuleState::OutOfRange => true,
+            ModuleState::Good | ModuleState::None => false,
+        }
+    }
+
+    /// What a channel is.
+    pub(super) fn kind(&self, channel: usize) -> Kind {
+        self.kinds.get(channel).copied().unwrap_or(Kind::None)
+    }
+
+    /// How a channel is read or driven.
+    pub(super) fn setting(&self, channel: usize) -> Option<&ChannelSettings> {
+        self.settings.get(channel)
+    }
+
+    /// Whether a channel, 0 to 3, cannot be read or driven.
+    pub(super) const fn fails(&self, channel: usize) -> bool {
+        self.failing >> (channel & 3) & 1 != 0
+    }
+
+    /// A channel's pulse counter.
+    pub(super) fn pulses(&self, channel: usize) -> u32 {
+        self.pulses.get(channel).copied().unwrap_or_default()
+    }
+
+    /// Sets a channel's pulse counter to 0.
+    pub(super) fn clear_pulses(&mut self, channel: usize) {
+        if let Some(pulses) = self.pulses.get_mut(channel) {
+            *pulses = 0;
+        }
+    }
+}

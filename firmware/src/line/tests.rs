@@ -1,0 +1,301 @@
+//! A line over a UART and a timer that are data.
+
+extern crate std;
+use std::boxed::Box;
+use std::vec::Vec;
+
+use modbus_server::line::{Framing, Receiver};
+use modbus_server::{Adu, Tables};
+
+use super::*;
+
+/// The UART: what waits in it, and what it was told.
+#[derive(Default)]
+struct FakeUart {
+    waiting: Option<u8>,
+    /// A byte is wanted, or the last one has left: each when that was asked for.
+    wants: bool,
+    finishing: bool,
+    driver: bool,
+    sent: Vec<u8>,
+    upset: bool,
+    set_up: u32,
+}
+
+#[derive(Clone, Copy)]
+struct Wants {
+    received: bool,
+    byte: bool,
+    sent: bool,
+}
+
+impl Uart for FakeUart {
+    type Status = Wants;
+
+    fn status(&self) -> Wants {
+        Wants {
+            received: self.waiting.is_some(),
+            byte: self.wants,
+            sent: self.finishing,
+        }
+    }
+
+    fn received(status: Wants) -> bool {
+        status.received
+    }
+
+    fn wants_byte(status: Wants) -> bool {
+        status.byte
+    }
+
+    fn sent(status: Wants) -> bool {
+        status.sent
+    }
+
+    fn read(&mut self, _: Wants) -> (u8, Faults) {
+        (self.waiting.take().unwrap(), Faults::NONE)
+    }
+
+    fn start_sending(&mut self, first: u8) {
+        self.driver = true;
+        self.sent.push(first);
+        self.wants = true;
+    }
+
+    fn send(&mut self, byte: u8) {
+        assert!(self.driver, "a byte without the driver");
+        self.sent.push(byte);
+    }
+
+    fn pause_sending(&mut self) {
+        self.wants = false;
+    }
+
+    fn resume_sending(&mut self) {
+        self.wants = true;
+    }
+
+    fn finish_sending(&mut self) {
+        (self.wants, self.finishing) = (false, true);
+    }
+
+    fn stop_sending(&mut self) {
+        (self.driver, self.finishing) = (false, false);
+    }
+
+    fn set_up(&mut self) {
+        *self = Self {
+            sent: self.sent.clone(),
+            set_up: self.set_up + 1,
+            ..Self::default()
+        };
+    }
+
+    fn is_sound(&self) -> bool {
+        !self.upset
+    }
+}
+
+/// The timer, whose silences the test lets pass.
+#[derive(Default)]
+struct FakeGap {
+    running: bool,
+    passed: Option<Silence>,
+    limited: bool,
+    limit_passed: bool,
+    upset: Option<u8>,
+}
+
+impl GapTimer for FakeGap {
+    const PARTS: u8 = 2;
+
+    fn restart(&mut self) {
+        self.running = true;
+    }
+
+    fn stop(&mut self) {
+        self.running = false;
+    }
+
+    fn is_running(&self) -> bool {
+        self.running
+    }
+
+    fn take_event(&mut self) -> Silence {
+        let event = self.passed.take().unwrap_or(Silence::None);
+        self.running &= event != Silence::T35;
+        event
+    }
+
+    fn limit_sending(&mut self) {
+        self.limited = true;
+    }
+
+    fn take_limit(&mut self) -> bool {
+        core::mem::take(&mut self.limit_passed)
+    }
+
+    fn set_up(&mut self) {
+        *self = Self::default();
+    }
+
+    fn is_sound(&self, part: u8) -> bool {
+        self.upset != Some(part)
+    }
+}
+
+/// Unit 17 with ten registers of 0x1111.
+struct Bench {
+    line: Line<FakeUart, FakeGap>,
+    server: Server,
+    registers: [u16; 10],
+}
+
+const REQUEST: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
+const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
+const LONGEST_MS: u16 = 20;
+
+impl Bench {
+    fn new() -> Self {
+        let adus = Box::leak(Box::new([Adu::new(), Adu::new()]));
+        let port = Port::new(Receiver::rtu(17, false), adus);
+        let (uart, gap) = (FakeUart::default(), FakeGap::default());
+        let mut bench = Self {
+            line: Line::new(uart, gap, port, LONGEST_MS),
+            server: Server::new(Framing::Rtu),
+            registers: [0x1111; 10],
+        };
+        assert!(
+            !bench.silence(Silence::T35),
+            "the port listens from here on"
+        );
+        bench
+    }
+
+    fn silence(&mut self, silence: Silence) -> bool {
+        self.line.gap.passed = Some(silence);
+        self.line.on_gap(0)
+    }
+
+    fn hear(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.line.uart.waiting = Some(*byte);
+            assert!(!self.line.on_uart());
+        }
+    }
+
+    /// Takes the waiting request; its reply begins.
+    fn take(&mut self) -> Request<'static> {
+        self.line.take(&self.server, 0).unwrap()
+    }
+
+    fn serve(&mut self, request: Request<'static>) {
+        let mut tables = Tables {
+            holding_registers: &mut self.registers,
+            ..Tables::default()
+        };
+        let decided = request.decide(&self.server, &tables);
+        let committed = self.line.answer(decided).commit(&mut self.server);
+        let served = committed.carry_out(&mut self.server, &mut tables);
+        self.line.finish(served);
+    }
+
+    /// The UART's interrupts up to the end of the reply.
+    fn send(&mut self) {
+        for _ in 0..600 {
+            if self.line.on_uart() {
+                return;
+            }
+        }
+        panic!("the reply does not end");
+    }
+
+    fn pass(&mut self, ms: u16) {
+        (0..ms).for_each(|_| self.line.on_millisecond());
+    }
+}
+
+#[test]
+fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
+    let mut bench = Bench::new();
+    bench.hear(&REQUEST);
+    assert!(!bench.line.uart.driver);
+    assert!(!bench.silence(Silence::T15));
+    assert!(bench.silence(Silence::T35), "a request waits");
+    let request = bench.take();
+    assert!(bench.line.uart.driver && bench.line.gap.limited);
+    assert!(!bench.line.gap.running, "no silence of its own reply");
+    assert!(!bench.line.on_uart());
+    assert!(
+        !bench.line.uart.wants,
+        "nothing is decided yet: it asks no more"
+    );
+    bench.serve(request);
+    bench.send();
+    assert_eq!(bench.line.uart.sent, REPLY);
+    assert!(!bench.line.uart.driver && !bench.line.is_replying());
+    assert!(!bench.line.take_repaired());
+}
+
+#[test]
+fn disturbed_registers_are_set_up_again_within_as_many_milliseconds_as_there_are_parts() {
+    for part in [None, Some(0), Some(1)] {
+        let mut bench = Bench::new();
+        bench.pass(100);
+        assert!(!bench.line.take_repaired());
+        match part {
+            None => bench.line.uart.upset = true,
+            Some(part) => bench.line.gap.upset = Some(part),
+        }
+        bench.pass(3);
+        assert!(bench.line.take_repaired(), "{part:?}");
+        assert!(!bench.line.take_repaired(), "it is told once");
+        assert_eq!(bench.line.uart.set_up, 1);
+        bench.silence(Silence::T35);
+        bench.hear(&REQUEST);
+        assert!(bench.silence(Silence::T35), "{part:?}");
+    }
+}
+
+#[test]
+fn timer_that_stopped_in_a_frame_is_started_again() {
+    let mut bench = Bench::new();
+    bench.hear(&REQUEST[..3]);
+    bench.line.gap.running = false;
+    bench.pass(3);
+    assert!(bench.line.take_repaired() && bench.line.gap.running);
+}
+
+#[test]
+fn reply_that_does_not_end_is_cut_off() {
+    let mut bench = Bench::new();
+    bench.hear(&REQUEST);
+    assert!(bench.silence(Silence::T35));
+    let _request = bench.take();
+    bench.pass(LONGEST_MS - 1);
+    assert!(bench.line.uart.driver && !bench.line.take_repaired());
+    bench.pass(1);
+    assert!(!bench.line.uart.driver && bench.line.take_repaired());
+
+    let mut bench = Bench::new();
+    bench.hear(&REQUEST);
+    assert!(bench.silence(Silence::T35));
+    let _request = bench.take();
+    bench.line.on_limit();
+    assert!(bench.line.uart.driver, "the limit has not passed");
+    bench.line.gap.limit_passed = true;
+    bench.line.on_limit();
+    assert!(!bench.line.uart.driver && bench.line.take_repaired());
+}
+
+#[test]
+fn interrupts_without_a_cause_have_the_uart_checked_in_the_same_millisecond() {
+    let mut bench = Bench::new();
+    bench.line.uart.upset = true;
+    for _ in 1..CAUSELESS {
+        bench.line.on_uart();
+        assert_eq!(bench.line.uart.set_up, 0);
+    }
+    bench.line.on_uart();
+    assert_eq!(bench.line.uart.set_up, 1);
+}

@@ -1,0 +1,201 @@
+//! The boards, as far as a master or a tool can tell them apart. The pins are elsewhere: a master does not see them.
+
+use core::fmt;
+use core::ops::Range;
+use core::str::FromStr;
+
+use crate::points;
+
+/// A board that the firmware is built for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Board {
+    /// Its name, on command lines and in the device identification: `modio-02`.
+    pub name: &'static str,
+    /// The value of register BOARD (0x0205).
+    pub code: u16,
+    /// The model name in the device identification: the product whose place the board takes, if there is one.
+    pub model: &'static str,
+    /// The first port with a slot, 1 to 8.
+    pub first_port: u16,
+    /// How many ports from there on have a slot, 1 to 8. All other ports have none.
+    pub slots: u16,
+    /// Where the configuration is stored.
+    pub store: StorePages,
+}
+
+/// The two pages of flash that hold the configuration. Each can be erased without the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StorePages {
+    /// The address of the first page. The second one follows.
+    pub first: u32,
+    /// Bytes of a page: what one erase clears (PM0075 2.1).
+    pub bytes: u32,
+}
+
+impl StorePages {
+    /// The addresses of both pages.
+    #[must_use]
+    pub const fn addresses(self) -> [u32; 2] {
+        [self.first, self.first + self.bytes]
+    }
+}
+
+/// The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
+pub const MODIO_02: Board = Board {
+    name: "modio-02",
+    code: 1,
+    model: "LLD-ModbusIO-02",
+    first_port: 5,
+    slots: 1,
+    // The last 2 KiB of the 64 KiB part, so that one image fits both parts.
+    store: StorePages {
+        first: 0x0800_F800,
+        bytes: 1024,
+    },
+};
+
+/// The larger board with an STM32F103RC: four slots, ports 1 to 4.
+pub const MODIO_08: Board = Board {
+    name: "modio-08",
+    code: 2,
+    model: "modio-08",
+    first_port: 1,
+    slots: 4,
+    // The last 4 KiB of 256. This part's pages have 2 KiB.
+    store: StorePages {
+        first: 0x0803_F000,
+        bytes: 2048,
+    },
+};
+
+impl Board {
+    /// All boards, in the order of their codes.
+    pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
+
+    /// Every code of register BOARD with the board's name.
+    pub const NAMES: [(u16, &'static str); Self::ALL.len()] = {
+        let mut names = [(0, ""); Self::ALL.len()];
+        let mut i = 0;
+        while i < names.len() {
+            names[i] = (Self::ALL[i].code, Self::ALL[i].name);
+            i += 1;
+        }
+        names
+    };
+
+    /// The board with this code in register BOARD.
+    #[must_use]
+    pub fn from_code(code: u16) -> Option<&'static Self> {
+        Self::ALL.into_iter().find(|board| board.code == code)
+    }
+
+    /// The board with this name.
+    #[must_use]
+    pub const fn named(name: &str) -> Option<&'static Self> {
+        let mut i = 0;
+        while i < Self::ALL.len() {
+            if same(Self::ALL[i].name.as_bytes(), name.as_bytes()) {
+                return Some(Self::ALL[i]);
+            }
+            i += 1;
+        }
+        None
+    }
+
+    /// The ports that have a slot, in ascending order.
+    #[must_use]
+    pub const fn ports(&self) -> Range<u16> {
+        self.first_port..self.first_port + self.slots
+    }
+
+    /// Whether a port has a slot.
+    #[inline]
+    #[must_use]
+    pub const fn has_slot(&self, port: u16) -> bool {
+        port.wrapping_sub(self.first_port) < self.slots
+    }
+
+    /// The addresses of the points of all ports that have a slot.
+    #[must_use]
+    pub const fn points(&self) -> Range<u16> {
+        let first = points::of_port(self.first_port);
+        first..first + self.slots * points::CHANNELS
+    }
+}
+
+/// Whether two names are the same, at compile time too.
+const fn same(one: &[u8], other: &[u8]) -> bool {
+    match (one.split_first(), other.split_first()) {
+        (Some((a, one)), Some((b, other))) => *a == *b && same(one, other),
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+impl fmt::Display for Board {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name)
+    }
+}
+
+/// A name that is no board's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnknownBoard;
+
+impl fmt::Display for UnknownBoard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("not a board; one of")?;
+        for (i, board) in Board::ALL.iter().enumerate() {
+            write!(f, "{} {board}", if i == 0 { "" } else { "," })?;
+        }
+        Ok(())
+    }
+}
+
+impl core::error::Error for UnknownBoard {}
+
+impl FromStr for &'static Board {
+    type Err = UnknownBoard;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Board::named(name).ok_or(UnknownBoard)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::string::ToString;
+
+    use super::*;
+
+    #[test]
+    fn codes_and_names_lead_back_to_the_board() {
+        for board in Board::ALL {
+            assert_eq!(Board::from_code(board.code), Some(board));
+            assert_eq!(board.to_string().parse(), Ok(board));
+        }
+        assert_eq!(Board::from_code(0), None);
+        let error = "nucleo".parse::<&Board>().unwrap_err();
+        assert_eq!(error.to_string(), "not a board; one of modio-02, modio-08");
+    }
+
+    #[test]
+    fn slots_are_where_the_hardware_has_them() {
+        assert_eq!(MODIO_02.points(), 0x10..0x14);
+        assert_eq!(MODIO_08.points(), 0x00..0x10);
+        let slots = |board: &Board| (0..10).filter(|port| board.has_slot(*port)).count();
+        assert_eq!((slots(&MODIO_02), slots(&MODIO_08)), (1, 4));
+        assert!(MODIO_02.ports().eq([5]) && MODIO_08.ports().eq(1..=4));
+    }
+
+    #[test]
+    fn both_pages_of_a_store_are_whole_pages_of_the_flash() {
+        for board in Board::ALL {
+            let [first, second] = board.store.addresses();
+            assert!(first.is_multiple_of(board.store.bytes), "{board}");
+            assert_eq!(second - first, board.store.bytes, "{board}");
+        }
+        assert_eq!(MODIO_08.store.addresses(), [0x0803_F000, 0x0803_F800]);
+    }
+}

@@ -1,0 +1,266 @@
+//! File records, functions 14 and 15; and the file that describes a modio.
+
+use modio_description::{Description, FILE, records};
+use register_map::{points, state};
+
+use crate::bench::Bench;
+use crate::case::{Case, Check, Need, case};
+use crate::target::Span;
+
+const N: &[Need] = &[Need::Function(0x14)];
+const M: &[Need] = &[Need::Function(0x14), Need::Modio];
+const S: &str = "V1.1b3 6.14";
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "fc14/byte-count",
+        S,
+        "a byte count below 07 or above F5 is exception 03",
+        N,
+        byte_count,
+    ),
+    case(
+        "fc14/length",
+        S,
+        "a request cut short or too long is 03 or silence",
+        N,
+        length,
+    )
+    .interpretation(),
+    case(
+        "fc14/reference-type",
+        S,
+        "a reference type other than 06 is exception 02",
+        N,
+        reference_type,
+    ),
+    case(
+        "fc14/file-0",
+        S,
+        "file number 0 is exception 02",
+        N,
+        file_0,
+    ),
+    case(
+        "fc14/record-above-9999",
+        S,
+        "a record number above 9999 is exception 02",
+        N,
+        record_above_9999,
+    ),
+    case(
+        "fc14/longest-reply",
+        S,
+        "groups that do not fit a reply of 253 bytes are exception 03, or 02 where the file has not so many records",
+        N,
+        longest_reply,
+    )
+    .interpretation(),
+    case(
+        "files/self-description",
+        "map",
+        "file 1 is the self-description, with its length, its CRC, which is register 0x020F, and the modules in force",
+        M,
+        self_description,
+    ),
+    case(
+        "files/groups",
+        S,
+        "several groups in one request are read in their order",
+        M,
+        groups,
+    ),
+    case(
+        "files/longest-reply",
+        S,
+        "a group of 124 records is read and one of 125 is exception 03",
+        M,
+        longest_of_modio,
+    ),
+    case(
+        "files/beyond-the-end",
+        "map",
+        "records beyond the end of file 1, and every other file, are exception 02",
+        M,
+        beyond_the_end,
+    ),
+    case(
+        "files/read-only",
+        "map",
+        "a write to a file is exception 02 and writes nothing",
+        &[Need::Function(0x14), Need::Function(0x15), Need::Modio],
+        read_only,
+    ),
+];
+
+/// A group of records: file, first record and how many.
+type Group = (u16, u16, u16);
+
+/// A group of a request, with this reference type.
+fn group(reference: u8, (file, record, count): Group) -> Vec<u8> {
+    let fields = [file, record, count].map(u16::to_be_bytes);
+    [&[reference], fields.as_flattened()].concat()
+}
+
+/// The PDU of a request whose groups have reference type 6.
+fn request(groups: &[Group]) -> Vec<u8> {
+    let groups: Vec<u8> = groups.iter().flat_map(|of| group(6, *of)).collect();
+    [&[0x14, groups.len() as u8], &groups[..]].concat()
+}
+
+/// Reads groups; the bytes of each.
+fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
+    let reply = bench.reply(&request(groups))?;
+    let [0x14, count, ref rest @ ..] = reply[..] else {
+        return bench.fail("14, a byte count and groups");
+    };
+    bench.ensure(
+        rest.len() == usize::from(count),
+        "a byte count that is true",
+    )?;
+    let (mut rest, mut read) = (rest, Vec::new());
+    for (_, _, records) in groups {
+        let bytes = usize::from(*records) * 2;
+        let head = [(bytes + 1) as u8, 6];
+        match rest.split_at_checked(2 + bytes) {
+            Some((group, others)) if group[..2] == head => {
+                read.push(group[2..].to_vec());
+                rest = others;
+            }
+            _ => return bench.fail(format!("a group of {bytes} bytes with its length and 06")),
+        }
+    }
+    bench.ensure(rest.is_empty(), "nothing after the groups")?;
+    Ok(read)
+}
+
+fn byte_count(bench: &mut Bench<'_>) -> Check {
+    bench.exception(&[0x14, 0], 3)?;
+    bench.exception(&[0x14, 6, 6, 0, 1, 0, 0, 0], 3)?;
+    // 35 groups are the most; this is one byte more.
+    let most = group(6, (1, 0, 1)).repeat(35);
+    let pdu = [&[0x14, 0xF6], &most[..], &[6]].concat();
+    bench.exception(&pdu, 3)
+}
+
+fn length(bench: &mut Bench<'_>) -> Check {
+    let whole = request(&[(1, 0, 1)]);
+    for length in [1, 2, 5, whole.len() - 1] {
+        bench.exception_03_or_silence(&whole[..length])?;
+    }
+    bench.exception_03_or_silence(&[&whole[..], &[0]].concat())?;
+    // A second group that is cut short.
+    let cut = [&[0x14, 10], &group(6, (1, 0, 1))[..], &[6, 0, 1]].concat();
+    bench.exception_03_or_silence(&cut)
+}
+
+fn reference_type(bench: &mut Bench<'_>) -> Check {
+    for reference in [0, 5, 7, 0xFF] {
+        let pdu = [&[0x14, 7], &group(reference, (1, 0, 1))[..]].concat();
+        bench.exception(&pdu, 2)?;
+    }
+    Ok(())
+}
+
+fn file_0(bench: &mut Bench<'_>) -> Check {
+    bench.exception(&request(&[(0, 0, 1)]), 2)
+}
+
+fn record_above_9999(bench: &mut Bench<'_>) -> Check {
+    for record in [10_000, 0x8000, 0xFFFF] {
+        bench.exception(&request(&[(1, record, 1)]), 2)?;
+    }
+    Ok(())
+}
+
+fn longest_reply(bench: &mut Bench<'_>) -> Check {
+    for groups in [
+        &[(1, 0, 125)][..],
+        &[(1, 0, 0x8000)],
+        &[(1, 0, 62), (1, 0, 62)],
+    ] {
+        let reply = bench.ask_due(&request(groups))?;
+        bench.ensure(
+            matches!(reply.exception(0x14), Some(2 | 3)),
+            "exception 03 or 02",
+        )?;
+    }
+    Ok(())
+}
+
+/// The head of file 1, and how many records the file has.
+fn head(bench: &mut Bench<'_>) -> Check<(Vec<u8>, u16)> {
+    let head = read(bench, &[(FILE, 0, 2)])?.concat();
+    let records = records(u16::from_be_bytes([head[0], head[1]]));
+    bench.ensure(records <= 10_000, "a length that a file can have")?;
+    Ok((head, records))
+}
+
+fn self_description(bench: &mut Bench<'_>) -> Check {
+    let (head, records) = head(bench)?;
+    let mut file = Vec::new();
+    for record in (0..records).step_by(124) {
+        let count = (records - record).min(124);
+        file.extend(read(bench, &[(FILE, record, count)])?.concat());
+    }
+    let unit = match Description::open(&file) {
+        Ok(unit) => unit,
+        Err(error) => return bench.fail(error),
+    };
+    let crc = bench.read_word(state::DESCRIPTION_CRC)?;
+    bench.ensure(
+        crc.to_be_bytes() == head[2..],
+        "the CRC of the second record",
+    )?;
+    let in_force = bench.read_words(Span {
+        first: state::MODULE_IN_FORCE,
+        last: state::MODULE_IN_FORCE + points::PORTS - 1,
+    })?;
+    let described = (1..).zip(in_force).all(|(number, code)| {
+        let port = unit.ports.iter().find(|port| port.number == number);
+        port.map_or(0, |port| port.module) == code
+    });
+    bench.ensure(described, format!("the modules of {:?}", unit.ports))
+}
+
+fn groups(bench: &mut Bench<'_>) -> Check {
+    let wanted = [(FILE, 7, 3), (FILE, 0, 2), (FILE, 7, 3), (FILE, 20, 40)];
+    let together = read(bench, &wanted)?;
+    for (group, bytes) in wanted.iter().zip(&together) {
+        let alone = read(bench, &[*group])?.concat();
+        bench.ensure(
+            alone == *bytes,
+            format!("the same as with other groups: {bytes:02X?}"),
+        )?;
+    }
+    Ok(())
+}
+
+fn longest_of_modio(bench: &mut Bench<'_>) -> Check {
+    read(bench, &[(FILE, 0, 124)])?;
+    bench.exception(&request(&[(FILE, 0, 125)]), 3)
+}
+
+fn beyond_the_end(bench: &mut Bench<'_>) -> Check {
+    let (_, records) = head(bench)?;
+    read(bench, &[(FILE, records - 1, 1)])?;
+    for beyond in [(records, 1), (records - 1, 2), (9999, 1)] {
+        bench.exception(&request(&[(FILE, beyond.0, beyond.1)]), 2)?;
+    }
+    for file in [2, 3, 0x100, 0xFFFF] {
+        bench.exception(&request(&[(file, 0, 1)]), 2)?;
+        bench.exception(&request(&[(FILE, 0, 1), (file, 0, 1)]), 2)?;
+    }
+    Ok(())
+}
+
+fn read_only(bench: &mut Bench<'_>) -> Check {
+    let before = read(bench, &[(FILE, 0, 8)])?;
+    for file in [FILE, 2, 0x100] {
+        let pdu = [&[0x15, 9], &group(6, (file, 4, 1))[..], &[0x5A, 0xA5]].concat();
+        let reply = bench.ask_due(&pdu)?;
+        bench.ensure(reply.exception(0x15) == Some(2), "exception 02")?;
+    }
+    let after = read(bench, &[(FILE, 0, 8)])?;
+    bench.ensure(after == before, "the same words as before")
+}

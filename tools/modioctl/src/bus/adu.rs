@@ -1,0 +1,210 @@
+//! Frames: a unit address and a PDU as they go over the line (Modbus over Serial Line V1.02, 2.5; Modbus Messaging on
+//! TCP/IP V1.0b, 3.1).
+
+use crc::{CRC_16_MODBUS, Crc};
+
+const CRC16: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+
+/// The longest RTU frame in bytes.
+pub const RTU_MOST: usize = 256;
+/// The longest ASCII frame in characters: `:`, two digits for each byte and the LRC, CR and LF.
+pub const ASCII_MOST: usize = 513;
+/// Bytes in front of the PDU on TCP.
+pub const MBAP: usize = 7;
+
+/// How frames are marked off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Framing {
+    /// Bytes between silences, with a CRC.
+    #[default]
+    Rtu,
+    /// Hexadecimal digits between `:` and CR LF, with an LRC.
+    Ascii,
+    /// A header with the length: Modbus TCP.
+    Mbap,
+}
+
+impl Framing {
+    /// The frame with this address and PDU. `transaction` counts for Modbus TCP only.
+    #[must_use]
+    pub fn frame(self, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
+        let mut frame = vec![unit];
+        frame.extend(pdu);
+        match self {
+            Self::Rtu => {
+                let check = crc(&frame);
+                frame.extend(check);
+                frame
+            }
+            Self::Ascii => {
+                frame.push(lrc(&frame));
+                let digits = frame.iter().map(|byte| format!("{byte:02X}"));
+                format!(":{}\r\n", digits.collect::<String>()).into_bytes()
+            }
+            Self::Mbap => {
+                let length = u16::try_from(frame.len()).unwrap_or(u16::MAX);
+                let mut header = transaction.to_be_bytes().to_vec();
+                header.extend([0, 0]);
+                header.extend(length.to_be_bytes());
+                header.append(&mut frame);
+                header
+            }
+        }
+    }
+
+    /// The address and the PDU of a whole frame; `None` when it is damaged.
+    #[must_use]
+    pub fn open(self, frame: &[u8]) -> Option<(u8, Vec<u8>)> {
+        let bytes = match self {
+            Self::Rtu => {
+                let (body, check) = frame.split_last_chunk::<2>()?;
+                (frame.len() <= RTU_MOST && crc(body) == *check).then(|| body.to_vec())?
+            }
+            Self::Ascii => {
+                let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
+                let mut bytes = hex(digits)?;
+                (lrc(&bytes) == 0).then(|| bytes.pop())?;
+                bytes
+            }
+            Self::Mbap => {
+                let (header, rest) = frame.split_at_checked(MBAP - 1)?;
+                let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
+                (header[2..4] == [0, 0] && rest.len() == length).then(|| rest.to_vec())?
+            }
+        };
+        let (unit, pdu) = bytes.split_first()?;
+        (!pdu.is_empty()).then(|| (*unit, pdu.to_vec()))
+    }
+}
+
+/// The CRC as it stands on the line, low byte first (V1.02, 6.2.2).
+#[must_use]
+pub fn crc(bytes: &[u8]) -> [u8; 2] {
+    CRC16.checksum(bytes).to_le_bytes()
+}
+
+/// What makes the sum of all bytes 0 (V1.02, 6.2.1).
+fn lrc(bytes: &[u8]) -> u8 {
+    let sum = bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
+    sum.wrapping_neg()
+}
+
+/// The bytes of hexadecimal digits; `None` when one is none, or is missing.
+fn hex(digits: &[u8]) -> Option<Vec<u8>> {
+    let (pairs, rest) = digits.as_chunks::<2>();
+    let digit = |digit: u8| char::from(digit).to_digit(16).map(|value| value as u8);
+    let byte = |[high, low]: &[u8; 2]| Some(digit(*high)? << 4 | digit(*low)?);
+    rest.is_empty().then(|| pairs.iter().map(byte).collect())?
+}
+
+/// How many bytes the RTU response to this request has, CRC included, as far as its beginning tells; `None` when more
+/// of it is needed, or nothing can tell but the silence after it.
+#[must_use]
+pub fn response_length(request: &[u8], frame: &[u8]) -> Option<usize> {
+    let function = *frame.get(1)?;
+    let counted = |at: usize| frame.get(at).map(|count| at + 1 + usize::from(*count) + 2);
+    match function {
+        0x80.. => Some(5),
+        0x01..=0x04 | 0x0C | 0x11 | 0x14 | 0x17 => counted(2),
+        0x05 | 0x06 | 0x0B | 0x0F | 0x10 => Some(8),
+        0x07 => Some(5),
+        // They send the request's own bytes back, or as many others.
+        0x08 | 0x15 => Some(request.len() + 3),
+        0x16 => Some(10),
+        0x18 => fifo_length(frame),
+        0x2B => identification_length(frame),
+        _ => None,
+    }
+}
+
+/// Returns the length of an RTU request in bytes, CRC included, as far as the beginning of the request determines the
+/// length. Returns `None` when more bytes are needed, or when the function is unknown.
+#[must_use]
+pub fn request_length(frame: &[u8]) -> Option<usize> {
+    let function = *frame.get(1)?;
+    let counted = |at: usize| frame.get(at).map(|count| at + 1 + usize::from(*count) + 2);
+    match function {
+        // Function 08 can send more than one word with subfunction 0. No common master does.
+        0x01..=0x06 | 0x08 => Some(8),
+        0x07 | 0x0B | 0x0C | 0x11 => Some(4),
+        0x0F | 0x10 => counted(6),
+        0x14 | 0x15 => counted(2),
+        0x16 => Some(10),
+        0x17 => counted(10),
+        0x18 => Some(6),
+        0x2B if frame.get(2) == Some(&0x0E) => Some(7),
+        _ => None,
+    }
+}
+
+/// Returns the length of a response of function 18, whose byte count has 16 bits (V1.1b3 6.18).
+fn fifo_length(frame: &[u8]) -> Option<usize> {
+    let count = frame.get(2..)?.first_chunk()?;
+    Some(4 + usize::from(u16::from_be_bytes(*count)) + 2)
+}
+
+/// The length of a response with objects of the device identification (V1.1b3 6.21).
+fn identification_length(frame: &[u8]) -> Option<usize> {
+    let objects = *frame.get(7)?;
+    let mut end = 8;
+    for _ in 0..objects {
+        end += 2 + usize::from(*frame.get(end + 1)?);
+    }
+    Some(end + 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_those_of_the_standards_examples() {
+        // V1.02 6.2.2 has the CRC of 02 07 as 41 12, low byte first.
+        assert_eq!(Framing::Rtu.frame(0, 2, &[7]), [2, 7, 0x41, 0x12]);
+        let ascii = Framing::Ascii.frame(0, 0x11, &[3, 0, 0x6B, 0, 3]);
+        assert_eq!(ascii, b":1103006B00037E\r\n");
+        let tcp = Framing::Mbap.frame(0x1501, 0xFF, &[3, 0, 4, 0, 1]);
+        assert_eq!(tcp, [0x15, 1, 0, 0, 0, 6, 0xFF, 3, 0, 4, 0, 1]);
+    }
+
+    #[test]
+    fn a_frame_leads_back_to_its_pdu_and_a_damaged_one_to_none() {
+        for framing in [Framing::Rtu, Framing::Ascii, Framing::Mbap] {
+            let frame = framing.frame(7, 17, &[3, 2, 0xAB, 0xCD]);
+            assert_eq!(framing.open(&frame), Some((17, vec![3, 2, 0xAB, 0xCD])));
+            assert_eq!(framing.open(&frame[..frame.len() - 1]), None);
+            assert_eq!(framing.open(&[]), None);
+            let mut damaged = frame.clone();
+            damaged[5] ^= 1;
+            assert_eq!(framing.open(&damaged), None, "{framing:?}");
+        }
+    }
+
+    #[test]
+    fn the_length_of_a_response_is_known_from_its_beginning() {
+        assert_eq!(response_length(&[3, 0, 0, 0, 2], &[1, 3]), None);
+        assert_eq!(response_length(&[3, 0, 0, 0, 2], &[1, 3, 4]), Some(9));
+        assert_eq!(response_length(&[3, 0, 0, 0, 2], &[1, 0x83]), Some(5));
+        assert_eq!(response_length(&[8, 0, 0, 1, 2, 3], &[1, 8]), Some(9));
+        let identity = [1, 0x2B, 14, 1, 1, 0, 0, 2, 0, 1, b'a', 1, 2, b'b', b'c'];
+        assert_eq!(response_length(&[0x2B, 14, 1, 0], &identity), Some(17));
+        assert_eq!(response_length(&[0x2B, 14, 1, 0], &identity[..11]), None);
+        assert_eq!(response_length(&[0x41], &[1, 0x41, 5]), None);
+        let fifo = [1, 0x18, 0, 6, 0, 2];
+        assert_eq!(response_length(&[0x18, 0, 1], &fifo), Some(12));
+    }
+
+    #[test]
+    fn request_length_is_known_from_the_beginning_of_the_request() {
+        let write = [1, 0x10, 0, 0, 0, 2, 4, 0, 1, 0, 2];
+        assert_eq!(request_length(&write[..6]), None);
+        assert_eq!(request_length(&write), Some(13));
+        assert_eq!(request_length(&[1, 3]), Some(8));
+        assert_eq!(request_length(&[1, 0x11]), Some(4));
+        assert_eq!(request_length(&[1, 0x2B]), None);
+        assert_eq!(request_length(&[1, 0x2B, 0x0E]), Some(7));
+        assert_eq!(request_length(&[1, 0x83]), None);
+        assert_eq!(request_length(&[]), None);
+    }
+}

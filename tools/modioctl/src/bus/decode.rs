@@ -1,0 +1,278 @@
+//! What requests and responses say, in words: for people who read along.
+
+use super::adu::Framing;
+use super::master::Direction;
+
+/// A frame in words: the unit, and what it is asked or answers. `request` is the PDU of the request before, if that is
+/// known: it tells what a response is about.
+#[must_use]
+pub fn frame(
+    framing: Framing,
+    direction: Direction,
+    bytes: &[u8],
+    request: Option<&[u8]>,
+) -> String {
+    match framing.open(bytes) {
+        None => format!("no whole frame, {} bytes", bytes.len()),
+        Some((unit, pdu)) => {
+            let text = match direction {
+                Direction::Request => self::request(&pdu),
+                Direction::Response => response(&pdu, request),
+            };
+            match unit {
+                0 => format!("all units: {text}"),
+                _ => format!("unit {unit}: {text}"),
+            }
+        }
+    }
+}
+
+/// Bytes as they are, in hexadecimal; an ASCII frame as its characters.
+#[must_use]
+pub fn bytes(framing: Framing, bytes: &[u8]) -> String {
+    if framing == Framing::Ascii && bytes.starts_with(b":") && bytes.is_ascii() {
+        return String::from_utf8_lossy(bytes).trim_end().to_owned();
+    }
+    let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    digits.join(" ")
+}
+
+/// The name of a function.
+#[must_use]
+pub fn function(code: u8) -> Option<&'static str> {
+    Some(match code & 0x7F {
+        0x01 => "read coils",
+        0x02 => "read discrete inputs",
+        0x03 => "read holding registers",
+        0x04 => "read input registers",
+        0x05 => "write single coil",
+        0x06 => "write single register",
+        0x07 => "read exception status",
+        0x08 => "diagnostics",
+        0x0B => "get comm event counter",
+        0x0C => "get comm event log",
+        0x0F => "write multiple coils",
+        0x10 => "write multiple registers",
+        0x11 => "report server id",
+        0x14 => "read file record",
+        0x15 => "write file record",
+        0x16 => "mask write register",
+        0x17 => "read/write multiple registers",
+        0x18 => "read FIFO queue",
+        0x2B => "encapsulated interface",
+        _ => return None,
+    })
+}
+
+/// The name of an exception (V1.1b3, 7).
+#[must_use]
+pub const fn exception(code: u8) -> &'static str {
+    match code {
+        0x01 => "illegal function",
+        0x02 => "illegal data address",
+        0x03 => "illegal data value",
+        0x04 => "server device failure",
+        0x05 => "acknowledge",
+        0x06 => "server device busy",
+        0x08 => "memory parity error",
+        0x0A => "gateway path unavailable",
+        0x0B => "gateway target device failed to respond",
+        _ => "unknown exception",
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u16> {
+    Some(u16::from_be_bytes(*bytes.get(at..)?.first_chunk()?))
+}
+
+fn named(code: u8) -> String {
+    function(code).map_or_else(|| format!("function {code:02X}"), str::to_owned)
+}
+
+/// A request in words.
+#[must_use]
+pub fn request(pdu: &[u8]) -> String {
+    let Some(code) = pdu.first() else {
+        return "nothing".to_owned();
+    };
+    let name = named(*code);
+    told(*code, pdu).map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
+}
+
+fn with_rest(name: &str, pdu: &[u8]) -> String {
+    match pdu.get(1..) {
+        None | Some([]) => name.to_owned(),
+        Some(rest) => format!("{name}: {}", bytes(Framing::Rtu, rest)),
+    }
+}
+
+/// What a request asks for; `None` when its form is not the function's.
+fn told(code: u8, pdu: &[u8]) -> Option<String> {
+    let (first, second) = (word(pdu, 1), word(pdu, 3));
+    Some(match code {
+        0x01..=0x04 => format!("{:#06X} x {}", first?, second?),
+        0x05 => format!("{:#06X} = {}", first?, coil(second?)),
+        0x06 => format!("{:#06X} = {}", first?, number(second?)),
+        0x08 => format!("{:02X}: {}", first?, bytes(Framing::Rtu, pdu.get(3..)?)),
+        0x0F => {
+            let count = usize::from(second?);
+            format!("{:#06X} x {count} = {}", first?, bits(pdu.get(6..)?, count))
+        }
+        0x10 => format!("{:#06X} x {} = {}", first?, second?, words(pdu.get(6..)?)),
+        0x14 => {
+            let groups = pdu.get(2..)?.chunks_exact(7).map(|group| {
+                let at = |at| word(group, at).unwrap_or_default();
+                format!("file {}, records {} x {}", at(1), at(3), at(5))
+            });
+            groups.collect::<Vec<_>>().join("; ")
+        }
+        0x16 => format!(
+            "{:#06X} and {:#06X} or {:#06X}",
+            first?,
+            second?,
+            word(pdu, 5)?
+        ),
+        0x17 => format!(
+            "{:#06X} x {}, write {:#06X} = {}",
+            first?,
+            second?,
+            word(pdu, 5)?,
+            words(pdu.get(10..)?)
+        ),
+        0x2B if pdu.get(1) == Some(&0x0E) => format!(
+            "read device identification, code {:02X}, from object {:02X}",
+            pdu.get(2)?,
+            pdu.get(3)?
+        ),
+        _ => return None,
+    })
+}
+
+/// A response in words.
+#[must_use]
+pub fn response(pdu: &[u8], request: Option<&[u8]>) -> String {
+    let Some(code) = pdu.first() else {
+        return "nothing".to_owned();
+    };
+    let name = named(*code);
+    if code & 0x80 != 0 {
+        let reason = pdu.get(1).copied().unwrap_or_default();
+        return format!("{name}: exception {reason:02X}, {}", exception(reason));
+    }
+    let request = request.filter(|request| request.first() == Some(code));
+    answered(*code, pdu, request)
+        .map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
+}
+
+fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
+    let from = request.and_then(|request| word(request, 1));
+    let from = from.map_or_else(String::new, |first| format!("{first:#06X} "));
+    Some(match code {
+        0x01 | 0x02 => {
+            let data = pdu.get(2..)?;
+            let count = request
+                .and_then(|request| word(request, 3))
+                .map(usize::from);
+            format!("{from}= {}", bits(data, count.unwrap_or(data.len() * 8)))
+        }
+        0x03 | 0x04 | 0x17 => format!("{from}= {}", words(pdu.get(2..)?)),
+        0x05 | 0x06 | 0x08 | 0x16 => told(code, pdu)?,
+        0x0F | 0x10 => format!("{:#06X} x {}", word(pdu, 1)?, word(pdu, 3)?),
+        0x07 => format!("= {:08b}", pdu.get(1)?),
+        0x0B => format!("status {:04X}, count {}", word(pdu, 1)?, word(pdu, 3)?),
+        0x2B => {
+            let objects = objects(pdu)?.into_iter();
+            let texts =
+                objects.map(|(id, text)| format!("{id:02X} {:?}", String::from_utf8_lossy(&text)));
+            format!("= {}", texts.collect::<Vec<_>>().join(", "))
+        }
+        _ => return None,
+    })
+}
+
+/// The objects in a response of function 2B/0E (V1.1b3, 6.21).
+#[must_use]
+pub fn objects(pdu: &[u8]) -> Option<Vec<(u8, Vec<u8>)>> {
+    let mut rest = pdu.get(7..)?;
+    let mut objects = Vec::new();
+    for _ in 0..*pdu.get(6)? {
+        let (head, data) = rest.split_first_chunk::<2>()?;
+        let (text, after) = data.split_at_checked(head[1].into())?;
+        objects.push((head[0], text.to_vec()));
+        rest = after;
+    }
+    Some(objects)
+}
+
+const fn coil(word: u16) -> &'static str {
+    match word {
+        0xFF00 => "on",
+        0 => "off",
+        _ => "neither on nor off",
+    }
+}
+
+fn number(word: u16) -> String {
+    format!("{word} ({word:#06X})")
+}
+
+fn words(data: &[u8]) -> String {
+    let (pairs, _) = data.as_chunks::<2>();
+    let texts = pairs
+        .iter()
+        .map(|pair| format!("{:04X}", u16::from_be_bytes(*pair)));
+    texts.collect::<Vec<_>>().join(" ")
+}
+
+fn bits(data: &[u8], count: usize) -> String {
+    let each = data
+        .iter()
+        .flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1));
+    each.take(count)
+        .map(|bit| if bit == 1 { '1' } else { '0' })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_and_responses_say_what_they_are_about() {
+        let asked = [3, 1, 1, 0, 2];
+        assert_eq!(request(&asked), "read holding registers 0x0101 x 2");
+        let answer = response(&[3, 4, 0, 96, 0, 0], Some(&asked));
+        assert_eq!(answer, "read holding registers 0x0101 = 0060 0000");
+        assert_eq!(
+            request(&[5, 0, 0x10, 0xFF, 0]),
+            "write single coil 0x0010 = on"
+        );
+        assert_eq!(
+            request(&[0x0F, 0, 0x10, 0, 4, 1, 5]),
+            "write multiple coils 0x0010 x 4 = 1010"
+        );
+        assert_eq!(
+            response(&[1, 1, 5], Some(&[1, 0, 16, 0, 4])),
+            "read coils 0x0010 = 1010"
+        );
+        assert_eq!(
+            response(&[0x86, 6], Some(&[6, 1, 1, 0, 1])),
+            "write single register: exception 06, server device busy"
+        );
+        let file = [0x14, 7, 6, 0, 1, 0, 0, 0, 2];
+        assert_eq!(request(&file), "read file record file 1, records 0 x 2");
+    }
+
+    #[test]
+    fn bytes_of_any_form_are_shown_and_nothing_panics() {
+        for code in 0..=0xFF {
+            for length in 0..12 {
+                let pdu = [&[code], &[0xFF; 12][..length]].concat();
+                let _ = (request(&pdu), response(&pdu, Some(&pdu)));
+            }
+        }
+        assert_eq!(request(&[0x41, 1, 2]), "function 41: 01 02");
+        let damaged = frame(Framing::Rtu, Direction::Response, &[1, 2, 3], None);
+        assert_eq!(damaged, "no whole frame, 3 bytes");
+    }
+}

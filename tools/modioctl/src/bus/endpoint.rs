@@ -1,0 +1,358 @@
+//! Where the unit is and how to talk to it: from the command line, a file of named endpoints, and the environment.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::{Args, CommandFactory, FromArgMatches, Parser};
+use etcetera::BaseStrategy;
+
+use super::adu::Framing;
+use super::format::Format;
+use crate::failure::Failure;
+
+/// Where the bytes go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A serial port by its path or name.
+    Serial(String),
+    /// RTU or ASCII frames over TCP, at `HOST:PORT`.
+    Tcp(String),
+    /// Modbus TCP, at `HOST:PORT`.
+    ModbusTcp(String),
+}
+
+impl Place {
+    /// Whether a unit's line settings are this computer's as well.
+    #[must_use]
+    pub const fn is_serial(&self) -> bool {
+        matches!(self, Self::Serial(_))
+    }
+}
+
+/// Where the unit is, and how to talk to it.
+#[derive(Clone, Debug)]
+pub struct Endpoint {
+    /// Where the bytes go.
+    pub place: Place,
+    /// In bit/s.
+    pub baud: u32,
+    /// Data bits, parity and stop bits.
+    pub format: Format,
+    /// How frames are marked off.
+    pub framing: Framing,
+    /// The unit's address, 1 to 247, or 255.
+    pub unit: u8,
+    /// How long to wait for the beginning of an answer.
+    pub timeout: Duration,
+    /// How often to ask again.
+    pub retries: u8,
+    /// Whether the time-out was given, and is not the default.
+    pub timeout_given: bool,
+}
+
+impl Endpoint {
+    /// How long `bytes` bytes take on the line, behind a gateway too; no time for Modbus TCP, whose server keeps the
+    /// times of its line itself.
+    #[must_use]
+    pub fn time_of(&self, bytes: usize) -> Duration {
+        if self.framing == Framing::Mbap {
+            return Duration::ZERO;
+        }
+        let bits = f64::from(self.format.bits()) * bytes as f64;
+        Duration::from_secs_f64(bits / f64::from(self.baud))
+    }
+
+    /// The silence between frames on a serial line: t3.5, and 1.75 ms above 19200 bit/s (V1.02, 2.5.1.1).
+    #[must_use]
+    pub fn frame_gap(&self) -> Duration {
+        if self.framing == Framing::Mbap {
+            Duration::ZERO
+        } else if self.baud > 19_200 {
+            Duration::from_micros(1750)
+        } else {
+            self.time_of(7) / 2
+        }
+    }
+}
+
+/// The endpoint's options: of the command line, of a named endpoint, or of the environment.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Endpoint")]
+pub struct Options {
+    /// Serial port of the line: /dev/ttyUSB0, COM3, a pseudo-terminal [env: MODIO_PORT]
+    #[arg(long, global = true, value_name = "PORT", group = "where")]
+    pub port: Option<String>,
+
+    /// RTU or ASCII frames over TCP, as gateways in transparent mode have them [env: MODIO_TCP]
+    #[arg(long, global = true, value_name = "HOST:PORT", group = "where")]
+    pub tcp: Option<String>,
+
+    /// Modbus TCP [env: MODIO_MODBUS_TCP]
+    #[arg(long, global = true, value_name = "HOST:PORT", group = "where")]
+    pub modbus_tcp: Option<String>,
+
+    /// Speed of the serial port in bit/s [default: 9600] [env: MODIO_BAUD]
+    #[arg(long, global = true, value_name = "RATE", value_parser = clap::value_parser!(u32).range(50..=4_000_000))]
+    pub baud: Option<u32>,
+
+    /// Data bits, parity, stop bits [default: 8N2] [env: MODIO_FORMAT]
+    #[arg(long, global = true)]
+    pub format: Option<Format>,
+
+    /// How frames are marked off on a serial line: rtu or ascii [default: rtu] [env: MODIO_MODE]
+    #[arg(long, global = true, value_enum)]
+    pub mode: Option<Mode>,
+
+    /// Address of the unit, 1 to 247; 255 for the loader's mode [default: 1] [env: MODIO_UNIT]
+    #[arg(long, global = true, value_name = "N", value_parser = unit)]
+    pub unit: Option<u8>,
+
+    /// How long to wait for an answer, such as 200ms or 1s [default: 1s] [env: MODIO_TIMEOUT]
+    #[arg(long, global = true, value_name = "TIME", value_parser = duration)]
+    pub timeout: Option<Duration>,
+
+    /// How often to ask again [default: 2] [env: MODIO_RETRIES]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=20))]
+    pub retries: Option<u8>,
+}
+
+/// The transmission mode of a serial line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Mode {
+    /// RTU.
+    Rtu,
+    /// ASCII.
+    Ascii,
+}
+
+fn unit(text: &str) -> Result<u8, String> {
+    match text.parse() {
+        Ok(unit @ (1..=247 | 255)) => Ok(unit),
+        _ => Err("a unit address is 1 to 247 (255 for the loader's mode)".to_owned()),
+    }
+}
+
+/// A duration with its unit, or a number of seconds.
+///
+/// # Errors
+///
+/// What is wrong with it.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse::<f64>().ok();
+    let duration = match seconds.map(Duration::try_from_secs_f64) {
+        Some(Ok(duration)) => duration,
+        _ => humantime::parse_duration(text).map_err(|error| error.to_string())?,
+    };
+    match duration.as_millis() {
+        1..=3_600_000 => Ok(duration),
+        _ => Err("a time from 1ms to 1h is needed".to_owned()),
+    }
+}
+
+/// The names of the options in files; in the environment they are in capitals behind `MODIO_`.
+const NAMES: [&str; 9] = [
+    "port",
+    "tcp",
+    "modbus-tcp",
+    "baud",
+    "format",
+    "mode",
+    "unit",
+    "timeout",
+    "retries",
+];
+
+/// To have options that stand elsewhere read as those of the command line are.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct Elsewhere {
+    #[command(flatten)]
+    options: Options,
+}
+
+impl Options {
+    /// The endpoint: each option from the command line, else from the named endpoint, else from the environment.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with a value, a name or the file; or that nobody says where the unit is.
+    pub fn endpoint(self, at: Option<&str>, file: Option<&Path>) -> Result<Endpoint, Failure> {
+        let environment = Self::from_environment()?;
+        let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+        let at = at.map(str::to_owned).or_else(|| variable("MODIO_AT"));
+        let named = match at {
+            Some(name) => Self::named(&name, file)?,
+            None => Self::default(),
+        };
+        let merged = self.or(named).or(environment);
+        let place = merged.place().ok_or_else(|| {
+            Failure::usage("where is the unit? Give --port, --tcp, --modbus-tcp or --at; `modioctl ports` lists the serial ports")
+        })?;
+        let framing = match (&place, merged.mode) {
+            (Place::ModbusTcp(_), _) => Framing::Mbap,
+            (_, Some(Mode::Ascii)) => Framing::Ascii,
+            _ => Framing::Rtu,
+        };
+        let format = merged.format.unwrap_or_default();
+        if framing == Framing::Rtu && format.data_bits == 7 && place.is_serial() {
+            return Err(Failure::usage(format!(
+                "--format {format}: RTU needs 8 data bits; 7 are for --mode ascii"
+            )));
+        }
+        Ok(Endpoint {
+            place,
+            baud: merged.baud.unwrap_or(9600),
+            format,
+            framing,
+            unit: merged.unit.unwrap_or(1),
+            timeout: merged.timeout.unwrap_or(Duration::from_secs(1)),
+            retries: merged.retries.unwrap_or(2),
+            timeout_given: merged.timeout.is_some(),
+        })
+    }
+
+    fn place(&self) -> Option<Place> {
+        let serial = self.port.clone().map(Place::Serial);
+        let tcp = || self.tcp.clone().map(Place::Tcp);
+        let modbus_tcp = || self.modbus_tcp.clone().map(Place::ModbusTcp);
+        serial.or_else(tcp).or_else(modbus_tcp)
+    }
+
+    /// These, and what they leave open from `rest`. The place is one option in three forms.
+    fn or(self, rest: Self) -> Self {
+        let (port, tcp, modbus_tcp) = if self.place().is_some() {
+            (self.port, self.tcp, self.modbus_tcp)
+        } else {
+            (rest.port, rest.tcp, rest.modbus_tcp)
+        };
+        Self {
+            port,
+            tcp,
+            modbus_tcp,
+            baud: self.baud.or(rest.baud),
+            format: self.format.or(rest.format),
+            mode: self.mode.or(rest.mode),
+            unit: self.unit.or(rest.unit),
+            timeout: self.timeout.or(rest.timeout),
+            retries: self.retries.or(rest.retries),
+        }
+    }
+
+    fn from_environment() -> Result<Self, Failure> {
+        let variables = NAMES.iter().filter_map(|name| {
+            let variable = format!("MODIO_{}", name.to_uppercase().replace('-', "_"));
+            let value = std::env::var(variable).ok()?;
+            (!value.is_empty()).then(|| ((*name).to_owned(), value))
+        });
+        Self::parse(variables).map_err(|what| {
+            Failure::usage(format!("in the environment (MODIO_PORT and so on): {what}"))
+        })
+    }
+
+    fn named(name: &str, file: Option<&Path>) -> Result<Self, Failure> {
+        let path = match file {
+            Some(path) => path.to_owned(),
+            None => usual_file()?,
+        };
+        let shown = path.display();
+        let text = std::fs::read_to_string(&path).map_err(|error| {
+            Failure::usage(format!("--at {name}: cannot read {shown}: {error}"))
+        })?;
+        let mut tables: toml::Table = text.parse().map_err(|error: toml::de::Error| {
+            Failure::usage(format!("{shown}: {}", error.message()))
+        })?;
+        let known = || tables.keys().cloned().collect::<Vec<_>>().join(", ");
+        let Some(toml::Value::Table(table)) = tables.get(name) else {
+            return Err(Failure::usage(format!(
+                "{shown} has no endpoint {name}; it has: {}",
+                known()
+            )));
+        };
+        if let Some(unknown) = table.keys().find(|key| !NAMES.contains(&key.as_str())) {
+            return Err(Failure::usage(format!(
+                "{shown}, endpoint {name}: unknown option {unknown}; there are {}",
+                NAMES.join(", ")
+            )));
+        }
+        let Some(toml::Value::Table(table)) = tables.remove(name) else {
+            return Ok(Self::default());
+        };
+        let values = table.into_iter().map(|(key, value)| {
+            let text = match value {
+                toml::Value::String(text) => text,
+                other => other.to_string(),
+            };
+            (key, text)
+        });
+        Self::parse(values)
+            .map_err(|what| Failure::usage(format!("{shown}, endpoint {name}: {what}")))
+    }
+
+    fn parse(values: impl Iterator<Item = (String, String)>) -> Result<Self, String> {
+        let arguments = values.map(|(name, value)| format!("--{name}={value}"));
+        let elsewhere = Elsewhere::command()
+            .try_get_matches_from(arguments)
+            .and_then(|matches| Elsewhere::from_arg_matches(&matches));
+        elsewhere
+            .map(|elsewhere| elsewhere.options)
+            .map_err(|error| first_line(&error.to_string()))
+    }
+}
+
+/// The first line of what clap says, without its heading.
+fn first_line(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    line.trim_start_matches("error: ").to_owned()
+}
+
+/// The file of named endpoints when none is given: `modio/endpoints.toml` where the system keeps settings.
+///
+/// # Errors
+///
+/// That there is no home directory.
+pub fn usual_file() -> Result<PathBuf, Failure> {
+    let strategy = etcetera::choose_base_strategy()
+        .map_err(|_| Failure::usage("there is no home directory: give --endpoints FILE"))?;
+    Ok(strategy.config_dir().join("modio").join("endpoints.toml"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(values: &[(&str, &str)]) -> Result<Options, String> {
+        let owned = |(name, value): &(&str, &str)| ((*name).to_owned(), (*value).to_owned());
+        Options::parse(values.iter().map(owned))
+    }
+
+    #[test]
+    fn an_option_counts_before_that_of_a_file() {
+        let given = parse(&[("tcp", "a:1"), ("baud", "19200")]).unwrap();
+        let file = parse(&[("port", "COM3"), ("baud", "1200"), ("unit", "9")]).unwrap();
+        let endpoint = given.or(file).endpoint(None, None).unwrap();
+        assert_eq!(endpoint.place, Place::Tcp("a:1".to_owned()));
+        assert_eq!((endpoint.baud, endpoint.unit), (19_200, 9));
+        assert_eq!(endpoint.timeout, Duration::from_secs(1));
+    }
+
+    #[test]
+    fn a_wrong_value_is_named() {
+        let wrong = parse(&[("unit", "300")]).unwrap_err();
+        assert!(
+            wrong.contains("--unit") && wrong.contains("1 to 247"),
+            "{wrong}"
+        );
+        assert!(parse(&[("port", "a"), ("tcp", "b:1")]).is_err());
+        let seven = parse(&[("port", "a"), ("format", "7E1")]).unwrap();
+        assert!(seven.endpoint(None, None).is_err(), "RTU with 7 data bits");
+    }
+
+    #[test]
+    fn times_are_seconds_or_have_a_unit() {
+        assert_eq!(duration("0.2"), Ok(Duration::from_millis(200)));
+        assert_eq!(duration("20ms"), Ok(Duration::from_millis(20)));
+        for wrong in ["", "x", "-1", "0", "2h", "1e99"] {
+            assert!(duration(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! What the bytes go through: a serial port, or a TCP connection.
+
+use std::io;
+use std::time::Duration;
+
+use serial2_tokio::{CharSize, Parity, SerialPort, Settings, StopBits};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+use super::endpoint::{Endpoint, Place};
+use super::format::Format;
+use crate::commands::ports;
+use crate::failure::Failure;
+
+/// Longest time for a connection to be made.
+const CONNECTING: Duration = Duration::from_secs(5);
+
+/// An open serial port or connection.
+#[derive(Debug)]
+pub enum Stream {
+    /// A serial port or a pseudo-terminal.
+    Serial(Serial),
+    /// A connection.
+    Tcp(TcpStream),
+}
+
+/// An open serial port.
+#[derive(Debug)]
+pub struct Serial {
+    port: SerialPort,
+    #[cfg(unix)]
+    _lock: std::fs::File,
+}
+
+impl Stream {
+    /// Opens it.
+    ///
+    /// # Errors
+    ///
+    /// Why it cannot be opened, with what to do.
+    pub async fn open(endpoint: &Endpoint) -> Result<Self, Failure> {
+        match &endpoint.place {
+            Place::Serial(path) => {
+                let settings = |mut settings: Settings| {
+                    settings.set_raw();
+                    settings.set_baud_rate(endpoint.baud)?;
+                    if !is_pseudo_terminal(path) {
+                        set_format(&mut settings, endpoint.format);
+                    }
+                    Ok(settings)
+                };
+                let not_opened = |error| not_opened(path, endpoint, &error);
+                #[cfg(unix)]
+                let lock = lock(path).map_err(not_opened)?;
+                let port = SerialPort::open(path, settings).map_err(not_opened)?;
+                #[cfg(unix)]
+                exclude(&lock);
+                // What arrived before belongs to nobody.
+                let _ = port.discard_buffers();
+                Ok(Self::Serial(Serial {
+                    port,
+                    #[cfg(unix)]
+                    _lock: lock,
+                }))
+            }
+            Place::Tcp(address) | Place::ModbusTcp(address) => {
+                let connected = timeout(CONNECTING, TcpStream::connect(address)).await;
+                let stream = connected
+                    .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+                    .map_err(|error| {
+                        Failure::Port(format!(
+                            "no connection to {address} ({error}): is the address right, and does the gateway or simulator run?"
+                        ))
+                    })?;
+                let _ = stream.set_nodelay(true);
+                Ok(Self::Tcp(stream))
+            }
+        }
+    }
+
+    /// Reads what is there, at least a byte; 0 bytes: the other end is gone.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub async fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Serial(serial) => serial.port.read(bytes).await,
+            Self::Tcp(stream) => stream.read(bytes).await,
+        }
+    }
+
+    /// Discards bytes that the system holds and has not sent yet; a connection cannot be used afterwards.
+    pub fn discard_unsent(&self) {
+        // Dropping the stream follows, so a stream that cannot discard its bytes is treated no differently.
+        let _ = match self {
+            Self::Serial(serial) => serial.port.discard_output_buffer(),
+            // Closing such a connection resets it. The system would otherwise send the bytes again for minutes.
+            Self::Tcp(stream) => stream.set_zero_linger(),
+        };
+    }
+
+    /// Writes all of it.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub async fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self {
+            Self::Serial(serial) => serial.port.write_all(bytes).await,
+            Self::Tcp(stream) => stream.write_all(bytes).await,
+        }
+    }
+}
+
+/// What keeps other programs from opening the port: two masters on one line would garble each other's answers.
+#[cfg(unix)]
+fn lock(path: &str) -> io::Result<std::fs::File> {
+    use rustix::fs::OFlags;
+    use std::os::unix::fs::OpenOptionsExt;
+    let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
+    let file = std::fs::OpenOptions::new()
+        .read(true)
+        .custom_flags(flags.cast_signed())
+        .open(path)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(std::fs::TryLockError::WouldBlock) => Err(io::ErrorKind::ResourceBusy.into()),
+        Err(std::fs::TryLockError::Error(error)) => Err(error),
+    }
+}
+
+/// Keeps out programs that do not lock, too, but for those of root.
+#[cfg(unix)]
+fn exclude(file: &std::fs::File) {
+    // A port that cannot is used all the same.
+    let _ = rustix::termios::ioctl_tiocexcl(file);
+}
+
+/// Whether a port is a pseudo-terminal: it carries bytes, which have neither parity nor stop bits.
+pub fn is_pseudo_terminal(path: &str) -> bool {
+    std::fs::canonicalize(path).is_ok_and(|path| path.starts_with("/dev/pts"))
+}
+
+fn set_format(settings: &mut Settings, format: Format) {
+    settings.set_char_size(if format.data_bits == 7 {
+        CharSize::Bits7
+    } else {
+        CharSize::Bits8
+    });
+    settings.set_parity(match format.parity {
+        'E' => Parity::Even,
+        'O' => Parity::Odd,
+        _ => Parity::None,
+    });
+    settings.set_stop_bits(if format.stop_bits == 2 {
+        StopBits::Two
+    } else {
+        StopBits::One
+    });
+}
+
+/// What to say of a serial port that cannot be opened.
+fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
+    Failure::Port(match error.kind() {
+        io::ErrorKind::NotFound => {
+            format!(
+                "there is no port {path}; this computer has {}",
+                ports::names()
+            )
+        }
+        io::ErrorKind::PermissionDenied if cfg!(windows) => {
+            format!("{path} is in use: close the program that has it open")
+        }
+        io::ErrorKind::PermissionDenied => {
+            let group = owning_group(path).unwrap_or_else(|| "dialout".to_owned());
+            format!(
+                "no permission for {path}: add yourself to its group with `sudo usermod -aG {group} $USER` and log in again"
+            )
+        }
+        io::ErrorKind::ResourceBusy => {
+            format!("{path} is in use: close the program that has it open")
+        }
+        io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported => format!(
+            "{path} does not take {} bit/s, {} ({error}); another adapter may",
+            endpoint.baud, endpoint.format
+        ),
+        _ => format!("{path} cannot be opened: {error}"),
+    })
+}
+
+/// The name of the group that may use a port.
+#[cfg(unix)]
+fn owning_group(path: &str) -> Option<String> {
+    use std::os::unix::fs::MetadataExt;
+    let gid = std::fs::metadata(path).ok()?.gid();
+    let groups = std::fs::read_to_string("/etc/group").ok()?;
+    groups.lines().find_map(|line| {
+        let mut fields = line.split(':');
+        let name = fields.next()?;
+        (fields.nth(1)?.parse() == Ok(gid)).then(|| name.to_owned())
+    })
+}
+
+#[cfg(not(unix))]
+fn owning_group(_: &str) -> Option<String> {
+    None
+}

@@ -1,0 +1,164 @@
+//! Looks for units: asks every address for its identity, function 11, without waiting long for any.
+//!
+//! A unit answers function 11 from its protocol stack, in a few milliseconds, and one without the function refuses as
+//! fast. Answers carry their unit's address, so one that an adapter hands on late still counts for the right unit. Where
+//! an answer came late, or something that is no answer, the addresses whose requests it can have met are asked again,
+//! with more time.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::adu::{Framing, MBAP, response_length};
+use super::master::{Lost, Master};
+
+/// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns what it sends is
+/// not taken for a unit.
+const REPORT: u8 = 0x11;
+
+/// How long an address has for the first byte of its answer: t3.5 at 9600 bit/s and the 16 ms for which adapters hold
+/// bytes back, with some room.
+pub const SHORT: Duration = Duration::from_millis(25);
+
+/// Bytes of a response that is being received arrive at least this often.
+const IDLE: Duration = Duration::from_millis(40);
+
+/// How long an address that is asked again has, and how often.
+const AGAIN: (Duration, u8) = (Duration::from_millis(300), 1);
+
+/// What a sweep has found.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// Units that answered.
+    pub units: BTreeSet<u8>,
+    /// Addresses at which something answered that could not be read.
+    pub garbled: BTreeSet<u8>,
+}
+
+/// What came while it was an address's turn.
+enum Turn {
+    /// Nothing, or its answer.
+    Quiet,
+    /// The answer of a unit that was asked before.
+    Late(u8),
+    /// Something that is no answer.
+    Garbled,
+}
+
+impl Master {
+    /// Asks these addresses. `wait` is how long each has for the beginning of its answer; `asked` is told each address.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub async fn sweep(
+        &mut self,
+        units: &[u8],
+        wait: Duration,
+        mut asked: impl FnMut(u8),
+    ) -> io::Result<Found> {
+        let mut found = Found::default();
+        let mut suspects = BTreeSet::new();
+        let mut got = Vec::new();
+        for (n, unit) in units.iter().enumerate() {
+            asked(*unit);
+            let before = units.get(..n).unwrap_or_default();
+            match self.offer(*unit, wait, &mut got, &mut found).await? {
+                Turn::Quiet => {}
+                Turn::Late(late) => {
+                    // Its answer met the requests that were sent since.
+                    let since = before.iter().rev().take_while(|unit| **unit != late);
+                    suspects.extend(since);
+                    suspects.insert(*unit);
+                }
+                Turn::Garbled => {
+                    suspects.extend(before.last());
+                    suspects.insert(*unit);
+                }
+            }
+        }
+        // Answers that the adapter or a gateway still holds.
+        let until = Instant::now() + self.endpoint().timeout.min(Duration::from_millis(300));
+        while self.read_until(until, &mut got).await? > 0 {}
+        if let Some(late) = self.take(&mut got, &mut found) {
+            suspects.extend(units.iter().rev().take_while(|unit| **unit != late));
+        }
+        let (timeout, retries) = AGAIN;
+        let usual = self.be_patient(timeout.min(self.endpoint().timeout), retries);
+        for unit in suspects.difference(&found.units.clone()) {
+            match self.ask(*unit, &[REPORT]).await {
+                Ok(_) => {
+                    found.units.insert(*unit);
+                }
+                Err(Lost::Silent) => {}
+                Err(Lost::Garbled(_)) => {
+                    found.garbled.insert(*unit);
+                }
+                Err(Lost::Broken(error)) => return Err(error),
+            }
+        }
+        self.be_patient(usual.0, usual.1);
+        Ok(found)
+    }
+
+    /// Asks one address.
+    async fn offer(
+        &mut self,
+        unit: u8,
+        wait: Duration,
+        got: &mut Vec<u8>,
+        found: &mut Found,
+    ) -> io::Result<Turn> {
+        got.clear();
+        let mut turn = Turn::Quiet;
+        let frame = self.put(unit, &[REPORT]).await?;
+        let mut until = self.free() + wait;
+        loop {
+            if self.read_until(until, got).await? == 0 {
+                return Ok(if got.is_empty() { turn } else { Turn::Garbled });
+            }
+            if got.starts_with(&frame) && self.endpoint().framing != Framing::Mbap {
+                got.drain(..frame.len());
+            }
+            match self.take(got, found) {
+                Some(answered) if answered == unit && got.is_empty() => return Ok(turn),
+                Some(late) if late != unit => turn = Turn::Late(late),
+                _ => until = until.max(Instant::now() + IDLE),
+            }
+        }
+    }
+
+    /// Takes whole answers out of what arrived. The unit of the last.
+    fn take(&mut self, got: &mut Vec<u8>, found: &mut Found) -> Option<u8> {
+        let mut last = None;
+        while let Some(length) = length(self.endpoint().framing, got)
+            && let Some(frame) = got.get(..length)
+            && let Some((unit, pdu)) = self.endpoint().framing.open(frame)
+        {
+            self.received(&got[..length]);
+            got.drain(..length);
+            last = Some(unit);
+            // A gateway that answers for a unit that is not there.
+            let absent = matches!(pdu[..], [code, 0x0A | 0x0B] if code == REPORT | 0x80);
+            // One that answers twice is two.
+            if !absent && !found.units.insert(unit) {
+                found.garbled.insert(unit);
+            }
+        }
+        last
+    }
+}
+
+/// The length of the frame at the beginning, if it is known.
+fn length(framing: Framing, bytes: &[u8]) -> Option<usize> {
+    match framing {
+        Framing::Rtu => response_length(&[REPORT], bytes),
+        Framing::Ascii => Some(bytes.windows(2).position(|two| two == b"\r\n")? + 2),
+        Framing::Mbap => {
+            let header = bytes.first_chunk::<MBAP>()?;
+            Some(MBAP - 1 + usize::from(u16::from_be_bytes([header[4], header[5]])))
+        }
+    }
+}

@@ -1,0 +1,371 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::bus::Options;
+use crate::bus::endpoint::duration;
+
+/// Finds, sets up and watches modio units over Modbus
+#[derive(Parser, Debug)]
+#[command(name = "modioctl", version, max_term_width = 100)]
+#[command(after_help = "\
+Exit status: 0 done; 1 the unit refused; 2 wrong usage; 3 no answer; 4 garbled answers; 5 the port cannot be opened.
+
+Options of the endpoint may also stand in the environment (MODIO_PORT, MODIO_BAUD, ...), or under a name in a file:
+`--at office` takes those of [office] in endpoints.toml, where the system keeps settings (Linux: ~/.config/modio/).")]
+pub struct Cli {
+    /// Where the unit is.
+    #[command(flatten)]
+    pub endpoint: Options,
+
+    /// A named endpoint of the file of endpoints [env: MODIO_AT]
+    #[arg(long, global = true, value_name = "NAME", help_heading = "Endpoint")]
+    pub at: Option<String>,
+
+    /// The file of named endpoints
+    #[arg(long, global = true, value_name = "FILE", help_heading = "Endpoint")]
+    pub endpoints: Option<PathBuf>,
+
+    /// Print data as JSON
+    #[arg(long, global = true)]
+    pub json: bool,
+
+    /// Show every frame, in words and with times, on standard error
+    #[arg(long, global = true)]
+    pub trace: bool,
+
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// List the serial ports of this computer
+    Ports,
+    /// Look for units on the line
+    Scan(Scan),
+    /// Show what the unit is and how it fares
+    Info,
+    /// Read points and registers
+    Read(Read),
+    /// Write points and registers
+    Write(Write),
+    /// Set which module is in a slot
+    #[command(subcommand)]
+    Module(Module),
+    /// Read and change the unit's settings
+    #[command(subcommand)]
+    Config(Config),
+    /// Print values again and again, until Ctrl-C
+    Watch(Watch),
+    /// Show the unit on the whole screen: live values, outputs to switch, chart, counters, frames
+    Monitor(Monitor),
+    /// Send a PDU and show both frames
+    Raw(Raw),
+    /// Show the frames of other devices on the line, until Ctrl-C, without sending anything
+    Sniff(Sniff),
+    /// List the unit's points and registers, with what they mean
+    Describe(Describe),
+    /// Write a configuration of another system for the unit
+    Export(Export),
+    /// Restart the unit
+    Reboot,
+    /// Have the unit blink all its LEDs for 10 s
+    Identify,
+    /// Print a script that completes commands in a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page
+    Man,
+}
+
+/// Look for units on the line.
+#[derive(Args, Debug)]
+pub struct Scan {
+    /// Addresses to ask, such as 1-20,40
+    #[arg(long, value_name = "LIST", default_value = "1-247", value_parser = units)]
+    pub units: Units,
+    /// Rates to try in bit/s, such as 9600,19200, or all; default: that of the endpoint
+    #[arg(long, value_name = "LIST", value_parser = rates)]
+    pub rates: Option<Rates>,
+    /// Formats to try, such as 8N2,8E1, or all; default: that of the endpoint
+    #[arg(long, value_name = "LIST", value_parser = formats)]
+    pub formats: Option<Formats>,
+}
+
+/// Unit addresses, in ascending order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Units(pub Vec<u8>);
+/// Rates in bit/s.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rates(pub Vec<u32>);
+/// Formats.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Formats(pub Vec<crate::bus::format::Format>);
+
+fn units(text: &str) -> Result<Units, String> {
+    let wrong = || format!("{text:?} is no list of unit addresses 1 to 247, such as 1-20,40");
+    let mut units = Vec::new();
+    for part in text.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let number = |text: &str| text.trim().parse::<u8>().map_err(|_| wrong());
+        let (first, last) = (number(first)?, number(last)?);
+        if first == 0 || last > 247 || first > last {
+            return Err(wrong());
+        }
+        units.extend(first..=last);
+    }
+    units.sort_unstable();
+    units.dedup();
+    Ok(Units(units))
+}
+
+fn rates(text: &str) -> Result<Rates, String> {
+    let all = register_map::codes::Baud::ALL;
+    if text == "all" {
+        return Ok(Rates(
+            all.iter().map(|baud| baud.bits_per_second()).collect(),
+        ));
+    }
+    let each = text.split(',').map(|part| part.trim().parse::<u32>());
+    let rates = each.collect::<Result<Vec<_>, _>>();
+    match rates {
+        Ok(rates) if rates.iter().all(|rate| (50..=4_000_000).contains(rate)) => Ok(Rates(rates)),
+        _ => Err(format!(
+            "{text:?} is no list of rates such as 9600,19200, nor `all`"
+        )),
+    }
+}
+
+fn formats(text: &str) -> Result<Formats, String> {
+    let text = if text == "all" {
+        "8N2,8E1,8O1,8N1"
+    } else {
+        text
+    };
+    let each = text.split(',').map(|part| part.trim().parse());
+    Ok(Formats(each.collect::<Result<_, _>>()?))
+}
+
+/// Read points and registers.
+#[derive(Args, Debug)]
+pub struct Read {
+    /// Names such as p5.1, p5.1.filter, BAUD, or addresses such as 0x0010
+    #[arg(required = true, value_name = "NAME|ADDR")]
+    pub names: Vec<String>,
+    /// Numbers as they stand in the registers, without units and names
+    #[arg(long)]
+    pub raw: bool,
+}
+
+/// Write points and registers.
+#[derive(Args, Debug)]
+pub struct Write {
+    /// What to write, such as p5.1=on, p5.3=12000, BAUD=19200. Settings count as their register says, and last if they are saved
+    #[arg(required = true, value_name = "NAME|ADDR=VALUE", value_parser = assignment)]
+    pub values: Vec<(String, String)>,
+    /// Numbers as they stand in the registers
+    #[arg(long)]
+    pub raw: bool,
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err(format!("{text:?} is not NAME=VALUE")),
+    }
+}
+
+/// Which module is in a slot.
+#[derive(Subcommand, Debug)]
+pub enum Module {
+    /// Set it, save, restart and check: all a slot needs
+    Set {
+        /// The port of the slot, 1 to 8
+        #[arg(id = "slot", value_name = "PORT", value_parser = clap::value_parser!(u8).range(1..=8))]
+        port: u8,
+        /// The module: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+        module: String,
+    },
+}
+
+/// The unit's settings.
+#[derive(Subcommand, Debug)]
+pub enum Config {
+    /// Show settings, all without names
+    Get {
+        /// Names such as BAUD, p5.1.filter
+        names: Vec<String>,
+    },
+    /// Change settings; `config save` makes them last
+    Set {
+        /// Such as BAUD=19200
+        #[arg(required = true, value_name = "NAME=VALUE", value_parser = assignment)]
+        values: Vec<(String, String)>,
+    },
+    /// Make the settings last over a restart
+    Save,
+    /// Show where the settings differ from a file, or from the factory's
+    Diff {
+        /// A file that `config export` wrote
+        file: Option<PathBuf>,
+    },
+    /// Write all settings as TOML
+    Export {
+        /// The file; without, standard output
+        file: Option<PathBuf>,
+    },
+    /// Take the settings of a file: all are checked first, then written and saved
+    Import {
+        /// A file that `config export` wrote
+        file: PathBuf,
+        /// Restart the unit afterwards if a setting needs it
+        #[arg(long)]
+        restart: bool,
+    },
+    /// Set all to the factory's values, and save
+    Reset {
+        /// Restart the unit afterwards
+        #[arg(long)]
+        restart: bool,
+    },
+}
+
+/// Print values again and again.
+#[derive(Args, Debug)]
+pub struct Watch {
+    /// Names; without, all points
+    pub names: Vec<String>,
+    /// How often
+    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration)]
+    pub every: Duration,
+    /// As a table for spreadsheets
+    #[arg(long, conflicts_with = "json_lines")]
+    pub csv: bool,
+    /// As one JSON object a line
+    #[arg(long)]
+    pub json_lines: bool,
+    /// Numbers as they stand in the registers
+    #[arg(long)]
+    pub raw: bool,
+    /// Stop after so many
+    #[arg(long, value_name = "N")]
+    pub count: Option<u64>,
+}
+
+/// Show the unit on the whole screen.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Keys: arrows select, Space or Enter switches an output or opens the slider of an analog one, ? shows all keys, q quits.
+
+The monitor sends every request once, so --retries has no effect: polling goes on anyway, and a failed write is repeated \
+only when you ask for it. Polling counts as traffic: the unit's communication watchdog does not trip while the monitor \
+runs.")]
+pub struct Monitor {
+    /// Interval at which the points are read, 50ms to 10s
+    #[arg(long, value_name = "TIME", default_value = "250ms", value_parser = poll_interval)]
+    pub every: Duration,
+}
+
+fn poll_interval(text: &str) -> Result<Duration, String> {
+    let interval = duration(text)?;
+    if (50..=10_000).contains(&interval.as_millis()) {
+        Ok(interval)
+    } else {
+        Err("a time from 50ms to 10s is needed".to_owned())
+    }
+}
+
+/// Send a PDU.
+#[derive(Args, Debug)]
+pub struct Raw {
+    /// Function code and data in hexadecimal, such as 03 0000 0001; the check is added
+    #[arg(required = true, value_name = "PDU-HEX")]
+    pub pdu: Vec<String>,
+}
+
+/// Show the frames of other devices on the line.
+#[derive(Args, Debug)]
+pub struct Sniff {
+    /// Write a capture file (pcapng) for Wireshark as well; an existing file is overwritten
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+}
+
+/// List points and registers.
+#[derive(Args, Debug)]
+pub struct Describe {
+    /// Ask the unit even if its description is known from before
+    #[arg(long)]
+    pub refresh: bool,
+}
+
+/// Write a configuration of another system for the unit.
+#[derive(Args, Debug)]
+pub struct Export {
+    // The id `format` belongs to the global option --format.
+    /// The system
+    #[arg(id = "system", value_name = "SYSTEM", value_enum)]
+    pub format: ExportFormat,
+    /// Write to this file instead of standard output; an existing file is overwritten
+    #[arg(long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// A system that a configuration is written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ExportFormat {
+    /// A table of all points and registers
+    Csv,
+    /// The description of the unit, with the endpoint
+    Json,
+    /// YAML for the integrations modbus and template
+    HomeAssistant,
+    /// TOML for the input plugin modbus
+    Telegraf,
+    /// A flow with nodes of node-red-contrib-modbus
+    NodeRed,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn export_and_sniff_parse_with_options_of_the_endpoint() {
+        for line in [
+            "modioctl --format 8E1 --port a export home-assistant --output b",
+            "modioctl --port a sniff --record b --format 8E1 --json",
+        ] {
+            let cli = Cli::try_parse_from(line.split(' ')).unwrap();
+            assert_eq!(cli.endpoint.format.unwrap().to_string(), "8E1");
+        }
+    }
+
+    #[test]
+    fn lists_of_units_are_read() {
+        assert_eq!(units("3,1-2,2"), Ok(Units(vec![1, 2, 3])));
+        for wrong in ["", "0", "248", "5-3", "1-", "x"] {
+            assert!(units(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(rates("all").unwrap().0.len(), 11);
+        assert!(rates("9600,x").is_err());
+        assert_eq!(formats("all").unwrap().0.len(), 4);
+    }
+}

@@ -1,0 +1,165 @@
+//! The file of settings: TOML, by register name.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use modio_description::Unit;
+use register_map::codes::{Format, Mode};
+use register_map::configuration::{FORMAT, MODE};
+
+use super::{is_module, of_modules};
+use crate::commands::module::description;
+use crate::failure::Failure;
+use crate::names::{Book, Item, Meaning};
+use crate::value::{parse, show, takes};
+
+/// The text of a file.
+///
+/// # Errors
+///
+/// That the unit is no modio.
+pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
+    let about = description(book)?;
+    let mut text = format!(
+        "# Settings of a {} with firmware {}, as `modioctl config export` wrote them.\n",
+        about.board, about.firmware
+    );
+    for (item, words) in items.iter().zip(values) {
+        let shown = show(item, words, false);
+        let value = match &shown.json {
+            serde_json::Value::String(name) => toml::Value::String(name.clone()).to_string(),
+            _ => shown.text.clone(),
+        };
+        let _ = writeln!(
+            text,
+            "{} = {value}  # {}",
+            item.name,
+            comment(item, &shown.unit)
+        );
+    }
+    Ok(text)
+}
+
+fn comment(item: &Item, unit: &str) -> String {
+    let about = item
+        .about
+        .trim_start_matches("By point. ")
+        .trim_start_matches("By port. ");
+    let takes = match (&item.meaning, &item.values) {
+        (Meaning::Value(modio_description::Value::Number(of)), Some(values)) => takes(values, of),
+        (_, Some(values))
+            if unit.is_empty()
+                && !matches!(
+                    item.meaning,
+                    Meaning::Value(modio_description::Value::Codes(_))
+                ) =>
+        {
+            takes(values, &Unit::default())
+        }
+        _ => String::new(),
+    };
+    let takes = takes.trim_start_matches("it takes ");
+    match takes {
+        "" => about.to_owned(),
+        takes => format!("{takes}. {about}"),
+    }
+}
+
+/// Reads a file: names and values.
+///
+/// # Errors
+///
+/// That it cannot be read, or is no TOML.
+pub fn read(path: &Path) -> Result<Vec<(String, String)>, Failure> {
+    let shown = path.display();
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Failure::usage(format!("cannot read {shown}: {error}")))?;
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
+        let line = error.span().map_or(1, |span| {
+            text.get(..span.start)
+                .unwrap_or_default()
+                .matches('\n')
+                .count()
+                + 1
+        });
+        Failure::usage(format!("{shown}, line {line}: {}", error.message()))
+    })?;
+    let mut values = Vec::new();
+    flatten(String::new(), table, &mut values);
+    Ok(values)
+}
+
+/// `p5.1.filter = 4` stands for tables within tables.
+fn flatten(prefix: String, table: toml::Table, values: &mut Vec<(String, String)>) {
+    for (key, value) in table {
+        let name = if prefix.is_empty() {
+            key
+        } else {
+            format!("{prefix}.{key}")
+        };
+        match value {
+            toml::Value::Table(inner) => flatten(name, inner, values),
+            toml::Value::String(text) => values.push((name, text)),
+            other => values.push((name, other.to_string())),
+        }
+    }
+}
+
+/// The names of the unit with the modules that the file asks for.
+///
+/// # Errors
+///
+/// That the file cannot be read, or asks for a module that there is not.
+pub fn book(book: &Book, path: &Path) -> Result<Book, Failure> {
+    let mut modules = Vec::new();
+    for (name, text) in read(path)? {
+        if let Ok(item) = book.find(&name)
+            && is_module(&item)
+        {
+            modules.push((item.address, parse(&item, &text, false)?));
+        }
+    }
+    of_modules(book, |port| {
+        let address = register_map::configuration::module_of(port.into());
+        let wanted = modules.iter().find(|(module, _)| *module == address);
+        wanted.and_then(|(_, words)| words.first().copied())
+    })
+}
+
+/// Checks names and values.
+///
+/// # Errors
+///
+/// The first that is wrong.
+pub fn check(book: &Book, values: Vec<(String, String)>) -> Result<Vec<(Item, Vec<u16>)>, Failure> {
+    let mut changes = Vec::new();
+    for (name, text) in values {
+        let item = book.find(&name)?;
+        if !item.setting {
+            return Err(Failure::usage(format!("{name} is no setting")));
+        }
+        let words = parse(&item, &text, false)?;
+        changes.push((item, words));
+    }
+    Ok(changes)
+}
+
+/// Checks that FORMAT suits MODE, as the unit would.
+///
+/// # Errors
+///
+/// That it does not.
+pub fn check_line(wanted: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+    let word = |address: u16| {
+        let found = wanted.iter().find(|(item, _)| item.address == address);
+        found.and_then(|(_, words)| words.first().copied())
+    };
+    let format = word(FORMAT).and_then(Format::from_code);
+    let mode = word(MODE).and_then(Mode::from_code);
+    match (format, mode) {
+        (Some(format), Some(mode)) if !format.suits(mode) => Err(Failure::usage(
+            "FORMAT with 7 data bits needs MODE = \"ASCII\"",
+        )),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,114 @@
+//! The commands.
+
+mod config;
+mod describe;
+mod export;
+mod info;
+mod module;
+pub mod ports;
+mod raw;
+mod read;
+mod scan;
+mod sniff;
+mod watch;
+mod write;
+
+pub(crate) use describe::{description_json, values};
+pub use module::description;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::CommandFactory;
+
+use crate::bus::Endpoint;
+use crate::cli::{Cli, Command};
+use crate::device::{Device, Learned, fetch};
+use crate::failure::Failure;
+use crate::{monitor, output, trace};
+
+/// What a shell says of a program that Ctrl-C ended.
+const INTERRUPTED: u8 = 130;
+
+/// Does what the command line says, until it is done or Ctrl-C is pressed.
+///
+/// # Errors
+///
+/// Why it could not be done.
+pub async fn run(cli: Cli) -> Result<ExitCode, Failure> {
+    let until_stopped = matches!(
+        cli.command,
+        Command::Watch(_) | Command::Monitor(_) | Command::Sniff(_)
+    );
+    tokio::select! {
+        result = dispatch(cli) => result.map(|()| ExitCode::SUCCESS),
+        _ = tokio::signal::ctrl_c() => Ok(if until_stopped {
+            ExitCode::SUCCESS
+        } else {
+            eprintln!("modioctl: stopped");
+            ExitCode::from(INTERRUPTED)
+        }),
+    }
+}
+
+async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
+    let json = cli.json;
+    // These need no unit.
+    match cli.command {
+        Command::Ports => return ports::run(json),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "modioctl", &mut script);
+            return output::line(format_args!("{}", String::from_utf8_lossy(&script)));
+        }
+        Command::Man => {
+            let mut page = Vec::new();
+            clap_mangen::Man::new(Cli::command())
+                .render(&mut page)
+                .map_err(Failure::usage)?;
+            return output::line(format_args!("{}", String::from_utf8_lossy(&page)));
+        }
+        _ => {}
+    }
+    let endpoint = endpoint(&mut cli)?;
+    if let Command::Monitor(options) = cli.command {
+        return monitor::run(endpoint, &options, cli.trace).await;
+    }
+    if let Command::Sniff(options) = cli.command {
+        return sniff::run(&endpoint, &options, json).await;
+    }
+    let observer = cli.trace.then(trace::to_stderr);
+    if let Command::Scan(options) = cli.command {
+        return scan::run(endpoint, observer, &options, json).await;
+    }
+    let mut device = Device::open(endpoint, observer).await?;
+    match cli.command {
+        Command::Info => info::run(&mut device, json).await,
+        Command::Read(options) => read::run(&mut device, &options, json).await,
+        Command::Write(options) => write::run(&mut device, &options).await,
+        Command::Module(options) => module::run(device, options).await,
+        Command::Config(options) => config::run(device, options, json).await,
+        Command::Watch(options) => watch::run(device, &options).await,
+        Command::Raw(options) => raw::run(&mut device, &options).await,
+        Command::Describe(options) => describe::run(&mut device, &options, json).await,
+        Command::Export(options) => export::run(&mut device, &options).await,
+        Command::Reboot => module::reboot(device).await,
+        Command::Identify => module::identify(&mut device).await,
+        Command::Scan(_)
+        | Command::Monitor(_)
+        | Command::Sniff(_)
+        | Command::Ports
+        | Command::Completions { .. }
+        | Command::Man => Ok(()),
+    }
+}
+
+fn endpoint(cli: &mut Cli) -> Result<Endpoint, Failure> {
+    let options = std::mem::take(&mut cli.endpoint);
+    options.endpoint(cli.at.as_deref(), cli.endpoints.as_deref().map(Path::new))
+}
+
+/// What the unit is.
+async fn learn(device: &mut Device) -> Result<Learned, Failure> {
+    fetch(device, false).await
+}

@@ -1,0 +1,115 @@
+//! `modioctl module`, `reboot` and `identify`: orders.
+
+use modio_description::Description;
+use register_map::{points, state};
+
+use super::learn;
+use crate::cli::Module;
+use crate::device::Device;
+use crate::failure::Failure;
+use crate::names::Book;
+use crate::output;
+use crate::value::{parse, show};
+
+/// COMMAND 6: all LEDs blink.
+const IDENTIFY: u16 = 6;
+
+/// Commissions a slot.
+///
+/// # Errors
+///
+/// That the port or the module is none of the unit's, or what went wrong with the unit.
+pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
+    let Module::Set { port, module } = options;
+    let book = learn(&mut device).await?.book;
+    let description = description(&book)?;
+    if !description.ports.iter().any(|known| known.number == port) {
+        let ports: Vec<_> = description
+            .ports
+            .iter()
+            .map(|port| port.number.to_string())
+            .collect();
+        return Err(Failure::usage(format!(
+            "port {port} has no slot: {} has slots at {}",
+            description.board,
+            ports.join(", ")
+        )));
+    }
+    let item = book.find(&format!("p{port}.module"))?;
+    let words = parse(&item, &module, false)?;
+    device.unlock().await?;
+    device.write_item(&item, &words).await?;
+    device.save().await?;
+    let mut device = device.restart().await?;
+    let index = u16::from(port) - 1;
+    let in_force = device.read_words(state::MODULE_IN_FORCE + index, 1).await?;
+    if in_force != words {
+        return Err(Failure::Refused(format!(
+            "port {port} has module {} in force, not {module}: look at `modioctl info`",
+            show(&item, &in_force, false)
+        )));
+    }
+    // A module needs some scans before it can be judged.
+    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+    let fares = book.find(&format!("p{port}.module_state"))?;
+    let state = device.read_items(std::slice::from_ref(&fares)).await?;
+    let state = state
+        .first()
+        .map(|words| show(&fares, words, false).text)
+        .unwrap_or_default();
+    output::line(format_args!(
+        "port {port}: {}, saved and in force; state: {state}",
+        show(&item, &words, false)
+    ))
+}
+
+/// The description of a modio.
+///
+/// # Errors
+///
+/// That the unit is none.
+pub fn description(book: &Book) -> Result<&Description, Failure> {
+    book.description().ok_or_else(|| {
+        Failure::Refused(
+            "the unit is no modio: of others `read` and `write` work with addresses".to_owned(),
+        )
+    })
+}
+
+/// Restarts the unit.
+///
+/// # Errors
+///
+/// What went wrong with the unit.
+pub async fn reboot(mut device: Device) -> Result<(), Failure> {
+    device.unlock().await?;
+    let mut device = device.restart().await?;
+    let words = device
+        .read_words(state::MODULE_STATE, points::PORTS)
+        .await?;
+    let bad = words.iter().any(|state| *state > 1);
+    output::line(format_args!(
+        "restarted{}",
+        if bad {
+            "; a module is not well, see `modioctl info`"
+        } else {
+            ""
+        }
+    ))
+}
+
+/// Has the unit blink.
+///
+/// # Errors
+///
+/// What went wrong with the unit.
+pub async fn identify(device: &mut Device) -> Result<(), Failure> {
+    device.unlock().await?;
+    device
+        .order(IDENTIFY, "blinking (firmware that is older cannot)")
+        .await?;
+    output::line(format_args!(
+        "all LEDs of unit {} blink for 10 s",
+        device.unit
+    ))
+}

@@ -1,0 +1,66 @@
+//! `modioctl ports`.
+
+use serde_json::json;
+use serialport::{SerialPortInfo, SerialPortType, available_ports};
+
+use crate::failure::Failure;
+use crate::output;
+
+/// Lists the serial ports with what is known of their adapters.
+///
+/// # Errors
+///
+/// That the system does not tell.
+pub fn run(json: bool) -> Result<(), Failure> {
+    let ports = available_ports().map_err(|error| {
+        Failure::Port(format!(
+            "the system does not list its serial ports: {error}"
+        ))
+    })?;
+    if json {
+        let each = ports.iter().map(|port| {
+            json!({ "port": port.port_name, "adapter": adapter(port), "serial": serial(port) })
+        });
+        return output::json(&each.collect::<Vec<_>>());
+    }
+    if ports.is_empty() {
+        return output::line(format_args!("no serial ports: is the adapter plugged in?"));
+    }
+    let rows: Vec<_> = ports
+        .iter()
+        .map(|port| [port.port_name.clone(), adapter(port), serial(port)])
+        .collect();
+    output::table(&rows)
+}
+
+/// The names of this computer's serial ports, for people.
+#[must_use]
+pub fn names() -> String {
+    let ports = available_ports().unwrap_or_default();
+    let names: Vec<_> = ports.into_iter().map(|port| port.port_name).collect();
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
+    }
+}
+
+fn adapter(port: &SerialPortInfo) -> String {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) => {
+            let name = [&usb.manufacturer, &usb.product];
+            let name: Vec<_> = name.into_iter().flatten().map(String::as_str).collect();
+            format!("USB {:04x}:{:04x} {}", usb.vid, usb.pid, name.join(" "))
+        }
+        SerialPortType::PciPort => "on board".to_owned(),
+        SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
+        SerialPortType::Unknown => "unknown".to_owned(),
+    }
+}
+
+fn serial(port: &SerialPortInfo) -> String {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) => usb.serial_number.clone().unwrap_or_default(),
+        _ => String::new(),
+    }
+}

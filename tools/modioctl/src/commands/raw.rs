@@ -1,0 +1,71 @@
+//! `modioctl raw`.
+
+use crate::bus::{Lost, decode};
+use crate::cli::Raw;
+use crate::device::Device;
+use crate::failure::Failure;
+use crate::output;
+
+/// Sends a PDU and shows both frames.
+///
+/// # Errors
+///
+/// That the digits are none, what went wrong, or the exception.
+pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
+    let pdu = hex(&options.pdu.concat())?;
+    let framing = device.master.endpoint().framing;
+    output::line(format_args!(
+        "-> {}  {}",
+        decode::bytes(framing, &framing.frame(0, device.unit, &pdu)),
+        decode::request(&pdu)
+    ))?;
+    match device.master.ask(device.unit, &pdu).await {
+        Ok(answer) => {
+            let frame = framing.frame(0, device.unit, &answer);
+            output::line(format_args!(
+                "<- {}  {}",
+                decode::bytes(framing, &frame),
+                decode::response(&answer, Some(&pdu))
+            ))?;
+            match answer[..] {
+                [function, code] if function & 0x80 != 0 => {
+                    Err(device.exception(code, "the request"))
+                }
+                _ => Ok(()),
+            }
+        }
+        Err(Lost::Garbled(bytes)) => {
+            output::line(format_args!(
+                "<- {}  no answer to this",
+                decode::bytes(framing, &bytes)
+            ))?;
+            Err(device.lost(&Lost::Garbled(bytes)))
+        }
+        Err(lost) => Err(device.lost(&lost)),
+    }
+}
+
+fn hex(digits: &str) -> Result<Vec<u8>, Failure> {
+    let digits: String = digits.chars().filter(|c| !c.is_whitespace()).collect();
+    let wrong = || {
+        Failure::usage(format!(
+            "{digits:?} is no PDU in hexadecimal, 1 to 253 bytes: 03 0000 0001"
+        ))
+    };
+    let bytes = digits.as_bytes();
+    let (pairs, rest) = bytes.as_chunks::<2>();
+    if pairs.is_empty() || pairs.len() > 253 || !rest.is_empty() {
+        return Err(wrong());
+    }
+    let byte = |pair: &[u8; 2]| {
+        let text = std::str::from_utf8(pair).ok()?;
+        text.bytes()
+            .all(|c| c.is_ascii_hexdigit())
+            .then(|| u8::from_str_radix(text, 16).ok())?
+    };
+    pairs
+        .iter()
+        .map(byte)
+        .collect::<Option<_>>()
+        .ok_or_else(wrong)
+}

@@ -1,0 +1,52 @@
+//! `modioctl read`.
+
+use serde_json::{Value as Json, json};
+
+use super::learn;
+use crate::cli::Read;
+use crate::device::Device;
+use crate::failure::Failure;
+use crate::names::Item;
+use crate::output;
+use crate::value::show;
+
+/// Reads items by name or address.
+///
+/// # Errors
+///
+/// That a name is unknown, or what went wrong with the unit.
+pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), Failure> {
+    let book = learn(device).await?.book;
+    let items: Vec<Item> = options
+        .names
+        .iter()
+        .map(|name| book.find(name))
+        .collect::<Result<_, _>>()?;
+    let values = device.read_items(&items).await?;
+    let both = items.iter().zip(&values);
+    if json {
+        let each = both.map(|(item, words)| as_json(item, words, options.raw));
+        return output::json(&each.collect::<Vec<_>>());
+    }
+    let rows: Vec<_> = both
+        .map(|(item, words)| {
+            [
+                item.name.clone(),
+                show(item, words, options.raw).to_string(),
+            ]
+        })
+        .collect();
+    output::table(&rows)
+}
+
+/// An item with its value, for programs.
+pub fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
+    let shown = show(item, words, raw);
+    json!({
+        "name": item.name,
+        "address": item.address,
+        "words": words,
+        "value": shown.json,
+        "unit": shown.unit,
+    })
+}

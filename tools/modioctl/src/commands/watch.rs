@@ -1,0 +1,126 @@
+//! `modioctl watch`.
+
+use chrono::{DateTime, Local, SecondsFormat};
+use serde_json::{Map, Value as Json, json};
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::learn;
+use crate::cli::Watch;
+use crate::device::Device;
+use crate::failure::Failure;
+use crate::names::{Book, Item};
+use crate::output;
+use crate::value::{Shown, show};
+
+/// Prints values until it is stopped. A unit that is lost is waited for.
+///
+/// # Errors
+///
+/// That a name is unknown, or that the unit refuses.
+pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
+    let items = chosen(&learn(&mut device).await?.book, &options.names)?;
+    if options.csv {
+        let names: Vec<_> = items.iter().map(|item| item.name.as_str()).collect();
+        output::line(format_args!("time,{}", names.join(",")))?;
+    }
+    let mut ticks = interval(options.every);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let mut lost = false;
+    let mut printed = 0;
+    while options.count.is_none_or(|count| printed < count) {
+        ticks.tick().await;
+        match device.read_items(&items).await {
+            Ok(values) => {
+                if lost {
+                    eprintln!("modioctl: the unit is back");
+                    lost = false;
+                }
+                let shown = items.iter().zip(&values);
+                let shown: Vec<_> = shown
+                    .map(|(item, words)| show(item, words, options.raw))
+                    .collect();
+                print(Local::now(), &items, &shown, options)?;
+                printed += 1;
+            }
+            Err(failure) if failure.may_pass() => {
+                if !lost {
+                    eprintln!("modioctl: {failure}; waiting for it");
+                    lost = true;
+                }
+                if matches!(failure, Failure::Port(_)) {
+                    let endpoint = device.master.endpoint().clone();
+                    device = reconnect(device, endpoint).await;
+                }
+            }
+            Err(failure) => return Err(failure),
+        }
+    }
+    Ok(())
+}
+
+/// Opens the port or connection again, as often as it takes.
+async fn reconnect(device: Device, endpoint: crate::bus::Endpoint) -> Device {
+    drop(device);
+    loop {
+        tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+        if let Ok(device) = Device::open(endpoint.clone(), None).await {
+            return device;
+        }
+    }
+}
+
+/// The items with these names; all points without names.
+///
+/// # Errors
+///
+/// That a name is unknown, or that there are no points.
+pub fn chosen(book: &Book, names: &[String]) -> Result<Vec<Item>, Failure> {
+    if !names.is_empty() {
+        return names.iter().map(|name| book.find(name)).collect();
+    }
+    let points: Vec<_> = book.points().cloned().collect();
+    if points.is_empty() {
+        return Err(Failure::usage(
+            "the unit has no points: set a module with `modioctl module set PORT MODULE`, or name what to watch",
+        ));
+    }
+    Ok(points)
+}
+
+fn print(
+    now: DateTime<Local>,
+    items: &[Item],
+    shown: &[Shown],
+    options: &Watch,
+) -> Result<(), Failure> {
+    let time = now.to_rfc3339_opts(SecondsFormat::Millis, false);
+    if options.csv {
+        let values: Vec<_> = shown.iter().map(|shown| quoted(&shown.text)).collect();
+        return output::line(format_args!("{time},{}", values.join(",")));
+    }
+    let both = items.iter().zip(shown);
+    if options.json_lines {
+        let mut object: Map<String, Json> = both
+            .map(|(item, shown)| (item.name.clone(), shown.json.clone()))
+            .collect();
+        object.insert("time".to_owned(), json!(time));
+        return output::line(format_args!("{}", Json::from(object)));
+    }
+    let values: Vec<_> = both
+        .map(|(item, shown)| format!("{} {shown}", item.name))
+        .collect();
+    output::line(format_args!(
+        "{}  {}",
+        now.format("%H:%M:%S%.3f"),
+        values.join("   ")
+    ))
+}
+
+/// A field of a CSV file (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}

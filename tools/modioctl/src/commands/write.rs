@@ -1,0 +1,70 @@
+//! `modioctl write`.
+
+use modio_description::Table;
+
+use super::learn;
+use crate::cli::Write;
+use crate::device::Device;
+use crate::failure::Failure;
+use crate::names::Item;
+use crate::output;
+use crate::value::{parse, show};
+
+/// Writes items by name or address, after all of them have been checked.
+///
+/// # Errors
+///
+/// That a name or a value is wrong; nothing is written then. Or what went wrong with the unit.
+pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
+    let book = learn(device).await?.book;
+    let mut checked = Vec::new();
+    for (name, text) in &options.values {
+        let item = book.find(name)?;
+        let words = parse(&item, text, options.raw)?;
+        checked.push((item, words));
+    }
+    if checked
+        .iter()
+        .any(|(item, _)| item.setting || item.name == "COMMAND")
+    {
+        device.unlock().await?;
+    }
+    for (item, words) in &checked {
+        device.write_item(item, words).await?;
+    }
+    let mut unsaved = false;
+    for (item, words) in &checked {
+        unsaved |= item.setting;
+        let when = if item.restart {
+            " after save and restart"
+        } else {
+            ""
+        };
+        output::line(format_args!(
+            "{} = {}{when}",
+            item.name,
+            show(item, words, options.raw)
+        ))?;
+    }
+    if unsaved {
+        output::line(format_args!(
+            "not saved: `modioctl config save` makes it last"
+        ))?;
+    }
+    Ok(())
+}
+
+impl Device {
+    /// Writes an item.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words.
+    pub async fn write_item(&mut self, item: &Item, words: &[u16]) -> Result<(), Failure> {
+        let about = format!("writing {}", item.name);
+        match (item.table, words) {
+            (Table::Bit, [bit, ..]) => self.write_bit(item.address, *bit != 0, &about).await,
+            _ => self.write_words(item.address, words, &about).await,
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! What a unit is: its own description of its registers, which this program may know already.
+
+use std::path::PathBuf;
+
+use etcetera::BaseStrategy;
+use modio_description::{Description, FILE, HEAD, checksum, describe, records};
+use register_map::configuration::{RANGE, SCALE};
+use register_map::{Board, Module, points, state};
+
+use super::Device;
+use crate::failure::Failure;
+use crate::names::Book;
+
+/// Records that one request reads: 124 go into a response, less a margin for gateways with small buffers.
+const RECORDS: u16 = 100;
+
+/// How often a description is read again whose check is wrong: the unit may have been given other modules meanwhile.
+const TIMES: u8 = 2;
+
+/// What is known of a unit.
+#[derive(Clone, Debug)]
+pub struct Learned {
+    /// Its names.
+    pub book: Book,
+    /// Where the description is from, for people.
+    pub source: String,
+}
+
+/// Learns what the unit is. A unit that is no modio has no names, only addresses. `refresh`: its description is read
+/// from the unit, even if it is known.
+///
+/// # Errors
+///
+/// That it does not answer, or that its description cannot be read.
+pub async fn fetch(device: &mut Device, refresh: bool) -> Result<Learned, Failure> {
+    let Some((description, source)) = description(device, refresh).await? else {
+        return Ok(Learned {
+            book: Book::default(),
+            source: "nothing: the unit is no modio".to_owned(),
+        });
+    };
+    let readings = readings(device, &description).await?;
+    Ok(Learned {
+        book: Book::new(description, readings),
+        source,
+    })
+}
+
+/// The unit's description and where it is from; `None` for a unit that is no modio.
+async fn description(
+    device: &mut Device,
+    refresh: bool,
+) -> Result<Option<(Description, String)>, Failure> {
+    if !is_modio(device).await? {
+        return Ok(None);
+    }
+    let known = known(device).await?;
+    let own = match device.read_words(state::DESCRIPTION_CRC, 1).await {
+        Ok(words) => words.first().copied(),
+        // Firmware from before it described itself.
+        Err(Failure::Refused(_)) => None,
+        Err(failure) => return Err(failure),
+    };
+    let Some(own) = own else {
+        return Ok(known.map(|known| (known, "this program: the unit has none".to_owned())));
+    };
+    if !refresh {
+        let same = |description: &Description| checksum(&description.encode()) == own;
+        if let Some(known) = known.filter(same) {
+            return Ok(Some((known, "this program, which knows it".to_owned())));
+        }
+        if let Some(kept) = kept(own).filter(same) {
+            return Ok(Some((
+                kept,
+                format!("file {}", path(own).unwrap_or_default().display()),
+            )));
+        }
+    }
+    let file = read_file(device).await?;
+    keep(own, &file);
+    let read = Description::open(&file).map_err(|error| {
+        Failure::Refused(format!(
+            "the unit's description cannot be used ({error}): a newer modioctl may be needed"
+        ))
+    })?;
+    Ok(Some((read, "the unit".to_owned())))
+}
+
+/// What this program knows of the unit by its register map, without asking for its description; `None` for a unit that
+/// is no modio, or has a board that is newer than this program.
+///
+/// # Errors
+///
+/// That it does not answer.
+pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> {
+    let head = match device.read_words(state::PRODUCT_CODE, 6).await {
+        Ok(head) => head,
+        Err(Failure::Refused(_)) => return Ok(None),
+        Err(failure) => return Err(failure),
+    };
+    let [high, low, version, patch, _, code] = head[..] else {
+        return Ok(None);
+    };
+    let product = u32::from(high) << 16 | u32::from(low);
+    let Some(board) = Board::from_code(code).filter(|_| product == state::PRODUCT) else {
+        return Ok(None);
+    };
+    let modules = device
+        .read_words(state::MODULE_IN_FORCE, points::PORTS)
+        .await?;
+    let firmware = format!("{}.{}.{patch}", version >> 8, version & 0xFF);
+    let module = |port: u16| {
+        let code = modules.get(usize::from(port) - 1).copied();
+        code.and_then(Module::from_code).unwrap_or(Module::None)
+    };
+    Ok(Some(describe(board, &firmware, module)))
+}
+
+async fn is_modio(device: &mut Device) -> Result<bool, Failure> {
+    match device.read_words(state::PRODUCT_CODE, 2).await {
+        Ok(words) => Ok(words == [(state::PRODUCT >> 16) as u16, state::PRODUCT as u16]),
+        Err(Failure::Refused(_)) => Ok(false),
+        Err(failure) => Err(failure),
+    }
+}
+
+/// File 1 of the unit, as bytes, with a check that is right.
+async fn read_file(device: &mut Device) -> Result<Vec<u8>, Failure> {
+    eprintln!("modioctl: reading the unit's description of itself; it is kept for the next time");
+    let mut last = None;
+    for _ in 0..TIMES {
+        let mut file = device.read_records(FILE, 0, HEAD).await?;
+        let length = file
+            .first_chunk::<2>()
+            .map_or(0, |length| u16::from_be_bytes(*length));
+        let mut next = HEAD;
+        while next < records(length) {
+            let count = (records(length) - next).min(RECORDS);
+            file.extend(device.read_records(FILE, next, count).await?);
+            next += count;
+        }
+        match Description::open(&file) {
+            Err(
+                error @ (modio_description::Error::Crc { .. }
+                | modio_description::Error::Short { .. }),
+            ) => {
+                last = Some(error);
+            }
+            _ => return Ok(file),
+        }
+    }
+    let why = last.map_or_else(String::new, |error| error.to_string());
+    Err(Failure::Garbled(format!(
+        "the unit's description does not arrive whole ({why})"
+    )))
+}
+
+/// RANGE and SCALE of every point.
+async fn readings(
+    device: &mut Device,
+    description: &Description,
+) -> Result<Vec<(u16, u16)>, Failure> {
+    let address = |name: &str, known: u16| {
+        let register = description.registers.iter().find(|r| r.name == name);
+        register.map_or(known, |register| register.address)
+    };
+    let ranges = device
+        .read_words(address("RANGE", RANGE), points::COUNT)
+        .await?;
+    let scales = device
+        .read_words(address("SCALE", SCALE), points::COUNT)
+        .await?;
+    Ok(ranges.into_iter().zip(scales).collect())
+}
+
+/// The file in which a description with this CRC is kept; `None` without a home directory.
+fn path(crc: u16) -> Option<PathBuf> {
+    let strategy = etcetera::choose_base_strategy().ok()?;
+    let directory = strategy.cache_dir().join("modio");
+    Some(directory.join(format!("description-{crc:04x}.bin")))
+}
+
+fn kept(crc: u16) -> Option<Description> {
+    Description::open(&std::fs::read(path(crc)?).ok()?).ok()
+}
+
+/// Keeps a description. One that cannot be kept is read again next time.
+fn keep(crc: u16, file: &[u8]) {
+    let Some(path) = path(crc) else { return };
+    // Whole or not at all, whatever ends the program meanwhile.
+    let new = path.with_extension(format!("{}.new", std::process::id()));
+    let written = path
+        .parent()
+        .map_or(Ok(()), std::fs::create_dir_all)
+        .and_then(|()| std::fs::write(&new, file));
+    if written.and_then(|()| std::fs::rename(&new, &path)).is_err() {
+        let _ = std::fs::remove_file(&new);
+    }
+}

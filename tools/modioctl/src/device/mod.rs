@@ -1,0 +1,255 @@
+//! A unit on the line: its registers and points, with errors in words.
+
+mod learn;
+mod orders;
+mod several;
+
+use std::time::Duration;
+
+pub use learn::{Learned, fetch, known};
+pub use orders::with_modules;
+
+use crate::bus::endpoint::{Endpoint, Place};
+use crate::bus::{Lost, Master, Observer, decode};
+use crate::failure::Failure;
+
+/// Registers that one request can read (V1.1b3, 6.3).
+const MOST_WORDS: u16 = 125;
+/// Registers that one request can write (V1.1b3, 6.12).
+const MOST_WRITTEN: usize = 123;
+/// Bits that one request can read here: far fewer than the standard's 2000, and more than there are.
+const MOST_BITS: u16 = 256;
+
+/// A unit, and the line to it.
+pub struct Device {
+    /// The line.
+    pub master: Master,
+    /// The unit's address.
+    pub unit: u8,
+}
+
+impl Device {
+    /// Opens the line to the endpoint's unit.
+    ///
+    /// # Errors
+    ///
+    /// Why it cannot be opened.
+    pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
+        let unit = endpoint.unit;
+        let master = Master::open(endpoint, observer).await?;
+        Ok(Self { master, unit })
+    }
+
+    /// Sends a request. An exception is a failure; `about` says what was asked, for its text.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words.
+    pub async fn ask(&mut self, pdu: &[u8], about: &str) -> Result<Vec<u8>, Failure> {
+        match self.master.ask(self.unit, pdu).await {
+            Ok(response) => match response[..] {
+                [function, code] if function & 0x80 != 0 => Err(self.exception(code, about)),
+                _ => Ok(response),
+            },
+            Err(lost) => Err(self.lost(&lost)),
+        }
+    }
+
+    /// Registers from `first` on, by function 03.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words.
+    pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>, Failure> {
+        let mut words = Vec::new();
+        let mut done = 0;
+        while done < count {
+            let now = (count - done).min(MOST_WORDS);
+            let from = first.wrapping_add(done);
+            let request = head(3, from, now);
+            let about = format!("reading {}", span(from, now));
+            let response = self.ask(&request, &about).await?;
+            let (pairs, _) = response.get(2..).unwrap_or_default().as_chunks::<2>();
+            words.extend(pairs.iter().map(|pair| u16::from_be_bytes(*pair)));
+            done += now;
+        }
+        Ok(words)
+    }
+
+    /// Bits from `first` on, by function 01.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words.
+    pub async fn read_bits(&mut self, first: u16, count: u16) -> Result<Vec<bool>, Failure> {
+        let count = count.min(MOST_BITS);
+        let request = head(1, first, count);
+        let about = format!("reading {}", span(first, count));
+        let response = self.ask(&request, &about).await?;
+        let bytes = response.get(2..).unwrap_or_default();
+        let bits = bytes
+            .iter()
+            .flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1 == 1));
+        Ok(bits.take(count.into()).collect())
+    }
+
+    /// Writes registers: one by function 06, more by function 10.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words; `about` is what is being written.
+    pub async fn write_words(
+        &mut self,
+        first: u16,
+        words: &[u16],
+        about: &str,
+    ) -> Result<(), Failure> {
+        if let [word] = words {
+            self.ask(&head(6, first, *word), about).await?;
+            return Ok(());
+        }
+        for (n, words) in (0_u16..).zip(words.chunks(MOST_WRITTEN)) {
+            let from = first.wrapping_add(n * MOST_WRITTEN as u16);
+            let mut request = head(0x10, from, words.len() as u16);
+            request.push(words.len() as u8 * 2);
+            request.extend(words.iter().flat_map(|word| word.to_be_bytes()));
+            self.ask(&request, about).await?;
+        }
+        Ok(())
+    }
+
+    /// Writes one bit, by function 05.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words; `about` is what is being written.
+    pub async fn write_bit(&mut self, address: u16, on: bool, about: &str) -> Result<(), Failure> {
+        let word = if on { 0xFF00 } else { 0 };
+        self.ask(&head(5, address, word), about).await?;
+        Ok(())
+    }
+
+    /// Records of a file, by function 14, as bytes.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words.
+    pub async fn read_records(
+        &mut self,
+        file: u16,
+        first: u16,
+        count: u16,
+    ) -> Result<Vec<u8>, Failure> {
+        let mut request = vec![0x14, 7, 6];
+        request.extend(
+            [file, first, count]
+                .iter()
+                .flat_map(|word| word.to_be_bytes()),
+        );
+        let about = format!("reading file {file}");
+        let response = self.ask(&request, &about).await?;
+        // Behind function, length of all, length of the group and reference type.
+        Ok(response.get(4..).unwrap_or_default().to_vec())
+    }
+
+    /// Waits until the unit answers again, after a restart.
+    ///
+    /// # Errors
+    ///
+    /// That it did not within `most`.
+    pub async fn wait_until_back(&mut self, most: Duration) -> Result<(), Failure> {
+        let until = tokio::time::Instant::now() + most;
+        // A unit that is still there, but not yet restarted, would answer as well.
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        loop {
+            match self.read_words(register_map::state::STATUS, 1).await {
+                Err(failure) if failure.may_pass() => {
+                    if tokio::time::Instant::now() > until {
+                        return Err(failure.while_doing("after the restart"));
+                    }
+                }
+                result => return result.map(|_| ()),
+            }
+        }
+    }
+
+    /// Says whether the unit's line settings are those of this computer's port.
+    #[must_use]
+    pub const fn is_serial(&self) -> bool {
+        self.master.endpoint().place.is_serial()
+    }
+
+    /// What an exception means.
+    #[must_use]
+    pub fn exception(&self, code: u8, about: &str) -> Failure {
+        let name = decode::exception(code);
+        let meaning = match code {
+            1 => "the unit does not have this function",
+            2 => "there is no such point or register, or it cannot be written",
+            3 => "the unit does not take this value",
+            4 => {
+                "the module in the slot does not answer: is it plugged in, and the one that is set?"
+            }
+            6 => "the configuration is locked, or a save is still under way: try again",
+            0x0A | 0x0B => "the gateway says that the unit does not answer",
+            _ => "the unit's manual says more",
+        };
+        let unit = self.unit;
+        Failure::Refused(format!(
+            "{about}: unit {unit} refuses with exception {code:02X} ({name}): {meaning}"
+        ))
+    }
+
+    /// Why there is no answer.
+    #[must_use]
+    pub fn lost(&self, lost: &Lost) -> Failure {
+        let endpoint = self.master.endpoint();
+        let unit = self.unit;
+        let place = place(endpoint);
+        match lost {
+            Lost::Silent => Failure::NoAnswer(format!(
+                "unit {unit} does not answer at {place}: check power, wiring (A and B swapped?), address, rate and format; `modioctl scan` looks for units"
+            )),
+            Lost::Garbled(bytes) => {
+                let shown = bytes.get(..bytes.len().min(12)).unwrap_or_default();
+                Failure::Garbled(format!(
+                    "something answers at {place}, but garbled ({} bytes: {}{}): wrong rate or format, two units with address {unit}, or no termination",
+                    bytes.len(),
+                    decode::bytes(endpoint.framing, shown),
+                    if shown.len() < bytes.len() {
+                        " ..."
+                    } else {
+                        ""
+                    },
+                ))
+            }
+            Lost::Broken(error) => Failure::Port(format!(
+                "{place} is lost ({error}): is the adapter still plugged in, or the gateway running?"
+            )),
+        }
+    }
+}
+
+/// An endpoint for people.
+#[must_use]
+pub fn place(endpoint: &Endpoint) -> String {
+    match &endpoint.place {
+        Place::Serial(path) => format!("{path}, {} bit/s {}", endpoint.baud, endpoint.format),
+        Place::Tcp(address) => address.clone(),
+        Place::ModbusTcp(address) => format!("{address} (Modbus TCP)"),
+    }
+}
+
+fn head(function: u8, first: u16, second: u16) -> Vec<u8> {
+    let mut pdu = vec![function];
+    pdu.extend(first.to_be_bytes());
+    pdu.extend(second.to_be_bytes());
+    pdu
+}
+
+fn span(first: u16, count: u16) -> String {
+    match count {
+        1 => format!("{first:#06X}"),
+        _ => format!("{first:#06X} to {:#06X}", first.wrapping_add(count - 1)),
+    }
+}

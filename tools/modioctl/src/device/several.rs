@@ -1,0 +1,93 @@
+//! Many items in few requests.
+
+use std::collections::BTreeMap;
+
+use modio_description::Table;
+
+use super::Device;
+use crate::failure::Failure;
+use crate::names::Item;
+
+/// Registers that one request asks for at most.
+const MOST: u16 = 120;
+
+impl Device {
+    /// Reads items, neighbours in one request each. The words of each item, in the order of the items.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong, in words.
+    pub async fn read_items(&mut self, items: &[Item]) -> Result<Vec<Vec<u16>>, Failure> {
+        let mut spans: Vec<(Table, u16, u16)> = items
+            .iter()
+            .map(|item| (item.table, item.address, item.words))
+            .collect();
+        spans.sort_unstable_by_key(|(table, address, _)| (*table == Table::Word, *address));
+        spans.dedup();
+        let mut found = BTreeMap::new();
+        for (table, first, count) in joined(&spans) {
+            let words = match table {
+                Table::Word => self.read_words(first, count).await?,
+                Table::Bit => {
+                    let bits = self.read_bits(first, count).await?;
+                    bits.into_iter().map(u16::from).collect()
+                }
+            };
+            let addresses = (0..count).map(|n| first.wrapping_add(n));
+            found.extend(
+                addresses
+                    .zip(words)
+                    .map(|(address, word)| ((table == Table::Word, address), word)),
+            );
+        }
+        let words = |item: &Item| {
+            let addresses = (0..item.words).map(|n| item.address.wrapping_add(n));
+            let word = |address| found.get(&(item.table == Table::Word, address)).copied();
+            addresses
+                .map(|address| word(address).unwrap_or_default())
+                .collect()
+        };
+        Ok(items.iter().map(words).collect())
+    }
+}
+
+/// Spans that follow one another, as one.
+fn joined(spans: &[(Table, u16, u16)]) -> Vec<(Table, u16, u16)> {
+    let mut joined: Vec<(Table, u16, u16)> = Vec::new();
+    for (table, address, count) in spans {
+        match joined.last_mut() {
+            Some((before, first, length))
+                if before == table
+                    && u32::from(*first) + u32::from(*length) == u32::from(*address)
+                    && *length + count <= MOST =>
+            {
+                *length += count;
+            }
+            _ => joined.push((*table, *address, *count)),
+        }
+    }
+    joined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_are_read_together_and_gaps_are_not_read() {
+        use Table::{Bit, Word};
+        let spans = [
+            (Bit, 16, 1),
+            (Bit, 17, 1),
+            (Word, 18, 1),
+            (Word, 19, 2),
+            (Word, 22, 1),
+        ];
+        assert_eq!(joined(&spans), [(Bit, 16, 2), (Word, 18, 3), (Word, 22, 1)]);
+        let many: Vec<_> = (0..300).map(|address| (Word, address, 1)).collect();
+        assert_eq!(
+            joined(&many),
+            [(Word, 0, 120), (Word, 120, 120), (Word, 240, 60)]
+        );
+    }
+}

@@ -1,0 +1,67 @@
+//! A table for spreadsheets and for the import functions of other programs (RFC 4180, with LF at the end of a line).
+
+use modio_description::Table;
+
+use super::{Scaling, Source};
+use crate::commands::values;
+use crate::failure::Failure;
+use crate::names::Item;
+use crate::value::{table_name, unit_name};
+
+const HEAD: &str = "name,address,table,function,words,type,scale,offset,unit,access,values,about";
+
+/// Returns one row for each point and register.
+pub fn text(source: Source<'_>) -> Result<String, Failure> {
+    source.unit_name()?;
+    let mut text = format!("{HEAD}\n");
+    for item in source.book.items() {
+        text.push_str(&row(item).join(","));
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+fn row(item: &Item) -> [String; 12] {
+    let scaling = Scaling::of(item);
+    let function = match (item.table, item.writable, item.words) {
+        (Table::Bit, false, _) => "01 02",
+        (Table::Bit, true, _) => "01 02 05 0F",
+        (Table::Word, false, _) => "03 04",
+        (Table::Word, true, 1) => "03 04 06 10",
+        (Table::Word, true, _) => "03 04 10",
+    };
+    let data_type = match (item.table, item.words) {
+        (Table::Bit, _) => "bool",
+        (Table::Word, 1) if scaling.signed => "int16",
+        (Table::Word, 1) => "uint16",
+        (Table::Word, 2) => "uint32",
+        (Table::Word, _) => "bytes",
+    };
+    let access = match (item.writable, item.restart) {
+        (false, _) => "read",
+        (true, false) => "read write",
+        (true, true) => "read write restart",
+    };
+    [
+        quoted(&item.name),
+        item.address.to_string(),
+        table_name(item.table).to_owned(),
+        function.to_owned(),
+        item.words.to_string(),
+        data_type.to_owned(),
+        scaling.factor().to_string(),
+        scaling.unit.offset.to_string(),
+        quoted(unit_name(&scaling.unit.code)),
+        access.to_owned(),
+        quoted(values(item).trim_start_matches("it takes ")),
+        quoted(&item.about),
+    ]
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}

@@ -1,0 +1,320 @@
+//! YAML for the integrations `modbus` and `template` of Home Assistant.
+//!
+//! The integration `modbus` has no numbers that a user can set. An analog output is therefore a sensor, and a number of
+//! the integration `template` that shows the sensor and writes by the action `modbus.write_register`.
+
+use modio_description::Table;
+use serde::Serialize;
+
+use super::{Scaling, Source, host_and_port, identifier, no_ascii_over_tcp, power};
+use crate::bus::adu::Framing;
+use crate::bus::{Endpoint, Place};
+use crate::failure::Failure;
+use crate::names::{Item, Meaning};
+use crate::value::unit_name;
+
+/// Interval between two readings of a diagnostic value, in seconds.
+const SLOWLY: u16 = 60;
+
+#[derive(Serialize)]
+struct File {
+    modbus: [Hub; 1],
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    template: Vec<Template>,
+}
+
+#[derive(Serialize)]
+struct Hub {
+    name: String,
+    #[serde(flatten)]
+    line: Line,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    sensors: Vec<Sensor>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    binary_sensors: Vec<BinarySensor>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    switches: Vec<Switch>,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Line {
+    Serial {
+        r#type: &'static str,
+        port: String,
+        baudrate: u32,
+        bytesize: u8,
+        method: Framing,
+        parity: char,
+        stopbits: u8,
+    },
+    Network {
+        r#type: &'static str,
+        host: String,
+        port: u16,
+    },
+}
+
+#[derive(Serialize)]
+struct Entity {
+    name: String,
+    unique_id: String,
+    slave: u8,
+    address: u16,
+}
+
+#[derive(Serialize)]
+struct Sensor {
+    #[serde(flatten)]
+    entity: Entity,
+    input_type: &'static str,
+    data_type: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    precision: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit_of_measurement: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    device_class: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    state_class: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scan_interval: Option<u16>,
+}
+
+#[derive(Serialize)]
+struct BinarySensor {
+    #[serde(flatten)]
+    entity: Entity,
+    input_type: &'static str,
+}
+
+#[derive(Serialize)]
+struct Switch {
+    #[serde(flatten)]
+    entity: Entity,
+    write_type: &'static str,
+    command_on: u8,
+    command_off: u8,
+    verify: Verify,
+}
+
+#[derive(Serialize)]
+struct Verify {
+    input_type: &'static str,
+}
+
+#[derive(Serialize)]
+struct Template {
+    number: Vec<Number>,
+}
+
+#[derive(Serialize)]
+struct Number {
+    name: String,
+    unique_id: String,
+    state: String,
+    availability: String,
+    min: f64,
+    max: f64,
+    step: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit_of_measurement: Option<String>,
+    set_value: [Action; 1],
+}
+
+#[derive(Serialize)]
+struct Action {
+    action: &'static str,
+    data: Write,
+}
+
+#[derive(Serialize)]
+struct Write {
+    hub: String,
+    slave: u8,
+    address: u16,
+    value: String,
+}
+
+/// Returns the YAML text.
+pub fn text(source: Source<'_>) -> Result<String, Failure> {
+    let unit = source.unit_name()?;
+    no_ascii_over_tcp("Home Assistant", source.endpoint)?;
+    let hub = identifier(&unit);
+    let points = || source.book.points();
+    let words = points().filter(|item| item.table == Table::Word);
+    let mut sensors: Vec<_> = words.map(|item| sensor(item, &unit, source)).collect();
+    sensors.extend(source.diagnostics().map(|item| {
+        let mut sensor = sensor(item, &unit, source);
+        sensor.scan_interval = Some(SLOWLY);
+        sensor
+    }));
+    let bits = |writable| {
+        points().filter(move |item| item.table == Table::Bit && item.writable == writable)
+    };
+    let numbers: Vec<_> = points()
+        .filter(|item| item.table == Table::Word && item.writable)
+        .map(|item| number(item, &unit, &hub, source.endpoint))
+        .collect();
+    let file = File {
+        modbus: [Hub {
+            name: hub,
+            line: line(source.endpoint)?,
+            sensors,
+            binary_sensors: bits(false)
+                .map(|item| BinarySensor {
+                    entity: entity(item, &unit, source),
+                    input_type: "discrete_input",
+                })
+                .collect(),
+            switches: bits(true)
+                .map(|item| Switch {
+                    entity: entity(item, &unit, source),
+                    write_type: "coil",
+                    command_on: 1,
+                    command_off: 0,
+                    verify: Verify { input_type: "coil" },
+                })
+                .collect(),
+        }],
+        template: if numbers.is_empty() {
+            Vec::new()
+        } else {
+            vec![Template { number: numbers }]
+        },
+    };
+    let yaml = serde_yaml_ng::to_string(&file).map_err(Failure::usage)?;
+    Ok(format!(
+        "# Home Assistant configuration for {unit}, written by `modioctl export home-assistant`.\n{yaml}"
+    ))
+}
+
+fn line(endpoint: &Endpoint) -> Result<Line, Failure> {
+    let network = |r#type, address: &str| {
+        let (host, port) = host_and_port(address)?;
+        Ok(Line::Network { r#type, host, port })
+    };
+    match &endpoint.place {
+        Place::Serial(port) => Ok(Line::Serial {
+            r#type: "serial",
+            port: port.clone(),
+            baudrate: endpoint.baud,
+            bytesize: endpoint.format.data_bits,
+            method: endpoint.framing,
+            parity: endpoint.format.parity,
+            stopbits: endpoint.format.stop_bits,
+        }),
+        Place::Tcp(address) => network("rtuovertcp", address),
+        Place::ModbusTcp(address) => network("tcp", address),
+    }
+}
+
+fn entity(item: &Item, unit: &str, source: Source<'_>) -> Entity {
+    let name = format!("{unit} {}", item.name);
+    Entity {
+        unique_id: identifier(&name),
+        name,
+        slave: source.endpoint.unit,
+        address: item.address,
+    }
+}
+
+fn sensor(item: &Item, unit: &str, source: Source<'_>) -> Sensor {
+    let scaling = Scaling::of(item);
+    let shown = shown(&scaling);
+    let offset = f64::from(scaling.unit.offset) * shown.factor;
+    Sensor {
+        entity: entity(item, unit, source),
+        input_type: if item.writable { "holding" } else { "input" },
+        data_type: scaling.data_type(item).to_lowercase(),
+        scale: (shown.exponent != 0).then_some(shown.factor),
+        offset: (scaling.unit.offset != 0).then_some(offset),
+        precision: (shown.exponent < 0).then(|| shown.exponent.unsigned_abs()),
+        unit_of_measurement: shown.unit,
+        device_class: shown.device_class,
+        state_class: matches!(item.meaning, Meaning::Analog(_)).then_some("measurement"),
+        scan_interval: None,
+    }
+}
+
+fn number(item: &Item, unit: &str, hub: &str, endpoint: &Endpoint) -> Number {
+    let scaling = Scaling::of(item);
+    let shown = shown(&scaling);
+    let offset = scaling.unit.offset;
+    let (min, max) = scaling.range.unwrap_or((0, 0xFFFF));
+    let quantity = |steps: i32| {
+        let steps = f64::from(steps) + f64::from(offset);
+        // Division by a whole power of ten gives the nearest decimal fraction.
+        if shown.exponent < 0 {
+            steps / power(-shown.exponent)
+        } else {
+            steps * shown.factor
+        }
+    };
+    let name = format!("{unit} {}", item.name);
+    let sensor = format!("sensor.{}", identifier(&name));
+    let mut value = match shown.factor {
+        1.0 => "value | round | int".to_owned(),
+        factor => format!("(value / {factor}) | round | int"),
+    };
+    if offset != 0 {
+        value = format!("({value}) - {offset}");
+    }
+    if scaling.signed {
+        // A value below 0 is written in two's complement.
+        value = format!("({value}) % 65536");
+    }
+    let value = format!("{{{{ {value} }}}}");
+    Number {
+        unique_id: format!("{}_set", identifier(&name)),
+        name: format!("{name} set"),
+        state: format!("{{{{ states('{sensor}') }}}}"),
+        availability: format!("{{{{ has_value('{sensor}') }}}}"),
+        min: quantity(min),
+        max: quantity(max),
+        step: shown.factor,
+        unit_of_measurement: shown.unit.clone(),
+        set_value: [Action {
+            action: "modbus.write_register",
+            data: Write {
+                hub: hub.to_owned(),
+                slave: endpoint.unit,
+                address: item.address,
+                value,
+            },
+        }],
+    }
+}
+
+/// How Home Assistant shows a quantity.
+struct Shown {
+    exponent: i8,
+    factor: f64,
+    unit: Option<String>,
+    device_class: Option<&'static str>,
+}
+
+fn shown(scaling: &Scaling) -> Shown {
+    let (exponent, unit, device_class) = match scaling.unit.code.as_str() {
+        // Home Assistant has no µA among the units of a current.
+        "uA" => (
+            scaling.unit.exponent.saturating_sub(3),
+            "mA",
+            Some("current"),
+        ),
+        "mV" => (scaling.unit.exponent, "mV", Some("voltage")),
+        "Cel" => (scaling.unit.exponent, "°C", Some("temperature")),
+        "s" => (scaling.unit.exponent, "s", Some("duration")),
+        code => (scaling.unit.exponent, unit_name(code), None),
+    };
+    Shown {
+        exponent,
+        factor: power(exponent),
+        unit: (!unit.is_empty()).then(|| unit.to_owned()),
+        device_class,
+    }
+}

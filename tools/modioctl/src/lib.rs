@@ -1,0 +1,22 @@
+//! `modioctl`: finds, sets up and watches modio units over Modbus, on a serial port, over TCP and over Modbus TCP.
+//!
+//! The program is [`run`]. What stands below it is of use to other programs as well: [`bus::Master`] asks units,
+//! [`device::Device`] reads and writes one of them with errors in words, [`names::Book`] knows its points and registers
+//! by name.
+
+#![forbid(unsafe_code)]
+
+pub mod bus;
+pub mod cli;
+pub mod commands;
+pub mod device;
+pub mod export;
+pub mod failure;
+pub mod monitor;
+pub mod names;
+pub mod output;
+pub mod sniff;
+pub mod trace;
+pub mod value;
+
+pub use commands::run;

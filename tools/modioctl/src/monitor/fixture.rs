@@ -1,0 +1,54 @@
+//! A display with a unit, for tests.
+
+use std::time::Duration;
+
+use modio_description::describe;
+use register_map::board::MODIO_02;
+use register_map::{Board, Module};
+use tokio::time::Instant;
+
+use super::messages::{Polled, Update};
+use super::model::Model;
+use super::plan::Words;
+use crate::names::Book;
+
+/// Interval of polling in tests.
+pub const EVERY: Duration = Duration::from_millis(250);
+
+/// The book of a unit with this module in every slot; RANGE and SCALE of every point are the same.
+pub fn book(board: &Board, module: Module, range: u16, scale: u16) -> Book {
+    let readings = vec![(range, scale); 32];
+    Book::new(describe(board, "0.1.0", |_| module), readings)
+}
+
+/// A display of a modio-02 with this module, in mA or V, of which nothing has been read yet.
+pub fn model(module: Module, now: Instant) -> Model {
+    let mut model = Model::new("/dev/ttyUSB0, 9600 bit/s 8N2".to_owned(), 1, EVERY, now);
+    let book = Box::new(book(&MODIO_02, module, 1, 1));
+    model.update(Update::Learned(book), now);
+    model
+}
+
+/// A round of polling with these values of p5.1 and so on; all channels and the module are well.
+pub fn polled(at: Instant, values: &[u16]) -> Polled {
+    let mut words = Words::new();
+    for (channel, value) in (1..).zip(values) {
+        words.insert(format!("p5.{channel}"), vec![*value]);
+        words.insert(format!("p5.{channel}.channel_status"), vec![0]);
+    }
+    words.insert("p5.module_state".to_owned(), vec![0]);
+    words.insert("bus messages".to_owned(), vec![1234]);
+    words.insert("uptime".to_owned(), vec![0, 60]);
+    Polled {
+        at,
+        took: Duration::from_millis(50),
+        words,
+        refused: Vec::new(),
+        waiting: [].into(),
+    }
+}
+
+/// Shows a round of polling.
+pub fn show(model: &mut Model, at: Instant, values: &[u16]) {
+    model.update(Update::Polled(polled(at, values)), at);
+}

@@ -1,0 +1,184 @@
+//! `modioctl monitor`: a unit on the whole screen.
+//!
+//! Three parts run side by side, and none waits for another. The [polling task](poll) alone uses the line. A thread reads
+//! keys and the mouse. The loop in [`run`] takes news of both into the [model](model::Model) and draws it.
+
+pub mod draw;
+pub mod editor;
+#[cfg(test)]
+mod fixture;
+pub mod frames;
+pub mod history;
+pub mod input;
+#[cfg(test)]
+mod input_tests;
+pub mod layout;
+pub mod link;
+pub mod messages;
+pub mod model;
+#[cfg(test)]
+mod model_tests;
+mod orders;
+pub mod plan;
+pub mod poll;
+#[cfg(test)]
+mod poll_tests;
+pub mod screen;
+pub mod tree;
+
+use std::io::{IsTerminal, stderr, stdout};
+use std::time::Duration;
+
+use ratatui::layout::Rect;
+use tokio::sync::mpsc::unbounded_channel;
+use tokio::time::{Instant, MissedTickBehavior, interval};
+
+use self::input::Action;
+use self::messages::Update;
+use self::model::Model;
+use self::poll::{Observers, Poller};
+use self::screen::Screen;
+use crate::bus::{Endpoint, Seen};
+use crate::cli::Monitor;
+use crate::commands::description;
+use crate::device::{Device, fetch, place};
+use crate::failure::Failure;
+use crate::trace;
+
+/// Interval at which the display is drawn: ages of values go on without news.
+const FRAME: Duration = Duration::from_millis(100);
+
+/// Shows the unit until the user quits.
+///
+/// # Errors
+///
+/// That there is no terminal, or no modio at the beginning. A unit that is lost later is shown as lost.
+pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<(), Failure> {
+    if !stdout().is_terminal() {
+        return Err(Failure::usage(
+            "monitor needs a terminal; `modioctl watch` prints values into files and pipes",
+        ));
+    }
+    if traced && stderr().is_terminal() {
+        return Err(Failure::usage(
+            "--trace would write over the monitor: add `2>FILE`, or look at its own log of frames",
+        ));
+    }
+    // Polling asks again anyway. A write must not be repeated after the user has seen no effect.
+    let endpoint = Endpoint {
+        retries: 0,
+        ..endpoint
+    };
+    let (updates, mut news) = unbounded_channel();
+    let mut observers: Observers = {
+        let updates = updates.clone();
+        Box::new(move || {
+            let updates = updates.clone();
+            let mut trace = traced.then(trace::to_stderr);
+            Box::new(move |seen: &Seen| {
+                if let Some(trace) = &mut trace {
+                    trace(seen);
+                }
+                let _ = updates.send(Update::Seen(seen.clone()));
+            })
+        })
+    };
+    let mut device = Device::open(endpoint.clone(), Some(observers())).await?;
+    if let Some(failure) = first(&mut device).await? {
+        let _ = updates.send(Update::Lost(failure));
+    }
+    let (orders, writes) = unbounded_channel();
+    let mut model = Model::new(
+        place(&endpoint),
+        endpoint.unit,
+        options.every,
+        Instant::now(),
+    );
+    let (mut screen, mut events) = Screen::open()?;
+    let poller = Poller::new(device, options.every, observers, updates, writes);
+    let mut poller = tokio::spawn(poller.run());
+    let mut ended = std::pin::pin!(ended());
+    let mut frames = interval(FRAME);
+    frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut area = Rect::default();
+    let mut dirty = true;
+    loop {
+        tokio::select! {
+            // News of a fast line must not keep keys waiting.
+            biased;
+            () = &mut ended => return Ok(()),
+            event = events.recv() => {
+                let event = match event {
+                    Some(Ok(event)) => event,
+                    Some(Err(error)) => {
+                        return Err(Failure::usage(format!("the terminal is lost: {error}")));
+                    }
+                    None => return Err(Failure::usage("the terminal is lost")),
+                };
+                match input::event(&mut model, &event, area, Instant::now()) {
+                    Action::None => {}
+                    Action::Quit => return Ok(()),
+                    Action::Write(write) => {
+                        let _ = orders.send(write);
+                    }
+                    Action::Mouse(take) => screen.take_mouse(take),
+                }
+                dirty = true;
+            }
+            _ = frames.tick() => dirty = true,
+            Some(update) = news.recv() => model.update(update, Instant::now()),
+            result = &mut poller => {
+                return Err(Failure::usage(match result {
+                    Err(error) => format!("polling has ended: {error}"),
+                    Ok(()) => "polling has ended".to_owned(),
+                }));
+            }
+        }
+        if screen.has_panicked() {
+            return Err(Failure::usage(
+                "a part of the monitor has panicked, as shown above",
+            ));
+        }
+        // Events that wait are handled before the next drawing.
+        if dirty && events.is_empty() {
+            let drawn = screen.terminal.draw(|frame| {
+                area = frame.area();
+                draw::draw(frame, &mut model, Instant::now());
+            });
+            drawn.map_err(|error| Failure::usage(format!("the terminal is lost: {error}")))?;
+            dirty = false;
+        }
+    }
+}
+
+/// Makes sure that the unit is a modio before the display begins. One frame that is lost does not end the program: the
+/// failure is returned.
+async fn first(device: &mut Device) -> Result<Option<Failure>, Failure> {
+    let (learned, failure) = match fetch(device, false).await {
+        Err(failure) if failure.may_pass() => (fetch(device, false).await?, Some(failure)),
+        result => (result?, None),
+    };
+    description(&learned.book)?;
+    Ok(failure)
+}
+
+/// Returns when the system asks the program to end, or the terminal has been closed.
+#[cfg(unix)]
+async fn ended() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (Ok(mut term), Ok(mut hangup)) = (
+        signal(SignalKind::terminate()),
+        signal(SignalKind::hangup()),
+    ) else {
+        return std::future::pending().await;
+    };
+    tokio::select! {
+        _ = term.recv() => {}
+        _ = hangup.recv() => {}
+    }
+}
+
+#[cfg(not(unix))]
+async fn ended() {
+    std::future::pending().await
+}

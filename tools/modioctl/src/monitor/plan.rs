@@ -1,0 +1,193 @@
+//! What the monitor reads of a unit, and whether the values that it read mean what it knows of the unit.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use modio_description::Description;
+
+use crate::names::{Book, Item, Meaning, PortItems};
+
+/// Values by the name of their item.
+pub type Words = BTreeMap<String, Vec<u16>>;
+
+/// Counters of the line, by the names that the description gives them.
+const COUNTERS: [&str; 9] = [
+    "bus messages",
+    "bus communication errors",
+    "exceptions sent",
+    "messages for this unit",
+    "no response",
+    "NAK",
+    "busy",
+    "character overruns",
+    "inter-character gaps",
+];
+
+/// What is read of a unit.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// Ports with their points.
+    pub ports: Vec<PortItems>,
+    /// State of the unit, of its modules and of its channels: read after the points.
+    pub state: Vec<Item>,
+    /// Settings that say what the points mean: read after the points. Without analog points there are none.
+    pub settings: Vec<Item>,
+    /// Counters of the line: read seldom.
+    pub counters: Vec<Item>,
+}
+
+impl Plan {
+    /// Returns what to read of the unit with this book.
+    #[must_use]
+    pub fn new(book: &Book) -> Self {
+        let ports = book.ports();
+        let found = |name: String| book.items().iter().find(|item| item.name == name).cloned();
+        let mut state: Vec<_> = ["uptime", "status"]
+            .iter()
+            .filter_map(|name| found((*name).to_owned()))
+            .collect();
+        let mut settings = Vec::new();
+        for port in &ports {
+            for name in ["module", "module_in_force", "module_state"] {
+                state.extend(found(format!("p{}.{name}", port.number)));
+            }
+            for point in &port.points {
+                state.extend(found(format!("{}.channel_status", point.name)));
+                if matches!(point.meaning, Meaning::Analog(_) | Meaning::Unknown) {
+                    settings.extend(found(format!("{}.range", point.name)));
+                    settings.extend(found(format!("{}.scale", point.name)));
+                }
+            }
+        }
+        let counters = COUNTERS.iter().filter_map(|name| found((*name).to_owned()));
+        Self {
+            counters: counters.collect(),
+            ports,
+            state,
+            settings,
+        }
+    }
+
+    /// Returns whether the unit still has the modules, ranges and scales that the plan was made for. These words were
+    /// read after the points, so a change between the two reads is noticed.
+    #[must_use]
+    pub fn holds(&self, words: &Words) -> bool {
+        self.ports.iter().all(|port| {
+            let in_force = words.get(&format!("p{}.module_in_force", port.number));
+            let alike = || {
+                port.points
+                    .iter()
+                    .all(|item| Self::reads_alike(item, words))
+            };
+            in_force.and_then(|words| words.first()) == Some(&port.code)
+                && (self.unsettled(port, words) || alike())
+        })
+    }
+
+    /// Returns the settings that say what a point means.
+    #[must_use]
+    pub fn settings_of(&self, point: &Item) -> Vec<Item> {
+        let names = ["range", "scale"].map(|setting| format!("{}.{setting}", point.name));
+        let settings = self.settings.iter();
+        let own = settings.filter(|item| names.contains(&item.name));
+        own.cloned().collect()
+    }
+
+    /// Returns whether RANGE and SCALE of an analog point are those for which its meaning is known. Other points have
+    /// the same meaning always.
+    #[must_use]
+    pub fn reads_alike(point: &Item, words: &Words) -> bool {
+        let setting = |setting: &str| {
+            let words = words.get(&format!("{}.{setting}", point.name));
+            words.and_then(|words| words.first()).copied()
+        };
+        match &point.meaning {
+            Meaning::Analog(reading) => {
+                setting("range") == Some(reading.range) && setting("scale") == Some(reading.scale)
+            }
+            _ => true,
+        }
+    }
+
+    /// Returns the ports whose MODULE differs from the module in force. RANGE and SCALE of such a port belong to the
+    /// module after the next restart, and do not say how the present one is read.
+    #[must_use]
+    pub fn waiting_for_restart(&self, words: &Words) -> BTreeSet<u8> {
+        let waiting = self.ports.iter().filter(|port| self.unsettled(port, words));
+        waiting.map(|port| port.number).collect()
+    }
+
+    fn unsettled(&self, port: &PortItems, words: &Words) -> bool {
+        let module = words.get(&format!("p{}.module", port.number));
+        module.is_some_and(|module| module.first() != Some(&port.code))
+    }
+}
+
+/// Returns the name and the firmware of a unit, for people.
+#[must_use]
+pub fn title(description: &Description) -> String {
+    format!("{} {}", description.board, description.firmware)
+}
+
+/// Returns whether an item is an analog point.
+#[must_use]
+pub const fn is_analog(item: &Item) -> bool {
+    matches!(item.meaning, Meaning::Analog(_))
+}
+
+#[cfg(test)]
+mod tests {
+    use modio_description::describe;
+    use register_map::Module;
+    use register_map::board::MODIO_02;
+
+    use super::*;
+
+    fn plan() -> Plan {
+        let mut readings = vec![(0, 0); 32];
+        readings[0x12] = (1, 1);
+        Plan::new(&Book::new(
+            describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2),
+            readings,
+        ))
+    }
+
+    fn words(scale: u16, module: u16, in_force: u16) -> Words {
+        let mut words = Words::new();
+        for channel in 1..=4 {
+            let engineering = if channel == 3 { scale } else { 0 };
+            words.insert(format!("p5.{channel}.range"), vec![engineering]);
+            words.insert(format!("p5.{channel}.scale"), vec![engineering]);
+        }
+        words.insert("p5.module".to_owned(), vec![module]);
+        words.insert("p5.module_in_force".to_owned(), vec![in_force]);
+        words
+    }
+
+    #[test]
+    fn plan_has_state_settings_and_counters_of_the_unit() {
+        let plan = plan();
+        let has = |items: &[Item], name: &str| items.iter().any(|item| item.name == name);
+        assert!(has(&plan.state, "uptime") && has(&plan.state, "p5.4.channel_status"));
+        assert!(has(&plan.state, "p5.module_state") && has(&plan.state, "p5.module_in_force"));
+        assert!(has(&plan.settings, "p5.1.range") && has(&plan.settings, "p5.4.scale"));
+        assert_eq!(plan.counters.len(), COUNTERS.len());
+    }
+
+    #[test]
+    fn other_scale_or_module_in_force_ends_the_plan() {
+        let plan = plan();
+        assert!(plan.holds(&words(1, 6, 6)));
+        assert!(!plan.holds(&words(0, 6, 6)), "another scale");
+        assert!(!plan.holds(&words(1, 4, 4)), "another module");
+        assert!(!plan.holds(&Words::new()), "nothing is known");
+    }
+
+    #[test]
+    fn other_module_setting_makes_the_port_wait_for_a_restart() {
+        let plan = plan();
+        let changed = words(0, 4, 6);
+        assert!(plan.holds(&changed));
+        assert_eq!(plan.waiting_for_restart(&changed), BTreeSet::from([5]));
+        assert!(plan.waiting_for_restart(&words(1, 6, 6)).is_empty());
+    }
+}

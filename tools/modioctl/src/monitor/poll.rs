@@ -1,0 +1,303 @@
+//! The polling task: it alone uses the line. The display never waits for it.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
+use tokio::time::{Instant, sleep_until};
+
+use super::messages::{Polled, Update, Write};
+use super::plan::{Plan, Words, is_analog};
+use crate::bus::{Endpoint, Observer};
+use crate::commands::description;
+use crate::device::{Device, fetch};
+use crate::failure::Failure;
+use crate::names::{Item, PortItems};
+
+/// Longest time from the order of a write to its request. An older order is not sent: an output must not switch when
+/// the user no longer expects it.
+const LATEST: Duration = Duration::from_millis(1500);
+/// Pause before a port or a connection is opened again, and after a failure.
+const AGAIN: Duration = Duration::from_secs(1);
+/// Time without an answer after which a connection is opened anew. A gateway that lost its supply never closes it.
+const STUCK: Duration = Duration::from_secs(5);
+/// Interval at which counters are read.
+const COUNTERS: Duration = Duration::from_secs(1);
+/// Shortest pause between two rounds.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// Makes an observer for each time that the line is opened.
+pub type Observers = Box<dyn FnMut() -> Observer + Send>;
+
+/// The polling task.
+pub struct Poller {
+    endpoint: Endpoint,
+    every: Duration,
+    observers: Observers,
+    updates: UnboundedSender<Update>,
+    writes: UnboundedReceiver<Write>,
+    device: Option<Device>,
+    plan: Option<Plan>,
+    /// Ports that wait for a restart, since the last restart that was seen.
+    waiting: BTreeSet<u8>,
+    /// The unit's uptime in seconds, and when it was read.
+    uptime: Option<(u64, Instant)>,
+    counted: Option<Instant>,
+    answered: Instant,
+}
+
+/// How a round ended.
+enum Round {
+    /// Its values are valid.
+    Complete(Box<Polled>),
+    /// A write waits, which may change values that were read before it.
+    Interrupted,
+    /// The unit is no longer what it was.
+    Changed,
+}
+
+impl Poller {
+    /// Makes the task for a device that is open, and of which nothing is known yet.
+    #[must_use]
+    pub fn new(
+        device: Device,
+        every: Duration,
+        observers: Observers,
+        updates: UnboundedSender<Update>,
+        writes: UnboundedReceiver<Write>,
+    ) -> Self {
+        Self {
+            endpoint: device.master.endpoint().clone(),
+            every,
+            observers,
+            updates,
+            writes,
+            device: Some(device),
+            plan: None,
+            waiting: BTreeSet::new(),
+            uptime: None,
+            counted: None,
+            answered: Instant::now(),
+        }
+    }
+
+    /// Polls until the display is gone.
+    pub async fn run(mut self) {
+        let mut next = Instant::now();
+        loop {
+            tokio::select! {
+                biased;
+                write = self.writes.recv() => match write {
+                    None => return,
+                    Some(write) => {
+                        self.write(write).await;
+                        next = Instant::now();
+                    }
+                },
+                () = sleep_until(next) => {
+                    let start = Instant::now();
+                    let pause = match self.step().await {
+                        Ok(pause) => pause,
+                        Err(failure) => self.lost(failure),
+                    };
+                    next = (start + pause).max(Instant::now() + PAUSE);
+                }
+            }
+        }
+    }
+
+    fn tell(&self, update: Update) {
+        // Without a display the task ends at its next look at the channel of writes.
+        let _ = self.updates.send(update);
+    }
+
+    /// Opens the line, learns what the unit is, or polls. Returns the time to the next step.
+    async fn step(&mut self) -> Result<Duration, Failure> {
+        let Some(device) = &mut self.device else {
+            let observer = (self.observers)();
+            self.device = Some(Device::open(self.endpoint.clone(), Some(observer)).await?);
+            self.answered = Instant::now();
+            return Ok(Duration::ZERO);
+        };
+        let Some(plan) = &self.plan else {
+            let book = fetch(device, false).await?.book;
+            description(&book)?;
+            self.answered = Instant::now();
+            self.plan = Some(Plan::new(&book));
+            self.counted = None;
+            self.tell(Update::Learned(Box::new(book)));
+            return Ok(Duration::ZERO);
+        };
+        let plan = plan.clone();
+        match self.round(&plan).await? {
+            Round::Complete(polled) => {
+                self.answered = Instant::now();
+                self.tell(Update::Polled(*polled));
+                Ok(self.every)
+            }
+            Round::Interrupted => Ok(Duration::ZERO),
+            Round::Changed => {
+                self.plan = None;
+                Ok(Duration::ZERO)
+            }
+        }
+    }
+
+    async fn round(&mut self, plan: &Plan) -> Result<Round, Failure> {
+        let Some(device) = &mut self.device else {
+            return Ok(Round::Changed);
+        };
+        let at = Instant::now();
+        let mut words = Words::new();
+        let refused = points(device, plan, &mut words).await?;
+        // Without analog points there are no settings to read.
+        for items in [&plan.settings, &plan.state] {
+            if !self.writes.is_empty() {
+                return Ok(Round::Interrupted);
+            }
+            read(device, items, &mut words).await?;
+        }
+        let took = at.elapsed();
+        self.note_restart(&words);
+        if !plan.holds(&words) {
+            return Ok(Round::Changed);
+        }
+        self.waiting.extend(plan.waiting_for_restart(&words));
+        for port in &plan.ports {
+            if self.waiting.contains(&port.number) {
+                for point in port.points.iter().filter(|point| is_analog(point)) {
+                    words.remove(&point.name);
+                }
+            }
+        }
+        let counted = self.counted.map(|counted| counted.elapsed());
+        if counted.is_none_or(|age| age >= COUNTERS)
+            && self.writes.is_empty()
+            && let Some(device) = &mut self.device
+        {
+            read(device, &plan.counters, &mut words).await?;
+            self.counted = Some(Instant::now());
+        }
+        Ok(Round::Complete(Box::new(Polled {
+            at,
+            took,
+            words,
+            refused,
+            waiting: self.waiting.clone(),
+        })))
+    }
+
+    /// Notices a restart by the uptime. A port that waited for a restart has had it then.
+    fn note_restart(&mut self, words: &Words) {
+        let Some(uptime) = words.get("uptime") else {
+            return;
+        };
+        let now = uptime
+            .iter()
+            .fold(0, |long: u64, word| long << 16 | u64::from(*word));
+        if let Some((before, at)) = self.uptime {
+            // A unit on its internal oscillator counts up to some per cent slower.
+            let least = before + at.elapsed().as_secs() * 9 / 10;
+            if now + 2 < least || now < before {
+                self.waiting.clear();
+                self.plan = None;
+            }
+        }
+        self.uptime = Some((now, Instant::now()));
+    }
+
+    /// Takes note of a failed step. Returns the time to the next one.
+    fn lost(&mut self, failure: Failure) -> Duration {
+        // A unit that comes back may have other modules.
+        self.plan = None;
+        let serial = self.endpoint.place.is_serial();
+        let stuck = !serial && self.answered.elapsed() > STUCK;
+        if matches!(failure, Failure::Port(_)) || stuck {
+            self.device = None;
+        }
+        let pause = match failure {
+            Failure::NoAnswer(_) | Failure::Garbled(_) => self.every,
+            _ => AGAIN,
+        };
+        self.tell(Update::Lost(failure));
+        pause
+    }
+
+    async fn write(&mut self, write: Write) {
+        let result = self.try_to_write(&write).await;
+        if let Err(failure) = &result
+            && failure.may_pass()
+        {
+            self.plan = None;
+            // The order must not reach the unit later, from a buffer of this computer.
+            if let Some(device) = self.device.take() {
+                device.master.close_unsent();
+            }
+        }
+        self.tell(Update::Wrote(write, result));
+    }
+
+    async fn try_to_write(&mut self, write: &Write) -> Result<(), Failure> {
+        let item = &write.item;
+        let not_sent =
+            |why: &str| Failure::Refused(format!("{} was not written: {why}", item.name));
+        let too_late = || write.ordered.elapsed() > LATEST;
+        let busy = || not_sent("the line was busy for too long");
+        if too_late() {
+            return Err(busy());
+        }
+        let (Some(device), Some(plan)) = (&mut self.device, &self.plan) else {
+            return Err(not_sent("the unit does not answer"));
+        };
+        let has = |port: &&PortItems| port.points.iter().any(|point| point == item);
+        let Some(port) = plan.ports.iter().find(has) else {
+            return Err(not_sent("the unit no longer has this output as it was"));
+        };
+        if is_analog(item) {
+            if self.waiting.contains(&port.number) {
+                return Err(not_sent("the port waits for a restart"));
+            }
+            // Another program may have changed RANGE or SCALE since the last round.
+            let mut words = Words::new();
+            read(device, &plan.settings_of(item), &mut words).await?;
+            if !Plan::reads_alike(item, &words) {
+                return Err(not_sent("its RANGE or SCALE has changed"));
+            }
+            if too_late() {
+                return Err(busy());
+            }
+        }
+        device.write_item(item, &write.words).await
+    }
+}
+
+/// Reads items into `words`.
+async fn read(device: &mut Device, items: &[Item], words: &mut Words) -> Result<(), Failure> {
+    let values = device.read_items(items).await?;
+    let names = items.iter().map(|item| item.name.clone());
+    words.extend(names.zip(values));
+    Ok(())
+}
+
+/// Reads all points together. If the unit refuses, reads each port alone, so that one port does not hide the others.
+/// Returns the ports that were refused.
+async fn points(
+    device: &mut Device,
+    plan: &Plan,
+    words: &mut Words,
+) -> Result<Vec<(u8, String)>, Failure> {
+    let ports = plan.ports.iter();
+    let all: Vec<_> = ports.flat_map(|port| port.points.clone()).collect();
+    match read(device, &all, words).await {
+        Err(Failure::Refused(_)) => {}
+        result => return result.map(|()| Vec::new()),
+    }
+    let mut refused = Vec::new();
+    for port in &plan.ports {
+        match read(device, &port.points, words).await {
+            Err(Failure::Refused(text)) => refused.push((port.number, text)),
+            result => result?,
+        }
+    }
+    Ok(refused)
+}

@@ -1,0 +1,401 @@
+//! Names of points and registers: `p5.1`, `p5.1.filter`, `p5.module`, `BAUD`, or an address.
+
+use modio_description::{Description, PointKind, Reading, Register, Scope, Table, Value, Values};
+
+use crate::failure::Failure;
+
+/// Points of a port.
+const CHANNELS: u16 = 4;
+
+/// Something that can be read: a point, a register, or an address of which nothing is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// Its name.
+    pub name: String,
+    /// Bit or word.
+    pub table: Table,
+    /// Its address, counted from 0.
+    pub address: u16,
+    /// How many registers it takes; 1 for a bit.
+    pub words: u16,
+    /// What its number means.
+    pub meaning: Meaning,
+    /// Whether it can be written.
+    pub writable: bool,
+    /// Whether it is a setting behind the lock.
+    pub setting: bool,
+    /// Whether what is written counts after a restart only.
+    pub restart: bool,
+    /// Which values it takes; `None` when nothing is known.
+    pub values: Option<Values>,
+    /// The factory's value, of a setting.
+    pub default: u16,
+    /// What it is, in one line.
+    pub about: String,
+}
+
+/// What an item's number means.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Meaning {
+    /// On or off.
+    Bit,
+    /// What the description says of the register.
+    Value(Value),
+    /// An analog point, as its RANGE and SCALE make it be read.
+    Analog(Reading),
+    /// Nothing is known.
+    Unknown,
+}
+
+/// A port with a slot, and the points that its module has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PortItems {
+    /// Number of the port, 1 to 8.
+    pub number: u8,
+    /// Code of the module in force.
+    pub code: u16,
+    /// Name of the module in force, `unknown` for a code without a name.
+    pub module: String,
+    /// Points of the port, in ascending order of the channels.
+    pub points: Vec<Item>,
+}
+
+/// The names of a unit.
+#[derive(Clone, Debug, Default)]
+pub struct Book {
+    description: Option<Description>,
+    items: Vec<Item>,
+}
+
+impl Book {
+    /// The names of a unit; `readings` has RANGE and SCALE of every point.
+    #[must_use]
+    pub fn new(description: Description, readings: Vec<(u16, u16)>) -> Self {
+        let mut items = points(&description, &readings);
+        for register in &description.registers {
+            items.extend(registers(&description, register));
+        }
+        Self {
+            description: Some(description),
+            items,
+        }
+    }
+
+    /// The unit's description; `None` for one that is no modio.
+    #[must_use]
+    pub const fn description(&self) -> Option<&Description> {
+        self.description.as_ref()
+    }
+
+    /// All items: the points, then the registers in the order of their addresses.
+    #[must_use]
+    pub fn items(&self) -> &[Item] {
+        &self.items
+    }
+
+    /// The points.
+    pub fn points(&self) -> impl Iterator<Item = &Item> {
+        let known = |item: &&Item| matches!(item.meaning, Meaning::Bit | Meaning::Analog(_));
+        self.items.iter().filter(known)
+    }
+
+    /// Returns the ports that have a slot with their points, those included whose values have no known meaning.
+    #[must_use]
+    pub fn ports(&self) -> Vec<PortItems> {
+        let Some(description) = &self.description else {
+            return Vec::new();
+        };
+        let port = |port: &modio_description::Port| {
+            let mut modules = description.modules.iter();
+            let module = modules.find(|module| module.code == port.module);
+            let names: Vec<_> = (1..=CHANNELS)
+                .map(|channel| format!("p{}.{channel}", port.number))
+                .collect();
+            let points = self.items.iter().filter(|item| names.contains(&item.name));
+            PortItems {
+                number: port.number,
+                code: port.module,
+                module: module.map_or_else(|| "unknown".to_owned(), |module| module.name.clone()),
+                points: points.cloned().collect(),
+            }
+        };
+        description.ports.iter().map(port).collect()
+    }
+
+    /// The settings: what a configuration file holds.
+    pub fn settings(&self) -> impl Iterator<Item = &Item> {
+        self.items.iter().filter(|item| item.setting)
+    }
+
+    /// The item with this name or address.
+    ///
+    /// # Errors
+    ///
+    /// That there is none, with names that are close.
+    pub fn find(&self, name: &str) -> Result<Item, Failure> {
+        let wanted = slug(name);
+        if let Some(item) = self.items.iter().find(|item| slug(&item.name) == wanted) {
+            return Ok(item.clone());
+        }
+        if let Some(address) = address(name) {
+            let at = |item: &&Item| (item.address..item.address + item.words).contains(&address);
+            let known = self
+                .items
+                .iter()
+                .find(at)
+                .filter(|item| item.address == address);
+            return Ok(known.cloned().unwrap_or_else(|| unknown(address)));
+        }
+        Err(Failure::usage(self.no_such(name, &wanted)))
+    }
+
+    fn no_such(&self, name: &str, wanted: &str) -> String {
+        if self.items.is_empty() {
+            return format!(
+                "{name}: this unit has no names that are known; give an address such as 0x0010"
+            );
+        }
+        let mut near: Vec<_> = self
+            .items
+            .iter()
+            .map(|item| {
+                (
+                    strsim::damerau_levenshtein(&slug(&item.name), wanted),
+                    &item.name,
+                )
+            })
+            .collect();
+        near.sort_by_key(|(distance, _)| *distance);
+        let near: Vec<_> = near.iter().take(4).map(|(_, name)| name.as_str()).collect();
+        format!(
+            "{name}: no such point or register; close to it: {}. `modioctl describe` lists all",
+            near.join(", ")
+        )
+    }
+}
+
+/// A name in the form in which names are compared.
+fn slug(name: &str) -> String {
+    name.trim().to_lowercase().replace([' ', '-'], "_")
+}
+
+/// An address: `0x0010`, or 16.
+fn address(text: &str) -> Option<u16> {
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u16::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+fn unknown(address: u16) -> Item {
+    Item {
+        name: format!("{address:#06X}"),
+        table: Table::Word,
+        address,
+        words: 1,
+        meaning: Meaning::Unknown,
+        writable: true,
+        setting: false,
+        restart: false,
+        values: None,
+        default: 0,
+        about: String::new(),
+    }
+}
+
+/// The ports that have a slot, each with what a point of it is, in order.
+fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKind)> {
+    description.ports.iter().flat_map(move |port| {
+        let module = description
+            .modules
+            .iter()
+            .find(|module| module.code == port.module);
+        let points = module.map_or([0; 4], |module| module.points);
+        (1..).zip(points).filter_map(move |(channel, kind)| {
+            let kind = description.kinds.get(usize::from(kind))?;
+            Some((u16::from(port.number), channel, kind))
+        })
+    })
+}
+
+/// The address of a point.
+fn point(port: u16, channel: u16) -> u16 {
+    (port.max(1) - 1) * CHANNELS + channel - 1
+}
+
+fn points(description: &Description, readings: &[(u16, u16)]) -> Vec<Item> {
+    let mut items = Vec::new();
+    for (port, channel, kind) in kinds(description) {
+        let Some(table) = kind.table else { continue };
+        let address = point(port, channel);
+        let reading = readings
+            .get(usize::from(address))
+            .and_then(|(range, scale)| {
+                let suits = |reading: &&Reading| reading.range == *range && reading.scale == *scale;
+                kind.readings.iter().find(suits)
+            });
+        items.push(Item {
+            name: format!("p{port}.{channel}"),
+            table,
+            address,
+            words: 1,
+            meaning: match (table, reading) {
+                (Table::Bit, _) => Meaning::Bit,
+                (Table::Word, Some(reading)) => Meaning::Analog(reading.clone()),
+                (Table::Word, None) => Meaning::Unknown,
+            },
+            writable: kind.writable,
+            setting: false,
+            restart: false,
+            values: None,
+            default: 0,
+            about: kind.name.clone(),
+        });
+    }
+    items
+}
+
+/// The items of a register or a run of them.
+fn registers(description: &Description, register: &Register) -> Vec<Item> {
+    let each = match (&register.value, register.scope) {
+        (Value::Opaque, Scope::Unit) => register.count,
+        (Value::Long(_), _) => 2,
+        _ => 1,
+    };
+    let item = |name: String, index: u16| Item {
+        name,
+        table: Table::Word,
+        address: register.address.wrapping_add(index.wrapping_mul(each)),
+        words: each,
+        meaning: Meaning::Value(register.value.clone()),
+        writable: register.writable,
+        setting: register.writable && is_setting(register),
+        restart: register.restart,
+        values: register.writable.then(|| register.values.clone()),
+        default: register.default,
+        about: register.about.clone(),
+    };
+    let name = slug(&register.name);
+    match register.scope {
+        Scope::Unit if register.count <= each => vec![item(register.name.clone(), 0)],
+        Scope::Unit => (0..register.count / each)
+            .map(|index| item(format!("{name}.{}", index + 1), index))
+            .collect(),
+        Scope::Port => {
+            let ports = description.ports.iter().map(|port| u16::from(port.number));
+            ports
+                .map(|port| item(format!("p{port}.{name}"), port.max(1) - 1))
+                .collect()
+        }
+        Scope::Point => kinds(description)
+            .map(|(port, channel, kind)| {
+                let mut item = item(format!("p{port}.{channel}.{name}"), point(port, channel));
+                let narrower = register.narrower.as_ref().filter(|narrower| {
+                    description.kinds.get(usize::from(narrower.kind)) == Some(kind)
+                });
+                if let Some(narrower) = narrower {
+                    item.values = Some(narrower.values.clone());
+                    item.default = narrower.default;
+                    if let Some(value) = &narrower.value {
+                        item.meaning = Meaning::Value(value.clone());
+                    }
+                }
+                item
+            })
+            .collect(),
+    }
+}
+
+/// Whether a register that can be written is a setting: not the lock, an order or a counter.
+fn is_setting(register: &Register) -> bool {
+    !matches!(register.name.as_str(), "KEY" | "COMMAND")
+        && !matches!(register.value, Value::Long(_))
+}
+
+#[cfg(test)]
+mod tests {
+    use modio_description::describe;
+    use register_map::Module;
+    use register_map::board::{MODIO_02, MODIO_08};
+
+    use super::*;
+
+    fn book(module: Module) -> Book {
+        let mut readings = vec![(0, 0); 32];
+        readings[0x10] = (1, 1);
+        Book::new(describe(&MODIO_02, "0.1.0", |_| module), readings)
+    }
+
+    #[test]
+    fn names_lead_to_addresses() {
+        let book = book(Module::Ai2Ao2);
+        let address = |name| book.find(name).map(|item| (item.address, item.words));
+        assert_eq!(address("p5.1"), Ok((0x10, 1)));
+        assert_eq!(address("P5.4.SAFE"), Ok((0x1D3, 1)));
+        assert_eq!(address("baud"), Ok((0x101, 1)));
+        assert_eq!(address("reset cause"), Ok((0x207, 1)));
+        assert_eq!(address("reset_cause"), Ok((0x207, 1)));
+        assert_eq!(address("p5.module"), Ok((0x114, 1)));
+        assert_eq!(address("p5.2.pulses"), Ok((0x322, 2)));
+        assert_eq!(address("product_code"), Ok((0x200, 2)));
+        assert_eq!(address("0x0101"), Ok((0x101, 1)));
+        assert_eq!(book.find("0x0101").unwrap().name, "BAUD");
+        assert_eq!(book.find("4096").unwrap().meaning, Meaning::Unknown);
+    }
+
+    #[test]
+    fn an_unknown_name_lists_the_closest_ones() {
+        let unknown = book(Module::Di4).find("BUAD").unwrap_err();
+        assert!(unknown.to_string().contains("BAUD"), "{unknown}");
+        assert!(
+            book(Module::None).find("p5.1").is_err(),
+            "an empty slot has no points"
+        );
+        assert!(Book::default().find("BAUD").is_err());
+        assert!(Book::default().find("16").is_ok());
+    }
+
+    #[test]
+    fn a_point_reads_as_its_settings_say_and_a_setting_takes_what_suits_it() {
+        let book = book(Module::Ai2Ao2);
+        let Meaning::Analog(reading) = book.find("p5.1").unwrap().meaning else {
+            panic!("no analog point");
+        };
+        assert_eq!((reading.unit.code.as_str(), reading.max), ("uA", 20_000));
+        assert_eq!(
+            book.find("p5.1.filter").unwrap().values,
+            Some(Values::Range(0, 8))
+        );
+        assert_eq!(
+            book.find("p5.3.range").unwrap().values,
+            Some(Values::Range(0, 1))
+        );
+        assert!(!book.find("p5.1").unwrap().writable && book.find("p5.3").unwrap().writable);
+    }
+
+    #[test]
+    fn ports_have_their_module_and_points_of_unknown_meaning() {
+        let ports = book(Module::Ai2Ao2).ports();
+        let names = |port: &PortItems| {
+            let names = port.points.iter().map(|item| item.name.clone());
+            names.collect::<Vec<_>>()
+        };
+        assert_eq!(ports.len(), 1);
+        assert_eq!((ports[0].number, ports[0].module.as_str()), (5, "2ai2ao"));
+        assert_eq!(names(&ports[0]), ["p5.1", "p5.2", "p5.3", "p5.4"]);
+        let unknown = Book::new(describe(&MODIO_02, "0.1.0", |_| Module::Ai4), Vec::new());
+        assert_eq!(names(&unknown.ports()[0]).len(), 4);
+        assert!(Book::default().ports().is_empty());
+    }
+
+    #[test]
+    fn a_board_with_more_slots_has_their_points() {
+        let book = Book::new(
+            describe(&MODIO_08, "0.1.0", |_| Module::Do4),
+            vec![(0, 0); 32],
+        );
+        assert_eq!(book.points().count(), 16);
+        assert_eq!(book.find("p4.4").unwrap().address, 15);
+        assert!(book.find("p5.1").is_err());
+    }
+}

@@ -1,0 +1,383 @@
+//! Values of points and registers, for people and for programs, and what people write back.
+
+use modio_description::{Table, Unit, Value, Values};
+use serde_json::{Value as Json, json};
+
+use crate::failure::Failure;
+use crate::names::{Item, Meaning};
+
+/// A value as it was read: one register or more, or a bit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// For people, without the unit.
+    pub text: String,
+    /// The unit for people; empty when there is none.
+    pub unit: String,
+    /// For programs: a number, a bool, or a text.
+    pub json: Json,
+}
+
+impl std::fmt::Display for Shown {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.unit.as_str() {
+            "" => f.write_str(&self.text),
+            unit => write!(f, "{} {unit}", self.text),
+        }
+    }
+}
+
+/// What registers say; `raw`: as numbers, whatever they mean.
+#[must_use]
+pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
+    let first = words.first().copied().unwrap_or_default();
+    match &item.meaning {
+        Meaning::Bit if raw => number(first.into(), &Unit::default()),
+        Meaning::Bit => Shown {
+            text: if first == 0 { "off" } else { "on" }.to_owned(),
+            unit: String::new(),
+            json: json!(first != 0),
+        },
+        Meaning::Analog(reading) if !raw => number(signed(first, reading.min), &reading.unit),
+        Meaning::Value(value) => register(value, words, raw),
+        Meaning::Analog(_) | Meaning::Unknown => number(first.into(), &Unit::default()),
+    }
+}
+
+/// A word, in two's complement where values below 0 are possible.
+fn signed(word: u16, min: i32) -> i64 {
+    if min < 0 {
+        i64::from(word.cast_signed())
+    } else {
+        word.into()
+    }
+}
+
+fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
+    let first = words.first().copied().unwrap_or_default();
+    let plain = Unit::default();
+    match value {
+        Value::Number(unit) => number(first.into(), if raw { &plain } else { unit }),
+        Value::Long(unit) => {
+            let long = words
+                .iter()
+                .fold(0, |long, word| long << 16 | i64::from(*word));
+            number(long, if raw { &plain } else { unit })
+        }
+        Value::Codes(names) if !raw => match names.iter().find(|(code, _)| *code == first) {
+            Some((_, name)) => text(name.clone()),
+            None => number(first.into(), &plain),
+        },
+        Value::Bits(names) if !raw => {
+            let set = names.iter().filter(|(bit, _)| first >> bit & 1 == 1);
+            let set: Vec<_> = set.map(|(_, name)| name.as_str()).collect();
+            Shown {
+                text: if set.is_empty() {
+                    "-".to_owned()
+                } else {
+                    set.join(", ")
+                },
+                unit: String::new(),
+                json: json!(set),
+            }
+        }
+        Value::Codes(_) | Value::Bits(_) => number(first.into(), &plain),
+        Value::Opaque => text(words.iter().map(|word| format!("{word:04X}")).collect()),
+    }
+}
+
+fn text(text: String) -> Shown {
+    Shown {
+        json: json!(text),
+        text,
+        unit: String::new(),
+    }
+}
+
+fn number(number: i64, unit: &Unit) -> Shown {
+    let text = decimal(number + i64::from(unit.offset), unit.exponent);
+    Shown {
+        json: text.parse::<i64>().map_or_else(
+            |_| json!(text.parse::<f64>().unwrap_or_default()),
+            |whole| json!(whole),
+        ),
+        text,
+        unit: unit_name(&unit.code).to_owned(),
+    }
+}
+
+/// `number * 10^exponent` in decimal digits.
+fn decimal(number: i64, exponent: i8) -> String {
+    let places = usize::from(exponent.min(0).unsigned_abs());
+    if places == 0 {
+        let zeros = "0".repeat(exponent.unsigned_abs().into());
+        return if number == 0 {
+            "0".to_owned()
+        } else {
+            format!("{number}{zeros}")
+        };
+    }
+    let digits = format!("{:0>width$}", number.unsigned_abs(), width = places + 1);
+    let (whole, fraction) = digits.split_at(digits.len() - places);
+    let sign = if number < 0 { "-" } else { "" };
+    format!("{sign}{whole}.{fraction}")
+}
+
+/// A UCUM code as people write the unit.
+#[must_use]
+pub fn unit_name(code: &str) -> &str {
+    match code {
+        "Cel" => "°C",
+        "uA" => "µA",
+        "By" => "bytes",
+        code => code,
+    }
+}
+
+/// The registers that make an item what `text` says; `raw`: a number as it stands in the register.
+///
+/// # Errors
+///
+/// That the item cannot be written, or which values it takes.
+pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
+    let name = &item.name;
+    if !item.writable {
+        return Err(Failure::usage(format!("{name} can only be read")));
+    }
+    let wrong = |takes: String| Failure::usage(format!("{name} does not take {text:?}: {takes}"));
+    let word = number_of(text);
+    let word = if raw && item.words == 1 {
+        let word = word.ok_or_else(|| wrong("--raw needs a number from 0 to 65535".to_owned()))?;
+        return check_raw(item, word).map(|()| vec![word]).map_err(wrong);
+    } else {
+        word
+    };
+    match &item.meaning {
+        Meaning::Bit => match text.to_lowercase().as_str() {
+            "1" | "on" | "true" => Ok(vec![1]),
+            "0" | "off" | "false" => Ok(vec![0]),
+            _ => Err(wrong("it is on or off".to_owned())),
+        },
+        Meaning::Analog(reading) => {
+            let takes = || range(reading.min.into(), reading.max.into(), &reading.unit);
+            let number = steps(text, &reading.unit).ok_or_else(|| wrong(takes()))?;
+            if !(i64::from(reading.min)..=i64::from(reading.max)).contains(&number) {
+                return Err(wrong(takes()));
+            }
+            Ok(vec![number as u16])
+        }
+        Meaning::Value(Value::Codes(names)) => {
+            let wanted = text.to_lowercase();
+            let named = names.iter().find(|(_, name)| name.to_lowercase() == wanted);
+            let code = named.map(|(code, _)| *code).or(word);
+            let allowed = |code: &u16| {
+                item.values
+                    .as_ref()
+                    .is_none_or(|values| allow(values, *code))
+            };
+            let code = code.filter(|code| allowed(code)).ok_or_else(|| {
+                let takes = names.iter().filter(|(code, _)| allowed(code));
+                let takes: Vec<_> = takes
+                    .map(|(code, name)| format!("{code} = {name}"))
+                    .collect();
+                wrong(format!("it takes {}", takes.join(", ")))
+            })?;
+            Ok(vec![code])
+        }
+        Meaning::Value(Value::Number(unit)) => {
+            let takes = || {
+                item.values.as_ref().map_or_else(
+                    || "it takes 0 to 65535".to_owned(),
+                    |values| takes(values, unit),
+                )
+            };
+            // A value outside the unit's range, such as 0xFFFF for hold, is written as it is.
+            let word = match text.get(..2) {
+                Some("0x" | "0X") => word.map(i64::from),
+                _ => steps(text, unit),
+            };
+            let word = word.and_then(|word| u16::try_from(word).ok());
+            let allowed = |word: &u16| {
+                item.values
+                    .as_ref()
+                    .is_none_or(|values| allow(values, *word))
+            };
+            word.filter(allowed)
+                .map(|word| vec![word])
+                .ok_or_else(|| wrong(takes()))
+        }
+        Meaning::Value(Value::Long(_)) => match text {
+            // The one long value that can be written is a counter that is cleared.
+            "0" => Ok(vec![0; usize::from(item.words)]),
+            _ => Err(wrong("it can only be cleared, by 0".to_owned())),
+        },
+        Meaning::Value(Value::Bits(_)) => word
+            .map(|word| vec![word])
+            .ok_or_else(|| wrong("it takes a number".to_owned())),
+        Meaning::Value(Value::Opaque) => {
+            Err(wrong("it has no values that can be written".to_owned()))
+        }
+        Meaning::Unknown => word
+            .map(|word| vec![word])
+            .ok_or_else(|| wrong("it takes 0 to 65535".to_owned())),
+    }
+}
+
+fn check_raw(item: &Item, word: u16) -> Result<(), String> {
+    match (&item.meaning, &item.values) {
+        (Meaning::Bit, _) if word > 1 => Err("a bit is 0 or 1".to_owned()),
+        (_, Some(values)) if !allow(values, word) => Err(takes(values, &Unit::default())),
+        _ => Ok(()),
+    }
+}
+
+/// A number from 0 to 65535, decimal or hexadecimal.
+fn number_of(text: &str) -> Option<u16> {
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u16::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+/// How many steps of the unit a quantity is; `None` when it is no number, has another unit, or lies between two steps.
+fn steps(text: &str, unit: &Unit) -> Option<i64> {
+    let shown = unit_name(&unit.code);
+    let number = text
+        .trim()
+        .strip_suffix(shown)
+        .or_else(|| text.trim().strip_suffix(&unit.code));
+    let quantity: f64 = number.unwrap_or(text).trim().parse().ok()?;
+    let steps = quantity / 10_f64.powi(unit.exponent.into());
+    let whole = steps.round();
+    let near = (steps - whole).abs() < 1e-6 && whole.abs() < 1e9;
+    near.then_some(whole as i64 - i64::from(unit.offset))
+}
+
+/// Whether a value is among those a register takes.
+#[must_use]
+pub fn allow(values: &Values, word: u16) -> bool {
+    match values {
+        Values::Range(min, max) => (*min..=*max).contains(&word),
+        Values::RangeOr(also, min, max) => word == *also || (*min..=*max).contains(&word),
+        Values::OneOf(values) => values.contains(&word),
+    }
+}
+
+/// Which values a register takes, in its unit.
+#[must_use]
+pub fn takes(values: &Values, unit: &Unit) -> String {
+    match values {
+        Values::Range(min, max) => range((*min).into(), (*max).into(), unit),
+        // The value beside the range stands for something else than a quantity, unless it is 0.
+        Values::RangeOr(0, min, max) => {
+            format!("{}, or 0", range((*min).into(), (*max).into(), unit))
+        }
+        Values::RangeOr(also, min, max) => {
+            format!(
+                "{}, or {also:#06X}",
+                range((*min).into(), (*max).into(), unit)
+            )
+        }
+        Values::OneOf(values) => {
+            let each = values
+                .iter()
+                .map(|value| number((*value).into(), unit).text);
+            let each: Vec<_> = each.collect();
+            format!("it takes {} {}", each.join(", "), unit_name(&unit.code))
+                .trim_end()
+                .to_owned()
+        }
+    }
+}
+
+fn range(min: i64, max: i64, unit: &Unit) -> String {
+    format!(
+        "it takes {} to {}",
+        number(min, unit).text,
+        number(max, unit)
+    )
+}
+
+/// What an item is read and written by, for people.
+#[must_use]
+pub const fn table_name(table: Table) -> &'static str {
+    match table {
+        Table::Bit => "bit",
+        Table::Word => "word",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use modio_description::describe;
+    use register_map::Module;
+    use register_map::board::MODIO_02;
+
+    use super::*;
+    use crate::names::Book;
+
+    fn book(range: u16, scale: u16) -> Book {
+        let mut readings = vec![(0, 0); 32];
+        readings[0x10] = (range, scale);
+        readings[0x12] = (range, scale);
+        Book::new(describe(&MODIO_02, "0.1.0", |_| Module::Ai2Ao2), readings)
+    }
+
+    fn shown(name: &str, words: &[u16]) -> String {
+        show(&book(2, 1).find(name).unwrap(), words, false).to_string()
+    }
+
+    fn parsed(book: &Book, name: &str, text: &str) -> Result<u16, String> {
+        let words = parse(&book.find(name).unwrap(), text, false);
+        words
+            .map(|words| words[0])
+            .map_err(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn values_have_their_units_and_names() {
+        assert_eq!(shown("p5.1", &[0xFF83]), "-12.5 °C");
+        assert_eq!(shown("p5.1", &[5]), "0.5 °C");
+        assert_eq!(shown("BAUD", &[1152]), "115200 bit/s");
+        assert_eq!(shown("FORMAT", &[1]), "8E1");
+        assert_eq!(shown("FRAME_GAP", &[12]), "1.2 ms");
+        assert_eq!(shown("LORA_CHANNEL", &[23]), "433 MHz");
+        assert_eq!(shown("uptime", &[1, 2]), "65538 s");
+        assert_eq!(shown("status", &[0]), "-");
+        assert_eq!(shown("FORMAT", &[99]), "99", "a code without a name");
+        let temperature = show(&book(2, 1).find("p5.1").unwrap(), &[0xFF83], false);
+        assert_eq!(temperature.json, json!(-12.5));
+        assert_eq!(
+            show(&book(2, 1).find("p5.1").unwrap(), &[0xFF83], true).text,
+            "65411"
+        );
+    }
+
+    #[test]
+    fn what_people_write_becomes_registers() {
+        let book = book(1, 1);
+        assert_eq!(parsed(&book, "BAUD", "115200"), Ok(1152));
+        assert_eq!(parsed(&book, "BAUD", "19200 bit/s"), Ok(192));
+        assert_eq!(parsed(&book, "FORMAT", "8e1"), Ok(1));
+        assert_eq!(parsed(&book, "FRAME_GAP", "1.2"), Ok(12));
+        assert_eq!(parsed(&book, "p5.3", "12000"), Ok(12_000));
+        assert_eq!(parsed(&book, "p5.3.safe", "0xFFFF"), Ok(0xFFFF));
+        assert_eq!(parsed(&book, "p5.module", "4ai"), Ok(4));
+        assert_eq!(parsed(&book, "LORA_CHANNEL", "433"), Ok(23));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_what_does() {
+        let book = book(1, 1);
+        let wrong = |name, text| parsed(&book, name, text).unwrap_err();
+        assert!(wrong("p5.3", "3000").contains("4000 to 20000 µA"));
+        assert!(wrong("BAUD", "14400").contains("9600"));
+        assert!(wrong("FORMAT", "9X9").contains("8N2"));
+        assert!(wrong("p5.3.range", "2").contains("4-20 mA"));
+        assert!(!wrong("p5.3.range", "2").contains("NTC"));
+        assert!(wrong("p5.1", "5").contains("only be read"));
+        assert!(wrong("FRAME_GAP", "1.23").contains("0.5 to 100.0 ms, or 0"));
+        for text in ["", "-1", "1e300", "nan", "99999999999999999999", "ä"] {
+            assert!(parsed(&book, "COMM_TIMEOUT", text).is_err(), "{text}");
+        }
+    }
+}

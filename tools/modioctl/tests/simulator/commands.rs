@@ -1,0 +1,254 @@
+//! Every command, on each kind of line.
+
+use std::process::Stdio;
+use std::thread;
+use std::time::Duration;
+
+use crate::program::{At, modioctl};
+use crate::unit::Unit;
+use crate::{bus, gateway};
+
+/// A unit on each kind of line.
+fn lines(unit: &Unit) -> [At; 3] {
+    [
+        At::port(unit.pty.display()),
+        At::tcp(unit.tcp),
+        At::modbus_tcp(gateway::before(unit.tcp)),
+    ]
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_slot_is_commissioned_with_one_command_and_its_points_are_read_on_every_line() {
+    for n in 0..3 {
+        let unit = Unit::start(1, "4ai");
+        let at = &lines(&unit)[n];
+        let text = at.run("module set 5 4ai").fine();
+        assert_eq!(text, "port 5: 4ai, saved and in force; state: good\n");
+        at.run("write p5.1.range=0 p5.1.scale=1").fine();
+        at.run("config save").fine();
+        unit.post("/api/channels/1", r#"{"millivolts":1650}"#);
+        thread::sleep(Duration::from_millis(500));
+        let text = at.run("read p5.1").fine();
+        assert!(
+            text.starts_with("p5.1  5") && text.ends_with(" mV\n") || text.starts_with("p5.1  49"),
+            "{text}"
+        );
+        let text = at.run("reboot").fine();
+        assert!(text.starts_with("restarted"), "{text}");
+        let text = at.run("read p5.1.scale p5.2.scale").fine();
+        assert!(
+            text.contains("engineering units") && text.contains("raw 12-bit"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn outputs_are_written_and_read_back_on_every_line() {
+    let unit = Unit::with(1, &["--module", "4do"]);
+    for at in lines(&unit) {
+        at.run("write p5.1=on p5.2=off").fine();
+        let text = at.run("--json read p5.1 p5.2").fine();
+        let values: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            (&values[0]["value"], &values[1]["value"]),
+            (&true.into(), &false.into())
+        );
+        at.run("write p5.1=0 0x0011=1").fine();
+        let text = at.run("read p5.1 p5.2").fine();
+        assert_eq!(text, "p5.1  off\np5.2  on\n");
+    }
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn info_and_describe_say_what_the_unit_is() {
+    let unit = Unit::with(7, &["--module", "2relay"]);
+    for at in lines(&unit) {
+        let text = at.run("--unit 7 info").fine();
+        for part in [
+            "LLD-ModbusIO-02",
+            "modio-02",
+            "2relay",
+            "reset cause",
+            "bus messages",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let info: serde_json::Value =
+            serde_json::from_str(&at.run("--unit 7 --json info").fine()).unwrap();
+        assert_eq!(info["unit address"], 7);
+        let text = at.run("--unit 7 describe").fine();
+        for part in ["p5.3 ", "digital output", "BAUD", "COMM_TIMEOUT", "0x0010"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        // The same from the unit itself, but for where it is from.
+        let read = at.run("--unit 7 describe --refresh").fine();
+        assert!(
+            read.lines().next().unwrap().ends_with("from the unit"),
+            "{read}"
+        );
+        assert!(
+            read.lines().skip(1).eq(text.lines().skip(1)),
+            "{read}\n{text}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn settings_go_to_a_file_and_back_and_a_wrong_file_changes_nothing() {
+    let unit = Unit::with(1, &["--module", "2ai2ao"]);
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("unit.toml");
+    let path = file.display();
+    for at in lines(&unit) {
+        at.run("config reset --restart").fine();
+        at.run("module set 5 2ai2ao").fine();
+        at.run(&format!("config export {path}")).fine();
+        let same = at.run(&format!("config diff {path}")).fine();
+        assert_eq!(same, "no difference\n");
+
+        let exported = std::fs::read_to_string(&file).unwrap();
+        let changed = exported
+            .replace("COMM_TIMEOUT = 0.0", "COMM_TIMEOUT = 2.5")
+            .replace("p5.3.safe = 0 ", "p5.3.safe = 1000 ");
+        std::fs::write(&file, changed.replace("p5.1.beta = 3950", "p5.1.beta = 10")).unwrap();
+        let wrong = at.run(&format!("config import {path}")).failed(2);
+        assert!(
+            wrong.contains("p5.1.beta") && wrong.contains("2000 to 5000 K"),
+            "{wrong}"
+        );
+        assert_eq!(at.run("read COMM_TIMEOUT").fine(), "COMM_TIMEOUT  0.0 s\n");
+
+        std::fs::write(&file, changed).unwrap();
+        let differs = at.run(&format!("config diff {path}")).fine();
+        assert!(
+            differs.contains("COMM_TIMEOUT") && differs.contains("p5.3.safe"),
+            "{differs}"
+        );
+        let text = at.run(&format!("config import {path} --restart")).fine();
+        assert_eq!(text, "2 settings written\nsaved\n");
+        assert_eq!(
+            at.run("config get COMM_TIMEOUT").fine(),
+            "COMM_TIMEOUT  2.5 s\n"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn an_import_with_another_rate_follows_the_unit() {
+    let unit = Unit::with(1, &["--module", "4di"]);
+    let at = At::port(unit.pty.display());
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("unit.toml");
+    std::fs::write(&file, "BAUD = 19200\nFORMAT = \"7E1\"\nMODE = \"ascii\"\n").unwrap();
+    let text = at
+        .run(&format!("config import {} --restart", file.display()))
+        .fine();
+    assert!(
+        text.ends_with("restarted: all settings are in force\n"),
+        "{text}"
+    );
+    let text = at
+        .run("--baud 19200 --format 7E1 --mode ascii read MODE")
+        .fine();
+    assert_eq!(text, "MODE  ASCII\n");
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn watch_prints_values_and_waits_for_a_unit_that_is_gone() {
+    let unit = Unit::with(1, &["--module", "4di"]);
+    for at in lines(&unit) {
+        let text = at.run("watch --count 3 --every 50ms").fine();
+        assert_eq!(text.matches("p5.4 off").count(), 3, "{text}");
+        let text = at
+            .run("watch p5.1 status --count 2 --every 50ms --csv")
+            .fine();
+        assert_eq!(text.lines().next(), Some("time,p5.1,status"));
+        assert_eq!(text.matches(",off,-").count(), 2, "{text}");
+        let watching = at
+            .command("--timeout 100ms --retries 0 watch p5.1 --count 40 --every 50ms --json-lines")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        thread::sleep(Duration::from_secs(1));
+        unit.post("/api/power", r#"{"on":false}"#);
+        thread::sleep(Duration::from_secs(1));
+        unit.post("/api/power", r#"{"on":true}"#);
+        let output = watching.wait_with_output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            told.contains("waiting for it") && told.contains("is back"),
+            "{told}"
+        );
+        let lines = String::from_utf8(output.stdout).unwrap();
+        let values: Vec<serde_json::Value> = lines
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        assert_eq!(values.len(), 40);
+        assert!(values.iter().all(|value| value["p5.1"] == false), "{lines}");
+    }
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_pdu_is_sent_as_it_is_and_both_frames_are_shown() {
+    let unit = Unit::with(1, &["--module", "4di"]);
+    let [pty, tcp, modbus_tcp] = lines(&unit);
+    for at in [pty, tcp] {
+        let text = at.run("raw 08 0000 1234").fine();
+        assert_eq!(
+            text,
+            "-> 01 08 00 00 12 34 ED 7C  diagnostics 00: 12 34\n<- 01 08 00 00 12 34 ED 7C  diagnostics 00: 12 34\n"
+        );
+    }
+    let text = modbus_tcp.run("raw 02 0010 0004").fine();
+    assert!(
+        text.contains("read discrete inputs 0x0010 = 0000"),
+        "{text}"
+    );
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn each_of_three_boards_on_a_line_answers_for_itself() {
+    let units = [
+        Unit::with(1, &["--module", "4do"]),
+        Unit::with(2, &["--module", "4di"]),
+        Unit::with(30, &["--module", "4ao"]),
+    ];
+    let at = At::tcp(bus::of(&units.each_ref().map(|unit| unit.tcp), 0));
+    let text = at.run("scan --units 1-40").fine();
+    let lines: Vec<_> = text
+        .lines()
+        .map(str::split_whitespace)
+        .map(|words| words.collect::<Vec<_>>().join(" "))
+        .collect();
+    assert_eq!(
+        lines,
+        [
+            "1 modio modio-02 0.1.0 p5 4do",
+            "2 modio modio-02 0.1.0 p5 4di",
+            "30 modio modio-02 0.1.0 p5 4ao",
+        ]
+    );
+    at.run("--unit 1 write p5.4=on").fine();
+    assert_eq!(at.run("--unit 2 read p5.4").fine(), "p5.4  off\n");
+    assert_eq!(at.run("--unit 1 read p5.4").fine(), "p5.4  on\n");
+}
+
+#[test]
+fn what_needs_no_unit_works_without_one() {
+    let run = |words: &[&str]| String::from_utf8(modioctl(words).output().unwrap().stdout).unwrap();
+    assert!(run(&["completions", "bash"]).contains("_modioctl"));
+    assert!(run(&["man"]).contains(".TH modioctl"));
+    assert!(modioctl(&["ports"]).output().unwrap().status.success());
+}

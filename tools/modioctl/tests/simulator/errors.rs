@@ -1,0 +1,179 @@
+//! Each exit status, provoked.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::thread;
+
+use modioctl::bus::adu::Framing;
+
+use crate::program::{At, modioctl};
+use crate::unit::Unit;
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn what_the_unit_refuses_is_status_1() {
+    let unit = Unit::with(1, &["--module", "4di"]);
+    let at = At::tcp(unit.tcp);
+    let text = at.run("read 0x0090").failed(1);
+    assert!(
+        text.contains("exception 02") && text.contains("no such"),
+        "{text}"
+    );
+    assert_eq!(at.run("raw 41").status, 1);
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_module_that_is_not_plugged_in_is_status_1() {
+    let unit = Unit::with(1, &["--module", "4ao"]);
+    unit.post("/api/power", r#"{"on":false}"#);
+    unit.post("/api/module", r#"{"name":"4di"}"#);
+    unit.post("/api/power", r#"{"on":true}"#);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let at = At::tcp(unit.tcp);
+    let text = at.run("write p5.1=100").failed(1);
+    assert!(
+        text.contains("exception 04") && text.contains("plugged in"),
+        "{text}"
+    );
+    let text = at.run("read p5.module_state").fine();
+    assert_eq!(text, "p5.module_state  not answering\n");
+}
+
+#[test]
+fn wrong_usage_is_status_2_and_says_what_is_right() {
+    let nowhere = At::tcp("127.0.0.1:1");
+    for (words, part) in [
+        ("read", "NAME"),
+        ("write p5.1", "NAME=VALUE"),
+        ("frobnicate", "frobnicate"),
+        ("--unit 0 info", "1 to 247"),
+        ("--timeout 0 info", "1ms to 1h"),
+        ("--port x info", "cannot be used with"),
+        ("scan --units 0-5", "1 to 247"),
+        ("scan --rates 9600", "over TCP"),
+        ("module set 9 4di", "1..=8"),
+    ] {
+        let ran = nowhere.run(words);
+        assert_eq!(ran.status, 2, "{words}: {ran:?}");
+        assert!(ran.err.contains(part), "{words}: {ran:?}");
+    }
+    let output = modioctl(&["info"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "no endpoint");
+    assert!(String::from_utf8(output.stderr).unwrap().contains("--port"));
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn wrong_names_and_values_are_status_2_and_nothing_is_written() {
+    let unit = Unit::with(1, &["--module", "4do"]);
+    let at = At::tcp(unit.tcp);
+    for (words, part) in [
+        ("read p5.9", "p5."),
+        ("read BUAD", "BAUD"),
+        ("write p5.1=on p5.2=maybe", "on or off"),
+        ("write p5.1=on uptime=0", "only be read"),
+        ("write p5.1=on BAUD=14400", "9600"),
+        ("module set 1 4di", "port 1 has no slot"),
+        ("module set 5 5di", "4di"),
+        ("config import /nowhere.toml", "/nowhere.toml"),
+        ("raw 0", "hexadecimal"),
+    ] {
+        let text = at.run(words).failed(2);
+        assert!(text.contains(part), "{words}: {text}");
+    }
+    assert_eq!(at.run("read p5.1").fine(), "p5.1  off\n");
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn silence_is_status_3() {
+    let unit = Unit::with(1, &["--module", "4di"]);
+    let at = At::tcp(unit.tcp);
+    let text = at.run("--unit 2 --timeout 100ms info").failed(3);
+    assert!(text.contains("unit 2 does not answer"), "{text}");
+    let text = at.run("--unit 2 scan --units 2-9").failed(3);
+    assert!(text.contains("no unit found"), "{text}");
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_wrong_rate_is_status_3_or_4() {
+    // The unit has 9600 bit/s. What it hears of 4800 is no request, or garbled, and so is what comes back.
+    let unit = Unit::with(1, &["--module", "4di", "--line", "4800,8N2"]);
+    let at = At::port(unit.pty.display());
+    let ran = at.run("--timeout 300ms info");
+    assert!(ran.status == 4 || ran.status == 3, "{ran:?}");
+}
+
+/// Two units with address 1: their answers meet on the line, where a 0 wins over a 1.
+fn two_units_with_one_address() -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        for mut master in listener.incoming().flatten() {
+            let mut bytes = [0; 512];
+            while let Ok(count @ 1..) = master.read(&mut bytes) {
+                let Some((1, pdu)) = Framing::Rtu.open(&bytes[..count]) else {
+                    continue;
+                };
+                // They are of one kind, and say so alike; all else differs.
+                let differs = pdu[0] != 0x11;
+                let answer = |unit: u8| [pdu[0], 2, 0x55, if differs { unit } else { 0xFF }];
+                let [one, other] = [1, 2].map(|unit| Framing::Rtu.frame(0, 1, &answer(unit)));
+                let both: Vec<_> = one
+                    .iter()
+                    .zip(other)
+                    .map(|(one, other)| one & other)
+                    .collect();
+                master.write_all(&both).unwrap();
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn two_units_with_one_address_are_status_4() {
+    let at = At::tcp(two_units_with_one_address());
+    let text = at.run("--timeout 200ms info").failed(4);
+    assert!(
+        text.contains("garbled") && text.contains("two units"),
+        "{text}"
+    );
+    let ran = at.run("scan --units 1-3");
+    assert_eq!(ran.status, 4, "{ran:?}");
+    let told = "something answers, but garbled, at address 1";
+    assert!(ran.out.contains(told), "{ran:?}");
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_port_that_cannot_be_opened_is_status_5() {
+    let text = At::port("/dev/nowhere").run("info").failed(5);
+    assert!(
+        text.contains("there is no port /dev/nowhere; this computer has"),
+        "{text}"
+    );
+    // Bound and not listening any more: nobody is there.
+    let free = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let text = At::tcp(free).run("info").failed(5);
+    assert!(text.contains("no connection"), "{text}");
+
+    let unit = Unit::with(1, &["--module", "4di"]);
+    let at = At::port(unit.pty.display());
+    let mut holder = at
+        .command("watch")
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let text = at.run("info").failed(5);
+    assert!(text.contains("is in use"), "{text}");
+    holder.kill().unwrap();
+    holder.wait().unwrap();
+    at.run("info").fine();
+}

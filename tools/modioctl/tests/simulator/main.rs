@@ -1,0 +1,14 @@
+//! `modioctl` against the release image in the simulator: over a pseudo-terminal, over TCP and over Modbus TCP. They need
+//! the simulator and the image, whose paths `cargo xtask test` gives in MODIO_SIM and MODIO_ELF.
+
+#![cfg(unix)]
+
+mod bus;
+mod commands;
+mod errors;
+mod gateway;
+mod newer;
+mod program;
+mod scanning;
+mod trouble;
+mod unit;

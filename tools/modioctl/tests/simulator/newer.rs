@@ -1,0 +1,131 @@
+//! A unit that is newer than this program: another board, firmware and registers that only its own description has.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::thread;
+
+use modio_description::{Description, Register, Scope, Unit, Value, Values, checksum, describe};
+use modioctl::bus::adu::Framing;
+use register_map::Module;
+use register_map::board::MODIO_02;
+
+use crate::program::At;
+
+/// The description: that of a modio-02, with what is new.
+fn description() -> Description {
+    let mut description = describe(&MODIO_02, "9.9.9", |_| Module::Ai4);
+    description.board = "modio-99".to_owned();
+    description.registers.push(Register {
+        address: 0x0500,
+        count: 1,
+        name: "PRESSURE_LIMIT".to_owned(),
+        scope: Scope::Unit,
+        value: Value::Number(Unit {
+            code: "kPa".to_owned(),
+            exponent: -1,
+            offset: 0,
+        }),
+        writable: false,
+        restart: false,
+        values: Values::Range(0, 1000),
+        default: 0,
+        narrower: None,
+        about: "Where the valve opens".to_owned(),
+    });
+    description
+}
+
+/// Serves its registers and its file over TCP.
+fn unit() -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let file = description().file();
+    let words = file
+        .as_chunks::<2>()
+        .0
+        .iter()
+        .map(|word| u16::from_be_bytes(*word))
+        .collect::<Vec<_>>();
+    let mut registers: BTreeMap<u16, u16> = (0x0180..0x01C0).map(|address| (address, 0)).collect();
+    registers.extend([
+        (0x0200, 0x2383),
+        (0x0201, 0x5860),
+        (0x0202, 0x0909),
+        (0x0203, 9),
+        (0x0204, 1),
+        (0x0205, 99),
+    ]);
+    registers.extend([
+        (0x020F, checksum(&description().encode())),
+        (0x0500, 1234),
+        (0x0010, 7),
+    ]);
+    thread::spawn(move || {
+        for mut master in listener.incoming().flatten() {
+            let mut bytes = [0; 512];
+            while let Ok(count @ 1..) = master.read(&mut bytes) {
+                let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
+                let answer = answer(&pdu, &registers, &words);
+                master
+                    .write_all(&Framing::Rtu.frame(0, unit, &answer))
+                    .unwrap();
+            }
+        }
+    });
+    address
+}
+
+fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
+    let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
+    let bytes = |words: Vec<u16>| {
+        words
+            .into_iter()
+            .flat_map(u16::to_be_bytes)
+            .collect::<Vec<_>>()
+    };
+    match pdu[0] {
+        3 => {
+            let addresses = word(1)..word(1) + word(3);
+            let words: Option<Vec<u16>> = addresses
+                .map(|address| registers.get(&address).copied())
+                .collect();
+            words.map_or(vec![0x83, 2], |words| {
+                [vec![3, words.len() as u8 * 2], bytes(words)].concat()
+            })
+        }
+        0x14 if word(3) == 1 => {
+            let first = usize::from(word(5));
+            let words = bytes(file[first..first + usize::from(word(7))].to_vec());
+            [
+                vec![0x14, words.len() as u8 + 2, words.len() as u8 + 1, 6],
+                words,
+            ]
+            .concat()
+        }
+        function => vec![function | 0x80, 1],
+    }
+}
+
+#[test]
+fn its_own_description_names_what_this_program_does_not_know() {
+    let at = At::tcp(unit());
+    let first = at.run("read PRESSURE_LIMIT p5.1");
+    assert!(
+        first.err.contains("reading the unit's description"),
+        "{first:?}"
+    );
+    assert_eq!(
+        first.fine(),
+        "PRESSURE_LIMIT  123.4 kPa\np5.1            7\n"
+    );
+    let again = at.run("describe");
+    assert!(again.err.is_empty(), "kept from before: {again:?}");
+    let text = again.fine();
+    assert!(
+        text.contains("modio-99") && text.contains("Where the valve opens"),
+        "{text}"
+    );
+    let text = at.run("read PRESURE_LIMIT").failed(2);
+    assert!(text.contains("PRESSURE_LIMIT"), "{text}");
+}

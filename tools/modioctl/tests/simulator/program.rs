@@ -1,0 +1,97 @@
+//! Runs the program.
+
+use std::fmt::Display;
+use std::process::{Command, Output};
+
+/// What a run of the program gave.
+#[derive(Debug)]
+pub struct Ran {
+    pub status: i32,
+    pub out: String,
+    pub err: String,
+}
+
+impl Ran {
+    fn of(output: &Output) -> Self {
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+        Self {
+            status: output.status.code().unwrap(),
+            out: text(&output.stdout),
+            err: text(&output.stderr),
+        }
+    }
+
+    /// Standard output of a run that went well.
+    #[track_caller]
+    pub fn fine(self) -> String {
+        assert_eq!(self.status, 0, "{self:#?}");
+        self.out
+    }
+
+    /// Standard error of a run that ended with this status, and said why in one line.
+    #[track_caller]
+    pub fn failed(self, status: i32) -> String {
+        assert_eq!(self.status, status, "{self:#?}");
+        assert_eq!(self.err.trim_end().lines().count(), 1, "{self:#?}");
+        self.err
+    }
+}
+
+/// The program, without what this machine's user has set.
+pub fn modioctl(endpoint: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_modioctl"));
+    for name in [
+        "PORT",
+        "TCP",
+        "MODBUS_TCP",
+        "BAUD",
+        "FORMAT",
+        "MODE",
+        "UNIT",
+        "TIMEOUT",
+        "RETRIES",
+        "AT",
+    ] {
+        command.env_remove(format!("MODIO_{name}"));
+    }
+    command.args(endpoint);
+    command
+}
+
+/// Where a unit is, and a way to run the program on it, with a cache of its own.
+pub struct At(Vec<String>, tempfile::TempDir);
+
+impl At {
+    pub fn port(path: impl Display) -> Self {
+        Self::new("--port", path)
+    }
+
+    pub fn tcp(address: impl Display) -> Self {
+        Self::new("--tcp", address)
+    }
+
+    pub fn modbus_tcp(address: impl Display) -> Self {
+        Self::new("--modbus-tcp", address)
+    }
+
+    fn new(option: &str, place: impl Display) -> Self {
+        Self(
+            vec![option.to_owned(), place.to_string()],
+            tempfile::tempdir().unwrap(),
+        )
+    }
+
+    /// The program with the words of this command.
+    pub fn command(&self, words: &str) -> Command {
+        let endpoint: Vec<_> = self.0.iter().map(String::as_str).collect();
+        let mut command = modioctl(&endpoint);
+        command.env("XDG_CACHE_HOME", self.1.path());
+        command.args(words.split_whitespace());
+        command
+    }
+
+    /// Runs the words of a command.
+    pub fn run(&self, words: &str) -> Ran {
+        Ran::of(&self.command(words).output().unwrap())
+    }
+}

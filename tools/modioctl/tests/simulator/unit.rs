@@ -1,0 +1,87 @@
+//! A simulated unit.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+
+/// A unit in the simulator, which ends with it.
+pub struct Unit {
+    simulator: Child,
+    /// The line's pseudo-terminal.
+    pub pty: PathBuf,
+    /// The line over TCP.
+    pub tcp: SocketAddr,
+    http: SocketAddr,
+}
+
+fn path(variable: &str) -> PathBuf {
+    std::env::var_os(variable)
+        .unwrap_or_else(|| panic!("{variable} is not set: run `cargo xtask test`"))
+        .into()
+}
+
+impl Unit {
+    /// Starts a modio-02 with this address and this module in its slot; nothing is stored yet.
+    pub fn start(address: u8, module: &str) -> Self {
+        Self::with(address, &["--module", module, "--no-preset"])
+    }
+
+    /// Starts a modio-02 with these options of the simulator.
+    pub fn with(address: u8, options: &[&str]) -> Self {
+        let mut simulator = Command::new(path("MODIO_SIM"))
+            .arg("--elf")
+            .arg(path("MODIO_ELF"))
+            .args(["--dip", &address.to_string()])
+            .args(["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"])
+            .args(options)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(simulator.stdout.take().unwrap()).lines();
+        let mut after = |name: &str| {
+            let line = lines.next().unwrap().unwrap();
+            let value = line.strip_prefix(name);
+            value
+                .unwrap_or_else(|| panic!("{line:?}, not {name}"))
+                .to_owned()
+        };
+        let pty = after("pty: ").into();
+        let tcp = after("tcp: ").parse().unwrap();
+        let http = after("http: http://");
+        let http = http.trim_end_matches('/').parse().unwrap();
+        // The simulator prints the firmware's log, which somebody must read.
+        std::thread::spawn(move || lines.for_each(drop));
+        let unit = Self {
+            simulator,
+            pty,
+            tcp,
+            http,
+        };
+        // It answers from some milliseconds after its start on; a test that asks once must not be too early.
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        unit
+    }
+
+    /// Asks the simulator's HTTP interface for something.
+    pub fn post(&self, path: &str, body: &str) {
+        let mut stream = TcpStream::connect(self.http).unwrap();
+        let length = body.len();
+        write!(
+            stream,
+            "POST {path} HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}",
+            self.http
+        )
+        .unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 2"), "{answer}");
+    }
+}
+
+impl Drop for Unit {
+    fn drop(&mut self) {
+        let _ = self.simulator.kill();
+        let _ = self.simulator.wait();
+    }
+}

@@ -1,0 +1,71 @@
+//! The configuration that stands in a board's flash before the firmware runs.
+
+use std::ops::Range;
+
+use register_map::record;
+
+use super::Layout;
+use crate::machine::memory::FLASH_BASE;
+
+impl Layout {
+    /// The pages of the configuration, as ranges of the flash.
+    fn pages(&self) -> [Range<usize>; 2] {
+        let store = &self.board.store;
+        store.addresses().map(|address| {
+            let start = (address - FLASH_BASE) as usize;
+            start..start + store.bytes as usize
+        })
+    }
+
+    /// Whether no configuration was ever stored in this flash.
+    #[must_use]
+    pub fn stores_nothing(&self, flash: &[u8]) -> bool {
+        let vacant = |page: &Range<usize>| flash.get(page.clone()).is_some_and(record::is_vacant);
+        self.pages().iter().all(vacant)
+    }
+
+    /// Stores these settings, address and value, in a flash whose pages of the configuration hold nothing. Returns
+    /// whether they fit.
+    pub fn store(&self, flash: &mut [u8], settings: &[(u16, u16)]) -> bool {
+        let [first, _] = self.pages();
+        let Some(page) = flash.get_mut(first) else {
+            return false;
+        };
+        page.fill(0xFF);
+        record::encode_page(0, settings, page).is_some()
+    }
+
+    /// A flash in which nothing stands but these settings; `None` when they do not fit.
+    #[must_use]
+    pub fn flash_with(&self, settings: &[(u16, u16)]) -> Option<Vec<u8>> {
+        let mut flash = vec![0xFF; self.part.flash_size];
+        self.store(&mut flash, settings).then_some(flash)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::MODIO_08;
+
+    #[test]
+    fn modules_are_stored_where_the_board_looks_for_them() {
+        let settings = [(0x0110, 1), (0x0113, 5)];
+        let mut flash = MODIO_08.flash_with(&settings).unwrap();
+        assert!(!MODIO_08.stores_nothing(&flash));
+        let page = &flash[0x3_F000..0x3_F800];
+        let (_, record) = record::records(page).next().unwrap();
+        assert!(record.pairs().eq(settings));
+        flash[0x3_F000..0x3_F800].fill(0xFF);
+        assert!(MODIO_08.stores_nothing(&flash));
+        flash[0x3_FFFE] = 0;
+        assert!(!MODIO_08.stores_nothing(&flash), "the second page");
+    }
+
+    #[test]
+    fn what_does_not_fit_is_not_stored() {
+        let settings = [(0, 0); 512];
+        assert_eq!(MODIO_08.flash_with(&settings), None);
+        assert!(!MODIO_08.store(&mut [], &[]));
+    }
+}

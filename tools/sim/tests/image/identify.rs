@@ -1,0 +1,65 @@
+//! COMMAND 6: a person at the board sees which unit it is.
+
+use sim::{Module, Time, board::Leds};
+
+use crate::bench::Bench;
+
+const LIT: Leds = Leds {
+    activity: true,
+    fault: true,
+    run: true,
+};
+const DARK: Leds = Leds {
+    activity: false,
+    fault: false,
+    run: false,
+};
+
+impl Bench {
+    /// What the LEDs show during this time, looked at every 50 ms, from the middle of a pattern's tick on.
+    fn watch_leds(&mut self, time: Time) -> Vec<Leds> {
+        let end = self.board.now() + time;
+        let mut seen = Vec::new();
+        while self.board.now() < end {
+            self.board.run_for(Time::from_ms(50));
+            seen.push(self.board.leds());
+        }
+        seen
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn identify_makes_all_leds_blink_for_ten_seconds() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    bench.command(6);
+    // The command ends this long before the LEDs are looked at.
+    let seen = bench.watch_leds(Time::from_ms(9500));
+    assert!(
+        seen.iter().all(|leds| [LIT, DARK].contains(leds)),
+        "{seen:?}"
+    );
+    let changes = seen.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert!((46..=48).contains(&changes), "{changes} changes in 9.5 s");
+    bench.board.run_for(Time::from_secs(1));
+    let after = bench.watch_leds(Time::from_secs(2));
+    assert!(after.iter().all(|leds| !leds.fault && !leds.activity));
+    let changes = after.windows(2).filter(|pair| pair[0] != pair[1]);
+    assert!(
+        (3..=4).contains(&changes.count()),
+        "run blinks once a second"
+    );
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn unit_serves_requests_while_it_identifies_itself() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    assert_eq!(bench.write(0x0108, &[6]), Err(6), "the lock is closed");
+    bench.command(6);
+    for _ in 0..20 {
+        bench.assert_answers(1);
+    }
+    assert!([LIT, DARK].contains(&bench.board.leds()));
+    assert_eq!(bench.register(0x0108), 0);
+}

@@ -1,0 +1,151 @@
+//! The self-description: file 1 over the line by function 14, and its CRC in register 0x020F.
+
+use modio_description::{Description, describe, records};
+use register_map::Module as Known;
+use sim::Module;
+
+use crate::LAYOUT;
+use crate::bench::{Bench, MODULE, PORT};
+
+/// Groups of records: file, first record and how many.
+type Groups<'a> = &'a [(u16, u16, u16)];
+
+/// The PDU of function 14.
+fn request(groups: Groups<'_>) -> Vec<u8> {
+    let mut pdu = vec![0x14, groups.len() as u8 * 7];
+    for (file, record, count) in groups {
+        pdu.push(6);
+        pdu.extend(
+            [*file, *record, *count]
+                .map(u16::to_be_bytes)
+                .as_flattened(),
+        );
+    }
+    pdu
+}
+
+impl Bench {
+    /// Reads groups of records by one request; the bytes of each, or the exception.
+    fn read_file(&mut self, groups: Groups<'_>) -> Result<Vec<Vec<u8>>, u8> {
+        let data = self.request(&request(groups))?;
+        assert_eq!(usize::from(data[0]), data.len() - 1, "the byte count");
+        let mut rest = &data[1..];
+        let read = groups.iter().map(|(_, _, count)| {
+            let bytes = usize::from(*count) * 2;
+            let (group, others) = rest.split_at(2 + bytes);
+            assert_eq!(group[..2], [bytes as u8 + 1, 6], "the group's head");
+            rest = others;
+            group[2..].to_vec()
+        });
+        let read = read.collect();
+        assert!(rest.is_empty(), "bytes after the groups");
+        Ok(read)
+    }
+
+    /// Reads all of file 1, with as many records in a request as fit in `groups` groups.
+    fn self_description(&mut self, groups: u16) -> Vec<u8> {
+        let head = self.read_file(&[(1, 0, 2)]).unwrap().concat();
+        let records = records(u16::from_be_bytes([head[0], head[1]]));
+        // A reply has 251 bytes for groups; each begins with 2 bytes.
+        let of_each = (251 / groups - 2) / 2;
+        let starts: Vec<u16> = (0..records).step_by(of_each.into()).collect();
+        let mut file = Vec::new();
+        for some in starts.chunks(groups.into()) {
+            let wanted: Vec<_> = some
+                .iter()
+                .map(|start| (1, *start, of_each.min(records - start)))
+                .collect();
+            file.extend(self.read_file(&wanted).unwrap().concat());
+        }
+        assert_eq!(self.read_file(&[(1, records, 1)]), Err(2), "beyond the end");
+        file
+    }
+
+    /// Asserts that file 1 describes this board with this module in its first slot, and that register 0x020F has its
+    /// CRC. Returns the CRC.
+    fn assert_described(&mut self, module: Known, file: &[u8]) -> u16 {
+        let modules = |port| {
+            if port == PORT { module } else { Known::None }
+        };
+        let expected = describe(LAYOUT.board, env!("CARGO_PKG_VERSION"), modules);
+        assert_eq!(Description::open(file), Ok(expected));
+        let crc = u16::from_be_bytes([file[2], file[3]]);
+        assert_eq!(self.register(0x020F), crc, "register 0x020F");
+        crc
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn file_1_describes_the_unit_however_it_is_read() {
+    let mut bench = Bench::set_up(Module::Ai4, &[]);
+    let file = bench.self_description(1);
+    bench.assert_described(Known::Ai4, &file);
+    for groups in [2, 7, 35] {
+        assert_eq!(bench.self_description(groups), file, "{groups} groups");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn crc_changes_with_the_module_in_force() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    let file = bench.self_description(1);
+    let before = bench.assert_described(Known::Di4, &file);
+    bench.configure(MODULE, &[Known::Ai2Ao2.code()]);
+    bench.save();
+    assert_eq!(bench.self_description(1), file, "not in force yet");
+    bench.tolerant = true;
+    bench.restart();
+    let file = bench.self_description(3);
+    let after = bench.assert_described(Known::Ai2Ao2, &file);
+    assert_ne!(before, after);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_request_for_other_records_is_refused() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    for (groups, code) in [
+        (&[(0, 0, 1)][..], 2),
+        (&[(2, 0, 1)], 2),
+        (&[(0x100, 0, 1)], 2),
+        (&[(1, 0, 1), (2, 0, 1)], 2),
+        (&[(1, 9999, 1)], 2),
+        (&[(1, 9999, 2)], 2),
+        (&[(1, 0xFFFF, 1)], 2),
+        (&[(1, 0, 125)], 3),
+        (&[(2, 0, 125)], 3),
+        (&[(1, 0, 0)], 3),
+        (&[(1, 0, 61), (1, 0, 63)], 3),
+    ] {
+        assert_eq!(bench.read_file(groups), Err(code), "{groups:?}");
+    }
+    for (pdu, code) in [
+        // Another reference type.
+        (&[0x14, 7, 5, 0, 1, 0, 0, 0, 1][..], 2),
+        (&[0x14, 7, 7, 0, 1, 0, 0, 0, 1], 2),
+        // Byte counts that are not allowed, or not those of the data.
+        (&[0x14], 3),
+        (&[0x14, 0], 3),
+        (&[0x14, 6, 6, 0, 1, 0, 0, 0], 3),
+        (&[0x14, 8, 6, 0, 1, 0, 0, 0, 1, 6], 3),
+        (&[0x14, 14, 6, 0, 1, 0, 0, 0, 1], 3),
+        (&[0x14, 7, 6, 0, 1, 0, 0, 0, 1, 0], 3),
+        // Writes.
+        (&[0x15, 9, 6, 0, 1, 0, 0, 0, 1, 0, 0], 2),
+        (&[0x15, 9, 6, 1, 0, 0, 0, 0, 1, 0, 0], 2),
+        (&[0x15, 9, 6, 0, 1, 0, 0, 0, 2, 0, 0], 3),
+    ] {
+        assert_eq!(bench.request(pdu), Err(code), "{pdu:02X?}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn functions_14_and_15_as_a_broadcast_get_no_reply() {
+    let mut bench = Bench::set_up(Module::Di4, &[]);
+    assert_eq!(bench.ask(0, &request(&[(1, 0, 2)])), None);
+    assert_eq!(bench.ask(0, &[0x15, 9, 6, 0, 1, 0, 0, 0, 1, 0, 0]), None);
+    bench.assert_answers(1);
+}

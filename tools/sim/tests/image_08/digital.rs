@@ -1,0 +1,65 @@
+//! Digital points of all slots: every point has a line of its own.
+
+use sim::{Module, Time};
+
+use crate::fitted::{LINES, change, fitted, outputs};
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn every_output_point_switches_its_own_line_and_no_other() {
+    let mut bench = fitted([Module::Do4; 4], &[]);
+    for point in 0..16 {
+        let mut bits = [false; 16];
+        bits[point] = true;
+        bench.write_bits(0, &bits).unwrap();
+        bench.board.run_for(Time::from_ms(5));
+        for (n, &(port, pin)) in LINES.as_flattened().iter().enumerate() {
+            assert!(bench.board.is_output(port, pin), "P{port}{pin}");
+            assert_eq!(bench.board.pin(port, pin), n == point, "P{port}{pin}");
+        }
+        assert_eq!(bench.bits(1, 0, 16), Ok(bits.to_vec()));
+    }
+    for (point, port) in (0..16).step_by(4).zip(1..) {
+        bench.write_bit(point + 2, true).unwrap();
+        bench.board.run_for(Time::from_ms(5));
+        assert!(outputs(&bench, port)[2], "port {port}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn every_input_point_follows_its_own_line_and_no_other() {
+    let mut bench = fitted([Module::Di4; 4], &[]);
+    for point in 0..16 {
+        let (port, channel) = (point as u8 / 4 + 1, point % 4 + 1);
+        change(&mut bench, port, |slot| slot.set_energised(channel, true)).unwrap();
+        bench.board.run_for(Time::from_ms(10));
+        let mut expected = vec![false; 16];
+        expected[point] = true;
+        for function in [1, 2] {
+            assert_eq!(bench.bits(function, 0, 16).as_ref(), Ok(&expected));
+        }
+        change(&mut bench, port, |slot| slot.set_energised(channel, false)).unwrap();
+        bench.board.run_for(Time::from_ms(10));
+    }
+    assert_eq!(bench.bits(2, 0, 16), Ok(vec![false; 16]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn pulses_are_counted_by_point_on_every_port() {
+    let mut bench = fitted([Module::Di4; 4], &[]);
+    for port in 1..=4 {
+        for _ in 0..port {
+            for energised in [true, false] {
+                change(&mut bench, port, |slot| slot.set_energised(2, energised)).unwrap();
+                bench.board.run_for(Time::from_ms(10));
+            }
+        }
+    }
+    for port in 1..=4_u16 {
+        let point = (port - 1) * 4 + 1;
+        assert_eq!(bench.long(0x0300 + 2 * point), u32::from(port));
+        assert_eq!(bench.long(0x0300 + 2 * (point - 1)), 0);
+    }
+}

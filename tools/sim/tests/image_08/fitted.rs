@@ -1,0 +1,61 @@
+//! A board with a module in each of its four slots.
+
+use register_map::configuration::modules;
+use sim::slot::Slot;
+use sim::{Channel, Config, Module};
+
+use crate::LAYOUT;
+use crate::bench::{Bench, flash_with_settings};
+
+/// The lines of all slots, port 1 first, as the board's schematic has them: port of the part and number of the pin.
+pub const LINES: [[(char, u8); 4]; 4] = [
+    [('A', 0), ('A', 1), ('A', 2), ('A', 3)],
+    [('A', 4), ('A', 5), ('A', 6), ('A', 7)],
+    [('C', 0), ('C', 1), ('C', 2), ('C', 3)],
+    [('B', 0), ('B', 1), ('C', 4), ('C', 5)],
+];
+
+/// A board with these modules in the slots of ports 1 to 4, which its configuration knows, and these settings stored
+/// beside them.
+pub fn fitted(plugged: [Module; 4], settings: &[(u16, u16)]) -> Bench {
+    let slots: Vec<_> = (1..).zip(plugged).collect();
+    let mut stored: Vec<_> = modules(slots.iter().copied()).collect();
+    stored.extend(settings);
+    Bench::with(Config {
+        layout: LAYOUT,
+        slots,
+        flash: Some(flash_with_settings(&stored)),
+        ..Config::default()
+    })
+}
+
+/// Changes what is outside the slot at a port.
+pub fn change<T>(bench: &mut Bench, port: u8, action: impl FnOnce(&mut Slot) -> T) -> T {
+    bench.board.change_slot(port, action).expect("a slot")
+}
+
+/// The four channels of the slot at a port.
+pub fn channels(bench: &Bench, port: u8) -> [Channel; 4] {
+    let (_, slot) = bench
+        .board
+        .slots()
+        .find(|(other, _)| *other == port)
+        .expect("a slot");
+    [1, 2, 3, 4].map(|n| slot.channel(n))
+}
+
+/// The states of the outputs of a 4DO.
+pub fn outputs(bench: &Bench, port: u8) -> [bool; 4] {
+    channels(bench, port).map(|channel| match channel {
+        Channel::Do { on } => on,
+        other => panic!("port {port} has {other:?}"),
+    })
+}
+
+/// The codes at the outputs of a 4AO.
+pub fn codes(bench: &Bench, port: u8) -> [u16; 4] {
+    channels(bench, port).map(|channel| match channel {
+        Channel::Ao { code } => code,
+        other => panic!("port {port} has {other:?}"),
+    })
+}

@@ -1,0 +1,101 @@
+//! What xtask needs to know of a board beyond the register map: the parts that its image runs on, and how much of
+//! them the application may take.
+
+use register_map::Board;
+
+const KIB: u32 = 1024;
+
+/// An amount of memory, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// Whose it is: the name of a part as probe-rs has it, or `budget`.
+    pub name: &'static str,
+    /// Bytes of flash.
+    pub flash: u32,
+    /// Bytes of RAM.
+    pub ram: u32,
+}
+
+impl Memory {
+    const fn kib(name: &'static str, flash: u32, ram: u32) -> Self {
+        Self {
+            name,
+            flash: flash * KIB,
+            ram: ram * KIB,
+        }
+    }
+}
+
+/// The hardware of a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hardware {
+    board: &'static Board,
+    /// The part on the board (STM32F103xB and xE data sheets).
+    pub part: Memory,
+    /// Another part that the image must fit as well.
+    pub smaller: Option<Memory>,
+    /// What the application may take at most. The rest is for the stack, the configuration store and a loader.
+    pub budget: Memory,
+}
+
+/// One row for each board.
+const HARDWARE: [Hardware; 2] = [
+    Hardware {
+        board: &register_map::board::MODIO_02,
+        part: Memory::kib("STM32F103CB", 128, 20),
+        smaller: Some(Memory::kib("STM32F103C8", 64, 20)),
+        budget: Memory::kib("budget", 47, 8),
+    },
+    Hardware {
+        board: &register_map::board::MODIO_08,
+        part: Memory::kib("STM32F103RC", 256, 48),
+        smaller: None,
+        budget: Memory::kib("budget", 47, 12),
+    },
+];
+
+const _: () = {
+    assert!(HARDWARE.len() == Board::ALL.len());
+    let mut n = 0;
+    while n < HARDWARE.len() {
+        assert!(HARDWARE[n].board.code == Board::ALL[n].code);
+        n += 1;
+    }
+};
+
+impl Hardware {
+    /// The hardware of a board.
+    #[must_use]
+    pub fn of(board: &Board) -> &'static Self {
+        let row = HARDWARE.iter().find(|row| row.board == board);
+        // Checked above: every board has a row.
+        row.unwrap_or(&HARDWARE[0])
+    }
+
+    /// What the image must fit: the parts, the smaller one first, and the budget.
+    pub fn limits(&self) -> impl Iterator<Item = Memory> {
+        let parts = self.smaller.into_iter().chain([self.part]);
+        parts.chain([self.budget])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hardware_of_every_board_is_its_own() {
+        let parts = Board::ALL.map(|board| Hardware::of(board).part.name);
+        assert_eq!(parts, ["STM32F103CB", "STM32F103RC"]);
+    }
+
+    #[test]
+    fn the_configuration_is_stored_in_flash_that_every_part_has() {
+        for board in Board::ALL {
+            let hardware = Hardware::of(board);
+            let least = hardware.smaller.unwrap_or(hardware.part).flash;
+            let end = board.store.first + 2 * board.store.bytes;
+            assert_eq!(end, crate::image::FLASH_BASE + least, "{board}");
+        }
+    }
+}
