@@ -3,10 +3,11 @@
 //! happened.
 
 use firmware::config::Settings;
-use firmware::store::Operation;
+use firmware::store::{Flash, Operation, Page, Store, StoreError};
+use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
-use crate::flash::{MESSES, Mess, MockFlash};
+use crate::flash::{Fault, MESSES, Mess, MockFlash};
 use crate::running::{fullest_settings, random_settings, save, settings, start, start_well};
 
 enum Event {
@@ -245,6 +246,55 @@ fn in_the_start_after_a_cut() {
             }
         }
     }
+}
+
+/// The half-word reads as erased when the start looks, and no longer when the save comes to it. Nothing can tell before,
+/// so the flash refuses it. What is stored stays, and the next save takes another place.
+#[test]
+fn in_the_first_half_word_of_a_record_which_then_reads_as_erased_for_a_while() {
+    let old = settings(&[(0x0141, 0x1111)]);
+    let new = settings(&[(0x0141, 0x2222)]);
+    let places = live(
+        MockFlash::erased(),
+        &Settings::defaults(),
+        &[Save(Box::new(old.clone())), Save(Box::new(new.clone()))],
+    );
+    let first = places.iter().find(|place| place.old == old).unwrap();
+    let mut refused = 0;
+    for starts in 1..1000 {
+        let mut flash = first.before.clone();
+        flash.cut_in(first.operation, Mess::Noise(1));
+        // What it reads as depends on how often the power has come back.
+        for _ in 0..starts {
+            flash.power_on();
+        }
+        // Every second look finds a page otherwise: here those of the start, and not that of the save.
+        if starts % 2 == 0 {
+            let _ = Flash::page(&flash, Page::First);
+        }
+        let mut store = Store::open(&flash);
+        let loaded = store.load(&MODIO_02, &flash);
+        let _ = Flash::page(&flash, Page::First);
+        store.prepare(&mut flash).unwrap();
+        assert!(loaded.settings == old && !loaded.invalid, "{starts}");
+        if let Err(failure) = save(&mut store, &mut flash, &new) {
+            assert!(
+                matches!(failure, StoreError::Flash(_, Fault::NotErased)),
+                "{starts}: {failure:?}"
+            );
+            refused += 1;
+            flash.power_on();
+            let loaded;
+            (loaded, store) = start_well(&mut flash);
+            assert!(loaded.settings == old && !loaded.invalid, "{starts}");
+            if save(&mut store, &mut flash, &new).is_err() {
+                save(&mut store, &mut flash, &new).unwrap();
+            }
+        }
+        flash.power_on();
+        assert!(start_well(&mut flash).0.settings == new, "{starts}");
+    }
+    assert!(refused > 10, "{refused}");
 }
 
 /// A setting that was saved once, long ago, is carried along.

@@ -65,8 +65,15 @@ impl Torn {
     }
 }
 
+/// Why an operation was not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PowerCut;
+pub enum Fault {
+    /// The power was cut in it.
+    PowerCut,
+    /// The half-word read as erased a moment ago, but its program was cut off once, and now it does not: the
+    /// controller refuses it (PGERR, RM0008 3.3).
+    NotErased,
+}
 
 /// The flash, and what was done to it.
 #[derive(Clone, Debug)]
@@ -167,7 +174,7 @@ impl MockFlash {
             Operation::Program { page, offset, half } => self.program(page, offset, half),
             Operation::Erase(page) => self.erase(page),
         };
-        assert_eq!(result, Err(PowerCut));
+        assert_eq!(result, Err(Fault::PowerCut));
     }
 
     /// Counts down to the cut; gives the mess when it is there.
@@ -189,7 +196,7 @@ impl MockFlash {
 }
 
 impl Flash for MockFlash {
-    type Error = PowerCut;
+    type Error = Fault;
 
     fn page(&self, page: Page) -> &[u8] {
         let index = page as usize;
@@ -202,7 +209,7 @@ impl Flash for MockFlash {
         }
     }
 
-    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), PowerCut> {
+    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), Fault> {
         let operation = Operation::Program { page, offset, half };
         let mess = self.begin(operation);
         self.programs += 1;
@@ -211,10 +218,18 @@ impl Flash for MockFlash {
             .as_mut_array()
             .unwrap();
         let before = u16::from_le_bytes(*place);
-        assert!(
-            before == 0xFFFF || half == 0,
-            "{operation:?} over {before:#06x}"
-        );
+        if before != 0xFFFF && half != 0 {
+            let at_place = |torn: &Torn| (torn.page, torn.offset) == (page as usize, offset);
+            assert!(
+                self.torn.iter().any(at_place),
+                "{operation:?} over {before:#06x}"
+            );
+            return Err(if self.off {
+                Fault::PowerCut
+            } else {
+                Fault::NotErased
+            });
+        }
         // Where a mark cannot be written, nobody can know.
         assert!(
             !self.weak[page as usize] || half == 0 || self.worn.is_some(),
@@ -250,10 +265,14 @@ impl Flash for MockFlash {
             });
         }
         self.look_otherwise(index);
-        if self.off { Err(PowerCut) } else { Ok(()) }
+        if self.off {
+            Err(Fault::PowerCut)
+        } else {
+            Ok(())
+        }
     }
 
-    fn erase(&mut self, page: Page) -> Result<(), PowerCut> {
+    fn erase(&mut self, page: Page) -> Result<(), Fault> {
         let mess = self.begin(Operation::Erase(page));
         let index = page as usize;
         self.erases[index] += 1;
@@ -278,7 +297,11 @@ impl Flash for MockFlash {
             }
         }
         self.look_otherwise(index);
-        if self.off { Err(PowerCut) } else { Ok(()) }
+        if self.off {
+            Err(Fault::PowerCut)
+        } else {
+            Ok(())
+        }
     }
 }
 

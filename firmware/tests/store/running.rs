@@ -6,12 +6,12 @@ use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, KEY, RULES, module_of};
 use register_map::rule_at;
 
-use crate::flash::{MockFlash, Noise, PowerCut};
+use crate::flash::{Fault, MockFlash, Noise};
 
 /// MODULE of the board's port.
 const MODULE_SLOT: u16 = module_of(5);
 
-pub type Failure = StoreError<PowerCut>;
+pub type Failure = StoreError<Fault>;
 
 /// Starts: what was loaded, and the store made ready.
 pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {
