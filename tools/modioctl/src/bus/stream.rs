@@ -175,9 +175,16 @@ fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
         }
         io::ErrorKind::PermissionDenied => {
             let group = owning_group(path).unwrap_or_else(|| "dialout".to_owned());
-            format!(
-                "no permission for {path}: add yourself to its group with `sudo usermod -aG {group} $USER` and log in again"
-            )
+            if group == "root" {
+                // Nobody should join that group.
+                format!(
+                    "no permission for {path}, which is root's alone: take it with `sudo chown $USER {path}`"
+                )
+            } else {
+                format!(
+                    "no permission for {path}: add yourself to its group with `sudo usermod -aG {group} $USER` and log in again"
+                )
+            }
         }
         io::ErrorKind::ResourceBusy => {
             format!("{path} is in use: close the program that has it open")

@@ -6,7 +6,7 @@ use std::thread;
 
 use modioctl::bus::adu::Framing;
 
-use crate::program::{At, modioctl};
+use crate::program::{At, Ran, modioctl};
 use crate::unit::Unit;
 
 #[test]
@@ -176,4 +176,46 @@ fn a_port_that_cannot_be_opened_is_status_5() {
     holder.kill().unwrap();
     holder.wait().unwrap();
     at.run("info").fine();
+}
+
+/// Root may open every port, so there the program runs as a user who may not.
+#[cfg(unix)]
+#[test]
+fn a_port_without_permission_is_status_5_and_names_the_group() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    use std::os::unix::process::CommandExt;
+
+    const NOBODY: u32 = 65534;
+    const ROOT: u32 = 0;
+    const DAEMON: u32 = 1;
+    let pseudo_terminal = portable_pty::native_pty_system()
+        .openpty(portable_pty::PtySize::default())
+        .unwrap();
+    let port = pseudo_terminal.master.tty_name().unwrap();
+    let permissions = |bits| std::fs::Permissions::from_mode(bits);
+    std::fs::set_permissions(&port, permissions(0)).unwrap();
+    // Where anybody may run it.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::set_permissions(folder.path(), permissions(0o755)).unwrap();
+    let is_root = folder.path().metadata().unwrap().uid() == ROOT;
+    let program = folder.path().join("modioctl");
+    std::fs::copy(env!("CARGO_BIN_EXE_modioctl"), &program).unwrap();
+    let refused = |group: u32| {
+        let mut command = std::process::Command::new(&program);
+        command.arg("--port").arg(&port).arg("info");
+        if is_root {
+            std::os::unix::fs::chown(&port, None, Some(group)).unwrap();
+            command.uid(NOBODY).gid(NOBODY);
+        }
+        let text = Ran::of(&command.output().unwrap()).failed(5);
+        assert!(text.contains("no permission for /dev/pts/"), "{text}");
+        text
+    };
+    let (of_daemon, of_root) = (refused(DAEMON), refused(ROOT));
+    if is_root {
+        let joins = of_daemon.contains("sudo usermod -aG daemon $USER");
+        assert!(joins, "{of_daemon}");
+        let takes = of_root.contains("sudo chown $USER /dev/pts/");
+        assert!(takes, "{of_root}");
+    }
 }
