@@ -114,17 +114,3 @@ fn a_stack_that_overflows_harms_nothing_and_is_recorded_as_that() {
     }
     assert_eq!(bench.register(0x0261), HANDLERS.len() as u16);
 }
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn there_is_stack_to_spare_after_all_kinds_of_work() {
-    let mut bench = Bench::set_up(Module::Ai2Ao2, &[]);
-    for address in (0x0100..0x0340).step_by(16) {
-        let _ = bench.registers(address, 16);
-    }
-    bench.configure(0x0120, &[7; 30]);
-    bench.save();
-    bench.board.run_for(Time::from_ms(50));
-    let free = bench.register(0x020B);
-    assert!((1024..20 * 1024).contains(&free), "{free} bytes");
-}

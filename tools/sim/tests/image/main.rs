@@ -12,7 +12,7 @@
 //! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
-//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults` |
+//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack` |
 
 use sim::board::{Layout, MODIO_02};
 
@@ -50,6 +50,7 @@ mod refusals;
 mod registers;
 mod saving;
 mod self_description;
+mod stack;
 mod standard_functions;
 mod storing;
 mod timing;

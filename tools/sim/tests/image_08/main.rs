@@ -47,6 +47,8 @@ mod registers;
 mod saving;
 #[path = "../image/self_description.rs"]
 mod self_description;
+#[path = "../image/stack.rs"]
+mod stack;
 #[path = "../image/storing.rs"]
 mod storing;
 #[path = "../image/timing.rs"]
