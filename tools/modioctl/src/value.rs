@@ -290,6 +290,13 @@ pub fn takes(values: &Values, unit: &Unit) -> String {
 }
 
 fn range(min: i64, max: i64, unit: &Unit) -> String {
+    if min == max {
+        // One value alone is no quantity but a key, or a 0 that clears something.
+        return match min {
+            0..10 => format!("it takes only {min}"),
+            _ => format!("it takes only {min:#06X}"),
+        };
+    }
     format!(
         "it takes {} to {}",
         number(min, unit).text,

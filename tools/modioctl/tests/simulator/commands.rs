@@ -1,4 +1,4 @@
-//! Every command, on each kind of line.
+//! Every command, on each kind of line, but for `monitor` and `sniff`, which have files of their own.
 
 use std::process::Stdio;
 use std::thread;
@@ -215,6 +215,34 @@ fn a_pdu_is_sent_as_it_is_and_both_frames_are_shown() {
         text.contains("read discrete inputs 0x0010 = 0000"),
         "{text}"
     );
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_unit_is_found_blinks_and_is_exported_on_every_line() {
+    let unit = Unit::with(2, &["--module", "2relay"]);
+    for at in lines(&unit) {
+        let found = at.run("--timeout 600ms --json scan --units 1-3").fine();
+        let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+        let units = found["units"].as_array().unwrap();
+        assert_eq!(units.len(), 1, "{found}");
+        assert_eq!(units[0]["unit"], 2, "{found}");
+
+        at.run("--unit 2 identify").fine();
+        let csv = at.run("--unit 2 export csv").fine();
+        assert!(csv.contains("p5.3,"), "{csv}");
+        let json = at.run("--unit 2 export json").fine();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert!(json.is_object());
+        for (system, output) in [
+            ("home-assistant", "p5.3"),
+            ("telegraf", "p5_3"),
+            ("node-red", "p5.3"),
+        ] {
+            let made = at.run(&format!("--unit 2 export {system}")).fine();
+            assert!(made.contains(output), "{system}: {made}");
+        }
+    }
 }
 
 #[test]

@@ -7,8 +7,12 @@ mod bus;
 mod commands;
 mod errors;
 mod gateway;
+mod listening;
 mod newer;
 mod program;
 mod scanning;
+mod screen;
+#[path = "../terminal/mod.rs"]
+mod terminal;
 mod trouble;
 mod unit;

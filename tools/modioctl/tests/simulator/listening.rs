@@ -1,0 +1,123 @@
+//! `modioctl sniff` beside a master.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::process::{Child, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use portable_pty::{PtySize, native_pty_system};
+
+use crate::program::At;
+use crate::unit::Unit;
+
+/// A line that a master can connect to, and all bytes on it in both directions.
+fn tapped(line: SocketAddr) -> (SocketAddr, Receiver<Vec<u8>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let (heard, hear) = channel();
+    std::thread::spawn(move || {
+        for mut master in listener.incoming().flatten() {
+            let mut unit = TcpStream::connect(line).unwrap();
+            let mut to_master = master.try_clone().unwrap();
+            let mut from_unit = unit.try_clone().unwrap();
+            let also_heard = heard.clone();
+            std::thread::spawn(move || {
+                let mut bytes = [0; 512];
+                while let Ok(count @ 1..) = from_unit.read(&mut bytes) {
+                    let _ = also_heard.send(bytes[..count].to_vec());
+                    let _ = to_master.write_all(&bytes[..count]);
+                }
+            });
+            let mut bytes = [0; 512];
+            while let Ok(count @ 1..) = master.read(&mut bytes) {
+                let _ = heard.send(bytes[..count].to_vec());
+                let _ = unit.write_all(&bytes[..count]);
+            }
+            let _ = unit.shutdown(std::net::Shutdown::Both);
+        }
+    });
+    (address, hear)
+}
+
+/// A process that ends with the test.
+struct Listener(Child);
+
+impl Listener {
+    fn at(at: &At, capture: &std::path::Path) -> Self {
+        let mut command = at.command("sniff --record");
+        command.arg(capture);
+        Self(command.stdout(Stdio::piped()).spawn().unwrap())
+    }
+
+    /// The first lines that it prints.
+    fn lines(&mut self, count: usize) -> Vec<String> {
+        use std::io::{BufRead, BufReader};
+        let lines = BufReader::new(self.0.stdout.take().unwrap()).lines();
+        lines.take(count).map(Result::unwrap).collect()
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A master writes and reads an output twice, and what the line carries goes to the ear.
+fn both_directions_are_shown(ear: &At, mut carry: impl FnMut(&[u8])) {
+    let unit = Unit::with(1, &["--module", "4do"]);
+    let (line, hear) = tapped(unit.tcp);
+    let folder = tempfile::tempdir().unwrap();
+    let capture = folder.path().join("line.pcapng");
+    let mut listener = Listener::at(ear, &capture);
+    std::thread::sleep(Duration::from_millis(500));
+    let master = At::tcp(line);
+    let text = master.run("raw 05 0010 FF00").fine();
+    assert_eq!(text.lines().count(), 2);
+    master.run("raw 01 0010 0004").fine();
+    while let Ok(bytes) = hear.recv_timeout(Duration::from_millis(500)) {
+        carry(&bytes);
+    }
+    let lines = listener.lines(4);
+    for (line, part) in lines.iter().zip([
+        "write single coil 0x0010",
+        "write single coil 0x0010",
+        "read coils 0x0010",
+        "read coils",
+    ]) {
+        assert!(line.contains(part), "{part}: {lines:#?}");
+    }
+    let capture = std::fs::read(capture).unwrap();
+    let section_header = [0x0A, 0x0D, 0x0D, 0x0A];
+    assert!(capture.starts_with(&section_header));
+    // Each frame stands in the file as it was on the line.
+    let write = [1, 5, 0, 0x10, 0xFF, 0];
+    let times = capture.windows(6).filter(|bytes| *bytes == write).count();
+    assert_eq!(times, 2);
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn sniff_over_tcp_shows_and_records_both_directions() {
+    let socket = TcpListener::bind("127.0.0.1:0").unwrap();
+    let ear = At::tcp(socket.local_addr().unwrap());
+    let mut stream = None;
+    both_directions_are_shown(&ear, |bytes| {
+        let stream = stream.get_or_insert_with(|| socket.accept().unwrap().0);
+        stream.write_all(bytes).unwrap();
+    });
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn sniff_on_a_pseudo_terminal_shows_and_records_both_directions() {
+    let pty = native_pty_system().openpty(PtySize::default()).unwrap();
+    let ear = At::port(pty.master.tty_name().unwrap().display());
+    let mut wire = pty.master.take_writer().unwrap();
+    both_directions_are_shown(&ear, |bytes| {
+        wire.write_all(bytes).unwrap();
+        wire.flush().unwrap();
+    });
+}
