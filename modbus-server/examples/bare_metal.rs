@@ -160,7 +160,7 @@ impl Write for Uart {
     }
 }
 
-/// The driver enable of an adapter that switches its transceiver by itself.
+/// The driver enable of an adapter that switches its transceiver without help.
 struct NoDriver;
 
 impl PinErrorType for NoDriver {

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// The calls of [`AnalogSource::read`] a module makes in one scan at most, for all its lines together.
-/// A converter that converts on demand may take some 20 calls for each.
+/// A converter that converts on demand may take about 20 calls for each.
 pub const POLLS_PER_SCAN: u8 = 64;
 
 /// Scans in a row without any answer from the converter after which all its lines count as failed.

@@ -33,7 +33,7 @@ pub struct Block {
     pub texts: &'static [Text],
 }
 
-/// What there is one of a register's values for.
+/// The things that have one value each in a run of registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// The unit.
@@ -45,7 +45,7 @@ pub enum Scope {
 }
 
 impl Text {
-    /// What there is one of the values for, in a run of `count` registers.
+    /// The things that have one value each in a run of `count` registers.
     #[must_use]
     pub const fn scope(&self, count: u16) -> Scope {
         let values = match self.value.registers() {

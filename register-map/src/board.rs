@@ -1,4 +1,4 @@
-//! The boards, as far as a master or a tool can tell them apart. The pins are elsewhere: a master does not see them.
+//! The boards as a master or a tool sees them: codes, names, ports. The pins are in `board-support`.
 
 use core::fmt;
 use core::ops::Range;

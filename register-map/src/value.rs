@@ -13,7 +13,7 @@ pub enum Value {
     Codes(&'static [(u16, &'static str)]),
     /// Bits with a name each, the lowest being bit 0. The others are 0.
     Bits(&'static [(u8, &'static str)]),
-    /// Registers that mean nothing but as a whole, as an identity does: shown in hexadecimal.
+    /// Registers that have a meaning only together, such as an identity. They are shown in hexadecimal.
     Opaque,
 }
 

@@ -9,7 +9,7 @@ use modbus_server::{Adu, Tables};
 
 use super::*;
 
-/// The UART: what waits in it, and what it was told.
+/// The UART: the bytes that wait in it, and its settings.
 #[derive(Default)]
 struct FakeUart {
     waiting: Option<u8>,
@@ -224,7 +224,10 @@ fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
     assert!(bench.silence(Silence::T35), "a request waits");
     let request = bench.take();
     assert!(bench.line.uart.driver && bench.line.gap.limited);
-    assert!(!bench.line.gap.running, "no silence of its own reply");
+    assert!(
+        !bench.line.gap.running,
+        "no gap is timed after its own reply"
+    );
     assert!(!bench.line.on_uart());
     assert!(
         !bench.line.uart.wants,
@@ -249,7 +252,7 @@ fn disturbed_registers_are_set_up_again_within_as_many_milliseconds_as_there_are
         }
         bench.pass(3);
         assert!(bench.line.take_repaired(), "{part:?}");
-        assert!(!bench.line.take_repaired(), "it is told once");
+        assert!(!bench.line.take_repaired(), "a repair is reported once");
         assert_eq!(bench.line.uart.set_up, 1);
         bench.silence(Silence::T35);
         bench.hear(&REQUEST);

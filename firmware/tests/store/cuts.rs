@@ -248,8 +248,8 @@ fn in_the_start_after_a_cut() {
     }
 }
 
-/// The half-word reads as erased when the start looks, and no longer when the save comes to it. Nothing can tell before,
-/// so the flash refuses it. What is stored stays, and the next save takes another place.
+/// The half-word reads as erased at the start and otherwise at the save. No program can foresee that, so the flash refuses
+/// the save. The stored settings stay, and the next save takes another place.
 #[test]
 fn in_the_first_half_word_of_a_record_which_then_reads_as_erased_for_a_while() {
     let old = settings(&[(0x0141, 0x1111)]);

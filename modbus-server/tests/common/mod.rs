@@ -69,7 +69,7 @@ impl Unit {
 }
 
 impl UnitOn<'_> {
-    /// The unit without listen-only mode if it lacks function 08.
+    /// The unit without listen-only mode, unless it has function 08.
     pub fn without_what_it_lacks(mut self) -> Self {
         if self.points.lacks.contains(&0x08) {
             self.server = self.server.without_listen_only();
@@ -185,7 +185,7 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
     }
 }
 
-/// Sends what there is to send; then the port waits, or is done.
+/// Sends the bytes of the reply. Afterwards the port waits or is done.
 pub fn send(port: &mut Port<'_>, reply: &mut Vec<u8>) -> Next {
     loop {
         match port.next() {

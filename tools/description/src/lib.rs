@@ -51,7 +51,7 @@ pub struct Register {
     pub count: u16,
     /// Its name: `BAUD`, `reset cause`.
     pub name: String,
-    /// What there is one of it for.
+    /// The things that have one value each.
     pub scope: Scope,
     /// What the number means.
     pub value: Value,
@@ -69,7 +69,7 @@ pub struct Register {
     pub about: String,
 }
 
-/// What there is one of a register's values for.
+/// The things that have one value each in a run of registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// The unit.

@@ -1,4 +1,4 @@
-//! What can go wrong, as the user is told: one line, and an exit status.
+//! The errors of the program: one line for the user, and an exit status.
 
 use std::fmt;
 

@@ -1,6 +1,6 @@
 //! `modioctl`: finds, sets up and watches modio units over Modbus, on a serial port, over TCP and over Modbus TCP.
 //!
-//! The program is [`run`]. What stands below it is of use to other programs as well: [`bus::Master`] asks units,
+//! The program is [`run`]. Other programs can use the modules below it: [`bus::Master`] asks units,
 //! [`device::Device`] reads and writes one of them with errors in words, [`names::Book`] knows its points and registers
 //! by name.
 

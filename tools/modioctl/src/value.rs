@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_what_does() {
+    fn a_value_out_of_range_is_refused_with_the_range() {
         let book = book(1, 1);
         let wrong = |name, text| parsed(&book, name, text).unwrap_err();
         assert!(wrong("p5.3", "3000").contains("4000 to 20000 µA"));

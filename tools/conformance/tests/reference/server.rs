@@ -1,4 +1,4 @@
-//! The reference server with the tables of this test; wrong where it is told to be.
+//! The reference server with the tables of this test, and with the faults that a test asks for.
 
 use modbus_reference::server::{EXCEPTIONS, NAK, NO_RESPONSE, OVERRUNS, UNIT_MESSAGES};
 use modbus_reference::{Device, Server as Reference};

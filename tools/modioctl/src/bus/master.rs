@@ -11,7 +11,7 @@ use super::stream::Stream;
 use super::waiting::Waiting;
 use crate::failure::Failure;
 
-/// The pause after a broadcast, in which every unit does what it was told (V1.02, 2.4.1: 100 to 200 ms).
+/// The pause after a broadcast, in which every unit carries it out (V1.02, 2.4.1: 100 to 200 ms).
 const TURNAROUND: Duration = Duration::from_millis(100);
 
 /// A silence that ends what arrives, beyond the time of some characters: adapters hand on bytes in batches, 16 ms apart
@@ -51,7 +51,7 @@ pub struct Seen {
     pub bytes: Vec<u8>,
 }
 
-/// Is told of every frame.
+/// Receives every frame, for the trace and the frame log.
 pub type Observer = Box<dyn FnMut(&Seen) + Send>;
 
 /// An open line, and how to talk to units on it.
@@ -126,7 +126,7 @@ impl Master {
         Err(garbled.map_or(Lost::Silent, Lost::Garbled))
     }
 
-    /// Tells all units.
+    /// Sends a broadcast to all units.
     ///
     /// # Errors
     ///

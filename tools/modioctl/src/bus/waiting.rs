@@ -1,4 +1,4 @@
-//! Whether what has arrived holds the answer to a request.
+//! Decides whether the bytes received so far contain the answer to a request.
 
 use super::adu::{Framing, MBAP, response_length};
 
@@ -59,7 +59,7 @@ impl Waiting<'_> {
         }
     }
 
-    /// The answer, if all that arrived before a silence is one: for functions whose length nothing else tells.
+    /// The answer, if all bytes before a silence are one frame. For functions whose length only the silence shows.
     #[must_use]
     pub fn whole(&self, bytes: &[u8]) -> Option<Vec<u8>> {
         (self.framing == Framing::Rtu).then(|| self.answer(bytes))?

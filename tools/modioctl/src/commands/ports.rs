@@ -10,7 +10,7 @@ use crate::output;
 ///
 /// # Errors
 ///
-/// That the system does not tell.
+/// Shown where the system does not know.
 pub fn run(json: bool) -> Result<(), Failure> {
     let ports = available_ports().map_err(|error| {
         Failure::Port(format!(

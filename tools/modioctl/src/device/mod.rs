@@ -188,7 +188,7 @@ impl Device {
             2 => "there is no such point or register, or it cannot be written",
             3 => "the unit does not take this value",
             4 => {
-                "the module in the slot does not answer: is it plugged in, and the one that is set?"
+                "the module in the slot does not answer: is it plugged in, and is it the kind that MODULE names?"
             }
             6 => "the configuration is locked, or a save is still under way: try again",
             0x0A | 0x0B => "the gateway says that the unit does not answer",

@@ -1,4 +1,4 @@
-//! Lines that damage what goes over them, and units that die.
+//! Lines with bit errors, and units that die.
 
 use std::process::Stdio;
 use std::thread;

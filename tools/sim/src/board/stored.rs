@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_not_stored() {
+    fn settings_larger_than_a_page_are_not_stored() {
         let settings = [(0, 0); 512];
         assert_eq!(MODIO_08.flash_with(&settings), None);
         assert!(!MODIO_08.store(&mut [], &[]));

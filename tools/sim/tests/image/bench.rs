@@ -43,7 +43,7 @@ pub fn image() -> &'static Image {
     })
 }
 
-/// A flash whose stored configuration knows nothing but the first slot's module.
+/// A flash whose stored configuration has only the first slot's module.
 pub fn flash_with(module: Module) -> Vec<u8> {
     let settings: Vec<_> = configuration::modules([(PORT, module)]).collect();
     flash_with_settings(&settings)
