@@ -12,6 +12,7 @@ pub mod commands;
 pub mod device;
 pub mod export;
 pub mod failure;
+mod listing;
 pub mod monitor;
 pub mod names;
 pub mod output;

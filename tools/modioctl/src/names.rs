@@ -93,6 +93,19 @@ impl Book {
         &self.items
     }
 
+    /// The description of a unit that must be a modio.
+    ///
+    /// # Errors
+    ///
+    /// Error when the unit is another device.
+    pub fn of_modio(&self) -> Result<&Description, Failure> {
+        self.description().ok_or_else(|| {
+            Failure::Refused(
+                "the unit is no modio: of others `read` and `write` work with addresses".to_owned(),
+            )
+        })
+    }
+
     /// The points.
     pub fn points(&self) -> impl Iterator<Item = &Item> {
         let known = |item: &&Item| matches!(item.meaning, Meaning::Bit | Meaning::Analog(_));

@@ -10,7 +10,6 @@ use tokio::time::timeout;
 
 use super::endpoint::{Endpoint, Place};
 use super::format::Format;
-use crate::commands::ports;
 use crate::failure::Failure;
 
 /// Longest time for a connection to be made.
@@ -167,7 +166,7 @@ fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
         io::ErrorKind::NotFound => {
             format!(
                 "there is no port {path}; this computer has {}",
-                ports::names()
+                port_names()
             )
         }
         io::ErrorKind::PermissionDenied if cfg!(windows) => {
@@ -195,6 +194,17 @@ fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
         ),
         _ => format!("{path} cannot be opened: {error}"),
     })
+}
+
+/// The names of this computer's serial ports, for people.
+fn port_names() -> String {
+    let ports = serialport::available_ports().unwrap_or_default();
+    let names: Vec<_> = ports.into_iter().map(|port| port.port_name).collect();
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
+    }
 }
 
 /// The name of the group that may use a port.

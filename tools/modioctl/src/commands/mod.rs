@@ -5,16 +5,13 @@ mod describe;
 mod export;
 mod info;
 mod module;
-pub mod ports;
+mod ports;
 mod raw;
 mod read;
 mod scan;
 mod sniff;
 mod watch;
 mod write;
-
-pub(crate) use describe::{description_json, values};
-pub use module::description;
 
 use std::path::Path;
 use std::process::ExitCode;

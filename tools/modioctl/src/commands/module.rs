@@ -1,13 +1,11 @@
 //! `modioctl module`, `reboot` and `identify`: orders.
 
-use modio_description::Description;
 use register_map::{points, state};
 
 use super::learn;
 use crate::cli::Module;
 use crate::device::Device;
 use crate::failure::Failure;
-use crate::names::Book;
 use crate::output;
 use crate::value::{parse, show};
 
@@ -22,7 +20,7 @@ const IDENTIFY: u16 = 6;
 pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let Module::Set { port, module } = options;
     let book = learn(&mut device).await?.book;
-    let description = description(&book)?;
+    let description = book.of_modio()?;
     if !description.ports.iter().any(|known| known.number == port) {
         let ports: Vec<_> = description
             .ports
@@ -61,19 +59,6 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
         "port {port}: {}, saved and in force; state: {state}",
         show(&item, &words, false)
     ))
-}
-
-/// The description of a modio.
-///
-/// # Errors
-///
-/// That the unit is none.
-pub fn description(book: &Book) -> Result<&Description, Failure> {
-    book.description().ok_or_else(|| {
-        Failure::Refused(
-            "the unit is no modio: of others `read` and `write` work with addresses".to_owned(),
-        )
-    })
 }
 
 /// Restarts the unit.

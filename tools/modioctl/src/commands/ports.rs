@@ -10,7 +10,7 @@ use crate::output;
 ///
 /// # Errors
 ///
-/// Shown where the system does not know.
+/// Error when the system does not list its ports.
 pub fn run(json: bool) -> Result<(), Failure> {
     let ports = available_ports().map_err(|error| {
         Failure::Port(format!(
@@ -31,18 +31,6 @@ pub fn run(json: bool) -> Result<(), Failure> {
         .map(|port| [port.port_name.clone(), adapter(port), serial(port)])
         .collect();
     output::table(&rows)
-}
-
-/// The names of this computer's serial ports, for people.
-#[must_use]
-pub fn names() -> String {
-    let ports = available_ports().unwrap_or_default();
-    let names: Vec<_> = ports.into_iter().map(|port| port.port_name).collect();
-    if names.is_empty() {
-        "none".to_owned()
-    } else {
-        names.join(", ")
-    }
 }
 
 fn adapter(port: &SerialPortInfo) -> String {

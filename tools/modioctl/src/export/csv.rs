@@ -3,8 +3,8 @@
 use modio_description::Table;
 
 use super::{Scaling, Source};
-use crate::commands::values;
 use crate::failure::Failure;
+use crate::listing::values;
 use crate::names::Item;
 use crate::value::{table_name, unit_name};
 

@@ -4,12 +4,12 @@ use serde_json::json;
 
 use super::Source;
 use crate::bus::Place;
-use crate::commands::description_json;
 use crate::failure::Failure;
+use crate::listing::as_json;
 
 /// Returns the description and the endpoint.
 pub fn text(source: Source<'_>) -> Result<String, Failure> {
-    let mut value = description_json(source.book, source.source)?;
+    let mut value = as_json(source.book, source.source)?;
     let endpoint = source.endpoint;
     let mut line = json!({ "unit": endpoint.unit });
     match &endpoint.place {

@@ -42,7 +42,7 @@ pub fn text(format: ExportFormat, source: Source<'_>) -> Result<String, Failure>
 impl Source<'_> {
     /// Returns a name for the unit: board and address.
     fn unit_name(&self) -> Result<String, Failure> {
-        let about = crate::commands::description(self.book)?;
+        let about = self.book.of_modio()?;
         Ok(format!("{} {}", about.board, self.endpoint.unit))
     }
 

@@ -65,7 +65,7 @@ struct Field {
 /// Returns the configuration of the input.
 pub fn text(source: Source<'_>) -> Result<String, Failure> {
     let name = source.unit_name()?;
-    let about = crate::commands::description(source.book)?;
+    let about = source.book.of_modio()?;
     let endpoint = source.endpoint;
     let serial = endpoint.place.is_serial();
     let ascii = endpoint.framing == Framing::Ascii;

@@ -40,7 +40,6 @@ use self::poll::{Observers, Poller};
 use self::screen::Screen;
 use crate::bus::{Endpoint, Seen};
 use crate::cli::Monitor;
-use crate::commands::description;
 use crate::device::{Device, fetch, place};
 use crate::failure::Failure;
 use crate::trace;
@@ -158,7 +157,7 @@ async fn first(device: &mut Device) -> Result<Option<Failure>, Failure> {
         Err(failure) if failure.may_pass() => (fetch(device, false).await?, Some(failure)),
         result => (result?, None),
     };
-    description(&learned.book)?;
+    learned.book.of_modio()?;
     Ok(failure)
 }
 

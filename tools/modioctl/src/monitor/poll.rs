@@ -9,7 +9,6 @@ use tokio::time::{Instant, sleep_until};
 use super::messages::{Polled, Update, Write};
 use super::plan::{Plan, Words, is_analog};
 use crate::bus::{Endpoint, Observer};
-use crate::commands::description;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, PortItems};
@@ -121,7 +120,7 @@ impl Poller {
         };
         let Some(plan) = &self.plan else {
             let book = fetch(device, false).await?.book;
-            description(&book)?;
+            book.of_modio()?;
             self.answered = Instant::now();
             self.plan = Some(Plan::new(&book));
             self.counted = None;

@@ -8,7 +8,6 @@ use register_map::codes::{Format, Mode};
 use register_map::configuration::{FORMAT, MODE};
 
 use super::{is_module, of_modules};
-use crate::commands::module::description;
 use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
 use crate::value::{parse, show, takes};
@@ -19,7 +18,7 @@ use crate::value::{parse, show, takes};
 ///
 /// That the unit is no modio.
 pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
-    let about = description(book)?;
+    let about = book.of_modio()?;
     let mut text = format!(
         "# Settings of a {} with firmware {}, as `modioctl config export` wrote them.\n",
         about.board, about.firmware

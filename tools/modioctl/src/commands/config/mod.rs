@@ -8,7 +8,6 @@ use register_map::codes::Command;
 use register_map::state::{self, status};
 use register_map::{configuration, points};
 
-use super::module::description;
 use super::{learn, read};
 use crate::cli::Config;
 use crate::device::{Device, with_modules};
@@ -78,7 +77,7 @@ pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), 
 
 /// The names of the unit as it will be with these modules.
 fn of_modules(book: &Book, module: impl Fn(u8) -> Option<u16>) -> Result<Book, Failure> {
-    let description = with_modules(description(book)?.clone(), module);
+    let description = with_modules(book.of_modio()?.clone(), module);
     Ok(Book::new(description, Vec::new()))
 }
 

@@ -1,0 +1,71 @@
+//! The points and registers of a unit as JSON, and their values in words.
+
+use modio_description::Unit;
+use serde_json::{Value as Json, json};
+
+use crate::failure::Failure;
+use crate::names::{Book, Item, Meaning};
+use crate::value::{table_name, takes, unit_name};
+
+/// Returns the description of a unit for programs. `source` says where the description is from.
+///
+/// # Errors
+///
+/// Error when the unit is not a modio.
+pub fn as_json(book: &Book, source: &str) -> Result<Json, Failure> {
+    let about = book.of_modio()?;
+    Ok(json!({
+        "board": about.board,
+        "model": about.model,
+        "firmware": about.firmware,
+        "map_version": about.map_version,
+        "source": source,
+        "items": book.items().iter().map(item_json).collect::<Vec<_>>(),
+    }))
+}
+
+fn unit(item: &Item) -> Unit {
+    match &item.meaning {
+        Meaning::Analog(reading) => reading.unit.clone(),
+        Meaning::Value(
+            modio_description::Value::Number(unit) | modio_description::Value::Long(unit),
+        ) => unit.clone(),
+        _ => Unit::default(),
+    }
+}
+
+/// The values of an item, for people.
+#[must_use]
+pub fn values(item: &Item) -> String {
+    let unit = unit(item);
+    match (&item.values, &item.meaning) {
+        (_, Meaning::Value(modio_description::Value::Codes(names))) => {
+            let allowed = names.iter().filter(|(code, _)| {
+                item.values
+                    .as_ref()
+                    .is_none_or(|values| crate::value::allow(values, *code))
+            });
+            let names: Vec<_> = allowed.map(|(_, name)| name.as_str()).collect();
+            names.join(" | ")
+        }
+        (Some(values), _) => takes(values, &unit),
+        (None, Meaning::Bit) => "off | on".to_owned(),
+        (None, _) => unit_name(&unit.code).to_owned(),
+    }
+}
+
+/// An item for programs.
+fn item_json(item: &Item) -> Json {
+    json!({
+        "name": item.name,
+        "table": table_name(item.table),
+        "address": item.address,
+        "words": item.words,
+        "writable": item.writable,
+        "setting": item.setting,
+        "restart": item.restart,
+        "unit": unit_name(&unit(item).code),
+        "values": values(item),
+        "about": item.about,
+    })
+}
