@@ -4,13 +4,16 @@
 //! |---|---|
 //! | `GET /api/state` | everything that can be seen of the board |
 //! | `GET /api/frames?since=K` | the last frames on the line, those numbered above K |
+//! | `GET /api/boards` | the boards: name, board, switch |
+//! | `GET /api/findings` | what the chip model objects to |
+//! | `GET /api/openapi.json` | this interface, described |
 //! | `POST /api/channels/N` | `{"energised":bool}`, `{"manual":bool}` or `{"millivolts":n}` outside channel N |
 //! | `POST /api/dip` | `{"value":n}`: moves the switch |
 //! | `POST /api/power` | `{"on":bool}` or `{"cycle":true}` |
 //! | `POST /api/module` | `{"name":...}`: plugs a module, with the power off |
 //! | `POST /api/slots/PORT/...` | `channels/N` or `module` of the slot at PORT; without it, of the first slot |
 //!
-//! A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
+//! What concerns a board also exists as `/api/boards/NAME/...`. A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
 
 use serde_json::{Map, Value, json};
 
@@ -69,11 +72,14 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
         .target
         .split_once('?')
         .unwrap_or((&request.target, ""));
-    let answered = match path.strip_prefix("/api/") {
+    let answered = match path.strip_prefix("/api/").map(|path| of_board(bench, path)) {
+        Some("boards") => reading(request).map(|()| boards(bench)),
         Some("state") => reading(request).map(|()| state::json(bench)),
         Some("frames") => reading(request)
             .and_then(|()| since(query))
             .map(|k| frames::json(bench.board.line(), k)),
+        Some("findings") => reading(request).map(|()| findings(bench)),
+        Some("openapi.json") => reading(request).map(|()| openapi()),
         Some("dip") => changing(bench, request, set_dip),
         Some("power") => changing(bench, request, set_power),
         Some(rest) => of_slot(bench, request, rest)
@@ -84,6 +90,24 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
         Ok(body) => Reply { status: 200, body },
         Err(refusal) => refusal,
     }
+}
+
+/// The path without the board's name, if it begins with that.
+fn of_board<'a>(bench: &Bench, path: &'a str) -> &'a str {
+    path.strip_prefix("boards/")
+        .and_then(|path| path.strip_prefix(name(bench)))
+        .and_then(|path| path.strip_prefix('/'))
+        .unwrap_or(path)
+}
+
+/// The only board's name: it is called after what it is.
+fn name(bench: &Bench) -> &'static str {
+    bench.board.layout().board.name
+}
+
+/// The body of `GET /api/boards`.
+fn boards(bench: &Bench) -> Value {
+    json!([{ "name": name(bench), "board": name(bench), "dip": bench.board.dip() }])
 }
 
 /// What concerns a slot, the first one unless `path` names a port; `None` when `path` is none of these.
@@ -106,6 +130,26 @@ fn of_slot(bench: &mut Bench, request: &Request, path: &str) -> Option<Result<Va
     };
     let change = |bench: &mut Bench, body: &Map<_, _>| set_channel(bench, port, number, body);
     Some(changing(bench, request, change))
+}
+
+/// The body of `GET /api/findings`.
+fn findings(bench: &Bench) -> Value {
+    let each = bench.board.findings().iter().map(|finding| {
+        json!({
+            "at_us": finding.at.as_us(),
+            "pc": format!("{:#010x}", finding.pc),
+            "what": finding.what.to_string(),
+            "count": finding.count,
+        })
+    });
+    json!({ "findings": each.collect::<Vec<_>>() })
+}
+
+/// The body of `GET /api/openapi.json`.
+fn openapi() -> Value {
+    const TEXT: &str = include_str!("openapi.json");
+    // A test reads it.
+    serde_json::from_str(TEXT).unwrap_or_default()
 }
 
 fn reading(request: &Request) -> Outcome {

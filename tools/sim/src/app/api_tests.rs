@@ -136,7 +136,6 @@ fn anything_ill_formed_is_refused_and_changes_nothing() {
     let mut bench = bench(Module::Di4);
     let before = state(&mut bench);
     for (method, target, body, status) in [
-        ("GET", "/", "", 404),
         ("GET", "/api", "", 404),
         ("GET", "/api/", "", 404),
         ("GET", "/api/states", "", 404),
@@ -245,4 +244,116 @@ fn a_board_with_one_slot_has_no_list_of_slots_but_a_port() {
         r#"{"energised":true}"#,
     );
     assert_eq!(reply.body["channels"][0]["energised"], true);
+}
+
+#[test]
+fn the_description_names_every_path_and_no_other() {
+    let mut bench = bench(Module::Di4);
+    let described = get(&mut bench, "/api/openapi.json");
+    assert_eq!(described.status, 200);
+    let paths = described.body["paths"].as_object().unwrap();
+    // The table of this module's documentation; `/api/events` is the server's own.
+    let mut known: Vec<_> = include_str!("api.rs")
+        .lines()
+        .filter_map(|line| line.strip_prefix("//! | `"))
+        .filter_map(|row| row.split(['`', '?']).next())
+        .map(|row| row.replace("/N", "/{channel}"))
+        .collect();
+    known.push("GET /api/events".to_owned());
+    for (path, methods) in paths {
+        for method in methods.as_object().unwrap().keys() {
+            if method == "parameters" {
+                continue;
+            }
+            let method = method.to_uppercase();
+            let plain = path.replace("/slots/{port}", "");
+            let known = known.iter().any(|row| *row == format!("{method} {plain}"));
+            assert!(known, "{method} {path}");
+            let target = path.replace("{port}", "5").replace("{channel}", "1");
+            let status = ask(&mut bench, &method, &target, "{}").status;
+            let expected = if method == "GET" { 200 } else { 400 };
+            assert!(
+                status == expected || path == "/api/events",
+                "{path}: {status}"
+            );
+        }
+    }
+    for row in &known {
+        let (method, path) = row.split_once(' ').unwrap();
+        let there = paths
+            .get(path)
+            .is_some_and(|methods| methods.get(method.to_lowercase()).is_some());
+        assert!(there || path == "/api/slots/PORT/...", "{row}");
+    }
+}
+
+#[test]
+fn replies_have_the_described_entries() {
+    let mut bench = bench_of(Config {
+        layout: &board::MODIO_08,
+        ..Config::default()
+    });
+    let schemas = get(&mut bench, "/api/openapi.json").body["components"]["schemas"].take();
+    bench.send(&[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C]);
+    bench.board.run_for(sim::Time::from_ms(20));
+    let frame = get(&mut bench, "/api/frames").body["frames"][0].take();
+    for (name, reply) in [("State", state(&mut bench)), ("Frame", frame)] {
+        let mut described: Vec<_> = schemas[name]["properties"]
+            .as_object()
+            .unwrap()
+            .keys()
+            .collect();
+        described.sort();
+        let mut there: Vec<_> = reply.as_object().unwrap().keys().collect();
+        there.sort();
+        assert_eq!(described, there, "{name}");
+    }
+}
+
+#[test]
+fn findings_are_told_with_place_and_time() {
+    use sim::Image;
+    // ldr r0, [pc, #4]; ldr r0, [r0]; b .; and the address of GPIOC, whose clock is off.
+    let image = [
+        0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0x01, 0x48, 0x00, 0x68, 0xFE, 0xE7, 0x00,
+        0xBF, 0x00, 0x10, 0x01, 0x40,
+    ];
+    let image = Image::from_bytes(&image).unwrap();
+    let board = sim::Board::new(&image, Config::default()).unwrap();
+    let mut bench = Bench::new(board);
+    bench.board.run_for(sim::Time::from_ms(10));
+    let found = get(&mut bench, "/api/findings").body["findings"][0].take();
+    assert_eq!(found["pc"], "0x0800000a", "{found}");
+    assert!(
+        found["what"].as_str().unwrap().contains("0x40011000"),
+        "{found}"
+    );
+    assert!(found["count"].as_u64() >= Some(1) && found["at_us"].is_u64());
+}
+
+#[test]
+fn a_board_is_also_addressed_by_its_name() {
+    let mut bench = bench(Module::Di4);
+    let boards = get(&mut bench, "/api/boards").body;
+    assert_eq!(
+        boards,
+        json!([{ "name": "modio-02", "board": "modio-02", "dip": 1 }])
+    );
+    let reply = post(
+        &mut bench,
+        "/api/boards/modio-02/channels/2",
+        r#"{"energised":true}"#,
+    );
+    assert_eq!(reply.body["channels"][1]["energised"], true);
+    let same = get(&mut bench, "/api/boards/modio-02/state").body;
+    assert_eq!(same, state(&mut bench));
+    for path in [
+        "/api/boards/modio-08/state",
+        "/api/boards/modio-02",
+        "/api/boards/modio-02/",
+        "/api/boards/modio-02state",
+        "/api/boards/",
+    ] {
+        assert_eq!(get(&mut bench, path).status, 404, "{path}");
+    }
 }

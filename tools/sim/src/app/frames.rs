@@ -12,7 +12,8 @@ pub fn json(line: &Line, since: u64) -> Value {
     json!({ "frames": line.frames_since(since).map(frame).collect::<Vec<_>>() })
 }
 
-fn frame(frame: &Frame) -> Value {
+/// A frame.
+pub fn frame(frame: &Frame) -> Value {
     let to_unit = frame.direction == Direction::FromMaster;
     json!({
         "number": frame.number,

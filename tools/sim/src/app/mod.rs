@@ -4,7 +4,7 @@
 //! ```text
 //! pty, TCP ──bytes──┐                     ┌──> bytes to pty and TCP
 //! exact line ───────┤                     ├──> bytes and times to the exact line
-//! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP
+//! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP, events to those who listen
 //! GDB ─────bytes────┤                     ├──> bytes to GDB
 //! Ctrl-C, SIGTERM ──┘    the board's only ├──> log on stdout
 //!                        thread           └──> findings on stderr
@@ -30,6 +30,7 @@ mod flash_file;
 mod frames;
 mod gdb;
 mod http;
+mod live;
 mod pace;
 mod pty;
 mod run;
@@ -51,7 +52,7 @@ enum Event {
     /// Bytes from a master, to go out on the line.
     Bytes(Vec<u8>),
     /// A request to the HTTP interface, and where its reply goes.
-    Request(api::Request, mpsc::Sender<api::Reply>),
+    Request(api::Request, tokio::sync::oneshot::Sender<api::Reply>),
     /// From the debugger.
     Gdb(gdb::Message),
     /// From the client of the exact line, and where the answer goes.
@@ -100,7 +101,8 @@ pub fn run(options: &Options) -> Result<(), String> {
                 .transpose()?,
         },
     };
-    let http = http::listen(options.http, events.clone())?;
+    let mut live = live::Live::default();
+    let http = http::listen(options.http, events.clone(), live.listeners())?;
     let gdb = options
         .gdb
         .map(|address| gdb::listen(address, events))
@@ -133,6 +135,7 @@ pub fn run(options: &Options) -> Result<(), String> {
         &mut bench,
         &queue,
         &endpoints,
+        &mut live,
         flash.as_mut(),
         options.run_for,
     );

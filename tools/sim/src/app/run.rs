@@ -10,6 +10,7 @@ use super::bench::Bench;
 use super::exact_line::Requests;
 use super::flash_file::FlashFile;
 use super::gdb::Session;
+use super::live::Live;
 use super::pace::{Pace, span};
 use super::{Event, api, pty, tcp};
 
@@ -40,6 +41,7 @@ pub fn until_stopped(
     bench: &mut Bench,
     queue: &Receiver<Event>,
     endpoints: &Endpoints,
+    live: &mut Live,
     mut flash: Option<&mut FlashFile>,
     limit: Option<Duration>,
 ) {
@@ -57,6 +59,7 @@ pub fn until_stopped(
         clock.catch_up(bench);
         requests.run(bench, span(AT_ONCE));
         bench.tell();
+        live.tell(bench, wall);
         if let Some(file) = &mut flash {
             file.keep_or_tell(&bench.board);
         }

@@ -15,6 +15,7 @@ pub fn json(bench: &mut Bench) -> Value {
     let leds = board.leds();
     let mut state = json!({
         "virtual_ms": board.now().as_ms(),
+        "board": board.layout().board.name,
         "powered": board.powered(),
         "dip": board.dip(),
         "module": board.module().name(),

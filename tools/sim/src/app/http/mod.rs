@@ -1,0 +1,197 @@
+//! The HTTP server: sends the page, takes requests off the network, hands them to the board's thread, sends the replies.
+
+mod connections;
+mod guard;
+mod page;
+#[cfg(test)]
+mod tests;
+
+use std::convert::Infallible;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::mpsc::Sender;
+use std::thread;
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{Method, StatusCode, Uri, header};
+use axum::response::sse::{self, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use tokio::sync::{broadcast, oneshot};
+use tokio_stream::wrappers::BroadcastStream;
+use tokio_stream::wrappers::errors::BroadcastStreamRecvError::Lagged;
+use tokio_stream::{Stream, StreamExt};
+
+use super::live::Note;
+use super::{Event, api};
+use connections::Bounded;
+use guard::Guard;
+
+/// Longest body taken, in bytes; the longest that means something has under a hundred.
+const LONGEST_BODY: usize = 64 * 1024;
+/// How much of a body that is too long is still read, in bytes, for a client that sends it all before it listens.
+const MOST_TO_DROP: usize = 64 * 1024 * 1024;
+/// A client that sends nothing of its body for so long gets no answer.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Serves at `address` from now on, and tells where: with port 0 the system chooses one. `live` has what
+/// `/api/events` streams.
+///
+/// # Errors
+///
+/// When nothing can listen there, in one line.
+pub fn listen(
+    address: SocketAddr,
+    events: Sender<Event>,
+    live: broadcast::Sender<Note>,
+) -> Result<SocketAddr, String> {
+    let cannot = |error: std::io::Error| {
+        format!("cannot serve HTTP at {address}: {error} (choose another with --http ADDR)")
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(cannot)?;
+    let listener = TcpListener::bind(address).map_err(cannot)?;
+    listener.set_nonblocking(true).map_err(cannot)?;
+    let bound = listener.local_addr().map_err(cannot)?;
+    let listener = {
+        let _in_runtime = runtime.enter();
+        tokio::net::TcpListener::from_std(listener).map_err(cannot)?
+    };
+    let server = Server {
+        events,
+        live,
+        guard: Guard::new(bound),
+    };
+    let app = Router::new()
+        .merge(page::routes())
+        .route("/api/events", get(stream).fallback(not_get))
+        .fallback(ask)
+        .with_state(server);
+    thread::spawn(move || {
+        // It ends with the program.
+        let _ = runtime.block_on(async { axum::serve(Bounded::new(listener), app).await });
+    });
+    Ok(bound)
+}
+
+/// What a request is answered with.
+#[derive(Clone)]
+struct Server {
+    events: Sender<Event>,
+    live: broadcast::Sender<Note>,
+    guard: Guard,
+}
+
+impl Server {
+    /// Has the board's thread answer.
+    async fn board(&self, request: api::Request) -> api::Reply {
+        let (reply, answer) = oneshot::channel();
+        let ending = || api::Reply::error(503, "the simulator is ending");
+        if self.events.send(Event::Request(request, reply)).is_err() {
+            return ending();
+        }
+        answer.await.unwrap_or_else(|_| ending())
+    }
+}
+
+async fn ask(State(server): State<Server>, request: axum::extract::Request) -> api::Reply {
+    let (head, body) = request.into_parts();
+    if head.method != Method::GET
+        && let Err(why) = server.guard.check(&head.headers)
+    {
+        return api::Reply::error(403, why);
+    }
+    let announced = head
+        .headers
+        .get(header::CONTENT_LENGTH)
+        .and_then(|length| length.to_str().ok()?.parse().ok());
+    match whole(body, announced.unwrap_or(0)).await {
+        Err(refusal) => refusal,
+        Ok(body) => {
+            server
+                .board(api::Request {
+                    method: head.method.to_string(),
+                    target: target(&head.uri),
+                    body,
+                })
+                .await
+        }
+    }
+}
+
+/// Path and query.
+fn target(uri: &Uri) -> String {
+    uri.path_and_query()
+        .map_or_else(|| uri.path().to_owned(), ToString::to_string)
+}
+
+/// The body of a request whose head says that it has `announced` bytes.
+async fn whole(body: Body, announced: u64) -> Result<Vec<u8>, api::Reply> {
+    let too_long = || api::Reply::error(413, "the body is longer than 64 KiB");
+    if announced > MOST_TO_DROP as u64 {
+        return Err(too_long());
+    }
+    let mut whole = Vec::new();
+    let mut length: usize = 0;
+    let mut pieces = body.into_data_stream();
+    while let Some(piece) = tokio::time::timeout(PATIENCE, pieces.next())
+        .await
+        .unwrap_or_else(|_| Some(Err(axum::Error::new("the client is silent"))))
+    {
+        let piece = piece.map_err(|_| api::Reply::error(400, "the body was cut short"))?;
+        length = length.saturating_add(piece.len());
+        if length > MOST_TO_DROP {
+            break;
+        }
+        if length <= LONGEST_BODY {
+            whole.extend(piece);
+        }
+    }
+    if length > LONGEST_BODY {
+        return Err(too_long());
+    }
+    Ok(whole)
+}
+
+async fn not_get() -> api::Reply {
+    api::Reply::error(405, "only GET here")
+}
+
+/// Server-sent events: the state, and from then on what changes.
+async fn stream(
+    State(server): State<Server>,
+) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
+    // First the ear, then the state: nothing is missed in between.
+    let notes = BroadcastStream::new(server.live.subscribe());
+    let state = server
+        .board(api::Request {
+            method: "GET".to_owned(),
+            target: "/api/state".to_owned(),
+            body: Vec::new(),
+        })
+        .await;
+    let first = event("state", state.body.to_string());
+    let then = notes.map(|note| match note {
+        Ok(note) => event(note.name, note.data.as_ref()),
+        // A client that reads too slowly can ask for the state and the frames.
+        Err(Lagged(count)) => event("lost", count.to_string()),
+    });
+    let all = tokio_stream::once(first).chain(then);
+    Sse::new(all.map(Ok)).keep_alive(KeepAlive::default())
+}
+
+fn event(name: &str, data: impl AsRef<str>) -> sse::Event {
+    sse::Event::default().event(name).data(data)
+}
+
+impl IntoResponse for api::Reply {
+    fn into_response(self) -> Response {
+        let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let json = [(header::CONTENT_TYPE, "application/json")];
+        (status, json, self.body.to_string()).into_response()
+    }
+}

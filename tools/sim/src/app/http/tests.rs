@@ -1,0 +1,216 @@
+//! The server on a socket, before a board that answers with what it was asked.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::sync::mpsc;
+
+use serde_json::json;
+
+use super::*;
+
+fn server() -> (SocketAddr, broadcast::Sender<Note>) {
+    let (events, queue) = mpsc::channel();
+    thread::spawn(move || {
+        while let Ok(Event::Request(request, reply)) = queue.recv() {
+            let body = String::from_utf8_lossy(&request.body).into_owned();
+            let body = json!([request.method, request.target, body]);
+            let _ = reply.send(api::Reply { status: 200, body });
+        }
+    });
+    let live = broadcast::Sender::new(16);
+    let address = listen("127.0.0.1:0".parse().unwrap(), events, live.clone()).unwrap();
+    (address, live)
+}
+
+fn ask(address: SocketAddr, request: &[u8]) -> String {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.write_all(request).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+const HEAD: &str = "Host: localhost\r\nConnection: close\r\n";
+
+#[test]
+fn a_request_comes_through_whole_and_its_reply_goes_back() {
+    let request =
+        format!("POST /api/dip?x HTTP/1.1\r\n{HEAD}Content-Length: 11\r\n\r\n{{\"value\":7}}");
+    let answer = ask(server().0, request.as_bytes());
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    assert!(
+        answer.contains("content-type: application/json"),
+        "{answer}"
+    );
+    let expected = json!(["POST", "/api/dip?x", "{\"value\":7}"]).to_string();
+    assert!(answer.ends_with(&expected), "{answer}");
+}
+
+#[test]
+fn the_page_needs_nothing_from_elsewhere() {
+    let (address, _live) = server();
+    let mut wanted = vec!["/".to_owned()];
+    let mut seen = Vec::new();
+    while let Some(path) = wanted.pop() {
+        let answer = ask(
+            address,
+            format!("GET {path} HTTP/1.1\r\n{HEAD}\r\n").as_bytes(),
+        );
+        assert!(answer.starts_with("HTTP/1.1 200"), "{path}: {answer}");
+        assert!(
+            answer.contains("content-security-policy: default-src 'self'"),
+            "{path}: {answer}"
+        );
+        for part in answer.split(['"', '\'', '(', ')']) {
+            assert!(
+                !part.starts_with("//") && (!part.contains("://") || part.contains("www.w3.org")),
+                "{path}: {part}"
+            );
+            let is_file =
+                part.starts_with('/') && [".js", ".css"].iter().any(|end| part.ends_with(end));
+            if is_file && !seen.contains(&part.to_owned()) {
+                wanted.push(part.to_owned());
+                seen.push(part.to_owned());
+            }
+        }
+    }
+    seen.sort();
+    assert_eq!(seen, ["/model.js", "/page.css", "/page.js"]);
+}
+
+#[test]
+fn only_reads_are_taken_from_other_pages_and_other_names() {
+    let (address, _live) = server();
+    let ask = |method: &str, headers: &str| {
+        let request = format!(
+            "{method} /api/power HTTP/1.1\r\n{headers}Connection: close\r\nContent-Length: 2\r\n\r\n{{}}"
+        );
+        ask(address, request.as_bytes())
+    };
+    let foreign = "Host: example.org\r\n";
+    assert!(ask("GET", foreign).starts_with("HTTP/1.1 200"));
+    for headers in [
+        foreign,
+        "Host: localhost\r\nOrigin: http://example.org\r\n",
+        "Host: localhost\r\nOrigin: null\r\n",
+    ] {
+        let answer = ask("POST", headers);
+        assert!(answer.starts_with("HTTP/1.1 403"), "{headers}: {answer}");
+        assert!(answer.contains("{\"error\":"), "{answer}");
+    }
+    let own = format!("Host: {address}\r\nOrigin: http://{address}\r\n");
+    assert!(ask("POST", &own).starts_with("HTTP/1.1 200"));
+}
+
+#[test]
+fn a_body_without_end_is_refused() {
+    let (address, _live) = server();
+    let head =
+        |length: u64| format!("POST /api/dip HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\n\r\n");
+    for length in [LONGEST_BODY as u64 + 1, 4_000_000] {
+        let mut request = head(length).into_bytes();
+        request.resize(request.len() + length as usize, b' ');
+        assert!(ask(address, &request).starts_with("HTTP/1.1 413"));
+    }
+    // Nobody waits for the end of this one, and its connection is closed.
+    assert!(ask(address, head(99_999_999_999).as_bytes()).starts_with("HTTP/1.1 413"));
+    let chunks =
+        format!("POST /api/dip HTTP/1.1\r\n{HEAD}Transfer-Encoding: chunked\r\n\r\n20000\r\n")
+            .into_bytes();
+    let mut request = chunks;
+    request.resize(request.len() + 0x20000, b' ');
+    request.extend(b"\r\n0\r\n\r\n");
+    assert!(ask(address, &request).starts_with("HTTP/1.1 413"));
+}
+
+#[test]
+fn a_client_that_dawdles_holds_up_no_other() {
+    let (address, _live) = server();
+    let mut slow = TcpStream::connect(address).unwrap();
+    slow.write_all(b"POST /api/dip HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n{")
+        .unwrap();
+    let answer = ask(
+        address,
+        format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n").as_bytes(),
+    );
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+}
+
+#[test]
+fn one_connection_too_many_is_refused_until_another_ends() {
+    let (address, _live) = server();
+    let request = format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n");
+    let held: Vec<_> = (0..connections::MOST)
+        .map(|_| TcpStream::connect(address).unwrap())
+        .collect();
+    let answer = ask(address, request.as_bytes());
+    assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
+    assert!(answer.ends_with("connections already\"}"), "{answer}");
+    drop(held);
+    // The server sees the ends of those a moment later.
+    let served = (0..200).any(|_| {
+        thread::sleep(Duration::from_millis(10));
+        ask(address, request.as_bytes()).starts_with("HTTP/1.1 200")
+    });
+    assert!(served);
+}
+
+#[test]
+fn events_begin_with_the_state_and_go_on_with_what_is_told() {
+    let (address, live) = server();
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream
+        .write_all(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        .unwrap();
+    let mut heard = String::new();
+    let mut until = |end: &str| {
+        let mut bytes = [0; 512];
+        while !heard.contains(end) {
+            let count = stream.read(&mut bytes).unwrap();
+            assert!(count > 0, "{heard}");
+            heard += std::str::from_utf8(&bytes[..count]).unwrap();
+        }
+        heard.clone()
+    };
+    let begun = until("/api/state");
+    assert!(begun.contains("content-type: text/event-stream"), "{begun}");
+    assert!(begun.contains("event: state\ndata: [\"GET\""), "{begun}");
+    live.send(Note {
+        name: "frame",
+        data: "{\"number\":1}".into(),
+    })
+    .unwrap();
+    until("event: frame\ndata: {\"number\":1}\n\n");
+    assert_eq!(live.receiver_count(), 1);
+    drop(stream);
+    // It notices when it next has something to send.
+    let gone = (0..200).any(|_| {
+        thread::sleep(Duration::from_millis(10));
+        let _ = live.send(Note {
+            name: "frame",
+            data: "{}".into(),
+        });
+        live.receiver_count() == 0
+    });
+    assert!(gone);
+}
+
+#[test]
+fn an_ending_simulator_says_so() {
+    let live = broadcast::Sender::new(1);
+    let address = listen("127.0.0.1:0".parse().unwrap(), mpsc::channel().0, live).unwrap();
+    let answer = ask(
+        address,
+        format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n").as_bytes(),
+    );
+    assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
+}
+
+#[test]
+fn a_port_in_use_is_told() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap();
+    let live = broadcast::Sender::new(1);
+    let text = listen(address, mpsc::channel().0, live).unwrap_err();
+    assert!(text.contains("in use") && text.contains("--http"), "{text}");
+}

@@ -1,0 +1,154 @@
+//! What `/api/events` streams: the state when it has changed, at most ten times a second, and every frame as it ends.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tokio::sync::broadcast;
+
+use super::bench::Bench;
+use super::{frames, state};
+
+/// Shortest time between two states.
+const STATE_EVERY: Duration = Duration::from_millis(100);
+/// Notes that may wait for a client that does not read: some seconds' worth. Beyond, it loses the oldest.
+const WAITING: usize = 1024;
+
+/// One event.
+#[derive(Clone, Debug)]
+pub struct Note {
+    /// `state` or `frame`.
+    pub name: &'static str,
+    /// JSON.
+    pub data: Arc<str>,
+}
+
+impl Note {
+    fn new(name: &'static str, data: &Value) -> Self {
+        Self {
+            name,
+            data: data.to_string().into(),
+        }
+    }
+}
+
+/// Tells those who listen.
+#[derive(Debug)]
+pub struct Live {
+    listeners: broadcast::Sender<Note>,
+    /// The number of the last frame that was told.
+    frame: u64,
+    /// The state that was told last, without its time.
+    state: Value,
+    told: Option<Instant>,
+}
+
+impl Default for Live {
+    fn default() -> Self {
+        Self {
+            listeners: broadcast::Sender::new(WAITING),
+            frame: 0,
+            state: Value::Null,
+            told: None,
+        }
+    }
+}
+
+impl Live {
+    /// Where one can begin to listen.
+    pub fn listeners(&self) -> broadcast::Sender<Note> {
+        self.listeners.clone()
+    }
+
+    /// Tells what is new at the instant `now` of the wall clock. Costs next to nothing while nobody listens.
+    pub fn tell(&mut self, bench: &mut Bench, now: Instant) {
+        if self.listeners.receiver_count() == 0 {
+            let last = bench.board.line().frames().next_back();
+            self.frame = last.map_or(self.frame, |frame| frame.number);
+            return;
+        }
+        for frame in bench.board.line().frames_since(self.frame) {
+            self.frame = frame.number;
+            let _ = self
+                .listeners
+                .send(Note::new("frame", &frames::frame(frame)));
+        }
+        if self.told.is_some_and(|told| now < told + STATE_EVERY) {
+            return;
+        }
+        let whole = state::json(bench);
+        let mut timeless = whole.clone();
+        timeless["virtual_ms"] = Value::Null;
+        if timeless != self.state {
+            self.state = timeless;
+            self.told = Some(now);
+            let _ = self.listeners.send(Note::new("state", &whole));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use register_map::Module;
+    use sim::Time;
+
+    use super::*;
+    use crate::app::testing::bench;
+
+    fn taken(notes: &mut broadcast::Receiver<Note>) -> Vec<(&'static str, Value)> {
+        std::iter::from_fn(|| notes.try_recv().ok())
+            .map(|note| (note.name, serde_json::from_str(&note.data).unwrap()))
+            .collect()
+    }
+
+    #[test]
+    fn frames_are_told_once_and_the_state_only_when_it_has_changed() {
+        let mut bench = bench(Module::Di4);
+        let mut live = Live::default();
+        let begin = Instant::now();
+        let request = [0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C];
+        bench.send(&request);
+        bench.board.run_for(Time::from_ms(20));
+        live.tell(&mut bench, begin);
+        let mut notes = live.listeners().subscribe();
+        live.tell(&mut bench, begin);
+        let first = taken(&mut notes);
+        assert_eq!(first.len(), 1, "what was before is in the state: {first:?}");
+        assert_eq!(first[0].0, "state");
+        assert_eq!(first[0].1["line"]["rx_frames"], 1);
+
+        bench.board.run_for(Time::from_ms(500));
+        live.tell(&mut bench, begin + Duration::from_millis(500));
+        assert!(taken(&mut notes).is_empty(), "only time has passed");
+
+        bench.send(&request);
+        bench.board.run_for(Time::from_ms(20));
+        bench.board.set_energised(2, true).unwrap();
+        let later = begin + Duration::from_secs(1);
+        for _ in 0..3 {
+            live.tell(&mut bench, later);
+        }
+        let then = taken(&mut notes);
+        let names: Vec<_> = then.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, ["frame", "state"]);
+        assert_eq!(then[0].1["bytes"], "0101001000043c0c");
+        assert_eq!(then[1].1["channels"][1]["energised"], true);
+    }
+
+    #[test]
+    fn the_state_is_told_ten_times_a_second_at_most_and_the_last_one_in_the_end() {
+        let mut bench = bench(Module::Di4);
+        let mut live = Live::default();
+        let mut notes = live.listeners().subscribe();
+        let begin = Instant::now();
+        for ms in 0..1000 {
+            bench.board.set_energised(1, ms % 2 == 0).unwrap();
+            live.tell(&mut bench, begin + Duration::from_millis(ms));
+        }
+        live.tell(&mut bench, begin + Duration::from_millis(1100));
+        let told = taken(&mut notes);
+        assert!((9..=12).contains(&told.len()), "{}", told.len());
+        let last = &told.last().unwrap().1;
+        assert_eq!(last["channels"][0]["energised"], false);
+    }
+}
