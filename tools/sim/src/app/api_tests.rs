@@ -311,7 +311,7 @@ fn replies_have_the_described_entries() {
 }
 
 #[test]
-fn findings_are_told_with_place_and_time() {
+fn findings_have_an_address_and_a_time() {
     use sim::Image;
     // ldr r0, [pc, #4]; ldr r0, [r0]; b .; and the address of GPIOC, whose clock is off.
     let image = [

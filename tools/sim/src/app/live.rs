@@ -32,15 +32,15 @@ impl Note {
     }
 }
 
-/// Tells those who listen.
+/// Sends the events to all listeners.
 #[derive(Debug)]
 pub struct Live {
     listeners: broadcast::Sender<Note>,
-    /// The number of the last frame that was told.
+    /// The number of the last frame that was sent.
     frame: u64,
-    /// The state that was told last, without its time.
+    /// The state that was sent last, without its time.
     state: Value,
-    told: Option<Instant>,
+    sent: Option<Instant>,
 }
 
 impl Default for Live {
@@ -49,19 +49,19 @@ impl Default for Live {
             listeners: broadcast::Sender::new(WAITING),
             frame: 0,
             state: Value::Null,
-            told: None,
+            sent: None,
         }
     }
 }
 
 impl Live {
-    /// Where one can begin to listen.
+    /// For those who want to listen.
     pub fn listeners(&self) -> broadcast::Sender<Note> {
         self.listeners.clone()
     }
 
-    /// Tells what is new at the instant `now` of the wall clock. Costs next to nothing while nobody listens.
-    pub fn tell(&mut self, bench: &mut Bench, now: Instant) {
+    /// Sends what has changed. `now` is the time of the wall clock. Does almost nothing without listeners.
+    pub fn send(&mut self, bench: &mut Bench, now: Instant) {
         if self.listeners.receiver_count() == 0 {
             let last = bench.board.line().frames().next_back();
             self.frame = last.map_or(self.frame, |frame| frame.number);
@@ -73,7 +73,7 @@ impl Live {
                 .listeners
                 .send(Note::new("frame", &frames::frame(frame)));
         }
-        if self.told.is_some_and(|told| now < told + STATE_EVERY) {
+        if self.sent.is_some_and(|sent| now < sent + STATE_EVERY) {
             return;
         }
         let whole = state::json(bench);
@@ -81,7 +81,7 @@ impl Live {
         timeless["virtual_ms"] = Value::Null;
         if timeless != self.state {
             self.state = timeless;
-            self.told = Some(now);
+            self.sent = Some(now);
             let _ = self.listeners.send(Note::new("state", &whole));
         }
     }
@@ -102,23 +102,23 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_told_once_and_the_state_only_when_it_has_changed() {
+    fn frames_are_sent_once_and_the_state_only_when_it_has_changed() {
         let mut bench = bench(Module::Di4);
         let mut live = Live::default();
         let begin = Instant::now();
         let request = [0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C];
         bench.send(&request);
         bench.board.run_for(Time::from_ms(20));
-        live.tell(&mut bench, begin);
+        live.send(&mut bench, begin);
         let mut notes = live.listeners().subscribe();
-        live.tell(&mut bench, begin);
+        live.send(&mut bench, begin);
         let first = taken(&mut notes);
         assert_eq!(first.len(), 1, "what was before is in the state: {first:?}");
         assert_eq!(first[0].0, "state");
         assert_eq!(first[0].1["line"]["rx_frames"], 1);
 
         bench.board.run_for(Time::from_ms(500));
-        live.tell(&mut bench, begin + Duration::from_millis(500));
+        live.send(&mut bench, begin + Duration::from_millis(500));
         assert!(taken(&mut notes).is_empty(), "only time has passed");
 
         bench.send(&request);
@@ -126,7 +126,7 @@ mod tests {
         bench.board.set_energised(2, true).unwrap();
         let later = begin + Duration::from_secs(1);
         for _ in 0..3 {
-            live.tell(&mut bench, later);
+            live.send(&mut bench, later);
         }
         let then = taken(&mut notes);
         let names: Vec<_> = then.iter().map(|(name, _)| *name).collect();
@@ -136,16 +136,16 @@ mod tests {
     }
 
     #[test]
-    fn the_state_is_told_ten_times_a_second_at_most_and_the_last_one_in_the_end() {
+    fn the_state_is_sent_ten_times_a_second_at_most_and_the_last_one_in_the_end() {
         let mut bench = bench(Module::Di4);
         let mut live = Live::default();
         let mut notes = live.listeners().subscribe();
         let begin = Instant::now();
         for ms in 0..1000 {
             bench.board.set_energised(1, ms % 2 == 0).unwrap();
-            live.tell(&mut bench, begin + Duration::from_millis(ms));
+            live.send(&mut bench, begin + Duration::from_millis(ms));
         }
-        live.tell(&mut bench, begin + Duration::from_millis(1100));
+        live.send(&mut bench, begin + Duration::from_millis(1100));
         let told = taken(&mut notes);
         assert!((9..=12).contains(&told.len()), "{}", told.len());
         let last = &told.last().unwrap().1;

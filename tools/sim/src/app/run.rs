@@ -59,7 +59,7 @@ pub fn until_stopped(
         clock.catch_up(bench);
         requests.run(bench, span(AT_ONCE));
         bench.tell();
-        live.tell(bench, wall);
+        live.send(bench, wall);
         if let Some(file) = &mut flash {
             file.keep_or_tell(&bench.board);
         }

@@ -1,5 +1,5 @@
 //! Who may change something. A page from anywhere can have a browser on this computer send requests to the simulator,
-//! also under a name of its own that it lets point here. Both show in the headers `Host` and `Origin`.
+//! even under a domain name of that page, which its owner lets point to this computer. Both show in the headers `Host` and `Origin`.
 
 use std::net::{IpAddr, SocketAddr};
 

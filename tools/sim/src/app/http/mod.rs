@@ -36,8 +36,8 @@ const MOST_TO_DROP: usize = 64 * 1024 * 1024;
 /// A client that sends nothing of its body for so long gets no answer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Serves at `address` from now on, and tells where: with port 0 the system chooses one. `live` has what
-/// `/api/events` streams.
+/// Serves at `address` from now on, and returns the address: with port 0 the system chooses the port. `live` carries
+/// the events that `/api/events` streams.
 ///
 /// # Errors
 ///

@@ -156,7 +156,7 @@ fn one_connection_too_many_is_refused_until_another_ends() {
 }
 
 #[test]
-fn events_begin_with_the_state_and_go_on_with_what_is_told() {
+fn events_begin_with_the_state_and_go_on_with_what_changes() {
     let (address, live) = server();
     let mut stream = TcpStream::connect(address).unwrap();
     stream
@@ -207,7 +207,7 @@ fn an_ending_simulator_says_so() {
 }
 
 #[test]
-fn a_port_in_use_is_told() {
+fn a_port_in_use_is_an_error_that_names_the_option() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap();
     let live = broadcast::Sender::new(1);
