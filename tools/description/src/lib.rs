@@ -1,5 +1,5 @@
 //! What a unit's registers and points mean, in a form that a tool can work with: read from the unit, or made from
-//! crate register-map for a unit that cannot tell.
+//! crate register-map for a unit without a description of its own.
 //!
 //! A tool that uses nothing but a [`Description`] can show, check and name every value of a unit that is newer than
 //! itself.

@@ -12,7 +12,7 @@ use crate::{Failure, Result, command};
 /// The package and its program.
 const TOOL: &str = "modioctl";
 
-/// Longest time for rustup to fetch a target: some 40 MB.
+/// Longest time for rustup to fetch a target, which is about 40 MB.
 const FETCHING: Duration = Duration::from_secs(300);
 
 /// Builds the tool, and gives its file and the name that it has in a release.

@@ -74,7 +74,7 @@ pub(super) fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
     let tests = directory.join("tests");
     let of_any = fs::read_dir(&tests)
         .map_err(|error| Failure::new(format!("{}: {error}", tests.display())))?;
-    // Not every board has suites of its own.
+    // A board need not have suites that are about it alone.
     let of_board = fs::read_dir(tests.join(board.name)).into_iter().flatten();
     let mut suites: Vec<PathBuf> = of_any
         .chain(of_board)

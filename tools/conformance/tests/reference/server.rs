@@ -88,7 +88,7 @@ impl Server {
             | (Some(Fault::ObeysBroadcastDiagnostics), Some(_)) => obeys_broadcast = true,
             (Some(Fault::TalksInListenOnly), _) => reference.listening = false,
             (Some(Fault::WritesInListenOnly), _) if listening => {
-                // What it does is not told.
+                // The write is carried out; its answer is thrown away.
                 let _ = self.answer(reference, pdu);
             }
             (Some(Fault::IgnoresDiagnosticData), Some(2 | 4 | 0x0A..=0x14)) => {

@@ -98,8 +98,8 @@ fn hex(digits: &[u8]) -> Option<Vec<u8>> {
     rest.is_empty().then(|| pairs.iter().map(byte).collect())?
 }
 
-/// How many bytes the RTU response to this request has, CRC included, as far as its beginning tells; `None` when more
-/// of it is needed, or nothing can tell but the silence after it.
+/// The length in bytes of the RTU response to this request, CRC included, from the beginning of the response. `None`
+/// when more bytes are needed, or when only the silence after the frame shows its end.
 #[must_use]
 pub fn response_length(request: &[u8], frame: &[u8]) -> Option<usize> {
     let function = *frame.get(1)?;

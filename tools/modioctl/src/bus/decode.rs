@@ -3,8 +3,8 @@
 use super::adu::Framing;
 use super::master::Direction;
 
-/// A frame in words: the unit, and what it is asked or answers. `request` is the PDU of the request before, if that is
-/// known: it tells what a response is about.
+/// A frame in words: the unit, and the request or response. `request` is the PDU of the request before, if that is known:
+/// it has the addresses that a response does not repeat.
 #[must_use]
 pub fn frame(
     framing: Framing,

@@ -273,7 +273,7 @@ impl Master {
         }
     }
 
-    /// A frame, or what stands for one, has arrived.
+    /// Passes a frame, or bytes that came in place of one, to the observer.
     pub(super) fn received(&mut self, bytes: &[u8]) {
         self.see(Direction::Response, bytes);
         self.free = Instant::now() + self.endpoint.frame_gap();

@@ -48,7 +48,7 @@ enum Turn {
 }
 
 impl Master {
-    /// Asks these addresses. `wait` is how long each has for the beginning of its answer; `asked` is told each address.
+    /// Asks these addresses. Each has the time `wait` for the beginning of its answer. `asked` is called with each address.
     ///
     /// # Errors
     ///

@@ -14,7 +14,7 @@ use crate::names::Book;
 /// Records that one request reads: 124 go into a response, less a margin for gateways with small buffers.
 const RECORDS: u16 = 100;
 
-/// How often a description is read again whose check is wrong: the unit may have been given other modules meanwhile.
+/// How often a description with a wrong CRC is read again: the modules of the unit may have changed during the read.
 const TIMES: u8 = 2;
 
 /// What is known of a unit.
@@ -187,7 +187,7 @@ fn kept(crc: u16) -> Option<Description> {
 /// Keeps a description. One that cannot be kept is read again next time.
 fn keep(crc: u16, file: &[u8]) {
     let Some(path) = path(crc) else { return };
-    // Whole or not at all, whatever ends the program meanwhile.
+    // Written beside it and then renamed, so that the file is never half written.
     let new = path.with_extension(format!("{}.new", std::process::id()));
     let written = path
         .parent()

@@ -1,4 +1,5 @@
-//! A line with several units on it, over TCP: all hear the master, and the master hears all. It can turn bits round.
+//! A line with several units on it, over TCP: every unit receives the requests, and the master every reply. It can
+//! invert bits.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};

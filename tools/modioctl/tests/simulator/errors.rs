@@ -99,7 +99,7 @@ fn silence_is_status_3() {
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
 fn a_wrong_rate_is_status_3_or_4() {
-    // The unit has 9600 bit/s. What it hears of 4800 is no request, or garbled, and so is what comes back.
+    // The unit runs at 9600 bit/s, the line at 4800. The unit does not recognise the request, or the reply is garbled.
     let unit = Unit::with(1, &["--module", "4di", "--line", "4800,8N2"]);
     let at = At::port(unit.pty.display());
     let ran = at.run("--timeout 300ms info");

@@ -58,7 +58,7 @@ pub fn modioctl(endpoint: &[&str]) -> Command {
     command
 }
 
-/// Where a unit is, and a way to run the program on it, with a cache of its own.
+/// The endpoint of a unit, for runs of the program that share a cache.
 pub struct At(Vec<String>, tempfile::TempDir);
 
 impl At {

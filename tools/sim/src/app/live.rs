@@ -60,7 +60,7 @@ impl Live {
         self.listeners.clone()
     }
 
-    /// Sends what has changed. `now` is the time of the wall clock. Does almost nothing without listeners.
+    /// Sends the changes since the last call. `now` is the time of the wall clock. Without listeners it costs little.
     pub fn send(&mut self, bench: &mut Bench, now: Instant) {
         if self.listeners.receiver_count() == 0 {
             let last = bench.board.line().frames().next_back();

@@ -1,4 +1,4 @@
-//! Digital points of all slots: every point has a line of its own.
+//! Digital points of all slots: each point is on a separate line.
 
 use sim::{Module, Time};
 

@@ -116,8 +116,8 @@ async fn get(
 
 /// Writes settings that are checked. The lock must be open.
 async fn write(device: &mut Device, changes: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
-    // Modules first: a change of module sets what belongs to its points. Neighbours go in one request, so that FORMAT and
-    // MODE, which must suit each other, are judged together.
+    // Modules first: a change of module resets the settings of its points. Registers with consecutive addresses go in one
+    // request, so that the unit checks FORMAT and MODE together.
     let mut sorted: Vec<_> = changes.iter().collect();
     sorted.sort_by_key(|(item, _)| (!is_module(item), item.address));
     let mut runs: Vec<(Vec<&str>, u16, Vec<u16>)> = Vec::new();

@@ -30,6 +30,14 @@ fn ask(address: SocketAddr, request: &[u8]) -> String {
     answer
 }
 
+/// The answer to a good request that changes nothing.
+fn read_state(address: SocketAddr) -> String {
+    ask(
+        address,
+        format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n").as_bytes(),
+    )
+}
+
 const HEAD: &str = "Host: localhost\r\nConnection: close\r\n";
 
 #[test]
@@ -129,28 +137,24 @@ fn a_client_that_dawdles_holds_up_no_other() {
     let mut slow = TcpStream::connect(address).unwrap();
     slow.write_all(b"POST /api/dip HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n{")
         .unwrap();
-    let answer = ask(
-        address,
-        format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n").as_bytes(),
-    );
+    let answer = read_state(address);
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
 }
 
 #[test]
 fn one_connection_too_many_is_refused_until_another_ends() {
     let (address, _live) = server();
-    let request = format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n");
     let held: Vec<_> = (0..connections::MOST)
         .map(|_| TcpStream::connect(address).unwrap())
         .collect();
-    let answer = ask(address, request.as_bytes());
+    let answer = read_state(address);
     assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
     assert!(answer.ends_with("connections already\"}"), "{answer}");
     drop(held);
     // The server sees the ends of those a moment later.
     let served = (0..200).any(|_| {
         thread::sleep(Duration::from_millis(10));
-        ask(address, request.as_bytes()).starts_with("HTTP/1.1 200")
+        read_state(address).starts_with("HTTP/1.1 200")
     });
     assert!(served);
 }
@@ -199,10 +203,7 @@ fn events_begin_with_the_state_and_go_on_with_what_changes() {
 fn an_ending_simulator_says_so() {
     let live = broadcast::Sender::new(1);
     let address = listen("127.0.0.1:0".parse().unwrap(), mpsc::channel().0, live).unwrap();
-    let answer = ask(
-        address,
-        format!("GET /api/state HTTP/1.1\r\n{HEAD}\r\n").as_bytes(),
-    );
+    let answer = read_state(address);
     assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
 }
 
