@@ -7,7 +7,8 @@
 //! | `modio-02.map` | finding what an address is, what takes how much |
 //! | `modio-02.cdx.json` | the crates in the image, as a CycloneDX bill of materials |
 //!
-//! Beside them stands `modioctl-TARGET`, the host tool for machines like this one.
+//! Beside them stand `modioctl-TARGET`, the host tool for machines like this one, and `modio-sim-TARGET`, the simulator
+//! with the images of all boards inside. `modio-sim-oci.tar`, made on Linux, is that simulator as a container image.
 //!
 //! `SHA256SUMS` has the check sums of all of them: `sha256sum --check SHA256SUMS`.
 //!
@@ -24,7 +25,9 @@ use crate::workspace::Workspace;
 use crate::{Failure, Result, build, image};
 
 mod hex;
+mod oci;
 mod sbom;
+mod simulator;
 mod tool;
 
 /// What to build, and where it goes.
@@ -67,10 +70,10 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
         for board in Board::ALL {
             names.extend(files(workspace, board, &out)?);
         }
+        names.extend(simulator::files(workspace, &Board::ALL, &out)?);
     }
-    let (file, name) = tool::build(workspace)?;
-    fs::copy(&file, out.join(&name))
-        .map_err(|error| Failure::new(format!("cannot copy {}: {error}", file.display())))?;
+    let (file, name) = tool::build(workspace, "modioctl", "modioctl", |_| ())?;
+    tool::copy(&file, &out.join(&name))?;
     names.push(name);
     write(&out.join("SHA256SUMS"), sums(&out, &names)?.as_bytes())?;
     for name in &names {

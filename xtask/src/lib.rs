@@ -28,8 +28,10 @@ pub mod fuzz;
 pub mod hil;
 pub mod image;
 mod matrix;
+pub mod page;
 pub mod peers;
 pub mod pymodbus;
+mod python;
 pub mod renode;
 #[cfg(all(test, unix))]
 mod script;
@@ -89,6 +91,8 @@ enum Command {
     Matrix,
     /// Renew docs/register-map.md
     Docs,
+    /// Take the pictures of the simulator's page in docs/images
+    Screenshots,
     /// Everything a change must pass
     Test(test::Options),
     /// What CI runs: formatting, lints and documentation, then the same as `test`
@@ -116,6 +120,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Hil(options) => hil::run(&workspace, &options),
         Command::Peers(options) => peers::run(&workspace, &options),
         Command::Docs => docs::run(&workspace),
+        Command::Screenshots => page::screenshots(&mut workspace),
         Command::Test(options) => test::run(&mut workspace, &options),
         Command::Ci => ci::run(&mut workspace),
     }

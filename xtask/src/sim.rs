@@ -1,9 +1,10 @@
-//! `cargo xtask sim`: builds the image and the simulator, then becomes the simulator.
+//! `cargo xtask sim`: builds the images and the simulator, then becomes the simulator.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
 
+use register_map::Board;
 use sim_options::Options;
 
 use crate::workspace::Workspace;
@@ -14,27 +15,33 @@ use crate::{Failure, Result, build, command};
 ///
 /// # Errors
 ///
-/// When image or simulator cannot be built or started.
+/// When an image or the simulator cannot be built or started.
 pub fn run(
     workspace: &mut Workspace,
     options: &Options,
     arguments: impl IntoIterator<Item = OsString>,
 ) -> Result<()> {
-    let built = match &options.elf {
-        Some(elf) if !elf.is_file() => {
-            return Err(Failure::asked(format!(
-                "there is no image {}",
-                elf.display()
-            )));
-        }
-        Some(_) => None,
-        None => Some(build::image(workspace, options.board)?.elf),
-    };
-    let mut simulator = Command::new(simulator(workspace)?);
-    simulator.args(arguments);
-    if let Some(elf) = built {
-        simulator.arg("--elf").arg(elf);
+    options.check_line().map_err(Failure::asked)?;
+    let named = options.elf.iter().map(|(_, elf)| elf);
+    if let Some(elf) = named.into_iter().find(|elf| !elf.is_file()) {
+        return Err(Failure::asked(format!(
+            "there is no image {}",
+            elf.display()
+        )));
     }
+    let fittings = options.fittings().map_err(Failure::asked)?;
+    let mut built: Vec<OsString> = Vec::new();
+    for board in Board::ALL {
+        let wanted = fittings.iter().any(|fitting| fitting.board == board);
+        if wanted && options.elf_of(board).is_none() {
+            let elf = build::image(workspace, board)?.elf;
+            let mut argument = OsString::from(format!("--elf={}=", board.name));
+            argument.push(elf);
+            built.push(argument);
+        }
+    }
+    let mut simulator = Command::new(simulator(workspace)?);
+    simulator.args(arguments).args(built);
     become_simulator(&mut simulator)
 }
 

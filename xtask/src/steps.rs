@@ -24,6 +24,18 @@ impl From<Result<()>> for Outcome {
     }
 }
 
+impl Outcome {
+    /// The outcome of a step whose tool is missing: failed when `strict`, as in CI.
+    #[must_use]
+    pub fn missing(what: &Failure, strict: bool) -> Self {
+        if strict {
+            Self::Failed(what.to_string())
+        } else {
+            Self::Skipped(what.to_string())
+        }
+    }
+}
+
 /// The steps run so far.
 #[derive(Debug, Default)]
 pub struct Steps {

@@ -4,11 +4,11 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use register_map::Board;
-use register_map::board::MODIO_02;
+use register_map::board::{MODIO_02, MODIO_08};
 
 use crate::steps::{Outcome, Steps};
 use crate::workspace::Workspace;
-use crate::{Result, build, command, pymodbus, renode, sim, size};
+use crate::{Result, build, command, page, pymodbus, renode, sim, size};
 
 /// The variable that names the corner of the part to the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
@@ -20,7 +20,7 @@ pub const CORNERS: [&str; 2] = ["slow", "fast"];
 /// The options of `cargo xtask test`.
 #[derive(clap::Args, Debug)]
 pub struct Options {
-    /// Without the simulator, which is for Linux: host tests, images and sizes
+    /// Without the simulator: host tests, images and sizes
     #[arg(long)]
     host: bool,
 }
@@ -90,7 +90,17 @@ pub fn add(workspace: &mut Workspace, steps: &mut Steps, strict: bool) -> Images
         )
     });
     steps.run("pymodbus as master", || {
-        images.step(&MODIO_02, |elf| pymodbus::step(workspace, elf, strict))
+        images.step(&MODIO_02, |elf| {
+            pymodbus::step(workspace, elf, images.of(&MODIO_08), strict)
+        })
+    });
+    steps.run("the simulator's page in Chromium", || {
+        images.step(&MODIO_02, |modio_02| {
+            images.step(&MODIO_08, |modio_08| {
+                let both = page::Images { modio_02, modio_08 };
+                page::step(workspace, both, strict)
+            })
+        })
     });
     for board in Board::ALL {
         steps.run(&format!("files for Renode, {board}"), || {
@@ -180,8 +190,6 @@ fn is_ci(variable: Option<&str>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use register_map::board::MODIO_08;
-
     use super::*;
 
     #[test]

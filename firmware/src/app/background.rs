@@ -1,6 +1,6 @@
 //! What may be late at no cost: DAC transfers, configuration store, LEDs, log.
 
-use board_support::stack;
+use board_support::stack::LowWater;
 use heapless::spsc::Consumer;
 use rtic::Mutex;
 
@@ -19,6 +19,7 @@ pub struct Background {
     pub persistence: Persistence,
     pub signals: Signals,
     pub log: Log,
+    pub stack: LowWater,
 }
 
 impl Background {
@@ -51,7 +52,7 @@ impl Background {
         if identify {
             self.signals.identify();
         }
-        let free = stack::free_low_water();
+        let free = self.stack.check();
         let (failing, millis) = device.lock(|device| {
             device.state.stack_free = free;
             (device.points.any_fails(), device.state.millis())

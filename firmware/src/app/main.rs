@@ -43,7 +43,7 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{ScanTimer, Watchdog, fault, pac::Interrupt};
+    use board_support::{ScanTimer, Watchdog, fault, pac::Interrupt, stack::LowWater};
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
@@ -103,6 +103,7 @@ mod app {
                     persistence: started.persistence,
                     signals: Signals::new(started.leds, started.trouble),
                     log: started.log,
+                    stack: LowWater::new(),
                 },
                 logged,
                 watchdog: started.watchdog,

@@ -18,11 +18,13 @@
 //!
 //! ```text
 //! board      the modio-02 and the modio-08       line   the RS-485 bus and its frames
-//! exact_line the protocol by which a client      slot   what is plugged in, and the world outside it
+//! bus        several boards on one line          slot   what is plugged in, and the world outside it
+//! exact_line the protocol by which a client
 //!            lets time pass
 //! ```
 
 pub mod board;
+pub mod bus;
 pub mod chip;
 pub mod corner;
 pub mod exact_line;
@@ -40,6 +42,7 @@ pub mod soc;
 pub mod time;
 
 pub use board::{Board, Config, Leds};
+pub use bus::Bus;
 pub use chip::{Chip, CoreTime, Error, Wait};
 pub use corner::Corner;
 pub use finding::Finding;

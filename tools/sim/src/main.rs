@@ -11,12 +11,20 @@ mod app;
 #[derive(Parser)]
 #[command(name = "modio-sim")]
 struct Cli {
+    /// Print the version, and that of the firmware inside, if there is any
+    #[arg(short = 'V', long)]
+    version: bool,
+
     #[command(flatten)]
     options: sim_options::Options,
 }
 
 fn main() -> ExitCode {
     let options = match Cli::try_parse() {
+        Ok(cli) if cli.version => {
+            print!("{}", app::version());
+            return ExitCode::SUCCESS;
+        }
         Ok(cli) => cli.options,
         Err(error) if error.use_stderr() => return refused(&sim_options::one_line(&error)),
         Err(help) => help.exit(),

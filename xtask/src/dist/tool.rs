@@ -1,7 +1,8 @@
-//! The host tool, as a file that runs without Rust and without this repository.
+//! A program for the host, as a file that runs without Rust and without this repository.
 //!
 //! On Linux it is linked against musl, so that it needs no library of the system and runs on every distribution.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -9,18 +10,21 @@ use std::time::Duration;
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command};
 
-/// The package and its program.
-const TOOL: &str = "modioctl";
-
 /// Longest time for rustup to fetch a target, which is about 40 MB.
 const FETCHING: Duration = Duration::from_secs(300);
 
-/// Builds the tool, and gives its file and the name that it has in a release.
+/// Builds a package's program, and gives its file and the name that it has in a release. `with` may add to cargo's
+/// environment.
 ///
 /// # Errors
 ///
 /// When rustup cannot fetch the target, or it does not build.
-pub fn build(workspace: &Workspace) -> Result<(PathBuf, String)> {
+pub fn build(
+    workspace: &Workspace,
+    package: &str,
+    program: &str,
+    with: impl FnOnce(&mut Command),
+) -> Result<(PathBuf, String)> {
     let host = host(&command::read(Command::new("rustc").arg("-vV"))?)?;
     let target = target(&host);
     if target != host {
@@ -28,14 +32,26 @@ pub fn build(workspace: &Workspace) -> Result<(PathBuf, String)> {
     }
     let mut cargo = workspace.cargo("build");
     cargo.args(["--locked", "--ignore-rust-version", "--profile", "tool"]);
-    cargo.args(["--package", TOOL, "--target", &target]);
+    cargo.args(["--package", package, "--bin", program, "--target", &target]);
+    with(&mut cargo);
     command::run(&mut cargo)?;
     let suffix = std::env::consts::EXE_SUFFIX;
     let built = workspace.target().join(&target).join("tool");
     Ok((
-        built.join(format!("{TOOL}{suffix}")),
-        format!("{TOOL}-{target}{suffix}"),
+        built.join(format!("{program}{suffix}")),
+        format!("{program}-{target}{suffix}"),
     ))
+}
+
+/// Copies a built program into a release.
+///
+/// # Errors
+///
+/// When the file cannot be copied.
+pub fn copy(file: &Path, to: &Path) -> Result<()> {
+    fs::copy(file, to)
+        .map(|_| ())
+        .map_err(|error| Failure::new(format!("cannot copy {}: {error}", file.display())))
 }
 
 /// The machine's own target, from what `rustc -vV` says.

@@ -5,14 +5,14 @@
 //! The platform and the scripts are checked by tests of this package (`platform`).
 
 use std::ffi::OsStr;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use register_map::{Board, Module, configuration, record};
 use serde_json::{Value, json};
 
 use super::DIRECTORY;
+use crate::python::Environment;
 use crate::steps::Outcome;
 use crate::workspace::Workspace;
 use crate::{Failure, Result, command, sim};
@@ -50,11 +50,16 @@ fn with_robot(
     check: impl FnOnce(&Path, &Path, &Path) -> Result<()>,
 ) -> Outcome {
     let checks = workspace.root().join(DIRECTORY).join("checks");
-    let environment = workspace.target().join("renode-venv");
-    match prepare("python3", &environment, &checks.join("requirements.txt")) {
+    let environment = Environment {
+        what: "Robot Framework with Unicorn",
+        directory: &workspace.target().join("renode-venv"),
+        requirements: &[checks.join("requirements.txt")],
+        imports: "robot, unicorn",
+        oldest: 8,
+    };
+    match environment.prepare() {
         Ok(python) => check(&python, &checks, &workspace.target().join("renode-checks")).into(),
-        Err(missing) if strict => Outcome::Failed(missing.to_string()),
-        Err(missing) => Outcome::Skipped(missing.to_string()),
+        Err(missing) => Outcome::missing(&missing, strict),
     }
 }
 
@@ -139,55 +144,6 @@ fn robot(
     })
 }
 
-/// Makes the virtual environment, or takes the one made earlier from the same requirements, and tells
-/// its interpreter.
-fn prepare(python: &str, environment: &Path, requirements: &Path) -> Result<PathBuf> {
-    let wanted = fs::read_to_string(requirements)
-        .map_err(|error| Failure::new(format!("{}: {error}", requirements.display())))?;
-    let interpreter = environment.join(if cfg!(windows) {
-        "Scripts/python.exe"
-    } else {
-        "bin/python"
-    });
-    // Written last, so that an installation cut short is not taken for a whole one.
-    let stamp = environment.join("installed.txt");
-    let works = || command::read(Command::new(&interpreter).args(["-c", "import robot, unicorn"]));
-    if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && works().is_ok() {
-        return Ok(interpreter);
-    }
-    command::read(
-        Command::new(python).args(["-c", "import sys; sys.exit(sys.version_info < (3, 8))"]),
-    )
-    .map_err(|_| {
-        Failure::new("Robot Framework needs Python 3.8 or newer as python3 on the PATH")
-    })?;
-    eprintln!("making {}", environment.display());
-    let mut venv = Command::new(python);
-    venv.args(["-m", "venv", "--clear"]).arg(environment);
-    command::read(&mut venv).map_err(|why| {
-        Failure::new(format!(
-            "no virtual environment (on Debian: python3-venv): {why}"
-        ))
-    })?;
-    let mut pip = Command::new(&interpreter);
-    pip.args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-    ]);
-    pip.arg("--requirement").arg(requirements);
-    command::read(&mut pip).map_err(|why| {
-        Failure::new(format!(
-            "Robot Framework and Unicorn cannot be installed from PyPI: {why}"
-        ))
-    })?;
-    fs::write(&stamp, wanted)
-        .map_err(|error| Failure::new(format!("cannot write {}: {error}", stamp.display())))?;
-    Ok(interpreter)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,15 +161,5 @@ mod tests {
         assert_eq!(last[1], "1=4di,2=4do,3=2relay,4=4ai");
         let stored = last[3].as_str().unwrap();
         assert!(stored.starts_with("6f6b6d6f0101000000000400"), "{stored}");
-    }
-
-    #[test]
-    fn without_python_the_step_says_so() {
-        let directory = tempfile::tempdir().unwrap();
-        let requirements = directory.path().join("requirements.txt");
-        fs::write(&requirements, "robotframework==6.1\n").unwrap();
-        let environment = directory.path().join("venv");
-        let failure = prepare("no-python-here", &environment, &requirements).unwrap_err();
-        assert!(failure.to_string().contains("Python 3.8"), "{failure}");
     }
 }

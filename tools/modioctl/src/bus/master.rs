@@ -8,7 +8,7 @@ use tokio::time::{Instant, timeout_at};
 use super::adu::Framing;
 use super::endpoint::Endpoint;
 use super::stream::Stream;
-use super::waiting::Waiting;
+use super::{Direction, Waiting};
 use crate::failure::Failure;
 
 /// The pause after a broadcast, in which every unit carries it out (V1.02, 2.4.1: 100 to 200 ms).
@@ -27,15 +27,6 @@ pub enum Lost {
     Garbled(Vec<u8>),
     /// The port or the connection is gone.
     Broken(io::Error),
-}
-
-/// Which way a frame went.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// To the unit.
-    Request,
-    /// From the unit.
-    Response,
 }
 
 /// A frame, or what arrived in place of one.

@@ -1,11 +1,12 @@
 //! `modioctl sniff`.
 
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use chrono::{DateTime, Local, SecondsFormat};
-use pcap_file::PcapError;
+use modbus_frames::capture::{Packet, Recorder};
 use serde_json::{Value as Json, json};
 use tokio::time::{Instant, timeout};
 
@@ -14,7 +15,6 @@ use crate::bus::{Direction, Endpoint, Place, Stream, decode, is_pseudo_terminal}
 use crate::cli::Sniff;
 use crate::device::place;
 use crate::failure::Failure;
-use crate::sniff::record::Recorder;
 use crate::sniff::{Kind, Piece, Splitter};
 use crate::{output, trace};
 
@@ -96,9 +96,9 @@ struct Printer {
 impl Printer {
     fn new(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<Self, Failure> {
         let record = options.record.as_deref().map(|path| {
-            let recorder = File::create(path)
-                .map_err(PcapError::IoError)
-                .and_then(|file| Recorder::new(file, endpoint.framing, &place(endpoint)));
+            let program = concat!("modioctl ", env!("CARGO_PKG_VERSION"));
+            let recorder =
+                File::create(path).and_then(|file| Recorder::new(file, program, &place(endpoint)));
             let recorder = recorder.map_err(|error| not_written(path, &error))?;
             Ok((recorder, path.to_owned()))
         });
@@ -125,7 +125,16 @@ impl Printer {
             if let Some((recorder, path)) = &mut self.record {
                 let since = self.wall.timestamp_nanos_opt().unwrap_or_default();
                 let since = Duration::from_nanos(u64::try_from(since).unwrap_or_default());
-                let written = recorder.write(piece, since, &words(self.framing, piece));
+                let written = recorder.write(&Packet {
+                    time: since.saturating_add(piece.from),
+                    direction: match &piece.kind {
+                        Kind::Frame { direction, .. } => Some(*direction),
+                        Kind::Garbled => None,
+                    },
+                    framing: self.framing,
+                    bytes: &piece.bytes,
+                    comment: &words(self.framing, piece),
+                });
                 written.map_err(|error| not_written(path, &error))?;
             }
         }
@@ -133,13 +142,9 @@ impl Printer {
     }
 }
 
-fn not_written(path: &Path, error: &PcapError) -> Failure {
-    let reason = match error {
-        PcapError::IoError(error) => error.to_string(),
-        other => other.to_string(),
-    };
+fn not_written(path: &Path, error: &io::Error) -> Failure {
     Failure::usage(format!(
-        "cannot write the capture file {}: {reason}",
+        "cannot write the capture file {}: {error}",
         path.display()
     ))
 }

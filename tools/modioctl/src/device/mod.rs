@@ -6,6 +6,8 @@ mod several;
 
 use std::time::Duration;
 
+use modbus_frames::names;
+
 pub use learn::{Learned, fetch, known};
 pub use orders::with_modules;
 
@@ -182,7 +184,7 @@ impl Device {
     /// What an exception means.
     #[must_use]
     pub fn exception(&self, code: u8, about: &str) -> Failure {
-        let name = decode::exception(code);
+        let name = names::exception(code).unwrap_or("unknown exception");
         let meaning = match code {
             1 => "the unit does not have this function",
             2 => "there is no such point or register, or it cannot be written",

@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use modbus_frames::names;
+
 use super::Request;
 use crate::bus::adu::{Framing, request_length, response_length};
-use crate::bus::{Direction, Waiting, decode};
+use crate::bus::{Direction, Waiting};
 
 /// Highest exception code of the standard (V1.1b3, 7).
 const LAST_EXCEPTION: u8 = 0x0B;
@@ -33,7 +35,7 @@ pub fn lengths(bytes: &[u8], open: Option<&Request>) -> Vec<Length> {
     let Some(function) = bytes.get(1) else {
         return vec![Length::Later];
     };
-    if decode::function(*function).is_none() {
+    if names::function(*function).is_none() {
         return Vec::new();
     }
     if function & 0x80 != 0 {

@@ -1,11 +1,10 @@
-//! Finds the frames in what a listener receives from a Modbus line, and writes them to capture files.
+//! Finds the frames in what a listener receives from a Modbus line.
 //!
 //! A listener receives requests and responses in one stream of bytes. On an RTU line, silence marks the end of a frame,
 //! but USB adapters deliver bytes in batches, 16 ms apart and more: the silences are lost. [`Splitter`] therefore finds
 //! frames by their content: by the lengths that a function allows, and by the CRC.
 
 mod kind;
-pub mod record;
 mod splitter;
 
 use std::time::Duration;

@@ -2,10 +2,17 @@
 //! wrong one at once, before it builds the image and the simulator, without depending on either.
 
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use register_map::{Board, Module, board::MODIO_02, codes::Format};
+
+mod fitting;
+
+pub use fitting::{Fitting, toml_error};
+
+/// Whether the simulator has pseudo-terminals on this system. macOS has them too, but nobody has tried them there.
+pub const PTY: bool = cfg!(all(unix, not(target_os = "macos")));
 
 /// What the simulator is told on its command line.
 #[derive(clap::Args, Clone, Debug, PartialEq, Eq)]
@@ -27,6 +34,17 @@ pub struct Options {
     /// slot
     #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = slot)]
     pub slots: Vec<(u8, Module)>,
+
+    /// Several boards on one RS-485 line, repeated: the unit address and what is plugged into the first slot, such as
+    /// 5:4do; without a module, what --module says
+    #[arg(long = "unit", value_name = "N[:MODULE]", value_parser = unit)]
+    #[arg(conflicts_with_all = ["dip", "slots", "flash", "gdb", "exact_line"])]
+    pub units: Vec<(u8, Option<Module>)>,
+
+    /// Several boards on one RS-485 line, from a TOML file with a table for each: name, board, dip, module, slots, flash
+    #[arg(long, value_name = "FILE")]
+    #[arg(conflicts_with_all = ["units", "board", "dip", "module", "slots", "flash", "gdb", "exact_line"])]
+    pub bus: Option<PathBuf>,
 
     /// Corner of the part, its clocks and what its instructions cost: nominal, slow or fast
     #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
@@ -52,15 +70,32 @@ pub struct Options {
     #[arg(long, value_name = "ADDR", value_parser = address)]
     pub tcp: Option<SocketAddr>,
 
+    /// Serve Modbus TCP at HOST:PORT, as a gateway to the RS-485 line: the unit identifier is the unit address
+    #[arg(long, value_name = "ADDR", value_parser = address)]
+    pub modbus_tcp: Option<SocketAddr>,
+
+    /// Write every frame on the RS-485 line to FILE as pcapng, for Wireshark; a file that exists is replaced
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+
     /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md:
     /// time stands still between its requests, so no endpoint that follows the clock is offered
-    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "gdb"])]
+    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb"])]
     pub exact_line: Option<SocketAddr>,
 
     /// Rate and format of the line's client, such as 9600,7N2: it keeps them whatever the unit does. Without the
     /// option the client follows the unit, which is not possible with 7N2, because the unit's UART is set to 8N1 then
     #[arg(long, value_name = "RATE,FORMAT", value_parser = line)]
     pub line: Option<(u32, String)>,
+
+    /// The line's client keeps its own rate and format, as on a real bus, instead of following the unit: the rate that
+    /// the master sets on the pseudo-terminal, and the format that the unit has at the start
+    #[arg(long, conflicts_with = "line")]
+    pub fixed_line: bool,
+
+    /// What the outside world does when, from a TOML file with a table for each step
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
 
     /// Where the HTTP interface listens, HOST:PORT; port 0 takes a free one
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
@@ -70,9 +105,10 @@ pub struct Options {
     #[arg(long, value_name = "ADDR", value_parser = address)]
     pub gdb: Option<SocketAddr>,
 
-    /// Run this image instead of building one
-    #[arg(long, value_name = "FILE")]
-    pub elf: Option<PathBuf>,
+    /// Run this image instead of building one; with BOARD= it is for the boards of that type only, and the option may
+    /// be repeated
+    #[arg(long, value_name = "[BOARD=]FILE", value_parser = elf)]
+    pub elf: Vec<(Option<&'static Board>, PathBuf)>,
 
     /// Stop after this much time, such as 10s or 2m
     #[arg(long = "for", value_name = "DURATION", value_parser = humantime::parse_duration)]
@@ -85,6 +121,73 @@ impl Options {
     pub fn preset(&self) -> bool {
         !self.no_preset
     }
+
+    /// Whether a master can reach the line on this system.
+    ///
+    /// # Errors
+    ///
+    /// Which option to give on a system without pseudo-terminals.
+    pub fn check_line(&self) -> Result<(), String> {
+        if PTY {
+            Ok(())
+        } else {
+            self.reached_without_pty()
+        }
+    }
+
+    fn reached_without_pty(&self) -> Result<(), String> {
+        let ways = [("--tcp", self.tcp), ("--modbus-tcp", self.modbus_tcp)];
+        let names = ways.map(|(name, _)| format!("{name} ADDR")).join(" or ");
+        let offered = self.exact_line.is_some() || ways.iter().any(|(_, way)| way.is_some());
+        if self.pty.is_none() && offered {
+            return Ok(());
+        }
+        Err(format!(
+            "the simulator has no pseudo-terminals on this system: offer the RS-485 line with {names} instead, \
+             such as --tcp 127.0.0.1:5020"
+        ))
+    }
+}
+
+impl Options {
+    /// The image that was named for a board: the last one that names its type, else the last one for all.
+    #[must_use]
+    pub fn elf_of(&self, board: &Board) -> Option<&Path> {
+        let last = |wanted: Option<&Board>| {
+            let mut named = self.elf.iter().rev();
+            named.find(|(of, _)| of.map(|of| of.name) == wanted.map(|of| of.name))
+        };
+        let (_, path) = last(Some(board)).or_else(|| last(None))?;
+        Some(path)
+    }
+}
+
+/// `FILE`, or `BOARD=FILE` where that names a board.
+fn elf(text: &str) -> Result<(Option<&'static Board>, PathBuf), String> {
+    let named = text.split_once('=').and_then(|(name, file)| {
+        let board: &'static Board = name.parse().ok()?;
+        Some((Some(board), PathBuf::from(file)))
+    });
+    match named.unwrap_or_else(|| (None, PathBuf::from(text))) {
+        (_, path) if path.as_os_str().is_empty() => Err("the name of a file is missing".to_owned()),
+        named => Ok(named),
+    }
+}
+
+/// `N` or `N:MODULE` as a unit address and a module.
+fn unit(text: &str) -> Result<(u8, Option<Module>), String> {
+    let (number, module) = match text.split_once(':') {
+        Some((number, module)) => (number, Some(module)),
+        None => (text, None),
+    };
+    let number = number
+        .parse()
+        .map_err(|_| format!("{text:?} is no unit address and module such as 5:4do"))?;
+    let module = module.map(|name| {
+        let module = name.parse::<Module>();
+        module.map_err(|why| format!("'{name}' is {why}"))
+    });
+    Ok((number, module.transpose()?))
 }
 
 /// `PORT=MODULE` as the number of a port and a module.
@@ -146,6 +249,7 @@ pub fn one_line(error: &clap::Error) -> String {
 mod tests {
     use super::*;
     use clap::Parser;
+    use register_map::board::MODIO_08;
 
     #[derive(Parser)]
     struct Cli {
@@ -166,8 +270,12 @@ mod tests {
         assert_eq!(options.corner, "nominal");
         assert_eq!(options.http, "127.0.0.1:8502".parse().unwrap());
         assert!(options.preset());
-        assert_eq!((options.pty, options.tcp, options.elf), (None, None, None));
+        assert_eq!((options.pty, options.tcp), (None, None));
+        assert!(options.elf.is_empty() && options.units.is_empty());
+        assert_eq!((options.bus, options.scenario), (None, None));
+        assert!(!options.fixed_line);
         assert_eq!((options.flash, options.gdb), (None, None));
+        assert_eq!((options.modbus_tcp, options.record), (None, None));
         assert_eq!((options.exact_line, options.line), (None, None));
         assert_eq!(options.run_for, None);
     }
@@ -183,12 +291,44 @@ mod tests {
     }
 
     #[test]
+    fn without_pseudo_terminals_the_line_needs_another_way() {
+        let check = |arguments: &[&str]| parse(arguments).unwrap().reached_without_pty();
+        assert_eq!(check(&["--tcp", "127.0.0.1:0"]), Ok(()));
+        assert_eq!(check(&["--modbus-tcp", "127.0.0.1:0"]), Ok(()));
+        assert_eq!(check(&["--exact-line", "127.0.0.1:0"]), Ok(()));
+        for arguments in [&[][..], &["--pty", "x", "--tcp", "127.0.0.1:0"]] {
+            let text = check(arguments).unwrap_err();
+            assert!(
+                text.contains("with --tcp ADDR or --modbus-tcp ADDR instead"),
+                "{text}"
+            );
+        }
+        assert_eq!(parse(&[]).unwrap().check_line().is_ok(), PTY);
+    }
+
+    #[test]
     fn slots_are_named_by_their_ports() {
         assert_eq!(parse(&[]).unwrap().board.name, "modio-02");
         let arguments = ["--board", "modio-08", "--slot", "1=4do", "--slot", "4=none"];
         let options = parse(&arguments).unwrap();
         assert_eq!(options.board.name, "modio-08");
         assert_eq!(options.slots, [(1, Module::Do4), (4, Module::None)]);
+    }
+
+    #[test]
+    fn units_have_an_address_and_may_name_their_module() {
+        let units = parse(&["--unit", "5:4do", "--unit", "6"]).unwrap().units;
+        assert_eq!(units, [(5, Some(Module::Do4)), (6, None)]);
+    }
+
+    #[test]
+    fn an_image_may_be_for_boards_of_one_type() {
+        let arguments = ["--elf", "a", "--elf", "modio-08=b", "--elf", "x=c"];
+        let options = parse(&arguments).unwrap();
+        assert_eq!(options.elf_of(&MODIO_08), Some(Path::new("b")));
+        assert_eq!(options.elf_of(&MODIO_02), Some(Path::new("x=c")));
+        let only = parse(&["--elf", "modio-08=b"]).unwrap();
+        assert_eq!(only.elf_of(&MODIO_02), None);
     }
 
     #[test]
@@ -226,12 +366,19 @@ mod tests {
             (&["--flash"][..], "--flash <FILE>"),
             (&["--gdb", "x"][..], "not an address"),
             (&["--exact-line", "x"][..], "not an address"),
+            (&["--modbus-tcp", "502"][..], "not an address"),
+            (&["--modbus-tcp"][..], "--modbus-tcp <ADDR>"),
+            (&["--record"][..], "--record <FILE>"),
             (
                 &["--exact-line", "127.0.0.1:0", "--pty", "x"][..],
                 "cannot be used with",
             ),
             (
                 &["--exact-line", "127.0.0.1:0", "--tcp", "127.0.0.1:0"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--modbus-tcp", "127.0.0.1:0"][..],
                 "cannot be used with",
             ),
             (
@@ -244,6 +391,21 @@ mod tests {
             (&["--slot", "3=8di"][..], "one of none, 4di"),
             (&["--pty"][..], "--pty <LINK>"),
             (&["--line", "9600"][..], "9600,7N2"),
+            (&["--unit", "x"][..], "5:4do"),
+            (&["--unit", "256"][..], "5:4do"),
+            (&["--unit", "5:8di"][..], "one of none, 4di"),
+            (&["--unit", "5", "--dip", "5"][..], "cannot be used with"),
+            (&["--unit", "5", "--bus", "x"][..], "cannot be used with"),
+            (
+                &["--bus", "x", "--module", "4do"][..],
+                "cannot be used with",
+            ),
+            (
+                &["--fixed-line", "--line", "9600,8N2"][..],
+                "cannot be used with",
+            ),
+            (&["--elf", ""][..], "name of a file"),
+            (&["--elf", "modio-02="][..], "name of a file"),
             (&["--line", "9600,7N1"][..], "9600,7N2"),
             (&["--line", "100,8N2"][..], "9600,7N2"),
         ] {

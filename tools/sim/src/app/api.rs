@@ -11,16 +11,20 @@
 //! | `POST /api/dip` | `{"value":n}`: moves the switch |
 //! | `POST /api/power` | `{"on":bool}` or `{"cycle":true}` |
 //! | `POST /api/module` | `{"name":...}`: plugs a module, with the power off |
+//! | `GET /api/faults` | the faults made on purpose |
+//! | `POST /api/faults` | makes faults or ends them: any of `bit_error_rate`, `drop_rate`, `noise_hz`, `i2c_absent`, `hse_failed`, `hsi_percent`, `lsi_khz` |
 //! | `POST /api/slots/PORT/...` | `channels/N` or `module` of the slot at PORT; without it, of the first slot |
 //!
-//! What concerns a board also exists as `/api/boards/NAME/...`. A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
+//! Every path also exists as `/api/boards/NAME/...`; without it the first board is meant. A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
 
 use serde_json::{Map, Value, json};
 
 use register_map::Module;
 use sim::Error;
 
+use super::action::{Action, Change};
 use super::bench::Bench;
+use super::faults::Faults;
 use super::{frames, state};
 
 /// A request as it came.
@@ -65,6 +69,7 @@ impl From<Error> for Reply {
 }
 
 type Outcome = Result<(), Reply>;
+type Body = Map<String, Value>;
 
 /// Does what a request asks for.
 pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
@@ -72,69 +77,98 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
         .target
         .split_once('?')
         .unwrap_or((&request.target, ""));
-    let answered = match path.strip_prefix("/api/").map(|path| of_board(bench, path)) {
-        Some("boards") => reading(request).map(|()| boards(bench)),
-        Some("state") => reading(request).map(|()| state::json(bench)),
-        Some("frames") => reading(request)
-            .and_then(|()| since(query))
-            .map(|k| frames::json(bench.board.line(), k)),
-        Some("findings") => reading(request).map(|()| findings(bench)),
-        Some("openapi.json") => reading(request).map(|()| openapi()),
-        Some("dip") => changing(bench, request, set_dip),
-        Some("power") => changing(bench, request, set_power),
-        Some(rest) => of_slot(bench, request, rest)
-            .unwrap_or_else(|| Err(Reply::error(404, format!("there is no {path}")))),
-        None => Err(Reply::error(404, format!("there is no {path}"))),
+    let answered = match path.strip_prefix("/api/") {
+        Some(rest) => {
+            let (board, rest) = of_board(bench, rest).unwrap_or((0, rest));
+            of_path(bench, board, request, rest, query)
+        }
+        None => None,
     };
     match answered {
-        Ok(body) => Reply { status: 200, body },
-        Err(refusal) => refusal,
+        Some(Ok(body)) => Reply { status: 200, body },
+        Some(Err(refusal)) => refusal,
+        None => Reply::error(404, format!("there is no {path}")),
     }
 }
 
-/// The path without the board's name, if it begins with that.
-fn of_board<'a>(bench: &Bench, path: &'a str) -> &'a str {
-    path.strip_prefix("boards/")
-        .and_then(|path| path.strip_prefix(name(bench)))
-        .and_then(|path| path.strip_prefix('/'))
-        .unwrap_or(path)
+/// The board that the path names, and the path without its name.
+fn of_board<'a>(bench: &Bench, path: &'a str) -> Option<(usize, &'a str)> {
+    let (name, rest) = path.strip_prefix("boards/")?.split_once('/')?;
+    let mut units = bench.units.iter();
+    Some((units.position(|unit| unit.name == name)?, rest))
 }
 
-/// The only board's name: it is called after what it is.
-fn name(bench: &Bench) -> &'static str {
-    bench.board.layout().board.name
+/// Does what a request for board `n` asks for; `None` when there is no such path.
+fn of_path(
+    bench: &mut Bench,
+    n: usize,
+    request: &Request,
+    path: &str,
+    query: &str,
+) -> Option<Result<Value, Reply>> {
+    Some(match path {
+        "boards" => reading(request).map(|()| boards(bench)),
+        "state" => reading(request).map(|()| state::json(bench, n)),
+        "frames" => reading(request)
+            .and_then(|()| since(query))
+            .map(|k| frames::json(bench.bus.line(), k)),
+        "findings" => reading(request).map(|()| findings(bench, n)),
+        "openapi.json" => reading(request).map(|()| openapi()),
+        "faults" if request.method == "GET" => Ok(state::faults(bench, n)),
+        "faults" => body(request)
+            .and_then(|body| set_faults(bench, n, body))
+            .map(|()| state::faults(bench, n)),
+        "dip" => changing(bench, n, request, |bench, body| set_dip(bench, n, body)),
+        "power" => changing(bench, n, request, |bench, body| set_power(bench, n, body)),
+        _ => return of_slot(bench, n, request, path),
+    })
 }
 
 /// The body of `GET /api/boards`.
 fn boards(bench: &Bench) -> Value {
-    json!([{ "name": name(bench), "board": name(bench), "dip": bench.board.dip() }])
+    let boards = bench.units.iter().zip(bench.bus.boards());
+    let each = boards.map(|(unit, board)| {
+        json!({ "name": unit.name, "board": board.layout().board.name, "dip": board.dip() })
+    });
+    each.collect()
 }
 
 /// What concerns a slot, the first one unless `path` names a port; `None` when `path` is none of these.
-fn of_slot(bench: &mut Bench, request: &Request, path: &str) -> Option<Result<Value, Reply>> {
+fn of_slot(
+    bench: &mut Bench,
+    n: usize,
+    request: &Request,
+    path: &str,
+) -> Option<Result<Value, Reply>> {
     let (port, rest) = match path.strip_prefix("slots/") {
-        Some(path) => path.split_once('/')?,
-        None => ("", path),
-    };
-    let port = if port.is_empty() {
-        bench.board.layout().slots[0].port
-    } else {
-        port.parse().ok()?
+        Some(path) => {
+            let (port, rest) = path.split_once('/')?;
+            (Some(port.parse().ok()?), rest)
+        }
+        None => (None, path),
     };
     if rest == "module" {
-        let change = |bench: &mut Bench, body: &Map<_, _>| set_module(bench, port, body);
-        return Some(changing(bench, request, change));
+        let change = |bench: &mut Bench, body: &Body| set_module(bench, n, port, body);
+        return Some(changing(bench, n, request, change));
     }
-    let Some(number) = channel_number(rest.strip_prefix("channels/")?) else {
+    let Some(channel) = channel_number(rest.strip_prefix("channels/")?) else {
         return Some(Err(Reply::error(404, "channels are numbered 1 to 4")));
     };
-    let change = |bench: &mut Bench, body: &Map<_, _>| set_channel(bench, port, number, body);
-    Some(changing(bench, request, change))
+    let change = |bench: &mut Bench, body: &Body| {
+        let change = change(body)?;
+        let action = Action::Channel {
+            port,
+            channel,
+            change,
+        };
+        Ok(bench.apply(n, &action)?)
+    };
+    Some(changing(bench, n, request, change))
 }
 
 /// The body of `GET /api/findings`.
-fn findings(bench: &Bench) -> Value {
-    let each = bench.board.findings().iter().map(|finding| {
+fn findings(bench: &Bench, n: usize) -> Value {
+    let each = bench.bus.board(n).findings().iter().map(|finding| {
         json!({
             "at_us": finding.at.as_us(),
             "pc": format!("{:#010x}", finding.pc),
@@ -159,26 +193,32 @@ fn reading(request: &Request) -> Outcome {
     }
 }
 
-/// Does `change` with the body's JSON object, and answers with the state after it.
+/// Does `change` with the body's JSON object, and answers with the state of board `n` after it.
 fn changing(
     bench: &mut Bench,
+    n: usize,
     request: &Request,
-    change: impl FnOnce(&mut Bench, &Map<String, Value>) -> Outcome,
+    change: impl FnOnce(&mut Bench, &Body) -> Outcome,
 ) -> Result<Value, Reply> {
+    change(bench, &body(request)?)?;
+    Ok(state::json(bench, n))
+}
+
+/// The JSON object that a POST brings.
+fn body(request: &Request) -> Result<Body, Reply> {
     if request.method != "POST" {
         return Err(Reply::error(405, "only POST here"));
     }
     let body: Value = serde_json::from_slice(&request.body)
         .map_err(|error| Reply::error(400, format!("the body is not JSON: {error}")))?;
-    let body = body
-        .as_object()
-        .ok_or_else(|| Reply::error(400, "the body is not a JSON object"))?;
-    change(bench, body)?;
-    Ok(state::json(bench))
+    match body {
+        Value::Object(body) => Ok(body),
+        _ => Err(Reply::error(400, "the body is not a JSON object")),
+    }
 }
 
 /// The only entry of an object that may have no other, as what was asked for may not be half done.
-fn only(body: &Map<String, Value>) -> Result<(&str, &Value), Reply> {
+fn only(body: &Body) -> Result<(&str, &Value), Reply> {
     let mut entries = body.iter();
     match (entries.next(), entries.next()) {
         (Some((key, value)), None) => Ok((key, value)),
@@ -219,64 +259,64 @@ fn channel_number(text: &str) -> Option<usize> {
         .map(|position| position + 1)
 }
 
-fn set_channel(bench: &mut Bench, port: u8, channel: usize, body: &Map<String, Value>) -> Outcome {
+fn change(body: &Body) -> Result<Change, Reply> {
     let (key, value) = only(body)?;
-    let board = &mut bench.board;
-    let done = match key {
-        "energised" => {
-            let on = boolean(key, value)?;
-            board.change_slot(port, |slot| slot.set_energised(channel, on))?
-        }
-        "manual" => {
-            let on = boolean(key, value)?;
-            board.change_slot(port, |slot| slot.set_manual(channel, on))?
-        }
-        "millivolts" => {
-            let millivolts = number(key, value, 3300)?;
-            board.change_slot(port, |slot| slot.set_millivolts(channel, millivolts))?
-        }
+    Ok(match key {
+        "energised" => Change::Energised(boolean(key, value)?),
+        "manual" => Change::Manual(boolean(key, value)?),
+        "millivolts" => Change::Millivolts(number(key, value, 3300)?),
         _ => return Err(unknown(key, "`energised`, `manual` or `millivolts`")),
-    };
-    Ok(done.map_err(Error::from)?)
+    })
 }
 
-fn set_dip(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
+fn set_dip(bench: &mut Bench, n: usize, body: &Body) -> Outcome {
     match only(body)? {
         (key @ "value", value) => {
             // 255 fits in eight switches.
-            bench
-                .board
-                .set_dip(number(key, value, 255)?.to_le_bytes()[0]);
-            Ok(())
+            let dip = number(key, value, 255)?.to_le_bytes()[0];
+            Ok(bench.apply(n, &Action::Dip(dip))?)
         }
         (key, _) => Err(unknown(key, "`value`")),
     }
 }
 
-fn set_power(bench: &mut Bench, body: &Map<String, Value>) -> Outcome {
-    match only(body)? {
+fn set_power(bench: &mut Bench, n: usize, body: &Body) -> Outcome {
+    let action = match only(body)? {
         (key @ "on", value) => match boolean(key, value)? {
-            true => bench.board.power_on(),
-            false => bench.board.power_off(),
+            true => Action::PowerOn,
+            false => Action::PowerOff,
         },
-        ("cycle", Value::Bool(true)) => bench.board.cycle(),
+        ("cycle", Value::Bool(true)) => {
+            bench.cycle(n);
+            return Ok(());
+        }
         ("cycle", _) => return Err(Reply::error(400, "`cycle` is true")),
         (key, _) => return Err(unknown(key, "`on` or `cycle`")),
-    }
-    Ok(())
+    };
+    Ok(bench.apply(n, &action)?)
 }
 
-fn set_module(bench: &mut Bench, port: u8, body: &Map<String, Value>) -> Outcome {
+fn set_module(bench: &mut Bench, n: usize, port: Option<u8>, body: &Body) -> Outcome {
     match only(body)? {
         ("name", Value::String(name)) => {
             let module: Module = name
                 .parse()
                 .map_err(|why| Reply::error(400, format!("`{name}` is {why}")))?;
-            Ok(bench.board.set_module_at(port, module)?)
+            Ok(bench.apply(n, &Action::Module { port, module })?)
         }
         ("name", _) => Err(Reply::error(400, "`name` is a string")),
         (key, _) => Err(unknown(key, "`name`")),
     }
+}
+
+fn set_faults(bench: &mut Bench, n: usize, body: Body) -> Outcome {
+    let faults: Faults = serde_json::from_value(Value::Object(body))
+        .map_err(|error| Reply::error(400, error.to_string()))?;
+    if faults.is_empty() {
+        return Err(Reply::error(400, "the object names no fault"));
+    }
+    faults.check().map_err(|what| Reply::error(400, what))?;
+    Ok(bench.apply(n, &Action::Faults(faults))?)
 }
 
 /// The K of `since=K`; 0, which is before all frames, without a query.
@@ -291,5 +331,5 @@ fn since(query: &str) -> Result<u64, Reply> {
 }
 
 #[cfg(test)]
-#[path = "api_tests.rs"]
+#[path = "api_tests/mod.rs"]
 mod tests;

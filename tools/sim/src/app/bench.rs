@@ -1,104 +1,269 @@
-//! The board on its bench: with what it has said so far.
+//! The boards on one line, with everything the command knows about them: disturbances, the scenario, logs and flash files.
 
-use std::collections::VecDeque;
 use std::io::Write;
 
-use sim::Board;
+use sim::bus::Bus;
+use sim::chip::CYCLE;
 use sim::line::Settings;
+use sim::slot::BusFault;
+use sim::{Board, Channel, Error, Time};
 
+use super::action::{Action, Change};
+use super::disturbance::Disturbance;
+use super::faults::{Faults, HSI_HZ};
 use super::gdb::Debug;
+use super::scenario::{Input, Known, Scenario};
+use super::unit::Unit;
 
-/// Lines of the log that the HTTP interface shows.
-const TAIL: usize = 50;
-
-/// The board and the end of its log.
+/// The boards on one line and the state of the command that belongs to them.
 pub struct Bench {
-    /// The virtual modio-02.
-    pub board: Board,
-    /// What a debugger has set up.
+    /// The boards and their line.
+    pub bus: Bus,
+    /// Name, log and flash file of each board, in the order of the bus.
+    pub units: Vec<Unit>,
+    /// Breakpoints and stepping of the debugger.
     pub debug: Debug,
-    log: VecDeque<String>,
-    /// A line of the log that has not ended yet.
-    unfinished: String,
-    findings: usize,
+    /// Random disturbances of the line.
+    pub disturbance: Disturbance,
+    /// Scheduled events of the outside world.
+    pub scenario: Scenario,
 }
 
 impl Bench {
-    /// A board that nobody has listened to yet.
-    pub fn new(mut board: Board) -> Self {
+    /// A bench with these boards; at least one.
+    pub fn new(boards: Vec<(Board, Unit)>) -> Self {
+        let (boards, units) = boards.into_iter().unzip();
+        let mut bus = Bus::new(boards);
         // A pty or socket carries no rate: a master behind it speaks at the unit's.
-        board.line().set_follow(true);
+        bus.line().set_follow(true);
         Self {
-            board,
+            bus,
+            units,
             debug: Debug::default(),
-            log: VecDeque::new(),
-            unfinished: String::new(),
-            findings: 0,
+            disturbance: Disturbance::default(),
+            scenario: Scenario::default(),
         }
+    }
+
+    /// The first board, which requests without a board's name mean.
+    pub fn first(&mut self) -> &mut Board {
+        self.bus.board_mut(0)
+    }
+
+    /// The virtual time.
+    pub fn now(&self) -> Time {
+        self.bus.now()
+    }
+
+    /// Runs until the virtual time is `t`.
+    pub fn run_until(&mut self, t: Time) {
+        self.pass(t, |bus, until| {
+            bus.run_until(until);
+            false
+        });
+    }
+
+    /// Runs the only board as a debugger does, to a breakpoint or until `t`; returns whether it has come to one.
+    pub fn run_debugged(&mut self, t: Time) -> bool {
+        self.pass(t, |bus, until| bus.board_mut(0).run_debugged(until))
+    }
+
+    /// Runs up to `t` in slices that end at the instants of the scenario. Queues the disturbances of each slice first. `run`
+    /// runs one slice and returns whether to stop there.
+    fn pass(&mut self, t: Time, mut run: impl FnMut(&mut Bus, Time) -> bool) -> bool {
+        loop {
+            let now = self.now();
+            self.play(now);
+            let until = self.scenario.next().map_or(t, |next| t.min(next));
+            self.disturbance.put(self.bus.line(), now, until);
+            if run(&mut self.bus, until) {
+                return true;
+            }
+            if until >= t {
+                return false;
+            }
+        }
+    }
+
+    /// Carries out the scenario steps that are due at `now`. Reports what a board refuses and continues.
+    fn play(&mut self, now: Time) {
+        let at_pin = |bus: &Bus, n, input| millivolts(bus.board(n), input);
+        while let Some((n, action)) = self
+            .scenario
+            .take(now, |n, input| at_pin(&self.bus, n, input))
+        {
+            if let Err(why) = self.apply(n, &action) {
+                let name = &self.units[n].name;
+                complain(&format!("the scenario at {now}: {name}: {why}"));
+            }
+        }
+    }
+
+    /// Names and ports of the boards, for checking a scenario.
+    pub fn known(&self) -> Vec<Known> {
+        let boards = self.units.iter().zip(self.bus.boards());
+        let known = |(unit, board): (&Unit, &Board)| Known {
+            name: unit.name.clone(),
+            ports: board.slots().map(|(port, _)| port).collect(),
+        };
+        boards.map(known).collect()
+    }
+
+    /// Applies `action` to board `n` at the present virtual time.
+    ///
+    /// # Errors
+    ///
+    /// Why the board refuses it; then nothing has changed.
+    pub fn apply(&mut self, n: usize, action: &Action) -> Result<(), Error> {
+        let board = self.bus.board_mut(n);
+        let first = board.layout().slots[0].port;
+        match *action {
+            Action::Channel {
+                port,
+                channel,
+                change,
+            } => board
+                .change_slot(port.unwrap_or(first), |slot| match change {
+                    Change::Energised(on) => slot.set_energised(channel, on),
+                    Change::Manual(on) => slot.set_manual(channel, on),
+                    Change::Millivolts(millivolts) => slot.set_millivolts(channel, millivolts),
+                })?
+                .map_err(Error::from)?,
+            Action::Dip(dip) => board.set_dip(dip),
+            Action::PowerOn => board.power_on(),
+            Action::PowerOff => board.power_off(),
+            Action::Module { port, module } => {
+                board.set_module_at(port.unwrap_or(first), module)?;
+            }
+            Action::Faults(ref faults) => self.make(faults, n)?,
+        }
+        Ok(())
+    }
+
+    /// Applies faults: those of the line, and those of the part on board `n`. The values must have passed [`Faults::check`].
+    fn make(&mut self, faults: &Faults, n: usize) -> Result<(), Error> {
+        self.disturbance
+            .change(faults.bit_error_rate, faults.noise_hz, faults.drop_rate);
+        let board = self.bus.board_mut(n);
+        if let Some(absent) = faults.i2c_absent {
+            let fault = match absent {
+                true => BusFault::Absent,
+                false => BusFault::None,
+            };
+            // All its DACs are on one I2C bus.
+            let ports: Vec<u8> = board.slots().map(|(port, _)| port).collect();
+            for port in ports {
+                board.change_slot(port, |slot| slot.set_bus_fault(fault))?;
+            }
+            self.units[n].i2c_absent = absent;
+        }
+        if let Some(failed) = faults.hse_failed {
+            board.set_crystal(!failed);
+        }
+        if faults.hsi_percent.is_some() || faults.lsi_khz.is_some() {
+            let hertz = |value: f64| value.round() as u32;
+            let (hsi, lsi) = board.rc_oscillators();
+            let percent = faults.hsi_percent;
+            let hsi = percent.map_or(hsi, |percent| hertz(HSI_HZ * (1.0 + percent / 100.0)));
+            let lsi = faults.lsi_khz.map_or(lsi, |khz| hertz(khz * 1000.0));
+            board.set_rc_oscillators(hsi, lsi)?;
+        }
+        Ok(())
+    }
+
+    /// Power off, 100 ms, power on.
+    pub fn cycle(&mut self, n: usize) {
+        self.bus.board_mut(n).power_off();
+        self.run_until(self.now() + CYCLE);
+        self.bus.board_mut(n).power_on();
     }
 
     /// Sets the rate and format of the line's client, which then no longer follows the unit.
     pub fn fix_line(&mut self, settings: Settings) {
-        self.board.line().set_follow(false);
-        self.board.line().set_settings(settings);
+        self.bus.line().set_follow(false);
+        self.bus.line().set_settings(settings);
     }
 
-    /// The last lines of the firmware's log, oldest first.
-    pub fn log_tail(&self) -> impl Iterator<Item = &str> {
-        self.log.iter().map(String::as_str)
+    /// Sets the rate of the line's client, which keeps its format.
+    pub fn set_client_rate(&mut self, baud: u32) {
+        let line = self.bus.line();
+        let settings = line.settings();
+        line.set_settings(Settings { baud, ..settings });
     }
 
     /// Sends bytes on the line now, or right behind those still on their way.
     pub fn send(&mut self, bytes: &[u8]) {
-        let now = self.board.now();
-        self.board.line().send(now, bytes);
+        let now = self.now();
+        let bytes = self.disturbance.not_dropped(bytes.iter().copied());
+        self.bus.line().send(now, &bytes);
     }
 
     /// What the master has heard on the line since the last call.
     pub fn heard(&mut self) -> Vec<u8> {
-        let heard = self.board.line().take_received();
-        heard.iter().map(|character| character.byte).collect()
+        let heard = self.bus.line().take_received();
+        let bytes = heard.iter().map(|character| character.byte);
+        self.disturbance.not_dropped(bytes)
     }
 
-    /// The lines that the firmware has logged since the last call.
-    pub fn take_log(&mut self) -> Vec<String> {
-        self.unfinished += &self.board.take_log();
-        let Some(end) = self.unfinished.rfind('\n') else {
-            return Vec::new();
-        };
-        let rest = self.unfinished.split_off(end + 1);
-        let text = std::mem::replace(&mut self.unfinished, rest);
-        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
-        self.log.extend(lines.iter().cloned());
-        self.log.drain(..self.log.len().saturating_sub(TAIL));
-        lines
-    }
-
-    /// What the firmware has done since the last call that a real board would not take well; each once.
-    pub fn take_findings(&mut self) -> Vec<String> {
-        let found = self.board.findings();
-        let new = found
-            .iter()
-            .skip(self.findings)
-            .map(ToString::to_string)
-            .collect();
-        self.findings = found.len();
-        new
-    }
-
-    /// Tells the log on stdout and the findings on stderr.
+    /// Prints new log lines on stdout and new findings on stderr. With several boards, each line starts with the board's
+    /// name.
     pub fn tell(&mut self) {
-        for line in self.take_log() {
-            say(&line);
+        let several = self.units.len() > 1;
+        for (n, unit) in self.units.iter_mut().enumerate() {
+            let prefix = match several {
+                true => format!("{}: ", unit.name),
+                false => String::new(),
+            };
+            let board = self.bus.board_mut(n);
+            for line in unit.take_log(board) {
+                say(&format!("{prefix}{line}"));
+            }
+            for finding in unit.take_findings(board) {
+                complain(&format!("{prefix}{finding}"));
+            }
         }
-        for finding in self.take_findings() {
-            // That nobody reads it is no reason to stop.
-            let _ = writeln!(std::io::stderr(), "modio-sim: {finding}");
+    }
+
+    /// Updates the flash files. Prints a write error on stderr.
+    pub fn keep_flash(&mut self) {
+        for (n, unit) in self.units.iter_mut().enumerate() {
+            if let Some(file) = &mut unit.flash {
+                file.keep_or_tell(self.bus.board(n));
+            }
         }
+    }
+
+    /// Updates the flash files.
+    ///
+    /// # Errors
+    ///
+    /// The first write error, in one line.
+    pub fn write_flash(&mut self) -> Result<(), String> {
+        for (n, unit) in self.units.iter_mut().enumerate() {
+            if let Some(file) = &mut unit.flash {
+                file.keep(self.bus.board(n))?;
+            }
+        }
+        Ok(())
     }
 }
 
-/// A line on stdout. That nobody reads it (any more) is no reason to stop.
+/// Voltage at the pin of an analog input, in mV; `None` for another kind of channel.
+fn millivolts(board: &Board, input: Input) -> Option<u16> {
+    let mut slots = board.slots();
+    let (_, slot) = slots.find(|(port, _)| input.port.is_none_or(|wanted| wanted == *port))?;
+    match slot.channel(input.channel) {
+        Channel::Ai { millivolts } => Some(millivolts),
+        _ => None,
+    }
+}
+
+/// Prints a line on stdout. A closed stdout does not stop the simulator.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// Prints a line on stderr. A closed stderr does not stop the simulator.
+pub fn complain(line: &str) {
+    let _ = writeln!(std::io::stderr(), "modio-sim: {line}");
 }

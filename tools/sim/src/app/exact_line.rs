@@ -99,7 +99,7 @@ pub struct Requests {
 impl Requests {
     /// Begins to carry out a request.
     pub fn begin(&mut self, bench: &mut Bench, request: Request, answers: Answers) {
-        match begin(&mut bench.board, &request) {
+        match begin(bench.first(), &request) {
             Ok(until) => self.under_way = Some((request, until, answers)),
             // A client that has disconnected needs no answer, here and below.
             Err(reason) => drop(answers.send(Err(reason))),
@@ -116,12 +116,12 @@ impl Requests {
         let Some((request, until, answers)) = self.under_way.take() else {
             return;
         };
-        let now = bench.board.now();
-        bench.board.run_until(until.min(now + slice));
-        if bench.board.now() < until {
+        let now = bench.now();
+        bench.run_until(until.min(now + slice));
+        if bench.now() < until {
             self.under_way = Some((request, until, answers));
         } else {
-            let reply = self.session.finish(&mut bench.board, &request);
+            let reply = self.session.finish(bench.first(), &request);
             drop(answers.send(Ok(reply)));
         }
     }

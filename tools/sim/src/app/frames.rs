@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
+use modbus_frames::sentence;
 use serde_json::{Value, json};
+use sim::Time;
 use sim::line::{Direction, Frame, Line};
-
-use super::summary;
 
 /// The body of `GET /api/frames`: the frames kept whose numbers are above `since`, oldest first.
 pub fn json(line: &Line, since: u64) -> Value {
@@ -21,11 +21,26 @@ pub fn frame(frame: &Frame) -> Value {
         "direction": if to_unit { "rx" } else { "tx" },
         "start_us": frame.start.as_us(),
         "end_us": frame.end.as_us(),
+        "gap_us": frame.gap.map(Time::as_us),
+        "turnaround_us": frame.turnaround.map(Time::as_us),
         "bytes": hex(&frame.bytes),
-        "summary": summary::of(&frame.bytes, to_unit, frame.crc_ok),
+        "summary": summary(frame),
         "crc_ok": frame.crc_ok,
         "damaged": frame.damaged,
     })
+}
+
+/// What a frame says.
+pub fn summary(frame: &Frame) -> String {
+    sentence::frame(way(frame.direction), &frame.bytes)
+}
+
+/// Which way a frame went, in the terms of the standard.
+pub fn way(direction: Direction) -> modbus_frames::Direction {
+    match direction {
+        Direction::FromMaster => modbus_frames::Direction::Request,
+        Direction::FromUnit => modbus_frames::Direction::Response,
+    }
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -41,7 +56,6 @@ fn hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::Time;
 
     #[test]
     fn a_frame_is_told_with_its_times_and_meaning() {
@@ -54,12 +68,16 @@ mod tests {
             crc_ok: true,
             damaged: false,
             longest_gap: Time::ZERO,
+            gap: Some(Time::from_us(1000)),
+            turnaround: None,
         };
         let expected = json!({
             "number": 7,
             "direction": "rx",
             "start_us": 1500,
             "end_us": 10_666,
+            "gap_us": 1000,
+            "turnaround_us": null,
             "bytes": "0101001000043c0c",
             "summary": "unit 1: read 4 coils from 0x0010",
             "crc_ok": true,

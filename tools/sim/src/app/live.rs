@@ -17,6 +17,8 @@ const WAITING: usize = 1024;
 /// One event.
 #[derive(Clone, Debug)]
 pub struct Note {
+    /// The board that it is about; frames are the line's.
+    pub board: Option<usize>,
     /// `state` or `frame`.
     pub name: &'static str,
     /// JSON.
@@ -24,8 +26,9 @@ pub struct Note {
 }
 
 impl Note {
-    fn new(name: &'static str, data: &Value) -> Self {
+    fn new(board: Option<usize>, name: &'static str, data: &Value) -> Self {
         Self {
+            board,
             name,
             data: data.to_string().into(),
         }
@@ -38,8 +41,8 @@ pub struct Live {
     listeners: broadcast::Sender<Note>,
     /// The number of the last frame that was sent.
     frame: u64,
-    /// The state that was sent last, without its time.
-    state: Value,
+    /// The state of each board that was sent last, without its time.
+    states: Vec<Value>,
     sent: Option<Instant>,
 }
 
@@ -48,7 +51,7 @@ impl Default for Live {
         Self {
             listeners: broadcast::Sender::new(WAITING),
             frame: 0,
-            state: Value::Null,
+            states: Vec::new(),
             sent: None,
         }
     }
@@ -63,26 +66,29 @@ impl Live {
     /// Sends the changes since the last call. `now` is the time of the wall clock. Without listeners it costs little.
     pub fn send(&mut self, bench: &mut Bench, now: Instant) {
         if self.listeners.receiver_count() == 0 {
-            let last = bench.board.line().frames().next_back();
+            let last = bench.bus.line().frames().next_back();
             self.frame = last.map_or(self.frame, |frame| frame.number);
             return;
         }
-        for frame in bench.board.line().frames_since(self.frame) {
+        for frame in bench.bus.line().frames_since(self.frame) {
             self.frame = frame.number;
             let _ = self
                 .listeners
-                .send(Note::new("frame", &frames::frame(frame)));
+                .send(Note::new(None, "frame", &frames::frame(frame)));
         }
         if self.sent.is_some_and(|sent| now < sent + STATE_EVERY) {
             return;
         }
-        let whole = state::json(bench);
-        let mut timeless = whole.clone();
-        timeless["virtual_ms"] = Value::Null;
-        if timeless != self.state {
-            self.state = timeless;
-            self.sent = Some(now);
-            let _ = self.listeners.send(Note::new("state", &whole));
+        self.states.resize(bench.units.len(), Value::Null);
+        for (n, last) in self.states.iter_mut().enumerate() {
+            let whole = state::json(bench, n);
+            let mut timeless = whole.clone();
+            timeless["virtual_ms"] = Value::Null;
+            if timeless != *last {
+                *last = timeless;
+                self.sent = Some(now);
+                let _ = self.listeners.send(Note::new(Some(n), "state", &whole));
+            }
         }
     }
 }
@@ -108,7 +114,7 @@ mod tests {
         let begin = Instant::now();
         let request = [0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C];
         bench.send(&request);
-        bench.board.run_for(Time::from_ms(20));
+        bench.bus.run_for(Time::from_ms(20));
         live.send(&mut bench, begin);
         let mut notes = live.listeners().subscribe();
         live.send(&mut bench, begin);
@@ -117,13 +123,13 @@ mod tests {
         assert_eq!(first[0].0, "state");
         assert_eq!(first[0].1["line"]["rx_frames"], 1);
 
-        bench.board.run_for(Time::from_ms(500));
+        bench.bus.run_for(Time::from_ms(500));
         live.send(&mut bench, begin + Duration::from_millis(500));
         assert!(taken(&mut notes).is_empty(), "only time has passed");
 
         bench.send(&request);
-        bench.board.run_for(Time::from_ms(20));
-        bench.board.set_energised(2, true).unwrap();
+        bench.bus.run_for(Time::from_ms(20));
+        bench.first().set_energised(2, true).unwrap();
         let later = begin + Duration::from_secs(1);
         for _ in 0..3 {
             live.send(&mut bench, later);
@@ -142,7 +148,7 @@ mod tests {
         let mut notes = live.listeners().subscribe();
         let begin = Instant::now();
         for ms in 0..1000 {
-            bench.board.set_energised(1, ms % 2 == 0).unwrap();
+            bench.first().set_energised(1, ms % 2 == 0).unwrap();
             live.send(&mut bench, begin + Duration::from_millis(ms));
         }
         live.send(&mut bench, begin + Duration::from_millis(1100));

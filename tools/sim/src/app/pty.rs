@@ -1,7 +1,8 @@
 //! The RS-485 line on a pseudo-terminal, which a Modbus master opens like a serial port.
 //!
-//! Its settings are raw and it carries no baud rate: whatever rate a master sets, bytes cross the line at
-//! the rate of the unit. As on a serial port, what comes while nobody has it open is lost: a master never
+//! Its settings are raw. Whatever rate a master sets, bytes cross the line at the rate of the unit, unless the line's
+//! client is to keep its own rate: then it is the one that the master sets. A pseudo-terminal keeps no parity and no length
+//! of characters, so the format never comes from there. As on a serial port, what comes while nobody has it open is lost: a master never
 //! finds answers to questions it did not ask.
 
 use std::fs;
@@ -28,6 +29,8 @@ pub struct Pty {
     master: Arc<OwnedFd>,
     path: PathBuf,
     link: Option<PathBuf>,
+    /// The rate that the master has set, where that counts.
+    rate: Option<u32>,
 }
 
 impl Pty {
@@ -51,12 +54,40 @@ impl Pty {
             master,
             path,
             link: link.map(Path::to_owned),
+            rate: None,
         })
     }
 
     /// The terminal's own name: `/dev/pts/N`.
-    pub fn path(&self) -> &Path {
-        &self.path
+    #[allow(clippy::unnecessary_wraps, reason = "some systems have no terminal")]
+    pub fn path(&self) -> Option<&Path> {
+        Some(&self.path)
+    }
+
+    /// From now on the rate that a master sets counts; until one does, it is `baud`.
+    ///
+    /// # Errors
+    ///
+    /// When the terminal cannot have this rate, in one line.
+    pub fn keep_own_rate(&mut self, baud: u32) -> Result<(), String> {
+        let set = || {
+            let mut settings = tcgetattr(&self.master)?;
+            settings.set_speed(baud)?;
+            tcsetattr(&self.master, OptionalActions::Now, &settings)
+        };
+        set().map_err(|error| format!("the pseudo-terminal cannot have {baud} baud: {error}"))?;
+        self.rate = Some(baud);
+        Ok(())
+    }
+
+    /// The rate that the master has set since the last call, where that counts and it is another one.
+    pub fn take_rate(&mut self) -> Option<u32> {
+        let before = self.rate?;
+        // Rates that no UART has, such as 0, which hangs up, are none.
+        let now = tcgetattr(&self.master).ok()?.output_speed();
+        let changed = now != before && (300..=4_000_000).contains(&now);
+        self.rate = Some(if changed { now } else { before });
+        changed.then_some(now)
     }
 
     /// Lets whoever has the terminal open read these bytes; never waits. What does not fit is lost.

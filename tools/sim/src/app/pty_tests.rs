@@ -43,7 +43,7 @@ fn is_open(pty: &Pty) -> bool {
 fn every_byte_passes_both_ways_as_it_is() {
     let (events, queue) = mpsc::channel();
     let pty = Pty::open(None, events).unwrap();
-    let mut master = open(pty.path());
+    let mut master = open(pty.path().unwrap());
     let all: Vec<u8> = (0..=255).collect();
     master.write_all(&all).unwrap();
     assert_eq!(came(&queue, 256), all);
@@ -58,7 +58,7 @@ fn it_outlives_its_masters_and_keeps_nothing_for_the_next() {
     let (events, queue) = mpsc::channel();
     let pty = Pty::open(None, events).unwrap();
     for round in 0..3_u8 {
-        let mut master = open(pty.path());
+        let mut master = open(pty.path().unwrap());
         master.write_all(&[round, 0x0A, 0x0D, 0x03]).unwrap();
         assert_eq!(came(&queue, 4), [round, 0x0A, 0x0D, 0x03]);
         pty.write(&[round]);
@@ -75,7 +75,7 @@ fn it_outlives_its_masters_and_keeps_nothing_for_the_next() {
 fn a_master_that_does_not_read_stops_nothing() {
     let (events, _queue) = mpsc::channel();
     let pty = Pty::open(None, events).unwrap();
-    let _master = open(pty.path());
+    let _master = open(pty.path().unwrap());
     for _ in 0..1000 {
         pty.write(&[0x55; 256]);
     }
@@ -86,12 +86,12 @@ fn the_link_is_there_while_it_is() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("line");
     let pty = Pty::open(Some(&link), mpsc::channel().0).unwrap();
-    assert_eq!(fs::read_link(&link).unwrap(), pty.path());
+    assert_eq!(fs::read_link(&link).unwrap(), pty.path().unwrap());
     let newer = Pty::open(Some(&link), mpsc::channel().0).unwrap();
     drop(pty);
     assert_eq!(
         fs::read_link(&link).unwrap(),
-        newer.path(),
+        newer.path().unwrap(),
         "a newer one's link stays"
     );
     drop(newer);
@@ -111,4 +111,23 @@ fn a_file_in_the_links_place_is_not_touched() {
     std::os::unix::fs::symlink(&file, &link).unwrap();
     assert!(Pty::open(Some(&link), mpsc::channel().0).is_err());
     assert_eq!(fs::read_link(&link).unwrap(), file);
+}
+
+#[test]
+fn the_rate_that_a_master_sets_counts_only_where_it_is_to() {
+    let mut pty = Pty::open(None, mpsc::channel().0).unwrap();
+    let master = open(pty.path().unwrap());
+    let set = |baud| {
+        let mut settings = tcgetattr(&master).unwrap();
+        settings.set_speed(baud).unwrap();
+        tcsetattr(&master, OptionalActions::Now, &settings).unwrap();
+    };
+    set(19_200);
+    assert_eq!(pty.take_rate(), None, "the client follows the unit");
+    pty.keep_own_rate(9600).unwrap();
+    assert_eq!(tcgetattr(&master).unwrap().output_speed(), 9600);
+    assert_eq!(pty.take_rate(), None);
+    set(115_200);
+    assert_eq!(pty.take_rate(), Some(115_200));
+    assert_eq!(pty.take_rate(), None, "told once");
 }

@@ -1,4 +1,4 @@
-//! Runs the board in step with the wall clock, or on request, and passes on what comes in and goes out.
+//! Runs the boards in step with the wall clock, or on request, and passes on what comes in and goes out.
 
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use sim::Time;
 
+use super::attached::Attached;
 use super::bench::Bench;
 use super::exact_line::Requests;
-use super::flash_file::FlashFile;
 use super::gdb::Session;
 use super::live::Live;
 use super::pace::{Pace, span};
@@ -36,19 +36,19 @@ pub enum Endpoints {
     Exact(SocketAddr),
 }
 
-/// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the flash's file up to date.
+/// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the files of the flashes up to date.
 pub fn until_stopped(
     bench: &mut Bench,
     queue: &Receiver<Event>,
-    endpoints: &Endpoints,
+    endpoints: &mut Endpoints,
     live: &mut Live,
-    mut flash: Option<&mut FlashFile>,
+    attached: &mut Attached,
     limit: Option<Duration>,
 ) {
     let begin = Instant::now();
     let mut clock = Clock {
         pace: match endpoints {
-            Endpoints::Clock { .. } => Some(Pace::new(begin, bench.board.now())),
+            Endpoints::Clock { .. } => Some(Pace::new(begin, bench.now())),
             Endpoints::Exact(_) => None,
         },
         debugger: Session::default(),
@@ -60,15 +60,17 @@ pub fn until_stopped(
         requests.run(bench, span(AT_ONCE));
         bench.tell();
         live.send(bench, wall);
-        if let Some(file) = &mut flash {
-            file.keep_or_tell(&bench.board);
-        }
+        attached.update(bench, clock.debugger.halted());
+        bench.keep_flash();
         let mut wait = if requests.busy() {
             Duration::ZERO
         } else {
             IDLE
         };
         if let Endpoints::Clock { pty, tcp } = endpoints {
+            if let Some(baud) = pty.take_rate() {
+                bench.set_client_rate(baud);
+            }
             let bytes = bench.heard();
             if !bytes.is_empty() {
                 pty.write(&bytes);
@@ -88,15 +90,20 @@ pub fn until_stopped(
                 clock.catch_up(bench);
                 bench.send(&bytes);
             }
+            Ok(Event::Gateway(message)) => {
+                if let Some(gateway) = &mut attached.gateway {
+                    gateway.take(message);
+                }
+            }
             Ok(Event::Exact(request, answers)) => requests.begin(bench, request, answers),
             Ok(Event::Request(request, reply)) => {
                 clock.catch_up(bench);
-                let before = bench.board.now();
+                let before = bench.now();
                 // That the client has gone does not matter.
                 let _ = reply.send(api::answer(bench, &request));
-                if bench.board.now() > before {
+                if bench.now() > before {
                     // A power cycle takes virtual time at once: from here on in step again.
-                    clock.restart(bench.board.now());
+                    clock.restart(bench.now());
                 }
             }
             Ok(Event::Gdb(message)) => {
@@ -111,7 +118,7 @@ pub fn until_stopped(
     }
 }
 
-/// What lets the board's time pass without being asked.
+/// What lets virtual time pass without being asked.
 struct Clock {
     /// The wall clock; `None` when time passes on request only.
     pace: Option<Pace>,
@@ -129,7 +136,7 @@ impl Clock {
     /// Brings virtual time to where the wall clock is, or a good way towards it; while a debugger has the
     /// core halted it stands still.
     fn catch_up(&mut self, bench: &mut Bench) {
-        let at = bench.board.now();
+        let at = bench.now();
         if self.debugger.halted() {
             return self.restart(at);
         }

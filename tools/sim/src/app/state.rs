@@ -5,13 +5,14 @@ use sim::Channel;
 use sim::slot::Slot;
 
 use super::bench::Bench;
+use super::faults::HSI_HZ;
 
-/// The body of `GET /api/state`.
-pub fn json(bench: &mut Bench) -> Value {
-    let line = bench.board.line();
+/// The body of `GET /api/state` of board `n`.
+pub fn json(bench: &mut Bench, n: usize) -> Value {
+    let line = bench.bus.line();
     let settings = line.settings();
     let (to_unit, from_unit) = line.frame_counts();
-    let board = &bench.board;
+    let board = bench.bus.board(n);
     let leds = board.leds();
     let mut state = json!({
         "virtual_ms": board.now().as_ms(),
@@ -28,7 +29,7 @@ pub fn json(bench: &mut Bench) -> Value {
             "tx_frames": from_unit,
         },
         "channels": channels(board.slot()),
-        "log_tail": bench.log_tail().collect::<Vec<_>>(),
+        "log_tail": bench.units[n].log_tail().collect::<Vec<_>>(),
     });
     if board.slots().count() > 1 {
         state["slots"] = board
@@ -37,6 +38,24 @@ pub fn json(bench: &mut Bench) -> Value {
             .collect();
     }
     state
+}
+
+/// The body of `GET /api/faults`: what is in force on the line and on board `n`.
+pub fn faults(bench: &Bench, n: usize) -> Value {
+    let line = &bench.disturbance;
+    let board = bench.bus.board(n);
+    let (hsi, lsi) = board.rc_oscillators();
+    // The rates are whole hertz.
+    let rounded = |value: f64| (value * 1000.0).round() / 1000.0;
+    json!({
+        "bit_error_rate": line.bit_error_rate(),
+        "drop_rate": line.drop_rate(),
+        "noise_hz": line.noise_hz(),
+        "i2c_absent": bench.units[n].i2c_absent,
+        "hse_failed": !board.crystal(),
+        "hsi_percent": rounded((f64::from(hsi) / HSI_HZ - 1.0) * 100.0),
+        "lsi_khz": rounded(f64::from(lsi) / 1000.0),
+    })
 }
 
 fn one_slot(port: u8, slot: &Slot) -> Value {

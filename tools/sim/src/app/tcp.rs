@@ -143,7 +143,7 @@ mod tests {
         let address = taken.local_addr().unwrap();
         let text = Tcp::listen(address, mpsc::channel().0).err().unwrap();
         assert!(
-            text.contains(&address.to_string()) && text.contains("in use"),
+            text.contains(&address.to_string()) && text.contains(crate::app::testing::IN_USE),
             "{text}"
         );
     }

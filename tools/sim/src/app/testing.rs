@@ -4,9 +4,36 @@ use register_map::Module;
 use sim::{Board, Config, Image};
 
 use super::bench::Bench;
+use super::unit::Unit;
+
+/// What the system says about an address that is bound already.
+pub const IN_USE: &str = if cfg!(windows) {
+    "Only one usage"
+} else {
+    "in use"
+};
+/// What it says about a directory that is not there.
+pub const NOT_THERE: &str = if cfg!(windows) {
+    "cannot find"
+} else {
+    "No such file"
+};
 
 /// The vector table (stack, reset) and `b .` after it.
 const LOOP: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
+
+/// A board with this module plugged, and its power on.
+pub fn board(module: Module) -> Board {
+    board_of(Config {
+        module,
+        ..Config::default()
+    })
+}
+
+fn board_of(config: Config) -> Board {
+    let image = Image::from_bytes(&LOOP).expect("a vector table and an instruction");
+    Board::new(&image, config).expect("it fits")
+}
 
 /// A bench whose board has this module plugged, and its power on.
 pub fn bench(module: Module) -> Bench {
@@ -18,6 +45,13 @@ pub fn bench(module: Module) -> Bench {
 
 /// A bench with a board like this.
 pub fn bench_of(config: Config) -> Bench {
-    let image = Image::from_bytes(&LOOP).expect("a vector table and an instruction");
-    Bench::new(Board::new(&image, config).expect("it fits"))
+    bench_of_boards([("modio-02", config)])
+}
+
+/// A bench with several boards and their names.
+pub fn bench_of_boards(boards: impl IntoIterator<Item = (&'static str, Config)>) -> Bench {
+    let boards = boards
+        .into_iter()
+        .map(|(name, config)| (board_of(config), Unit::new(name.to_owned(), None)));
+    Bench::new(boards.collect())
 }

@@ -33,6 +33,9 @@ pub struct Config {
     /// Decides what chance decides in the part: which cells an interrupted flash operation leaves unsteady,
     /// and how they read. Runs with the same seed are the same.
     pub seed: u64,
+    /// Has the core translate everything anew, instead of going on with what the core of an earlier board of this
+    /// process has translated. The run is the same, it only takes longer.
+    pub new_core: bool,
 }
 
 impl Default for Config {
@@ -46,6 +49,7 @@ impl Default for Config {
             unique_id,
             write_protection,
             seed,
+            new_core,
         } = chip::Config::default();
         Self {
             dip: 1,
@@ -58,6 +62,7 @@ impl Default for Config {
             unique_id,
             write_protection,
             seed,
+            new_core,
         }
     }
 }
@@ -85,6 +90,7 @@ impl Config {
             unique_id: self.unique_id,
             write_protection: self.write_protection,
             seed: self.seed,
+            new_core: self.new_core,
             ..chip::Config::default()
         }
     }

@@ -24,6 +24,27 @@ impl Layout {
         self.pages().iter().all(vacant)
     }
 
+    /// Returns the setting at `address` in the newest configuration in this flash; `None` when no setting is stored
+    /// there, which means its default.
+    #[must_use]
+    pub fn stored(&self, flash: &[u8], address: u16) -> Option<u16> {
+        let pages = self.pages();
+        let records = pages
+            .iter()
+            .filter_map(|page| flash.get(page.clone()))
+            .flat_map(record::records)
+            .map(|(_, record)| record);
+        let newest = records.reduce(|newest, record| {
+            if record::is_newer(record.sequence, newest.sequence) {
+                record
+            } else {
+                newest
+            }
+        })?;
+        let mut pairs = newest.pairs();
+        pairs.find(|(at, _)| *at == address).map(|(_, value)| value)
+    }
+
     /// Stores these settings, address and value, in a flash whose pages of the configuration hold nothing. Returns
     /// whether they fit.
     pub fn store(&self, flash: &mut [u8], settings: &[(u16, u16)]) -> bool {
@@ -60,6 +81,18 @@ mod tests {
         assert!(MODIO_08.stores_nothing(&flash));
         flash[0x3_FFFE] = 0;
         assert!(!MODIO_08.stores_nothing(&flash), "the second page");
+    }
+
+    #[test]
+    fn newest_record_of_both_pages_has_the_stored_setting() {
+        let mut flash = MODIO_08.flash_with(&[(0x0103, 1), (0x0110, 4)]).unwrap();
+        assert_eq!(MODIO_08.stored(&flash, 0x0103), Some(1));
+        assert_eq!(MODIO_08.stored(&flash, 0x0104), None);
+        let second = &mut flash[0x3_F800..0x4_0000];
+        record::encode_page(7, &[(0x0110, 2)], second).unwrap();
+        assert_eq!(MODIO_08.stored(&flash, 0x0103), None, "the default again");
+        assert_eq!(MODIO_08.stored(&flash, 0x0110), Some(2));
+        assert_eq!(MODIO_08.stored(&[0xFF; 0x4_0000], 0x0110), None);
     }
 
     #[test]

@@ -28,6 +28,9 @@ pub struct Config {
     /// Decides what chance decides in the part: which cells an interrupted flash operation leaves unsteady,
     /// and how they read. Runs with the same seed are the same.
     pub seed: u64,
+    /// Has the core translate everything anew, instead of going on with what the core of an earlier chip of this
+    /// process has translated. The run is the same, it only takes longer.
+    pub new_core: bool,
 }
 
 impl Default for Config {
@@ -41,6 +44,7 @@ impl Default for Config {
             unique_id: *b"modio-sim-01",
             write_protection: u32::MAX,
             seed: 0x6D6F_6469_6F00,
+            new_core: false,
         }
     }
 }

@@ -22,8 +22,8 @@ use crate::periph::rcc::Cause;
 use crate::soc::{Circuit, Soc};
 use crate::time::Time;
 
-/// From power off to power on in [`Chip::cycle`].
-const CYCLE: Time = Time::from_ms(100);
+/// Time from power off to power on in a power cycle, as in [`Chip::cycle`].
+pub const CYCLE: Time = Time::from_ms(100);
 
 /// An STM32F103 in the circuit `C`.
 #[derive(Debug)]
@@ -55,7 +55,8 @@ impl<C: Circuit> Chip<C> {
         let ident = Ident::new(part, config.unique_id, config.write_protection);
         let soc = Soc::new(&config, flash, circuit);
         let costs = config.corner.costs();
-        let mut machine = Machine::new(part, soc, ident, costs, image.symbol("_SEGGER_RTT"));
+        let rtt_block = image.symbol("_SEGGER_RTT");
+        let mut machine = Machine::new(part, soc, ident, costs, rtt_block, config.new_core);
         machine.bus.soc.refresh(Time::ZERO);
         machine.power_on();
         Ok(Self {
@@ -65,6 +66,12 @@ impl<C: Circuit> Chip<C> {
                 .map(|(name, address)| (name.to_owned(), address))
                 .collect(),
         })
+    }
+
+    /// Whether the core goes on with what it has translated for an earlier chip.
+    #[must_use]
+    pub fn core_is_used(&self) -> bool {
+        self.machine.core_is_used()
     }
 
     /// The circuit, to look at.
@@ -168,6 +175,12 @@ impl<C: Circuit> Chip<C> {
     /// now, 1 = the next, when `fraction` (0 to 1) of it is done. A power cut before then takes it back.
     pub fn cut_in_flash_operation(&mut self, nth: u64, fraction: f64) {
         self.machine.cut_in_flash_operation(nth, fraction);
+    }
+
+    /// How often the power came on.
+    #[must_use]
+    pub fn power_ons(&self) -> u64 {
+        self.machine.power_ons()
     }
 
     /// Pulls the reset pin for a moment.

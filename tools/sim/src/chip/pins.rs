@@ -19,6 +19,33 @@ impl<C: Circuit> Chip<C> {
         self.machine.bus.soc.set_crystal(works, now);
     }
 
+    /// The frequencies of HSI and LSI, in Hz.
+    #[must_use]
+    pub fn rc_oscillators(&self) -> (u32, u32) {
+        let oscillators = self.machine.bus.soc.rcc.oscillators();
+        (oscillators.hsi, oscillators.lsi)
+    }
+
+    /// Sets the frequencies of the part's RC oscillators in Hz: temperature, supply and the single part move them
+    /// (DS5319 tables 24 and 25). They stay so over a power cycle. What IWDG has begun to count by the LSI ends as it
+    /// began; the next reload counts at the new rate.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Range`] outside 6.4 to 9.6 MHz for the HSI, and 15 to 90 kHz for the LSI: more than any part is off.
+    pub fn set_rc_oscillators(&mut self, hsi: u32, lsi: u32) -> Result<(), Error> {
+        if !(6_400_000..=9_600_000).contains(&hsi) {
+            return Err(Error::Range("the HSI runs at 6.4 to 9.6 MHz"));
+        }
+        if !(15_000..=90_000).contains(&lsi) {
+            return Err(Error::Range("the LSI runs at 15 to 90 kHz"));
+        }
+        self.sync();
+        let now = self.now();
+        self.machine.bus.soc.set_rc_oscillators(hsi, lsi, now);
+        Ok(())
+    }
+
     /// The supply of the part, in millivolts.
     #[must_use]
     pub fn supply_mv(&self) -> u16 {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crc::{CRC_16_MODBUS, Crc};
+use modbus_frames::adu::Framing;
 
 use crate::serial::Word;
 use crate::time::Time;
@@ -13,9 +13,6 @@ pub const KEPT: usize = 1000;
 /// A frame is cut after so many bytes: sixteen times the longest that RTU has, for a line that never falls
 /// silent.
 pub const LONGEST: usize = 4096;
-
-/// The CRC of RTU frames (Modbus over Serial Line V1.02, 6.2.2).
-const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
 /// Who spoke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,12 +37,16 @@ pub struct Frame {
     pub end: Time,
     /// The characters' data.
     pub bytes: Vec<u8>,
-    /// The last two bytes are the CRC of those before them, of which there are at least two.
+    /// It is a whole RTU frame whose CRC is right, or a whole ASCII frame whose LRC is right.
     pub crc_ok: bool,
     /// Some character was not as it should be: parity, framing, noise, or both sides spoke.
     pub damaged: bool,
     /// The longest silence between two of its characters.
     pub longest_gap: Time,
+    /// The silence before it, since the end of the frame before; `None` for the first frame on the line.
+    pub gap: Option<Time>,
+    /// For the first frame of a unit after a request to that unit: the time from the end of the request to its start.
+    pub turnaround: Option<Time>,
 }
 
 /// Gathers words into frames.
@@ -54,6 +55,10 @@ pub struct Record {
     kept: VecDeque<Frame>,
     open: Option<Frame>,
     last_number: u64,
+    /// The end of the last frame.
+    last_end: Option<Time>,
+    /// The unit in the last request, and the end of the request, until a unit answers.
+    request: Option<(u8, Time)>,
     keep_all: bool,
     from_master: u64,
     from_unit: u64,
@@ -86,6 +91,8 @@ impl Record {
             crc_ok: false,
             damaged: false,
             longest_gap: Time::ZERO,
+            gap: None,
+            turnaround: None,
         });
         let gap = word.start.saturating_sub(frame.end);
         frame.longest_gap = frame.longest_gap.max(gap);
@@ -122,11 +129,28 @@ impl Record {
         let Some(mut frame) = self.open.take() else {
             return;
         };
-        frame.crc_ok = crc_ok(&frame.bytes);
+        let opened = Framing::on_line(&frame.bytes).and_then(|framing| framing.open(&frame.bytes));
+        let unit = opened.map(|(unit, _)| unit);
+        frame.crc_ok = unit.is_some();
+        frame.gap = self.last_end.map(|end| frame.start.saturating_sub(end));
+        self.last_end = Some(frame.end);
         self.last_number = frame.number;
         match frame.direction {
-            Direction::FromMaster => self.from_master += 1,
-            Direction::FromUnit => self.from_unit += 1,
+            Direction::FromMaster => {
+                self.from_master += 1;
+                if let Some(unit) = unit {
+                    // No unit answers a broadcast.
+                    self.request = (unit != 0).then_some((unit, frame.end));
+                }
+            }
+            Direction::FromUnit => {
+                self.from_unit += 1;
+                frame.turnaround = self
+                    .request
+                    .take()
+                    .filter(|(asked, _)| unit.is_none_or(|unit| unit == *asked))
+                    .map(|(_, end)| frame.start.saturating_sub(end));
+            }
         }
         self.kept.push_back(frame);
         self.trim();
@@ -136,15 +160,6 @@ impl Record {
         while !self.keep_all && self.kept.len() > KEPT {
             self.kept.pop_front();
         }
-    }
-}
-
-/// Whether an RTU frame ends in its CRC, low byte first.
-#[must_use]
-pub fn crc_ok(frame: &[u8]) -> bool {
-    match frame.split_last_chunk::<2>() {
-        Some((body, sent)) if body.len() >= 2 => CRC.checksum(body) == u16::from_le_bytes(*sent),
-        _ => false,
     }
 }
 
@@ -229,11 +244,59 @@ mod tests {
         assert_eq!(lengths, [LONGEST, LONGEST]);
     }
 
+    /// A record of these frames: direction, start in us, and bytes.
+    fn record(frames: &[(Direction, u64, Vec<u8>)]) -> Vec<Frame> {
+        let mut record = Record::default();
+        for (direction, start, bytes) in frames {
+            for (byte, n) in bytes.iter().zip(0..) {
+                let word = word(start + n * 100, u16::from(*byte));
+                record.word(&word, *direction, false, SILENCE);
+            }
+        }
+        record.quiet(Time::from_secs(1), SILENCE);
+        record.frames().cloned().collect()
+    }
+
     #[test]
-    fn a_frame_with_nothing_before_its_crc_is_not_good() {
-        // 0xFFFF is the CRC of no byte at all.
-        assert!(!crc_ok(&[0xFF, 0xFF]));
-        assert!(!crc_ok(&[1]));
-        assert!(!crc_ok(&[]));
+    fn ascii_frames_are_checked_by_their_lrc() {
+        let good = Framing::Ascii.frame(0, 17, &[3, 0, 0x6B, 0, 3]);
+        let mut bad = good.clone();
+        bad[4] ^= 1;
+        let frames = record(&[
+            (Direction::FromMaster, 0, good),
+            (Direction::FromMaster, 10_000, bad),
+        ]);
+        let checks: Vec<_> = frames.iter().map(|frame| frame.crc_ok).collect();
+        assert_eq!(checks, [true, false]);
+    }
+
+    #[test]
+    fn gaps_and_turnarounds_are_measured() {
+        use Direction::{FromMaster, FromUnit};
+        let frame = |unit| Framing::Rtu.frame(0, unit, &[7]);
+        let noise = || vec![0xFF];
+        let frames = record(&[
+            (FromMaster, 1000, frame(1)),
+            // A glitch between a request and its reply belongs to neither.
+            (FromMaster, 2000, noise()),
+            (FromUnit, 5000, frame(1)),
+            (FromUnit, 6000, frame(1)),
+            (FromMaster, 10_000, frame(0)),
+            (FromUnit, 11_000, frame(2)),
+            (FromMaster, 20_000, frame(1)),
+            (FromUnit, 21_000, frame(2)),
+            (FromMaster, 30_000, frame(1)),
+            (FromUnit, 32_000, noise()),
+        ]);
+        let us = |time: Option<Time>| time.map(Time::as_us);
+        let gaps: Vec<_> = frames.iter().map(|frame| us(frame.gap)).collect();
+        assert_eq!(
+            gaps[..5],
+            [None, Some(600), Some(2900), Some(600), Some(3600)]
+        );
+        let turnarounds: Vec<_> = frames.iter().map(|frame| us(frame.turnaround)).collect();
+        let mut wanted = [None; 10];
+        (wanted[2], wanted[9]) = (Some(3600), Some(1600));
+        assert_eq!(turnarounds, wanted);
     }
 }

@@ -21,7 +21,7 @@ pub struct Received {
     pub framing_error: bool,
     /// The samples of some bit were not of one mind.
     pub noise: bool,
-    /// The master was sending at the same time.
+    /// The master, or another unit, was sending at the same time.
     pub collided: bool,
 }
 
@@ -40,7 +40,9 @@ pub(super) struct Master {
     pub(super) wave: Wave,
     /// When it is sending, now and in the future; neighbours do not touch.
     pub(super) talking: VecDeque<Span>,
-    queued_until: Time,
+    pub(super) queued_until: Time,
+    /// Grows with everything that is queued.
+    pub(super) version: u64,
 }
 
 impl Master {
@@ -61,6 +63,7 @@ impl Master {
             }),
         }
         self.queued_until = end;
+        self.version += 1;
     }
 }
 
@@ -94,12 +97,13 @@ impl Line {
     /// left of it.
     pub fn noise(&mut self, at: Time, width: Time) {
         let end = at + width;
-        let start = at.max(self.now);
+        let start = at.max(self.earliest());
         let start = self
             .noise
             .previous_edge(Time::MAX)
             .map_or(start, |last| last.max(start));
         if start < end {
+            self.master.version += 1;
             self.noise.push(start, false);
             self.noise.push(end, true);
         }
@@ -108,7 +112,7 @@ impl Line {
     /// When everything the master has queued is out; now when that is past.
     #[must_use]
     pub fn master_free(&self) -> Time {
-        self.master.queued_until.max(self.now)
+        self.master.queued_until.max(self.earliest())
     }
 
     /// What the master has heard of the unit, oldest first: the last 65 536 characters unless everything

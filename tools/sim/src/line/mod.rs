@@ -9,11 +9,15 @@
 //! master --- wave --+
 //!                   AND -- XOR -- bus --+-- the unit's receiver (off while its driver is on)
 //! USART1 - driver --+       |           +-- the listener: received(), frames
-//!                         noise
+//! other units ------+     noise
 //! ```
+//!
+//! Several boards share a bus in [`crate::bus`]: then each board has its own end of the line, and one more line is the
+//! bus, with the master and the record.
 
 mod frames;
 mod master;
+mod shared;
 mod silence;
 mod wiring;
 
@@ -26,9 +30,11 @@ use crate::periph::usart::TxPin;
 pub use crate::serial::{Character, Format, Parity, Rate, Settings};
 use crate::serial::{Receiver, Wave};
 use crate::time::Time;
-pub use frames::{Direction, Frame, KEPT, LONGEST, Record, crc_ok};
+pub use frames::{Direction, Frame, KEPT, LONGEST, Record};
 use master::Master;
 pub use master::Received;
+pub(crate) use shared::Said;
+use shared::Shared;
 
 /// How long the bus can be looked back at, [`Line::level_at`].
 pub const HISTORY: Time = Time::from_ms(100);
@@ -72,6 +78,8 @@ pub struct Line {
     collisions: VecDeque<Span>,
     findings: Vec<(Time, &'static str)>,
     keep_all: bool,
+    /// What it has to do with the other units of a bus.
+    shared: Shared,
     /// Everything up to here has happened.
     now: Time,
 }
@@ -100,6 +108,7 @@ impl Default for Line {
             collisions: VecDeque::new(),
             findings: Vec::new(),
             keep_all: false,
+            shared: Shared::default(),
             now: Time::ZERO,
         }
     }
@@ -146,12 +155,13 @@ impl Line {
         self.record.counts()
     }
 
-    /// Each switching of the unit's driver, and whether it was on after it.
+    /// Each switching of the unit's driver, and whether it was on after it; on a bus with several units, whether any
+    /// unit's driver was on.
     pub fn driver_edges(&self) -> impl DoubleEndedIterator<Item = (Time, bool)> + '_ {
         self.driver_edges.iter().copied()
     }
 
-    /// When the master was sending while the unit's driver was on.
+    /// When the master was sending while a unit's driver was on, or the drivers of two units were on.
     pub fn collisions(&self) -> impl DoubleEndedIterator<Item = Span> + '_ {
         self.collisions.iter().copied()
     }
@@ -185,8 +195,9 @@ impl Line {
 
 /// Appends to a list that forgets its oldest entries beyond [`KEPT_EVENTS`], unless all are wanted.
 fn keep<T>(list: &mut VecDeque<T>, entry: T, all: bool) {
-    list.push_back(entry);
-    if !all && list.len() > KEPT_EVENTS {
+    // Before the push, so that a full list does not allocate twice its length.
+    if !all && list.len() >= KEPT_EVENTS {
         list.pop_front();
     }
+    list.push_back(entry);
 }

@@ -15,6 +15,7 @@ impl Wire for Line {
             let now = now.max(self.now);
             self.extend(now);
             self.tx_pin = pin;
+            self.shared.changed = true;
             self.settle(now);
         }
     }
@@ -42,6 +43,7 @@ impl Wire for Line {
         [Some(&self.master.wave), Some(&self.noise), unit]
             .into_iter()
             .flatten()
+            .chain(self.shared.waves())
             .filter_map(|wave| wave.next_edge(self.now))
             .map(|(at, _)| at)
             .min()
@@ -58,6 +60,10 @@ impl Wire for Line {
     }
 
     fn caught_up(&mut self, usart: &Usart) {
+        if self.shared.is_end() {
+            self.forget(self.now.saturating_sub(HISTORY));
+            return;
+        }
         self.listen();
         if self.follow && self.master_free() == self.now {
             self.settings = usart.settings().unwrap_or(self.settings);
@@ -87,6 +93,7 @@ impl Line {
             ));
         }
         self.driver = on;
+        self.shared.switched(now, on);
         keep(&mut self.driver_edges, (now, on), self.keep_all);
         self.settle(now);
     }
@@ -106,6 +113,7 @@ impl Line {
 
     /// USART1 did something to its TX pin.
     fn put(&mut self, sent: Sent) {
+        self.shared.changed = true;
         match sent {
             Sent::Character(character) => {
                 for bit in 0..character.bits {
@@ -140,13 +148,14 @@ impl Line {
 
     /// The waves of the unit, the bus and the RX pin are worked out from where they stand up to `to`. The
     /// driver does not change on the way.
-    fn extend(&mut self, to: Time) {
+    pub(super) fn extend(&mut self, to: Time) {
         self.collide(to);
         // Something may have been queued or sent at this very instant.
         self.settle(self.now);
         loop {
             let next = [&self.master.wave, &self.noise, &self.usart]
                 .into_iter()
+                .chain(self.shared.waves())
                 .filter_map(|wave: &Wave| wave.next_edge(self.now))
                 .map(|(at, _)| at)
                 .min()
@@ -159,14 +168,22 @@ impl Line {
     }
 
     /// The levels at `at`, the latest instant there is.
-    fn settle(&mut self, at: Time) {
+    pub(super) fn settle(&mut self, at: Time) {
         let unit = !self.driver
             || match self.tx_pin {
                 TxPin::Usart => self.usart.level_at(at),
                 TxPin::Level(level) => level,
             };
-        let bus = (self.master.wave.level_at(at) && unit) == self.noise.level_at(at);
+        let others = self.shared.level_at(at);
+        let level = self.master.wave.level_at(at) && unit && others;
+        let bus = level == self.noise.level_at(at);
         let rx = bus || (self.driver && !self.echo);
+        // The bus has no unit: the record attributes characters of every unit to `FromUnit`.
+        let unit = if self.shared.is_end() {
+            unit
+        } else {
+            unit && others
+        };
         self.unit.push(at, unit);
         self.bus.push(at, bus);
         if rx != self.rx {
@@ -185,6 +202,10 @@ impl Line {
         {
             self.master.talking.pop_front();
         }
+        if self.shared.is_bus() {
+            self.collide_units(to);
+            return;
+        }
         if !self.driver {
             return;
         }
@@ -201,7 +222,7 @@ impl Line {
     }
 
     /// The listener hears what has come so far; what it needs no more is dropped.
-    fn listen(&mut self) {
+    pub(super) fn listen(&mut self) {
         let framing = Framing::of(self.settings);
         let silence = self.settings.frame_silence();
         while let Some(word) = self.listener.next_word(&self.bus, &framing, self.now) {
@@ -217,6 +238,11 @@ impl Line {
         if let Some(start) = self.listener.start() {
             oldest = oldest.min(start.saturating_sub(framing.rate.bits(1)));
         }
+        self.forget(oldest);
+    }
+
+    /// Drops what happened before `oldest`.
+    fn forget(&mut self, oldest: Time) {
         for wave in [
             &mut self.master.wave,
             &mut self.noise,
@@ -226,12 +252,13 @@ impl Line {
         ] {
             wave.drop_before(oldest);
         }
+        self.shared.drop_before(oldest);
     }
 
     fn heard(&mut self, word: &Word, silence: Time) {
         let unit = self.unit.low_between(word.start, word.at);
         let master = self.master.wave.low_between(word.start, word.at);
-        let collided = unit && master;
+        let collided = unit && master || self.shared.talkers(word.start, word.at) > 1;
         let unit_began = unit && (!master || self.master.wave.level_at(word.start));
         let direction = if unit_began {
             Direction::FromUnit

@@ -17,6 +17,7 @@ impl<C: Circuit> Machine<C> {
     /// A run with breakpoints ends before the instruction at `address`. The memory is left alone. As many
     /// removals as additions take it away.
     pub fn add_breakpoint(&mut self, address: u32) {
+        self.debugged = true;
         self.core.add_breakpoint(u64::from(address & !1));
     }
 
@@ -34,6 +35,7 @@ impl<C: Circuit> Machine<C> {
     /// Executes one instruction, without taking an interrupt unless the core sleeps.
     pub fn step_instruction(&mut self) -> Stop {
         let asleep = self.core.waiting();
+        self.debugged = true;
         self.core.hold_interrupts(!asleep);
         self.pass_breakpoint();
         let stop = self.run(Limit {

@@ -5,7 +5,7 @@ use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
 use super::run::{IPSR, Limit, XPSR};
-use super::segment::{End, Place, Segment};
+use super::segment::{End, Place};
 use super::{FLASH_BASE, Machine, RAM_BASE};
 use crate::soc::Circuit;
 use crate::time::Time;
@@ -33,6 +33,7 @@ impl<C: Circuit> Machine<C> {
         self.bus.stop = (stop, most);
         // Code in flash that runs on from the prefetch buffer beside a flash operation is looked at after every
         // instruction: then it stalls. So is the NMI's handler, whose line is tested when it returns.
+        self.stirred = false;
         let busy = self.bus.soc.flash.busy_until().is_some();
         self.bus.busy = busy;
         let nmi = self.bus.soc.rcc.nmi();
@@ -40,7 +41,7 @@ impl<C: Circuit> Machine<C> {
         if let Some(exit) = self.enter_exception() {
             return exit;
         }
-        let mut until = self.next_event().min(stop);
+        let mut until = self.bus.clock.cycle_at(self.next_event().min(stop));
         loop {
             let count = self.core.retired();
             let pc = self.pc();
@@ -49,13 +50,12 @@ impl<C: Circuit> Machine<C> {
                     let offset = (pc - RAM_BASE) as usize;
                     self.ram_code.runs(offset, &mut *self.core, &self.bus.ram);
                 }
-                let segment = *self.segment(pc);
-                self.bus.clock.follow(count, &segment);
+                self.follow(count, pc);
             }
             let budget = self
                 .bus
                 .clock
-                .instructions_until(count, until)
+                .instructions_to(count, until)
                 .min(most.saturating_sub(count));
             let budget = if self.bus.halt { 1 } else { budget.max(1) };
             let exit = self.core.run(budget as u32, &mut self.bus).0;
@@ -78,9 +78,9 @@ impl<C: Circuit> Machine<C> {
                 return exit;
             }
             if core::mem::take(&mut self.bus.touched) {
-                until = self.next_event().min(stop);
+                until = self.bus.clock.cycle_at(self.next_event().min(stop));
             }
-            if self.now() >= until {
+            if self.cycles() >= until {
                 return exit;
             }
         }
@@ -102,21 +102,22 @@ impl<C: Circuit> Machine<C> {
         (exit != Exit::Budget).then_some(exit)
     }
 
-    /// The segment of code at `pc`; none outside the memories.
-    fn segment(&mut self, pc: u32) -> &Segment {
-        let flash = self.bus.flash_offset(pc);
-        let in_flash = flash.is_some();
-        let (memory, offset) = match flash {
-            Some(offset) => (self.bus.soc.flash.bytes(), offset),
-            None => (self.bus.ram.bytes(), pc.wrapping_sub(RAM_BASE)),
+    /// After the `count`th instruction the core executes the segment of code at `pc`; none outside the memories.
+    fn follow(&mut self, count: u64, pc: u32) {
+        let bus = &mut self.bus;
+        let flash = bus.flash_offset(pc);
+        let (memory, offset, changes) = match flash {
+            Some(offset) => (bus.soc.flash.bytes(), offset, Some(bus.soc.flash.changes())),
+            None => (bus.ram.bytes(), pc.wrapping_sub(RAM_BASE), None),
         };
         let code = memory.get(offset as usize..).unwrap_or_default();
         let place = Place {
             start: pc,
-            in_flash,
+            in_flash: flash.is_some(),
             branched: self.sequential != Some(pc),
         };
-        self.bus.segments.at(place, code)
+        bus.clock
+            .follow(count, bus.segments.at(place, code, changes));
     }
 
     /// Charges what the end of a segment costs by where it has led to; `after` is the address after it.

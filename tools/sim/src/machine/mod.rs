@@ -13,6 +13,7 @@ pub mod decode;
 pub mod dwt;
 mod execute;
 mod flash_reads;
+mod kit;
 pub mod memory;
 mod ram_code;
 mod run;
@@ -21,7 +22,7 @@ pub mod timing;
 pub mod usage;
 pub mod waits;
 
-use rigless::emulator::{Processor, Queued};
+use rigless::emulator::Queued;
 use rigless::soc::Width;
 
 use crate::finding::Findings;
@@ -36,7 +37,8 @@ use bus::Bus;
 use costs::{Costs, Pace};
 use dwt::Dwt;
 use execute::Active;
-use memory::{FLASH_BASE, Memory, RAM_BASE, ROUTED_PAGE};
+use kit::{Core, Parts};
+use memory::{FLASH_BASE, RAM_BASE, ROUTED_PAGE};
 use ram_code::RamCode;
 pub use run::{Limit, Stop};
 use segment::Segments;
@@ -62,7 +64,7 @@ struct Cut {
 #[derive(Debug)]
 pub struct Machine<C> {
     /// Dropped before the memories mapped into it.
-    core: Box<dyn Processor>,
+    core: Core,
     /// Everything else.
     pub bus: Bus<C>,
     /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
@@ -87,12 +89,19 @@ pub struct Machine<C> {
     sequential: Option<u32>,
     /// An exception may be entered before the next instruction.
     unsettled: bool,
+    /// The core's own timer has gone off since the core executed something.
+    stirred: bool,
     ram_code: RamCode,
+    /// The core was another machine's before.
+    core_is_used: bool,
+    /// A debugger has set something in the core.
+    debugged: bool,
 }
 
 impl<C: Circuit> Machine<C> {
     /// The machine of `part` around `soc`, without power, at time 0, whose core has these costs and whose firmware
-    /// keeps its RTT control block at `rtt_block`.
+    /// keeps its RTT control block at `rtt_block`. It goes on with what a core of an earlier machine has translated
+    /// unless it is to have a new one.
     ///
     /// # Panics
     ///
@@ -104,20 +113,15 @@ impl<C: Circuit> Machine<C> {
         ident: Ident,
         costs: Costs,
         rtt_block: Option<u32>,
+        new_core: bool,
     ) -> Self {
-        let mut ram = Memory::new(part.ram_size, 0);
-        let mut core = cortex::m3(part);
-        let fresh = core.save();
-        let flash = soc.flash.host();
-        let base = u64::from(FLASH_BASE);
-        // SAFETY: both memories are aligned to 4 KiB, as long as mapped, and live in this struct, behind
-        // pointers that do not move, until after `core` is dropped. Slices of them are lent out only by
-        // methods that borrow the machine while the core does not run, or by its bus inside a call.
-        unsafe {
-            core.map(base, part.flash_size as u64, flash, false);
-            core.map(0, part.flash_size as u64, flash, false);
-            core.map(u64::from(RAM_BASE), part.ram_size as u64, ram.host(), true);
-        }
+        let Parts {
+            core,
+            fresh,
+            ram,
+            ram_code,
+            used,
+        } = Parts::of(part, &mut soc.flash, new_core);
         let hclk = soc.rcc.clocks().hclk;
         Self {
             core,
@@ -162,7 +166,10 @@ impl<C: Circuit> Machine<C> {
             active: Active::default(),
             sequential: None,
             unsettled: true,
-            ram_code: RamCode::default(),
+            stirred: true,
+            ram_code,
+            core_is_used: used,
+            debugged: false,
         }
     }
 
@@ -170,6 +177,12 @@ impl<C: Circuit> Machine<C> {
     #[must_use]
     pub fn now(&self) -> Time {
         self.bus.clock.time(self.core.retired())
+    }
+
+    /// Whether its core goes on with what it has translated for an earlier machine.
+    #[must_use]
+    pub fn core_is_used(&self) -> bool {
+        self.core_is_used
     }
 
     /// Instructions done since the machine was made.
@@ -247,6 +260,12 @@ impl<C: Circuit> Machine<C> {
     #[must_use]
     pub fn resets(&self) -> u32 {
         self.resets
+    }
+
+    /// How often the power came on.
+    #[must_use]
+    pub fn power_ons(&self) -> u64 {
+        self.power_ons
     }
 
     /// What the firmware logged since the last call.
@@ -366,6 +385,7 @@ impl<C: Circuit> Machine<C> {
         self.bus.update_rate(0);
         self.active = Active::default();
         self.unsettled = true;
+        self.stirred = true;
         self.locked_up = false;
         self.resets = self.resets.saturating_add(1);
         let pulse = if cause == Cause::PowerOn {

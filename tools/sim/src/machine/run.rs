@@ -239,6 +239,22 @@ impl<C: Circuit> Machine<C> {
             .min(self.cut_at.unwrap_or(Time::MAX))
     }
 
+    /// The earliest instant at which the core may execute an instruction, by what is known now; [`Time::MAX`] for
+    /// never.
+    pub fn next_instruction(&self) -> Time {
+        let now = self.now();
+        let event = self.next_event();
+        if let Some((end, _)) = self.idle_end(now) {
+            return end.min(event);
+        }
+        let asleep = self.core.waiting() && self.bus.queued.is_empty() && !self.stirred;
+        if asleep && !self.bus.soc.rcc.nmi() {
+            event.max(now)
+        } else {
+            now
+        }
+    }
+
     /// Until when the core does nothing for sure: no power, no clock, held in reset, locked up, stalled by the
     /// flash.
     fn idle_end(&self, now: Time) -> Option<(Time, Rest)> {
@@ -274,6 +290,7 @@ impl<C: Circuit> Machine<C> {
             self.core
                 .on_event(VirtualNanos(self.bus.clock.cycle(count)));
             self.unsettled = true;
+            self.stirred = true;
         }
     }
 

@@ -27,10 +27,9 @@ pub struct Place {
 /// A segment of code with the cycles its instructions take.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// Where it starts, whether a branch has led there, and the bytes that it was made from.
+    /// Where it starts, whether a branch has led there, and how many bytes it was made from.
     start: u32,
     branched: bool,
-    bytes: [u8; 4 * MOST],
     size: u8,
     /// Instructions.
     length: u8,
@@ -46,7 +45,6 @@ impl Segment {
     pub const EMPTY: Self = Self {
         start: 0,
         branched: false,
-        bytes: [0; 4 * MOST],
         size: 0,
         length: 0,
         end: End::Sequential,
@@ -90,9 +88,7 @@ impl Segment {
                 break;
             }
         }
-        let size = at.min(code.len());
-        segment.bytes[..size].copy_from_slice(&code[..size]);
-        segment.size = size as u8;
+        segment.size = at.min(code.len()) as u8;
         segment
     }
 
@@ -108,33 +104,29 @@ impl Segment {
         segment
     }
 
-    /// Whether it is the segment at `place`, and `code` still the code there.
-    fn is(&self, place: Place, code: &[u8]) -> bool {
-        let size = usize::from(self.size);
-        (self.start, self.branched) == (place.start, place.branched)
-            && size > 0
-            && code.get(..size) == Some(&self.bytes[..size])
-    }
-
     /// Whether the instruction after its first `n` is one of its own, and is at `pc`.
+    #[inline]
     #[must_use]
     pub fn goes_on(&self, n: u64, pc: u32) -> bool {
         n < self.length() && self.start + u32::from(self.offsets[n as usize]) == pc
     }
 
     /// Instructions in it.
+    #[inline]
     #[must_use]
     pub fn length(&self) -> u64 {
         u64::from(self.length)
     }
 
     /// The address after its last instruction.
+    #[inline]
     #[must_use]
     pub fn after(&self) -> u32 {
         self.start + u32::from(self.size)
     }
 
     /// The cycles of its first `n` instructions; beyond its end one each.
+    #[inline]
     #[must_use]
     pub fn cycles(&self, n: u64) -> u64 {
         let beyond = n.saturating_sub(self.length());
@@ -142,6 +134,7 @@ impl Segment {
     }
 
     /// The least number of its instructions that take `cycles` or more; all of them when that is not enough.
+    #[inline]
     #[must_use]
     pub fn reaches(&self, cycles: u64) -> u64 {
         let costs = &self.costs[..=usize::from(self.length)];
@@ -242,11 +235,50 @@ fn cost(class: Class, after_access: bool, in_flash: bool, pace: &Pace) -> u32 {
     }
 }
 
+/// A segment and the bytes that it was made from.
+#[derive(Clone, Debug)]
+struct Made {
+    segment: Segment,
+    bytes: [u8; 4 * MOST],
+    /// The memory's count of changes when the bytes were last the same, if it counts them.
+    changes: Option<u64>,
+}
+
+impl Made {
+    /// None.
+    const EMPTY: Self = Self {
+        segment: Segment::EMPTY,
+        bytes: [0; 4 * MOST],
+        changes: None,
+    };
+
+    fn new(place: Place, code: &[u8], pace: &Pace) -> Self {
+        let segment = Segment::new(place, code, pace);
+        let size = usize::from(segment.size);
+        let mut made = Self {
+            segment,
+            ..Self::EMPTY
+        };
+        made.bytes[..size].copy_from_slice(&code[..size]);
+        made
+    }
+
+    /// Whether it is the segment at `place`, and `code` still the code there.
+    fn is(&self, place: Place, code: &[u8], changes: Option<u64>) -> bool {
+        let segment = &self.segment;
+        let size = usize::from(segment.size);
+        (segment.start, segment.branched) == (place.start, place.branched)
+            && size > 0
+            && (changes.is_some() && changes == self.changes
+                || code.get(..size) == Some(&self.bytes[..size]))
+    }
+}
+
 /// The segments made so far, by where they start.
 #[derive(Debug)]
 pub struct Segments {
     pace: Pace,
-    made: Vec<Segment>,
+    made: Vec<Made>,
 }
 
 impl Segments {
@@ -258,11 +290,12 @@ impl Segments {
     pub fn new(pace: Pace) -> Self {
         Self {
             pace,
-            made: vec![Segment::EMPTY; Self::PLACES],
+            made: vec![Made::EMPTY; Self::PLACES],
         }
     }
 
     /// What code costs now.
+    #[inline]
     #[must_use]
     pub fn pace(&self) -> &Pace {
         &self.pace
@@ -280,13 +313,15 @@ impl Segments {
         }
     }
 
-    /// The segment at `place`, whose bytes are `code`.
-    pub fn at(&mut self, place: Place, code: &[u8]) -> &Segment {
+    /// The segment at `place`, whose bytes are `code`. They are the same as long as `changes` is.
+    #[inline]
+    pub fn at(&mut self, place: Place, code: &[u8], changes: Option<u64>) -> &Segment {
         let index = (place.start | u32::from(place.branched)) as usize % Self::PLACES;
         let kept = &mut self.made[index];
-        if !kept.is(place, code) {
-            *kept = Segment::new(place, code, &self.pace);
+        if !kept.is(place, code, changes) {
+            *kept = Made::new(place, code, &self.pace);
         }
-        kept
+        kept.changes = changes;
+        &kept.segment
     }
 }

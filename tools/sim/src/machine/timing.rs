@@ -53,6 +53,7 @@ impl InstructionClock {
     }
 
     /// When the `count`th instruction ends.
+    #[inline]
     #[must_use]
     pub fn time(&self, count: u64) -> Time {
         let (at, base) = self.at;
@@ -60,12 +61,14 @@ impl InstructionClock {
     }
 
     /// The cycle of HCLK in which the `count`th instruction ends.
+    #[inline]
     #[must_use]
     pub fn cycle(&self, count: u64) -> u64 {
         self.cycle + self.segment.cycles(count - self.count)
     }
 
     /// When cycle `cycle` of HCLK begins, at the present rate.
+    #[inline]
     #[must_use]
     pub fn time_of_cycle(&self, cycle: u64) -> Time {
         let (at, base) = self.since;
@@ -76,6 +79,7 @@ impl InstructionClock {
     }
 
     /// After the `count`th instruction the core executes `segment`.
+    #[inline]
     pub fn follow(&mut self, count: u64, segment: &Segment) {
         self.cycle = self.cycle(count);
         self.count = count;
@@ -83,33 +87,46 @@ impl InstructionClock {
     }
 
     /// Whether the instruction after the `count`th belongs to the code that is followed, and is at `pc`.
+    #[inline]
     #[must_use]
     pub fn goes_on(&self, count: u64, pc: u32) -> bool {
         self.segment.goes_on(count - self.count, pc)
     }
 
     /// The code that is followed, when it has ended with the `count`th instruction.
+    #[inline]
     #[must_use]
     pub fn ended(&self, count: u64) -> Option<&Segment> {
         let length = self.segment.length();
         (length > 0 && count - self.count >= length).then_some(&self.segment)
     }
 
-    /// How many instructions after the `count`th, but not beyond the code that is followed, the first one ends
-    /// at `until` or later: 0 when the `count`th does.
+    /// The first cycle that does not end before `until`, while time does not jump and the rate stays.
     #[must_use]
-    pub fn instructions_until(&self, count: u64, until: Time) -> u64 {
+    pub fn cycle_at(&self, until: Time) -> u64 {
         let (at, base) = self.at;
-        let Some(span) = until.checked_sub(at) else {
-            return 0;
-        };
-        let last = base.saturating_add(self.hclk_cycle.least(span.as_ps()));
+        until.checked_sub(at).map_or(0, |span| {
+            base.saturating_add(self.hclk_cycle.least(span.as_ps()))
+        })
+    }
+
+    /// How many instructions after the `count`th, but not beyond the code that is followed, the first one ends
+    /// in cycle `last` or later: 0 when the `count`th does.
+    #[must_use]
+    pub fn instructions_to(&self, count: u64, last: u64) -> u64 {
         let done = count - self.count;
         let reached = self.segment.reaches(last.saturating_sub(self.cycle));
         reached.saturating_sub(done)
     }
 
+    /// The same for the first one that ends at `until` or later.
+    #[must_use]
+    pub fn instructions_until(&self, count: u64, until: Time) -> u64 {
+        self.instructions_to(count, self.cycle_at(until))
+    }
+
     /// The core stands still for `cycles` of HCLK, or the instruction under way takes as many more.
+    #[inline]
     pub fn charge(&mut self, cycles: u32) {
         self.cycle += u64::from(cycles);
     }

@@ -87,6 +87,11 @@ impl Iwdg {
         self.started
     }
 
+    /// The LSI runs at `hz` Hz. What is being counted ends as it began.
+    pub fn set_rate(&mut self, hz: u32) {
+        self.hz = hz;
+    }
+
     /// The LSI runs from `since` on, or does not run.
     pub fn set_lsi(&mut self, since: Option<Time>) {
         self.lsi = since;

@@ -183,6 +183,14 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
+    /// The circuit will do something else to an RX pin than it would have.
+    pub fn wires_changed(&mut self) {
+        for block in [Block::Usart1, Block::Usart3, Block::Tim1] {
+            self.note_due(block);
+        }
+        self.find_next();
+    }
+
     /// Takes the findings that blocks and wires have had, each with its instant.
     pub fn take_notes(&mut self) -> Vec<(Time, What)> {
         core::mem::take(&mut self.notes)

@@ -310,6 +310,16 @@ impl<C: Circuit> Soc<C> {
         bus_error
     }
 
+    /// The RC oscillators have these rates in Hz from `now` on.
+    pub fn set_rc_oscillators(&mut self, hsi: u32, lsi: u32, now: Time) {
+        self.catch_up(Block::Rcc, now);
+        self.rcc.set_rc_oscillators(hsi, lsi);
+        self.catch_up(Block::Iwdg, now);
+        self.iwdg.set_rate(lsi);
+        self.settle(Block::Rcc, now);
+        self.find_next();
+    }
+
     /// The crystal works or does not from `now` on.
     pub fn set_crystal(&mut self, works: bool, now: Time) {
         self.catch_up(Block::Rcc, now);

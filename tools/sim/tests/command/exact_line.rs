@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use super::{Running, endless_loop, refused, state};
+use super::{Running, connect, refused, state};
 
 /// A client of the line.
 struct Client {
@@ -13,12 +13,8 @@ struct Client {
 
 impl Client {
     fn connect(address: &str) -> Self {
-        let stream = TcpStream::connect(address).unwrap();
-        stream
-            .set_read_timeout(Some(Duration::from_secs(60)))
-            .unwrap();
         Self {
-            stream: BufReader::new(stream),
+            stream: BufReader::new(connect(address)),
         }
     }
 
@@ -36,12 +32,8 @@ impl Client {
 
 /// A simulator whose firmware is an endless loop, its line's address and its front panel's.
 fn started(more: &[&str]) -> (Running, String, String) {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
-    let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
-    arguments.extend(["--exact-line", "127.0.0.1:0"]);
-    arguments.extend(more);
-    let mut running = Running::start(&arguments);
+    let arguments = [&["--exact-line", "127.0.0.1:0"][..], more].concat();
+    let mut running = Running::start_loop(&arguments);
     let line = running.endpoint("exact-line: ");
     let http = running.endpoint("http: http://");
     (running, line, http)
@@ -170,6 +162,7 @@ fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
     assert_eq!(served(&line).ask(b"run 0\n"), "ok 60100000.000\n");
 }
 
+#[cfg(unix)]
 #[test]
 fn signals_end_it_while_a_long_request_is_carried_out() {
     let (mut running, line, _) = started(&[]);

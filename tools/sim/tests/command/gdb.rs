@@ -30,7 +30,7 @@ impl Debugged {
             "--gdb",
             "127.0.0.1:0",
         ]);
-        running.endpoint("pty: ");
+        running.line();
         let http = running.endpoint("http: http://");
         let gdb = running.endpoint("gdb: ");
         Self {

@@ -1,9 +1,11 @@
-//! The command `modio-sim` as a process: what it prints, how it ends, what it refuses.
-
-#![cfg(unix)]
+//! The command `modio-sim` as a process: what it prints, how it ends, what it refuses. Where the simulator has no
+//! pseudo-terminals, its line is reached over TCP.
 
 mod exact_line;
+mod gateway;
 mod gdb;
+mod record;
+mod several;
 mod unit;
 
 use std::fs;
@@ -12,6 +14,19 @@ use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+
+/// What the system says about an address that is bound already.
+const IN_USE: &str = if cfg!(windows) {
+    "Only one usage"
+} else {
+    "in use"
+};
+/// What it says about a file or a directory that is not there.
+const NOT_THERE: &str = if cfg!(windows) {
+    "cannot find"
+} else {
+    "No such file"
+};
 
 /// An ELF file whose firmware is an endless loop.
 fn endless_loop(directory: &Path) -> PathBuf {
@@ -47,8 +62,15 @@ fn elf(directory: &Path, program: &[u16]) -> PathBuf {
     path
 }
 
+/// The options that offer the line besides the pseudo-terminal.
+const LINES: [&str; 3] = ["--tcp", "--modbus-tcp", "--exact-line"];
+
+/// The command with these arguments, and with one more where it would not start without.
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
+    if !sim_options::PTY && !arguments.iter().any(|name| LINES.contains(name)) {
+        command.args(["--tcp", "127.0.0.1:0"]);
+    }
     command
         .args(arguments)
         .stdout(Stdio::piped())
@@ -60,6 +82,8 @@ fn command(arguments: &[&str]) -> Command {
 struct Running {
     child: Child,
     lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
+    /// Holds the image of the endless loop, where the simulator runs that.
+    _directory: Option<tempfile::TempDir>,
 }
 
 impl Running {
@@ -69,7 +93,18 @@ impl Running {
         Self {
             child,
             lines: BufReader::new(stdout).lines(),
+            _directory: None,
         }
+    }
+
+    /// Starts a simulator whose firmware is an endless loop, with HTTP on a free port.
+    fn start_loop(more: &[&str]) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let elf = endless_loop(directory.path());
+        let first = ["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
+        let mut running = Self::start(&[&first[..], more].concat());
+        running._directory = Some(directory);
+        running
     }
 
     /// What follows `prefix` on the next line.
@@ -80,6 +115,20 @@ impl Running {
             .to_owned()
     }
 
+    /// Returns the path of the pseudo-terminal. On systems without one, returns the address of the line over TCP, which
+    /// [`command`] has added to the arguments.
+    fn line(&mut self) -> String {
+        self.endpoint(if sim_options::PTY { "pty: " } else { "tcp: " })
+    }
+
+    /// Reads the line that announces the pseudo-terminal, where there is one.
+    fn skip_pty(&mut self) {
+        if sim_options::PTY {
+            self.endpoint("pty: ");
+        }
+    }
+
+    #[cfg(unix)]
     fn signal(&self, name: &str) {
         let id = self.child.id().to_string();
         assert!(
@@ -117,12 +166,35 @@ impl Drop for Running {
     }
 }
 
+/// Connects to an address of the simulator. A read waits for 60 s at most.
+fn connect(address: &str) -> TcpStream {
+    let stream = TcpStream::connect(address).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(60)))
+        .unwrap();
+    stream
+}
+
 /// The body of `GET /api/state` of the simulator at `url`, as host, port and a slash.
 fn state(url: &str) -> serde_json::Value {
+    get(url, "/api/state")
+}
+
+/// The body of a reply of the simulator at `url`.
+fn get(url: &str, path: &str) -> serde_json::Value {
+    http(url, &format!("GET {path} HTTP/1.1\r\n"), "")
+}
+
+/// The body of the reply to a POST.
+fn post(url: &str, path: &str, body: &str) -> serde_json::Value {
+    let head = format!("POST {path} HTTP/1.1\r\nContent-Length: {}\r\n", body.len());
+    http(url, &head, body)
+}
+
+fn http(url: &str, head: &str, body: &str) -> serde_json::Value {
     let mut stream = TcpStream::connect(url.trim_end_matches('/')).unwrap();
-    stream
-        .write_all(b"GET /api/state HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
-        .unwrap();
+    let request = format!("{head}Host: localhost\r\nConnection: close\r\n\r\n{body}");
+    stream.write_all(request.as_bytes()).unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).unwrap();
     serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap()
@@ -152,40 +224,41 @@ fn a_slot_that_the_board_lacks_is_refused() {
 
 #[test]
 fn a_board_with_several_slots_shows_them_over_http() {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
-    let mut running = Running::start(&[
-        "--elf",
-        elf.to_str().unwrap(),
-        "--board",
-        "modio-08",
-        "--module",
-        "4do",
-        "--slot",
-        "3=4ai",
-        "--http",
-        "127.0.0.1:0",
-    ]);
-    running.endpoint("pty: ");
+    let slots = ["--module", "4do", "--slot", "3=4ai"];
+    let mut running = Running::start_loop(&[&["--board", "modio-08"][..], &slots].concat());
+    running.line();
     let http = running.endpoint("http: http://");
     let state = state(&http);
     let modules = [0, 1, 2, 3].map(|n| state["slots"][n]["module"].clone());
     assert_eq!(modules, ["4do", "none", "4ai", "none"]);
-    running.signal("-TERM");
-    assert_eq!(running.end().0, Some(0));
 }
 
+#[test]
+fn without_pseudo_terminals_it_says_which_option_to_give() {
+    let mut bare = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
+    let output = bare.args(["--http", "127.0.0.1:0"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert_eq!(said.contains("--tcp"), !sim_options::PTY, "{said}");
+}
+
+#[cfg(unix)]
 #[test]
 fn signals_end_it_well_and_remove_the_link() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     for signal in ["-INT", "-TERM"] {
         let link = directory.path().join("line");
-        let (elf, link_name) = (elf.to_str().unwrap(), link.to_str().unwrap());
-        let mut running =
-            Running::start(&["--elf", elf, "--pty", link_name, "--http", "127.0.0.1:0"]);
-        let pty = running.endpoint("pty: ");
-        assert_eq!(fs::read_link(&link).unwrap(), Path::new(&pty));
+        let mut arguments = vec!["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
+        if sim_options::PTY {
+            arguments.extend(["--pty", link.to_str().unwrap()]);
+        }
+        let mut running = Running::start(&arguments);
+        let pty = running.line();
+        if sim_options::PTY {
+            assert_eq!(fs::read_link(&link).unwrap(), Path::new(&pty));
+        }
         running.endpoint("http: http://127.0.0.1:");
         running.signal(signal);
         assert_eq!(running.end(), (Some(0), String::new()), "{signal}");
@@ -198,38 +271,19 @@ fn signals_end_it_well_and_remove_the_link() {
 
 #[test]
 fn it_stops_by_itself_after_the_time_given() {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
     let begin = Instant::now();
-    let mut running = Running::start(&[
-        "--elf",
-        elf.to_str().unwrap(),
-        "--for",
-        "300ms",
-        "--http",
-        "127.0.0.1:0",
-    ]);
+    let mut running = Running::start_loop(&["--for", "300ms"]);
     assert_eq!(running.end().0, Some(0));
     assert!(begin.elapsed() >= Duration::from_millis(300));
 }
 
 #[test]
 fn every_endpoint_is_announced_and_answers() {
-    let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
-    let mut running = Running::start(&[
-        "--elf",
-        elf.to_str().unwrap(),
-        "--tcp",
-        "127.0.0.1:0",
-        "--http",
-        "127.0.0.1:0",
-        "--dip",
-        "17",
-        "--module",
-        "2relay",
-    ]);
-    running.endpoint("pty: /");
+    let fitting = ["--dip", "17", "--module", "2relay"];
+    let mut running = Running::start_loop(&[&["--tcp", "127.0.0.1:0"][..], &fitting].concat());
+    if sim_options::PTY {
+        running.endpoint("pty: /");
+    }
     let mut line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
     let url = running.endpoint("http: http://");
     let before = state(&url);
@@ -250,7 +304,7 @@ fn an_image_that_is_missing_or_broken_is_refused() {
     let broken = directory.path().join("modio");
     let broken = broken.to_str().unwrap();
     refused(&[], &["--elf", "cargo xtask sim"]);
-    refused(&["--elf", broken], &[broken, "No such file"]);
+    refused(&["--elf", broken], &[broken, NOT_THERE]);
     fs::write(broken, "#!/bin/sh\n").unwrap();
     refused(&["--elf", broken], &[broken, "ELF"]);
     let whole = fs::read(endless_loop(directory.path())).unwrap();
@@ -265,15 +319,14 @@ fn a_port_or_a_link_in_use_is_refused() {
     let elf = elf.to_str().unwrap();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    refused(&["--elf", elf, "--http", &address], &[&address, "in use"]);
+    refused(&["--elf", elf, "--http", &address], &[&address, IN_USE]);
     let tcp = ["--elf", elf, "--http", "127.0.0.1:0", "--tcp", &address];
-    refused(&tcp, &[&address, "in use"]);
+    refused(&tcp, &[&address, IN_USE]);
     let gdb = ["--elf", elf, "--http", "127.0.0.1:0", "--gdb", &address];
-    refused(&gdb, &[&address, "in use"]);
-    refused(
-        &["--elf", elf, "--http", "127.0.0.1:0", "--pty", elf],
-        &[elf],
-    );
+    refused(&gdb, &[&address, IN_USE]);
+    let pty = ["--elf", elf, "--http", "127.0.0.1:0", "--pty", elf];
+    let part = if sim_options::PTY { elf } else { "--tcp" };
+    refused(&pty, &[part]);
 }
 
 #[test]
@@ -287,8 +340,10 @@ fn a_flash_that_is_none_or_cannot_be_kept_is_refused() {
     };
     refused(directory.path().to_str().unwrap(), "not a file");
     refused(elf, "bytes, the flash 131072");
-    refused("/nowhere/flash", "No such file");
-    refused("/proc/flash", "");
+    refused("/nowhere/flash", NOT_THERE);
+    if cfg!(target_os = "linux") {
+        refused("/proc/flash", "");
+    }
 }
 
 #[test]
@@ -334,4 +389,7 @@ fn a_wrong_option_is_refused() {
     refused(&["--for", "ever"], &["--for"]);
     refused(&["--line", "9600,7N1"], &["--line", "9600,7N2"]);
     refused(&["--flash"], &["--flash"]);
+    refused(&["--unit", "5:8di"], &["--unit", "2ai2ao"]);
+    refused(&["--unit", "5", "--dip", "5"], &["--unit", "--dip"]);
+    refused(&["--bus", "/nowhere.toml"], &["/nowhere.toml", "No such"]);
 }

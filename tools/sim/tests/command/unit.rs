@@ -1,39 +1,39 @@
 //! The real image in the running command, with a master on its TCP line.
 
-use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Running, endless_loop, state};
+use modbus_frames::adu::Framing;
+
+use super::{Running, state};
 
 /// KEY, which opens the configuration's lock with 0x5A17.
-const KEY: u16 = 0x0100;
+pub const KEY: u16 = 0x0100;
 /// Line rate in 100 bit/s.
-const BAUD: u16 = 0x0101;
+pub const BAUD: u16 = 0x0101;
 /// 1 saves, 2 restarts.
-const COMMAND: u16 = 0x0108;
+pub const COMMAND: u16 = 0x0108;
 /// The first channel's filter time in ms.
 const FILTER: u16 = 0x0130;
 /// Bit 3: changed, not saved.
 const STATUS: u16 = 0x020A;
 
 /// A simulator that runs the image, and the master's end of its line.
-struct Unit {
-    running: Running,
-    line: TcpStream,
-    http: String,
+pub struct Unit {
+    pub running: Running,
+    pub line: TcpStream,
+    pub http: String,
 }
 
 impl Unit {
-    fn start(more: &[&str]) -> Self {
+    pub fn start(more: &[&str]) -> Self {
         let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
         let mut arguments = vec!["--elf", &image, "--tcp", "127.0.0.1:0"];
         arguments.extend(["--http", "127.0.0.1:0"]);
         arguments.extend(more);
         let mut running = Running::start(&arguments);
-        running.endpoint("pty: ");
+        running.skip_pty();
         let line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
         line.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
         let http = running.endpoint("http: http://");
@@ -44,69 +44,75 @@ impl Unit {
         }
     }
 
-    /// Asks unit 1; the reply's PDU, `length` bytes of it. What gets lost because the machine is too busy
-    /// to keep time is asked again.
+    /// Asks unit 1; the reply's PDU, `length` bytes of it.
     fn ask(&mut self, pdu: &[u8], length: usize) -> Vec<u8> {
-        let crc = crc::Crc::<u16>::new(&crc::CRC_16_MODBUS);
-        let mut request = [&[1], pdu].concat();
-        request.extend(crc.checksum(&request).to_le_bytes());
-        for _ in 0..10 {
-            // The silence before a frame.
-            std::thread::sleep(Duration::from_millis(20));
-            self.line.write_all(&request).unwrap();
-            let mut reply = vec![0; length + 3];
-            if self.line.read_exact(&mut reply).is_ok() {
-                assert_eq!(crc.checksum(&reply), 0, "{reply:02X?}");
-                return reply[1..=length].to_vec();
-            }
-        }
-        panic!("no answer to {pdu:02X?}");
+        let reply = self.ask_unit(1, pdu, length);
+        reply.unwrap_or_else(|| panic!("no answer to {pdu:02X?}"))
     }
 
-    fn read(&mut self, address: u16) -> u16 {
+    /// Asks a unit; the reply's PDU, `length` bytes of it. What gets lost because the machine is too busy to keep time is
+    /// asked again.
+    pub fn ask_unit(&mut self, unit: u8, pdu: &[u8], length: usize) -> Option<Vec<u8>> {
+        (0..10).find_map(|_| {
+            let reply = self.try_unit(unit, pdu, length)?;
+            let (address, pdu) = Framing::Rtu.open(&reply).expect("a good CRC");
+            assert_eq!(address, unit);
+            Some(pdu)
+        })
+    }
+
+    /// Sends a request once and returns the reply unchecked: `length` bytes of PDU with address and CRC.
+    pub fn try_unit(&mut self, unit: u8, pdu: &[u8], length: usize) -> Option<Vec<u8>> {
+        // The silence before a frame.
+        std::thread::sleep(Duration::from_millis(20));
+        let request = Framing::Rtu.frame(0, unit, pdu);
+        self.line.write_all(&request).unwrap();
+        let mut reply = vec![0; length + 3];
+        self.line.read_exact(&mut reply).ok().map(|()| reply)
+    }
+
+    pub fn read(&mut self, address: u16) -> u16 {
         let [high, low] = address.to_be_bytes();
         let reply = self.ask(&[3, high, low, 0, 1], 4);
         assert_eq!(reply[..2], [3, 2]);
         u16::from_be_bytes([reply[2], reply[3]])
     }
 
-    fn write(&mut self, address: u16, value: u16) {
+    pub fn write(&mut self, address: u16, value: u16) {
         let pdu = [&[6][..], &address.to_be_bytes(), &value.to_be_bytes()].concat();
         assert_eq!(self.ask(&pdu, 5), pdu);
     }
 
     /// Saves `value` as the filter time.
-    fn save_filter(&mut self, value: u16) {
+    pub fn save_filter(&mut self, value: u16) {
         self.write(KEY, 0x5A17);
         self.write(FILTER, value);
         self.save();
     }
 
-    fn save(&mut self) {
+    pub fn save(&mut self) {
         self.write(COMMAND, 1);
         while self.read(STATUS) & 8 != 0 {}
     }
 
     /// The rate that the simulator's own end of the line has.
-    fn rate(&self) -> u64 {
+    pub fn rate(&self) -> u64 {
         state(&self.http)["line"]["baud"].as_u64().unwrap()
     }
 
-    fn end(mut self, signal: &str) -> Option<i32> {
+    #[cfg(unix)]
+    pub fn end(mut self, signal: &str) -> Option<i32> {
         self.running.signal(signal);
         self.running.end().0
     }
 }
 
-fn flash_in(directory: &Path) -> PathBuf {
-    directory.join("flash")
-}
-
+#[cfg(unix)]
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_saved_configuration_survives_the_simulator_however_it_ends() {
     let directory = tempfile::tempdir().unwrap();
-    let flash = flash_in(directory.path());
+    let flash = directory.path().join("flash");
     let option = ["--flash", flash.to_str().unwrap()];
     let mut stored = 5;
     for (value, signal, status) in [
@@ -118,11 +124,11 @@ fn a_saved_configuration_survives_the_simulator_however_it_ends() {
         assert_eq!(unit.read(FILTER), stored);
         unit.save_filter(value);
         assert_eq!(unit.end(signal), status, "{signal}");
-        assert_eq!(fs::metadata(&flash).unwrap().len(), 128 * 1024);
+        assert_eq!(std::fs::metadata(&flash).unwrap().len(), 128 * 1024);
         stored = value;
     }
     // Another image is written over its own pages; the stored configuration is not among them.
-    let other = endless_loop(directory.path());
+    let other = super::endless_loop(directory.path());
     let mut running = Running::start(&[
         "--elf",
         other.to_str().unwrap(),

@@ -9,10 +9,11 @@
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
 //! | the description | `self_description` |
-//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip` |
+//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip`, `bus` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
-//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack` |
+//! | the simulator | `cores`: boards of one process share translated code; `bus`: several boards on one line |
+//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
 
@@ -26,8 +27,10 @@ mod analog_outputs;
 mod ascii;
 mod bench;
 mod boot;
+mod bus;
 mod clock;
 mod comm_watchdog;
+mod cores;
 mod counters;
 mod dac_faults;
 mod dip;
@@ -39,6 +42,7 @@ mod hung_task;
 mod identify;
 mod in_force;
 mod lock;
+mod long_run;
 mod module_choice;
 mod noise;
 mod outputs_at_start;

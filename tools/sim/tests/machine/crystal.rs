@@ -157,3 +157,36 @@ fn the_watchdog_gets_a_core_without_a_clock_going_again() {
     board.run_for(Time::from_ms(1));
     assert!(board.instructions() > done);
 }
+
+#[test]
+fn rc_oscillators_off_their_rates_change_the_core_and_the_watchdog() {
+    let mut program = Asm::new();
+    program.store(IWDG_KR, 0xCCCC);
+    let mut board = with_handler(program, 1);
+    assert_eq!(board.rc_oscillators(), (8_000_000, 40_000));
+    board.set_rc_oscillators(8_200_000, 20_000).unwrap();
+    assert_eq!(board.hclk(), 8_200_000);
+    // The same instructions at the typical rate took as many cycles.
+    let before = (board.now(), board.cycles());
+    board.step(64_000);
+    let cycles = board.cycles() - before.1;
+    assert!(cycles > 64_000);
+    assert_eq!(
+        (board.now() - before.0).as_ns(),
+        Time::cycles(cycles, 8_200_000).as_ns(),
+        "time goes by the HSI"
+    );
+    // 4096 x 4 / 20 kHz are 819.2 ms, counted from a little after the start.
+    board.run_until(Time::from_ms(800));
+    assert_eq!(board.resets(), 0);
+    board.run_until(Time::from_ms(840));
+    assert_eq!(board.resets(), 1);
+    for (hsi, lsi) in [
+        (6_399_999, 40_000),
+        (9_600_001, 40_000),
+        (8_000_000, 14_999),
+    ] {
+        assert!(board.set_rc_oscillators(hsi, lsi).is_err());
+    }
+    assert_eq!(board.rc_oscillators(), (8_200_000, 20_000));
+}

@@ -1,35 +1,85 @@
-"""Drives the firmware image in simulation with pymodbus, a Modbus master nobody here wrote.
+"""Tests the firmware image in simulation with pymodbus, a Modbus master nobody here wrote, and with it the Python client
+of the simulator.
 
-Run by `cargo xtask test`, which makes the virtual environment; by hand:
+`cargo xtask test` makes the virtual environment and runs the tests here, and with `--tests` those of the simulator's
+page. By hand:
 
     python run.py --sim target/debug/modio-sim --elf target/thumbv7m-none-eabi/firmware/modio
 """
 
 import argparse
+import concurrent.futures
 import logging
+import os
 import pathlib
+import subprocess
 import sys
 import unittest
 
-import simulator
+HERE = pathlib.Path(__file__).resolve().parent
+CLIENT = HERE.parents[1] / "python"
+# mbpoll gives up by the wall clock, so these tests have the machine for themselves.
+ALONE = "test_mbpoll.py"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program modio-sim")
-    parser.add_argument("--elf", required=True, type=pathlib.Path, help="the firmware image")
+    parser.add_argument("--elf", required=True, type=pathlib.Path, help="the image of the modio-02")
+    parser.add_argument("--elf-08", type=pathlib.Path, help="the image of the modio-08")
+    parser.add_argument("--tests", type=pathlib.Path, help="the tests of this directory instead")
+    parser.add_argument("--only", type=pathlib.Path, metavar="FILE", help="the tests of one file")
     options = parser.parse_args()
-    for file in (options.sim, options.elf):
+    # Where the tests, and the client, look for them.
+    for variable, file in (
+            ("MODIO_SIM", options.sim), ("MODIO_ELF", options.elf), ("MODIO_ELF_08", options.elf_08)):
+        if file is None:
+            continue
         if not file.is_file():
             parser.error(f"there is no file {file}")
-    simulator.PROGRAM = options.sim.resolve()
-    simulator.IMAGE = options.elf.resolve()
+        os.environ[variable] = str(file.resolve())
+    if options.only is not None:
+        return tests_of(options.only)
+    return all_files([options.tests] if options.tests else [HERE, CLIENT / "tests"])
 
+
+def all_files(directories: list[pathlib.Path]) -> int:
+    """Runs the files side by side, each in a process of its own: the simulators follow the wall clock, so the tests
+    mostly wait."""
+    files = [file for directory in directories for file in directory.glob("test_*.py")]
+    # The largest first, so that none is left to run on its own at the end.
+    files.sort(key=lambda file: -file.stat().st_size)
+    side_by_side = [file for file in files if file.name != ALONE]
+
+    def run(file):
+        command = [sys.executable, "-B", *sys.argv, "--only", str(file)]
+        return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    failed = []
+
+    def report(file, ended):
+        print(f"{file.name}:\n{ended.stdout}", file=sys.stderr, flush=True)
+        if ended.returncode != 0:
+            failed.append(file.name)
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for file, ended in zip(side_by_side, pool.map(run, side_by_side)):
+            report(file, ended)
+    for file in files:
+        if file not in side_by_side:
+            report(file, run(file))
+    if failed:
+        print(f"failed: {', '.join(failed)}", file=sys.stderr)
+    # No tests at all must not look like success.
+    return 0 if files and not failed else 1
+
+
+def tests_of(file: pathlib.Path) -> int:
+    """Runs the tests of one file, which may use what is here and the client."""
+    sys.path[:0] = [str(CLIENT), str(HERE)]
     # That a unit stays silent is what many tests want, and nothing to log.
     logging.getLogger("pymodbus").addHandler(logging.NullHandler())
-
-    here = pathlib.Path(__file__).parent
-    tests = unittest.defaultTestLoader.discover(str(here), pattern="test_*.py")
+    tests = unittest.defaultTestLoader.discover(str(file.parent), pattern=file.name)
     result = unittest.TextTestRunner(verbosity=2).run(tests)
     # No tests at all must not look like success.
     return 0 if result.wasSuccessful() and result.testsRun else 1

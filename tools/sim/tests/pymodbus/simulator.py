@@ -1,23 +1,14 @@
-"""The simulator as a child process, and masters on its RS-485 line."""
+"""A simulator with masters on its RS-485 line."""
 
-import json
-import pathlib
-import subprocess
-import tempfile
-import threading
+import os
 import time
 import unittest
-import urllib.error
-import urllib.request
 
+import modio_sim
 import serial
 from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusIOException
-
-# Set by run.py.
-PROGRAM: pathlib.Path
-IMAGE: pathlib.Path
 
 # Virtual time stays behind the wall clock where the machine is busy, so what the unit does, or does not
 # do, is judged by virtual time, and the wall clock only says when the simulator is taken to be dead.
@@ -31,140 +22,61 @@ SILENCE_MS = 500
 GIVE_UP = 0.5
 
 
-class Simulator:
-    """A running modio-sim, with `--pty` and an HTTP port of its own."""
+class Simulator(modio_sim.Simulator):
+    """A simulator, and what masters do with it."""
 
-    def __init__(self, *, dip: int = 1, module: str = "4di"):
-        # What masters speak from now on.
-        self.framer = FramerType.RTU
-        self._directory = tempfile.TemporaryDirectory(prefix="modio-")
-        self.port = str(pathlib.Path(self._directory.name, "line"))
-        self._process = subprocess.Popen(
-            [PROGRAM, "--elf", IMAGE, "--dip", str(dip), "--module", module,
-             "--pty", self.port, "--http", "127.0.0.1:0"],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.lines: list[str] = []
-        self.complaints: list[str] = []
-        self._readers = [
-            threading.Thread(target=self._read, args=(pipe, lines), daemon=True)
-            for pipe, lines in ((self._process.stdout, self.lines),
-                                (self._process.stderr, self.complaints))]
-        for reader in self._readers:
-            reader.start()
-        try:
-            self.url = self._endpoint("http: ").rstrip("/")
-        except BaseException:
-            self.stop()
-            raise
+    # What masters speak from now on.
+    framer = FramerType.RTU
 
-    @staticmethod
-    def _read(pipe, lines):
-        for line in pipe:
-            lines.append(line.rstrip("\n"))
+    @classmethod
+    def of(cls, *, board: str = "modio-02", options=(), **more) -> "Simulator":
+        """A simulator with the image for this board, which run.py names."""
+        image = {"modio-02": "MODIO_ELF", "modio-08": "MODIO_ELF_08"}[board]
+        return cls.start(board=board, elf=os.environ[image], options=options, **more)
 
-    def _endpoint(self, prefix: str) -> str:
-        end = time.monotonic() + PATIENCE
-        while time.monotonic() < end and self._process.poll() is None:
-            for line in list(self.lines):
-                if line.startswith(prefix):
-                    return line.removeprefix(prefix)
-            time.sleep(0.01)
-        raise RuntimeError(f"the simulator did not start: {self.complaints or self.lines}")
+    def end_well(self):
+        """Ends it as Ctrl-C would. It must end without an error and must not have printed any complaint."""
+        status = self.close()
+        if status != 0 or self.complaints:
+            raise AssertionError(f"exit status {status}, stderr {self.complaints}")
 
-    def stop(self) -> int:
-        """Ends it as Ctrl-C would; the exit status."""
-        if self._process.poll() is None:
-            self._process.terminate()
-        try:
-            status = self._process.wait(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            status = self._process.wait()
-        for reader in self._readers:
-            reader.join(timeout=10)
-        self._process.stdout.close()
-        self._process.stderr.close()
-        self._directory.cleanup()
-        return status
-
-    def http(self, method: str, path: str, body=None) -> tuple[int, dict]:
-        """Status and JSON of a request."""
-        data = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(self.url + path, data=data, method=method)
-        try:
-            with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
-                return answer.status, json.load(answer)
-        except urllib.error.HTTPError as refusal:
-            with refusal:
-                return refusal.code, json.load(refusal)
-
-    def state(self) -> dict:
-        """GET /api/state."""
-        status, state = self.http("GET", "/api/state")
-        assert status == 200, state
-        return state
-
-    def post(self, path: str, body) -> dict:
-        """A POST that is accepted."""
-        status, answer = self.http("POST", path, body)
-        assert status == 200, answer
-        return answer
+    @property
+    def gateway(self) -> str:
+        """Where masters with Modbus TCP find the line."""
+        return self.endpoint("modbus-tcp")
 
     def outputs(self) -> list[bool]:
         """The four digital outputs, as they stand."""
-        return [channel["on"] for channel in self.state()["channels"]]
-
-    def until(self, is_so, what: str):
-        """Waits until something is so."""
-        end = time.monotonic() + PATIENCE
-        while not is_so():
-            if time.monotonic() > end:
-                raise AssertionError(f"{what} did not happen in {PATIENCE} s")
-            time.sleep(0.005)
-
-    def virtual_ms(self) -> int:
-        """The unit's time."""
-        return self.state()["virtual_ms"]
-
-    def wait(self, milliseconds: int):
-        """Lets so much of the unit's time pass."""
-        end = self.virtual_ms() + milliseconds
-        self.until(lambda: self.virtual_ms() >= end, f"{milliseconds} ms of virtual time")
-
-    def frames(self, since: int = 0) -> list[dict]:
-        """The complete frames on the line with numbers above `since`."""
-        status, answer = self.http("GET", f"/api/frames?since={since}")
-        assert status == 200, answer
-        return answer["frames"]
+        return [channel.on for channel in self.state().channels]
 
     def last_frame(self) -> int:
         """The number of the last frame, once the line has been silent for many times t3.5."""
         self.wait(60)
-        return max((frame["number"] for frame in self.frames()), default=0)
+        return max((frame.number for frame in self.frames()), default=0)
 
     def answer_to(self, since: int) -> bytes:
         """What the unit answers to the first frame after number `since`; empty for silence."""
-        requests = lambda: [f for f in self.frames(since) if f["direction"] == "rx"]
-        self.until(requests, "the request")
+        requests = lambda: [f for f in self.frames(since) if f.direction == "rx"]
+        self.wait_for(requests, what="there is no request")
         request = requests()[0]
-        over = lambda: self.virtual_ms() * 1000 >= request["end_us"] + SILENCE_MS * 1000
-        answers = lambda: [f for f in self.frames(request["number"]) if f["direction"] == "tx"]
-        self.until(lambda: over() or answers(), "an answer, or silence")
+        over = lambda: self.state().virtual_ms * 1000 >= request.end_us + SILENCE_MS * 1000
+        answers = lambda: [f for f in self.frames(request.number) if f.direction == "tx"]
+        self.wait_for(lambda: over() or answers(), what="there is neither an answer nor silence")
         answer = answers()
-        return bytes.fromhex(answer[0]["bytes"]) if answer else b""
+        return answer[0].bytes if answer else b""
 
     def master(self, timeout: float = PATIENCE, baudrate: int = 9600,
                stopbits: int = 2) -> ModbusSerialClient:
         """pymodbus on the line, which asks once. Without parity: a pseudo-terminal has none."""
         client = ModbusSerialClient(
-            self.port, framer=self.framer, baudrate=baudrate, stopbits=stopbits, timeout=timeout,
+            self.pty, framer=self.framer, baudrate=baudrate, stopbits=stopbits, timeout=timeout,
             retries=0)
         assert client.connect()
         return client
 
     def wire(self) -> serial.Serial:
         """The line for bytes of one's own."""
-        return serial.Serial(self.port, 9600, stopbits=2, timeout=PATIENCE)
+        return serial.Serial(self.pty, 9600, stopbits=2, timeout=PATIENCE)
 
 
 class OnSimulator(unittest.TestCase):
@@ -175,15 +87,10 @@ class OnSimulator(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.simulator = Simulator(dip=cls.DIP, module=cls.MODULE)
-        # First in, last out: nothing may be complained of, and Ctrl-C must end it well.
-        cls.addClassCleanup(cls._end)
-
-    @classmethod
-    def _end(cls):
-        status = cls.simulator.stop()
-        if status != 0 or cls.simulator.complaints:
-            raise AssertionError(f"exit status {status}, stderr {cls.simulator.complaints}")
+        cls.simulator = Simulator.of(
+            dip=cls.DIP, module=cls.MODULE, options=["--modbus-tcp", "127.0.0.1:0"])
+        # Cleanups run in reverse order, so this one is the last.
+        cls.addClassCleanup(cls.simulator.end_well)
 
     def setUp(self):
         self.master = self.simulator.master()
@@ -215,8 +122,8 @@ class OnSimulator(unittest.TestCase):
 
     def eventually(self, what, wanted, within_ms: int = 1000):
         """`what()` becomes `wanted` within a second: an input is debounced, an output is scanned."""
-        end = self.simulator.virtual_ms() + within_ms
-        while (seen := what()) != wanted and self.simulator.virtual_ms() < end:
+        end = self.simulator.state().virtual_ms + within_ms
+        while (seen := what()) != wanted and self.simulator.state().virtual_ms < end:
             time.sleep(0.005)
         self.assertEqual(seen, wanted)
 
@@ -234,7 +141,7 @@ class AsciiLine:
             assert not answer.isError(), answer
         master.close()
         cls.simulator.wait(300)
-        assert cls.simulator.state()["line"]["baud"] == 115200
+        assert cls.simulator.state().line.baud == 115200
         cls.simulator.framer = FramerType.ASCII
 
 

@@ -47,7 +47,7 @@ class NoUnit(OnSimulator):
 
     def test_the_fault_led_blinks(self):
         for wanted in (True, False, True):
-            self.eventually(lambda: self.simulator.state()["leds"]["fault"], wanted)
+            self.eventually(lambda: self.simulator.state().leds.fault, wanted)
 
 
 class ReservedUnit(NoUnit):
@@ -58,10 +58,10 @@ class ReservedUnit(NoUnit):
 
 class SwitchMoved(OnSimulator):
     def test_the_switch_counts_from_the_next_power_on(self):
-        self.simulator.post("/api/dip", {"value": 17})
+        self.simulator.set_dip(17)
         self.bits(self.master.read_coils(FIRST, count=4, device_id=1), 4)
-        self.simulator.post("/api/power", {"on": False})
+        self.simulator.power_off()
         self.silent(lambda master: master.read_coils(FIRST, count=4, device_id=1))
-        self.simulator.post("/api/power", {"on": True})
+        self.simulator.power_on()
         self.silent(lambda master: master.read_coils(FIRST, count=4, device_id=1))
         self.bits(self.master.read_coils(FIRST, count=4, device_id=17), 4)

@@ -28,7 +28,7 @@ class Configuration(OnSimulator):
             assert not answer.isError(), answer
         cls.simulator.wait(200)
         master.close()
-        cls.simulator.post("/api/power", {"cycle": True})
+        cls.simulator.power_cycle()
         cls.simulator.wait(200)
 
     def written(self, address, *values):
@@ -82,25 +82,25 @@ class Configuration(OnSimulator):
         self.assertTrue(self.register(STATUS) & UNSAVED)
         self.save()
         self.assertTrue(self.register(STATUS) & WAITING)
-        self.assertEqual(self.simulator.state()["line"]["baud"], 9600, "not before the restart")
+        self.assertEqual(self.simulator.state().line.baud, 9600, "not before the restart")
         self.written(COMMAND, RESTART)
         self.reconnect(baudrate=115200, stopbits=1)
-        line = self.simulator.state()["line"]
-        self.assertEqual((line["baud"], line["format"]), (115200, "8N1"))
+        line = self.simulator.state().line
+        self.assertEqual((line.baud, line.format), (115200, "8N1"))
         self.assertEqual(self.register(BAUD, 2), [1152, 3])
         self.assertTrue(self.register(RESET_CAUSE) & 8, "by software")
         self.assertEqual(self.register(STATUS), 0)
         self.bits(self.master.write_coils(FIRST, [True] * 4), 0)
         self.eventually(self.simulator.outputs, [True] * 4)
         # It is there after a power cycle too; and back.
-        self.simulator.post("/api/power", {"cycle": True})
+        self.simulator.power_cycle()
         self.reconnect(baudrate=115200, stopbits=1)
         self.unlock()
         self.written(BAUD, 96, 0)
         self.save()
         self.written(COMMAND, RESTART)
         self.reconnect()
-        self.assertEqual(self.simulator.state()["line"]["baud"], 9600)
+        self.assertEqual(self.simulator.state().line.baud, 9600)
         self.assertEqual(self.register(BAUD, 2), [96, 0])
 
     def test_what_is_not_saved_is_lost_or_dropped(self):
@@ -111,7 +111,7 @@ class Configuration(OnSimulator):
         self.written(COMMAND, DROP)
         self.assertEqual(self.register(FILTER), 50)
         self.written(FILTER, 70)
-        self.simulator.post("/api/power", {"cycle": True})
+        self.simulator.power_cycle()
         self.reconnect()
         self.assertEqual(self.register(FILTER), 50)
 
@@ -120,25 +120,25 @@ class Configuration(OnSimulator):
         self.written(START, 1, 0, 0, 1)
         self.save()
         self.assertEqual(self.simulator.outputs(), [False] * 4)
-        self.simulator.post("/api/power", {"cycle": True})
+        self.simulator.power_cycle()
         self.eventually(self.simulator.outputs, [True, False, False, True])
 
     def test_another_module_needs_no_other_firmware(self):
         self.unlock()
         self.written(MODULE, 5)
         self.save()
-        self.simulator.post("/api/power", {"on": False})
-        self.simulator.post("/api/module", {"name": "4ao"})
-        self.simulator.post("/api/power", {"on": True})
+        self.simulator.power_off()
+        self.simulator.set_module("4ao")
+        self.simulator.power_on()
         self.reconnect()
         self.assertEqual(self.register(MODULE_IN_FORCE), 5)
         self.written(FIRST, 1, 2, 3, 4095)
         self.refused(self.master.read_coils(FIRST, count=1), 2)
-        codes = lambda: [channel["code"] for channel in self.simulator.state()["channels"]]
+        codes = lambda: [channel.code for channel in self.simulator.state().channels]
         self.eventually(codes, [1, 2, 3, 4095])
-        self.simulator.post("/api/power", {"on": False})
-        self.simulator.post("/api/module", {"name": "4do"})
-        self.simulator.post("/api/power", {"on": True})
+        self.simulator.power_off()
+        self.simulator.set_module("4do")
+        self.simulator.power_on()
         self.reconnect()
 
     def test_a_silent_line_sends_outputs_to_safe_until_they_are_written(self):

@@ -97,7 +97,7 @@ class Rtu(OnSimulator):
 
     def test_busy_is_counted(self):
         # The lock is closed after it.
-        self.simulator.post("/api/power", {"cycle": True})
+        self.simulator.power_cycle()
         self.simulator.wait(300)
         self.refused(self.master.write_register(FILTER, 6), 6)
         self.assertEqual(self.good(self.master.diag_read_device_busy_count()).message, 1)
@@ -242,7 +242,7 @@ class Ascii(AsciiLine, Rtu):
     def test_points_are_read(self):
         for pattern in ([True, False, False, True], [False, True, True, False]):
             for number, energised in enumerate(pattern, 1):
-                self.simulator.post(f"/api/channels/{number}", {"energised": energised})
+                self.simulator.set_channel(number, energised=energised)
             self.eventually(lambda: self.bits(self.master.read_coils(FIRST, count=4), 4), pattern)
             self.assertEqual(self.bits(self.master.read_discrete_inputs(FIRST, count=4), 4), pattern)
         self.refused(self.master.write_coil(FIRST, True), 2)
@@ -280,7 +280,7 @@ class AnalogPoints(OnSimulator):
     MODULE = "4ao"
 
     def codes(self):
-        return [channel["code"] for channel in self.simulator.state()["channels"]]
+        return [channel.code for channel in self.simulator.state().channels]
 
     def test_16_and_17_write_outputs(self):
         answer = self.master.readwrite_registers(

@@ -18,7 +18,7 @@ class Inputs(OnSimulator):
 
     def energise(self, inputs):
         for number, energised in enumerate(inputs, 1):
-            self.simulator.post(f"/api/channels/{number}", {"energised": energised})
+            self.simulator.set_channel(number, energised=energised)
 
     def tearDown(self):
         self.energise([False] * 4)

@@ -39,7 +39,7 @@ class Mbpoll(OnSimulator):
     def read(self, table, address, count=1, **settings):
         """The values, or why there are none."""
         output, refusal = self.call(
-            "-t", table, "-r", str(address), "-c", str(count), self.simulator.port, **settings)
+            "-t", table, "-r", str(address), "-c", str(count), self.simulator.pty, **settings)
         values = [int(value) for value in re.findall(r"^\[\d+\]:\s+(-?\d+)", output, re.MULTILINE)]
         self.assertEqual(len(values), 0 if refusal else count, output)
         return refusal or values
@@ -47,17 +47,17 @@ class Mbpoll(OnSimulator):
     def write(self, table, address, *values, **settings):
         """None, or why it was refused."""
         output, refusal = self.call(
-            "-t", table, "-r", str(address), self.simulator.port, *map(str, values), **settings)
+            "-t", table, "-r", str(address), self.simulator.pty, *map(str, values), **settings)
         self.assertEqual(f"Written {len(values)} references." in output, not refusal, output)
         return refusal or None
 
     def assert_nothing_is_written(self, table, first=FIRST, count=4):
         """Neither one by one nor together."""
-        before = self.simulator.state()["channels"]
+        before = self.simulator.state().channels
         for address in range(first, first + count):
             self.assertEqual(self.write(table, address, 1), ADDRESS)
         self.assertEqual(self.write(table, first, *[1] * count), ADDRESS)
-        self.assertEqual(self.simulator.state()["channels"], before)
+        self.assertEqual(self.simulator.state().channels, before)
 
 
 class Empty(Mbpoll):
@@ -68,21 +68,21 @@ class Empty(Mbpoll):
         self.assert_nothing_is_written(HOLDING_REGISTERS)
 
     def test_another_unit_is_silent(self):
-        sent = self.simulator.state()["line"]["tx_frames"]
+        sent = self.simulator.state().line.tx_frames
         self.assertEqual(self.read(COILS, FIRST, unit=2, wait=SILENCE), "Connection timed out")
         self.simulator.wait(500)
-        self.assertEqual(self.simulator.state()["line"]["tx_frames"], sent)
+        self.assertEqual(self.simulator.state().line.tx_frames, sent)
 
     def test_it_says_what_it_is(self):
         """Function 11, read as libmodbus reads it: an identity of one byte, and the run indicator."""
-        output, refusal = self.call("-u", self.simulator.port)
+        output, refusal = self.call("-u", self.simulator.pty)
         self.assertEqual(refusal, "")
         self.assertRegex(output, r"Length: 2\nId    : 0x01\nStatus: On\n")
 
     def test_it_polls_several_units_and_goes_on_where_one_is_silent(self):
         # Long enough for the one that answers, on a busy machine too.
         output, refusal = self.call(
-            "-t", HOLDING_REGISTERS, "-r", "518", self.simulator.port, unit="2,1,3", wait="3.00")
+            "-t", HOLDING_REGISTERS, "-r", "518", self.simulator.pty, unit="2,1,3", wait="3.00")
         self.assertEqual(refusal, "Connection timed out")
         self.assertRegex(output, r"slave 2\.\.\.\n-- Polling slave 1\.\.\.\n\[518\]:\s+1\n")
 
@@ -101,11 +101,11 @@ class Numbers(Mbpoll):
 
         def pair(kind, value, *options):
             output, refusal = self.call(
-                *options, "-t", f"4:{kind}", *first, self.simulator.port, "--", value)
+                *options, "-t", f"4:{kind}", *first, self.simulator.pty, "--", value)
             self.assertEqual("Written 1 references." in output, not refusal, output)
             if refusal:
                 return refusal
-            outputs = [self.call(*options, "-t", f"{table}:{kind}", *first, self.simulator.port)[0]
+            outputs = [self.call(*options, "-t", f"{table}:{kind}", *first, self.simulator.pty)[0]
                        for table in WORDS]
             values = [re.search(r"^\[321\]:\s+(\S+)$", text, re.MULTILINE)[1] for text in outputs]
             self.assertEqual(values[0], values[1], "functions 03 and 04 read the same")
@@ -120,7 +120,7 @@ class Numbers(Mbpoll):
         self.assertEqual(pair("int", "32", "-B"), VALUE)
         self.assertEqual(self.read(HOLDING_REGISTERS, 0x0141, 2), [0xC020, 0], "all or nothing")
         for table in WORDS:
-            output, _ = self.call("-t", f"{table}:hex", *first, "-c", "2", self.simulator.port)
+            output, _ = self.call("-t", f"{table}:hex", *first, "-c", "2", self.simulator.pty)
             self.assertRegex(output, r"\[321\]:\s+0xC020\n\[322\]:\s+0x0000\n")
 
 
@@ -130,7 +130,7 @@ class DigitalInputs(Mbpoll):
     def test_inputs_are_read_and_counted(self):
         for number, pattern in enumerate(([1, 0, 0, 1], [0, 0, 0, 0], [1, 1, 0, 0])):
             for channel, energised in enumerate(pattern, 1):
-                self.simulator.post(f"/api/channels/{channel}", {"energised": bool(energised)})
+                self.simulator.set_channel(channel, energised=bool(energised))
             self.simulator.wait(20)
             for table in BITS:
                 self.assertEqual(self.read(table, FIRST, 4), pattern, number)
@@ -141,7 +141,7 @@ class DigitalInputs(Mbpoll):
 
     def counters(self):
         output, refusal = self.call(
-            "-B", "-t", "3:int", "-r", str(0x0320), "-c", "4", self.simulator.port)
+            "-B", "-t", "3:int", "-r", str(0x0320), "-c", "4", self.simulator.pty)
         self.assertEqual(refusal, "")
         return [int(value) for value in re.findall(r"^\[\d+\]:\s+(\d+)", output, re.MULTILINE)]
 
@@ -171,7 +171,7 @@ class DigitalOutputs(Mbpoll):
         self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0108, 1))
         self.assertIsNone(self.write(HOLDING_REGISTERS, 0x0108, 2))
         self.simulator.wait(300)
-        self.assertEqual(self.simulator.state()["line"]["baud"], 115200)
+        self.assertEqual(self.simulator.state().line.baud, 115200)
         self.assertEqual(self.read(HOLDING_REGISTERS, 0x0101, 2, baudrate=115200), [1152, 0])
 
 
@@ -179,8 +179,8 @@ class Relays(Mbpoll):
     MODULE = "2relay"
 
     def test_coils_are_written_and_jumpers_read(self):
-        coils = lambda: [channel["energised"] for channel in self.simulator.state()["channels"][:2]]
-        self.simulator.post("/api/channels/2", {"manual": True})
+        coils = lambda: [channel.energised for channel in self.simulator.state().channels[:2]]
+        self.simulator.set_channel(2, manual=True)
         self.assertIsNone(self.write(COILS, FIRST + 2, 1, 0))
         self.eventually(coils, [True, False])
         self.assertIsNone(self.write(COILS, FIRST + 3, 1))
@@ -196,7 +196,7 @@ class AnalogInputs(Mbpoll):
 
     def test_inputs_are_read(self):
         for channel, millivolts in enumerate((3300, 0, 1650, 825), 1):
-            self.simulator.post(f"/api/channels/{channel}", {"millivolts": millivolts})
+            self.simulator.set_channel(channel, millivolts=millivolts)
         self.simulator.wait(500)
         for table in WORDS:
             for value, wanted in zip(self.read(table, FIRST, 4), (4095, 0, 2048, 1024), strict=True):
@@ -210,7 +210,7 @@ class AnalogOutputs(Mbpoll):
     FIRST_OUTPUT, OUTPUTS = FIRST, 4
 
     def codes(self):
-        return [channel["code"] for channel in self.simulator.state()["channels"] if "code" in channel]
+        return [channel.code for channel in self.simulator.state().channels if channel.code is not None]
 
     def test_outputs_are_written_one_by_one_and_together(self):
         values = [4095, 0, 2048, 1][:self.OUTPUTS]
@@ -234,7 +234,7 @@ class AnalogInputsAndOutputs(AnalogOutputs):
     FIRST_OUTPUT, OUTPUTS = FIRST + 2, 2
 
     def test_inputs_are_only_read(self):
-        self.simulator.post("/api/channels/1", {"millivolts": 3300})
+        self.simulator.set_channel(1, millivolts=3300)
         self.simulator.wait(500)
         self.assertEqual(self.read(INPUT_REGISTERS, FIRST, 2), [4095, 0])
         self.assert_nothing_is_written(HOLDING_REGISTERS, FIRST, 2)
@@ -246,9 +246,9 @@ class NoModule(Mbpoll):
     MODULE = "4ao"
 
     def test_its_points_fail(self):
-        self.simulator.post("/api/power", {"on": False})
-        self.simulator.post("/api/module", {"name": "none"})
-        self.simulator.post("/api/power", {"on": True})
+        self.simulator.power_off()
+        self.simulator.set_module("none")
+        self.simulator.power_on()
         self.simulator.wait(500)
         for table in WORDS:
             self.assertEqual(self.read(table, FIRST, 4), FAILURE)

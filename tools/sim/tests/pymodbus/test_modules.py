@@ -39,7 +39,7 @@ class Module:
         self.reads((WORD_IN, WORD_OUT), read)
 
     def test_only_outputs_of_their_kind_are_written(self):
-        before = self.simulator.state()["channels"]
+        before = self.simulator.state().channels
         for address, count, exists in self.spans(BIT_OUT):
             if not exists:
                 self.refused(self.master.write_coils(address, [True] * count), 2)
@@ -50,7 +50,7 @@ class Module:
                 self.refused(self.master.write_registers(address, [1] * count), 2)
                 if count == 1:
                     self.refused(self.master.write_register(address, 1), 2)
-        self.assertEqual(self.simulator.state()["channels"], before)
+        self.assertEqual(self.simulator.state().channels, before)
 
     def words(self, count=4):
         """The points as words, read both ways."""
@@ -72,7 +72,7 @@ class Module:
 
     def codes(self):
         """What stands at the DAC, None where there is no output."""
-        return [channel.get("code") for channel in self.simulator.state()["channels"]]
+        return [channel.code for channel in self.simulator.state().channels]
 
 
 class Empty(Module, OnSimulator):
@@ -94,12 +94,12 @@ class Relays(Module, OnSimulator):
     KINDS = [BIT_IN, BIT_IN, BIT_OUT, BIT_OUT]
 
     def coils(self):
-        return [channel["energised"] for channel in self.simulator.state()["channels"][:2]]
+        return [channel.energised for channel in self.simulator.state().channels[:2]]
 
     def test_coils_are_written_and_jumpers_are_read(self):
         for first, second in ((True, False), (False, True), (True, True), (False, False)):
-            self.simulator.post("/api/channels/1", {"manual": second})
-            self.simulator.post("/api/channels/2", {"manual": first})
+            self.simulator.set_channel(1, manual=second)
+            self.simulator.set_channel(2, manual=first)
             self.bits(self.master.write_coils(FIRST + 2, [first, second]), 0)
             self.eventually(self.coils, [first, second])
             wanted = [second, first, first, second]
@@ -123,7 +123,7 @@ class AnalogInputs(Module, OnSimulator):
     def test_voltages_are_read_as_codes(self):
         for millivolts in ((0, 825, 1650, 3300), (3300, 1650, 825, 0)):
             for number, value in enumerate(millivolts, 1):
-                self.simulator.post(f"/api/channels/{number}", {"millivolts": value})
+                self.simulator.set_channel(number, millivolts=value)
             wanted = [round(value * 4095 / 3300) for value in millivolts]
             self.settled(wanted)
             self.eventually(lambda: self.words()[0] == self.words()[1], True)
@@ -162,7 +162,7 @@ class AnalogInputsAndOutputs(Module, OnSimulator):
 
     def test_inputs_are_read_and_outputs_written(self):
         for number, millivolts in ((1, 1650), (2, 825)):
-            self.simulator.post(f"/api/channels/{number}", {"millivolts": millivolts})
+            self.simulator.set_channel(number, millivolts=millivolts)
         self.assertFalse(self.master.write_registers(FIRST + 2, [1234, 4095]).isError())
         self.settled([2048, 1024, 1234, 4095])
         self.eventually(self.codes, [None, None, 1234, 4095])

@@ -53,11 +53,11 @@ class Outputs(OnSimulator):
         self.assertEqual(self.simulator.outputs(), [False] * 4)
 
     def test_a_broadcast_is_done_in_silence(self):
-        sent = self.simulator.state()["line"]["tx_frames"]
+        sent = self.simulator.state().line.tx_frames
         self.master.write_coils(FIRST, [True, False, True, True], device_id=0, no_response_expected=True)
         self.eventually(self.simulator.outputs, [True, False, True, True])
         self.simulator.wait(SILENCE_MS)
-        self.assertEqual(self.simulator.state()["line"]["tx_frames"], sent)
+        self.assertEqual(self.simulator.state().line.tx_frames, sent)
         self.assertEqual(self.read(), [True, False, True, True])
 
     def test_another_units_write_changes_nothing(self):
@@ -67,7 +67,7 @@ class Outputs(OnSimulator):
     def test_a_power_cycle_turns_the_outputs_off(self):
         self.bits(self.master.write_coils(FIRST, [True] * 4), 0)
         self.eventually(self.simulator.outputs, [True] * 4)
-        self.simulator.post("/api/power", {"cycle": True})
+        self.simulator.power_cycle()
         self.simulator.wait(200)
         self.assertEqual(self.simulator.outputs(), [False] * 4)
         self.assertEqual(self.read(), [False] * 4)

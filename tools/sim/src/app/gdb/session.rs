@@ -45,8 +45,8 @@ impl Session {
     /// Runs the board to `until`, or to a breakpoint; not at all while it is halted.
     pub fn run_until(&mut self, until: Time, bench: &mut Bench) {
         if self.machine.is_none() {
-            bench.board.run_until(until);
-        } else if !self.halted() && bench.board.run_debugged(until) {
+            bench.run_until(until);
+        } else if !self.halted() && bench.run_debugged(until) {
             self.stopped(bench, SingleThreadStopReason::SwBreak(()));
         }
     }
@@ -61,7 +61,7 @@ impl Session {
     fn step_if_wanted(&mut self, bench: &mut Bench) {
         if bench.debug.step && self.machine.is_some() && !self.halted() {
             bench.debug.step = false;
-            bench.board.step_instruction();
+            bench.first().step_instruction();
             self.stopped(bench, SingleThreadStopReason::DoneStep);
         }
     }

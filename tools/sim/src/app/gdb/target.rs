@@ -92,12 +92,12 @@ impl Bench {
     /// Takes away every breakpoint: the debugger has gone.
     pub fn forget_breakpoints(&mut self) {
         for address in core::mem::take(&mut self.debug.breakpoints) {
-            self.board.remove_breakpoint(address);
+            self.first().remove_breakpoint(address);
         }
     }
 
     fn add_breakpoint(&mut self, address: u32) -> bool {
-        self.board.add_breakpoint(address);
+        self.first().add_breakpoint(address);
         self.debug.breakpoints.push(address);
         true
     }
@@ -108,7 +108,7 @@ impl Bench {
             return false;
         };
         breakpoints.swap_remove(at);
-        self.board.remove_breakpoint(address);
+        self.first().remove_breakpoint(address);
         true
     }
 }
@@ -133,7 +133,11 @@ impl Target for Bench {
 impl SingleThreadBase for Bench {
     fn read_registers(&mut self, registers: &mut CoreRegisters) -> TargetResult<(), Self> {
         for (number, register) in registers.0.iter_mut().enumerate() {
-            *register = self.board.register(number).ok_or(TargetError::NonFatal)?;
+            *register = self
+                .bus
+                .board(0)
+                .register(number)
+                .ok_or(TargetError::NonFatal)?;
         }
         Ok(())
     }
@@ -141,8 +145,8 @@ impl SingleThreadBase for Bench {
     fn write_registers(&mut self, registers: &CoreRegisters) -> TargetResult<(), Self> {
         for (number, value) in registers.0.into_iter().enumerate() {
             // Only what changes: SP is MSP or PSP under another name.
-            if self.board.register(number) != Some(value) {
-                self.board
+            if self.bus.board(0).register(number) != Some(value) {
+                self.first()
                     .set_register(number, value)
                     .map_err(|_| TargetError::NonFatal)?;
             }
@@ -151,14 +155,14 @@ impl SingleThreadBase for Bench {
     }
 
     fn read_addrs(&mut self, address: u32, bytes: &mut [u8]) -> TargetResult<usize, Self> {
-        match self.board.read_memory(address, bytes) {
+        match self.first().read_memory(address, bytes) {
             0 if !bytes.is_empty() => Err(TargetError::NonFatal),
             read => Ok(read),
         }
     }
 
     fn write_addrs(&mut self, address: u32, bytes: &[u8]) -> TargetResult<(), Self> {
-        self.board
+        self.first()
             .write_memory(address, bytes)
             .map_err(|_| TargetError::NonFatal)
     }
@@ -171,7 +175,7 @@ impl SingleThreadBase for Bench {
 impl SingleThreadResume for Bench {
     fn resume(&mut self, _signal: Option<Signal>) -> Result<(), Infallible> {
         self.debug.step = false;
-        self.board.pass_breakpoint();
+        self.first().pass_breakpoint();
         Ok(())
     }
 
@@ -225,10 +229,10 @@ impl MonitorCmd for Bench {
     ) -> Result<(), Infallible> {
         match command.trim_ascii() {
             b"reset" => {
-                self.board.reset();
+                self.first().reset();
                 outputln!(out, "reset; halted before the first instruction");
             }
-            b"time" => outputln!(out, "{}", self.board.now()),
+            b"time" => outputln!(out, "{}", self.now()),
             _ => outputln!(out, "reset: pulls the reset pin\ntime: the virtual time"),
         }
         Ok(())

@@ -14,15 +14,15 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::body::Body;
-use axum::extract::State;
+use axum::extract::{Path, State};
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::sse::{self, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use tokio::sync::{broadcast, oneshot};
+use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError::Lagged;
-use tokio_stream::{Stream, StreamExt};
 
 use super::live::Note;
 use super::{Event, api};
@@ -68,7 +68,11 @@ pub fn listen(
     };
     let app = Router::new()
         .merge(page::routes())
-        .route("/api/events", get(stream).fallback(not_get))
+        .route("/api/events", get(stream_of_first).fallback(not_get))
+        .route(
+            "/api/boards/{name}/events",
+            get(stream_of).fallback(not_get),
+        )
         .fallback(ask)
         .with_state(server);
     thread::spawn(move || {
@@ -95,6 +99,16 @@ impl Server {
             return ending();
         }
         answer.await.unwrap_or_else(|_| ending())
+    }
+
+    /// The reply to `GET target`.
+    async fn get(&self, target: &str) -> api::Reply {
+        self.board(api::Request {
+            method: "GET".to_owned(),
+            target: target.to_owned(),
+            body: Vec::new(),
+        })
+        .await
     }
 }
 
@@ -161,27 +175,42 @@ async fn not_get() -> api::Reply {
     api::Reply::error(405, "only GET here")
 }
 
-/// Server-sent events: the state, and from then on what changes.
-async fn stream(
+async fn stream_of_first(State(server): State<Server>) -> Result<Response, api::Reply> {
+    stream(server, 0, "/api/state").await
+}
+
+async fn stream_of(
     State(server): State<Server>,
-) -> Sse<impl Stream<Item = Result<sse::Event, Infallible>>> {
+    Path(name): Path<String>,
+) -> Result<Response, api::Reply> {
+    let boards = server.get("/api/boards").await.body;
+    let mut names = boards.as_array().into_iter().flatten();
+    match names.position(|board| board["name"] == name) {
+        Some(board) => stream(server, board, &format!("/api/boards/{name}/state")).await,
+        None => Err(api::Reply::error(404, format!("there is no board {name}"))),
+    }
+}
+
+/// Server-sent events: the state of a board, and from then on what changes on it and on the line.
+async fn stream(server: Server, board: usize, state: &str) -> Result<Response, api::Reply> {
     // First the ear, then the state: nothing is missed in between.
     let notes = BroadcastStream::new(server.live.subscribe());
-    let state = server
-        .board(api::Request {
-            method: "GET".to_owned(),
-            target: "/api/state".to_owned(),
-            body: Vec::new(),
-        })
-        .await;
+    let state = server.get(state).await;
+    if state.status != 200 {
+        return Err(state);
+    }
     let first = event("state", state.body.to_string());
-    let then = notes.map(|note| match note {
-        Ok(note) => event(note.name, note.data.as_ref()),
+    let then = notes.filter_map(move |note| match note {
+        Ok(note) if note.board.is_some_and(|about| about != board) => None,
+        Ok(note) => Some(event(note.name, note.data.as_ref())),
         // A client that reads too slowly can ask for the state and the frames.
-        Err(Lagged(count)) => event("lost", count.to_string()),
+        Err(Lagged(count)) => Some(event("lost", count.to_string())),
     });
-    let all = tokio_stream::once(first).chain(then);
-    Sse::new(all.map(Ok)).keep_alive(KeepAlive::default())
+    let all = tokio_stream::once(first)
+        .chain(then)
+        .map(Ok::<_, Infallible>);
+    let events = Sse::new(all).keep_alive(KeepAlive::default());
+    Ok(events.into_response())
 }
 
 fn event(name: &str, data: impl AsRef<str>) -> sse::Event {

@@ -5,28 +5,24 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
 
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
 /// Path, type and content of each file.
-const FILES: [(&str, &str, &str); 4] = [
-    (
-        "/",
-        "text/html; charset=utf-8",
-        include_str!("../page/index.html"),
-    ),
-    (
-        "/page.css",
-        "text/css; charset=utf-8",
-        include_str!("../page/page.css"),
-    ),
-    (
-        "/page.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../page/page.js"),
-    ),
-    (
-        "/model.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../page/model.js"),
-    ),
+pub const FILES: [(&str, &str, &str); 12] = [
+    ("/", HTML, include_str!("../page/index.html")),
+    ("/page.css", CSS, include_str!("../page/page.css")),
+    ("/board.css", CSS, include_str!("../page/board.css")),
+    ("/page.js", SCRIPT, include_str!("../page/page.js")),
+    ("/api.js", SCRIPT, include_str!("../page/api.js")),
+    ("/board.js", SCRIPT, include_str!("../page/board.js")),
+    ("/channels.js", SCRIPT, include_str!("../page/channels.js")),
+    ("/chart.js", SCRIPT, include_str!("../page/chart.js")),
+    ("/faults.js", SCRIPT, include_str!("../page/faults.js")),
+    ("/frames.js", SCRIPT, include_str!("../page/frames.js")),
+    ("/model.js", SCRIPT, include_str!("../page/model.js")),
+    ("/ui.js", SCRIPT, include_str!("../page/ui.js")),
 ];
 
 /// The page needs nothing from elsewhere and no script in its text.

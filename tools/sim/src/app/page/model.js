@@ -1,7 +1,7 @@
 // What values mean, without the page.
 
 const PIN_MV = 3300;
-/** 10 V and 20 mA are full scale at the pin (docs/wiring.md). */
+const LARGEST_CODE = 4095;
 const KELVIN = 273.15;
 /** The firmware's default thermistor: 10 kOhm at 25 degrees, B = 3950 K, under a pull-up of 10 kOhm. */
 const BETA = 3950;
@@ -10,14 +10,15 @@ const T0 = 25 + KELVIN;
 const within = (millivolts) => Math.min(PIN_MV, Math.max(0, Math.round(millivolts)));
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
+/** 10 V and 20 mA are full scale at the pin (docs/wiring.md). */
 const linear = (unit, full) => ({
   unit,
   fromPin: (millivolts) => rounded((millivolts * full) / PIN_MV, 3),
   toPin: (value) => within((value * PIN_MV) / full),
 });
 
-/** The units of an analog input: from millivolts at the pin, and to them. */
-export const signals = {
+/** The ranges of an analog input: from millivolts at the pin, and to them. */
+export const inputs = {
   volts: linear("V", 10),
   milliamps: linear("mA", 20),
   degrees: {
@@ -34,20 +35,56 @@ export const signals = {
   },
 };
 
-/** What a code of an analog output is, by its jumper. */
-export function outputs(code) {
-  const share = code / 4095;
-  return `${(share * 10).toFixed(2)} V or ${(share * 20).toFixed(2)} mA`;
+/** The ranges of an analog output, which its jumper chooses: what a code of the DAC is. */
+export const outputs = {
+  volts: { unit: "V", fromCode: (code) => ((code * 10) / LARGEST_CODE).toFixed(2) },
+  milliamps: { unit: "mA", fromCode: (code) => ((code * 20) / LARGEST_CODE).toFixed(2) },
+};
+
+/** An analog channel as a share of full scale; null for any other channel. */
+export function share(channel) {
+  if (channel.kind === "ai") return channel.millivolts / PIN_MV;
+  if (channel.kind === "ao") return channel.code / LARGEST_CODE;
+  return null;
 }
 
-/** Milliseconds of silence before a frame; null before the first. */
-export function gapBefore(last, frame) {
-  return last ? (frame.start_us - last.end_us) / 1000 : null;
+/** The modules, and the labels of their five screw terminals. */
+const FOUR = ["1", "2", "3", "4", "COM"];
+export const modules = {
+  none: { text: "empty slot", terminals: ["", "", "", "", ""] },
+  "4di": { text: "4DI, digital inputs", terminals: FOUR },
+  "4do": { text: "4DO, digital outputs", terminals: FOUR },
+  "2relay": { text: "2Relay, relays", terminals: ["1 COM", "1 NO", "2 COM", "2 NO", "2 NC"] },
+  "4ai": { text: "4AI, analog inputs", terminals: FOUR },
+  "4ao": { text: "4AO, analog outputs", terminals: FOUR },
+  "2ai2ao": { text: "2AI2AO, analog inputs and outputs", terminals: FOUR },
+};
+
+/** The port of a board's only slot, which the state does not name: that of the modio-02. */
+const ONLY_PORT = 5;
+
+/** The slots of a board. The path of a board's only slot is the board's. */
+export function slotsOf(state) {
+  if (!state.slots) {
+    return [{ port: ONLY_PORT, path: "", module: state.module, channels: state.channels }];
+  }
+  return state.slots.map((slot) => ({ ...slot, path: `slots/${slot.port}/` }));
 }
+
+/** The Modbus address of a point (docs/points.md). */
+export function address(port, number) {
+  return `0x${((port - 1) * 4 + number - 1).toString(16).padStart(4, "0")}`;
+}
+
+/** The bytes of a frame, with spaces between them. */
+export const spaced = (hex) => hex.match(/../g)?.join(" ") ?? "";
 
 /** Whether a frame has all of the words in its meaning, its bytes or its direction. */
 export function isShown(frame, words) {
   const from = frame.direction === "rx" ? "master" : "unit";
-  const text = `${frame.summary} ${frame.bytes} ${from} ${frame.crc_ok ? "" : "bad"}`.toLowerCase();
-  return words.toLowerCase().split(/\s+/).every((word) => text.includes(word));
+  const state = frame.crc_ok && !frame.damaged ? "" : "bad";
+  const text = `${frame.summary} ${spaced(frame.bytes)} ${from} ${state}`.toLowerCase();
+  // Bytes may be typed without the spaces between them.
+  const isIn = (word) => text.includes(word) || (/^([0-9a-f]{2})+$/.test(word) && text.includes(spaced(word)));
+  return words.toLowerCase().split(/\s+/).every(isIn);
 }

@@ -1,6 +1,7 @@
 //! The bus with a USART on it: who hears what, and when.
 
 mod faults;
+mod several;
 
 use super::*;
 use crate::periph::timer::{Kind, Timer};

@@ -88,6 +88,15 @@ impl Cells {
         self.memory.host()
     }
 
+    pub(super) fn move_to(&mut self, mut memory: Memory) {
+        memory.bytes_mut().copy_from_slice(self.memory.bytes());
+        self.memory = memory;
+    }
+
+    pub(super) fn take_memory(&mut self) -> Memory {
+        core::mem::replace(&mut self.memory, Memory::new(1, 0))
+    }
+
     pub(super) fn bytes(&self) -> &[u8] {
         self.memory.bytes()
     }

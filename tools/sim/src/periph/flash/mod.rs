@@ -6,6 +6,7 @@
 mod array;
 mod operations;
 
+use crate::machine::memory::Memory;
 use crate::part::Part;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
@@ -148,6 +149,16 @@ impl Flash {
     /// Where the core finds the cells ([`crate::machine::memory::Memory::host`]).
     pub fn host(&mut self) -> *mut u8 {
         self.cells.host()
+    }
+
+    /// The cells move to `memory`, which is as large, and what is there now is lost.
+    pub(crate) fn move_to(&mut self, memory: Memory) {
+        self.cells.move_to(memory);
+    }
+
+    /// Takes the memory of the cells, of a flash that is not needed any more.
+    pub(crate) fn take_memory(&mut self) -> Memory {
+        self.cells.take_memory()
     }
 
     /// The contents.

@@ -114,6 +114,22 @@ pub struct Rcc {
 }
 
 impl Rcc {
+    /// The oscillators.
+    #[must_use]
+    pub fn oscillators(&self) -> Oscillators {
+        self.oscillators
+    }
+
+    /// The RC oscillators have these rates in Hz from now on.
+    pub fn set_rc_oscillators(&mut self, hsi: u32, lsi: u32) {
+        self.oscillators = Oscillators {
+            hsi,
+            lsi,
+            ..self.oscillators
+        };
+        self.changes.clocks = true;
+    }
+
     /// RCC as power-on leaves it, on a board with these oscillators, whose crystal works or not.
     #[must_use]
     pub fn new(crystal: bool, oscillators: Oscillators) -> Self {

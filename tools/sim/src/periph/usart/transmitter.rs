@@ -161,6 +161,11 @@ impl Transmitter {
         sending
     }
 
+    /// Whether something went out since the last [`Transmitter::take_sent`].
+    pub fn has_sent(&self) -> bool {
+        !self.sent.is_empty()
+    }
+
     /// What went out since the last call.
     pub fn take_sent(&mut self) -> Vec<Sent> {
         std::mem::take(&mut self.sent)

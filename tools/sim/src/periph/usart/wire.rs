@@ -2,6 +2,7 @@
 
 use super::{Sent, Usart};
 use crate::peripheral::Peripheral;
+use crate::serial::Rate;
 use crate::time::Time;
 
 /// Who drives the TX pin of a USART.
@@ -86,6 +87,34 @@ impl Usart {
         let listens = self.awaits_start() || wire.has_edges();
         let edge = wire.next_edge().filter(|_| listens);
         [self.next_event(), edge].into_iter().flatten().min()
+    }
+
+    /// Whether the transmitter has sent something that was not passed to its wire yet.
+    #[must_use]
+    pub fn has_sent(&self) -> bool {
+        self.tx.has_sent()
+    }
+
+    /// The length of a bit that it sends; `None` while the transmitter is off.
+    #[must_use]
+    pub fn bit(&self) -> Option<Time> {
+        let shape = self.shape()?;
+        Some(Rate::from_clock(shape.bit_cycles, shape.hz).bits(1))
+    }
+
+    /// The earliest instant at which a character can begin that has not begun, if the core does nothing before `now`
+    /// but may do anything then: the end of what is under way, or else a tick of the baud generator.
+    /// `None` while the transmitter is off: then an idle frame comes first.
+    #[must_use]
+    pub fn earliest_start(&self, now: Time) -> Option<Time> {
+        let shape = self.shape()?;
+        let under_way = self.tx.shift_end().filter(|&end| end >= now);
+        under_way.or_else(|| {
+            let rate = Rate::from_clock(shape.bit_cycles, shape.hz);
+            let after = now + Time::from_ps(1);
+            let (_, tick) = rate.ticks(1, after.saturating_sub(shape.since));
+            Some(shape.since + tick)
+        })
     }
 
     /// Takes the edges at the RX pin since the last call, for a timer that captures the same pin: of the falling

@@ -1,7 +1,7 @@
 //! What requests and responses say, in words: for people who read along.
 
-use super::adu::Framing;
-use super::master::Direction;
+use crate::adu::Framing;
+use crate::{Direction, names};
 
 /// A frame in words: the unit, and the request or response. `request` is the PDU of the request before, if that is known:
 /// it has the addresses that a response does not repeat.
@@ -37,56 +37,12 @@ pub fn bytes(framing: Framing, bytes: &[u8]) -> String {
     digits.join(" ")
 }
 
-/// The name of a function.
-#[must_use]
-pub fn function(code: u8) -> Option<&'static str> {
-    Some(match code & 0x7F {
-        0x01 => "read coils",
-        0x02 => "read discrete inputs",
-        0x03 => "read holding registers",
-        0x04 => "read input registers",
-        0x05 => "write single coil",
-        0x06 => "write single register",
-        0x07 => "read exception status",
-        0x08 => "diagnostics",
-        0x0B => "get comm event counter",
-        0x0C => "get comm event log",
-        0x0F => "write multiple coils",
-        0x10 => "write multiple registers",
-        0x11 => "report server id",
-        0x14 => "read file record",
-        0x15 => "write file record",
-        0x16 => "mask write register",
-        0x17 => "read/write multiple registers",
-        0x18 => "read FIFO queue",
-        0x2B => "encapsulated interface",
-        _ => return None,
-    })
-}
-
-/// The name of an exception (V1.1b3, 7).
-#[must_use]
-pub const fn exception(code: u8) -> &'static str {
-    match code {
-        0x01 => "illegal function",
-        0x02 => "illegal data address",
-        0x03 => "illegal data value",
-        0x04 => "server device failure",
-        0x05 => "acknowledge",
-        0x06 => "server device busy",
-        0x08 => "memory parity error",
-        0x0A => "gateway path unavailable",
-        0x0B => "gateway target device failed to respond",
-        _ => "unknown exception",
-    }
-}
-
-fn word(bytes: &[u8], at: usize) -> Option<u16> {
+pub(crate) fn word(bytes: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_be_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
 fn named(code: u8) -> String {
-    function(code).map_or_else(|| format!("function {code:02X}"), str::to_owned)
+    names::function(code).map_or_else(|| format!("function {code:02X}"), str::to_owned)
 }
 
 /// A request in words.
@@ -157,7 +113,8 @@ pub fn response(pdu: &[u8], request: Option<&[u8]>) -> String {
     let name = named(*code);
     if code & 0x80 != 0 {
         let reason = pdu.get(1).copied().unwrap_or_default();
-        return format!("{name}: exception {reason:02X}, {}", exception(reason));
+        let why = names::exception(reason).unwrap_or("unknown exception");
+        return format!("{name}: exception {reason:02X}, {why}");
     }
     let request = request.filter(|request| request.first() == Some(code));
     answered(*code, pdu, request)
@@ -180,6 +137,9 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         0x0F | 0x10 => format!("{:#06X} x {}", word(pdu, 1)?, word(pdu, 3)?),
         0x07 => format!("= {:08b}", pdu.get(1)?),
         0x0B => format!("status {:04X}, count {}", word(pdu, 1)?, word(pdu, 3)?),
+        0x0C => log(pdu)?,
+        0x11 => identity(pdu)?,
+        0x14 => groups(pdu)?,
         0x2B => {
             let objects = objects(pdu)?.into_iter();
             let texts =
@@ -188,6 +148,54 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         }
         _ => return None,
     })
+}
+
+/// The counters and the events in a response of function 0C (V1.1b3, 6.10): the latest event first.
+fn log(pdu: &[u8]) -> Option<String> {
+    let [status, events, messages] = [word(pdu, 2)?, word(pdu, 4)?, word(pdu, 6)?];
+    let latest = match bytes(Framing::Rtu, counted(pdu)?.get(6..)?) {
+        none if none.is_empty() => String::new(),
+        latest => format!(": {latest}"),
+    };
+    Some(format!(
+        "status {status:04X}, events {events}, messages {messages}{latest}"
+    ))
+}
+
+/// The identity in a response of function 11, which the device chooses, and the run indicator after it, if the device
+/// sends just that (V1.1b3, 6.13).
+fn identity(pdu: &[u8]) -> Option<String> {
+    let data = counted(pdu)?;
+    let (identity, state) = match data.split_last()? {
+        (0, identity) => (identity, ", off"),
+        (0xFF, identity) => (identity, ", on"),
+        _ => (data, ""),
+    };
+    let text = str::from_utf8(identity).ok().filter(|text| {
+        let printable = |letter: char| !letter.is_control();
+        !text.is_empty() && text.chars().all(printable)
+    });
+    let identity = text.map_or_else(|| bytes(Framing::Rtu, identity), |text| format!("{text:?}"));
+    Some(format!("= {identity}{state}"))
+}
+
+/// The records in a response of function 14, one group for each that was asked for (V1.1b3, 6.14).
+fn groups(pdu: &[u8]) -> Option<String> {
+    let mut rest = counted(pdu)?;
+    let mut groups = Vec::new();
+    while let Some((length, after)) = rest.split_first() {
+        // The length counts the reference type, which is 6.
+        let (group, after) = after.split_at_checked((*length).into())?;
+        groups.push(words(group.strip_prefix(&[6])?));
+        rest = after;
+    }
+    Some(format!("= {}", groups.join("; ")))
+}
+
+/// The bytes that the second byte of a PDU counts; `None` when there are more or fewer.
+fn counted(pdu: &[u8]) -> Option<&[u8]> {
+    let data = pdu.get(2..)?;
+    (data.len() == usize::from(*pdu.get(1)?)).then_some(data)
 }
 
 /// The objects in a response of function 2B/0E (V1.1b3, 6.21).
@@ -261,6 +269,39 @@ mod tests {
         );
         let file = [0x14, 7, 6, 0, 1, 0, 0, 0, 2];
         assert_eq!(request(&file), "read file record file 1, records 0 x 2");
+    }
+
+    #[test]
+    fn responses_with_a_byte_count_are_taken_apart() {
+        for (pdu, text) in [
+            // The example of V1.1b3, 6.10.
+            (
+                &[0x0C, 8, 0, 0, 1, 8, 1, 0x21, 0x20, 0][..],
+                "get comm event log status 0000, events 264, messages 289: 20 00",
+            ),
+            (
+                &[0x0C, 6, 0xFF, 0xFF, 0, 0, 0, 9],
+                "get comm event log status FFFF, events 0, messages 9",
+            ),
+            (&[0x0C, 7, 0, 0], "get comm event log: 07 00 00"),
+            (
+                &[0x11, 6, b'm', b'o', b'd', b'i', b'o', 0xFF],
+                "report server id = \"modio\", on",
+            ),
+            (&[0x11, 2, 1, 0], "report server id = 01, off"),
+            (&[0x11, 2, 1, 7], "report server id = 01 07"),
+            (&[0x11, 3, 1, 0xFF], "report server id: 03 01 FF"),
+            // The example of V1.1b3, 6.14.
+            (
+                &[
+                    0x14, 0x0C, 5, 6, 0x0D, 0xFE, 0, 0x20, 5, 6, 0x33, 0xCD, 0, 0x40,
+                ],
+                "read file record = 0DFE 0020; 33CD 0040",
+            ),
+            (&[0x14, 3, 5, 6, 0], "read file record: 03 05 06 00"),
+        ] {
+            assert_eq!(response(pdu, None), text);
+        }
     }
 
     #[test]

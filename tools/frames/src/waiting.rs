@@ -1,6 +1,6 @@
 //! Decides whether the bytes received so far contain the answer to a request.
 
-use super::adu::{Framing, MBAP, response_length};
+use crate::adu::{Framing, MBAP, response_length};
 
 /// Bytes in front of an answer that are forgiven: what a driver that is switched on makes of the line.
 const NOISE: usize = 3;

@@ -1,9 +1,12 @@
 //! The HTTP interface against a real board whose firmware does nothing.
 
+mod boards;
+mod description;
+
 use serde_json::{Value, json};
 
 use super::*;
-use crate::app::testing::{bench, bench_of};
+use crate::app::testing::{bench, bench_of, bench_of_boards};
 use sim::{Config, board};
 
 fn get(bench: &mut Bench, target: &str) -> Reply {
@@ -32,7 +35,7 @@ fn state(bench: &mut Bench) -> Value {
 #[test]
 fn the_state_has_everything_of_the_contract() {
     let mut bench = bench(Module::Di4);
-    bench.board.run_for(sim::Time::from_ms(3));
+    bench.bus.run_for(sim::Time::from_ms(3));
     let state = state(&mut bench);
     assert_eq!(state["virtual_ms"], 3);
     assert_eq!(state["dip"], 1);
@@ -105,21 +108,21 @@ fn power_and_switch_and_module() {
         post(&mut bench, "/api/dip", r#"{"value":247}"#).body["dip"],
         247
     );
-    let before = bench.board.now();
+    let before = bench.now();
     assert_eq!(
         post(&mut bench, "/api/power", r#"{"cycle":true}"#).body["powered"],
         true
     );
-    assert!(bench.board.now() > before);
+    assert!(bench.now() > before);
 }
 
 #[test]
 fn frames_are_told_from_a_number_on() {
     let mut bench = bench(Module::Di4);
     for _ in 0..2 {
-        bench.board.run_for(sim::Time::from_ms(1));
+        bench.bus.run_for(sim::Time::from_ms(1));
         bench.send(&[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C]);
-        bench.board.run_for(sim::Time::from_ms(20));
+        bench.bus.run_for(sim::Time::from_ms(20));
     }
     let all = get(&mut bench, "/api/frames").body;
     assert_eq!(all["frames"].as_array().unwrap().len(), 2);
@@ -192,125 +195,6 @@ fn anything_ill_formed_is_refused_and_changes_nothing() {
 }
 
 #[test]
-fn slots_of_a_larger_board_are_addressed_by_their_ports() {
-    let mut bench = bench_of(Config {
-        layout: &board::MODIO_08,
-        slots: vec![(3, Module::Relay2)],
-        ..Config::default()
-    });
-    let first = state(&mut bench);
-    let slots = first["slots"].as_array().expect("a list");
-    let ports: Vec<_> = slots.iter().map(|slot| &slot["port"]).collect();
-    assert_eq!(ports, [1, 2, 3, 4]);
-    let modules: Vec<_> = slots.iter().map(|slot| &slot["module"]).collect();
-    assert_eq!(modules, ["4di", "none", "2relay", "none"]);
-    assert_eq!(first["module"], "4di");
-    assert_eq!(first["channels"], slots[0]["channels"]);
-
-    let reply = post(&mut bench, "/api/slots/3/channels/2", r#"{"manual":true}"#);
-    assert_eq!(reply.status, 200);
-    assert_eq!(reply.body["slots"][2]["channels"][1]["manual"], true);
-    let reply = post(&mut bench, "/api/channels/4", r#"{"energised":true}"#);
-    assert_eq!(reply.body["slots"][0]["channels"][3]["energised"], true);
-
-    let plug = |bench: &mut Bench| post(bench, "/api/slots/4/module", r#"{"name":"4ai"}"#);
-    assert_eq!(plug(&mut bench).status, 409);
-    post(&mut bench, "/api/power", r#"{"on":false}"#);
-    assert_eq!(plug(&mut bench).body["slots"][3]["module"], "4ai");
-    for (path, status) in [
-        ("/api/slots/5/module", 404),
-        ("/api/slots/5/channels/1", 404),
-        ("/api/slots/x/module", 404),
-        ("/api/slots/3/channels/5", 404),
-        ("/api/slots/3", 404),
-        ("/api/slots/3/dip", 404),
-    ] {
-        let body = if path.ends_with("module") {
-            r#"{"name":"4do"}"#
-        } else {
-            r#"{"manual":true}"#
-        };
-        assert_eq!(post(&mut bench, path, body).status, status, "{path}");
-    }
-}
-
-#[test]
-fn a_board_with_one_slot_has_no_list_of_slots_but_a_port() {
-    let mut bench = bench(Module::Di4);
-    assert_eq!(state(&mut bench).get("slots"), None);
-    let reply = post(
-        &mut bench,
-        "/api/slots/5/channels/1",
-        r#"{"energised":true}"#,
-    );
-    assert_eq!(reply.body["channels"][0]["energised"], true);
-}
-
-#[test]
-fn the_description_names_every_path_and_no_other() {
-    let mut bench = bench(Module::Di4);
-    let described = get(&mut bench, "/api/openapi.json");
-    assert_eq!(described.status, 200);
-    let paths = described.body["paths"].as_object().unwrap();
-    // The table of this module's documentation; `/api/events` is the server's own.
-    let mut known: Vec<_> = include_str!("api.rs")
-        .lines()
-        .filter_map(|line| line.strip_prefix("//! | `"))
-        .filter_map(|row| row.split(['`', '?']).next())
-        .map(|row| row.replace("/N", "/{channel}"))
-        .collect();
-    known.push("GET /api/events".to_owned());
-    for (path, methods) in paths {
-        for method in methods.as_object().unwrap().keys() {
-            if method == "parameters" {
-                continue;
-            }
-            let method = method.to_uppercase();
-            let plain = path.replace("/slots/{port}", "");
-            let known = known.iter().any(|row| *row == format!("{method} {plain}"));
-            assert!(known, "{method} {path}");
-            let target = path.replace("{port}", "5").replace("{channel}", "1");
-            let status = ask(&mut bench, &method, &target, "{}").status;
-            let expected = if method == "GET" { 200 } else { 400 };
-            assert!(
-                status == expected || path == "/api/events",
-                "{path}: {status}"
-            );
-        }
-    }
-    for row in &known {
-        let (method, path) = row.split_once(' ').unwrap();
-        let there = paths
-            .get(path)
-            .is_some_and(|methods| methods.get(method.to_lowercase()).is_some());
-        assert!(there || path == "/api/slots/PORT/...", "{row}");
-    }
-}
-
-#[test]
-fn replies_have_the_described_entries() {
-    let mut bench = bench_of(Config {
-        layout: &board::MODIO_08,
-        ..Config::default()
-    });
-    let schemas = get(&mut bench, "/api/openapi.json").body["components"]["schemas"].take();
-    bench.send(&[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C]);
-    bench.board.run_for(sim::Time::from_ms(20));
-    let frame = get(&mut bench, "/api/frames").body["frames"][0].take();
-    for (name, reply) in [("State", state(&mut bench)), ("Frame", frame)] {
-        let mut described: Vec<_> = schemas[name]["properties"]
-            .as_object()
-            .unwrap()
-            .keys()
-            .collect();
-        described.sort();
-        let mut there: Vec<_> = reply.as_object().unwrap().keys().collect();
-        there.sort();
-        assert_eq!(described, there, "{name}");
-    }
-}
-
-#[test]
 fn findings_have_an_address_and_a_time() {
     use sim::Image;
     // ldr r0, [pc, #4]; ldr r0, [r0]; b .; and the address of GPIOC, whose clock is off.
@@ -320,8 +204,9 @@ fn findings_have_an_address_and_a_time() {
     ];
     let image = Image::from_bytes(&image).unwrap();
     let board = sim::Board::new(&image, Config::default()).unwrap();
-    let mut bench = Bench::new(board);
-    bench.board.run_for(sim::Time::from_ms(10));
+    let unit = crate::app::unit::Unit::new("modio-02".to_owned(), None);
+    let mut bench = Bench::new(vec![(board, unit)]);
+    bench.bus.run_for(sim::Time::from_ms(10));
     let found = get(&mut bench, "/api/findings").body["findings"][0].take();
     assert_eq!(found["pc"], "0x0800000a", "{found}");
     assert!(
@@ -332,28 +217,51 @@ fn findings_have_an_address_and_a_time() {
 }
 
 #[test]
-fn a_board_is_also_addressed_by_its_name() {
-    let mut bench = bench(Module::Di4);
-    let boards = get(&mut bench, "/api/boards").body;
+fn faults_are_made_shown_and_ended() {
+    let mut bench = bench(Module::Ao4);
+    let none = json!({
+        "bit_error_rate": 0.0, "drop_rate": 0.0, "noise_hz": 0.0,
+        "i2c_absent": false, "hse_failed": false, "hsi_percent": 0.0, "lsi_khz": 40.0,
+    });
+    assert_eq!(get(&mut bench, "/api/faults").body, none);
+    let all = json!({
+        "bit_error_rate": 0.001, "drop_rate": 0.5, "noise_hz": 10.0,
+        "i2c_absent": true, "hse_failed": true, "hsi_percent": -1.5, "lsi_khz": 30.0,
+    });
+    let made = post(&mut bench, "/api/faults", &all.to_string());
+    assert_eq!((made.status, &made.body), (200, &all));
+    // 8 MHz less 1.5 %: the program here runs from the HSI.
+    assert_eq!(bench.first().hclk(), 7_880_000);
+    assert!(!bench.first().crystal());
+    let one = post(&mut bench, "/api/faults", r#"{"i2c_absent":false}"#).body;
     assert_eq!(
-        boards,
-        json!([{ "name": "modio-02", "board": "modio-02", "dip": 1 }])
+        (&one["i2c_absent"], &one["drop_rate"]),
+        (&json!(false), &json!(0.5))
     );
-    let reply = post(
-        &mut bench,
-        "/api/boards/modio-02/channels/2",
-        r#"{"energised":true}"#,
+    assert_eq!(
+        post(&mut bench, "/api/faults", &none.to_string()).body,
+        none
     );
-    assert_eq!(reply.body["channels"][1]["energised"], true);
-    let same = get(&mut bench, "/api/boards/modio-02/state").body;
-    assert_eq!(same, state(&mut bench));
-    for path in [
-        "/api/boards/modio-08/state",
-        "/api/boards/modio-02",
-        "/api/boards/modio-02/",
-        "/api/boards/modio-02state",
-        "/api/boards/",
+
+    for body in [
+        "{}",
+        "[]",
+        r#"{"smoke":true}"#,
+        r#"{"hse_failed":1}"#,
+        r#"{"drop_rate":1.1}"#,
+        r#"{"drop_rate":-0.1}"#,
+        r#"{"bit_error_rate":0.6}"#,
+        r#"{"noise_hz":10001}"#,
+        r#"{"hsi_percent":21}"#,
+        r#"{"lsi_khz":14}"#,
+        r#"{"hse_failed":true,"lsi_khz":900}"#,
     ] {
-        assert_eq!(get(&mut bench, path).status, 404, "{path}");
+        assert_eq!(post(&mut bench, "/api/faults", body).status, 400, "{body}");
     }
+    assert_eq!(
+        get(&mut bench, "/api/faults").body,
+        none,
+        "nothing half done"
+    );
+    assert_eq!(ask(&mut bench, "DELETE", "/api/faults", "").status, 405);
 }

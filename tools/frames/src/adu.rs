@@ -26,6 +26,15 @@ pub enum Framing {
 }
 
 impl Framing {
+    /// Returns how a frame on a serial line is marked off, by its own form; `None` when its check is wrong. Each byte of
+    /// an ASCII frame has to fit, so an RTU frame is not mistaken for one.
+    #[must_use]
+    pub fn on_line(frame: &[u8]) -> Option<Self> {
+        [Self::Ascii, Self::Rtu]
+            .into_iter()
+            .find(|framing| framing.open(frame).is_some())
+    }
+
     /// The frame with this address and PDU. `transaction` counts for Modbus TCP only.
     #[must_use]
     pub fn frame(self, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
@@ -178,6 +187,21 @@ mod tests {
             let mut damaged = frame.clone();
             damaged[5] ^= 1;
             assert_eq!(framing.open(&damaged), None, "{framing:?}");
+        }
+    }
+
+    #[test]
+    fn form_of_a_frame_shows_how_it_is_marked_off() {
+        for framing in [Framing::Rtu, Framing::Ascii] {
+            // Unit 0x3A has the code of the colon.
+            let frame = framing.frame(0, 0x3A, &[3, 0, 0, 0, 1]);
+            assert_eq!(Framing::on_line(&frame), Some(framing));
+            assert_eq!(Framing::on_line(&frame[..frame.len() - 1]), None);
+        }
+        assert_eq!(Framing::on_line(&Framing::Mbap.frame(1, 1, &[7])), None);
+        // 0xFFFF is the CRC of no byte at all.
+        for short in [&[0xFF, 0xFF][..], &[1, 0x7E, 0x80], &[1], &[], b":\r\n"] {
+            assert_eq!(Framing::on_line(short), None, "{short:02X?}");
         }
     }
 

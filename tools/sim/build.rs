@@ -1,0 +1,53 @@
+//! Puts firmware images into the program, so that it runs without an image file: every `*.elf` of the directory that
+//! the variable `MODIO_SIM_IMAGES` names, under the name of its file, which is the board's. `cargo xtask dist` sets the
+//! variable; without it there are none.
+
+use std::env;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const VARIABLE: &str = "MODIO_SIM_IMAGES";
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed={VARIABLE}");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    let mut rows = String::new();
+    if let Some(directory) = env::var_os(VARIABLE) {
+        println!(
+            "cargo::rerun-if-changed={}",
+            Path::new(&directory).display()
+        );
+        for (name, file) in images(Path::new(&directory)) {
+            // Beside the code that includes it, so that no path of this machine is in the program.
+            let copy = format!("{name}.elf");
+            fs::copy(&file, out.join(&copy)).expect("cargo's directory can be written to");
+            writeln!(
+                rows,
+                "    ({name:?}, include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{copy}\"))),"
+            )
+            .expect("a String takes everything");
+        }
+    }
+    fs::write(out.join("images.rs"), format!("&[\n{rows}]\n"))
+        .expect("cargo's directory can be written to");
+}
+
+/// The images in a directory, by name.
+fn images(directory: &Path) -> Vec<(String, PathBuf)> {
+    let files = fs::read_dir(directory)
+        .unwrap_or_else(|error| panic!("{VARIABLE}: {}: {error}", directory.display()));
+    let mut found: Vec<(String, PathBuf)> = files
+        .map(|file| file.expect("a directory that can be read").path())
+        .filter(|file| file.extension().is_some_and(|extension| extension == "elf"))
+        .filter_map(|file| Some((file.file_stem()?.to_str()?.to_owned(), file.clone())))
+        .collect();
+    found.sort();
+    assert!(
+        !found.is_empty(),
+        "{VARIABLE}: no image in {}",
+        directory.display()
+    );
+    found
+}

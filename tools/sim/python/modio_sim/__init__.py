@@ -1,0 +1,26 @@
+"""Starts and operates virtual modio boards.
+
+The program `modio-sim` runs the firmware of a modio board on an emulated microcontroller. This package starts it, or
+attaches to one that runs, and does through its HTTP interface what hands and eyes do at a real board:
+
+    import modio_sim
+
+    with modio_sim.Simulator.start(module="4di") as sim:
+        sim.set_channel(1, energised=True)
+        print(sim.pty)  # the serial port for a Modbus master
+        for frame in sim.frames():
+            print(frame.summary)
+
+It needs nothing beyond Python's standard library. All errors are of the class `SimulatorError`.
+"""
+
+from .board import Board
+from .errors import RefusedError, SimulatorError, StartError, UnreachableError
+from .events import Events
+from .simulator import Simulator
+from .model import BoardInfo, Channel, Faults, Finding, Frame, Leds, Line, Lost, Slot, State
+
+__all__ = [
+    "Board", "BoardInfo", "Channel", "Events", "Faults", "Finding", "Frame", "Leds", "Line", "Lost", "RefusedError",
+    "Simulator", "SimulatorError", "Slot", "StartError", "State", "UnreachableError",
+]

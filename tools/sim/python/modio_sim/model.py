@@ -1,0 +1,191 @@
+"""Types of what the simulator returns. Fields have the names of its HTTP interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Dict, Mapping, Optional, Tuple, Type, TypedDict, TypeVar
+
+T = TypeVar("T")
+
+
+def taken(what: Type[T], data: Mapping[str, Any]) -> T:
+    """Makes a `what` from those members of a JSON object that are its fields. A newer simulator may send more members."""
+    names = {field.name for field in fields(what)}  # type: ignore[arg-type]
+    return what(**{name: value for name, value in data.items() if name in names})
+
+
+@dataclass(frozen=True)
+class Leds:
+    """The LEDs of a board; true when lit."""
+
+    activity: bool
+    fault: bool
+    run: bool
+
+
+@dataclass(frozen=True)
+class Line:
+    """The RS-485 line, as its client has it."""
+
+    baud: int
+    format: str
+    """Such as "8N2"."""
+    rx_frames: int
+    """How many frames were sent to the unit."""
+    tx_frames: int
+    """How many frames the unit has sent."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of a module. Fields that its kind does not have are None."""
+
+    kind: str
+    """"di", "do", "relay", "ai", "ao" or "none"."""
+    energised: Optional[bool] = None
+    """Of a digital input: voltage is applied. Of a relay: its coil is energised."""
+    on: Optional[bool] = None
+    """Of a digital output."""
+    manual: Optional[bool] = None
+    """Of a relay: its jumper is set to manual."""
+    millivolts: Optional[int] = None
+    """Of an analog input: what is applied at the pin, 0 to 3300."""
+    code: Optional[int] = None
+    """Of an analog output: what its converter puts out, 0 to 4095."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A slot of a board."""
+
+    port: int
+    module: str
+    channels: Tuple[Channel, ...]
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Slot:
+        """Makes a slot from JSON."""
+        return taken(Slot, {**data, "channels": channels(data)})
+
+
+@dataclass(frozen=True)
+class State:
+    """All that can be seen of a board."""
+
+    virtual_ms: int
+    """Virtual time since the simulator was started."""
+    board: str
+    """"modio-02" or "modio-08"."""
+    powered: bool
+    dip: int
+    """The DIP switch as a number."""
+    module: str
+    """What is plugged into the first slot."""
+    leds: Leds
+    driver_enable: bool
+    """The unit's RS-485 driver is on."""
+    line: Line
+    channels: Tuple[Channel, ...]
+    """The four channels of the first slot: `channels[0]` is channel 1."""
+    log_tail: Tuple[str, ...]
+    """The last lines of the firmware's log."""
+    slots: Tuple[Slot, ...] = ()
+    """All slots of a board that has several; empty for a board with one."""
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> State:
+        """Makes a state from JSON."""
+        return taken(State, {
+            **data,
+            "leds": taken(Leds, data["leds"]),
+            "line": taken(Line, data["line"]),
+            "channels": channels(data),
+            "log_tail": tuple(data["log_tail"]),
+            "slots": tuple(Slot.from_json(slot) for slot in data.get("slots", ())),
+        })
+
+    def slot(self, port: int) -> Slot:
+        """The slot at a port of a board that has several; KeyError when there is none."""
+        for slot in self.slots:
+            if slot.port == port:
+                return slot
+        raise KeyError(f"the board has no slot at port {port}")
+
+
+def channels(data: Mapping[str, Any]) -> Tuple[Channel, ...]:
+    """The channels of a state or a slot."""
+    return tuple(taken(Channel, channel) for channel in data["channels"])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame on the line."""
+
+    number: int
+    direction: str
+    """As the unit sees it: "rx" or "tx"."""
+    start_us: int
+    """Virtual microseconds."""
+    end_us: int
+    bytes: bytes
+    summary: str
+    """What it means, in a line."""
+    crc_ok: bool
+    gap_us: Optional[int]
+    """Silence before it; None for the first frame."""
+    turnaround_us: Optional[int]
+    """Of a reply: from the end of the request to its start; None for any other frame."""
+    damaged: bool
+    """A character was collided with, or bad."""
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Frame:
+        """Makes a frame from JSON."""
+        return taken(Frame, {**data, "bytes": bytes.fromhex(data["bytes"])})
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that the firmware did and a real microcontroller would not take well."""
+
+    at_us: int
+    """Virtual time of the first time."""
+    pc: str
+    """Address of the instruction."""
+    what: str
+    count: int
+    """How often it happened."""
+
+
+@dataclass(frozen=True)
+class BoardInfo:
+    """A board on the line."""
+
+    name: str
+    """What `Simulator.board` knows it by."""
+    board: str
+    """"modio-02" or "modio-08"."""
+    dip: int
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Events that were lost because they were not read in time."""
+
+    count: int
+
+
+class Faults(TypedDict, total=False):
+    """What is wrong with the line, the board or the chip, by intention. What is missing stays as it is."""
+
+    bit_error_rate: float
+    drop_rate: float
+    noise_hz: float
+    i2c_absent: bool
+    hse_failed: bool
+    hsi_percent: float
+    lsi_khz: float
+
+
+# What a request is answered with, as JSON.
+Json = Dict[str, Any]

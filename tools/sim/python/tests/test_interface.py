@@ -1,0 +1,139 @@
+"""The client has all of the HTTP interface that the simulator describes (src/app/openapi.json)."""
+
+import ast
+import dataclasses
+import inspect
+import json
+import pathlib
+import re
+import typing
+import unittest
+
+import modio_sim
+from modio_sim.connection import Http
+
+HERE = pathlib.Path(__file__).resolve().parent
+DESCRIPTION = json.loads((HERE.parents[1] / "src/app/openapi.json").read_text())
+
+CHANNELS = [{"kind": "none"}] * 4
+STATE = {
+    "virtual_ms": 1, "board": "modio-08", "powered": True, "dip": 1, "module": "4di",
+    "leds": {"activity": False, "fault": False, "run": True}, "driver_enable": False,
+    "line": {"baud": 9600, "format": "8N2", "rx_frames": 0, "tx_frames": 0},
+    "channels": CHANNELS, "log_tail": [], "slots": [{"port": 1, "module": "4di", "channels": CHANNELS}],
+}
+
+# How each method that makes a request is called, at least once.
+CALLS = {
+    "board": [], "boards": [{}], "events": [{}], "faults": [{}], "findings": [{}], "frames": [{"since": 7}],
+    "openapi": [{}], "power_cycle": [{}], "power_off": [{}], "power_on": [{}],
+    "set_channel": [{"channel": 4, "energised": True}, {"channel": 4, "manual": True, "port": 1}],
+    "set_dip": [{"value": 5}], "set_faults": [{"faults": {"drop_rate": 0.5}}],
+    "set_module": [{"name": "4do"}, {"name": "4do", "port": 1}], "state": [{}],
+}
+# Those that make none, or only by others.
+OTHERS = {"attach", "close", "endpoint", "start", "wait", "wait_for"}
+
+
+class Recorder(Http):
+    """Writes down what is asked, and answers something of the right form."""
+
+    def __init__(self):
+        super().__init__("http://nowhere", 1)
+        self.asked = set()
+
+    def open(self, method, path, body=None):
+        self.asked.add((method, path.partition("?")[0]))
+
+    def ask(self, method, path, body=None):
+        self.open(method, path)
+        return {
+            "boards": [{"name": "one", "board": "modio-02", "dip": 1}], "findings": {"findings": []},
+            "frames": {"frames": []}, "faults": {}, "openapi.json": {},
+        }.get(path.partition("?")[0].rpartition("/")[2], STATE)
+
+
+def called(simulator, board):
+    """Calls all methods of a simulator, those of a board on `board`; the requests that they make."""
+    recorder = simulator._http
+    recorder.asked.clear()
+    for name, calls in CALLS.items():
+        for arguments in calls:
+            getattr(board if hasattr(board, name) else simulator, name)(**arguments)
+    return recorder.asked
+
+
+def matches(template, path):
+    """Whether a path is one of a template such as `/api/channels/{channel}`."""
+    return re.fullmatch(re.sub(r"\\{[^/]+\\}", "[^/]+", re.escape(template)), path)
+
+
+class Paths(unittest.TestCase):
+    def setUp(self):
+        self.simulator = modio_sim.Simulator("http://nowhere")
+        self.simulator._http = Recorder()
+
+    def described(self):
+        return [(method.upper(), path) for path, methods in DESCRIPTION["paths"].items()
+                for method in methods if method in ("get", "post", "put", "patch", "delete")]
+
+    def test_every_method_is_called_here(self):
+        methods = {name for name, _ in inspect.getmembers(modio_sim.Simulator, callable) if name[0] != "_"}
+        self.assertEqual(methods, CALLS.keys() | OTHERS)
+
+    def test_every_request_that_is_described_is_made(self):
+        asked = called(self.simulator, self.simulator)
+        for method, template in self.described():
+            made = any(method == kind and matches(template, path) for kind, path in asked)
+            self.assertTrue(made, f"no method makes the request {method} {template}")
+
+    def test_a_board_is_asked_by_its_name(self):
+        asked = called(self.simulator, self.simulator.board("left/1"))
+        of_all = {("GET", "/api/events"), ("GET", "/api/boards"), ("GET", "/api/openapi.json")}
+        for method, path in asked - of_all:
+            self.assertTrue(path.startswith("/api/boards/left%2F1/"), path)
+        self.assertIn(("POST", "/api/boards/left%2F1/slots/1/channels/4"), asked)
+
+    def test_one_thing_is_applied_to_a_channel(self):
+        for given in ({}, {"energised": True, "manual": False}):
+            with self.assertRaises(ValueError):
+                self.simulator.set_channel(1, **given)
+        self.assertEqual(self.simulator._http.asked, set())
+
+
+class Types(unittest.TestCase):
+    def test_every_member_that_is_described_is_a_field(self):
+        schemas = DESCRIPTION["components"]["schemas"]
+        seen = set()
+        for schema, of in (("State", modio_sim.State), ("Slot", modio_sim.Slot), ("Channel", modio_sim.Channel),
+                           ("Frame", modio_sim.Frame), ("Finding", modio_sim.Finding), ("Board", modio_sim.BoardInfo),
+                           ("Faults", modio_sim.Faults)):
+            if schema not in schemas:
+                continue
+            seen.add(schema)
+            kinds = schemas[schema].get("oneOf", [schemas[schema]])
+            members = {name for kind in kinds for name in kind["properties"]}
+            fields = typing.get_type_hints(of).keys()
+            self.assertEqual(members - fields, set(), f"{of.__name__} lacks them")
+        for name, of in (("leds", modio_sim.Leds), ("line", modio_sim.Line)):
+            members = schemas["State"]["properties"][name]["properties"].keys()
+            self.assertEqual(members, {field.name for field in dataclasses.fields(of)})
+        self.assertGreaterEqual(seen, {"State", "Slot", "Channel", "Frame", "Finding", "Board"})
+
+    def test_what_a_newer_simulator_tells_more_is_left_out(self):
+        state = modio_sim.State.from_json({**STATE, "temperature": 300})
+        self.assertEqual(state.virtual_ms, 1)
+        self.assertEqual(state.slot(1).module, "4di")
+        with self.assertRaises(KeyError):
+            state.slot(5)
+
+
+class Package(unittest.TestCase):
+    def test_it_is_written_in_the_oldest_python_that_it_names(self):
+        for file in (HERE.parent / "modio_sim").glob("*.py"):
+            ast.parse(file.read_text(), str(file), feature_version=(3, 9))
+
+    def test_its_version_is_that_of_the_simulator(self):
+        versions = {re.search(r'^version = "(.+)"$', file.read_text(), re.MULTILINE)[1]
+                    for file in (HERE.parent / "pyproject.toml", HERE.parents[3] / "Cargo.toml")}
+        self.assertEqual(len(versions), 1, versions)

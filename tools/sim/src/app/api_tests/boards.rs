@@ -1,0 +1,119 @@
+//! Requests to one of several boards, and to one of several slots.
+
+use super::*;
+
+#[test]
+fn slots_of_a_larger_board_are_addressed_by_their_ports() {
+    let mut bench = bench_of(Config {
+        layout: &board::MODIO_08,
+        slots: vec![(3, Module::Relay2)],
+        ..Config::default()
+    });
+    let first = state(&mut bench);
+    let slots = first["slots"].as_array().expect("a list");
+    let ports: Vec<_> = slots.iter().map(|slot| &slot["port"]).collect();
+    assert_eq!(ports, [1, 2, 3, 4]);
+    let modules: Vec<_> = slots.iter().map(|slot| &slot["module"]).collect();
+    assert_eq!(modules, ["4di", "none", "2relay", "none"]);
+    assert_eq!(first["module"], "4di");
+    assert_eq!(first["channels"], slots[0]["channels"]);
+
+    let reply = post(&mut bench, "/api/slots/3/channels/2", r#"{"manual":true}"#);
+    assert_eq!(reply.status, 200);
+    assert_eq!(reply.body["slots"][2]["channels"][1]["manual"], true);
+    let reply = post(&mut bench, "/api/channels/4", r#"{"energised":true}"#);
+    assert_eq!(reply.body["slots"][0]["channels"][3]["energised"], true);
+
+    let plug = |bench: &mut Bench| post(bench, "/api/slots/4/module", r#"{"name":"4ai"}"#);
+    assert_eq!(plug(&mut bench).status, 409);
+    post(&mut bench, "/api/power", r#"{"on":false}"#);
+    assert_eq!(plug(&mut bench).body["slots"][3]["module"], "4ai");
+    for (path, status) in [
+        ("/api/slots/5/module", 404),
+        ("/api/slots/5/channels/1", 404),
+        ("/api/slots/x/module", 404),
+        ("/api/slots/3/channels/5", 404),
+        ("/api/slots/3", 404),
+        ("/api/slots/3/dip", 404),
+    ] {
+        let body = if path.ends_with("module") {
+            r#"{"name":"4do"}"#
+        } else {
+            r#"{"manual":true}"#
+        };
+        assert_eq!(post(&mut bench, path, body).status, status, "{path}");
+    }
+}
+
+#[test]
+fn a_board_with_one_slot_has_no_list_of_slots_but_a_port() {
+    let mut bench = bench(Module::Di4);
+    assert_eq!(state(&mut bench).get("slots"), None);
+    let reply = post(
+        &mut bench,
+        "/api/slots/5/channels/1",
+        r#"{"energised":true}"#,
+    );
+    assert_eq!(reply.body["channels"][0]["energised"], true);
+}
+
+#[test]
+fn a_board_is_also_addressed_by_its_name() {
+    let mut bench = bench(Module::Di4);
+    let boards = get(&mut bench, "/api/boards").body;
+    assert_eq!(
+        boards,
+        json!([{ "name": "modio-02", "board": "modio-02", "dip": 1 }])
+    );
+    let reply = post(
+        &mut bench,
+        "/api/boards/modio-02/channels/2",
+        r#"{"energised":true}"#,
+    );
+    assert_eq!(reply.body["channels"][1]["energised"], true);
+    let same = get(&mut bench, "/api/boards/modio-02/state").body;
+    assert_eq!(same, state(&mut bench));
+    for path in [
+        "/api/boards/modio-08/state",
+        "/api/boards/modio-02",
+        "/api/boards/modio-02/",
+        "/api/boards/modio-02state",
+        "/api/boards/",
+    ] {
+        assert_eq!(get(&mut bench, path).status, 404, "{path}");
+    }
+}
+
+#[test]
+fn several_boards_are_addressed_by_their_names_and_the_first_one_without() {
+    let config = |module| Config {
+        module,
+        ..Config::default()
+    };
+    let mut bench = bench_of_boards([("pump", config(Module::Di4)), ("fan", config(Module::Ai4))]);
+    let boards = get(&mut bench, "/api/boards").body;
+    assert_eq!(
+        boards,
+        json!([
+            { "name": "pump", "board": "modio-02", "dip": 1 },
+            { "name": "fan", "board": "modio-02", "dip": 1 },
+        ])
+    );
+    assert_eq!(state(&mut bench)["module"], "4di");
+    let fan = get(&mut bench, "/api/boards/fan/state").body;
+    assert_eq!(fan["module"], "4ai");
+
+    let millivolts = r#"{"millivolts":500}"#;
+    let changed = post(&mut bench, "/api/boards/fan/channels/2", millivolts);
+    assert_eq!(changed.body["channels"][1]["millivolts"], 500);
+    assert_eq!(post(&mut bench, "/api/channels/2", millivolts).status, 409);
+
+    post(&mut bench, "/api/boards/fan/dip", r#"{"value":7}"#);
+    assert_eq!(state(&mut bench)["dip"], 1);
+    post(&mut bench, "/api/boards/fan/power", r#"{"cycle":true}"#);
+    let both = ["pump", "fan"].map(|name| {
+        let state = get(&mut bench, &format!("/api/boards/{name}/state")).body;
+        (state["dip"].clone(), state["virtual_ms"].clone())
+    });
+    assert_eq!(both, [(json!(1), json!(100)), (json!(7), json!(100))]);
+}

@@ -1,0 +1,48 @@
+//! What is attached to the line besides the endpoints for bytes: the Modbus TCP gateway and the capture file.
+
+use std::sync::mpsc::Sender;
+
+use sim_options::Options;
+
+use super::Event;
+use super::bench::Bench;
+use super::capture::Capture;
+use super::gateway::Gateway;
+
+/// The gateway and the capture file, if they are wanted.
+pub struct Attached {
+    /// `--modbus-tcp`.
+    pub gateway: Option<Gateway>,
+    /// `--record`.
+    capture: Option<Capture>,
+}
+
+impl Attached {
+    /// Attaches what the options name.
+    ///
+    /// # Errors
+    ///
+    /// In one line: an address that cannot be listened at, a file that cannot be written.
+    pub fn new(options: &Options, events: Sender<Event>) -> Result<Self, String> {
+        Ok(Self {
+            gateway: options
+                .modbus_tcp
+                .map(|address| Gateway::listen(address, events))
+                .transpose()?,
+            capture: options.record.as_deref().map(Capture::create).transpose()?,
+        })
+    }
+
+    /// Brings both up to date with the line. While a debugger has `halted` the core, time stands still.
+    pub fn update(&mut self, bench: &mut Bench, halted: bool) {
+        if let Some(capture) = &mut self.capture {
+            capture.update(bench.bus.line());
+            if capture.failed() {
+                self.capture = None;
+            }
+        }
+        if let Some(gateway) = &mut self.gateway {
+            gateway.update(bench, halted);
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Makes the boards that the options name, each with its image, flash and modules.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use register_map::configuration;
+use sim::board::Layout;
+use sim::{Board, Config, Image};
+use sim_options::{Fitting, Options};
+
+use super::flash_file::FlashFile;
+use super::inside;
+use super::unit::Unit;
+
+/// Makes the boards. A board with a flash file starts with the contents of the file; the image overwrites its own pages.
+///
+/// # Errors
+///
+/// In one line: an image or a file that is missing or of no use, a slot that a board does not have.
+pub fn fitted(options: &Options) -> Result<Vec<(Board, Unit)>, String> {
+    let fittings = options.fittings()?;
+    let mut images = BTreeMap::new();
+    let several = fittings.len() > 1;
+    let mut boards = Vec::new();
+    for (fitting, number) in fittings.into_iter().zip(1..) {
+        let name = fitting.board.name;
+        let elf = options.elf_of(fitting.board);
+        let image = match images.get(name) {
+            Some(image) => image,
+            None => {
+                let image = elf.map_or_else(|| inside::image(fitting.board), image)?;
+                images.entry(name).or_insert(image)
+            }
+        };
+        let (config, flash) = config(&fitting, number, options)?;
+        let board = Board::new(image, config).map_err(|error| {
+            let what = match several {
+                true => format!("{}: {error}", fitting.name),
+                false => error.to_string(),
+            };
+            match error {
+                sim::Error::Slot(_) => format!("{name}: {what}"),
+                _ => match elf {
+                    Some(elf) => format!("{}: {what}", elf.display()),
+                    None => format!("the image inside: {what}"),
+                },
+            }
+        })?;
+        boards.push((board, Unit::new(fitting.name, flash)));
+    }
+    Ok(boards)
+}
+
+/// Returns the configuration of board `number` of the line, from 1, and its flash file.
+fn config(
+    fitting: &Fitting,
+    number: u8,
+    options: &Options,
+) -> Result<(Config, Option<FlashFile>), String> {
+    let layout = Layout::of(fitting.board).ok_or("the simulator does not know this board")?;
+    let path = fitting.flash.as_deref();
+    let opened = path.map(|path| FlashFile::open(path, layout.part.flash_size));
+    let (file, stored) = opened.transpose()?.unzip();
+    let mut flash = stored
+        .flatten()
+        .unwrap_or_else(|| vec![0xFF; layout.part.flash_size]);
+    let mut config = Config {
+        layout,
+        dip: fitting.dip,
+        module: fitting.module,
+        slots: fitting.slots.clone(),
+        corner: options.corner.parse()?,
+        ..Config::default()
+    };
+    // Give each part its own unique identity and its own random seed.
+    let [.., last] = &mut config.unique_id;
+    *last = last.wrapping_add(number - 1);
+    config.seed += u64::from(number - 1);
+    if options.preset() {
+        write_preset(&config, &mut flash);
+    }
+    config.flash = Some(flash);
+    Ok((config, file))
+}
+
+fn image(elf: &Path) -> Result<Image, String> {
+    Image::read(elf).map_err(|error| format!("cannot run the image {error}"))
+}
+
+/// Stores a configuration that knows which modules are plugged, when nothing is stored.
+fn write_preset(config: &Config, flash: &mut [u8]) {
+    if config.layout.stores_nothing(flash) {
+        // One setting for each port: they fit.
+        let settings: Vec<_> = configuration::modules(config.plugged()).collect();
+        config.layout.store(flash, &settings);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use register_map::{Module, record};
+    use sim::machine::memory::FLASH_BASE;
+
+    use super::*;
+
+    #[test]
+    fn a_preset_names_every_plugged_module_and_is_stored_only_where_nothing_is() {
+        for layout in Layout::ALL {
+            let fitted = |module| Config {
+                layout,
+                slots: layout
+                    .slots
+                    .iter()
+                    .map(|slot| (slot.port, module))
+                    .collect(),
+                ..Config::default()
+            };
+            let mut flash = vec![0xFF; layout.part.flash_size];
+            write_preset(&fitted(Module::Do4), &mut flash);
+            let at = (layout.board.store.first - FLASH_BASE) as usize;
+            let page = at..at + layout.board.store.bytes as usize;
+            let (_, record) = record::records(&flash[page]).next().unwrap();
+            let modules = layout.board.ports().map(|port| (0x010F + port, 2));
+            assert!(record.pairs().eq(modules), "{}", layout.board);
+            let before = flash.clone();
+            write_preset(&fitted(Module::Di4), &mut flash);
+            assert_eq!(flash, before, "what is stored stays");
+
+            let mut flash = vec![0xFF; layout.part.flash_size];
+            let [_, second] = layout.board.store.addresses();
+            flash[(second - FLASH_BASE) as usize + 500] = 0;
+            let before = flash.clone();
+            write_preset(&fitted(Module::Di4), &mut flash);
+            assert_eq!(flash, before, "even what is damaged");
+        }
+    }
+
+    #[test]
+    fn broken_image_is_reported_with_its_path() {
+        let directory = tempfile::tempdir().unwrap();
+        let elf = directory.path().join("modio");
+        assert!(image(&elf).unwrap_err().contains("modio"), "missing");
+        std::fs::write(&elf, b"#!/bin/sh\n").unwrap();
+        let text = image(&elf).unwrap_err();
+        assert!(
+            text.contains("modio") && text.contains("ELF") && !text.contains('\n'),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,150 @@
+//! The frames on the line in a capture file: `--record`.
+
+use std::fs::File;
+use std::io::{self, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use modbus_frames::adu::Framing;
+use modbus_frames::capture::{Packet, Recorder};
+use sim::line::{Frame, Line};
+
+use super::frames;
+
+/// A capture file that is being written.
+pub struct Capture {
+    path: PathBuf,
+    /// The same open file as in `recorder`.
+    file: File,
+    /// `None` after the file could not be written.
+    recorder: Option<Recorder<File>>,
+    /// Number of the last frame in the file.
+    last: u64,
+}
+
+impl Capture {
+    /// Starts the file at `path`. A file that exists is replaced.
+    ///
+    /// # Errors
+    ///
+    /// In one line, what keeps it from being written.
+    pub fn create(path: &Path) -> Result<Self, String> {
+        let program = concat!("modio-sim ", env!("CARGO_PKG_VERSION"));
+        let started = || -> io::Result<Self> {
+            let file = File::create(path)?;
+            let recorder = Recorder::new(file.try_clone()?, program, "RS-485")?;
+            Ok(Self {
+                path: path.to_owned(),
+                file,
+                recorder: Some(recorder),
+                last: 0,
+            })
+        };
+        started().map_err(|error| cannot(path, &error))
+    }
+
+    /// Writes the frames that have ended since the last call. An error is reported on stderr, and ends the recording.
+    pub fn update(&mut self, line: &Line) {
+        for frame in line.frames_since(self.last) {
+            self.last = frame.number;
+            let Some(recorder) = &mut self.recorder else {
+                return;
+            };
+            // A pipe has no position.
+            let whole = self.file.stream_position();
+            if let Err(error) = write(recorder, frame) {
+                // Its buffer writes what it can when it is dropped. The file is cut off after the last whole packet.
+                self.recorder = None;
+                if let Ok(whole) = whole {
+                    let _ = self.file.set_len(whole);
+                }
+                let what = cannot(&self.path, &error);
+                // The simulator goes on when nobody reads stderr.
+                let _ = writeln!(io::stderr(), "modio-sim: {what}; the recording ends");
+            }
+        }
+    }
+
+    /// Whether the file could not be written.
+    pub fn failed(&self) -> bool {
+        self.recorder.is_none()
+    }
+}
+
+fn cannot(path: &Path, error: &io::Error) -> String {
+    format!("cannot write the capture file {}: {error}", path.display())
+}
+
+fn write(recorder: &mut Recorder<File>, frame: &Frame) -> io::Result<()> {
+    let mut comment = frames::summary(frame);
+    if frame.damaged {
+        comment += " (damaged on the line)";
+    }
+    recorder.write(&Packet {
+        time: Duration::from_nanos(frame.start.as_ns()),
+        direction: Some(frames::way(frame.direction)),
+        framing: Framing::on_line(&frame.bytes).unwrap_or_default(),
+        bytes: &frame.bytes,
+        comment: &comment,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use register_map::Module;
+    use sim::Time;
+
+    use super::*;
+    use crate::app::testing::bench;
+
+    #[test]
+    fn frames_are_in_the_file_as_soon_as_they_have_ended() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("line.pcapng");
+        let mut capture = Capture::create(&path).unwrap();
+        let mut bench = bench(Module::Di4);
+        let size = || std::fs::metadata(&path).unwrap().len();
+        let mut sizes = vec![size()];
+        for pdu in [&[7][..], &[3, 0, 0, 0, 1]] {
+            bench.send(&Framing::Rtu.frame(0, 1, pdu));
+            bench.bus.run_for(Time::from_ms(20));
+            capture.update(bench.bus.line());
+            capture.update(bench.bus.line());
+            sizes.push(size());
+        }
+        let grown: Vec<_> = sizes.windows(2).map(|two| two[1] - two[0]).collect();
+        assert!(
+            grown.iter().all(|bytes| (80..250).contains(bytes)),
+            "{grown:?}"
+        );
+        let written = std::fs::read(&path).unwrap();
+        let frame = Framing::Rtu.frame(0, 1, &[3, 0, 0, 0, 1]);
+        let times = written.windows(8).filter(|bytes| *bytes == frame).count();
+        assert_eq!(times, 1, "each frame once");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn reader_of_a_pipe_that_leaves_ends_the_recording() {
+        let mut bench = bench(Module::Di4);
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.unwrap().success());
+        let reader = std::thread::spawn({
+            let path = path.clone();
+            move || File::open(path).unwrap()
+        });
+        let mut capture = Capture::create(&path).unwrap();
+        let mut fails = || {
+            bench.send(&[1, 2, 3]);
+            bench.bus.run_for(Time::from_ms(20));
+            capture.update(bench.bus.line());
+            capture.failed()
+        };
+        let reader = reader.join().unwrap();
+        assert!(!fails());
+        drop(reader);
+        assert!(fails());
+    }
+}

@@ -1,0 +1,173 @@
+//! Random disturbances of the line: inverted bits, noise pulses, and bytes lost on the way to and from the client. The
+//! random generator has a fixed seed, so that a run in virtual time repeats.
+
+use fastrand::Rng;
+use sim::Time;
+use sim::line::Line;
+
+/// The width of a short pulse.
+const PULSE: Time = Time::from_us(5);
+const PS_PER_S: f64 = 1e12;
+
+/// Rates of the disturbances, and when each occurs next.
+#[derive(Debug)]
+pub struct Disturbance {
+    bit_error_rate: f64,
+    noise_hz: f64,
+    drop_rate: f64,
+    bits: Strikes,
+    pulses: Strikes,
+    chance: Rng,
+}
+
+impl Default for Disturbance {
+    /// A quiet line.
+    fn default() -> Self {
+        Self {
+            bit_error_rate: 0.0,
+            noise_hz: 0.0,
+            drop_rate: 0.0,
+            bits: Strikes::default(),
+            pulses: Strikes::default(),
+            chance: Rng::with_seed(0x6D6F_6469),
+        }
+    }
+}
+
+impl Disturbance {
+    /// Probability that a bit time is inverted.
+    pub fn bit_error_rate(&self) -> f64 {
+        self.bit_error_rate
+    }
+
+    /// Mean number of noise pulses per second.
+    pub fn noise_hz(&self) -> f64 {
+        self.noise_hz
+    }
+
+    /// Share of bytes that are lost.
+    pub fn drop_rate(&self) -> f64 {
+        self.drop_rate
+    }
+
+    /// Sets the rates that are `Some`.
+    pub fn change(
+        &mut self,
+        bit_error_rate: Option<f64>,
+        noise_hz: Option<f64>,
+        drop_rate: Option<f64>,
+    ) {
+        if let Some(rate) = bit_error_rate {
+            (self.bit_error_rate, self.bits) = (rate, Strikes::default());
+        }
+        if let Some(rate) = noise_hz {
+            (self.noise_hz, self.pulses) = (rate, Strikes::default());
+        }
+        self.drop_rate = drop_rate.unwrap_or(self.drop_rate);
+    }
+
+    /// Queues the disturbances of the line from `now` on and before `until`.
+    pub fn put(&mut self, line: &mut Line, now: Time, until: Time) {
+        let baud = line.settings().baud;
+        let bits_hz = self.bit_error_rate * f64::from(baud);
+        loop {
+            let bit = self.bits.next(bits_hz, now, &mut self.chance);
+            let pulse = self.pulses.next(self.noise_hz, now, &mut self.chance);
+            // The line accepts noise in time order only.
+            if bit.min(pulse) >= until {
+                return;
+            }
+            if bit < pulse {
+                line.noise(bit, Time::cycles(1, baud));
+                self.bits.pass(bits_hz, &mut self.chance);
+            } else {
+                line.noise(pulse, PULSE);
+                self.pulses.pass(self.noise_hz, &mut self.chance);
+            }
+        }
+    }
+
+    /// Returns the bytes that are not lost.
+    pub fn not_dropped(&mut self, bytes: impl Iterator<Item = u8>) -> Vec<u8> {
+        let (rate, chance) = (self.drop_rate, &mut self.chance);
+        bytes
+            .filter(|_| rate == 0.0 || chance.f64() >= rate)
+            .collect()
+    }
+}
+
+/// Random events with a mean rate.
+#[derive(Debug, Default)]
+struct Strikes(Option<Time>);
+
+impl Strikes {
+    /// Time of the next event, not before `now`.
+    fn next(&mut self, hz: f64, now: Time, chance: &mut Rng) -> Time {
+        let at = *self.0.get_or_insert_with(|| now + pause(hz, chance));
+        at.max(now)
+    }
+
+    /// Draws the time of the event after the next one.
+    fn pass(&mut self, hz: f64, chance: &mut Rng) {
+        self.0 = self.0.map(|at| at + pause(hz, chance));
+    }
+}
+
+/// Random time between two events with a mean rate of `hz`, exponentially distributed: at least 1 us and at most 1 h.
+fn pause(hz: f64, chance: &mut Rng) -> Time {
+    const MOST: f64 = 3600.0 * PS_PER_S;
+    let seconds = -(1.0 - chance.f64()).ln() / hz;
+    // At 0 Hz the quotient is infinite or NaN, and `min` returns the limit.
+    let ps = (seconds * PS_PER_S).min(MOST);
+    Time::from_us(1).max(Time::from_ps(ps as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edges(disturbance: &mut Disturbance, seconds: u64) -> usize {
+        let mut line = Line::default();
+        let mut edges = 0;
+        for ms in (0..seconds * 1000).step_by(50) {
+            let (from, to) = (Time::from_ms(ms), Time::from_ms(ms + 50));
+            disturbance.put(&mut line, from, to);
+            sim::periph::usart::Wire::advance(&mut line, to);
+            edges += line.falling_edges(from, to).count();
+        }
+        edges
+    }
+
+    #[test]
+    fn default_disturbance_leaves_the_line_idle() {
+        assert_eq!(edges(&mut Disturbance::default(), 100), 0);
+    }
+
+    #[test]
+    fn noise_and_bit_errors_occur_at_their_mean_rates() {
+        let mut noisy = Disturbance::default();
+        noisy.change(None, Some(50.0), None);
+        let count = edges(&mut noisy, 100);
+        assert!((4700..=5300).contains(&count), "{count} of 5000");
+
+        let mut wrong = Disturbance::default();
+        wrong.change(Some(1e-3), None, None);
+        // 9600 bits in each of 100 seconds.
+        let count = edges(&mut wrong, 100);
+        assert!((870..=1050).contains(&count), "{count} of 960");
+
+        noisy.change(None, Some(0.0), None);
+        assert_eq!(edges(&mut noisy, 10), 0, "switched off again");
+    }
+
+    #[test]
+    fn drop_rate_is_the_share_of_lost_bytes() {
+        let mut lossy = Disturbance::default();
+        assert_eq!(lossy.not_dropped(0..100), (0..100).collect::<Vec<_>>());
+        lossy.change(None, None, Some(0.25));
+        let left = lossy.not_dropped((0..10_000).map(|n| n as u8)).len();
+        assert!((7300..=7700).contains(&left), "{left} of 7500");
+        lossy.change(None, None, Some(1.0));
+        assert!(lossy.not_dropped(0..100).is_empty());
+    }
+}

@@ -1,0 +1,143 @@
+//! A Modbus TCP gateway to the line: `--modbus-tcp`.
+//!
+//! ```text
+//! client --- thread --- requests --+
+//! client --- thread --- requests --+-- in turn, one at a time --- the line
+//! client --- thread --- requests --+
+//! ```
+//!
+//! The gateway is one more master on the line. It sends the request of one client, waits for the reply of the unit that
+//! the request is for, and passes the reply on. A frame with a wrong check, a damaged one or one of another unit is no
+//! reply. It does not listen before it sends, as a gateway on a real line does not either: when another master is
+//! active at the same time, they collide.
+
+mod client;
+mod exchange;
+mod mbap;
+mod mode;
+
+use std::collections::VecDeque;
+use std::net::SocketAddr;
+use std::sync::mpsc::{Sender, TryRecvError};
+
+use modbus_frames::adu::Framing;
+
+use self::client::{Client, Responses};
+use self::exchange::{Exchange, Outcome};
+use self::mbap::Request;
+use self::mode::Mode;
+use super::Event;
+use super::bench::Bench;
+
+/// Exception 0A: nothing can be sent on the line now, or not to this unit.
+const NO_PATH: u8 = 0x0A;
+/// Exception 0B: no unit has answered.
+const NO_ANSWER: u8 = 0x0B;
+
+/// Requests that are answered in one go, so that clients whose requests need no line cannot keep the thread of the line
+/// busy.
+const AT_ONCE: usize = 64;
+
+/// What the clients' threads tell the thread that has the line.
+pub enum Message {
+    /// A client has connected.
+    Joined(Client),
+    /// A client has sent a request, or is gone.
+    Ready,
+}
+
+/// The gateway, on the side of the line.
+pub struct Gateway {
+    address: SocketAddr,
+    /// Whose turn it is stands first.
+    clients: VecDeque<Client>,
+    under_way: Option<(Exchange, Request, Responses)>,
+    mode: Mode,
+}
+
+impl Gateway {
+    /// Listens at `address` from now on.
+    ///
+    /// # Errors
+    ///
+    /// When nothing can listen there, in one line.
+    pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<Self, String> {
+        Ok(Self {
+            address: client::listen(address, events)?,
+            clients: VecDeque::new(),
+            under_way: None,
+            mode: Mode::default(),
+        })
+    }
+
+    /// Where it listens: with port 0 the system has chosen one.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Takes up what came from a client. What is to be done is done by the next [`update`](Self::update).
+    pub fn take(&mut self, message: Message) {
+        match message {
+            Message::Joined(client) => self.clients.push_back(client),
+            Message::Ready => {}
+        }
+    }
+
+    /// Passes on a reply that has been received by now, and sends the next request. While a debugger has `halted` the
+    /// core, no time passes on the line, so nothing can be sent.
+    pub fn update(&mut self, bench: &mut Bench, halted: bool) {
+        self.mode.update(bench.bus.board(0));
+        for _ in 0..AT_ONCE {
+            if let Some((exchange, request, responses)) = self.under_way.take() {
+                match exchange.outcome(bench.bus.line()) {
+                    Outcome::Waiting => {
+                        self.under_way = Some((exchange, request, responses));
+                        return;
+                    }
+                    Outcome::Reply(pdu) => respond(&responses, &request, &pdu),
+                    Outcome::Silence => refuse(&responses, &request, NO_ANSWER),
+                    Outcome::Sent => {}
+                }
+            }
+            let Some((request, responses)) = self.next() else {
+                return;
+            };
+            // No unit can have these addresses (V1.02, 2.2).
+            if halted || (248..=254).contains(&request.unit) {
+                refuse(&responses, &request, NO_PATH);
+            } else {
+                let framing = self.mode.framing(bench.bus.line().settings());
+                let exchange = Exchange::begin(bench, framing, &request);
+                self.under_way = Some((exchange, request, responses));
+            }
+        }
+    }
+
+    /// The next request of the next client that has one. Clients that are gone are forgotten.
+    fn next(&mut self) -> Option<(Request, Responses)> {
+        for _ in 0..self.clients.len() {
+            let client = self.clients.pop_front()?;
+            match client.next() {
+                Ok(request) => {
+                    let responses = client.responses.clone();
+                    self.clients.push_back(client);
+                    return Some((request, responses));
+                }
+                Err(TryRecvError::Empty) => self.clients.push_back(client),
+                Err(TryRecvError::Disconnected) => {}
+            }
+        }
+        None
+    }
+}
+
+fn respond(responses: &Responses, request: &Request, pdu: &[u8]) {
+    responses.send(Framing::Mbap.frame(request.transaction, request.unit, pdu));
+}
+
+/// Answers with an exception; a broadcast has no response, whatever becomes of it.
+fn refuse(responses: &Responses, request: &Request, exception: u8) {
+    if request.unit != 0 {
+        respond(responses, request, &[request.pdu[0] | 0x80, exception]);
+    }
+}

@@ -1,0 +1,104 @@
+//! The mode of the line, which the gateway has to speak: RTU or ASCII.
+
+use modbus_frames::adu::Framing;
+use register_map::{codes, configuration};
+use sim::Board;
+use sim::line::{Format, Settings};
+
+/// The DIP switch's loader mode: the line in RTU, whatever is stored.
+const LOADER: u8 = 255;
+
+/// The mode that the unit has set its line to: the stored one as it was when the unit started.
+#[derive(Debug, Default)]
+pub struct Mode {
+    /// Power-ons, and resets since: they identify a start.
+    start: Option<(u64, u32)>,
+    /// The switch at power-on.
+    dip: u8,
+    stored: u16,
+}
+
+impl Mode {
+    /// Looks whether the unit has started again.
+    pub fn update(&mut self, board: &Board) {
+        let start = (board.power_ons(), board.resets());
+        if self.start == Some(start) {
+            return;
+        }
+        if self.start.is_none_or(|(power_ons, _)| power_ons != start.0) {
+            self.dip = board.dip();
+        }
+        self.start = Some(start);
+        let mode = board.layout().stored(board.flash(), configuration::MODE);
+        self.stored = mode.unwrap_or_default();
+    }
+
+    /// How frames are marked off. RTU cannot be with 7 data bits (V1.02, 2.5.1).
+    pub fn framing(&self, settings: Settings) -> Framing {
+        let seven = match settings.format {
+            Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => true,
+            Format::N2 | Format::E1 | Format::O1 | Format::N1 => false,
+        };
+        let ascii = self.stored == codes::Mode::Ascii.code() && self.dip != LOADER;
+        if seven || ascii {
+            Framing::Ascii
+        } else {
+            Framing::Rtu
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::Config;
+
+    use super::*;
+    use crate::app::testing::bench_of;
+
+    fn framing(dip: u8, stored: u16, format: Format) -> Framing {
+        let layout = Config::default().layout;
+        let mut bench = bench_of(Config {
+            dip,
+            flash: layout.flash_with(&[(configuration::MODE, stored)]),
+            ..Config::default()
+        });
+        let mut mode = Mode::default();
+        mode.update(bench.bus.board(0));
+        // The switch counts at power-on.
+        bench.first().set_dip(1);
+        mode.update(bench.bus.board(0));
+        let baud = 9600;
+        mode.framing(Settings { baud, format })
+    }
+
+    #[test]
+    fn mode_is_the_stored_one_but_for_loader_mode_and_seven_bits() {
+        assert_eq!(framing(1, 0, Format::N2), Framing::Rtu);
+        assert_eq!(framing(1, 1, Format::N2), Framing::Ascii);
+        assert_eq!(framing(255, 1, Format::N2), Framing::Rtu);
+        assert_eq!(framing(1, 0, Format::SevenE1), Framing::Ascii);
+    }
+
+    #[test]
+    fn stored_mode_counts_from_the_next_start() {
+        let mut bench = bench_of(Config::default());
+        let mut mode = Mode::default();
+        mode.update(bench.bus.board(0));
+        let ascii = bench
+            .bus
+            .board(0)
+            .layout()
+            .flash_with(&[(configuration::MODE, 1)]);
+        bench.first().power_off();
+        bench
+            .first()
+            .flash_mut()
+            .unwrap()
+            .copy_from_slice(&ascii.unwrap());
+        mode.update(bench.bus.board(0));
+        assert_eq!(mode.framing(Settings::default()), Framing::Rtu);
+        bench.first().power_on();
+        mode.update(bench.bus.board(0));
+        assert_eq!(mode.framing(Settings::default()), Framing::Ascii);
+    }
+}

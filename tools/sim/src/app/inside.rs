@@ -1,0 +1,82 @@
+//! The firmware images inside the program, one for each board; none unless `cargo xtask dist` has built it.
+
+use register_map::Board;
+use sim::board::Layout;
+use sim::{Config, Image, Time};
+
+/// Boards by name, and their images as ELF files.
+const IMAGES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/images.rs"));
+
+/// So long after the start the firmware has said which it is.
+const TOLD: Time = Time::from_ms(100);
+
+/// The image of a board.
+///
+/// # Errors
+///
+/// When none is inside: what to do, in one line.
+pub fn image(board: &Board) -> Result<Image, String> {
+    let elf = elf(board).ok_or(
+        "no image to run: give one with --elf FILE, or use `cargo xtask sim`, which builds one",
+    )?;
+    Image::from_elf(&elf).map_err(|error| format!("cannot run the image inside: {error}"))
+}
+
+/// The image of a board as an ELF file, if it is inside; a copy, for in the program it is not aligned as its reader needs.
+fn elf(board: &Board) -> Option<Vec<u8>> {
+    let inside = IMAGES.iter().find(|(name, _)| *name == board.name);
+    inside.map(|(_, elf)| elf.to_vec())
+}
+
+/// The version of the program, and on a line for each image inside the version of that firmware.
+pub fn version() -> String {
+    let mut text = format!("modio-sim {}\n", env!("CARGO_PKG_VERSION"));
+    for layout in Layout::ALL {
+        if let Some(elf) = elf(layout.board) {
+            let version = firmware(layout, &elf).unwrap_or_else(|| "of unknown version".to_owned());
+            text += &format!("firmware of the {}: {version}\n", layout.board);
+        }
+    }
+    text
+}
+
+/// What the image itself says: the first line of its log is `modio VERSION on BOARD, ...`.
+fn firmware(layout: &'static Layout, elf: &[u8]) -> Option<String> {
+    let config = Config {
+        layout,
+        ..Config::default()
+    };
+    let mut board = sim::Board::new(&Image::from_elf(elf).ok()?, config).ok()?;
+    board.run_until(TOLD);
+    let log = board.take_log();
+    let (version, _) = log.strip_prefix("modio ")?.split_once(" on ")?;
+    Some(version.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_image_inside_is_of_a_board_and_tells_its_version() {
+        let mut lines = version().lines().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(
+            lines.remove(0),
+            concat!("modio-sim ", env!("CARGO_PKG_VERSION"))
+        );
+        assert_eq!(lines.len(), IMAGES.len(), "{lines:?}");
+        for line in lines {
+            assert!(!line.contains("unknown"), "{line}");
+        }
+    }
+
+    #[test]
+    #[ignore = "needs the image: cargo xtask test"]
+    fn an_image_tells_its_version() {
+        let path = std::env::var_os("MODIO_ELF").expect("MODIO_ELF names the image");
+        let elf = std::fs::read(path).unwrap();
+        let layout = Layout::of(&register_map::board::MODIO_02).unwrap();
+        let version = firmware(layout, &elf).unwrap();
+        assert_eq!(version, env!("CARGO_PKG_VERSION"));
+    }
+}

@@ -1,0 +1,116 @@
+// The board: power, switch, LEDs, line, and the slots with their modules.
+
+import { modules, slotsOf } from "/model.js";
+import { post } from "/api.js";
+import { buildChannel, showChannel } from "/channels.js";
+import { byId, element, select, setText } from "/ui.js";
+
+let shown = null;
+
+/** The state that is shown; null before the first. */
+export const current = () => shown;
+
+/** The channels of all slots, each with its name and the number of its element. */
+export function channels(state) {
+  return slotsOf(state).flatMap((slot, n) => slot.channels.map((channel, at) => ({
+    id: idOf(n, at), channel, name: state.slots ? `port ${slot.port}, ${at + 1}` : `${at + 1}`,
+  })));
+}
+
+const idOf = (slot, at) => `c${slot}-${at + 1}`;
+const redraw = () => shown && show(shown);
+
+/** What cannot change without new elements: which modules are where. */
+const shape = (state) => JSON.stringify([state.board, slotsOf(state).map((slot) => [slot.port, slot.module])]);
+
+/** Shows a state. */
+export function show(state) {
+  const isNew = shown === null || shape(shown) !== shape(state);
+  shown = state;
+  if (isNew) byId("slots").replaceChildren(...slotsOf(state).map(buildSlot));
+  setText(byId("name"), state.board);
+  document.title = `${state.board}, a virtual board`;
+  byId("power").setAttribute("aria-checked", String(state.powered));
+  setText(byId("power"), state.powered ? "Power is on" : "Power is off");
+  byId("cycle").disabled = !state.powered;
+  if (document.activeElement !== byId("dip-value")) byId("dip-value").value = state.dip;
+  [...byId("dip").children].forEach((rocker, n) =>
+    rocker.setAttribute("aria-checked", String((state.dip >> n) % 2 === 1)));
+  for (const name of ["run", "fault", "activity"]) {
+    byId(`led-${name}`).classList.toggle("lit", state.leds[name]);
+    setText(byId(`led-${name}-text`), state.leds[name] ? "on" : "off");
+  }
+  setText(byId("line-rate"), `${state.line.baud} bit/s`);
+  setText(byId("line-format"), state.line.format);
+  setText(byId("line-driver"), state.driver_enable ? "on" : "off");
+  setText(byId("line-requests"), String(state.line.rx_frames));
+  setText(byId("line-replies"), String(state.line.tx_frames));
+  slotsOf(state).forEach((slot, n) => showSlot(slot, n, state.powered));
+  const log = byId("log");
+  const text = state.log_tail.join("\n");
+  if (log.textContent !== text) {
+    log.textContent = text;
+    log.scrollTop = log.scrollHeight;
+  }
+}
+
+/** Forgets the board, for another one to be shown. */
+export function forget() {
+  shown = null;
+}
+
+/** Connects the switch and the power. */
+export function listen() {
+  byId("power").addEventListener("click", () => shown && post("power", { on: !shown.powered }));
+  byId("cycle").addEventListener("click", () => post("power", { cycle: true }));
+  byId("dip-value").addEventListener("change", (event) => {
+    const value = event.target.valueAsNumber;
+    if (Number.isFinite(value)) post("dip", { value });
+  });
+  byId("dip-value").addEventListener("blur", redraw);
+  for (let n = 0; n < 8; n += 1) byId("dip").append(rocker(n));
+}
+
+/** One of the eight switches in SW01. */
+function rocker(n) {
+  const set = (on) => {
+    const value = on ? shown.dip | (1 << n) : shown.dip & ~(1 << n);
+    if (value !== shown.dip) post("dip", { value });
+  };
+  return element("button", {
+    type: "button", role: "switch", "aria-checked": "false", "aria-label": `SW01 position ${n + 1}, adds ${1 << n}`,
+    onclick: () => shown && set((shown.dip & (1 << n)) === 0),
+    onkeydown: (event) => {
+      const { key, currentTarget } = event;
+      if (key === "ArrowUp" || key === "ArrowDown") shown && set(key === "ArrowUp");
+      else if (key === "ArrowRight") currentTarget.nextElementSibling?.focus();
+      else if (key === "ArrowLeft") currentTarget.previousElementSibling?.focus();
+      else return;
+      event.preventDefault();
+    },
+  }, element("span", {}, String(n + 1)));
+}
+
+function buildSlot(slot, n) {
+  const title = `Port ${slot.port}`;
+  const module = modules[slot.module];
+  const made = slot.channels.map((channel, at) => buildChannel(slot, idOf(n, at), channel, at + 1, redraw));
+  return element("div", { class: `slot m-${slot.module}`, role: "group", "aria-label": title },
+    element("header", {},
+      element("h3", {}, title),
+      select({
+        id: `module-${n}`, "aria-label": `Module in ${title}`,
+        onchange: (event) => post(`${slot.path}module`, { name: event.target.value }),
+      }, Object.entries(modules).map(([name, each]) => [name, each.text]))),
+    element("div", { class: "channels" }, ...made.filter(Boolean)),
+    element("ol", { class: "terminals", "aria-label": `Screw terminals of ${title}` },
+      ...module.terminals.map((label) => element("li", {}, element("span", {}, label)))));
+}
+
+function showSlot(slot, n, powered) {
+  const module = byId(`module-${n}`);
+  module.value = slot.module;
+  module.disabled = powered;
+  module.title = powered ? "Switch the power off to change the module" : "";
+  slot.channels.forEach((channel, at) => showChannel(idOf(n, at), channel));
+}

@@ -1,0 +1,136 @@
+// The channels of a module: what they look like, what a person can do to them, and what they show.
+
+import { inputs, outputs, address } from "/model.js";
+import { post, stream, isStreaming } from "/api.js";
+import { byId, element, select, setText } from "/ui.js";
+
+/** The range that was chosen for an analog channel. */
+const rangeOf = new Map();
+const inputRange = (id) => inputs[rangeOf.get(id) ?? "volts"];
+const outputRange = (id) => outputs[rangeOf.get(id) ?? "volts"];
+
+const NAMES = { di: "DI", do: "DO", relay: "Relay", ai: "AI", ao: "AO" };
+
+/** A channel's element; `id` is unique on the page, `redraw` shows the board again. */
+export function buildChannel(slot, id, channel, number, redraw) {
+  const name = NAMES[channel.kind];
+  if (name === undefined) return null;
+  // The points of a relay are its jumper and, two addresses on, its coil.
+  const point = address(slot.port, channel.kind === "relay" ? number + 2 : number);
+  return element("div", { class: `channel ${channel.kind}`, role: "group", "aria-label": `${name} ${number}` },
+    element("div", { class: "name" }, element("span", {}, `${name} ${number}`), element("code", {}, point)),
+    ...control(`${slot.path}channels/${number}`, id, channel.kind, number, redraw));
+}
+
+function control(path, id, kind, number, redraw) {
+  const toggle = (key, label) => element("button", {
+    id, type: "button", role: "switch", "aria-checked": "false", "aria-label": label, class: "toggle",
+    onclick: (event) => post(path, { [key]: event.currentTarget.getAttribute("aria-checked") !== "true" }),
+  });
+  const lamp = (label) => element("div", {
+    id: `${id}-lamp`, class: "lamp", role: "switch", "aria-readonly": "true", "aria-checked": "false", "aria-label": label,
+  });
+  switch (kind) {
+    case "di":
+      return [toggle("energised", `Digital input ${number}`)];
+    case "do":
+      return [lamp(`Digital output ${number}`)];
+    case "relay":
+      return [lamp(`Coil of relay ${number}`), toggle("manual", `Manual jumper of relay ${number}`)];
+    case "ai":
+      return analogInput(path, id, number, redraw);
+    default:
+      return analogOutput(id, number, redraw);
+  }
+}
+
+function analogInput(path, id, number, redraw) {
+  const field = element("input", {
+    type: "number", id: `${id}-number`, step: "any", "aria-label": `Analog input ${number}`,
+    onchange: () => {
+      const millivolts = inputRange(id).toPin(field.valueAsNumber);
+      if (!Number.isFinite(millivolts)) return;
+      field.value = inputRange(id).fromPin(millivolts);
+      post(path, { millivolts });
+    },
+    onblur: redraw,
+  });
+  const range = select({
+    id: `${id}-range`, "aria-label": `Range of analog input ${number}`,
+    onchange: (event) => {
+      rangeOf.set(id, event.target.value);
+      redraw();
+    },
+  }, Object.entries(inputs).map(([key, each]) => [key, each.unit]));
+  range.value = rangeOf.get(id) ?? "volts";
+  const slider = element("input", {
+    type: "range", id, min: 0, max: 3300, step: 1, "aria-label": `Slider of analog input ${number}`, "data-path": path,
+    oninput: (event) => stream(path, { millivolts: Number(event.target.value) }).then(redraw),
+  });
+  return [element("div", { class: "value" }, field, range), slider, element("p", { class: "pin", id: `${id}-text` })];
+}
+
+function analogOutput(id, number, redraw) {
+  const range = select({
+    id: `${id}-range`, "aria-label": `Jumper of analog output ${number}`,
+    onchange: (event) => {
+      rangeOf.set(id, event.target.value);
+      redraw();
+    },
+  }, Object.entries(outputs).map(([key, each]) => [key, each.unit]));
+  range.value = rangeOf.get(id) ?? "volts";
+  const meter = element("meter", { id: `${id}-meter`, min: 0, max: 4095, "aria-label": `Analog output ${number}` });
+  return [
+    element("div", { class: "value" }, element("span", { class: "reading", id: `${id}-value` }), range),
+    meter,
+    element("p", { class: "pin", id: `${id}-text` }),
+  ];
+}
+
+/** Shows what a channel is now. */
+export function showChannel(id, channel) {
+  switch (channel.kind) {
+    case "di":
+      showSwitch(id, channel.energised, channel.energised ? "24 V" : "open");
+      break;
+    case "do":
+      showSwitch(`${id}-lamp`, channel.on, channel.on ? "conducts" : "off");
+      break;
+    case "relay":
+      showSwitch(`${id}-lamp`, channel.energised, channel.energised ? "energised" : "released");
+      showSwitch(id, channel.manual, channel.manual ? "jumper: manual" : "jumper: automatic");
+      break;
+    case "ai":
+      showInput(id, channel.millivolts);
+      break;
+    case "ao":
+      byId(`${id}-meter`).value = channel.code;
+      setText(byId(`${id}-value`), outputRange(id).fromCode(channel.code));
+      setText(byId(`${id}-text`), `code ${channel.code} of 4095`);
+      break;
+    default:
+  }
+}
+
+function showSwitch(id, on, text) {
+  byId(id).setAttribute("aria-checked", String(on));
+  setText(byId(id), text);
+}
+
+function showInput(id, millivolts) {
+  const { fromPin, unit } = inputRange(id);
+  const slider = byId(id);
+  const field = byId(`${id}-number`);
+  // What a person is typing or dragging is not taken away.
+  if (document.activeElement !== field) field.value = fromPin(millivolts);
+  if (!isStreaming(slider.dataset.path)) slider.value = millivolts;
+  slider.setAttribute("aria-valuetext", `${fromPin(millivolts)} ${unit}, ${millivolts} mV at the pin`);
+  setText(byId(`${id}-text`), `pin: ${millivolts} mV`);
+}
+
+/** An analog channel's value in its range; null for any other channel. */
+export function reading(id, channel) {
+  if (channel.kind === "ai") return `${inputRange(id).fromPin(channel.millivolts)} ${inputRange(id).unit}`;
+  if (channel.kind === "ao") return `${outputRange(id).fromCode(channel.code)} ${outputRange(id).unit}`;
+  return null;
+}

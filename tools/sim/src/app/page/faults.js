@@ -1,0 +1,66 @@
+// Faults that a person makes on the line and the chip.
+
+import { get, path, send } from "/api.js";
+import { byId, element } from "/ui.js";
+
+const LABELS = {
+  bit_error_rate: "Bit errors, share of bits",
+  drop_rate: "Lost bytes, share of bytes",
+  noise_hz: "Noise on the line, pulses per second",
+  i2c_absent: "DAC does not answer on I2C",
+  hse_failed: "Crystal has failed",
+  hsi_percent: "HSI off by, percent",
+  lsi_khz: "LSI, kHz",
+};
+
+const idOf = (key) => `fault-${key}`;
+
+function control(key, value) {
+  const label = LABELS[key] ?? key.replaceAll("_", " ");
+  const set = (wanted) => change({ [key]: wanted });
+  if (typeof value === "boolean") {
+    const box = element("input", { id: idOf(key), type: "checkbox", onchange: (event) => set(event.target.checked) });
+    return element("label", { class: "check" }, box, label);
+  }
+  const field = element("input", {
+    id: idOf(key), type: "number", step: "any",
+    onchange: (event) => {
+      if (Number.isFinite(event.target.valueAsNumber)) set(event.target.valueAsNumber);
+    },
+    onblur: () => refresh(),
+  });
+  return element("label", {}, field, label);
+}
+
+function show(faults) {
+  const known = Object.entries(faults).filter(([, value]) => ["boolean", "number"].includes(typeof value));
+  const list = byId("faults");
+  const keys = known.map(([key]) => key).join();
+  if (list.dataset.keys !== keys) {
+    list.dataset.keys = keys;
+    list.replaceChildren(...known.map(([key, value]) => control(key, value)));
+  }
+  for (const [key, value] of known) {
+    const field = byId(idOf(key));
+    if (typeof value === "boolean") field.checked = value;
+    else if (document.activeElement !== field) field.value = value;
+  }
+}
+
+/** How many changes were made: an answer that was asked for before the last one is out of date. */
+let changes = 0;
+
+async function change(wanted) {
+  changes += 1;
+  await send(path("faults"), wanted);
+  await refresh();
+}
+
+/** Shows the faults, and hides the panel where there are none to choose. */
+export async function refresh() {
+  const before = changes;
+  const faults = await get(path("faults")).catch(() => null);
+  if (before !== changes) return;
+  byId("faults-section").hidden = faults === null;
+  if (faults !== null) show(faults);
+}

@@ -1,0 +1,182 @@
+//! Scenarios on boards whose firmware does nothing.
+
+use register_map::Module;
+use sim::{Channel, Config};
+
+use super::*;
+use crate::app::bench::Bench;
+use crate::app::testing::{bench, bench_of_boards};
+
+fn play(bench: &mut Bench, text: &str) {
+    bench.scenario = Scenario::parse(text, &bench.known()).unwrap();
+}
+
+fn energised(bench: &Bench, board: usize, channel: usize) -> bool {
+    match bench.bus.board(board).channel(channel) {
+        Channel::Di { energised } => energised,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn steps_happen_in_time_order_not_in_file_order() {
+    let mut bench = bench(Module::Di4);
+    play(
+        &mut bench,
+        r#"
+        [[step]]
+        at = "20ms"
+        channel = 1
+        energised = false
+        [[step]]
+        at = "10ms"
+        channel = 1
+        energised = true
+        [[step]]
+        at = "10ms"
+        dip = 9
+        "#,
+    );
+    let ms = Time::from_ms;
+    bench.run_until(ms(10) - Time::from_us(1));
+    assert!(!energised(&bench, 0, 1));
+    assert_eq!(bench.scenario.next(), Some(ms(10)));
+    bench.run_until(ms(10) + Time::from_us(1));
+    assert!(energised(&bench, 0, 1));
+    assert_eq!(bench.bus.board(0).dip(), 9);
+    bench.run_until(ms(20) + Time::from_us(1));
+    assert!(!energised(&bench, 0, 1));
+    assert_eq!(bench.scenario.next(), None);
+}
+
+#[test]
+fn ramp_starts_at_the_present_voltage_and_repeats_in_every_round() {
+    let mut bench = bench(Module::Ai4);
+    let millivolts = |bench: &Bench| match bench.bus.board(0).channel(2) {
+        Channel::Ai { millivolts } => millivolts,
+        other => panic!("{other:?}"),
+    };
+    play(
+        &mut bench,
+        r#"
+        repeat = "300ms"
+        [[step]]
+        channel = 2
+        millivolts = 1000
+        [[step]]
+        at = "100ms"
+        channel = 2
+        millivolts = 2000
+        over = "100ms"
+        "#,
+    );
+    let mut seen = Vec::new();
+    for ms in [1, 101, 125, 151, 199, 201, 299, 301, 451, 501] {
+        bench.run_until(Time::from_ms(ms));
+        seen.push(millivolts(&bench));
+    }
+    let expected = [1000, 1000, 1200, 1500, 1900, 2000, 2000, 1000, 1500, 2000];
+    assert_eq!(seen, expected);
+}
+
+#[test]
+fn steps_with_a_board_name_change_that_board_only() {
+    let config = |module| Config {
+        module,
+        ..Config::default()
+    };
+    let mut bench = bench_of_boards([("a", config(Module::Di4)), ("b", config(Module::Di4))]);
+    play(
+        &mut bench,
+        r#"
+        [[step]]
+        at = "10ms"
+        board = "b"
+        power = "off"
+        [[step]]
+        at = "20ms"
+        board = "b"
+        module = "4ai"
+        [[step]]
+        at = "20ms"
+        board = "a"
+        module = "4ai"
+        [[step]]
+        at = "30ms"
+        board = "b"
+        power = "on"
+        [[step]]
+        at = "40ms"
+        power = "cycle"
+        [[step]]
+        at = "50ms"
+        board = "b"
+        faults = { hse_failed = true, noise_hz = 5.0 }
+        "#,
+    );
+    let powered = |bench: &Bench| [0, 1].map(|n| bench.bus.board(n).powered());
+    let mut seen = Vec::new();
+    for ms in [5, 15, 35, 45, 145] {
+        bench.run_until(Time::from_ms(ms));
+        seen.push(powered(&bench));
+    }
+    let on = [true, true];
+    assert_eq!(seen, [on, [true, false], on, [false, true], on]);
+    let modules = [0, 1].map(|n| bench.bus.board(n).module());
+    assert_eq!(modules, [Module::Di4, Module::Ai4], "refused with power on");
+    assert!(bench.bus.board(0).crystal() && !bench.bus.board(1).crystal());
+    assert!((bench.disturbance.noise_hz() - 5.0).abs() < 1e-9);
+}
+
+#[test]
+fn errors_name_line_or_step_in_one_line() {
+    let bench = bench(Module::Di4);
+    for (text, part) in [
+        ("", "no [[step]]"),
+        ("[[step]]\nat = 5", "line 2"),
+        ("[[step]]\nat = 'soon'\ndip = 1", "line 2: \"soon\""),
+        ("[[step]]\nat = '1000days'\ndip = 1", "100 days"),
+        ("[[step]]\nat = '1s'", "step 1: one of energised"),
+        (
+            "[[step]]\nat = '1s'\ndip = 1\npower = 'on'",
+            "step 1: one of",
+        ),
+        ("[[step]]\nat = '1s'\npower = 'up'", "line 3"),
+        (
+            "[[step]]\nat = '1s'\nenergised = true",
+            "`channel` is wanted",
+        ),
+        (
+            "[[step]]\nat = '1s'\ndip = 1\nchannel = 1",
+            "`channel` is wanted",
+        ),
+        ("[[step]]\nat = '1s'\nchannel = 5\nmanual = true", "1 to 4"),
+        (
+            "[[step]]\nat = '1s'\nchannel = 1\nmillivolts = 3301",
+            "0 to 3300",
+        ),
+        (
+            "[[step]]\nat = '1s'\nchannel = 1\nmanual = true\nover = '1s'",
+            "`over`",
+        ),
+        ("[[step]]\nat = '1s'\nslot = 5\ndip = 1", "`slot` belongs"),
+        (
+            "[[step]]\nat = '1s'\nslot = 3\nmodule = '4do'",
+            "no slot at port 3",
+        ),
+        ("[[step]]\nat = '1s'\nmodule = '8do'", "step 1: '8do' is"),
+        ("[[step]]\nat = '1s'\nboard = 'x'\ndip = 1", "no board 'x'"),
+        ("[[step]]\nat = '1s'\nfaults = {}", "names none"),
+        (
+            "[[step]]\nat = '1s'\nfaults = { drop_rate = 2.0 }",
+            "from 0 to 1",
+        ),
+        ("[[step]]\nat = '1s'\nfaults = { smoke = true }", "line 3"),
+        ("repeat = '1s'\n[[step]]\nat = '2s'\ndip = 1", "`repeat`"),
+        ("repeat = '1ns'\n[[step]]\nat = '0s'\ndip = 1", "`repeat`"),
+    ] {
+        let what = Scenario::parse(text, &bench.known()).unwrap_err();
+        assert!(what.contains(part), "{text:?}: {what}");
+        assert!(!what.contains('\n'), "{what:?}");
+    }
+}

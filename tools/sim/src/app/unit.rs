@@ -1,0 +1,70 @@
+//! Name, log and flash file of a board.
+
+use std::collections::VecDeque;
+
+use sim::Board;
+
+use super::flash_file::FlashFile;
+
+/// Lines of the log that the HTTP interface shows.
+const TAIL: usize = 50;
+
+/// Name, log and flash file of a board.
+#[derive(Debug)]
+pub struct Unit {
+    /// What the HTTP interface calls it.
+    pub name: String,
+    /// The file that its flash is kept in.
+    pub flash: Option<FlashFile>,
+    /// Whether its DACs were taken off the I2C bus on purpose.
+    pub i2c_absent: bool,
+    log: VecDeque<String>,
+    /// A line of the log that has not ended yet.
+    unfinished: String,
+    findings: usize,
+}
+
+impl Unit {
+    /// An entry for a board without any log yet.
+    pub fn new(name: String, flash: Option<FlashFile>) -> Self {
+        Self {
+            name,
+            flash,
+            i2c_absent: false,
+            log: VecDeque::new(),
+            unfinished: String::new(),
+            findings: 0,
+        }
+    }
+
+    /// The last lines of the firmware's log, oldest first.
+    pub fn log_tail(&self) -> impl Iterator<Item = &str> {
+        self.log.iter().map(String::as_str)
+    }
+
+    /// Returns the lines that the firmware has logged since the last call.
+    pub fn take_log(&mut self, board: &mut Board) -> Vec<String> {
+        self.unfinished += &board.take_log();
+        let Some(end) = self.unfinished.rfind('\n') else {
+            return Vec::new();
+        };
+        let rest = self.unfinished.split_off(end + 1);
+        let text = std::mem::replace(&mut self.unfinished, rest);
+        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        self.log.extend(lines.iter().cloned());
+        self.log.drain(..self.log.len().saturating_sub(TAIL));
+        lines
+    }
+
+    /// Returns the findings since the last call.
+    pub fn take_findings(&mut self, board: &Board) -> Vec<String> {
+        let found = board.findings();
+        let new = found
+            .iter()
+            .skip(self.findings)
+            .map(ToString::to_string)
+            .collect();
+        self.findings = found.len();
+        new
+    }
+}

@@ -1,0 +1,101 @@
+//! The capture file of the running command.
+
+use std::fs;
+use std::io::Write;
+use std::net::TcpStream;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use modbus_frames::adu::Framing;
+use pcap_file::pcapng::{Block, PcapNgReader};
+
+use super::{Running, endless_loop, refused};
+
+/// Time in ns and data of each packet in a file, which must be whole.
+pub fn packets(path: &Path) -> Vec<(u128, Vec<u8>)> {
+    let file = fs::read(path).unwrap();
+    let mut reader = PcapNgReader::new(&file[..]).unwrap();
+    let mut packets = Vec::new();
+    while let Some(block) = reader.next_block() {
+        if let Block::EnhancedPacket(packet) = block.unwrap() {
+            packets.push((packet.timestamp.as_nanos(), packet.data.into_owned()));
+        }
+    }
+    packets
+}
+
+#[cfg(unix)]
+#[test]
+fn capture_file_is_readable_while_the_simulator_runs_and_whole_at_its_end() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("line.pcapng");
+    fs::write(&path, "an older file").unwrap();
+    for signal in ["-INT", "-TERM", "-KILL"] {
+        let record = ["--record", path.to_str().unwrap()];
+        let mut running = Running::start_loop(&[["--tcp", "127.0.0.1:0"], record].concat());
+        running.skip_pty();
+        let mut line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
+        assert!(packets(&path).is_empty(), "{signal}: a new file");
+        let frame = Framing::Rtu.frame(0, 1, &[3, 0, 0, 0, 1]);
+        for count in 1..=3 {
+            line.write_all(&frame).unwrap();
+            let limit = Instant::now() + Duration::from_secs(60);
+            while packets(&path).len() < count {
+                assert!(Instant::now() < limit, "{signal}: the frame is in the file");
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        }
+        running.signal(signal);
+        running.end();
+        let packets = packets(&path);
+        assert_eq!(packets.len(), 3, "{signal}");
+        assert!(packets.iter().all(|(_, data)| data.ends_with(&frame)));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("line.pcapng");
+    let mut files = Vec::new();
+    for _ in 0..2 {
+        let record = ["--record", path.to_str().unwrap()];
+        let mut running = Running::start_loop(&[["--exact-line", "127.0.0.1:0"], record].concat());
+        let mut line = TcpStream::connect(running.endpoint("exact-line: ")).unwrap();
+        line.write_all(b"run 1000\nsend 01 07 41 E2\nrun 2000000\n")
+            .unwrap();
+        let limit = Instant::now() + Duration::from_secs(60);
+        while packets(&path).is_empty() {
+            assert!(Instant::now() < limit, "the frame is in the file");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        running.signal("-TERM");
+        assert_eq!(running.end().0, Some(0));
+        files.push(packets(&path));
+    }
+    assert_eq!(files[0][0].0, 101_000_000, "100 ms of start-up, and 1 ms");
+    assert_eq!(files[0], files[1], "the same in every run");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn capture_file_that_cannot_be_written_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = endless_loop(directory.path());
+    for (path, part) in [
+        ("/nowhere/line.pcapng", "No such file"),
+        (directory.path().to_str().unwrap(), "directory"),
+        ("/dev/full", "No space"),
+    ] {
+        let arguments = [
+            "--elf",
+            elf.to_str().unwrap(),
+            "--http",
+            "127.0.0.1:0",
+            "--record",
+            path,
+        ];
+        refused(&arguments, &[path, part]);
+    }
+}

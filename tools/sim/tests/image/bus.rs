@@ -1,0 +1,233 @@
+//! Several boards on one line.
+
+use sim::line::{Direction, Frame, Received};
+use sim::{Board, Bus, Channel, Config, Module, Time};
+
+use crate::LAYOUT;
+use crate::bench::{FIRST, adu, corner, flash_with, image};
+
+/// Boards with these switches on one bus, given time to start.
+fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
+    let boards = dips.into_iter().map(board).collect();
+    let mut bus = Bus::new(boards);
+    bus.run_for(Time::from_ms(150));
+    bus
+}
+
+fn board(dip: u8) -> Board {
+    board_with(dip, Module::Di4)
+}
+
+fn board_with(dip: u8, module: Module) -> Board {
+    let config = Config {
+        dip,
+        module,
+        flash: Some(flash_with(module)),
+        layout: LAYOUT,
+        corner: corner(),
+        ..Config::default()
+    };
+    Board::new(image(), config).expect("the image fits")
+}
+
+/// Sends these bytes now, waits 50 ms after their end, and returns what the master has received.
+fn exchange(bus: &mut Bus, bytes: &[u8]) -> Vec<Received> {
+    let now = bus.now();
+    let end = bus.line().send(now, bytes);
+    bus.run_until(end + Time::from_ms(50));
+    bus.line().take_received()
+}
+
+/// Sends a PDU to a unit; the PDU of its reply.
+fn ask(bus: &mut Bus, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+    let received = exchange(bus, &adu(&[&[unit], pdu].concat()));
+    assert!(received.iter().all(Received::is_good), "{received:?}");
+    let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+    let body = bytes.get(..bytes.len().checked_sub(2)?)?;
+    assert_eq!(bytes, adu(body), "the CRC");
+    assert_eq!(body[0], unit);
+    Some(body[1..].to_vec())
+}
+
+fn read_inputs(bus: &mut Bus, unit: u8) -> Option<Vec<u8>> {
+    ask(bus, unit, &[2, 0, FIRST, 0, 4])
+}
+
+/// A counter of function 08.
+fn counter(bus: &mut Bus, unit: u8, which: u8) -> u16 {
+    match ask(bus, unit, &[8, 0, which, 0, 0]).as_deref() {
+        Some(&[8, 0, echo, high, low]) if echo == which => u16::from_be_bytes([high, low]),
+        reply => panic!("a counter: {reply:02X?}"),
+    }
+}
+
+fn assert_sound(bus: &Bus) {
+    for board in bus.boards() {
+        assert_eq!(board.findings(), []);
+        assert_eq!(board.resets(), 0);
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn each_unit_answers_only_when_it_is_asked() {
+    let mut bus = bus([1, 2]);
+    bus.board_mut(1).set_energised(1, true).unwrap();
+    bus.run_for(Time::from_ms(100));
+    for _ in 0..3 {
+        assert_eq!(read_inputs(&mut bus, 1).as_deref(), Some(&[2, 1, 0][..]));
+        assert_eq!(read_inputs(&mut bus, 2).as_deref(), Some(&[2, 1, 1][..]));
+        assert_eq!(read_inputs(&mut bus, 3), None);
+    }
+    assert_eq!(bus.line().collisions().count(), 0);
+    let frames: Vec<Frame> = bus.line().frames().cloned().collect();
+    assert_eq!(frames.len(), 15);
+    assert!(frames.iter().all(|frame| frame.crc_ok && !frame.damaged));
+    let answers = |unit: &&Frame| unit.direction == Direction::FromUnit;
+    assert_eq!(frames.iter().filter(answers).count(), 6);
+    assert_sound(&bus);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn units_that_only_listen_count_every_message_and_no_error() {
+    let mut bus = bus([1, 2, 3]);
+    for _ in 0..40 {
+        assert!(read_inputs(&mut bus, 1).is_some());
+    }
+    for unit in [2, 3] {
+        // The messages before, and the request itself.
+        let frames = bus.line().frames().count() as u16;
+        assert_eq!(counter(&mut bus, unit, 0x0B), frames + 1);
+        assert_eq!(counter(&mut bus, unit, 0x0C), 0);
+    }
+    assert_sound(&bus);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn replies_of_two_units_with_the_same_address_collide() {
+    let run = || {
+        let mut bus = bus([1, 1]);
+        bus.board_mut(1).set_energised(1, true).unwrap();
+        bus.run_for(Time::from_ms(100));
+        let received = exchange(&mut bus, &adu(&[1, 2, 0, FIRST, 0, 4]));
+        let line = bus.line();
+        let frames: Vec<Frame> = line.frames().cloned().collect();
+        (received, frames, line.collisions().collect::<Vec<_>>())
+    };
+    let (received, frames, collisions) = run();
+    assert!(received.iter().all(|received| received.collided));
+    // The replies differ in the inputs and in the CRC: what both leave high is high.
+    let (one, other) = (adu(&[1, 2, 1, 0]), adu(&[1, 2, 1, 1]));
+    let wired: Vec<u8> = one.iter().zip(&other).map(|(a, b)| a & b).collect();
+    let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+    assert_eq!(bytes, wired);
+    assert_ne!(bytes, one);
+    assert_eq!(frames.len(), 2);
+    assert!(frames[1].damaged && !frames[1].crc_ok);
+    // From the first start bit to the end of the last stop bit both drivers are on.
+    let [collision] = collisions[..] else {
+        panic!("one collision: {collisions:?}");
+    };
+    assert!(
+        collision.start <= frames[1].start && frames[1].end <= collision.end + Time::from_us(1)
+    );
+    assert_eq!(run(), (received, frames, collisions));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_broadcast_acts_on_all_units() {
+    let boards = [1, 2, 3].map(|dip| board_with(dip, Module::Do4));
+    let mut bus = Bus::new(boards.into());
+    bus.run_for(Time::from_ms(150));
+    assert_eq!(exchange(&mut bus, &adu(&[0, 5, 0, FIRST, 0xFF, 0])), []);
+    for board in bus.boards() {
+        assert_eq!(board.channel(1), Channel::Do { on: true });
+    }
+    assert_sound(&bus);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_unit_that_loses_power_in_mid_reply_lets_go_of_the_line() {
+    let mut bus = bus([1, 2]);
+    let now = bus.now();
+    let sent = bus.line().send(now, &adu(&[1, 2, 0, FIRST, 0, 4]));
+    let settings = bus.line().settings();
+    // In the middle of the third byte: the reply begins within a character after t3.5.
+    while !bus.board(0).driver_enable() {
+        bus.run_for(settings.rate().bits(1));
+    }
+    bus.run_for(settings.rate().bits(28));
+    bus.board_mut(0).power_off();
+    let cut = bus.now();
+    bus.run_until(sent + Time::from_ms(50));
+    let received = bus.line().take_received();
+    assert!((2..=3).contains(&received.len()), "{received:?}");
+    assert!(bus.line().level_at(cut + Time::from_us(2)));
+    assert_eq!(
+        bus.line()
+            .falling_edges(cut, sent + Time::from_ms(50))
+            .count(),
+        0
+    );
+    // The other unit has received an incomplete message, and still answers.
+    assert_eq!(read_inputs(&mut bus, 1), None);
+    assert!(read_inputs(&mut bus, 2).is_some());
+    let before = bus.now();
+    bus.cycle(0);
+    assert!(
+        bus.boards()
+            .iter()
+            .all(|board| board.now() >= before + Time::from_ms(100))
+    );
+    bus.run_for(Time::from_ms(150));
+    assert!(read_inputs(&mut bus, 1).is_some());
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn one_board_on_a_bus_is_the_board_alone() {
+    let mut alone = board(1);
+    let mut bus = Bus::new(vec![board(1)]);
+    let request = adu(&[1, 2, 0, FIRST, 0, 4]);
+    alone.run_for(Time::from_ms(150));
+    bus.run_for(Time::from_ms(150));
+    for _ in 0..3 {
+        let now = alone.now();
+        assert_eq!(bus.now(), now);
+        let end = alone.line().send(now, &request);
+        assert_eq!(bus.line().send(now, &request), end);
+        alone.run_until(end + Time::from_ms(30));
+        bus.run_until(end + Time::from_ms(30));
+    }
+    let said = |line: &sim::line::Line| {
+        (
+            line.frames().cloned().collect::<Vec<_>>(),
+            line.received().copied().collect::<Vec<_>>(),
+            line.driver_edges().collect::<Vec<_>>(),
+            line.falling_edges(Time::ZERO, line.now())
+                .collect::<Vec<_>>(),
+        )
+    };
+    let (one, other) = (said(alone.line()), said(bus.line()));
+    assert_eq!((one.0.len(), one.2.len()), (6, 6));
+    assert_eq!(one, other);
+    assert_eq!(alone.instructions(), bus.board(0).instructions());
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn a_unit_replies_the_same_whether_others_listen_or_not() {
+    let replies = |dips: &[u8]| {
+        let mut bus = bus(dips.iter().copied());
+        for _ in 0..5 {
+            assert!(read_inputs(&mut bus, 1).is_some());
+        }
+        let received = bus.line().frames().cloned();
+        received.collect::<Vec<_>>()
+    };
+    assert_eq!(replies(&[1]), replies(&[1, 2, 3, 4]));
+}

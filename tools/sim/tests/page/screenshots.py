@@ -1,0 +1,156 @@
+"""Takes the pictures of the simulator's page for the documents: `cargo xtask screenshots`.
+
+The board's time and the page's stand still between steps, so a picture hardly changes unless the page or the firmware does.
+"""
+
+import argparse
+import math
+import os
+import pathlib
+import socket
+import sys
+
+from PIL import Image
+from playwright.sync_api import expect, sync_playwright
+
+# The tests of pymodbus have the simulator, by its Python client.
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / "pymodbus"),
+                str(pathlib.Path(__file__).resolve().parents[2] / "python")]
+import simulator  # noqa: E402
+from browser import DESKTOP, PHONE, launch  # noqa: E402
+
+SECONDS = 60
+EXACT = ["--exact-line", "127.0.0.1:0"]
+
+
+class Line:
+    """The board's line by the exact-line protocol of docs/conformance.md."""
+
+    def __init__(self, address: str):
+        host, port = address.rsplit(":", 1)
+        with socket.create_connection((host, int(port)), timeout=simulator.PATIENCE) as connection:
+            # Keeps the connection until it is closed itself.
+            self.file = connection.makefile("rw")
+        self.ask("hello 1")
+
+    def ask(self, request: str):
+        self.file.write(request + "\n")
+        self.file.flush()
+        answer = self.file.readline()
+        assert answer.startswith("ok "), (request, answer)
+
+    def request(self, body: str, run_ms: int):
+        """Sends a request, and lets time pass."""
+        self.ask(f"send {simulator.crc(bytes.fromhex(body)).hex()}")
+        self.ask(f"run {run_ms * 1000}")
+
+
+def value(second: int, channel: int) -> int:
+    """Millivolts at an input: a slow wave, each channel at its own level."""
+    return round(1650 + (900 - 150 * channel) * math.sin(second / (6 + 2 * channel) + channel))
+
+
+def larger_board(browser, board, line, scheme, file):
+    """The modio-08 with four modules, after a minute of a master's requests."""
+    page = opened(browser, board, DESKTOP, scheme, 1.25)
+    for number in (1, 4):
+        board.set_channel(number, energised=True)
+    line.request("02050006ff00", 100)
+    for second in range(SECONDS):
+        for channel in range(4):
+            board.set_channel(channel + 1, port=3, millivolts=value(second, channel))
+        level = value(second, 0)
+        if second == SECONDS - 1:
+            while not board.state()["leds"]["run"]:
+                line.ask("run 20000")
+        requests = ["020400080004", "020100000004", f"0206000c{level:04x}", f"0206000e{4095 - level:04x}"]
+        line.request(requests[second % 4], 1000 if second < SECONDS - 1 else 40)
+        shows(page, "c2-1", value(second, 0))
+        page.clock.run_for(1000)
+    shoot(page, file, page.locator("#frame-scroll"))
+
+
+def smaller_board(browser, board, line, scheme, file):
+    """The modio-02 with an analog module, on a phone."""
+    page = opened(browser, board, PHONE, scheme, 2)
+    board.set_channel(1, millivolts=1815)
+    board.set_channel(2, millivolts=1000)
+    page.get_by_label("Range of analog input 2").select_option(label="°C")
+    line.request("020600120800", 100)
+    line.request("020400100002", 40)
+    shows(page, "c0-1", 1815)
+    page.clock.run_for(1000)
+    shoot(page, file, page.locator(".board"))
+
+
+def opened(browser, board, viewport, scheme, scale):
+    page = browser.new_page(viewport=viewport, color_scheme=scheme, device_scale_factor=scale)
+    page.clock.install(time=0)
+    page.goto(board.url)
+    expect(page.locator("#connection")).to_have_text("live")
+    page.clock.pause_at(SECONDS * 1000)
+    return page
+
+
+def shows(page, slider: str, millivolts: int):
+    """Waits until the page shows this value at a slider."""
+    expect(page.locator(f"#{slider}")).to_have_value(str(millivolts))
+
+
+def shoot(page, file: pathlib.Path, last):
+    """A picture of the page down to the element `last`, in 256 colours."""
+    # The last frame and the state after it have come.
+    page.wait_for_load_state()
+    page.clock.run_for(500)
+    box = last.bounding_box()
+    width = page.viewport_size["width"]
+    page.screenshot(path=file, full_page=True,
+                    clip={"x": 0, "y": 0, "width": width, "height": box["y"] + box["height"] + 12})
+    reduced(Image.open(file).convert("RGB")).save(file, optimize=True)
+    print(f"wrote {file}, {file.stat().st_size // 1024} KiB")
+    page.close()
+
+
+def reduced(picture: Image.Image) -> Image.Image:
+    """The picture in 256 colours: the most frequent ones as they are, so that grounds keep theirs, and others that are
+    far from these, so that an LED keeps its."""
+    counted = sorted(picture.getcolors(picture.width * picture.height), reverse=True)
+    frequent = [colour for _, colour in counted[:128]]
+    far = picture.quantize(128, Image.Quantize.MAXCOVERAGE).getpalette()[:3 * 128]
+    palette = frequent + list(zip(far[::3], far[1::3], far[2::3]))
+    distance = lambda one, other: sum((a - b) ** 2 for a, b in zip(one, other))
+    nearest = {colour: min(range(len(palette)), key=lambda n: distance(palette[n], colour)) for _, colour in counted}
+    pixels = bytes(nearest[colour] for colour in picture.get_flattened_data())
+    made = Image.frombytes("P", picture.size, pixels)
+    made.putpalette([part for colour in palette for part in colour])
+    return made
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sim", required=True, type=pathlib.Path)
+    parser.add_argument("--elf", required=True, type=pathlib.Path)
+    parser.add_argument("--elf-08", required=True, type=pathlib.Path)
+    parser.add_argument("--to", required=True, type=pathlib.Path, help="the directory of the pictures")
+    options = parser.parse_args()
+    os.environ |= {"MODIO_SIM": str(options.sim), "MODIO_ELF": str(options.elf), "MODIO_ELF_08": str(options.elf_08)}
+    options.to.mkdir(parents=True, exist_ok=True)
+    slots = ["--slot", "1=4di", "--slot", "2=2relay", "--slot", "3=4ai", "--slot", "4=4ao"]
+    pictures = [("desktop", larger_board, {"board": "modio-08", "options": slots}),
+                ("phone", smaller_board, {"module": "2ai2ao"})]
+    with sync_playwright() as playwright:
+        browser = launch(playwright)
+        for name, take, board in pictures:
+            for scheme in ("light", "dark"):
+                running = simulator.Simulator.of(dip=2, **board | {"options": [*EXACT, *board.get("options", ())]})
+                try:
+                    line = Line(running.endpoint("exact-line"))
+                    take(browser, running, line, scheme, options.to / f"panel-{name}-{scheme}.png")
+                    line.file.close()
+                finally:
+                    running.close()
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""What the page shows of faults made on purpose, and of several boards on one line."""
+
+from browser import OnPage
+from playwright.sync_api import expect
+
+
+class Faults(OnPage):
+    def setUp(self):
+        super().setUp()
+        self.simulator.set_faults({"bit_error_rate": 0, "drop_rate": 0, "noise_hz": 0, "i2c_absent": False,
+                                   "hse_failed": False, "hsi_percent": 0, "lsi_khz": 40})
+        expect(self.page.get_by_role("heading", name="Faults")).to_be_visible()
+
+    def is_expected(self, message) -> bool:
+        return super().is_expected(message) or (message.location["url"].endswith("/faults") and "400" in message.text)
+
+    def in_force(self, name: str):
+        return lambda: self.simulator.faults()[name]
+
+    def test_faults_are_chosen_one_by_one(self):
+        self.page.get_by_label("Noise on the line, pulses per second").fill("2")
+        self.page.keyboard.press("Enter")
+        self.page.get_by_label("DAC does not answer on I2C").check()
+        self.page.get_by_label("LSI, kHz").fill("30.5")
+        self.page.keyboard.press("Tab")
+        expect(self.page.get_by_label("LSI, kHz")).to_have_value("30.5")
+        expect(self.page.get_by_label("DAC does not answer on I2C")).to_be_checked()
+        for name, value in (("noise_hz", 2), ("i2c_absent", True), ("lsi_khz", 30.5)):
+            self.eventually(self.in_force(name), value)
+
+    def test_failed_crystal_lights_the_fault_led(self):
+        lamp = self.page.locator("#led-fault-text")
+        expect(lamp).to_have_text("off")
+        self.page.get_by_label("Crystal has failed").check()
+        expect(lamp).to_have_text("on")
+        self.page.get_by_label("Crystal has failed").uncheck()
+        self.eventually(self.in_force("hse_failed"), False)
+        self.simulator.power_cycle()
+
+    def test_refused_fault_is_told_and_taken_back(self):
+        self.page.get_by_label("Bit errors, share of bits").fill("7")
+        self.page.keyboard.press("Tab")
+        expect(self.page.get_by_role("alert")).to_contain_text("from 0 to 0.5")
+        expect(self.page.get_by_label("Bit errors, share of bits")).to_have_value("0")
+
+    def test_faults_that_begin_by_themselves_are_shown(self):
+        expect(self.page.get_by_label("DAC does not answer on I2C")).not_to_be_checked()
+        self.simulator.set_faults({"i2c_absent": True})
+        expect(self.page.get_by_label("DAC does not answer on I2C")).to_be_checked()
+
+
+class OneBoard(OnPage):
+    def test_chooser_is_hidden(self):
+        expect(self.page.locator("#chooser")).to_be_hidden()
+
+
+class Boards(OnPage):
+    MODULE = None
+    OPTIONS = ("--unit", "1:4di", "--unit", "2:4do")
+
+    def test_chosen_board_is_shown_and_operated(self):
+        chooser = self.page.get_by_role("combobox", name="Board").first
+        expect(chooser.locator("option")).to_have_text(["unit-1 (modio-02)", "unit-2 (modio-02)"])
+        address = self.page.get_by_label("SW01 as a number")
+        expect(address).to_have_value("1")
+        chooser.select_option("unit-2")
+        expect(address).to_have_value("2")
+        expect(self.page.get_by_role("group", name="DO 4")).to_be_visible()
+        self.good(self.master.write_coil(0x0010, True, device_id=2))
+        expect(self.page.get_by_role("switch", name="Digital output 1")).to_have_text("conducts")
+        self.page.get_by_role("switch", name="SW01 position 3, adds 4").click()
+        expect(address).to_have_value("6")
+        self.assertEqual([self.simulator.board(name).state().dip for name in ("unit-1", "unit-2")], [1, 6])
+        chooser.select_option("unit-1")
+        expect(address).to_have_value("1")
+        expect(self.page.get_by_role("group", name="DI 4")).to_be_visible()

@@ -1,0 +1,198 @@
+//! The simulator as a container image: an archive in the OCI image layout, which `podman load` and `docker load` take.
+//!
+//! ```text
+//! oci-layout                   the version of the layout
+//! index.json ──> blobs/sha256/manifest ──> blobs/sha256/config   how to start it
+//!                                     └──> blobs/sha256/layer    the files in it: a tar with the program
+//! manifest.json                the same for a docker that is older than 25
+//! ```
+//!
+//! All times are 0 and all owners root, so that the same program gives the same archive.
+
+use register_map::Board;
+use serde_json::{Value, json};
+use tar::{Builder, EntryType, Header};
+
+use super::sha256;
+use crate::{Failure, Result};
+
+/// The image's name and tag.
+const NAME: &str = concat!("modio-sim:", env!("CARGO_PKG_VERSION"));
+/// The program in the image.
+const PROGRAM: &str = "modio-sim";
+/// Where it listens: on all addresses, for a container's loopback is its own.
+const HTTP: u16 = 8502;
+const TCP: u16 = 5020;
+/// A user without a name and without rights; what a volume for `--flash` must be writable to.
+const USER: &str = "65532:65532";
+
+const MANIFEST: &str = "application/vnd.oci.image.manifest.v1+json";
+const CONFIG: &str = "application/vnd.oci.image.config.v1+json";
+const LAYER: &str = "application/vnd.oci.image.layer.v1.tar";
+
+/// The archive with this program, for a processor as Rust calls it.
+///
+/// # Errors
+///
+/// When the processor has no name in OCI images.
+pub(super) fn archive(program: &[u8], processor: &str) -> Result<Vec<u8>> {
+    let architecture = match processor {
+        "x86_64" => "amd64",
+        "aarch64" => "arm64",
+        "riscv64gc" => "riscv64",
+        other => return Err(Failure::new(format!("no container image for {other}"))),
+    };
+    let layer = packed(&[(PROGRAM, 0o755, program)])?;
+    let config = config(architecture, &sha256(&layer)).to_string();
+    let config = config.as_bytes();
+    let manifest = json!({
+        "schemaVersion": 2,
+        "mediaType": MANIFEST,
+        "config": descriptor(CONFIG, config),
+        "layers": [descriptor(LAYER, &layer)],
+    });
+    let manifest = manifest.to_string();
+    let mut entry = descriptor(MANIFEST, manifest.as_bytes());
+    entry["annotations"] = json!({
+        "org.opencontainers.image.ref.name": NAME,
+        // What podman and containerd call it after loading.
+        "io.containerd.image.name": format!("docker.io/library/{NAME}"),
+    });
+    entry["platform"] = json!({ "architecture": architecture, "os": "linux" });
+    let index = json!({
+        "schemaVersion": 2,
+        "mediaType": "application/vnd.oci.image.index.v1+json",
+        "manifests": [entry],
+    });
+    let blob = |content: &[u8]| format!("blobs/sha256/{}", sha256(content));
+    let old = json!([{ "Config": blob(config), "RepoTags": [NAME], "Layers": [blob(&layer)] }]);
+    packed(&[
+        ("oci-layout", 0o644, br#"{"imageLayoutVersion":"1.0.0"}"#),
+        ("index.json", 0o644, index.to_string().as_bytes()),
+        ("manifest.json", 0o644, old.to_string().as_bytes()),
+        (&blob(manifest.as_bytes()), 0o644, manifest.as_bytes()),
+        (&blob(config), 0o644, config),
+        (&blob(&layer), 0o644, &layer),
+    ])
+}
+
+/// How the container starts, and what is in it.
+fn config(architecture: &str, layer: &str) -> Value {
+    let boards = Board::ALL.map(|board| board.name).join(" and ");
+    json!({
+        "architecture": architecture,
+        "os": "linux",
+        "config": {
+            "User": USER,
+            "ExposedPorts": { format!("{HTTP}/tcp"): {}, format!("{TCP}/tcp"): {} },
+            "Entrypoint": [
+                format!("/{PROGRAM}"), "--http", format!("0.0.0.0:{HTTP}"), "--tcp", format!("0.0.0.0:{TCP}"),
+            ],
+            "Labels": {
+                "org.opencontainers.image.title": PROGRAM,
+                "org.opencontainers.image.description": format!("Virtual boards {boards}"),
+                "org.opencontainers.image.version": env!("CARGO_PKG_VERSION"),
+                "org.opencontainers.image.licenses": "MIT OR Apache-2.0",
+            },
+        },
+        "rootfs": { "type": "layers", "diff_ids": [format!("sha256:{layer}")] },
+    })
+}
+
+fn descriptor(kind: &str, content: &[u8]) -> Value {
+    json!({
+        "mediaType": kind,
+        "digest": format!("sha256:{}", sha256(content)),
+        "size": content.len(),
+    })
+}
+
+/// A tar of these files: name, permissions, content.
+fn packed(files: &[(&str, u32, &[u8])]) -> Result<Vec<u8>> {
+    let mut tar = Builder::new(Vec::new());
+    for (name, mode, content) in files {
+        let mut header = Header::new_ustar();
+        header.set_entry_type(EntryType::Regular);
+        header.set_mode(*mode);
+        header.set_size(content.len() as u64);
+        header.set_uid(0);
+        header.set_gid(0);
+        header.set_mtime(0);
+        tar.append_data(&mut header, name, *content)
+            .map_err(|error| Failure::new(format!("cannot pack {name}: {error}")))?;
+    }
+    tar.into_inner()
+        .map_err(|error| Failure::new(format!("cannot pack: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::io::Read as _;
+
+    use super::*;
+
+    fn unpacked(archive: &[u8]) -> BTreeMap<String, Vec<u8>> {
+        let mut files = BTreeMap::new();
+        for file in tar::Archive::new(archive).entries().unwrap() {
+            let mut file = file.unwrap();
+            let header = file.header();
+            assert_eq!((header.mtime().unwrap(), header.uid().unwrap()), (0, 0));
+            let name = file.path().unwrap().to_string_lossy().into_owned();
+            let mut content = Vec::new();
+            file.read_to_end(&mut content).unwrap();
+            files.insert(name, content);
+        }
+        files
+    }
+
+    /// The blob that a descriptor names, whose size and sum are checked.
+    fn blob<'a>(files: &'a BTreeMap<String, Vec<u8>>, descriptor: &Value) -> &'a [u8] {
+        let sum = descriptor["digest"].as_str().unwrap();
+        let sum = sum.strip_prefix("sha256:").unwrap();
+        let content = &files[&format!("blobs/sha256/{sum}")];
+        assert_eq!(sha256(content), sum);
+        assert_eq!(descriptor["size"], content.len());
+        content
+    }
+
+    #[test]
+    fn the_program_is_found_from_the_index_and_started_without_rights() {
+        let files = unpacked(&archive(b"program", "x86_64").unwrap());
+        let read = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).unwrap();
+        let index = read(&files["index.json"]);
+        let entry = &index["manifests"][0];
+        assert_eq!(entry["platform"]["architecture"], "amd64");
+        let manifest = read(blob(&files, entry));
+        let config = read(blob(&files, &manifest["config"]));
+        let layer = blob(&files, &manifest["layers"][0]);
+        assert_eq!(
+            config["rootfs"]["diff_ids"][0],
+            manifest["layers"][0]["digest"]
+        );
+        assert_eq!(unpacked(layer)["modio-sim"], b"program");
+        assert_eq!(config["config"]["User"], "65532:65532");
+        let entrypoint = config["config"]["Entrypoint"].as_array().unwrap();
+        assert_eq!(entrypoint[0], "/modio-sim");
+        for port in ["8502", "5020"] {
+            let address = format!("0.0.0.0:{port}");
+            assert!(entrypoint.contains(&address.into()), "{entrypoint:?}");
+            assert!(config["config"]["ExposedPorts"][format!("{port}/tcp")].is_object());
+        }
+        let old = read(&files["manifest.json"]);
+        assert!(files.contains_key(old[0]["Config"].as_str().unwrap()));
+        assert_eq!(
+            files.len(),
+            6,
+            "the layout, the index, the old manifest, three blobs"
+        );
+    }
+
+    #[test]
+    fn the_same_program_gives_the_same_archive() {
+        let archive = |processor| archive(b"program", processor).unwrap();
+        assert_eq!(archive("x86_64"), archive("x86_64"));
+        assert_ne!(archive("x86_64"), archive("aarch64"));
+        assert!(super::archive(b"program", "sparc64").is_err());
+    }
+}
