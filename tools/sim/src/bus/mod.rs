@@ -5,9 +5,11 @@
 //! none of them may pass an instant at which another one could still pull the line low.
 //!
 //! A unit can do that only when its transmitter begins a character: at the end of the one under way, or at a tick of
-//! its baud generator while its core executes instructions. So always the board whose core executes something first
-//! goes on, up to the earliest such instant of the others. A core that sleeps does nothing until its next event, and
-//! its board stays behind until then, or until the run ends. All edges of a character are known when it begins.
+//! its baud generator while its core executes instructions. So each board goes on up to the earliest such instant of
+//! the others, all of them at the same time on as many threads as the host has cores; then they hear what the others
+//! have said, and go on. What a board does is the same whatever the number of threads. A core that sleeps does nothing
+//! until its next event, and its board stays behind until then, or until the run ends. All edges of a character are
+//! known when it begins.
 //!
 //! That is exact but for two things:
 //!
@@ -19,6 +21,8 @@
 //! - A unit that breaks off a character, by its driver, its pin or its supply, or that pulls the line low by a plain
 //!   output, does so between two ticks. The others may be up to one bit of that unit past it by then, or [`FARTHEST`]
 //!   while its transmitter is off, and hear of it then.
+
+use rayon::prelude::*;
 
 use crate::board::Board;
 use crate::chip::CYCLE;
@@ -45,6 +49,51 @@ struct Plan {
     start: Time,
     /// The other boards may be there already: half a bit after `start`, [`LATEST`] at most.
     bound: Time,
+}
+
+/// Up to where boards can run before they hear from each other: no other one begins a character before.
+#[derive(Clone, Copy, Debug)]
+struct Horizon {
+    /// The board whose bound is the least, which runs up to the next one.
+    first: usize,
+    least: Time,
+    next: Time,
+}
+
+impl Horizon {
+    /// `None` when all boards sleep until `t`, the end of the run.
+    fn of(plans: &[Plan], t: Time) -> Option<Self> {
+        let awake = plans.iter().map(|plan| plan.awake).min()?;
+        if awake >= t {
+            return None;
+        }
+        let mut horizon = Self {
+            first: 0,
+            least: t,
+            next: t,
+        };
+        for (n, plan) in plans.iter().enumerate() {
+            if plan.bound < horizon.least {
+                horizon.next = horizon.least;
+                (horizon.first, horizon.least) = (n, plan.bound);
+            } else {
+                horizon.next = horizon.next.min(plan.bound);
+            }
+        }
+        // One instruction at least.
+        horizon.least = horizon.least.max(awake + Time::from_ps(1));
+        horizon.next = horizon.next.max(horizon.least);
+        Some(horizon)
+    }
+
+    /// Up to where board `n` runs.
+    fn of_board(self, n: usize) -> Time {
+        if n == self.first {
+            self.next
+        } else {
+            self.least
+        }
+    }
 }
 
 /// Boards on one RS-485 line.
@@ -137,17 +186,17 @@ impl Bus {
             return board.run_until(t);
         }
         self.take_up();
-        while let Some((n, to)) = self.next_run(t) {
-            self.boards[n].run_on_bus(to);
-            self.plans[n] = self.boards[n].plan();
-            self.pass_on(n);
-            self.record(t);
-        }
-        for n in 0..self.boards.len() {
-            self.boards[n].run_on_bus(t);
-            self.pass_on(n);
-            self.plans[n] = self.boards[n].plan();
-        }
+        // On a thread of the pool, where to share work out is cheap.
+        rayon::scope(|_| {
+            while let Some(horizon) = Horizon::of(&self.plans, t) {
+                self.run_boards(|n, plan| {
+                    let to = horizon.of_board(n);
+                    (plan.awake < to).then_some(to)
+                });
+                self.record(t);
+            }
+            self.run_boards(|_, _| Some(t));
+        });
         self.record_until(t);
     }
 
@@ -198,18 +247,23 @@ impl Bus {
         }
     }
 
-    /// The board that executes something first, and up to where no other one could change what is on the line; `None`
-    /// when all sleep until `t`.
-    fn next_run(&self, t: Time) -> Option<(usize, Time)> {
-        let plans = || self.plans.iter().enumerate();
-        let (n, plan) = plans().min_by_key(|(_, plan)| plan.awake)?;
-        if plan.awake >= t {
-            return None;
+    /// Runs each board until the instant that `to` gives, if any, and lets everyone hear what they have said.
+    fn run_boards(&mut self, to: impl Fn(usize, &Plan) -> Option<Time>) {
+        let mut due: Vec<_> = self
+            .boards
+            .iter_mut()
+            .zip(&mut self.plans)
+            .enumerate()
+            .filter_map(|(n, (board, plan))| Some((n, to(n, plan)?, board, plan)))
+            .collect();
+        due.par_iter_mut().for_each(|(_, to, board, plan)| {
+            board.run_on_bus(*to);
+            **plan = board.plan();
+        });
+        let ran: Vec<_> = due.into_iter().map(|(n, ..)| n).collect();
+        for n in ran {
+            self.pass_on(n);
         }
-        let others = plans().filter(|&(other, _)| other != n);
-        let to = others.fold(t, |to, (_, other)| to.min(other.bound));
-        // One instruction at least.
-        Some((n, to.max(plan.awake + Time::from_ps(1)).min(t)))
     }
 
     /// Brings the bus up to where all boards are, at most to `t`, when it has not been for a while.

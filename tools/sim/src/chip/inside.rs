@@ -69,7 +69,7 @@ impl<C: Circuit> Chip<C> {
     /// someone was lent them to change.
     #[must_use]
     pub fn flash_changes(&self) -> u64 {
-        self.machine.bus.soc.flash.changes()
+        self.machine.bus.soc.flash.changes().get()
     }
 
     /// Flash operations started since the chip was made.

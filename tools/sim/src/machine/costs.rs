@@ -20,7 +20,7 @@
 //! The slow entry's 16 contains the wake-up from sleep: 1.8 us at 8 MHz are 14.4 cycles (DS5319 table 26).
 
 /// The costs of a core, in cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Costs {
     /// Fetches in sequence overlap execution as far as the prefetch buffer lets them.
     pub overlapped_fetch: bool,
@@ -129,7 +129,7 @@ impl Costs {
 }
 
 /// The costs with the flash as FLASH_ACR sets it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Pace {
     /// The core's.
     pub costs: Costs,

@@ -42,9 +42,8 @@ impl<C: Circuit> Machine<C> {
             return exit;
         }
         let mut until = self.bus.clock.cycle_at(self.next_event().min(stop));
+        let (mut count, mut pc) = (self.core.retired(), self.pc());
         loop {
-            let count = self.core.retired();
-            let pc = self.pc();
             if !self.bus.clock.goes_on(count, pc) {
                 if pc >= RAM_BASE {
                     let offset = (pc - RAM_BASE) as usize;
@@ -59,28 +58,28 @@ impl<C: Circuit> Machine<C> {
                 .min(most.saturating_sub(count));
             let budget = if self.bus.halt { 1 } else { budget.max(1) };
             let exit = self.core.run(budget as u32, &mut self.bus).0;
-            let ran = self.core.retired() - count;
+            let before = count;
+            (count, pc) = (self.core.retired(), self.pc());
             if busy {
-                self.bus.soc.flash.ran(ran);
+                self.bus.soc.flash.ran(count - before);
             }
-            if let Some(segment) = self.bus.clock.ended(count + ran) {
+            if let Some(segment) = self.bus.clock.ended(count) {
                 let (end, after) = (segment.end, segment.after());
-                self.charge_end(end, after);
+                self.charge_end(end, after, pc);
             }
             if exit != Exit::Budget {
                 self.unsettled = true;
                 return exit;
             }
             // Code in SRAM that comes back to flash stalls there.
-            let stalls = busy && self.is_flash(self.pc());
-            if self.bus.halt || stalls || !self.bus.queued.is_empty() || self.core.retired() >= most
-            {
+            let stalls = busy && self.is_flash(pc);
+            if self.bus.halt || stalls || !self.bus.queued.is_empty() || count >= most {
                 return exit;
             }
             if core::mem::take(&mut self.bus.touched) {
                 until = self.bus.clock.cycle_at(self.next_event().min(stop));
             }
-            if self.cycles() >= until {
+            if self.bus.clock.cycle(count) >= until {
                 return exit;
             }
         }
@@ -120,9 +119,8 @@ impl<C: Circuit> Machine<C> {
             .follow(count, bus.segments.at(place, code, changes));
     }
 
-    /// Charges what the end of a segment costs by where it has led to; `after` is the address after it.
-    fn charge_end(&mut self, end: End, after: u32) {
-        let pc = self.pc();
+    /// Charges what the end of a segment costs by where it has led to, which is `pc`; `after` is the address after it.
+    fn charge_end(&mut self, end: End, after: u32, pc: u32) {
         self.sequential = (pc == after).then_some(pc);
         let pace = *self.bus.segments.pace();
         let cycles = match end {

@@ -3,6 +3,12 @@
 //! The core runs a segment at a time: up to an instruction that may branch, change what interrupts are masked, or
 //! wait. Whether a branch was taken is seen afterwards, by where the core is.
 
+mod made;
+
+use std::num::NonZero;
+use std::sync::Arc;
+
+use self::made::Made;
 use super::costs::Pace;
 pub use super::decode::End;
 use super::decode::{Class, decode};
@@ -14,7 +20,7 @@ const LINE: u32 = 8;
 const WORD: u32 = 4;
 
 /// Where a segment starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Place {
     /// The address of its first instruction.
     pub start: u32,
@@ -27,9 +33,8 @@ pub struct Place {
 /// A segment of code with the cycles its instructions take.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// Where it starts, whether a branch has led there, and how many bytes it was made from.
+    /// Where it starts, and how many bytes it was made from.
     start: u32,
-    branched: bool,
     size: u8,
     /// Instructions.
     length: u8,
@@ -44,7 +49,6 @@ impl Segment {
     /// No code: an instruction that is counted nevertheless takes a cycle.
     pub const EMPTY: Self = Self {
         start: 0,
-        branched: false,
         size: 0,
         length: 0,
         end: End::Sequential,
@@ -56,13 +60,10 @@ impl Segment {
     #[must_use]
     pub fn new(place: Place, code: &[u8], pace: &Pace) -> Self {
         let Place {
-            start,
-            in_flash,
-            branched,
+            start, in_flash, ..
         } = place;
         let mut segment = Self {
             start,
-            branched,
             ..Self::EMPTY
         };
         let half = |at: usize| {
@@ -138,8 +139,11 @@ impl Segment {
     #[must_use]
     pub fn reaches(&self, cycles: u64) -> u64 {
         let costs = &self.costs[..=usize::from(self.length)];
+        if costs.last().is_none_or(|&all| u64::from(all) < cycles) {
+            return self.length();
+        }
         let n = costs.partition_point(|&cost| u64::from(cost) < cycles);
-        (n as u64).min(self.length())
+        n as u64
     }
 }
 
@@ -235,62 +239,33 @@ fn cost(class: Class, after_access: bool, in_flash: bool, pace: &Pace) -> u32 {
     }
 }
 
-/// A segment and the bytes that it was made from.
-#[derive(Clone, Debug)]
-struct Made {
-    segment: Segment,
-    bytes: [u8; 4 * MOST],
-    /// The memory's count of changes when the bytes were last the same, if it counts them.
-    changes: Option<u64>,
-}
-
-impl Made {
-    /// None.
-    const EMPTY: Self = Self {
-        segment: Segment::EMPTY,
-        bytes: [0; 4 * MOST],
-        changes: None,
-    };
-
-    fn new(place: Place, code: &[u8], pace: &Pace) -> Self {
-        let segment = Segment::new(place, code, pace);
-        let size = usize::from(segment.size);
-        let mut made = Self {
-            segment,
-            ..Self::EMPTY
-        };
-        made.bytes[..size].copy_from_slice(&code[..size]);
-        made
-    }
-
-    /// Whether it is the segment at `place`, and `code` still the code there.
-    fn is(&self, place: Place, code: &[u8], changes: Option<u64>) -> bool {
-        let segment = &self.segment;
-        let size = usize::from(segment.size);
-        (segment.start, segment.branched) == (place.start, place.branched)
-            && size > 0
-            && (changes.is_some() && changes == self.changes
-                || code.get(..size) == Some(&self.bytes[..size]))
-    }
-}
-
 /// The segments made so far, by where they start.
 #[derive(Debug)]
 pub struct Segments {
     pace: Pace,
-    made: Vec<Made>,
+    kept: Vec<Kept>,
+}
+
+/// A segment, and what a lookup needs: little, for every machine has a table of its own.
+#[derive(Clone, Debug, Default)]
+struct Kept {
+    start: u32,
+    branched: bool,
+    /// The memory's count of changes when the code was last the same, if it counts them.
+    changes: Option<NonZero<u64>>,
+    made: Option<Arc<Made>>,
 }
 
 impl Segments {
     /// Places for segments: a power of two.
-    const PLACES: usize = 4096;
+    const PLACES: usize = 1 << 14;
 
     /// None, for a core with these costs.
     #[must_use]
     pub fn new(pace: Pace) -> Self {
         Self {
             pace,
-            made: vec![Made::EMPTY; Self::PLACES],
+            kept: vec![Kept::default(); Self::PLACES],
         }
     }
 
@@ -315,13 +290,20 @@ impl Segments {
 
     /// The segment at `place`, whose bytes are `code`. They are the same as long as `changes` is.
     #[inline]
-    pub fn at(&mut self, place: Place, code: &[u8], changes: Option<u64>) -> &Segment {
+    pub fn at(&mut self, place: Place, code: &[u8], changes: Option<NonZero<u64>>) -> &Segment {
         let index = (place.start | u32::from(place.branched)) as usize % Self::PLACES;
-        let kept = &mut self.made[index];
-        if !kept.is(place, code, changes) {
-            *kept = Made::new(place, code, &self.pace);
+        let kept = &mut self.kept[index];
+        let known = (kept.start, kept.branched) == (place.start, place.branched)
+            && (changes.is_some() && changes == kept.changes
+                || kept.made.as_ref().is_some_and(|made| made.is_of(code)));
+        if !known {
+            kept.made = None;
+            (kept.start, kept.branched) = (place.start, place.branched);
         }
         kept.changes = changes;
-        &kept.segment
+        let made = kept
+            .made
+            .get_or_insert_with(|| made::shared(place, code, &self.pace));
+        &made.segment
     }
 }

@@ -103,6 +103,11 @@ impl Wave {
     /// Since when the level just before the edge at `edge` had stood: `None` when longer than known.
     #[must_use]
     pub fn previous_edge(&self, edge: Time) -> Option<Time> {
+        if let last @ Some(at) = self.last_edge()
+            && at < edge
+        {
+            return last;
+        }
         let n = self.edges.partition_point(|&(t, _)| t < edge);
         n.checked_sub(1).map(|n| self.edges[n].0)
     }
@@ -125,8 +130,17 @@ impl Wave {
         self.edges.is_empty()
     }
 
+    /// The last edge.
+    fn last_edge(&self) -> Option<Time> {
+        self.edges.back().map(|&(at, _)| at)
+    }
+
     /// The number of edges up to and including `at`.
     fn index_after(&self, at: Time) -> usize {
+        // Most ask about the present of a wire that has no edges in the future.
+        if self.last_edge().is_none_or(|last| last <= at) {
+            return self.edges.len();
+        }
         self.edges.partition_point(|&(t, _)| t <= at)
     }
 }

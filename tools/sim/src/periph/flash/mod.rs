@@ -6,6 +6,8 @@
 mod array;
 mod operations;
 
+use std::num::NonZero;
+
 use crate::machine::memory::Memory;
 use crate::part::Part;
 use crate::peripheral::{Peripheral, Unmodelled};
@@ -116,7 +118,7 @@ pub struct Flash {
     started: u64,
     complaint: Option<Complaint>,
     changed: Option<(usize, usize)>,
-    changes: u64,
+    changes: NonZero<u64>,
 }
 
 impl Flash {
@@ -142,7 +144,7 @@ impl Flash {
             started: 0,
             complaint: None,
             changed: None,
-            changes: 0,
+            changes: NonZero::<u64>::MIN,
         }
     }
 
@@ -169,7 +171,7 @@ impl Flash {
 
     /// The contents, to change from outside.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
-        self.changes += 1;
+        self.changes = self.changes.saturating_add(1);
         self.cells.bytes_mut()
     }
 
@@ -217,7 +219,7 @@ impl Flash {
 
     /// Grows whenever the contents may have changed, by an operation or from outside.
     #[must_use]
-    pub fn changes(&self) -> u64 {
+    pub fn changes(&self) -> NonZero<u64> {
         self.changes
     }
 
@@ -340,7 +342,7 @@ impl Peripheral for Flash {
         {
             self.busy = None;
             self.changed = Some(self.cells.finish(busy.operation));
-            self.changes += 1;
+            self.changes = self.changes.saturating_add(1);
             self.ahead = 0;
             self.bsy_is_late = false;
             self.sr &= !SR_BSY;

@@ -21,7 +21,7 @@ impl Flash {
             let done = now.saturating_sub(busy.from).as_ps();
             let parts = (u128::from(done) * 65_536 / u128::from(whole)).min(65_536) as u32;
             self.changed = Some(self.cells.tear(busy.operation, self.torn, parts));
-            self.changes += 1;
+            self.changes = self.changes.saturating_add(1);
         }
     }
 
