@@ -15,37 +15,37 @@ const INTRODUCTION: &str = "\
 
 <!-- Written by `cargo xtask docs` from crate register-map. Change it there. -->
 
-Addresses are as they stand in the frame, counted from zero. Many masters count from one, or put a digit for
-the table in front: 0x0010 is then 17, 00017 or 10017 as a bit, 40017 or 30017 as a word.
+Addresses are the numbers in the frame and count from 0. Many masters count from 1, or put a digit for the table in
+front: 0x0010 is then 17, 00017 or 10017 as a bit, and 40017 or 30017 as a word.
 
 ## Rules
 
-- Every bit point reads through functions 01 and 02 alike, every word through 03 and 04 alike.
-- A request lies within one of the blocks below and within its defined registers: gaps are exception 02.
-- A write to something that can only be read, or is not there, is exception 02, and nothing is written.
-- A write to several registers is checked whole and then done whole, or not at all.
-- The first check that fails decides the exception: function (01), then quantity, byte count and the form of
-  the value (03), then the address (02), then the value (03), then the state (04: a module does not answer,
-  06: the configuration is locked or its store busy).
-- A value of two registers has its high word first, and is read as one when both are read in one request.
+- Functions 01 and 02 read the same bits, and functions 03 and 04 the same words.
+- A request must lie within one of the blocks below and within its defined registers: gaps are exception 02.
+- A write to a register that does not exist, or that can only be read, is exception 02 and writes nothing.
+- A write to several registers is checked completely, and then done completely or not at all.
+- The first failing check decides the exception: function (01), then quantity, byte count and form of the value (03),
+  then the address (02), then the value (03), then the state (04: a module does not answer, 06: the configuration is
+  locked or its store is busy).
+- A value of two registers has its high word first. A request that reads both registers gets one consistent value.
 ";
 
 const CONFIGURATION_NOTES: &str = "
-- Every write to this block but that of KEY needs the lock open, COMMAND included; else it is exception 06.
-  What counts is whether it was open when the request came: KEY and a setting in one request need it open
-  already. A refused write neither opens it nor keeps it open. A value of KEY other than 0x5A17 is exception 03.
-- What is written here reads back at once. \"now\" counts at once, \"restart\" after the next start, and only if
-  it was saved before.
-- The response to COMMAND is out before the command acts. While a save runs another save is exception 06, a
-  restart waits for it, and a change made meanwhile is not part of it. Status bit 3 clears when the save is
-  complete. Saving what is stored already writes nothing to the flash.
+- Every write to this block except to KEY needs the open lock, COMMAND included. Otherwise it is exception 06. The state
+  of the lock when the request arrives counts: a request with KEY and a setting needs an open lock already. A refused
+  write does not open the lock and does not keep it open. A value of KEY other than 0x5A17 is exception 03.
+- A written value reads back immediately. \"now\" is in force immediately. \"restart\" is in force after the next start, if
+  the value was saved before it.
+- The response to COMMAND is sent before the command is executed. While a save runs, another save is exception 06 and a
+  restart waits for the save. A change that is made during a save is not part of it. Status bit 3 clears when the save is
+  complete. A save of values that are already stored writes nothing to the flash.
 - The lock closes 60 s after the last configuration write.
-- Identify (6): all LEDs blink together for 10 s, and show the state of the device again after that. Another
-  identify begins the 10 s anew.
-- Load defaults (3) and drop (4) change the settings as if they had been written: save to make them last.
-- A setting by point takes the values of the kind of point that MODULE, as last written, makes it; where a
-  point has no use for it, any value of the register. A change of MODULE from one module to another puts the
-  settings of its points to the defaults; from none to a module keeps those that suit.
+- Identify (6): all LEDs blink together for 10 s, and then show the state of the device again. Another identify starts
+  the 10 s again.
+- Load defaults (3) and drop (4) change the settings as writes do: save to make them permanent.
+- A setting by point takes the values of the kind of point that the last written MODULE makes it. If a point has no use
+  for the setting, it takes any value of the register. A change of MODULE from one module to another sets the settings of
+  its points to their defaults. A change from none to a module keeps the settings that suit.
 - Until the restart a \"now\" setting that does not suit the module in force counts as its default.
 ";
 
@@ -54,8 +54,8 @@ A counter wraps. A write of 0 to both registers of a point in one request clears
 ";
 
 const FAULT_NOTES: &str = "
-The record outlives every reset but a loss of power; a new fault takes its place. Line repairs begin at 0 with each
-start and stop at 65535.
+The record survives every reset but a loss of power. A new fault replaces it. Line repairs start at 0 with each start and
+stop at 65535.
 ";
 
 /// Writes the whole document.
@@ -295,8 +295,8 @@ fn write_store(out: &mut impl Write) -> Result {
     writeln!(
         out,
         ".\nIt is a record of the settings that differ from their defaults, with a CRC-32. A setting that this \
-         firmware does not know\nis passed over, and one whose stored value it does not allow has its default: status \
-         bit 1 then says so, as when nothing\ngood was found."
+         firmware does not know\nis ignored. A setting with a stored value that it does not allow has its default; status \
+         bit 1 reports this, and also when nothing\nvalid was found."
     )
 }
 
