@@ -241,7 +241,7 @@ fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
 }
 
 #[test]
-fn disturbed_registers_are_set_up_again_within_as_many_milliseconds_as_there_are_parts() {
+fn disturbed_registers_are_set_up_again_within_one_millisecond_per_part() {
     for part in [None, Some(0), Some(1)] {
         let mut bench = Bench::new();
         bench.pass(100);
