@@ -94,7 +94,6 @@ impl DacWorker {
     /// failed transfer. A failed transfer is repeated at the next call, and after more failures once 1, 2, 4, 8 and
     /// then 16 calls have been skipped. Returns whether a transfer was made. Before the first post the DAC is not
     /// accessed. Every transfer of the bus must end within a bounded time.
-    /// within a bounded time.
     ///
     /// # Errors
     /// [`DacError`] when a transfer failed. From the second failure in a row until the next success,

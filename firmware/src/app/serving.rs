@@ -50,7 +50,7 @@ impl Serving {
             })
         });
         if silent {
-            // The previous reply has been sent, or there was none.
+            // The previous reply has been sent, or will never be sent.
             pass_order_on(device, orders);
         }
         request.is_some_and(|request| self.serve(request, line, device))
