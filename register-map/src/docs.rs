@@ -1,4 +1,4 @@
-//! `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
+//! Writes `docs/register-map.md` from the data of the registers, so that the document cannot differ from them.
 
 use core::fmt::{Result, Write};
 use core::ops::Range;
@@ -15,54 +15,56 @@ const INTRODUCTION: &str = "\
 
 <!-- Written by `cargo xtask docs` from crate register-map. Change it there. -->
 
-Addresses are as they stand in the frame, counted from zero. Many masters count from one, or put a digit for
-the table in front: 0x0010 is then 17, 00017 or 10017 as a bit, 40017 or 30017 as a word.
+Addresses are those in the frame, counted from zero. Many masters count from one, or put a digit for the table in
+front: 0x0010 is then 17, 00017 or 10017 as a bit, 40017 or 30017 as a word.
 
 ## Rules
 
-- Every bit point reads through functions 01 and 02 alike, every word through 03 and 04 alike.
-- A request lies within one of the blocks below and within its defined registers: gaps are exception 02.
-- A write to something that can only be read, or is not there, is exception 02, and nothing is written.
-- A write to several registers is checked whole and then done whole, or not at all.
-- The first check that fails decides the exception: function (01), then quantity, byte count and the form of
-  the value (03), then the address (02), then the value (03), then the state (04: a module does not answer,
-  06: the configuration is locked or its store busy).
-- A value of two registers has its high word first, and is read as one when both are read in one request.
+- Functions 01 and 02 read the same bits, and functions 03 and 04 read the same words.
+- A request must lie within one of the blocks below and within its defined registers. Gaps return exception 02.
+- A write to a read-only or missing register returns exception 02, and nothing is written.
+- A write to several registers is checked completely first. Then all of it is written, or nothing.
+- The first check that fails determines the exception: function (01), then quantity, byte count and the form of the
+  value (03), then the address (02), then the value (03), then the state (04: a module does not answer, 06: the
+  configuration is locked or its store is busy).
+- A value of two registers has its high word first. Read both registers in one request to get a consistent value.
 ";
 
 const CONFIGURATION_NOTES: &str = "
-- Every write to this block but that of KEY needs the lock open, COMMAND included; else it is exception 06.
-  What counts is whether it was open when the request came: KEY and a setting in one request need it open
-  already. A refused write neither opens it nor keeps it open. A value of KEY other than 0x5A17 is exception 03.
-- What is written here reads back at once. \"now\" counts at once, \"restart\" after the next start, and only if
-  it was saved before.
-- The response to COMMAND is out before the command acts. While a save runs another save is exception 06, a
-  restart waits for it, and a change made meanwhile is not part of it. Status bit 3 clears when the save is
-  complete. Saving what is stored already writes nothing to the flash.
+- Every write to this block, including COMMAND, needs the lock to be open; otherwise it returns exception 06. Only KEY
+  can be written while the lock is closed. The lock is checked before the write: a request that writes KEY and a
+  setting together needs the lock to be open already. A rejected write neither opens the lock nor keeps it open. A
+  value of KEY other than 0x5A17 returns exception 03.
+- A written value is read back immediately. \"now\" means that it takes effect immediately, \"restart\" that it takes
+  effect after the next start, if it was saved before.
+- The response to COMMAND is sent before the command is executed. While a save is running, another save returns
+  exception 06, a restart waits for the save, and a new change is not part of the save. Status bit 3 is cleared when
+  the save is complete. Saving settings that are already stored writes nothing to the flash.
 - The lock closes 60 s after the last configuration write.
-- Identify (6): all LEDs blink together for 10 s, and show the state of the device again after that. Another
-  identify begins the 10 s anew.
-- Load defaults (3) and drop (4) change the settings as if they had been written: save to make them last.
-- A setting by point takes the values of the kind of point that MODULE, as last written, makes it; where a
-  point has no use for it, any value of the register. A change of MODULE from one module to another puts the
-  settings of its points to the defaults; from none to a module keeps those that suit.
-- Until the restart a \"now\" setting that does not suit the module in force counts as its default.
+- Identify (6): all LEDs blink together for 10 s; after that they show the state of the device again. Another identify
+  restarts the 10 s.
+- Load defaults (3) and drop (4) change the settings like writes. Save to store them.
+- A setting by point allows the values for the kind of point that MODULE, as last written, defines. If the setting does
+  not apply to that kind, it allows any value of the register. A change of MODULE from one module to another sets the
+  settings of its points to the defaults. A change from none to a module keeps the settings that the module allows.
+- Until the restart, a \"now\" setting that the module in force does not allow acts as its default.
 ";
 
 const COUNTER_NOTES: &str = "
-A counter wraps. A write of 0 to both registers of a point in one request clears the counter. Any other write is exception 03.
+The counters wrap. A write of 0 to both registers of a point in one request clears its counter. Any other write returns
+exception 03.
 ";
 
 const FAULT_NOTES: &str = "
-The record outlives every reset but a loss of power; a new fault takes its place. Line repairs begin at 0 with each
-start and stop at 65535.
+The record is kept over every reset but not over a loss of power. A new fault replaces it. Line repairs begin at 0 with
+each start and stop at 65535.
 ";
 
 /// Writes the whole document.
 ///
 /// # Errors
 ///
-/// Those of `out`.
+/// The errors of `out`.
 pub fn write_markdown(out: &mut impl Write) -> Result {
     out.write_str(INTRODUCTION)?;
     for block in BLOCKS {
@@ -211,8 +213,8 @@ fn plural(kind: Kind) -> &'static str {
 
 fn write_points(out: &mut impl Write) -> Result {
     out.write_str(
-        "`address = (port - 1) * 4 + (channel - 1)`, for bits and words alike. Points of ports without a slot, and those \
-         a module\ndoes not have, are exception 02. The boards have slots at these ports:\n\n\
+        "`address = (port - 1) * 4 + (channel - 1)`, for bits and words. Points of ports without a slot, and points \
+         that a module\ndoes not have, return exception 02. The boards have slots at these ports:\n\n\
          | board | ports | points |\n|---|---|---|\n",
     )?;
     for board in Board::ALL {
@@ -241,8 +243,8 @@ fn write_points(out: &mut impl Write) -> Result {
     }
     out.write_str(
         "\nThe bits of 2relay: 1 and 2 are the mode jumpers of relays 1 and 2 (1 = manual), 3 and 4 their coils. \
-         An output reads back\nwhat was commanded. RANGE and SCALE of a point say what its word means. Values below 0 are \
-         in two's complement. A write of\nanother value to an output is exception 03.\n\n",
+         An output reads back\nits commanded value. RANGE and SCALE of a point determine the unit of its word. Values below 0 \
+         are in two's complement.\nA write of another value to an output returns exception 03.\n\n",
     )?;
     write_readings(out)?;
     out.write_str("\n")?;
@@ -253,7 +255,7 @@ fn write_points(out: &mut impl Write) -> Result {
     )
 }
 
-/// Writes what the words of analog points mean.
+/// Writes the meaning of the words of analog points.
 fn write_readings(out: &mut impl Write) -> Result {
     out.write_str(
         "| RANGE | SCALE | unit | analog input | analog output |\n|---|---|---|---|---|\n",
@@ -283,20 +285,20 @@ fn write_readings(out: &mut impl Write) -> Result {
 }
 
 fn write_store(out: &mut impl Write) -> Result {
-    out.write_str("\nA save goes to two flash pages: ")?;
+    out.write_str("\nSettings are saved to two flash pages: ")?;
     for (i, board) in Board::ALL.iter().enumerate() {
         let [first, second] = board.store.addresses();
         let separator = if i == 0 { "" } else { "; " };
         write!(
             out,
-            "{separator}on the {board} those at {first:#010X} and {second:#010X}"
+            "{separator}on the {board} at {first:#010X} and {second:#010X}"
         )?;
     }
     writeln!(
         out,
-        ".\nIt is a record of the settings that differ from their defaults, with a CRC-32. A setting that this \
-         firmware does not know\nis passed over, and one whose stored value it does not allow has its default: status \
-         bit 1 then says so, as when nothing\ngood was found."
+        ".\nA save writes a record of the settings that differ from their defaults, with a CRC-32. A start ignores stored \
+         settings that the\nfirmware does not know. A stored value that it does not allow is replaced by its default, \
+         and status bit 1 is set. It is also\nset when something was stored but no record is valid."
     )
 }
 
@@ -322,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_written_as_people_read_them() {
+    fn values_are_written_as_ranges_and_lists() {
         let written = |values| {
             let mut text = String::new();
             write_set(values, &mut text).unwrap();
