@@ -1,5 +1,5 @@
-//! Gives the code the commit that it is built from, and the self-description of each board. For the image, also gives the linker the memory layout and the
-//! script of cortex-m-rt.
+//! Gives the code the commit that it is built from and the self-description of each board. For the image, also
+//! gives the linker the memory layout and the linker script of cortex-m-rt.
 
 use std::{
     env, fs,
@@ -10,8 +10,8 @@ use std::{
 use modio_description::{FILE, HEAD, PORT_BYTES, checksum};
 use register_map::{Board, Module};
 
-/// What the image is made of, beside the lock file: with a change in any of it the commit does not say what is in the
-/// image.
+/// Everything that the image is built from. When any of it differs from the commit, the commit does not identify
+/// the image.
 const SOURCES: [&str; 7] = [
     "../firmware",
     "../board-support",
@@ -23,25 +23,24 @@ const SOURCES: [&str; 7] = [
 ];
 
 fn main() {
-    tell_commit();
+    set_commit();
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    fs::write(out.join("self_description.rs"), self_descriptions())
-        .expect("cargo's directory can be written to");
+    fs::write(out.join("self_description.rs"), self_descriptions()).expect("OUT_DIR is writable");
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=build.rs");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
     if let Some(layout) = layout() {
-        fs::write(out.join("memory.x"), layout).expect("cargo's directory can be written to");
+        fs::write(out.join("memory.x"), layout).expect("OUT_DIR is writable");
     }
     println!("cargo::rustc-link-search={}", out.display());
     println!("cargo::rustc-link-arg-bins=--nmagic");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
 }
 
-/// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which the
-/// firmware puts in.
+/// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which
+/// the firmware adds.
 fn self_descriptions() -> String {
     let mut rows = String::new();
     for board in Board::ALL {
@@ -54,13 +53,13 @@ fn self_descriptions() -> String {
         rows += &format!("    Fixed {{ board: {code}, bytes: &{fixed:?}, crc: {crc:#06X} }},\n");
     }
     format!(
-        "/// The number of the file.
+        "/// File number.
 const FILE: u16 = {FILE};
-/// Records in front of the document.
+/// Number of records in front of the document.
 const HEAD: u16 = {HEAD};
-/// Bytes of a port at the end of the document.
+/// Bytes of one port at the end of the document.
 const PORT_BYTES: usize = {PORT_BYTES};
-/// The fixed part of each board's document.
+/// Fixed part of each board's document.
 const BOARDS: [Fixed; {}] = [
 {rows}];
 ",
@@ -68,29 +67,29 @@ const BOARDS: [Fixed; {}] = [
     )
 }
 
-/// The linker's script for the board that was chosen, if one was: a feature is named like the board's file in
-/// `memory`.
+/// Returns the linker script for the selected board, or `None` without a board. The feature has the name of the
+/// board's file in `memory`.
 fn layout() -> Option<String> {
-    let files = fs::read_dir("memory").expect("the directory can be read");
+    let files = fs::read_dir("memory").expect("the directory `memory` is readable");
     let chosen = files
         .filter_map(|file| Some(file.ok()?.path()))
         .find(|file| {
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
-            // Cargo tells the chosen features as variables.
+            // Cargo sets an environment variable for each enabled feature.
             let feature = name.to_uppercase().replace('-', "_");
             env::var_os(format!("CARGO_FEATURE_{feature}")).is_some()
         })?;
-    let read = |path: &Path| fs::read_to_string(path).expect("the file can be read");
+    let read = |path: &Path| fs::read_to_string(path).expect("the linker script is readable");
     Some(read(&chosen) + &read(Path::new("memory/sections.x")))
 }
 
-/// Sets MODIO_COMMIT to the commit's first eight digits, and MODIO_CHANGED when the sources are not those of the
-/// commit. Without git, or outside a repository, neither.
-fn tell_commit() {
+/// Sets MODIO_COMMIT to the first eight digits of the commit, and MODIO_CHANGED when the sources differ from the
+/// commit. Sets neither without git or outside a repository.
+fn set_commit() {
     for source in SOURCES {
         println!("cargo::rerun-if-changed={source}");
     }
-    // HEAD names the branch, and its log gets a line with every commit and checkout.
+    // HEAD names the branch, and git appends a line to the log of HEAD with every commit and checkout.
     for name in ["HEAD", "logs/HEAD"] {
         if let Some(path) = git(&["rev-parse", "--git-path", name]) {
             println!("cargo::rerun-if-changed={path}");
@@ -107,7 +106,7 @@ fn tell_commit() {
     }
 }
 
-/// What git prints, without the end of the line; `None` when it fails or is not there.
+/// Returns what git prints, without the trailing line break, or `None` when git fails or is missing.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = output.status.success().then_some(output.stdout)?;

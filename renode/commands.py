@@ -1,18 +1,18 @@
-# Commands for Renode's monitor, in its IronPython 2; board.resc includes them.
+# Commands for Renode's monitor, in IronPython 2; board.resc includes this file.
 #
 #   modio_inputs DIP     drives every input pin until the next reset: SW01 to DIP, a number from 0 to 255,
 #                        and the other inputs as with nothing connected. Every reset drives $dip again, so
 #                        set $dip to move the switch.
-#   modio_board NAME     says which board the machine is: modio-02 or modio-08
+#   modio_board NAME     selects the board: modio-02 or modio-08
 #   modio_input PORT CHANNEL LEVEL
 #                        drives a line of a slot: false energises an input of a 4DI
-#   modio_preset MODULE  stores that MODULE is in the first slot, when nothing is stored yet; several slots as
+#   modio_preset MODULE  stores MODULE for the first slot, if nothing is stored yet; several slots as
 #                        "1=4di,3=4ao"
-#   modio_log            shows the firmware's log, as much of it as its buffer holds
-#   modio_quiet          keeps warnings that mean nothing out of Renode's log
+#   modio_log            prints the part of the firmware's log that is in its buffer
+#   modio_quiet          disables meaningless warnings in Renode's log
 
-# What differs from board to board. sw01: position 1 first, port and pin. lines: those of the slots, by port. store:
-# the address of the configuration's first page, and the bytes of both.
+# Differences between the boards. sw01: port and pin, position 1 first. lines: those of the slots, by port. store:
+# address of the configuration's first page, and bytes of both pages.
 MODIO_BOARDS = {
     "modio-02": {
         "sw01": [("A", 4), ("A", 5), ("A", 6), ("A", 7), ("B", 12), ("B", 13), ("B", 14), ("B", 15)],
@@ -33,10 +33,10 @@ MODIO_BOARDS = {
     },
 }
 
-# The codes of the modules.
+# Codes of the modules.
 MODIO_MODULES = ["none", "4di", "4do", "2relay", "4ai", "4ao", "2ai2ao"]
 
-# The board that the machine is.
+# The board of the machine.
 MODIO_MACHINE = {"board": "modio-02"}
 
 
@@ -46,7 +46,7 @@ def modio_board():
 
 def mc_modio_board(board):
     if str(board) not in MODIO_BOARDS:
-        raise ValueError("there is no board %s, but %s" % (board, ", ".join(sorted(MODIO_BOARDS))))
+        raise ValueError("there is no board %s; use %s" % (board, ", ".join(sorted(MODIO_BOARDS))))
     MODIO_MACHINE["board"] = str(board)
 
 
@@ -59,7 +59,7 @@ def mc_modio_inputs(dip):
     for bit, place in enumerate(board["sw01"]):
         # ON pulls the pin low.
         modio_drive(place, int(dip) >> bit & 1 == 0)
-    # High with nothing connected: RX, the radio's AUX, the lines of the slots.
+    # These pins are high with nothing connected: RX, the radio's AUX, the lines of the slots.
     modio_drive(("A", 10), True)
     modio_drive(board["aux"], True)
     for lines in board["lines"].values():
@@ -75,13 +75,13 @@ def mc_modio_input(port, channel, high):
 
 
 def modio_slots(modules):
-    # Modules by port: the first slot's alone, or each as PORT=MODULE.
+    # Modules by port: a single module for the first slot, or each as PORT=MODULE.
     ports = sorted(modio_board()["lines"])
     slots = {}
     for part in str(modules).split(","):
         port, module = (part.split("=") if "=" in part else (ports[0], part))
         if module not in MODIO_MODULES:
-            raise ValueError("there is no module %s, but %s" % (module, ", ".join(MODIO_MODULES)))
+            raise ValueError("there is no module %s; use %s" % (module, ", ".join(MODIO_MODULES)))
         if int(port) not in ports:
             raise ValueError("there is no slot at port %s" % port)
         slots[int(port)] = MODIO_MODULES.index(module)
@@ -98,7 +98,7 @@ def modio_crc32(values):
 
 
 def modio_halves(values):
-    # Bytes of half-words, the low one first.
+    # Bytes of half-words, low byte first.
     return [value >> shift & 0xFF for value in values for shift in (0, 8)]
 
 
@@ -118,8 +118,8 @@ def mc_modio_preset(modules):
 
 
 def mc_modio_quiet():
-    # Versions of Renode after 1.16.1 have dma1 and wire the timers' updates to it. The firmware does not use
-    # dma1, which then logs 500 warnings a second. No failure in here may stop board.resc.
+    # Renode versions after 1.16.1 have dma1 and connect the timers' updates to it. The firmware does not use dma1,
+    # which then logs 500 warnings per second. A failure here must not stop board.resc.
     try:
         monitor.Machine["sysbus.dma1"]
         monitor.Parse("logLevel 3 sysbus.dma1")

@@ -3,16 +3,15 @@
 #
 #   exact_line PORT   a command of the monitor: listens on TCP port PORT of 127.0.0.1
 #
-# Include this file after board.resc, and do not `start` the emulation. line-exact.resc does both right.
+# Include this file after board.resc, and do not `start` the emulation. line-exact.resc does both.
 #
-# A byte reaches the unit when its last stop bit ends. Renode 1.16.1 delivers a byte at the instant of
-# WriteChar; later versions deliver it 10 bits later, whatever the format. LineUnit finds out which one runs.
+# A byte reaches the unit when its last stop bit ends. Renode 1.16.1 delivers a byte immediately in WriteChar; later
+# versions deliver it 10 bits later, for every format. LineUnit detects which version runs.
 #
-# Runs in Renode's IronPython 2, in the monitor's scope. All names begin with `line`, so that they do not
-# replace names of other scripts. All calls were seen to work in Renode 1.16.1 and in later versions, except
-# TcpClient.Close, whose failure does no harm. That is why ReadLine reads the requests, with two consequences:
-# a carriage return alone ends a line as well, and the last line of a client that disconnects counts even
-# without its end.
+# Runs in Renode's IronPython 2, in the monitor's scope. All names begin with `line`, so that they do not replace
+# names of other scripts. All calls were tested in Renode 1.16.1 and in later versions, except TcpClient.Close,
+# whose failure does no harm. Therefore ReadLine reads the requests, with two consequences: a carriage return alone
+# also ends a line, and the last line of a client that disconnects counts even without a line end.
 import clr
 clr.AddReference("System.Net.Sockets")
 clr.AddReference("System.Net.Primitives")
@@ -26,12 +25,12 @@ from Antmicro.Renode.Time import TimeInterval
 
 # Longest request line in characters, without the line end.
 LINE_LONGEST = 1048576
-# The most virtual time that one request may take.
+# Longest virtual time that one request may take.
 LINE_MOST_NS = 600000000000
 # Virtual time from power-on until the unit answers.
 LINE_START_NS = 500000000
 
-# Bits of a character by format. Renode's UART has no parity, so 8E1 and 8O1 are missing.
+# Bits per character of each format. Renode's UART has no parity, so 8E1 and 8O1 are missing.
 LINE_FORMATS = {"8N1": 10, "8N2": 11}
 # Bits between WriteChar and the delivery in versions after 1.16.1.
 LINE_DELIVERY_BITS = 10
@@ -42,7 +41,7 @@ LINE_UART_RXNE = 1 << 5
 LINE_UART_CR1 = 0x4001380C
 LINE_UART_RECEIVING = 1 << 13 | 1 << 2
 
-# The flags of the next reset, a register of peripherals/rcc.py: power-on and pin, or the pin alone.
+# Flags of the next reset, a register of peripherals/rcc.py: power-on and pin, or only the pin.
 LINE_RESET_FLAGS = 0x400213F0
 LINE_POWER_ON = 0x0C000000
 LINE_PIN = 0x04000000
@@ -59,11 +58,11 @@ LINE_MISSING = {
 
 
 class LineError(Exception):
-    """Error when a request cannot be carried out; its text is the reason."""
+    """Error when a request cannot be executed; its text is the reason."""
 
 
 def line_text(ns):
-    """Returns a time as the protocol writes it, in microseconds with three decimals."""
+    """Returns a time in the protocol's format, in microseconds with three decimals."""
     return "%d.%03d" % (ns // 1000, ns % 1000)
 
 
@@ -79,18 +78,18 @@ def line_reason(error):
 
 
 def line_number(text, most):
-    """Returns the number that a text of decimal digits stands for, or None above `most`."""
-    # The length is checked first, because a conversion of very many digits takes very long.
+    """Returns the number from a text of decimal digits, or None above `most`."""
+    # Check the length first, because converting very many digits takes very long.
     if not text.isdigit() or len(text) > 12 or int(text) > most:
         return None
     return int(text)
 
 
 def line_time(text):
-    """Returns a time in ns; the text has microseconds with at most three decimals."""
+    """Returns a time in ns from a text in microseconds with at most three decimals."""
     whole, point, decimals = text.partition(".")
     if not whole.isdigit() or point and (not decimals.isdigit() or len(decimals) > 3):
-        raise LineError("%s is no time in microseconds, such as 4010 or 4010.417" % line_shown(text))
+        raise LineError("%s is not a time in microseconds, such as 4010 or 4010.417" % line_shown(text))
     us = line_number(whole, LINE_MOST_NS // 1000)
     ns = None if us is None else us * 1000 + int((decimals + "000")[:3])
     if ns is None or ns > LINE_MOST_NS:
@@ -99,7 +98,7 @@ def line_time(text):
 
 
 def line_bytes(text):
-    """Returns the numbers that a text of hexadecimal digits stands for."""
+    """Returns the bytes from a text of hexadecimal digits."""
     if len(text) % 2 or any(c not in "0123456789abcdefABCDEF" for c in text):
         raise LineError("%s is not an even number of hexadecimal digits" % line_shown(text))
     return [int(text[at:at + 2], 16) for at in range(0, len(text), 2)]
@@ -114,7 +113,7 @@ def line_piece(word):
         return [], line_time(value)
     if kind in LINE_MISSING:
         raise LineError("%s needs the ability %s, which Renode does not have" % (kind, LINE_MISSING[kind]))
-    raise LineError("%s is no piece: use hexadecimal bytes or gap" % line_shown(kind))
+    raise LineError("%s is not a piece: use hexadecimal bytes or gap" % line_shown(kind))
 
 
 class LineClock(object):
@@ -126,25 +125,25 @@ class LineClock(object):
         self.powered = True
         self.offset = 0
         self.now = self.emulated()
-        # End of the time that is passing.
+        # End of the time span that is passing.
         self.target = self.now
 
     def emulated(self):
-        """Returns the emulation's time in ns. Renode counts in steps of 1/8 us, so nothing is lost."""
+        """Returns the emulation's time in ns. Renode counts in steps of 1/8 us, so the result is exact."""
         return int(self.machine.ElapsedVirtualTime.TimeElapsed.TotalMicroseconds * 1000 + 0.5)
 
     def instant(self):
-        """Returns the time of an event that happens while time passes."""
+        """Returns the time of an event that occurs while time passes."""
         return min(max(self.emulated() + self.offset, self.now), self.target)
 
     def catch_up(self):
-        """Takes over the time that passed by a command of the monitor."""
+        """Adds the time that a command of the monitor let pass."""
         if self.powered:
             self.now = max(self.now, self.emulated() + self.offset)
 
     def run_until(self, target):
-        """Lets time pass. The emulation takes whole microseconds, so it stops less than one in front of
-        `target`; the next run makes up for it."""
+        """Lets time pass. The emulation runs for whole microseconds, so it stops less than one microsecond before
+        `target`; the next run compensates for that."""
         self.target = target
         if self.powered:
             self.run_emulation_until(target - self.offset)
@@ -158,13 +157,13 @@ class LineClock(object):
             us = (target - before) // 1000
             if us <= 0:
                 return
-            # Returns when the emulation stands still again. int() makes a small number of a long one.
+            # Returns when the emulation has stopped again. int() converts a long to a plain number.
             self.emulation.RunFor(TimeInterval.FromMicroseconds(int(us)))
             if self.emulated() <= before:
                 raise LineError("the emulation does not run")
 
     def reset(self):
-        """Resets the machine. The line's time goes on, also when that sets the emulation's time back."""
+        """Resets the machine. The line's time continues, even when the reset sets the emulation's time back."""
         before = self.emulated()
         self.machine.Reset()
         self.offset += before - self.emulated()
@@ -180,12 +179,12 @@ class LineUnit(object):
         self.uart = machine["sysbus.usart1"]
         self.rate = 9600
         self.format = "8N2"
-        # Whether WriteChar delivers at once; None until the first byte shows it.
+        # Whether WriteChar delivers a byte immediately; None until the first byte shows it.
         self.at_once = None
         self.events = []
 
     def listen(self):
-        """Collects from now on what the unit sends."""
+        """Collects everything that the unit sends from now on."""
         uart = self.uart
         uart.CharReceived += lambda byte: self.keep(byte)
 
@@ -193,7 +192,7 @@ class LineUnit(object):
         # The emulation calls this, and an exception would end it.
         try:
             at = line_text(self.clock.instant())
-            # A byte takes no time on the way out of Renode's UART: its start is its end.
+            # Renode's UART sends a byte without duration: its start is its end.
             self.events.append("%02X@%s-%s" % (int(byte), at, at))
         except:
             pass
@@ -214,9 +213,9 @@ class LineUnit(object):
         return self.bits(characters * LINE_FORMATS[self.format]) + sum(gap for _, gap in pieces)
 
     def send(self, pieces):
-        """Puts pieces on the line, and lets time pass until the last one has ended."""
+        """Sends pieces on the line, and lets time pass until the last one has ended."""
         clock = self.clock
-        # The characters' bits are summed up apart from the other times, so that rounding does not add up.
+        # The bits of the characters are summed up separately, so that rounding errors do not add up.
         rest = clock.now
         bits = 0
         for data, gap in pieces:
@@ -227,7 +226,7 @@ class LineUnit(object):
         clock.run_until(rest + self.bits(bits))
 
     def deliver(self, byte, end):
-        """Gives the unit the byte whose last stop bit ends at `end`. Returns how many ns later it ends."""
+        """Delivers the byte whose last stop bit ends at `end`. Returns the delay of its end in ns."""
         clock = self.clock
         lead = self.bits(LINE_DELIVERY_BITS)
         clock.run_until(end - lead if self.at_once is False else end)
@@ -240,13 +239,13 @@ class LineUnit(object):
         self.at_once = self.has_byte()
         if self.at_once:
             return 0
-        # The first byte is on its way for 10 bits more. The line waits for it, so that the times after it
-        # are exact in this version, too.
+        # The delivery of the first byte takes 10 more bits. The line waits for it, so that the times after it are
+        # exact in this version, too.
         clock.run_until(end + lead)
         return lead
 
     def receives(self):
-        """Returns whether the receiver is on and empty, so that a byte shows how it is delivered."""
+        """Returns whether the receiver is on and empty, so that a byte shows the kind of delivery."""
         on = self.sysbus.ReadDoubleWord(LINE_UART_CR1) & LINE_UART_RECEIVING == LINE_UART_RECEIVING
         return on and not self.has_byte()
 
@@ -270,7 +269,7 @@ class LineUnit(object):
 
 
 class LineRequests(object):
-    """Carries out request lines on a unit."""
+    """Executes request lines on a unit."""
 
     def __init__(self, unit):
         self.unit = unit
@@ -296,7 +295,7 @@ class LineRequests(object):
         return " ".join([line_text(clock.now)] + rest)
 
     def carry_out(self, name, words):
-        """Carries out a request. Returns the words of the reply after the time."""
+        """Executes a request. Returns the words of the reply after the time."""
         if name == "hello":
             return self.hello(words)
         if name == "send":
@@ -311,13 +310,13 @@ class LineRequests(object):
             return self.reset(words)
         if name in ("echo", "findings"):
             raise LineError("%s needs the ability %s, which Renode does not have" % (name, LINE_MISSING[name]))
-        raise LineError("%s is no request: use hello, send, run, line, power or reset" % line_shown(name))
+        raise LineError("%s is not a request: use hello, send, run, line, power or reset" % line_shown(name))
 
     def hello(self, words):
         if len(words) != 1:
             raise LineError("hello takes the newest version that the client knows")
         if not line_number(words[0], 999999999999):
-            raise LineError("%s is no version of the protocol, such as 1" % line_shown(words[0]))
+            raise LineError("%s is not a version of the protocol, such as 1" % line_shown(words[0]))
         settings = "line=%d,%s" % (self.unit.rate, self.unit.format)
         return ["version=1", settings, "abilities=line,power,reset", "name=modio in Renode"]
 
@@ -342,7 +341,7 @@ class LineRequests(object):
             raise LineError("line takes a rate and a format, such as 9600 8N2")
         rate = line_number(words[0], 4000000)
         if rate is None or rate < 300:
-            raise LineError("%s is no rate from 300 to 4000000 bit/s" % line_shown(words[0]))
+            raise LineError("%s is not a rate from 300 to 4000000 bit/s" % line_shown(words[0]))
         if words[1] not in LINE_FORMATS:
             raise LineError("format %s is not supported: Renode's UART has no parity; use 8N1 or 8N2"
                             % line_shown(words[1]))
@@ -361,14 +360,14 @@ class LineRequests(object):
 
     def reset(self, words):
         if words:
-            raise LineError("reset takes nothing")
+            raise LineError("reset takes no arguments")
         self.unit.reset()
         return []
 
 
 def line_thread(work):
-    """Starts a thread that does not keep Renode from ending. `work` must not raise anything: an exception
-    in a thread ends Renode's process."""
+    """Starts a thread that does not prevent Renode from ending. `work` must not raise an exception, because
+    that would end Renode's process."""
     thread = Thread(ThreadStart(work))
     thread.IsBackground = True
     thread.Start()
@@ -387,12 +386,12 @@ class LineServer(object):
         self.busy = False
 
     def serve(self):
-        """Lets the unit start, then accepts clients. Ends when accepting has failed ten times in a row."""
+        """Lets the unit start, then accepts clients. Ends after ten failures to accept in a row."""
         try:
             clock = self.unit.clock
             clock.run_until(clock.now + LINE_START_NS)
         except:
-            # Every request that lets time pass fails for the same reason, and reports it.
+            # Every request that lets time pass fails for the same reason and reports it.
             pass
         failures = 0
         while failures < 10:
@@ -418,7 +417,7 @@ class LineServer(object):
         try:
             self.answer_lines(client.GetStream())
         except:
-            # The connection is lost. The board stays as it is, and the next client is served.
+            # The connection is lost. The board keeps its state, and the next client is served.
             pass
         self.busy = False
         try:
@@ -441,7 +440,7 @@ class LineServer(object):
 def mc_exact_line(port):
     number = int(port)
     if not 1 <= number <= 65535:
-        raise ValueError("%d is no TCP port from 1 to 65535" % number)
+        raise ValueError("%d is not a TCP port from 1 to 65535" % number)
     machine = monitor.Machine
     if machine is None:
         raise ValueError("there is no machine: include board.resc first")

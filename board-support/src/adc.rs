@@ -1,9 +1,9 @@
-//! ADC1, which serves the analog lines of all slots: once a scan the [`Sampler`] converts every line in use and leaves
-//! the codes where [`AnalogInputs`] takes them from.
+//! ADC1, which samples the analog lines of all slots. Once per scan the [`Sampler`] converts every line in use and
+//! stores the codes; [`AnalogInputs`] reads them.
 //!
-//! Each conversion is started by software and polled with a bound: the HAL's driver sits out each conversion, and its
-//! calibration, without one. Voltages are taken against the board's 3.3 V, which is also the supply of what the module
-//! conditions, so drifts of the supply cancel.
+//! Software starts each conversion and polls for its end a limited number of times. The HAL's driver is not used,
+//! because it polls a conversion and the calibration without a limit. Voltages are relative to the board's 3.3 V.
+//! The same 3.3 V supplies the signal conditioning of the module, so supply drift cancels out.
 
 use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
 
@@ -18,39 +18,40 @@ use crate::{
 /// Inputs of ADC1 on pins.
 const INPUTS: usize = 16;
 
-/// The code of each input that nobody has taken yet, or one of the two below. The scan alone writes and reads them.
+/// The newest code of each input, or [`NONE`] or [`FAILED`]. Only the scan task writes and reads these values.
 static SAMPLES: [AtomicU16; INPUTS] = [const { AtomicU16::new(NONE) }; INPUTS];
-/// There is no new code.
+/// No new code since the last read.
 const NONE: u16 = 0xFFFF;
-/// There will be no code before the next start.
+/// The converter does not work; there is no code until the next start.
 const FAILED: u16 = 0xFFFE;
 
-/// The converter does not work: its calibration did not end. Nothing helps but a restart.
+/// Error when the calibration of the converter did not end. The converter does not work until the next restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotCalibrated;
 
 /// The analog lines of a slot.
 pub struct AnalogInputs {
-    /// The ADC's input for each line.
+    /// ADC input number of each line, 0 to 15.
     inputs: [u8; 4],
-    /// How many of them are analog.
+    /// Number of analog lines, counted from line 1.
     count: u8,
 }
 
 impl AnalogInputs {
     pub(crate) fn new(lines: [Pin; 4], count: u8) -> Self {
         Self {
-            // The board's descriptor has no slot with a line that is not an input; see its check.
+            // `Descriptor::check` has verified that every line of a slot has an ADC input.
             inputs: lines.map(|line| line.adc_input().unwrap_or_default()),
             count,
         }
     }
 
-    /// The code of a line, counted from 0, if it has been sampled since the last call: 0 for ground to 4095 for 3.3 V.
+    /// Returns the code of a line, counted from 0, if it was sampled since the last call: 0 for ground to 4095 for
+    /// 3.3 V.
     ///
     /// # Errors
     ///
-    /// `WouldBlock` when there is no new code, [`NotCalibrated`] when there will be none.
+    /// `WouldBlock` when there is no new code, [`NotCalibrated`] when the converter does not work.
     pub fn read(&mut self, line: u8) -> nb::Result<u16, NotCalibrated> {
         let input = self.inputs.get(usize::from(line));
         let Some(sample) = input.and_then(|input| SAMPLES.get(usize::from(*input))) else {
@@ -67,21 +68,21 @@ impl AnalogInputs {
     }
 }
 
-/// The converter.
+/// The converter and the list of inputs to sample.
 pub struct Sampler {
     adc: pac::ADC1,
-    /// The inputs in use, input 0 in bit 0.
+    /// Inputs in use, input 0 in bit 0.
     used: u16,
 }
 
 impl Sampler {
-    /// Its clock is on. It is powered up with the first lines that [are used](Self::serve).
+    /// The ADC's clock must be on. The converter is powered up by the first call of [`serve`](Self::serve).
     pub(crate) const fn new(adc: pac::ADC1) -> Self {
         Self { adc, used: 0 }
     }
 
-    /// Takes up the lines of a slot. The first time powers the converter up and calibrates it, which takes some
-    /// 15 us; should that fail, every reading will say so.
+    /// Adds the analog lines of a slot. The first call powers the converter up and calibrates it, which takes about
+    /// 15 us. If the calibration fails, every reading returns [`NotCalibrated`].
     pub fn serve(&mut self, lines: &AnalogInputs) {
         if self.used == 0 && !self.power_up() {
             SAMPLES
@@ -93,8 +94,8 @@ impl Sampler {
         }
     }
 
-    /// Samples every line in use once: 5.7 us each (6.8 us without a crystal). A conversion that does not end is given
-    /// up after [`ADC_LOOKS`], and so are those of the lines after it, until the next call.
+    /// Samples every line in use once: 5.7 us each, 6.8 us without a crystal. If a conversion has not ended after
+    /// [`ADC_LOOKS`] polls, this call stops there and skips the remaining lines.
     pub fn run(&mut self) {
         for (input, sample) in (0_u8..).zip(&SAMPLES) {
             if self.used >> input & 1 == 0 || sample.load(Relaxed) == FAILED {
@@ -108,34 +109,35 @@ impl Sampler {
     }
 
     fn convert(&mut self, input: u8) -> Option<u16> {
-        // A new sequence resets a conversion that has not ended (RM0008 11.3.3). The result of one that ended too late
-        // is dropped.
-        // SAFETY: an input is below 16, and a channel number of five bits is expected.
+        // A new sequence aborts a conversion that has not ended (RM0008 11.3.3). Reading DR discards the result of
+        // a conversion that ended too late.
+        // SAFETY: an input is below 16, and the field takes channel numbers of five bits.
         self.adc.sqr3().write(|w| unsafe { w.sq1().bits(input) });
         let _ = self.adc.dr().read();
         self.adc.cr2().modify(|_, w| w.swstart().set_bit());
         for _ in 0..ADC_LOOKS {
             if self.adc.sr().read().eoc().bit_is_set() {
-                // Reading it takes EOC back (RM0008 11.12.1).
+                // Reading DR also clears EOC (RM0008 11.12.1).
                 return Some(self.adc.dr().read().data().bits());
             }
         }
         None
     }
 
-    /// Whether the converter works now.
+    /// Powers the converter up and calibrates it. Returns whether the calibration succeeded.
     fn power_up(&mut self) -> bool {
         const {
             assert!(
                 ADC_SAMPLE_HALF_CYCLES == 2 * 55 + 1,
-                "what SMPR1 and SMPR2 are set to"
+                "CYCLES_55_5 below is for this sampling time"
             )
         };
-        /// 55.5 cycles, in each of a register's ten fields of three bits (RM0008 11.12.4 and 11.12.5).
+        /// Sampling time code for 55.5 cycles in each of the ten 3-bit fields of a register (RM0008 11.12.4 and
+        /// 11.12.5).
         const CYCLES_55_5: u32 = 0o5_555_555_555;
         // SAFETY: each field of three bits takes any value.
         self.adc.smpr2().write(|w| unsafe { w.bits(CYCLES_55_5) });
-        // SAFETY: as above; this register has eight of them.
+        // SAFETY: as above; this register has eight of these fields.
         self.adc
             .smpr1()
             .write(|w| unsafe { w.bits(CYCLES_55_5 & 0x00FF_FFFF) });
@@ -147,7 +149,8 @@ impl Sampler {
         self.calibrate()
     }
 
-    /// RM0008 11.4: the calibration's registers are reset, then filled.
+    /// Calibrates the converter: resets the calibration registers, then runs the calibration (RM0008 11.4). Returns
+    /// whether both ended in time.
     fn calibrate(&mut self) -> bool {
         let adc = &self.adc;
         adc.cr2().modify(|_, w| w.rstcal().set_bit());

@@ -24,35 +24,35 @@ use crate::{
     unique_id, vectors, wait,
 };
 
-/// The flag of a power-on in [`Board::reset_cause`].
+/// The power-on flag in [`Board::reset_cause`].
 const POWER_ON: u8 = 1 << 4;
 
 /// The board's devices.
 pub struct Board {
-    /// What the core runs on.
+    /// Clock source of the core.
     pub clock: ClockSource,
-    /// Why the chip started: bit 0 low-power, 1 window watchdog, 2 independent watchdog, 3 software,
-    /// 4 power-on, 5 reset pin. A power-on sets the pin's bit as well (RM0008 7.3.10).
+    /// Reset flags of this start: bit 0 low-power, 1 window watchdog, 2 independent watchdog, 3 software, 4
+    /// power-on, 5 reset pin. A power-on also sets bit 5 (RM0008 7.3.10).
     pub reset_cause: u8,
-    /// What went wrong before this start.
+    /// The last fault before this start.
     pub faults: FaultRecord,
-    /// SW01 as a number 0 to 255, as it was at power-on.
+    /// SW01 as a number from 0 to 255, as read at power-on.
     pub dip: u8,
-    /// The chip's unique number, half-words in the order of their addresses (RM0008 30.2).
+    /// The chip's unique identity, half-words in the order of their addresses (RM0008 30.2).
     pub unique_id: [u16; 6],
     /// The slots, in the order of their ports.
     pub slots: [Slot; SLOTS],
     /// The converter of the slots' analog lines.
     pub sampler: Sampler,
-    /// The bus to the DACs of the analog-output modules, its pins floating until it is used.
+    /// The bus to the DACs of the analog-output modules. Its pins float until the first transfer.
     pub dacs: DacBus,
-    /// The pages that survive a power cycle.
+    /// The flash pages that keep data without power.
     pub flash: Flash,
     /// The status LEDs, all off.
     pub leds: Leds,
-    /// The scan's beat, not started.
+    /// The timer that starts each scan, not started yet.
     pub scan_timer: ScanTimer,
-    /// The watchdog, started with the long period of the start-up.
+    /// The watchdog, running with the long period for the start-up.
     pub watchdog: Watchdog,
     /// The RS-485 line, off, with its driver disabled.
     pub line: LineOff,
@@ -69,23 +69,24 @@ pub struct LineOff {
 }
 
 impl LineOff {
-    /// Sets the line up with these times, and listens. `None` when the rate or the silences cannot be had from the
-    /// clock: the line then stays off.
+    /// Sets the line up with these settings and times, and turns the receiver on. Returns `None` when the clock
+    /// cannot produce the baud rate or the silences; the line then stays off.
     #[must_use]
     pub fn start(mut self, settings: LineSettings, times: LineTimes) -> Option<(Rs485, GapTimer)> {
         let (clock, rcc) = (self.clock, &mut self.rcc);
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
-        // TX, too, needs no steeper edges than those of 10 MHz.
+        // TX needs no faster edges than the 10 MHz setting gives, either.
         Port::A.registers().crh().modify(|_, w| w.mode9().output());
         Some((line, gap))
     }
 }
 
-/// Brings the board up, with interrupts disabled. Lines of the slots are still floating, as after the reset.
+/// Sets the board up. Interrupts must be disabled. The slots' lines still float, as after the reset.
 ///
-/// `masked` is BASEPRI while flash is erased or programmed: what it lets through must run from RAM.
+/// `masked` is the value of BASEPRI while flash is erased or programmed: interrupts that it does not mask must run
+/// from RAM.
 #[must_use]
 pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     vectors::move_to_ram(scb);
@@ -100,15 +101,15 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     let mut b = device.GPIOB.split(&mut rcc);
     let mut c = device.GPIOC.split(&mut rcc);
 
-    // First of all the driver's pin, so that nothing gets on the bus.
+    // Configure the driver-enable pin first, so that nothing is sent on the bus.
     let mut driver = a
         .pa8
         .into_push_pull_output_with_state(&mut a.crh, PinState::Low);
-    // 10 MHz is a rise in 25 ns (DS5319 table 37), a fortieth of a bit at 921600 bit/s.
+    // 10 MHz gives a rise time of 25 ns (DS5319 table 37), which is 1/40 of a bit at 921600 bit/s.
     driver.set_speed(&mut a.crh, IOPinSpeed::Mhz10);
     let rx = a.pa10.into_pull_up_input(&mut a.crh);
 
-    // SW01: one side of each switch is on ground.
+    // SW01: one side of each switch is connected to ground.
     BOARD.switch.iter().for_each(|pin| pin.pull_up());
     cortex_m::asm::delay(DIP_SETTLE_CYCLES);
     let kept = fault::kept_dip().filter(|_| reset_cause & POWER_ON == 0);
@@ -118,9 +119,9 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
 
     let leds = Leds::new(b.pb8, b.pb9, &mut b.crh, c.pc13, &mut c.crh);
 
-    // A probe can read the log while the core sleeps.
+    // Allow a debug probe to read the log while the core sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
-    // TIM1 looks at PA10 through the alternate-function block, in its reset mapping.
+    // TIM1 is connected to PA10 through the alternate-function block, in its reset mapping.
     pac::AFIO::enable(&mut rcc);
     pac::ADC1::enable(&mut rcc);
     pac::I2C1::enable(&mut rcc);
@@ -155,14 +156,14 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     }
 }
 
-/// Reads SW01 at this instant.
+/// Reads SW01 now, without waiting for a stable value.
 fn read_dip() -> u8 {
     dip::number(&BOARD.switch, Port::levels())
 }
 
-/// Reads the reset flags and takes them back, so that the next start sees only its own.
+/// Reads and clears the reset flags, so that the next start sees only its own flags.
 fn take_reset_cause(rcc: &pac::RCC) -> u8 {
-    // The uppermost six bits, from LPWRRSTF down to PINRSTF (RM0008 7.3.10).
+    // The six most significant bits, from LPWRRSTF down to PINRSTF (RM0008 7.3.10).
     let flags = rcc.csr().read().bits().reverse_bits();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
     flags as u8 & 0b11_1111

@@ -1,15 +1,15 @@
-//! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal does not
-//! start, or has failed too often since power-on.
+//! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal does not start
+//! or has failed too often since power-on.
 //!
-//! The HAL would wait without end for a dead crystal, or for a PLL that does not lock, and it panics over
-//! frequencies that it does not accept. Here every wait has an end and the frequencies are constants. While it
-//! runs on the crystal, the clock security system watches it (RM0008 7.2.7).
+//! The HAL would wait forever for a crystal that does not start or a PLL that does not lock, and it panics on
+//! frequencies that it does not accept. Here every wait is bounded and the frequencies are constants. While the
+//! core runs on the crystal, the clock security system monitors it (RM0008 7.2.7).
 
 use stm32f1xx_hal::pac;
 
 use crate::design::{HSE_HZ, HSE_READY_LOOKS, PLL_READY_LOOKS, SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ};
 
-/// What the core runs on.
+/// Clock source of the core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClockSource {
     /// The crystal: 72 MHz.
@@ -19,13 +19,13 @@ pub enum ClockSource {
 }
 
 impl ClockSource {
-    /// Whether the crystal runs.
+    /// Returns whether the core runs on the crystal.
     #[must_use]
     pub const fn is_crystal(self) -> bool {
         matches!(self, Self::Crystal)
     }
 
-    /// The core's clock in Hz, which is that of APB2 and of all timers as well.
+    /// Returns the core clock in Hz. APB2 and all timers run at the same frequency.
     #[must_use]
     pub const fn core_hz(self) -> u32 {
         match self {
@@ -34,32 +34,32 @@ impl ClockSource {
         }
     }
 
-    /// The same in whole MHz.
+    /// Returns the core clock in MHz.
     #[must_use]
     pub const fn core_mhz(self) -> u8 {
         (self.core_hz() / 1_000_000) as u8
     }
 
-    /// The clock of APB1 in Hz: half the core's.
+    /// Returns the clock of APB1 in Hz, which is half the core clock.
     #[must_use]
     pub const fn apb1_hz(self) -> u32 {
         self.core_hz() / 2
     }
 }
 
-/// PLLMUL for a multiple of the PLL's source: 0 for twice (RM0008 7.3.2).
+/// Returns PLLMUL for a multiple of the PLL's input frequency: 0 stands for a factor of 2 (RM0008 7.3.2).
 const fn multiplier(source_hz: u32, hz: u32) -> u8 {
     assert!(hz.is_multiple_of(source_hz) && hz / source_hz >= 2 && hz / source_hz <= 16);
     (hz / source_hz - 2) as u8
 }
 
 const ON_CRYSTAL: u8 = multiplier(HSE_HZ, SYSCLK_ON_HSE_HZ);
-/// The internal oscillator feeds the PLL at half its 8 MHz.
+/// PLLMUL for the internal oscillator, which the PLL receives at half its 8 MHz.
 const ON_INTERNAL: u8 = multiplier(4_000_000, SYSCLK_ON_HSI_HZ);
 
-/// Starts the clocks, whatever state they are in. `crystal`: whether to try the crystal.
+/// Starts the clocks from any previous state. `crystal` says whether to try the crystal.
 pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, crystal: bool) -> ClockSource {
-    // Two wait states, for more than 48 MHz (RM0008 3.3.3), and the prefetch that makes up for them.
+    // Two wait states, for more than 48 MHz (RM0008 3.3.3), and the prefetch buffer to compensate for them.
     // SAFETY: two is a defined number of wait states.
     flash
         .acr()
@@ -67,7 +67,7 @@ pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, crystal: bool) -> ClockS
     to_internal_without_pll(rcc);
     if crystal && crystal_starts(rcc) {
         if pll_runs(rcc, ClockSource::Crystal) {
-            // From here on a crystal that fails raises the NMI.
+            // From here on a crystal failure raises the NMI.
             rcc.cr().modify(|_, w| w.csson().set_bit());
             return ClockSource::Crystal;
         }
@@ -75,21 +75,21 @@ pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, crystal: bool) -> ClockS
         rcc.cr().modify(|_, w| w.hseon().clear_bit());
     }
     if !pll_runs(rcc, ClockSource::Internal) {
-        // Nothing outside the chip could cause this. Nothing else can be done about it either.
+        // The internal oscillator and the PLL need nothing outside the chip, so only a reset can help.
         crate::restart();
     }
     ClockSource::Internal
 }
 
-/// As after a reset. A debugger or a boot loader may have left it otherwise, and the PLL takes its
-/// settings only while it is off.
+/// Switches to the internal oscillator and turns the PLL off, as after a reset. A debugger or a boot loader may
+/// have left the PLL on, and its settings can only be changed while it is off.
 fn to_internal_without_pll(rcc: &pac::RCC) {
     rcc.cr().modify(|_, w| w.hsion().set_bit());
     looked(PLL_READY_LOOKS, || rcc.cr().read().hsirdy().bit_is_set());
     rcc.cfgr().modify(|_, w| w.sw().hsi());
     looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_hsi());
     rcc.cr().modify(|_, w| w.pllon().clear_bit());
-    // The PLL still runs for a while, and its settings may not be written before it is off (RM0008 7.3.2).
+    // The PLL keeps running for a while, and its settings must not be written before it is off (RM0008 7.3.2).
     looked(PLL_READY_LOOKS, || rcc.cr().read().pllrdy().bit_is_clear());
 }
 
@@ -102,11 +102,11 @@ fn crystal_starts(rcc: &pac::RCC) -> bool {
     ready
 }
 
-/// Sets the PLL and the dividers up for a source and goes over to it.
+/// Sets up the PLL and the dividers for a source and switches the core to the PLL. Returns whether that succeeded.
 fn pll_runs(rcc: &pac::RCC, source: ClockSource) -> bool {
     rcc.cfgr().write(|w| {
         match source {
-            // SAFETY: both multipliers are of four bits, by `multiplier`.
+            // SAFETY: `multiplier` returns values of four bits.
             ClockSource::Crystal => unsafe {
                 w.pllsrc().hse_div_prediv().pllmul().bits(ON_CRYSTAL)
             },
@@ -123,7 +123,7 @@ fn pll_runs(rcc: &pac::RCC, source: ClockSource) -> bool {
     looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_pll())
 }
 
-/// Looks up to `looks` times whether something is so.
+/// Evaluates a condition up to `looks` times. Returns whether it became true.
 fn looked(looks: u32, mut is_so: impl FnMut() -> bool) -> bool {
     (0..looks).any(|_| is_so())
 }

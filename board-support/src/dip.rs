@@ -1,15 +1,17 @@
-//! SW01, the eight-way DIP switch: read at power-on, once it is stable, and kept over every other reset.
+//! SW01, the eight-way DIP switch. It is read at power-on, once it is stable, and its value is kept over every
+//! other reset.
 //!
-//! A reset by the watchdog, by software or by the pin alone does not read it again: an address that changed in
-//! service would be a surprise to the master. The map says "read once at power-on".
+//! A reset by the watchdog, by software or by the pin does not read the switch again. Otherwise a unit in service
+//! could change its address at a reset, which a master does not expect. The register map says "read once at
+//! power-on".
 
 use crate::{
     design::{DIP_POLLS, DIP_STABLE_POLLS},
     pin::Pin,
 };
 
-/// The switch as a number 0 to 255, from the levels of ports A, B and C: position 1 is bit 0, and ON pulls
-/// its pin low.
+/// Returns the switch as a number from 0 to 255, given the levels of ports A, B and C. Position 1 is bit 0; a
+/// position that is ON pulls its pin low.
 pub(crate) fn number(switch: &[Pin; 8], levels: [u32; 3]) -> u8 {
     let positions = switch.iter().rev();
     positions.fold(0, |number, pin| {
@@ -17,8 +19,8 @@ pub(crate) fn number(switch: &[Pin; 8], levels: [u32; 3]) -> u8 {
     })
 }
 
-/// The switch once it has read the same [`DIP_STABLE_POLLS`] times more, with `wait` in between; as it was last when
-/// that does not happen within [`DIP_POLLS`] polls.
+/// Returns the switch once [`DIP_STABLE_POLLS`] more readings equal the first, calling `wait` between readings. If
+/// that does not happen within [`DIP_POLLS`] readings, returns the last one.
 pub(crate) fn stable(mut read: impl FnMut() -> u8, mut wait: impl FnMut()) -> u8 {
     let mut value = read();
     let mut equal = 0;
@@ -37,12 +39,12 @@ pub(crate) fn stable(mut read: impl FnMut() -> u8, mut wait: impl FnMut()) -> u8
 /// Distinguishes a kept switch from what RAM holds after power-on.
 const MAGIC: u32 = 0xD1B5_0000;
 
-/// The switch as a word to keep: with its complement and a magic number.
+/// Returns the switch as a word to keep: the value, its complement and a magic number.
 pub(crate) const fn to_word(dip: u8) -> u32 {
     MAGIC | (!dip as u32) << 8 | dip as u32
 }
 
-/// The switch from a kept word, if it is one.
+/// Returns the switch from a kept word, or `None` when the word is not valid.
 pub(crate) const fn from_word(word: u32) -> Option<u8> {
     if to_word(word as u8) == word {
         Some(word as u8)
@@ -59,7 +61,8 @@ mod tests {
     use super::*;
     use crate::boards::{modio_02, modio_08};
 
-    /// The value read from these readings, the last of which goes on for ever, and how many were taken.
+    /// Feeds these readings to `stable`, repeating the last one, and returns the value and the number of readings
+    /// taken.
     fn read(readings: &[u8]) -> (u8, usize) {
         let mut taken = 0;
         let value = stable(
@@ -88,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn switch_that_never_settles_is_given_up() {
+    fn switch_that_never_settles_returns_the_last_reading() {
         let bounces: Vec<u8> = (0..200).map(|n| 17 + n % 2).collect();
         let (value, taken) = read(&bounces);
         assert_eq!(taken, 1 + DIP_POLLS as usize);
@@ -96,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn kept_word_returns_its_switch_and_no_flipped_bit_goes_unnoticed() {
+    fn kept_word_returns_its_switch_and_any_flipped_bit_is_detected() {
         for dip in 0..=255 {
             let word = to_word(dip);
             assert_eq!(from_word(word), Some(dip));
@@ -110,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn every_position_is_its_own_bit_and_other_pins_do_not_count() {
+    fn every_position_has_its_own_bit_and_other_pins_are_ignored() {
         const ALL: u32 = 0xFFFF;
         let modio_02 = |a, b| number(&modio_02::BOARD.switch, [a, b, ALL]);
         let modio_08 = |b, c| number(&modio_08::BOARD.switch, [ALL, b, c]);

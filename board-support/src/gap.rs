@@ -1,7 +1,7 @@
-//! From a line's silences to the settings of the frame-gap timer.
+//! Conversion of a line's silences to the settings of the frame-gap timer.
 //!
-//! The timer starts when the receiver raises its flag, which is some time before the character has
-//! left the line, and must reach a silence no sooner than that time after its end.
+//! The receiver raises its flag some time before the character has left the line. The timer starts at that flag and
+//! must not end a silence early, so this time is added to t1.5 and t3.5.
 //!
 //! ```text
 //!  character |......t1.5|.......t3.5|
@@ -9,8 +9,8 @@
 //!                       |-- late ---|-- late --->    one character each
 //! ```
 //!
-//! A character that has begun by t1.5 or t3.5 raises its flag within one more character: that long the
-//! decision can be put off, and no longer.
+//! A character that has begun by t1.5 or t3.5 raises its flag within one more character time. The decision can be
+//! delayed by that much and no longer.
 
 use crate::uart::LineSettings;
 
@@ -21,14 +21,14 @@ pub struct LineTimes {
     pub t15_ns: u32,
     /// t3.5 in nanoseconds.
     pub t35_ns: u32,
-    /// The most a reply may take, in microseconds, up to 33 s.
+    /// The longest time that a reply may take, in microseconds, up to 33 s.
     pub limit_us: u32,
 }
 
 /// Settings of a 16-bit up-counting timer in one-pulse mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GapTicks {
-    /// Prescaler register: the clock is divided by one more.
+    /// Prescaler register: the clock is divided by this value plus 1.
     pub prescaler: u16,
     /// Compare value: t1.5 after the character's end.
     pub t15: u16,
@@ -40,17 +40,18 @@ pub struct GapTicks {
     pub t35_late: u16,
 }
 
-/// Settings of a 16-bit timer that runs free, for the time after which a reply is cut off.
+/// Settings of a free-running 16-bit timer for the time after which a reply is aborted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LimitTicks {
-    /// Prescaler register: the clock is divided by one more.
+    /// Prescaler register: the clock is divided by this value plus 1.
     pub prescaler: u16,
-    /// Ticks of that time.
+    /// The time in ticks.
     pub ticks: u16,
 }
 
 impl LimitTicks {
-    /// Settings for `us` microseconds, up to 33 s, with the timer's clock in whole MHz, up to 128; rounded up.
+    /// Returns settings for `us` microseconds, up to 33 s, with the timer's clock in whole MHz, up to 128. The time
+    /// is rounded up.
     #[must_use]
     pub const fn new(clock_mhz: u8, us: u32) -> Self {
         let cycles = us.saturating_mul(clock_mhz as u32);
@@ -63,22 +64,22 @@ impl LimitTicks {
 }
 
 impl GapTicks {
-    /// Settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock
-    /// in whole MHz, up to 128. The coarsest tick is used that 16 bits need, and every time is rounded
+    /// Returns settings for silences of `t15_ns` and `t35_ns` nanoseconds on a line, with the timer's clock in
+    /// whole MHz, up to 128. The prescaler is the smallest with which 16 bits are enough, and every time is rounded
     /// up.
     ///
-    /// `None` without a clock or a rate.
+    /// Returns `None` when the rate or the clock is 0, or the clock is above 128 MHz.
     #[must_use]
     pub const fn new(clock_mhz: u8, line: LineSettings, t15_ns: u32, t35_ns: u32) -> Option<Self> {
         if line.baud == 0 || clock_mhz == 0 || clock_mhz > 128 {
             return None;
         }
         let clock = clock_mhz as u32;
-        // At most 128 * 62,500 * 176, so that 32 bits are enough: a division of 64 bits takes 400 bytes.
+        // At most 128 * 62,500 * 176, so 32 bits are enough. A 64-bit division would cost 400 bytes of code.
         let sixteenth = clock * 62_500;
         let rest = (sixteenth * line.format.sixteenths_after_flag()).div_ceil(line.baud);
         let character = (sixteenth * 16 * line.format.bits()).div_ceil(line.baud);
-        // 4.3 s at most, of 128 MHz: 30 bits.
+        // At most 4.3 s at 128 MHz: 30 bits.
         let t15 = rest.saturating_add(cycles(clock, t15_ns));
         let t35 = rest.saturating_add(cycles(clock, t35_ns));
         let t35_late = t35.saturating_add(character);
@@ -94,7 +95,7 @@ impl GapTicks {
     }
 }
 
-/// Nanoseconds in cycles of so many MHz, rounded up.
+/// Converts nanoseconds to cycles of a clock in MHz, rounded up.
 const fn cycles(clock_mhz: u32, ns: u32) -> u32 {
     clock_mhz * (ns / 1000) + (clock_mhz * (ns % 1000)).div_ceil(1000)
 }
@@ -104,7 +105,7 @@ mod tests {
     use super::*;
     use crate::uart::Format;
 
-    /// The instant of a count after the character's end, in nanoseconds.
+    /// Returns the time of a count after the character's end, in nanoseconds.
     fn after_end(ticks: GapTicks, count: u16, line: LineSettings) -> i64 {
         let divider = u64::from(ticks.prescaler) + 1;
         let flag_to_end = u64::from(line.format.sixteenths_after_flag()) * 1_000_000_000
@@ -113,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn the_silences_are_never_short_and_at_most_two_ticks_long() {
+    fn a_silence_is_never_too_short_and_at_most_two_ticks_too_long() {
         for (baud, t15, t35) in [
             (1200, 13_750_000, 32_083_334),
             (9600, 1_718_750, 4_010_417),
@@ -142,7 +143,7 @@ mod tests {
                 ] {
                     let over = after_end(ticks, count, line) - i64::from(wanted);
                     assert!(
-                        // The character above is up to 11 ns short.
+                        // The character time above is up to 11 ns short.
                         (-1..=2 * tick_ns + 11).contains(&over),
                         "{line:?} {wanted}: {over} ns over"
                     );
@@ -152,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_is_never_short_and_at_most_a_tick_long() {
+    fn a_limit_is_never_too_short_and_at_most_one_tick_too_long() {
         for us in [1, 900, 3_600, 24_900, 300_000, 4_800_000, 33_000_000] {
             let ticks = LimitTicks::new(72, us);
             let divider = u64::from(ticks.prescaler) + 1;
@@ -162,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused() {
+    fn a_rate_or_clock_of_zero_is_rejected() {
         let line = LineSettings {
             baud: 0,
             format: Format::N2,
@@ -172,7 +173,7 @@ mod tests {
         assert_eq!(GapTicks::new(0, line, 1, 2), None);
         assert!(
             GapTicks::new(72, line, u32::MAX, u32::MAX).is_some(),
-            "4.3 s is fine"
+            "4.3 s can be measured"
         );
     }
 }

@@ -1,17 +1,17 @@
-//! The frame-gap timer: TIM2 in one-pulse mode measures t1.5 and t3.5, and TIM1 sees whether a character
-//! may already be on its way.
+//! The frame-gap timer: TIM2 in one-pulse mode measures t1.5 and t3.5, and TIM1 detects whether the next character
+//! may already have begun.
 //!
-//! The UART raises its flag only when a character is complete. A character that began just before t3.5
-//! belongs to the frame, but its flag is not set yet when t3.5 is reached. Its start bit has been on the
-//! line: PA10 is the input of USART1 and of TIM1's channel 3, and the capture flag shows, without any
-//! interrupt, that the line has fallen since the flag was cleared.
+//! The UART raises its flag only when a character is complete. A character that began just before t3.5 belongs to
+//! the frame, but its flag is not set yet when t3.5 is reached. Its start bit is already on the line: PA10 is both
+//! the input of USART1 and that of TIM1's channel 3. The capture flag shows, without an interrupt, that the line
+//! has fallen since the flag was cleared.
 //!
-//! The line also falls when a pulse of noise is too short for a start bit (RM0008 27.3.3). So an edge
-//! puts the decision off by one character, once: a real character is complete by then and starts the
-//! silence again, and noise delays a reply by one character at most, however often it comes.
+//! The line also falls when a noise pulse is too short for a start bit (RM0008 27.3.3). An edge therefore delays
+//! the decision only once, by one character time. A real character is complete by then and restarts the silence.
+//! Noise delays a reply by at most one character time, however often it occurs.
 //!
-//! TIM1 limits the time of a reply as well: its counter runs free, with a tick so long that the longest reply has less
-//! than 65,536 of them, and its channel 1 compares.
+//! TIM1 also limits the duration of a reply. Its counter runs free, its tick is long enough that the longest reply
+//! takes fewer than 65,536 ticks, and its channel 1 compares.
 
 use stm32f1xx_hal::{
     pac,
@@ -25,14 +25,14 @@ use crate::{
     uart::LineSettings,
 };
 
-/// What the timer's interrupt is about.
+/// Reason for the timer's interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GapEvent {
     /// The line has been silent for t1.5 since the last character.
     T15,
     /// The line has been silent for t3.5.
     T35,
-    /// Nothing to do: the interrupt was overtaken by a character, or one is on its way.
+    /// Nothing to do: a character was received before the interrupt was served, or one may have begun.
     Nothing,
 }
 
@@ -42,13 +42,13 @@ pub struct GapTimer {
     start_bit: pac::TIM1,
     ticks: GapTicks,
     limit: LimitTicks,
-    /// The signatures of the registers of TIM2 and TIM1 after they were set. They are compared with what they read, not with what was
-    /// written: an emulator need not keep every bit.
+    /// Signatures of the registers of TIM2 and TIM1, read back after they were set up. Later checks compare with
+    /// these instead of the written values, because an emulator may not keep every bit.
     set: [Signature; 3],
 }
 
 impl GapTimer {
-    /// Sets the timers up for these times. `None` when no setting of TIM2 reaches the silences.
+    /// Sets the timers up for these times. Returns `None` when TIM2 cannot measure the silences.
     pub(crate) fn new(
         timer: pac::TIM2,
         start_bit: pac::TIM1,
@@ -74,7 +74,7 @@ impl GapTimer {
     }
 
     /// Sets every register of both timers that matters. The silence is measured from the next
-    /// [`restart`](Self::restart) on.
+    /// [`restart`](Self::restart).
     pub fn set_up(&mut self) {
         let (timer, ticks) = (&self.timer, self.ticks);
         timer.cr1().reset();
@@ -97,7 +97,7 @@ impl GapTimer {
         start_bit.smcr().reset();
         start_bit.dier().reset();
         start_bit.ccmr1_output().reset();
-        // The channel is off while its input is selected (RM0008 14.4.7).
+        // The channel must be off while its input is selected (RM0008 14.4.7).
         start_bit.ccer().reset();
         start_bit.ccmr2_input().write(|w| w.cc3s().ti3());
         // Capture on the falling edge.
@@ -106,14 +106,15 @@ impl GapTimer {
             .write(|w| w.cc3e().set_bit().cc3p().set_bit());
         start_bit.psc().write(|w| w.psc().set(self.limit.prescaler));
         start_bit.arr().write(|w| w.arr().set(0xFFFF));
-        // Loads the prescaler.
+        // Load the prescaler.
         start_bit.egr().write(|w| w.ug().update());
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
         self.set = [self.control(), self.times(), self.start_bit()];
     }
 
-    /// A reply has begun: [`take_limit`](Self::take_limit) tells when it has taken longer than it can.
+    /// Starts the time limit of a reply that has just begun. [`take_limit`](Self::take_limit) reports when it is
+    /// exceeded.
     #[inline]
     pub fn limit_sending(&mut self) {
         let timer = &self.start_bit;
@@ -128,8 +129,9 @@ impl GapTimer {
         timer.dier().write(|w| w.cc1ie().enabled());
     }
 
-    /// Takes the interrupt of the [limit](Self::limit_sending), which comes also when the reply has ended before.
-    /// Whether the limit has been reached: not when a reply has begun since, and set another.
+    /// Acknowledges the interrupt of the [limit](Self::limit_sending) and returns whether the limit has been
+    /// reached. The interrupt also occurs when the reply ended in time. Returns false when a newer reply has
+    /// started its own limit.
     pub fn take_limit(&mut self) -> bool {
         let reached = self.start_bit.sr().read().cc1if().bit_is_set();
         if reached {
@@ -138,25 +140,25 @@ impl GapTimer {
         reached
     }
 
-    /// Whether TIM2, which measures the silences, works as it was set up to.
+    /// Returns whether the control registers of TIM2, which measures the silences, are as set up.
     #[must_use]
     pub fn control_is_sound(&self) -> bool {
         self.control() == self.set[0]
     }
 
-    /// Whether the times that TIM2 measures are those it was set up for.
+    /// Returns whether the times in TIM2 are as set up.
     #[must_use]
     pub fn times_are_sound(&self) -> bool {
         self.times() == self.set[1]
     }
 
-    /// Whether TIM1, which sees the start bit and limits replies, is as it was set up.
+    /// Returns whether TIM1, which detects the start bit and limits replies, is as set up.
     #[must_use]
     pub fn start_bit_is_sound(&self) -> bool {
         self.start_bit() == self.set[2]
     }
 
-    /// The signature of TIM2's control registers, without the bits that change while silences are measured.
+    /// Returns the signature of TIM2's control registers, without the bits that change while a silence is measured.
     fn control(&self) -> Signature {
         const CEN: u32 = 1;
         const CC2IE: u32 = 1 << 2;
@@ -169,7 +171,7 @@ impl GapTimer {
             .with(timer.ccmr2_output().read().bits())
     }
 
-    /// The signature of TIM2's times.
+    /// Returns the signature of TIM2's times.
     fn times(&self) -> Signature {
         let timer = &self.timer;
         Signature::default()
@@ -180,7 +182,7 @@ impl GapTimer {
             .with(timer.ccr3().read().bits())
     }
 
-    /// The signature of TIM1's registers, without those that change with each reply.
+    /// Returns the signature of TIM1's registers, without those that change with each reply.
     fn start_bit(&self) -> Signature {
         let start_bit = &self.start_bit;
         Signature::default()
@@ -192,7 +194,7 @@ impl GapTimer {
             .with(start_bit.arr().read().bits())
     }
 
-    /// Whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.
+    /// Returns whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.
     #[must_use]
     pub fn is_running(&self) -> bool {
         let timer = &self.timer;
@@ -200,12 +202,12 @@ impl GapTimer {
             || timer.sr().read().bits() & timer.dier().read().bits() != 0
     }
 
-    /// Starts the silence over: a character has just come in.
+    /// Restarts the silence: a character has just been received.
     #[inline]
     pub fn restart(&mut self) {
-        // The flag stands for edges after this character.
+        // Clear the capture flag, so that it shows edges after this character only.
         self.start_bit.sr().write(|w| w.cc3if().clear_bit());
-        // An update by software clears counter and prescaler, and with URS raises no interrupt.
+        // The update event clears the counter and the prescaler. With URS set it raises no interrupt.
         self.timer
             .cr1()
             .write(|w| w.urs().counter_only().opm().enabled());
@@ -216,7 +218,7 @@ impl GapTimer {
             .write(|w| w.urs().counter_only().opm().enabled().cen().enabled());
     }
 
-    /// Stops: no silence is of interest until the next character.
+    /// Stops the timer until the next character.
     pub fn stop(&mut self) {
         self.halt();
         self.timer.sr().reset();
@@ -228,16 +230,16 @@ impl GapTimer {
             .write(|w| w.urs().counter_only().opm().enabled());
     }
 
-    /// Takes what the timer's interrupt is about.
+    /// Acknowledges the timer's interrupt and returns its reason.
     #[inline]
     pub fn take_event(&mut self) -> GapEvent {
         let flags = self.timer.sr().read();
-        // Only the flags that were read: one that is set from here on raises the interrupt again.
-        // SAFETY: every bit of SR is cleared by 0 and left alone by 1 (RM0008 15.4.5).
+        // Clear only the flags that were read; a flag set after that raises the interrupt again.
+        // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 15.4.5).
         self.timer.sr().write(|w| unsafe { w.bits(!flags.bits()) });
         let may_be_on_its_way = self.start_bit.sr().read().cc3if().bit_is_set();
         if flags.uif().bit_is_set() {
-            // One-pulse mode has stopped the counter.
+            // The counter has stopped, because of one-pulse mode.
             GapEvent::T35
         } else if flags.cc3if().bit_is_set() {
             if may_be_on_its_way {
@@ -248,7 +250,7 @@ impl GapTimer {
         } else if flags.cc2if().bit_is_set() && self.late_t15(false) {
             GapEvent::T15
         } else if flags.cc1if().bit_is_set() {
-            // When the later instant has passed too, it has been waited for.
+            // The decision is delayed only once: not after the later compare value has passed.
             if may_be_on_its_way && flags.cc2if().bit_is_clear() {
                 self.late_t15(true);
                 return GapEvent::Nothing;
@@ -259,7 +261,7 @@ impl GapTimer {
         }
     }
 
-    /// Has t1.5 reported one character late, or not; returns whether it was to be until now.
+    /// Selects whether t1.5 is reported one character time late. Returns the previous selection.
     fn late_t15(&mut self, on: bool) -> bool {
         let before = self.timer.dier().read().cc2ie().bit_is_set();
         self.timer.dier().modify(|_, w| w.cc2ie().bit(on));

@@ -6,20 +6,20 @@ use stm32f1xx_hal::gpio::{
 
 use crate::pin::Port;
 
-/// PC13's bit in the registers of port C.
+/// Bit of PC13 in the registers of port C.
 const RUN: u32 = 1 << 13;
 
-/// Line activity, fault and running.
+/// The LEDs for line activity, fault and running.
 pub struct Leds {
     activity: PB8<Output<PushPull>>,
     fault: PB9<Output<PushPull>>,
-    /// Changed through port C's registers: the HAL makes every output a 50 MHz one at first, and PC13 may not be
-    /// faster than 2 MHz, with 3 mA (DS5319 table 5, notes).
+    /// Changed through port C's registers. The HAL first makes every output a 50 MHz one, but PC13 is limited to 2
+    /// MHz and 3 mA (DS5319 table 5, notes).
     _run: PC13,
 }
 
 impl Leds {
-    /// All off, with the slowest edges.
+    /// Turns all LEDs off and selects the slowest edges.
     pub(crate) fn new(
         activity: PB8,
         fault: PB9,
@@ -44,20 +44,20 @@ impl Leds {
         leds
     }
 
-    /// Shows traffic for this unit.
+    /// Sets the activity LED: traffic for this unit.
     pub fn set_activity(&mut self, on: bool) {
         self.activity.set_state(PinState::from(on));
     }
 
-    /// Shows that something is wrong.
+    /// Sets the fault LED.
     pub fn set_fault(&mut self, on: bool) {
         self.fault.set_state(PinState::from(on));
     }
 
-    /// Shows that the firmware runs. This LED is wired to the supply: low lights it.
+    /// Sets the running LED. It is connected to the supply, so a low level lights it.
     pub fn set_run(&mut self, on: bool) {
         let bits = if on { RUN << 16 } else { RUN };
-        // SAFETY: changes PC13 alone, which this value owns, in one store (RM0008 9.2.5).
+        // SAFETY: one store changes PC13 only, which this value owns (RM0008 9.2.5).
         Port::C
             .registers()
             .bsrr()

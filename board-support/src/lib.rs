@@ -1,8 +1,9 @@
-//! The boards, each an STM32F103 with what hangs on its pins, as named devices.
+//! The boards, each an STM32F103 with the devices on its pins, as named fields.
 //!
-//! `board::setup` brings the clocks up, reads the DIP switch and returns one `Board` whose fields are
-//! the devices. This is the only crate that names the HAL; a port to another board is a descriptor in [`boards`]. What needs no hardware ([`design`], [`uart`], [`tolerance`], [`gap`], the logic of [`fault`] and of
-//! freeing an I2C bus) is built and tested on the host.
+//! `board::setup` starts the clocks, reads the DIP switch and returns one `Board` whose fields are the devices.
+//! This is the only crate that uses the HAL. A port to another board is a descriptor in [`boards`]. The parts
+//! without hardware access ([`design`], [`uart`], [`tolerance`], [`gap`], the logic of [`fault`] and of the
+//! recovery of an I2C bus) are built and tested on the host.
 
 #![no_std]
 
@@ -69,7 +70,7 @@ pub use {
     watchdog::Watchdog,
 };
 
-/// Starts the device over: a reset by software, which makes every pin a floating input at once.
+/// Restarts the device by a software reset, which immediately makes every pin a floating input.
 #[cfg(target_os = "none")]
 pub fn restart() -> ! {
     cortex_m::peripheral::SCB::sys_reset()

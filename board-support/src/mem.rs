@@ -1,13 +1,13 @@
-//! Copying and filling memory in few bytes of code: the functions that the compiler calls for it.
+//! Small versions of the functions that the compiler calls to copy and fill memory.
 //!
-//! Those of `compiler_builtins` are unrolled for speed and take 1.4 KB of flash, for an image that copies
-//! some hundred bytes at start and a few in a request. These take a word at a time where both ends
-//! lie on words, else a byte. They are in assembly because a compiler makes a call of `memcpy` of such a
-//! loop; the linker prefers them, as `compiler_builtins` declares its own weak.
+//! Those of `compiler_builtins` are unrolled for speed and take 1.4 KB of flash, but the image copies only a few
+//! hundred bytes at start and a few per request. The versions here work by words when both addresses are
+//! word-aligned, and otherwise by bytes. They are in assembly because a compiler replaces such a loop by a call of
+//! `memcpy`. The linker prefers them, because the symbols of `compiler_builtins` are weak.
 //!
-//! Names and arguments: C standard (`memcpy`, `memmove`, `memset`) and the Run-time ABI for the Arm
-//! architecture, 4.3.4 (`__aeabi_*`, whose `memset` takes the length before the value). Each changes r0 to
-//! r3, r12 and the flags alone.
+//! Names and arguments follow the C standard (`memcpy`, `memmove`, `memset`) and the Run-time ABI for the Arm
+//! architecture, 4.3.4 (`__aeabi_*`, whose `memset` takes the length before the value). Each function changes only
+//! r0 to r3, r12 and the flags.
 
 use core::arch::global_asm;
 
@@ -20,7 +20,8 @@ global_asm!(
     "\\name:",
     "  .endr",
     ".endm",
-    // r0 to, r1 from, r2 bytes: upwards, or downwards where the end of what is read would be overwritten.
+    // r0: destination, r1: source, r2: number of bytes. Copies upwards, or downwards where copying upwards would
+    // overwrite the end of the source.
     ".section .text.modio_copy, \"ax\", %progbits",
     "modio_function memmove, __aeabi_memmove, __aeabi_memmove4, __aeabi_memmove8",
     "  subs r3, r0, r1",
@@ -52,7 +53,7 @@ global_asm!(
     "  strbhs r3, [r0, r2]",
     "  bhs 3b",
     "  bx lr",
-    // r0 to, r1 bytes, for __aeabi_memset r2 the value.
+    // r0: destination, r1: number of bytes, r2 (only `__aeabi_memset`): value.
     ".section .text.modio_fill, \"ax\", %progbits",
     "modio_function __aeabi_memclr, __aeabi_memclr4, __aeabi_memclr8",
     "  movs r2, #0",
@@ -60,7 +61,7 @@ global_asm!(
     "  mov r3, r1",
     "  mov r1, r2",
     "  mov r2, r3",
-    // r0 to, r1 the value, r2 bytes.
+    // r0: destination, r1: value, r2: number of bytes.
     "modio_function memset",
     "  mov r12, r0",
     "  uxtb r1, r1",

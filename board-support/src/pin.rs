@@ -1,10 +1,10 @@
-//! Pins as data, and what can be done with one through its port's registers.
+//! Pins as data, and access to a pin through the registers of its port.
 //!
-//! The HAL has a type for every pin, so that a board's pins would be spread over the code as types. Here they stand in
+//! The HAL has one type per pin, which would spread a board's pins over the code as types. Here they are listed in
 //! the board's [descriptor](crate::boards::Descriptor).
 //!
-//! A configuration register (CRL, CRH) is changed by a read and a write. A change that another context made in between
-//! would be lost, so each register is changed by one context at a time:
+//! Code changes a configuration register (CRL, CRH) by a read and a write. A change by another context in between
+//! would be lost, so only one context at a time may change each register:
 //!
 //! | register | changed by |
 //! |---|---|
@@ -12,9 +12,9 @@
 //! | port B CRL, for the DACs' bus | `BusPins`: in `init` and later by the background task alone |
 //! | the slots' | `outputs_off`, from fault handlers, after which the interrupted program does not run again |
 //!
-//! Output bits are changed through BSRR, a single store that leaves all other pins alone.
+//! Output bits are changed through BSRR by a single store, which does not affect other pins.
 
-/// A port of pins.
+/// A GPIO port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Port {
@@ -26,28 +26,28 @@ pub enum Port {
     C = 2,
 }
 
-/// A pin.
+/// A pin of a GPIO port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin {
     port: Port,
-    /// 0 to 15.
+    /// Number of the pin in its port, 0 to 15.
     number: u8,
 }
 
 impl Pin {
-    /// A pin of port A.
+    /// Returns a pin of port A.
     #[must_use]
     pub const fn a(number: u8) -> Self {
         Self::new(Port::A, number)
     }
 
-    /// A pin of port B.
+    /// Returns a pin of port B.
     #[must_use]
     pub const fn b(number: u8) -> Self {
         Self::new(Port::B, number)
     }
 
-    /// A pin of port C.
+    /// Returns a pin of port C.
     #[must_use]
     pub const fn c(number: u8) -> Self {
         Self::new(Port::C, number)
@@ -58,7 +58,7 @@ impl Pin {
         Self { port, number }
     }
 
-    /// The input of ADC1 on this pin, if there is one (DS5319 table 5, DS5792 table 5).
+    /// Returns the number of the ADC1 input on this pin, if there is one (DS5319 table 5, DS5792 table 5).
     #[must_use]
     pub const fn adc_input(self) -> Option<u8> {
         match (self.port, self.number) {
@@ -69,7 +69,7 @@ impl Pin {
         }
     }
 
-    /// Whether it is high, given the input registers (IDR) of ports A, B and C.
+    /// Returns whether the pin is high, given the input registers (IDR) of ports A, B and C.
     #[cfg(any(target_os = "none", test))]
     #[must_use]
     pub(crate) const fn is_high_in(self, levels: [u32; 3]) -> bool {
@@ -83,14 +83,14 @@ impl Pin {
     }
 }
 
-/// What a pin is: its four bits in a configuration register (RM0008 9.2.1 and 9.2.2).
+/// Mode of a pin: its four bits in a configuration register (RM0008 9.2.1 and 9.2.2).
 #[cfg(target_os = "none")]
 #[derive(Clone, Copy)]
 #[repr(u32)]
 pub(crate) enum Mode {
     /// A floating input, as after a reset.
     Floating = 0b0100,
-    /// An input pulled up or down, as its output bit says.
+    /// An input with a pull-up or pull-down, selected by the output bit.
     Pulled = 0b1000,
     /// An analog input.
     Analog = 0b0000,
@@ -105,26 +105,26 @@ mod registers {
     use super::{Mode, Pin, Port};
 
     impl Port {
-        /// The port's registers. The caller must own the pins that it changes.
+        /// Returns the port's registers. The caller must own the pins that it changes.
         pub(crate) fn registers(self) -> &'static RegisterBlock {
-            // All three blocks have the same layout; the crate makes them one type.
+            // All three blocks have the same layout, and the PAC uses one type for them.
             let block = match self {
                 Self::A => GPIOA::ptr(),
                 Self::B => GPIOB::ptr(),
                 Self::C => GPIOC::ptr(),
             };
-            // SAFETY: the registers are there for ever, and no access to them can break memory.
+            // SAFETY: the registers always exist, and no access to them can violate memory safety.
             unsafe { &*block }
         }
 
-        /// The input registers of ports A, B and C.
+        /// Returns the input registers of ports A, B and C.
         pub(crate) fn levels() -> [u32; 3] {
             [Self::A, Self::B, Self::C].map(|port| port.registers().idr().read().bits())
         }
     }
 
     impl Pin {
-        /// Makes it an input, or an output that is low.
+        /// Sets the mode of the pin. An output starts low.
         pub(crate) fn configure(self, mode: Mode) {
             if matches!(mode, Mode::Output) {
                 self.set(false);
@@ -134,7 +134,7 @@ mod registers {
             let with = |bits: u32| bits & !(0b1111 << shift) | (mode as u32) << shift;
             if self.number < 8 {
                 let bits = with(registers.crl().read().bits());
-                // SAFETY: the pin's own four bits, which are one of the modes; the others stay.
+                // SAFETY: writes a valid mode to the four bits of this pin and keeps the other bits.
                 registers.crl().write(|w| unsafe { w.bits(bits) });
             } else {
                 let bits = with(registers.crh().read().bits());
@@ -143,25 +143,25 @@ mod registers {
             }
         }
 
-        /// Makes it an input with its pull-up.
+        /// Makes the pin an input with pull-up.
         pub(crate) fn pull_up(self) {
             self.set(true);
             self.configure(Mode::Pulled);
         }
 
-        /// Sets its output bit.
+        /// Sets the output bit of the pin.
         #[inline]
         pub(crate) fn set(self, high: bool) {
             let bit = 1 << self.number;
             let bits = if high { bit } else { bit << 16 };
-            // SAFETY: changes this pin alone, in one store (RM0008 9.2.5).
+            // SAFETY: one store changes this pin only (RM0008 9.2.5).
             self.port
                 .registers()
                 .bsrr()
                 .write(|w| unsafe { w.bits(bits) });
         }
 
-        /// Whether it is high.
+        /// Returns whether the pin is high.
         #[inline]
         pub(crate) fn is_high(self) -> bool {
             self.port.registers().idr().read().bits() >> self.number & 1 != 0
@@ -174,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn adc_inputs_are_where_the_data_sheet_has_them() {
+    fn adc_inputs_are_on_the_pins_of_the_data_sheet() {
         let inputs = (0..16).filter_map(|n| Pin::a(n).adc_input());
         let inputs = inputs.chain((0..16).filter_map(|n| Pin::b(n).adc_input()));
         let inputs = inputs.chain((0..16).filter_map(|n| Pin::c(n).adc_input()));

@@ -1,8 +1,8 @@
-//! The RS-485 line: USART1 with its transceiver's driver enable.
+//! The RS-485 line: USART1 and the driver enable of its transceiver.
 //!
-//! Half duplex: while the unit sends, its receiver is off, so that it cannot take its own bytes for a
-//! request even where the transceiver's receiver stays on. The methods are what one interrupt needs,
-//! each a few instructions: [`Rs485::status`] is read once and says what the interrupt is about.
+//! The line is half duplex. While the unit sends, its receiver is off, so that it does not receive its own bytes
+//! even when the transceiver's receiver stays enabled. Each method serves one interrupt in a few instructions:
+//! [`Rs485::status`] is read once and gives the reason for the interrupt.
 
 use stm32f1xx_hal::{
     gpio::{Input, Output, PA8, PA10, PinState, PullUp, PushPull},
@@ -16,26 +16,26 @@ use crate::{
     uart::{Format, LineSettings, divider},
 };
 
-/// What the UART wants, as it was when [`Rs485::status`] read it.
+/// The UART's flags and interrupt enables, as [`Rs485::status`] read them.
 #[derive(Clone, Copy)]
 pub struct Status {
     flags: u16,
-    /// CR1, whose interrupt enables stand at the places of their flags (RM0008 27.6.1, 27.6.4).
+    /// CR1, whose interrupt enable bits have the same positions as their flags (RM0008 27.6.1, 27.6.4).
     enables: u16,
 }
 
-/// A character from the line.
+/// A character received from the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Character {
-    /// Its eight data bits; with seven of them, bit 7 is the parity bit or the first stop bit.
+    /// Its eight data bits. With seven data bits, bit 7 is the parity bit or the first stop bit.
     pub byte: u8,
-    /// What was wrong with it: bit 0 parity, bit 1 framing (the stop bit was low), bit 3 overrun (a
-    /// character after it was lost). Never bit 2, noise, which is samples of a bit that disagreed:
-    /// the majority decides, and the check of the frame finds out whether it was right.
+    /// Errors: bit 0 parity, bit 1 framing (the stop bit was low), bit 3 overrun (a character after this one was
+    /// lost). Bit 2, noise, is never set: it means that the samples of a bit differed. The UART uses the majority,
+    /// and the frame's checksum detects a wrong result.
     pub faults: u8,
 }
 
-/// PE, FE and ORE: as [`Character::faults`] has them.
+/// PE, FE and ORE, at the bit positions of [`Character::faults`].
 const FAULTS: u16 = 0b1011;
 const ORE: u16 = 1 << 3;
 const RXNE: u16 = 1 << 5;
@@ -43,26 +43,26 @@ const TC: u16 = 1 << 6;
 const TXE: u16 = 1 << 7;
 
 impl Status {
-    /// A character is waiting to be [`read`](Rs485::read), or was lost.
+    /// Returns whether a character is waiting to be [read](Rs485::read) or was lost.
     #[must_use]
     pub const fn received(self) -> bool {
         self.flags & (RXNE | ORE) != 0
     }
 
-    /// The next byte can be [sent](Rs485::send), and one is wanted.
+    /// Returns whether the UART wants the next byte and can [send](Rs485::send) it.
     #[must_use]
     pub const fn wants_byte(self) -> bool {
         self.flags & self.enables & TXE != 0
     }
 
-    /// The last stop bit has left the unit.
+    /// Returns whether the last stop bit has been sent.
     #[must_use]
     pub const fn sent(self) -> bool {
         self.flags & self.enables & TC != 0
     }
 }
 
-/// The pins of the line, before it is set up.
+/// The pins of the line before it is set up.
 pub(crate) struct Pins {
     pub(crate) driver: PA8<Output<PushPull>>,
     pub(crate) tx: stm32f1xx_hal::gpio::PA9,
@@ -76,15 +76,15 @@ pub struct Rs485 {
     driver: PA8<Output<PushPull>>,
     divider: u16,
     format: Format,
-    /// [`Format::stop_in_data`], ready for every byte.
+    /// [`Format::stop_in_data`] of the line's format, to be set in every byte.
     stop_in_data: u8,
-    /// What CR1 read after it was set, and the signature of the other registers. They are compared with what they
-    /// read, not with what was written: an emulator need not keep every bit.
+    /// CR1 and the signature of the other registers, read back after they were set up. Later checks compare with
+    /// these instead of the written values, because an emulator may not keep every bit.
     cr1: u16,
     set: Signature,
 }
 
-/// CR1 of a receiver: the line's settings, with UE, TE, RE and RXNEIE (RM0008 27.6.4).
+/// Returns CR1 for receiving in this format: the line's settings with UE, TE, RE and RXNEIE (RM0008 27.6.4).
 const fn receiving(format: Format) -> u16 {
     const UE: u16 = 1 << 13;
     const M: u16 = 1 << 12;
@@ -93,7 +93,7 @@ const fn receiving(format: Format) -> u16 {
     const TE: u16 = 1 << 3;
     const RE: u16 = 1 << 2;
     const RXNEIE: u16 = 1 << 5;
-    // A parity bit is the last bit of the word, which has nine bits with M (RM0008 27.3.7).
+    // The parity bit is the last bit of the word; with M set a word has nine bits (RM0008 27.3.7).
     let format = match format {
         Format::N2 | Format::N1 | Format::SevenN2 => 0,
         Format::E1 => M | PCE,
@@ -104,7 +104,7 @@ const fn receiving(format: Format) -> u16 {
     UE | TE | RE | RXNEIE | format
 }
 
-/// CR2: two stop bits, or one. The first one of 7N2 is a data bit, [`Format::stop_in_data`].
+/// Returns CR2, for one or two stop bits. In 7N2 the first stop bit is a data bit, [`Format::stop_in_data`].
 const fn stop_bits(format: Format) -> u16 {
     match format {
         Format::N2 => 0b10 << 12,
@@ -113,8 +113,8 @@ const fn stop_bits(format: Format) -> u16 {
 }
 
 impl Rs485 {
-    /// Sets the line up and turns the receiver on. `None` when the rate cannot be had from this
-    /// clock; the line then stays off.
+    /// Sets the line up and turns the receiver on. Returns `None` when this clock cannot produce the rate; the line
+    /// then stays off.
     pub(crate) fn new(
         usart: pac::USART1,
         mut pins: Pins,
@@ -135,32 +135,33 @@ impl Rs485 {
             set: Signature::default(),
         };
         line.set_up();
-        // The transmitter is on and idles high before the pin becomes its output.
+        // The transmitter is on and drives high before the pin becomes its output.
         let _tx = pins.tx.into_alternate_push_pull(&mut pins.cr);
         let _rx = pins.rx;
         Some(line)
     }
 
-    /// Turns the driver off, sets every register of the UART, and listens. A character under way is lost.
+    /// Turns the driver off, sets every register of the UART, and turns the receiver on. A character under way is
+    /// lost.
     pub fn set_up(&mut self) {
         self.driver.set_state(PinState::Low);
         let usart = &self.usart;
         usart.cr1().reset();
         usart.cr3().reset();
         usart.gtpr().reset();
-        // SAFETY: the reserved bits of these registers are 0 in every value written here (RM0008 27.6).
+        // SAFETY: every value written here has 0 in the reserved bits of these registers (RM0008 27.6).
         unsafe {
             usart.brr().write(|w| w.bits(self.divider));
             usart.cr2().write(|w| w.bits(stop_bits(self.format)));
             usart.cr1().write(|w| w.bits(receiving(self.format)));
         }
-        // What was received or damaged before is not the next frame's.
+        // Discard what was received before, including its error flags; it is not part of the next frame.
         let _ = (usart.sr().read(), usart.dr().read());
         self.cr1 = usart.cr1().read().bits();
         self.set = self.settings();
     }
 
-    /// The signature of CR2, CR3 and BRR.
+    /// Returns the signature of CR2, CR3 and BRR.
     fn settings(&self) -> Signature {
         let usart = &self.usart;
         Signature::default()
@@ -169,7 +170,8 @@ impl Rs485 {
             .with(usart.brr().read().bits().into())
     }
 
-    /// Whether every register of the UART is as it was set up and the driver is off, while nothing is being sent.
+    /// Returns whether every register of the UART is as set up and the driver is off. Call this only while nothing
+    /// is being sent.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.usart.cr1().read().bits() == self.cr1
@@ -177,7 +179,7 @@ impl Rs485 {
             && self.driver.is_set_low()
     }
 
-    /// What the UART wants.
+    /// Reads the UART's flags and interrupt enables.
     #[inline]
     #[must_use]
     pub fn status(&self) -> Status {
@@ -187,20 +189,20 @@ impl Rs485 {
         }
     }
 
-    /// Takes the character that [`Status::received`] told of.
+    /// Reads the character that [`Status::received`] reported.
     #[inline]
     pub fn read(&mut self, status: Status) -> Character {
         Character {
-            // With nine bits, the ninth is the parity bit.
+            // With words of nine bits, the ninth is the parity bit.
             byte: self.usart.dr().read().bits() as u8,
             faults: (status.flags & FAULTS) as u8,
         }
     }
 
-    /// Turns the driver on and sends the first byte of a response, with the receiver off.
+    /// Turns the receiver off and the driver on, and sends the first byte of a reply.
     pub fn start_sending(&mut self, first: u8) {
         self.driver.set_state(PinState::High);
-        // Reading SR and then writing DR takes TC back (RM0008 27.6.1).
+        // Reading SR and then writing DR clears TC (RM0008 27.6.1).
         let _ = self.usart.sr().read();
         self.write(first);
         self.usart
@@ -208,7 +210,7 @@ impl Rs485 {
             .modify(|_, w| w.re().disabled().rxneie().disabled().txeie().enabled());
     }
 
-    /// A parity bit takes the place of the highest bit (RM0008 27.6.2).
+    /// The UART replaces the highest bit by the parity bit (RM0008 27.6.2).
     #[inline]
     fn write(&self, byte: u8) {
         let word = byte | self.stop_in_data;
@@ -219,26 +221,26 @@ impl Rs485 {
     #[inline]
     pub fn send(&mut self, byte: u8) {
         self.write(byte);
-        // When this comes late, the byte before may end between the reading of SR and this write, which then does
-        // not clear TC (RM0008 27.6.1). This byte cannot have ended yet: a TC that is set is not its own, and
-        // would switch the driver off too early.
+        // When this runs late, the previous byte may end between the read of SR and the write to DR, which then
+        // does not clear TC (RM0008 27.6.1). This byte cannot have ended yet, so a TC that is set belongs to the
+        // previous one. It would switch the driver off too early.
         if self.usart.sr().read().tc().bit_is_set() {
-            // SAFETY: the other flags of SR are left alone by 1 or cannot be written.
+            // SAFETY: writing 1 leaves the other flags of SR unchanged, or they cannot be written.
             self.usart.sr().write(|w| unsafe { w.bits(!TC) });
         }
     }
 
-    /// No byte is ready yet: asks no more until [`resume_sending`](Self::resume_sending).
+    /// Stops asking for bytes until [`resume_sending`](Self::resume_sending): no byte is ready yet.
     pub fn pause_sending(&mut self) {
         self.usart.cr1().modify(|_, w| w.txeie().disabled());
     }
 
-    /// Bytes are ready again.
+    /// Asks for bytes again.
     pub fn resume_sending(&mut self) {
         self.usart.cr1().modify(|_, w| w.txeie().enabled());
     }
 
-    /// The last byte was given to the UART: [`Status::sent`] will tell when it has left.
+    /// Ends the sending: the last byte was given to the UART. [`Status::sent`] reports when it has been sent.
     #[inline]
     pub fn finish_sending(&mut self) {
         self.usart
@@ -246,7 +248,7 @@ impl Rs485 {
             .modify(|_, w| w.txeie().disabled().tcie().enabled());
     }
 
-    /// Turns the driver off and the receiver on, at once when [`Status::sent`] tells.
+    /// Turns the driver off and the receiver on. Call this as soon as [`Status::sent`] returns true.
     #[inline]
     pub fn stop_sending(&mut self) {
         self.driver.set_state(PinState::Low);

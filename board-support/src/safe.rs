@@ -1,4 +1,4 @@
-//! Outputs off at once, from wherever the program has come to.
+//! Turns the outputs off from any point of the program.
 
 use core::ptr;
 
@@ -6,21 +6,22 @@ use stm32f1xx_hal::pac;
 
 use crate::{boards::BOARD, pin::Mode};
 
-/// PA8 low: the upper half of the set/reset register (RM0008 9.2.5).
+/// Sets PA8 low: its bit in the upper half of the set/reset register (RM0008 9.2.5).
 const DRIVER_OFF: u32 = 1 << (16 + 8);
 
-/// Makes the lines of all slots floating inputs, which is off for every module, and turns the RS-485 driver
-/// off. For fault handlers, which may not go on to use the pins: it does not ask who owns them.
+/// Makes the lines of all slots floating inputs, which turns every module's outputs off, and turns the RS-485
+/// driver off. For fault handlers, after which the interrupted program does not run again; it ignores who owns the
+/// pins.
 ///
-/// The analog outputs of 4AO and 2AI2AO are out of reach from here: their DACs keep their last codes
-/// until the program that starts over writes them, some milliseconds after the reset. A transfer on a
-/// bus that may be the very thing that failed has no place in a fault handler.
+/// The analog outputs of 4AO and 2AI2AO are not changed. Their DACs keep their last codes until the restarted
+/// program writes them, some milliseconds after the reset. A fault handler must not start a transfer on a bus that
+/// may itself have caused the fault.
 pub fn outputs_off() {
-    // SAFETY: single register accesses that are defined in every state of the chip. Whoever owned the
-    // pins does not run again: that is what this is for.
+    // SAFETY: single register accesses that are defined in every state of the chip. The owner of the pins does not
+    // run again.
     unsafe {
-        // Without its clock a port is as the reset left it, and takes no access. All have theirs since the same step
-        // of the start.
+        // A port without its clock is still in its reset state and ignores accesses. The same start-up step turns
+        // the clocks of all ports on, so checking one is enough.
         if (*pac::RCC::ptr()).apb2enr().read().iopcen().bit_is_clear() {
             return;
         }

@@ -1,4 +1,4 @@
-//! TIM4: the beat of all clocks and of the scan, [`SCAN_HZ`].
+//! TIM4, the timer of the scan and of the device's clock, at [`SCAN_HZ`].
 
 use stm32f1xx_hal::{
     pac,
@@ -16,23 +16,23 @@ impl ScanTimer {
     pub(crate) fn new(timer: pac::TIM4, clock: ClockSource, rcc: &mut pac::RCC) -> Self {
         pac::TIM4::enable(rcc);
         pac::TIM4::reset(rcc);
-        // Half the clock fits 16 bits; the design constants see to that and to whole numbers.
+        // Half the clock fits 16 bits and is a whole number; the design constants check both.
         timer.psc().write(|w| w.psc().set(1));
         let ticks = clock.core_hz() / 2 / SCAN_HZ;
         timer.arr().write(|w| w.arr().set((ticks - 1) as u16));
         Self { timer }
     }
 
-    /// Starts the beat: an interrupt every millisecond.
+    /// Starts the timer: one interrupt every millisecond.
     pub fn start(&mut self) {
-        // The update by software loads the prescaler; its flag is no beat.
+        // The update event by software loads the prescaler. Clear its flag, because it is no tick of the timer.
         self.timer.egr().write(|w| w.ug().update());
         self.timer.sr().write(|w| w.uif().clear_bit());
         self.timer.dier().write(|w| w.uie().enabled());
         self.timer.cr1().write(|w| w.cen().enabled());
     }
 
-    /// Takes a beat: its interrupt is over.
+    /// Acknowledges the timer's interrupt.
     pub fn take_beat(&mut self) {
         self.timer.sr().write(|w| w.uif().clear_bit());
     }

@@ -1,15 +1,15 @@
-//! One number for a set of registers.
+//! One number that represents a set of registers.
 
-/// A number that differs when the registers differ in any one bit. Comparing it takes fewer instructions, and less
-/// RAM, than comparing every register.
+/// A number that changes when any single bit of the registers changes. Comparing it takes fewer instructions and
+/// less RAM than comparing every register.
 ///
-/// Always inlined, because its callers run from RAM. One register at a time, because a loop over all of them takes
-/// four times as long.
+/// Always inlined, because its callers run from RAM. It takes one register per call, because a loop over all
+/// registers takes four times as long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Signature(u32);
 
 impl Signature {
-    /// Of these registers and one more.
+    /// Returns the signature of the previous registers and one more.
     #[inline(always)]
     #[must_use]
     pub(crate) const fn with(self, register: u32) -> Self {

@@ -1,4 +1,4 @@
-//! A slot: four lines that become what the module in it needs.
+//! A slot: four lines that are configured for the module in it.
 
 use core::convert::Infallible;
 
@@ -10,14 +10,14 @@ use crate::{
     pin::{Mode, Pin},
 };
 
-/// The four lines, floating as after a reset until one of the methods is called. A module that needs
-/// none of them, or one that is not there, leaves them so. To be set up in `init`, before the first interrupt.
+/// The four lines of a slot. They float, as after a reset, until one of the methods is called; an empty slot leaves
+/// them floating. Configure a slot in `init`, before the first interrupt.
 pub struct Slot {
     lines: [Pin; 4],
     dac_address: u8,
 }
 
-/// How many of a slot's lines are analog inputs.
+/// Number of a slot's lines that are analog inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnalogLines {
     /// Lines 1 and 2.
@@ -26,8 +26,8 @@ pub enum AnalogLines {
     Four,
 }
 
-/// A slot line as an input with pull-up. The HAL's type for any pin of a port looks it up in an array,
-/// with a panic for one that is not there.
+/// A slot line as an input with pull-up. The HAL's type for any pin of a port is not used: it looks the pin up in
+/// an array and panics when it does not exist.
 pub struct SlotInput(Pin);
 
 /// A slot line as a push-pull output.
@@ -38,14 +38,15 @@ fn input(line: Pin) -> SlotInput {
     SlotInput(line)
 }
 
-/// Low from its first instant. The slowest edges are enough: relays and open collectors need no steep ones.
+/// Makes a line an output that is low from the start, with the slowest edges: relays and open collectors need no
+/// fast ones.
 fn output(line: Pin) -> SlotOutput {
     line.configure(Mode::Output);
     SlotOutput(line)
 }
 
 impl Slot {
-    /// Each of a board's slots is made once.
+    /// Each slot of a board must be created only once.
     pub(crate) const fn new(pins: &SlotPins) -> Self {
         Self {
             lines: pins.lines,
@@ -53,33 +54,32 @@ impl Slot {
         }
     }
 
-    /// The address of its module's DAC, should that have one.
+    /// Returns the I2C address of the DAC of a module in this slot.
     #[must_use]
     pub const fn dac_address(&self) -> u8 {
         self.dac_address
     }
 
-    /// Four inputs with pull-ups.
+    /// Makes all lines inputs with pull-ups.
     #[must_use]
     pub fn into_inputs(self) -> [SlotInput; 4] {
         self.lines.map(input)
     }
 
-    /// Four outputs that drive low from their first instant.
+    /// Makes all lines outputs that are low from the start.
     #[must_use]
     pub fn into_outputs_low(self) -> [SlotOutput; 4] {
         self.lines.map(output)
     }
 
-    /// Lines 1 and 2 as inputs with pull-ups, lines 3 and 4 as outputs that drive low from their first
-    /// instant.
+    /// Makes lines 1 and 2 inputs with pull-ups, and lines 3 and 4 outputs that are low from the start.
     #[must_use]
     pub fn into_relay(self) -> ([SlotInput; 2], [SlotOutput; 2]) {
         let [line1, line2, line3, line4] = self.lines;
         ([line1, line2].map(input), [line3, line4].map(output))
     }
 
-    /// The first lines as analog inputs, the others left floating.
+    /// Makes the first lines analog inputs and leaves the others floating.
     #[must_use]
     pub fn into_analog(self, lines: AnalogLines) -> AnalogInputs {
         let count: u8 = match lines {

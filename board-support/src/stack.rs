@@ -1,29 +1,28 @@
-//! How much of the stack was never used.
+//! Measures how much of the stack was never used.
 //!
-//! The stack lies at the bottom of the RAM and grows towards its start, with the statics above it
-//! (firmware's memory.x): one that is too deep runs into addresses where there is no memory, and the
-//! bus answers with a fault, before it can overwrite a static. That needs no linker of its own, as
-//! flip-link would. cortex-m-rt paints it before anything runs on it; what still has the paint has
-//! never been written.
+//! The stack lies at the bottom of the RAM and grows downwards, with the statics above it (firmware's memory.x). A
+//! stack that is too deep reaches addresses without memory, and the bus reports a fault before the stack can
+//! overwrite a static. This needs no special linker such as flip-link. cortex-m-rt paints the stack before it is
+//! used; words that still hold the paint were never written.
 
 use core::ptr;
 
 use cortex_m_rt::STACK_PAINT_VALUE;
 
 unsafe extern "C" {
-    /// Where the stack ends: its lowest address, and that of the RAM. Placed by memory.x.
+    /// End of the stack: its lowest address, which is also the lowest of the RAM. Defined by memory.x.
     static _stack_end: u32;
-    /// Where it starts: one beyond its highest address.
+    /// Start of the stack: the address after its highest one.
     static _stack_start: u32;
 }
 
-/// The stack's lowest address.
+/// Returns the stack's lowest address.
 #[must_use]
 pub fn bottom() -> u32 {
     &raw const _stack_end as u32
 }
 
-/// The address just above the stack.
+/// Returns the address just above the stack.
 #[must_use]
 pub fn top() -> u32 {
     &raw const _stack_start as u32
@@ -43,7 +42,7 @@ pub struct LowWater {
 }
 
 impl LowWater {
-    /// Starts with the present stack pointer as the lowest address in use.
+    /// Creates the search with the present stack pointer as the lowest address in use.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -52,15 +51,15 @@ impl LowWater {
         }
     }
 
-    /// Checks the next 16 words, upwards from the end of the stack, and returns the number of bytes never used since the
-    /// start: 0 to the size of the stack, in steps of 4.
+    /// Checks the next 16 words, upwards from the end of the stack, and returns the number of bytes never used
+    /// since the start: 0 to the size of the stack, in steps of 4.
     ///
     /// Deeper use of the stack is found after at most one pass over the unused part, one call for every 64 bytes.
     pub fn check(&mut self) -> u16 {
         let end = self.lowest.min(self.next + 4 * AT_ONCE);
         let used = (self.next..end).step_by(4).find(|&word| {
-            // SAFETY: these are the words of the stack, which is RAM. What they hold is somebody else's and changes at
-            // any time, so it is read as volatile and only compared.
+            // SAFETY: these are words of the stack, which is RAM. Their content may change at any time, so it is
+            // read as volatile and only compared.
             unsafe { ptr::read_volatile(word as *const u32) != STACK_PAINT_VALUE }
         });
         self.lowest = used.unwrap_or(self.lowest);

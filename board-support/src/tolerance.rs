@@ -1,24 +1,24 @@
-//! Rates that a UART still receives when this end runs on the internal oscillator.
+//! Baud rates that a UART can still receive when this unit runs on the internal oscillator.
 
 use crate::{
     design::{HSI_ERROR_PPM, LINE_ASYMMETRY_NS, MASTER_ERROR_PPM, SYSCLK_ON_HSI_HZ},
     uart::{Format, LineSettings, divider},
 };
 
-/// Deviation that a receiver tolerates, in ppm (RM0008 27.3.5, tables for a zero and any other DIV_Fraction,
-/// noise allowed), and half bits from the start edge to the sample of the last bit.
+/// Returns the deviation that a receiver tolerates, in ppm (RM0008 27.3.5, tables for a zero and any other
+/// DIV_Fraction, noise allowed), and the number of half bits from the start edge to the sample of the last bit.
 const fn receiver(format: Format, whole_divider: bool) -> (u32, u32) {
     match (format, whole_divider) {
         (Format::E1 | Format::O1, true) => (39_700, 21),
         (Format::E1 | Format::O1, false) => (35_300, 21),
-        // Words of 8 bits, a parity bit counted in.
+        // Words of 8 bits, parity bit included.
         (_, true) => (43_750, 19),
         (_, false) => (38_800, 19),
     }
 }
 
-/// Whether all errors together stay within what a receiver tolerates, over the whole range of temperature: those
-/// of the internal oscillator, the divider, the other end and the line.
+/// Returns whether the sum of all errors stays within what a receiver tolerates, over the whole temperature range:
+/// the errors of the internal oscillator, the divider, the other station and the line.
 #[must_use]
 pub const fn internal_oscillator_serves(settings: LineSettings) -> bool {
     let LineSettings { baud, format } = settings;

@@ -1,8 +1,8 @@
-//! What the line's UART has to be set to: character format and baud rate divider.
+//! UART settings of a line: character format and baud rate divider.
 
 use crate::design::BAUD_ERROR_PPM;
 
-/// How a character stands on the line: eight data bits, unless the name says seven.
+/// Format of a character on the line. It has eight data bits unless the name says seven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// No parity, two stop bits.
@@ -23,7 +23,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Bits of a character on the line, start, parity and stop bits among them: 10 or 11.
+    /// Returns the bits of a character on the line, including start, parity and stop bits: 10 or 11.
     #[must_use]
     pub const fn bits(self) -> u32 {
         match self {
@@ -32,12 +32,12 @@ impl Format {
         }
     }
 
-    /// The most sixteenths of a bit from the receiver's interrupt to the end of the character.
+    /// Returns the longest time from the receiver's interrupt to the end of the character, in sixteenths of a bit.
     ///
-    /// A stop bit is sampled in its middle, at the 10th sixteenth of it; the flag of a second stop
-    /// bit comes at the end of the first (RM0008 27.3.3). The receiver's own sixteenths begin at any instant, and the
-    /// first one with the line low counts as the start bit's first: so all of this can be up to one sixteenth early.
-    /// In 7N2 the UART takes the first stop bit for a data bit, so that the second is its only stop bit.
+    /// The UART samples a stop bit in its middle, at the 10th sixteenth. With two stop bits it sets the flag at the
+    /// end of the first one (RM0008 27.3.3). The receiver's sampling clock is not synchronous with the line, and
+    /// the first sample that is low counts as the first of the start bit, so the flag can be up to one sixteenth
+    /// early. In 7N2 the UART treats the first stop bit as a data bit, so the second one is its only stop bit.
     #[must_use]
     pub const fn sixteenths_after_flag(self) -> u32 {
         match self {
@@ -46,10 +46,10 @@ impl Format {
         }
     }
 
-    /// The bit of the data register that is the first stop bit: 0x80 in 7N2, 0 in every other format.
+    /// Returns the first stop bit as a bit of the data register: 0x80 in 7N2, 0 in every other format.
     ///
-    /// The USARTs of the F103 have words of 8 or 9 bits (RM0008 27.6.4, bit M), so 7N2 is 8N1 there with the
-    /// highest data bit always 1. On the line both are the same.
+    /// The USARTs of the F103 have words of 8 or 9 bits (RM0008 27.6.4, bit M). 7N2 is therefore set up as 8N1 with
+    /// the highest data bit always 1, which is the same on the line.
     #[must_use]
     pub const fn stop_in_data(self) -> u8 {
         match self {
@@ -59,7 +59,7 @@ impl Format {
     }
 }
 
-/// Rate and format of a line.
+/// Baud rate and format of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineSettings {
     /// Bits per second.
@@ -69,17 +69,17 @@ pub struct LineSettings {
 }
 
 impl LineSettings {
-    /// The factory setting, 9600 8N2, which is also the loader mode's.
+    /// The factory setting, 9600 8N2, also used in loader mode.
     pub const FACTORY: Self = Self {
         baud: 9600,
         format: Format::N2,
     };
 }
 
-/// The baud rate register for a rate, at the UART's clock in Hz: the clock over the rate, in
-/// sixteenths of the oversampling (RM0008 27.3.4), rounded to the nearest.
+/// Returns the baud rate register for a rate, given the UART's clock in Hz: clock divided by rate, in sixteenths of
+/// the oversampling (RM0008 27.3.4), rounded to the nearest.
 ///
-/// `None` for a rate that cannot be had within [`BAUD_ERROR_PPM`].
+/// Returns `None` when no divider reaches the rate within [`BAUD_ERROR_PPM`].
 #[must_use]
 pub const fn divider(clock_hz: u32, baud: u32) -> Option<u16> {
     if baud == 0 {
@@ -90,7 +90,7 @@ pub const fn divider(clock_hz: u32, baud: u32) -> Option<u16> {
     if divider < 16 || divider > u16::MAX as u32 {
         return None;
     }
-    // The product is the clock and half a rate at most.
+    // The product is at most the clock plus half the rate.
     let error = (divider * baud).abs_diff(clock_hz);
     if error <= clock_hz / 1_000_000 * BAUD_ERROR_PPM {
         Some(divider as u16)
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn every_rate_of_the_map_can_be_had_on_both_clocks() {
+    fn every_rate_of_the_register_map_has_a_divider_on_both_clocks() {
         for baud in [
             1200, 2400, 4800, 9600, 19200, 38400, 57600, 115_200, 230_400, 460_800, 921_600,
         ] {
@@ -123,13 +123,13 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_that_would_be_wrong_is_refused() {
+    fn a_rate_out_of_tolerance_has_no_divider() {
         assert_eq!(divider(72_000_000, 0), None);
         assert_eq!(divider(72_000_000, 300), None, "the divider has 16 bits");
         assert_eq!(
             divider(72_000_000, 5_000_000),
             None,
-            "no sixteen samples a bit"
+            "fewer than sixteen clocks per bit"
         );
         assert_eq!(divider(8_000_000, 460_800), None, "2.1 % off");
     }

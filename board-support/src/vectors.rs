@@ -1,34 +1,35 @@
-//! The vector table in RAM, so that an interrupt is entered while flash cannot be read.
+//! The vector table in RAM, so that interrupts can be entered while flash cannot be read.
 
 use core::{cell::UnsafeCell, mem::MaybeUninit, ptr};
 
 use cortex_m::peripheral::SCB;
 
-/// The core's 16 and the interrupts of the medium-density parts (RM0008 table 63).
+/// Number of vectors: 16 of the core and the interrupts of the medium-density parts (RM0008 table 63).
 const VECTORS: usize = 16 + 60;
 
-/// The linker aligns it to 512 bytes, the next power of two that holds it (PM0056 4.4.4).
+/// The linker aligns the table to 512 bytes, the next power of two above its size (PM0056 4.4.4).
 #[repr(transparent)]
 struct Table(UnsafeCell<MaybeUninit<[u32; VECTORS]>>);
 
-// SAFETY: written once, before interrupts are enabled; from then on the core alone reads it.
+// SAFETY: written once, before interrupts are enabled; from then on only the core reads it.
 unsafe impl Sync for Table {}
 
 #[unsafe(link_section = ".ram_vectors")]
 static TABLE: Table = Table(UnsafeCell::new(MaybeUninit::uninit()));
 
 unsafe extern "C" {
-    /// Of cortex-m-rt: the table in flash.
+    /// The vector table in flash, from cortex-m-rt.
     static __vector_table: [u32; VECTORS];
 }
 
-/// Copies the table to RAM and has the core use it. To be called with interrupts disabled.
+/// Copies the table to RAM and makes the core use it. Interrupts must be disabled.
 pub(crate) fn move_to_ram(scb: &SCB) {
     let table = TABLE.0.get();
-    // SAFETY: both are as long; nothing else touches the table in RAM, and the core does not until VTOR is written.
+    // SAFETY: both tables have the same length. Nothing else accesses the table in RAM, and the core does not use
+    // it until VTOR is written.
     unsafe { ptr::copy_nonoverlapping(&raw const __vector_table, table.cast(), 1) };
     cortex_m::asm::dsb();
-    // SAFETY: the table is whole and aligned.
+    // SAFETY: the table is complete and aligned.
     unsafe { scb.vtor.write(table as u32) };
     cortex_m::asm::dsb();
 }

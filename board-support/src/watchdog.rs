@@ -1,6 +1,6 @@
-//! The independent watchdog: resets the device when it is not fed, even with the main clock dead. It runs from
-//! the first steps of a start on.
-//! Driven through its registers, because the HAL's panics and waits without a bound.
+//! The independent watchdog. It resets the device when it is not refreshed, even when the main clock has stopped.
+//! It runs from the first steps of a start. It is set up through its registers, because the HAL's driver panics and
+//! waits without a limit.
 
 use stm32f1xx_hal::pac;
 
@@ -9,7 +9,7 @@ use crate::{
     wait::within_us,
 };
 
-/// What KR is to be told (RM0008 19.4.1).
+/// Keys for the register KR (RM0008 19.4.1).
 const FEED: u16 = 0xAAAA;
 const OPEN: u16 = 0x5555;
 const START: u16 = 0xCCCC;
@@ -20,14 +20,15 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// Starts it with the long period of the start-up, [`WATCHDOG_START_MS`](crate::design::WATCHDOG_START_MS), so
-    /// that a start that hangs is reset, too. It stops while a debugger has halted the core.
+    /// Starts the watchdog with the long period for the start-up,
+    /// [`WATCHDOG_START_MS`](crate::design::WATCHDOG_START_MS), so that a start that hangs is reset, too. The
+    /// watchdog stops while a debugger halts the core.
     pub(crate) fn start(iwdg: pac::IWDG, debug: &pac::DBGMCU) -> Self {
         debug.cr().modify(|_, w| w.dbg_iwdg_stop().set_bit());
         let mut watchdog = Self { iwdg };
-        // The start also turns the LSI on, which copies the settings.
-        watchdog.tell(START);
-        watchdog.tell(OPEN);
+        // Starting the watchdog also turns the LSI on, which is needed to accept the settings.
+        watchdog.write_key(START);
+        watchdog.write_key(OPEN);
         watchdog.iwdg.pr().write(|w| w.pr().divide_by16());
         watchdog
             .iwdg
@@ -40,8 +41,8 @@ impl Watchdog {
     /// Sets the period of the running device: from now on the watchdog must be refreshed every
     /// [`WATCHDOG_MS`](crate::design::WATCHDOG_MS) milliseconds.
     pub fn arm(&mut self) {
-        // PVU and RVU are clear: `start` has waited for that, so PR and RLR may be written (RM0008 19.4.4).
-        self.tell(OPEN);
+        // `start` has waited until PVU and RVU are clear, so PR and RLR may be written (RM0008 19.4.4).
+        self.write_key(OPEN);
         self.iwdg.pr().write(|w| w.pr().divide_by8());
         self.iwdg.rlr().write(|w| w.rl().set(WATCHDOG_RELOAD));
         self.reload_when_set();
@@ -56,13 +57,13 @@ impl Watchdog {
         self.feed();
     }
 
-    /// Feeds it.
+    /// Refreshes the watchdog.
     pub fn feed(&mut self) {
-        self.tell(FEED);
+        self.write_key(FEED);
     }
 
-    fn tell(&mut self, key: u16) {
-        // SAFETY: any value may be written to the key register; three of them mean something.
+    fn write_key(&mut self, key: u16) {
+        // SAFETY: any value may be written to the key register; three values have an effect.
         self.iwdg.kr().write(|w| unsafe { w.key().bits(key) });
     }
 }

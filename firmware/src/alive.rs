@@ -1,64 +1,65 @@
-//! Who has been alive since the watchdog was last fed.
+//! Checks that every task has run since the watchdog was last refreshed.
 //!
-//! Every task leaves its mark, the watchdog is fed only when all marks are there, and feeding takes
-//! them back. A task that hangs, or is starved by one that does, so resets the device; the marks then
-//! tell which it was: one without a mark did not run, one that has [`BEGUN`] did not come to its end.
+//! Every task sets its mark. The watchdog is refreshed only when all marks are set, and the refresh clears them. A
+//! task that hangs, or is blocked by one that hangs, therefore causes a watchdog reset. The marks then show which
+//! task it was: a task without a mark did not run, and a task with the mark [`BEGUN`] did not finish.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-/// The mark of a task that has begun.
+/// Mark of a task that has begun.
 pub const BEGUN: u8 = 2;
-/// The mark of a task that has come to its end.
+/// Mark of a task that has finished.
 pub const ENDED: u8 = 1;
 
-/// A task that has to be alive, and the place of its mark.
+/// A task that must set its mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
-    /// The line's interrupts.
+    /// The interrupts of the line.
     Line,
-    /// The serving of requests.
+    /// The task that serves requests.
     Serve,
-    /// The scan of the modules.
+    /// The task that scans the modules.
     Scan,
-    /// The background work.
+    /// The background task.
     Background,
 }
 
-/// Marks, one for each [`Task`] in the order of the variants: 0 is none. They may lie where a reset
-/// leaves them alone, so that the start after a bite can tell whose was missing.
+/// The marks, one for each [`Task`] in the order of the variants; 0 means no mark. They may lie in memory that a
+/// reset keeps, so that the start after a watchdog reset can report the missing ones.
 pub type Marks = [AtomicU8; 4];
 
-/// Marks a task as begun. A single store: interrupts can afford it.
+/// Marks a task as begun. This is a single store, cheap enough for interrupts.
 #[inline]
 pub fn begin(marks: &Marks, task: Task) {
     of(marks, task).store(BEGUN, Ordering::Relaxed);
 }
 
-/// Marks a task as ended.
+/// Marks a task as finished.
 #[inline]
 pub fn end(marks: &Marks, task: Task) {
     of(marks, task).store(ENDED, Ordering::Relaxed);
 }
 
-/// The mark of a task as it is.
+/// Returns the mark of a task.
 #[inline]
 #[must_use]
 pub fn look(marks: &Marks, task: Task) -> u8 {
     of(marks, task).load(Ordering::Relaxed)
 }
 
-/// Puts back the mark that [`look`] saw, after a run that is no proof of life.
+/// Restores the mark that [`look`] returned, after a run that does not prove that the task works.
 #[inline]
 pub fn put_back(marks: &Marks, task: Task, mark: u8) {
     of(marks, task).store(mark, Ordering::Relaxed);
 }
 
-/// The line's interrupts have no time for a second mark: a task they can interrupt, and which
-/// therefore runs after their end, leaves it for them.
+/// Marks the line's interrupts as finished if they have begun. They have no time to set a second mark, so a task of
+/// lower priority, which runs only after they have returned, calls this for them.
 #[inline]
 pub fn end_line(marks: &Marks) {
     let line = of(marks, Task::Line);
-    // One that comes in between is marked as ended, which it is when this goes on.
+    // An interrupt between the load and the store is also marked as finished, which is correct: it has returned by
+    // then.
     if line.load(Ordering::Relaxed) == BEGUN {
         line.store(ENDED, Ordering::Relaxed);
     }
@@ -75,9 +76,9 @@ const fn of(marks: &Marks, task: Task) -> &AtomicU8 {
     }
 }
 
-/// Whether all tasks have left their marks; if so, they are taken back. For the one who runs when no
-/// task does, so that what has begun has ended too. A mark left while they are being taken back may be
-/// lost, which costs one round.
+/// Returns whether all tasks have set their marks, and clears the marks if so. Call this from `idle`, where every
+/// task that has started has also finished. A mark that is set during the clearing may be lost, which only delays
+/// the next refresh by one round.
 pub fn take_all(marks: &Marks) -> bool {
     let all = marks.iter().all(|mark| mark.load(Ordering::Relaxed) != 0);
     if all {
@@ -95,7 +96,7 @@ mod tests {
     const TASKS: [Task; 4] = [Task::Line, Task::Serve, Task::Scan, Task::Background];
 
     #[test]
-    fn only_all_marks_together_count_and_each_only_once() {
+    fn all_marks_are_required_and_each_counts_once() {
         for missing in TASKS {
             let marks = Marks::default();
             TASKS
@@ -105,16 +106,16 @@ mod tests {
             assert!(!take_all(&marks), "{missing:?} is missing");
             begin(&marks, missing);
             assert!(take_all(&marks));
-            assert!(!take_all(&marks), "the marks were taken back");
+            assert!(!take_all(&marks), "the marks were cleared");
         }
     }
 
     #[test]
-    fn what_has_begun_is_told_from_what_has_ended() {
+    fn a_begun_task_is_distinguished_from_a_finished_one() {
         let marks = Marks::default();
         end_line(&marks);
         let left = || TASKS.map(|task| look(&marks, task));
-        assert_eq!(left(), [0; 4], "no line, no mark");
+        assert_eq!(left(), [0; 4], "no line interrupt, no mark");
         begin(&marks, Task::Line);
         begin(&marks, Task::Scan);
         end(&marks, Task::Background);

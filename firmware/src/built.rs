@@ -1,12 +1,13 @@
-//! What the firmware was built from. The build script asks git.
+//! The commit that the firmware was built from. The build script reads it from git.
 
-/// The first 32 bits of the commit; 0 when that is not known.
+/// First 32 bits of the commit; 0 when it is not known.
 pub const COMMIT: u32 = match option_env!("MODIO_COMMIT") {
     Some(digits) => number(digits),
     None => 0,
 };
 
-/// The register BUILD: bit 0 the sources had changes that are not in the commit, 2 not signed.
+/// Value of the register BUILD: bit 0 means that the sources had changes that are not in the commit, bit 2 that the
+/// image is not signed.
 pub const FLAGS: u16 = NOT_SIGNED
     | if option_env!("MODIO_CHANGED").is_some() {
         CHANGED

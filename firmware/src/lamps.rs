@@ -1,40 +1,40 @@
-//! What the status LEDs show, from what the device knows, every 10 ms.
+//! The patterns of the status LEDs, in steps of 10 ms.
 //!
 //! | LED | shows |
 //! |---|---|
 //! | running | blinks once a second |
 //! | activity | lights for 50 ms after a request for this unit |
-//! | all three | blink together for 10 s after COMMAND 6, identify, in place of all else |
-//! | fault | blinks five times in two seconds: SW01 is no unit address; steady: a module does not answer; a short flash every two seconds: no crystal |
+//! | all three | blink together for 10 s after COMMAND 6, identify, instead of all other patterns |
+//! | fault | blinks five times in two seconds: SW01 is not set to a unit address; steady: a module does not answer; a short flash every two seconds: no crystal |
 
 use crate::start_up::Address;
 
-/// How often [`Lamps::tick`] is to be called, in milliseconds.
+/// Interval between calls of [`Lamps::tick`], in milliseconds.
 pub const TICK_MS: u16 = 10;
 
 const PERIOD: u16 = 2000 / TICK_MS;
 const BLINK: u16 = 200 / TICK_MS;
 const RUN: u16 = 500 / TICK_MS;
 const FLASH: u16 = 100 / TICK_MS;
-/// How long the LEDs blink after [`Lamps::identify`].
+/// Duration of the blinking after [`Lamps::identify`], in ticks.
 const IDENTIFY: u16 = 10_000 / TICK_MS;
 const ACTIVITY: u8 = (50 / TICK_MS) as u8;
 
-/// The worst thing wrong, worst first.
+/// The most severe known fault. The variants are in order of decreasing severity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// SW01 shows no unit address: the line is not served.
+    /// SW01 is not set to a unit address: the line is not served.
     NoAddress,
     /// A module does not answer.
     Module,
-    /// The crystal does not run: the clock is 2.5 % off at worst.
+    /// The crystal does not run: the clock may be wrong by up to 2.5 %.
     NoCrystal,
-    /// Nothing.
+    /// No fault.
     None,
 }
 
 impl Trouble {
-    /// What is known to be wrong from the start.
+    /// Returns the fault that is known at the start.
     #[must_use]
     pub const fn at_start(address: Address, crystal: bool) -> Self {
         match address {
@@ -44,7 +44,7 @@ impl Trouble {
         }
     }
 
-    /// The worse of this and a failing module.
+    /// Returns the more severe of this fault and a failing module.
     #[must_use]
     pub const fn or_module(self, failing: bool) -> Self {
         match self {
@@ -85,12 +85,13 @@ impl Lamps {
         }
     }
 
-    /// Makes all LEDs blink together for 10 s from now on, then show the state of the device again.
+    /// Makes all LEDs blink together for 10 s from now on; after that they show the state of the device again.
     pub const fn identify(&mut self) {
         self.identify = IDENTIFY;
     }
 
-    /// What is lit for the next [`TICK_MS`]; `request` says that one has come since the last tick.
+    /// Returns which LEDs are lit for the next [`TICK_MS`]. `request` says that a request has been served since the
+    /// last tick.
     pub fn tick(&mut self, request: bool, trouble: Trouble) -> Lit {
         self.activity = if request {
             ACTIVITY
@@ -101,7 +102,7 @@ impl Lamps {
         self.tick = if tick + 1 < PERIOD { tick + 1 } else { 0 };
         if let Some(left) = self.identify.checked_sub(1) {
             self.identify = left;
-            // On for the first 200 ms, dark for the last 200 ms.
+            // Lit for the first 200 ms, dark for the last 200 ms.
             let lit = !(left / BLINK).is_multiple_of(2);
             return Lit {
                 activity: lit,
@@ -129,7 +130,7 @@ mod tests {
 
     use super::*;
 
-    /// Milliseconds lit and times switched on in two seconds.
+    /// Returns the milliseconds lit and the number of times switched on in two seconds.
     fn measure(trouble: Trouble, led: fn(Lit) -> bool) -> (u16, usize) {
         let mut lamps = Lamps::new();
         let lit: Vec<bool> = (0..PERIOD)
@@ -174,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn identify_while_the_leds_blink_begins_the_ten_seconds_anew() {
+    fn identify_while_the_leds_blink_restarts_the_ten_seconds() {
         let mut lamps = Lamps::new();
         lamps.identify();
         for _ in 0..IDENTIFY - 1 {
@@ -187,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_trouble_is_shown() {
+    fn the_most_severe_trouble_is_shown() {
         let unit = Address::Unit(1);
         assert_eq!(Trouble::at_start(unit, true), Trouble::None);
         assert_eq!(Trouble::at_start(unit, false), Trouble::NoCrystal);

@@ -1,5 +1,5 @@
-//! The device's logic without its hardware: what the tasks of the application do, in a form that runs
-//! and is tested on the host.
+//! The device's logic without its hardware, which the tasks of the application call. It is built and tested on the
+//! host.
 
 #![no_std]
 #![forbid(unsafe_code)]

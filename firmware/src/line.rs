@@ -1,8 +1,8 @@
-//! A line: UART, frame-gap timer and port, and what keeps it going after a disturbance.
+//! A line: UART, frame-gap timer and port, and its recovery after a disturbance.
 //!
-//! It knows no hardware: UART and timer are two traits, so that every line of a board, and the tests, have the same
-//! code. On the device all of it runs from RAM, so that it goes on while flash is erased or programmed: what is called
-//! here must be there, too (`memory/sections.x`).
+//! This module does not access hardware. UART and timer are two traits, so that every line of a board and the tests
+//! use the same code. On the device all of it runs from RAM, so that it continues while flash is erased or
+//! programmed. Functions that are called from here must be in RAM, too (`memory/sections.x`).
 
 use modbus_server::{
     Answered, Decided, Request, Served, Server,
@@ -11,61 +11,62 @@ use modbus_server::{
 
 /// A UART with the driver enable of its transceiver.
 pub trait Uart {
-    /// What the UART wants, as it was when it was asked.
+    /// State of the UART at the time of a [`status`](Self::status) call.
     type Status: Copy;
 
-    /// What the UART wants.
+    /// Reads the state of the UART.
     fn status(&self) -> Self::Status;
-    /// A character is waiting to be [read](Self::read), or was lost.
+    /// Returns whether a character is waiting to be [read](Self::read) or was lost.
     fn received(status: Self::Status) -> bool;
-    /// The next byte can be [sent](Self::send), and one is wanted.
+    /// Returns whether the UART wants the next byte and can [send](Self::send) it.
     fn wants_byte(status: Self::Status) -> bool;
-    /// The last stop bit has left the unit.
+    /// Returns whether the last stop bit has been sent.
     fn sent(status: Self::Status) -> bool;
 
-    /// Takes the character that [`received`](Self::received) told of, with what was wrong with it.
+    /// Reads the character that [`received`](Self::received) reported, with its errors.
     fn read(&mut self, status: Self::Status) -> (u8, Faults);
-    /// Turns the driver on and sends the first byte of a reply, with the receiver off.
+    /// Turns the receiver off and the driver on, and sends the first byte of a reply.
     fn start_sending(&mut self, first: u8);
     /// Sends the next byte.
     fn send(&mut self, byte: u8);
-    /// No byte is ready yet: asks no more until [`resume_sending`](Self::resume_sending).
+    /// Stops asking for bytes until [`resume_sending`](Self::resume_sending): no byte is ready yet.
     fn pause_sending(&mut self);
-    /// Bytes are ready again.
+    /// Asks for bytes again.
     fn resume_sending(&mut self);
-    /// The last byte was given to the UART: [`sent`](Self::sent) will tell when it has left.
+    /// Ends the sending: the last byte was given to the UART. [`sent`](Self::sent) reports when it has been sent.
     fn finish_sending(&mut self);
     /// Turns the driver off and the receiver on.
     fn stop_sending(&mut self);
 
-    /// Turns the driver off, sets every register up, and listens.
+    /// Turns the driver off, sets every register up, and turns the receiver on.
     fn set_up(&mut self);
-    /// Whether every register is as it was set up and the driver is off, while nothing is being sent.
+    /// Returns whether every register is as set up and the driver is off. Only valid while nothing is being sent.
     fn is_sound(&self) -> bool;
 }
 
-/// The timer of a line's silences, which also limits the time of a reply.
+/// The timer that measures a line's silences and limits the duration of a reply.
 pub trait GapTimer {
-    /// How many [parts](Self::is_sound) of its registers are looked at one after the other.
+    /// Number of [parts](Self::is_sound) of its registers, which are checked one after another.
     const PARTS: u8;
 
-    /// A character has come: the silence begins.
+    /// Restarts the silence: a character was received.
     fn restart(&mut self);
-    /// No silence is waited for while a reply is being sent.
+    /// Stops measuring: silences do not matter while a reply is being sent.
     fn stop(&mut self);
-    /// Whether a silence is waited for.
+    /// Returns whether a silence is being measured.
     fn is_running(&self) -> bool;
-    /// Takes what its interrupt is about.
+    /// Acknowledges its interrupt and returns the reason.
     fn take_event(&mut self) -> Silence;
-    /// A reply has begun, and may take its time.
+    /// Starts the time limit of a reply that has just begun.
     fn limit_sending(&mut self);
-    /// Takes the interrupt of [`limit_sending`](Self::limit_sending): whether the time has passed.
+    /// Acknowledges the interrupt of [`limit_sending`](Self::limit_sending). Returns whether the time limit has
+    /// been reached.
     fn take_limit(&mut self) -> bool;
 
     /// Sets every register up.
     fn set_up(&mut self);
-    /// Whether the registers of a part, 0 to [`PARTS`](Self::PARTS) less 1, are as they were set up. All at once would
-    /// hold the line's interrupts off for longer.
+    /// Returns whether the registers of a part, 0 to [`PARTS`](Self::PARTS) - 1, are as set up. Checking all of
+    /// them in one call would delay the line's interrupts for longer.
     fn is_sound(&self, part: u8) -> bool;
 }
 
@@ -76,7 +77,7 @@ pub enum Silence {
     T15,
     /// t3.5 has passed.
     T35,
-    /// None has; the interrupt came for nothing.
+    /// Neither; the interrupt had no cause.
     None,
 }
 
@@ -85,26 +86,27 @@ pub struct Line<U, G> {
     uart: U,
     gap: G,
     port: Port<'static>,
-    /// Milliseconds that a reply may take, should the timer not limit it, and that the one under way has taken.
+    /// Milliseconds that a reply may take, in case the timer does not limit it, and milliseconds that the present
+    /// one has taken.
     longest_ms: u16,
     sending_ms: u16,
-    /// What was looked at in the last millisecond: the UART, or from 1 on a part of the timer.
+    /// Part that was checked in the last millisecond: [`UART`], or from 1 on a part of the timer.
     looked_at: u8,
-    /// Interrupts of the UART without a cause since the last millisecond.
+    /// Number of interrupts of the UART without a cause since the last millisecond.
     causeless: u8,
-    /// The line was set up again since [`take_repaired`](Self::take_repaired).
+    /// The line was set up again since the last [`take_repaired`](Self::take_repaired).
     repaired: bool,
 }
 
-/// The place of the UART in [`Line::looked_at`].
+/// Value of [`Line::looked_at`] for the UART.
 const UART: u8 = 0;
 
-/// Interrupts of the UART without a cause in one millisecond after which its registers are checked.
+/// Number of UART interrupts without a cause in one millisecond after which its registers are checked.
 const CAUSELESS: u8 = 8;
 
 impl<U: Uart, G: GapTimer> Line<U, G> {
-    /// Listens. The gap timer measures the port's silences. A reply that takes more than `longest_ms` milliseconds is
-    /// cut off.
+    /// Creates a line that receives. The gap timer measures the port's silences. A reply that takes more than
+    /// `longest_ms` milliseconds is aborted.
     pub fn new(uart: U, mut gap: G, port: Port<'static>, longest_ms: u16) -> Self {
         gap.restart();
         Self {
@@ -119,15 +121,15 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// The UART's interrupt. True when a reply has just left.
+    /// Handles the UART's interrupt. Returns true when a reply has just been sent.
     #[inline]
     pub fn on_uart(&mut self) -> bool {
         let status = self.uart.status();
-        // First, for the bus is another's within a bit of the last stop bit.
+        // Checked first, because another station may drive the bus within a bit time after the last stop bit.
         if U::sent(status) {
             self.uart.stop_sending();
             self.port.sent();
-            // Whatever else there is calls again.
+            // Other causes raise the interrupt again.
             return true;
         }
         if U::received(status) {
@@ -147,7 +149,8 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         false
     }
 
-    /// The gap timer's interrupt, `now_ms` milliseconds after the start. True when a request waits to be taken.
+    /// Handles the gap timer's interrupt at `now_ms` milliseconds after the start. Returns true when a request
+    /// waits to be served.
     #[inline]
     pub fn on_gap(&mut self, now_ms: u32) -> bool {
         match self.gap.take_event() {
@@ -157,8 +160,8 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// The UART's interrupt has come without a cause that is known here. The scan pends it now and then; more
-    /// than that is a disturbed register whose interrupt comes again at once and keeps all tasks from running.
+    /// Counts an interrupt of the UART without a known cause. The scan pends the interrupt now and then. If there
+    /// are more, a disturbed register raises the interrupt again and again, which blocks all tasks.
     fn without_cause(&mut self) {
         self.causeless += 1;
         if self.causeless == CAUSELESS {
@@ -167,10 +170,10 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Sets the line up again when registers are not what they were set to, when the end of a frame is
-    /// not being waited for, or when a reply does not end: whatever has disturbed them, the driver goes off
-    /// and the next request is served. While a reply is being sent only its time is looked at, because the driver must
-    /// go off right after the last bit.
+    /// Sets the line up again when registers are not as set up, when the end of a frame is not being measured, or
+    /// when a reply does not end. After that the driver is off and the next request is served, whatever the cause
+    /// was. While a reply is being sent only its duration is checked, because the driver must be turned off right
+    /// after the last bit.
     #[cold]
     fn check(&mut self, registers: u8) {
         let is_sound = if self.port.is_sending() {
@@ -194,19 +197,19 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         self.repaired = true;
     }
 
-    /// The time has passed that the last reply to begin may take: one that is still being sent never ends.
+    /// Handles the interrupt of the time limit: a reply that is still being sent is aborted.
     pub fn on_limit(&mut self) {
         if self.gap.take_limit() && self.port.is_sending() {
             self.repair();
         }
     }
 
-    /// Whether the line was set up again since the last call.
+    /// Returns whether the line was set up again since the last call.
     pub const fn take_repaired(&mut self) -> bool {
         core::mem::replace(&mut self.repaired, false)
     }
 
-    /// A millisecond has passed: the response delay runs, and a disturbed line is set up again.
+    /// Runs once per millisecond: advances the response delay and repairs a disturbed line.
     pub fn on_millisecond(&mut self) {
         self.causeless = 0;
         self.sending_ms = self.sending_ms.saturating_add(1);
@@ -220,12 +223,12 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         self.start();
     }
 
-    /// Whether a reply is on its way, or waits to be.
+    /// Returns whether a reply is being sent or waits to be sent.
     pub fn is_replying(&self) -> bool {
         self.port.is_replying()
     }
 
-    /// The request that waits, if any; its reply starts now, or after `delay_ms`.
+    /// Takes the waiting request, if any. Its reply starts now, or after `delay_ms`.
     #[inline]
     pub fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {
         let request = server.take(&mut self.port, delay_ms);
@@ -233,20 +236,20 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         request
     }
 
-    /// The reply is decided upon.
+    /// Passes the decision on the reply to the port.
     pub fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {
         let answered = decided.answer(&mut self.port);
         self.resume();
         answered
     }
 
-    /// The request has been carried out.
+    /// Ends a request whose work is done.
     pub fn finish(&mut self, served: Served<'static>) {
         served.finish(&mut self.port);
         self.resume();
     }
 
-    /// Takes the bus and sends the first byte of a reply that starts now, if one does.
+    /// Turns the driver on and sends the first byte of a reply, if one starts now.
     #[inline]
     fn start(&mut self) {
         if let Some(first) = self.port.start() {
@@ -257,7 +260,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// There may be more of the reply now.
+    /// Continues a reply whose next bytes may be ready now.
     #[inline]
     fn resume(&mut self) {
         if self.port.is_sending() {

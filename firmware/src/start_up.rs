@@ -1,16 +1,16 @@
-//! What the device decides once, when it starts.
+//! Decisions that the device makes once, when it starts.
 
 use crate::config::LineConfig;
 
-/// What the DIP switch SW01 asks for.
+/// Meaning of the position of DIP switch SW01.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Address {
     /// Serve the line as this unit, 1 to 247.
     Unit(u8),
-    /// Serve the line as unit [`LOADER_UNIT`] with the factory's line settings, whatever is stored, so
-    /// that a unit with a forgotten setting can be reached.
+    /// Serve the line as unit [`LOADER_UNIT`] with the factory's line settings, so that a unit with unknown
+    /// settings can be reached.
     Loader,
-    /// Not a unit address (0 and 248 to 254): stay silent and blink the fault LED.
+    /// Not a unit address (0 and 248 to 254): send nothing and blink the fault LED.
     Invalid,
 }
 
@@ -18,7 +18,7 @@ pub enum Address {
 pub const LOADER_UNIT: u8 = 255;
 
 impl Address {
-    /// What the switch, read as a number, asks for.
+    /// Returns the meaning of the switch's number.
     #[must_use]
     pub const fn from_dip(dip: u8) -> Self {
         match dip {
@@ -28,7 +28,7 @@ impl Address {
         }
     }
 
-    /// The unit address to answer to, if any.
+    /// Returns the unit address, if there is one.
     #[must_use]
     pub const fn unit(self) -> Option<u8> {
         match self {
@@ -39,8 +39,8 @@ impl Address {
     }
 }
 
-/// What the line is set to: as configured, or as the factory set it in the loader mode and while
-/// there is no address.
+/// Returns the line settings to use: the configured ones, or the factory settings in loader mode and without a
+/// valid address.
 #[must_use]
 pub const fn line(address: Address, configured: LineConfig) -> LineConfig {
     match address {
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_position_of_the_switch_has_its_meaning() {
+    fn every_switch_position_has_the_documented_meaning() {
         for dip in 0..=255u8 {
             let expected = match dip {
                 1..=247 => Some(dip),
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loader_mode_has_the_factorys_line_whatever_is_configured() {
+    fn the_loader_mode_uses_the_factory_line_settings() {
         let configured = LineConfig {
             baud: register_map::codes::Baud::B115200,
             ..LineConfig::FACTORY

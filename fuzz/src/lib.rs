@@ -1,13 +1,13 @@
-//! What the fuzz targets do with an input: read it as a script of events, play it to the code and to an
-//! independent model beside it, and panic where the two differ.
+//! The fuzz targets. Each decodes an input into a script of events, applies it to the code and to an independent
+//! model, and panics when the two differ.
 //!
-//! | target | what it plays | the model |
+//! | target | input | model |
 //! |---|---|---|
-//! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers that are away | [`modbus_reference::Receiver`] |
+//! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers in use by requests | [`modbus_reference::Receiver`] |
 //! | `pdu` | requests of any content to one server, and their replies | [`modbus_reference::Server`] |
-//! | `store` | flash pages of any content, saves, starts, power cuts, wear | [`pages`], and: what was saved last is found |
+//! | `store` | flash pages of any content, saves, starts, power cuts, wear | [`pages`]; a start finds what was saved last |
 //!
-//! Every target takes any bytes. The seeds in `corpus/` are written by `examples/seeds.rs`.
+//! Every target accepts any bytes. `examples/seeds` writes the seeds in `corpus/`.
 
 #[path = "../../modbus-server/tests/common/mod.rs"]
 #[allow(missing_docs, clippy::all)] // the tests' own

@@ -1,4 +1,4 @@
-//! Flash pages of any content, and what is stored there by an independent reading of them.
+//! Flash pages with any content, and an independent decoder of them.
 
 use std::fmt;
 
@@ -13,12 +13,12 @@ use crate::script::Script;
 /// The two pages of a store.
 pub type Pages = [[u8; PAGE_SIZE]; 2];
 
-/// A page of a script: pieces one behind the other until one says that is all.
+/// Decodes a page of a script: consecutive pieces up to the end piece.
 ///
 /// ```text
 ///   0 the end       1 a page mark     2 a record         3 a record without its last half-words
-///   4 bytes         5 erased cells    6 the beginning    7 erased cells up to so many from the end
-///   a record: sequence number less the base, then 0 seed size: settings; or n: n times address, value
+///   4 bytes         5 erased cells    6 the beginning    7 erased cells up to a distance from the end
+///   a record: sequence number minus base, then 0 seed size: settings; or n: n times address, value
 /// ```
 pub fn page(script: &mut Script<'_>, base: u32) -> [u8; PAGE_SIZE] {
     let mut bytes = Vec::new();
@@ -46,7 +46,7 @@ pub fn page(script: &mut Script<'_>, base: u32) -> [u8; PAGE_SIZE] {
     bytes.try_into().expect("a page")
 }
 
-/// A record of the layout in `register_map::record`, written down anew.
+/// Encodes a record in the layout of `register_map::record`, independently of that module.
 fn record(script: &mut Script<'_>, base: u32) -> Vec<u8> {
     let sequence = base.wrapping_add(u32::from(script.half()));
     let pairs: Vec<(u16, u16)> = match script.byte() {
@@ -70,19 +70,19 @@ fn record(script: &mut Script<'_>, base: u32) -> Vec<u8> {
     record
 }
 
-/// What a start may find.
+/// A configuration that a start may find.
 #[derive(Clone, PartialEq)]
 pub struct Found {
     /// The settings in force.
     pub settings: Settings,
-    /// They are defaults in place of something that was stored.
+    /// Something was stored, but the settings are the defaults.
     pub invalid: bool,
-    /// Values that are not allowed.
+    /// Number of values that are not allowed.
     pub rejected: u16,
 }
 
 impl Found {
-    /// Settings stored by this firmware.
+    /// Returns settings that this firmware has stored.
     #[must_use]
     pub fn good(settings: &Settings) -> Self {
         Self {
@@ -92,7 +92,7 @@ impl Found {
         }
     }
 
-    /// Something was stored, but nothing good.
+    /// Returns the result for pages on which something was stored, but no record is valid.
     #[must_use]
     pub fn damaged() -> Self {
         Self {
@@ -114,14 +114,15 @@ impl fmt::Debug for Found {
     }
 }
 
-/// Whether there is no good record anywhere.
+/// Returns whether no page contains a valid record.
 #[must_use]
 pub fn nothing_good(pages: &Pages) -> bool {
     pages.iter().all(|page| records(page).is_empty())
 }
 
-/// What a start may find on these pages: the newest sealed record, or the newest of all when none is sealed. Where the sequence numbers go so far apart
-/// that no order is in them, as no store leaves them, any of the records.
+/// Returns the configurations that a start may find on these pages: the newest sealed record, or the newest of all
+/// records when none is sealed. When the sequence numbers are too far apart to have an order, which the store never
+/// produces, it may be any of the records.
 #[must_use]
 pub fn read(pages: &Pages) -> Vec<Found> {
     let good: Vec<_> = pages.iter().flat_map(|page| records(page)).collect();
@@ -142,17 +143,17 @@ pub fn read(pages: &Pages) -> Vec<Found> {
     let age = |sequence: u32| i64::from(sequence.wrapping_sub(*first) as i32);
     let ages = || all.iter().map(|(sequence, _)| age(*sequence));
     let (Some(oldest), Some(newest)) = (ages().min(), ages().max()) else {
-        unreachable!("there is one")
+        unreachable!("there is at least one record")
     };
     if newest - oldest > 1 << 30 {
         return all.into_iter().map(|(_, found)| found).collect();
     }
-    // Of equals the first, which is on the first page.
+    // Of equal ages the first one counts, which is on the first page.
     let place = ages().position(|age| age == newest);
     place.map(|at| all[at].1.clone()).into_iter().collect()
 }
 
-/// Sequence number, whether it is sealed, and contents of every good record.
+/// Returns sequence number, seal and content of every valid record.
 fn records(page: &[u8]) -> Vec<(u32, bool, Found)> {
     let half = |at: usize| u16::from_le_bytes([page[at], page[at + 1]]);
     let word = |at: usize| u32::from(half(at)) | u32::from(half(at + 2)) << 16;
@@ -182,8 +183,8 @@ fn records(page: &[u8]) -> Vec<(u32, bool, Found)> {
     found
 }
 
-/// Nothing was ever stored: erased, or no more than a mark of any sort and a beginning that may have
-/// been cut off.
+/// Returns whether nothing was ever stored on the page: it is erased, or contains only a mark of any kind and a
+/// beginning that may be interrupted.
 fn is_vacant(page: &[u8]) -> bool {
     page.iter().enumerate().skip(2).all(|(at, byte)| {
         let full = BEGINNING.get(at - 2).copied().unwrap_or(0xFF);
@@ -191,7 +192,7 @@ fn is_vacant(page: &[u8]) -> bool {
     })
 }
 
-/// CRC-32/ISO-HDLC, bit by bit.
+/// Computes CRC-32/ISO-HDLC, bit by bit.
 fn crc32(bytes: &[u8]) -> u32 {
     let mut register = u32::MAX;
     for byte in bytes {

@@ -1,14 +1,14 @@
-//! Target `pdu`: requests of any content through one server, one after another, in RTU or ASCII mode.
+//! Target `pdu`: requests of any content to one server, one after another, in RTU or ASCII mode.
 //!
-//! Reply, points, counters and modes are those of the server of modbus-reference: so the
-//! CRC or LRC is right, an exception has its form, what is refused changes nothing, and a broadcast is
-//! never answered.
+//! Reply, points, counters and modes must equal those of the server of modbus-reference. This checks that the CRC
+//! or LRC is correct, an exception has the right form, a rejected request changes nothing, and a broadcast is never
+//! answered.
 //!
 //! ```text
 //!   script: settings (1: ASCII, the rest: which functions are missing), first read-only point, requests
 //!   request: tag, length, bytes
-//!     tag & 3:  0 a PDU to this unit  1 to all  2 unit and PDU as they come  3 so many bad frames
-//!     tag >> 5: the exception that the device's state calls for, from then on; 0 to 2: none
+//!     tag & 3:  0 a PDU to this unit  1 to all  2 any unit and PDU  3 a number of damaged frames
+//!     tag >> 5: the exception for the device's state, from then on; 0 to 2: none
 //! ```
 
 use std::sync::LazyLock;
@@ -20,10 +20,10 @@ use modbus_server::line::{Faults, Framing, Port, Receiver, Width};
 use crate::common::{self, Points, UnitOn, delimiter};
 use crate::script::Script;
 
-/// More bits than one write may hold, more words than one read may ask for, and ends within reach.
+/// More bits than one request may write, more words than one request may read, and an end that tests can reach.
 static DEVICE: LazyLock<Device> = LazyLock::new(|| {
     let mut device = Device::new(0, 0);
-    // Each table has other values, and other ends.
+    // Each table has other values and another end.
     let bits = |count: u32, most| (0..count).map(move |n| n * n % 7 < most).collect();
     let words = |count: u16, by| (0..count).map(move |n| n.wrapping_mul(by)).collect();
     device.bits = bits(2010, 3);
@@ -44,7 +44,7 @@ pub fn run(input: &[u8]) {
     } else {
         Framing::ASCII
     };
-    // The first function that is missing, and how many codes lie between it and the next.
+    // The first function that is missing, and the distance to the next one.
     let (first, step) = (settings >> 1 & 7, usize::from(settings >> 4));
     let device = Device {
         lacks: match step {
@@ -83,7 +83,7 @@ pub fn run(input: &[u8]) {
     }
 }
 
-/// The unit and the reference, side by side.
+/// The unit and the reference, which receive the same requests.
 struct Pair<'a> {
     unit: UnitOn<'a>,
     reference: Server,
@@ -121,7 +121,7 @@ impl Pair<'_> {
         assert_eq!(reply, expected, "{bytes:02X?}");
         if let Some(reply) = reply {
             assert!(!listening && *unit == UNIT);
-            // Its check is right, and it comes apart as it was put together.
+            // The frame of the reply must be valid.
             assert!(
                 unframed(delimiter, &reply)[1..].len() <= 253,
                 "{reply:02X?}"

@@ -1,17 +1,17 @@
-//! Targets `receiver_rtu` and `receiver_ascii`: characters with and without faults, silences in any
-//! order, replies and buffers that come back late.
+//! Targets `receiver_rtu` and `receiver_ascii`: characters with and without faults, silences in any order, replies,
+//! and buffers that are given back late.
 //!
-//! After every event the receiver has heard what [`modbus_reference::Receiver`] has, to the counter. At the end both buffers
-//! are still there, and good requests after a silence are received.
+//! After every event the receiver must have the same requests and counters as [`modbus_reference::Receiver`]. At
+//! the end both buffers still exist, and valid requests after a silence are received.
 //!
 //! ```text
 //!   script: settings, delimiter (ASCII), events
 //!   event:  0 characters          length, characters
 //!           1 a good frame        unit (0: this one, 1: all), length, PDU
 //!           2 a faulty character  character, faults
-//!           3 t1.5                4 t3.5, the buffer stays away
-//!           5 a buffer comes back 6 the unit has been sending
-//!           7 t3.5, the buffer comes back at once
+//!           3 t1.5                4 t3.5, the buffer stays in use
+//!           5 a buffer is given back 6 the unit has been sending
+//!           7 t3.5, the buffer is given back immediately
 //! ```
 
 use modbus_reference::{LineCounters, Mode, UNIT, framed};
@@ -37,7 +37,7 @@ pub fn ascii(input: &[u8]) {
         _ => (Width::Eight, false, false),
     };
     let mut receiver = Receiver::ascii(UNIT, width);
-    // Function 08 sub-function 03 sets no other (V1.1b3 6.8).
+    // Function 08 sub-function 03 allows no other values (V1.1b3 6.8).
     let delimiter = match script.byte() {
         0 => b'\n',
         other if other > 127 || b":\r0123456789ABCDEF".contains(&other) => b'\n',
@@ -52,13 +52,13 @@ pub fn ascii(input: &[u8]) {
     play(script, receiver, mode);
 }
 
-/// Receiver and model, side by side.
+/// Receiver and model, which receive the same events.
 struct Pair<'a> {
     receiver: Receiver<'a>,
-    heard: modbus_reference::Receiver,
+    model: modbus_reference::Receiver,
     /// The end mark of ASCII frames.
     delimiter: Option<u8>,
-    /// The bit that is 1 in every byte of a good character because it is a stop bit, or 0.
+    /// Mask of the stop bit that is 1 in every byte of a valid character, or 0.
     stop: u8,
     away: Vec<&'a mut Adu>,
 }
@@ -67,7 +67,7 @@ fn play(mut script: Script<'_>, receiver: Receiver<'_>, mode: Mode) {
     let (mut one, mut two) = (Adu::new(), Adu::new());
     let mut pair = Pair {
         receiver,
-        heard: modbus_reference::Receiver::new(mode),
+        model: modbus_reference::Receiver::new(mode),
         delimiter: match mode {
             Mode::Rtu { .. } => None,
             Mode::Ascii { delimiter, .. } => Some(delimiter),
@@ -84,8 +84,8 @@ fn play(mut script: Script<'_>, receiver: Receiver<'_>, mode: Mode) {
     pair.receiver.give_back(&mut two);
     while let Some(tag) = script.tag() {
         pair.event(tag & 7, &mut script);
-        assert_eq!(pair.counters(), pair.heard.counters);
-        assert_eq!(pair.receiver.is_over(), pair.heard.is_over());
+        assert_eq!(pair.counters(), pair.model.counters);
+        assert_eq!(pair.receiver.is_over(), pair.model.is_over());
     }
     pair.must_be_whole();
 }
@@ -117,17 +117,17 @@ impl Pair<'_> {
             2 => {
                 let (byte, faults) = (script.byte(), script.byte() & 15);
                 self.receiver.character(byte, Faults::from_bits(faults));
-                self.heard.character(byte, faults);
+                self.model.character(byte, faults);
             }
             3 => {
                 self.receiver.pause();
-                self.heard.pause();
+                self.model.pause();
             }
             4 => self.close(),
             5 => self.give_back(),
             6 => {
                 self.receiver.resume();
-                self.heard.resume();
+                self.model.resume();
             }
             _ => {
                 let before = self.away.len();
@@ -139,7 +139,7 @@ impl Pair<'_> {
         }
     }
 
-    /// A frame with a good check.
+    /// Sends a frame with a valid CRC or LRC.
     fn frame(&mut self, unit: u8, pdu: &[u8]) {
         let mut frame = framed(self.delimiter, unit, pdu);
         frame.iter_mut().for_each(|byte| *byte |= self.stop);
@@ -149,13 +149,13 @@ impl Pair<'_> {
     fn characters(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.receiver.character(*byte, Faults::NONE);
-            self.heard.character(*byte, 0);
+            self.model.character(*byte, 0);
         }
     }
 
     fn close(&mut self) {
         let closed = self.receiver.close();
-        let expected = self.heard.close().request();
+        let expected = self.model.close().request();
         let delivered = closed.as_ref().map(|closed| closed.adu.as_slice());
         assert_eq!(delivered, expected.as_deref());
         if let Some(closed) = closed {
@@ -167,17 +167,18 @@ impl Pair<'_> {
     fn give_back(&mut self) {
         if let Some(adu) = self.away.pop() {
             self.receiver.give_back(adu);
-            self.heard.free += 1;
+            self.model.free += 1;
         }
     }
 
-    /// Whatever has been: there are two buffers, and after a silence two requests are taken. A third finds no buffer, and is counted.
+    /// Checks that there are still two buffers: after a silence two requests are taken. A third request finds no
+    /// buffer and is counted.
     fn must_be_whole(&mut self) {
         self.close();
         while !self.away.is_empty() {
             self.give_back();
         }
-        assert_eq!(self.heard.free, 2);
+        assert_eq!(self.model.free, 2);
         let request = [0x03, 0, 1, 0, 1];
         for (taken, dropped) in [(1, 0), (2, 0), (2, 1)] {
             let before = self.counters();

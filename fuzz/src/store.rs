@@ -1,15 +1,15 @@
-//! Target `store`: two flash pages of any content, then the life of a device: saves, starts, spares
-//! made, the power cut in any operation with any mess, a half-word worn out.
+//! Target `store`: two flash pages with any content, then a device history: saves, starts, erased spare pages, a
+//! power cut in any operation that leaves any mess, a worn half-word.
 //!
-//! Every start finds what was saved last, or, after a cut in a save, that or what was there before,
-//! whole. The flash of firmware's tests takes no programming that RM0008 3.3 does not allow. In the end,
-//! unless the flash is worn, a save works at once, without an erase, and the next start finds it.
+//! Every start must find what was saved last or, after a power cut in a save, the old or the new configuration,
+//! complete. The mock flash of firmware's tests refuses any programming that RM0008 3.3 does not allow. At the end,
+//! unless the flash is worn, a save works immediately and without an erase, and the next start finds it.
 //!
 //! ```text
 //!   script: base of the sequence numbers (4 bytes), two pages, events
 //!   event:  0 save              seed, size     1 save of every setting  seed
-//!           2 a start                          3 a cut      so many operations later, mess
-//!           4 a spare is made                  5 wear       place (2 bytes; top bit: second page)
+//!           2 a start                          3 a cut      number of operations before it, mess
+//!           4 erase the spare page             5 wear       place (2 bytes; top bit: second page)
 //!           6 save of two settings  4 bytes    7 save of what is stored
 //! ```
 
@@ -23,7 +23,7 @@ use crate::pages::{self, Found};
 use crate::running::{fullest_settings, random_settings, save};
 use crate::script::Script;
 
-/// More than fill both pages several times.
+/// Enough events to fill both pages several times.
 const MOST_EVENTS: usize = 60;
 
 /// Target `store`.
@@ -46,11 +46,11 @@ pub fn run(input: &[u8]) {
 
 struct Life {
     flash: MockFlash,
-    /// What the next start may find.
+    /// Configurations that the next start may find.
     expected: Vec<Found>,
-    /// While the power is on.
+    /// The store while the power is on.
     store: Option<Store>,
-    /// Operations that the flash refused.
+    /// Number of operations that the flash refused.
     refusals: usize,
 }
 
@@ -76,7 +76,7 @@ impl Life {
                     .store
                     .as_mut()
                     .map(|store| store.make_spare(&mut self.flash));
-                self.bear(spare);
+                self.handle(spare);
             }
             5 => {
                 let place = script.half();
@@ -85,7 +85,7 @@ impl Life {
                 } else {
                     Page::Second
                 };
-                // What is worn once stays so.
+                // A worn-out half-word stays worn for the rest of the run.
                 let offset = usize::from(place) * 2 % PAGE_SIZE;
                 self.flash.worn.get_or_insert((page, offset));
             }
@@ -106,17 +106,17 @@ impl Life {
         self.store = None;
         let reads_otherwise = self.flash.unsteady.contains(&true);
         if reads_otherwise && pages::nothing_good(&self.flash.pages) {
-            // What an erase that was cut short has left looks like something stored one time and like
-            // nothing the next.
+            // An interrupted erase may leave data that looks like something stored at one start and like nothing at
+            // the next.
             self.expected = vec![Found::good(&Settings::defaults()), Found::damaged()];
         }
     }
 
-    /// Starts, unless it has; again, if the power is cut meanwhile.
+    /// Starts the device unless it is running. Starts it again if the power is cut during the start.
     fn start(&mut self) {
         while self.store.is_none() {
             let mut store = Store::open(&self.flash);
-            // A start that is cut short decides nothing.
+            // An interrupted start selects no configuration.
             self.check(store.load(&MODIO_02, &self.flash));
             let prepared = store.prepare(&mut self.flash);
             if prepared.is_ok() {
@@ -124,7 +124,7 @@ impl Life {
                 self.decide(found);
             }
             self.store = Some(store);
-            self.bear(Some(prepared));
+            self.handle(Some(prepared));
         }
     }
 
@@ -143,23 +143,24 @@ impl Life {
     }
 
     fn decide(&mut self, found: Found) {
-        // Records without an order among them may still be there after a cut.
+        // After a power cut, records without an order may still exist.
         if self.expected.len() <= 2 {
             self.expected = vec![found];
         }
     }
 
-    /// A cut ends this life; a worn flash may refuse.
-    fn bear<T>(&mut self, result: Option<Result<T, StoreError<Fault>>>) {
+    /// Handles the result of an operation: a power cut stops the device, and a worn flash may refuse.
+    fn handle<T>(&mut self, result: Option<Result<T, StoreError<Fault>>>) {
         if matches!(result, Some(Err(_))) && pages::nothing_good(&self.flash.pages) {
-            // The defaults that the first start stores are not there: it was cut short, or the flash is
-            // worn. Then what is left of an erase or a save is all there is.
+            // The defaults that the first start stores are missing, because the start was interrupted or the flash
+            // is worn. Only the remains of an erase or a save exist.
             self.expected.push(Found::damaged());
         }
         match result {
             None | Some(Ok(_)) => {}
             Some(Err(StoreError::Flash(_, Fault::PowerCut))) => self.power_cycle(),
-            // Only a half-word whose program was cut off is refused. What was stored still is.
+            // The flash only refuses a half-word whose programming was interrupted. The stored configuration
+            // remains.
             Some(Err(StoreError::Flash(_, Fault::NotErased))) => self.refusals += 1,
             Some(Err(StoreError::Worn(..))) => assert!(self.flash.worn.is_some(), "not worn"),
         }
@@ -171,13 +172,13 @@ impl Life {
         let saved = save(store, &mut self.flash, settings);
         match saved {
             Ok(_) => self.expected = vec![Found::good(settings)],
-            // Where the second seal is worn out, the record counts already.
+            // The record already counts when the second seal is worn out.
             Err(_) => self.expected.push(Found::good(settings)),
         }
-        self.bear(Some(saved));
+        self.handle(Some(saved));
     }
 
-    /// The device works whatever has been.
+    /// Checks that the device still works after all events.
     fn must_go_on(&mut self) {
         self.power_cycle();
         self.start();
@@ -188,8 +189,8 @@ impl Life {
         self.must_save(&fullest_settings(3));
     }
 
-    /// A save is done at once and without an erase. Each page may refuse one, where the program of its next half-word
-    /// was once cut off; the save after that takes another place.
+    /// Checks that a save works immediately and without an erase. Each page may refuse one save, when the
+    /// programming of its next half-word was once interrupted; the next save then uses another place.
     fn must_save(&mut self, settings: &Settings) {
         let (erases, refusals) = (self.flash.erases, self.refusals);
         loop {
@@ -200,7 +201,11 @@ impl Life {
             }
             assert!(self.refusals <= refusals + 2, "both pages refused");
         }
-        assert_eq!(self.expected, [Found::good(settings)], "it is saved");
+        assert_eq!(
+            self.expected,
+            [Found::good(settings)],
+            "the settings are saved"
+        );
         assert!(
             self.flash.erases == erases || self.refusals == refusals + 2,
             "erased while the line was served"

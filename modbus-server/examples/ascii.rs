@@ -1,6 +1,6 @@
 //! A thermostat, unit 17 in ASCII mode on a serial port: `cargo run --example ascii -- /dev/ttyUSB0`.
 //!
-//! It implements the data model, because its setpoint has limits and it has device identification.
+//! It implements the data model itself, because its setpoint has limits and it has device identification.
 
 mod line;
 

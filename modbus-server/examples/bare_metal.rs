@@ -1,7 +1,7 @@
 //! Unit 17 in RTU mode without an operating system: [`Unit`] needs a UART that implements embedded-io, the transceiver's
 //! driver enable as an embedded-hal pin, and a clock in microseconds. It neither allocates nor uses the standard library.
 //!
-//! So that it can be tried, `main` gives it a serial port of a computer: `cargo run --example bare_metal -- /dev/ttyUSB0`.
+//! To try it, `main` uses a serial port of a computer: `cargo run --example bare_metal -- /dev/ttyUSB0`.
 
 use core::convert::Infallible;
 
@@ -20,7 +20,7 @@ pub struct Unit<S, D> {
 }
 
 impl<S: Read + ReadReady + Write, D: OutputPin> Unit<S, D> {
-    /// The unit with this address, 1 to 247, at `now` microseconds. At 19200 bit/s the silences are
+    /// Creates the unit with this address, 1 to 247, at `now` microseconds. At 19200 bit/s the silences are
     /// `Silences::rtu(&Gaps::standard(19_200, 11), 1_000)`.
     pub fn new(
         serial: S,
@@ -39,8 +39,8 @@ impl<S: Read + ReadReady + Write, D: OutputPin> Unit<S, D> {
         }
     }
 
-    /// To be called again and again, at `now` microseconds, which wrap: more often than once in the shorter silence,
-    /// so that it is seen.
+    /// Serves the line. Call this repeatedly, at `now` microseconds, which wrap: more often than the shorter
+    /// silence, so that no silence is missed.
     pub fn poll(&mut self, now: u32, model: &mut impl DataModel) -> Result<(), S::Error> {
         let mut waits = self.port.poll(now);
         while !waits && self.serial.read_ready()? {
@@ -67,7 +67,8 @@ impl<S: Read + ReadReady + Write, D: OutputPin> Unit<S, D> {
         while let Next::Byte(byte) = self.port.port().next() {
             result = result.and_then(|()| self.serial.write_all(&[byte]));
         }
-        // `flush` must return when the last stop bit has left, and not before: then the bus is the master's.
+        // `flush` must return exactly when the last stop bit has been sent: from then on the master may use the
+        // bus.
         let result = result.and_then(|()| self.serial.flush());
         let _ = self.driver.set_low();
         self.port.sent();
@@ -83,7 +84,7 @@ fn main() -> std::io::Result<()> {
 /// Serves the line until the port fails.
 pub fn run(port: SerialPort) -> std::io::Result<()> {
     let uart = Uart::new(port)?;
-    // A computer is late now and then, which must not end a frame.
+    // A computer sometimes reads late; that must not end a frame.
     let silences = Silences {
         short: 20_000,
         long: 20_000,
@@ -97,7 +98,7 @@ pub fn run(port: SerialPort) -> std::io::Result<()> {
         ..Tables::default()
     };
     loop {
-        // The count wraps.
+        // The count of microseconds wraps.
         let now = begun.elapsed().as_micros() as u32;
         unit.poll(now, &mut tables)
             .map_err(|error| std::io::Error::other(format!("{error:?}")))?;
@@ -160,7 +161,7 @@ impl Write for Uart {
     }
 }
 
-/// The driver enable of an adapter that switches its transceiver without help.
+/// The driver enable of an adapter that switches its transceiver automatically.
 struct NoDriver;
 
 impl PinErrorType for NoDriver {

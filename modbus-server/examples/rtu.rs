@@ -32,7 +32,7 @@ pub fn run(port: SerialPort) -> io::Result<()> {
     let mut line = Line::rtu(port, 17)?;
     loop {
         line.request()?;
-        // The program uses the tables between two requests: it counts the requests here.
+        // The program may use the tables between two requests. Here it counts the requests.
         tables.input_registers[0] = tables.input_registers[0].wrapping_add(1);
         line.serve(&mut tables)?;
     }

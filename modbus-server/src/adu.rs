@@ -1,23 +1,22 @@
-//! The buffer of one frame: filled by the receiver, read by the server, reused for the body of the
-//! reply.
+//! The buffer of one frame. The receiver fills it, the server reads it and reuses it for the body of the reply.
 
-/// One application data unit of up to 256 bytes (V1.02 2.5.1: the largest RTU frame, address and
-/// CRC included; an ASCII frame holds at most 255).
+/// One application data unit of up to 256 bytes (V1.02 2.5.1: the largest RTU frame, including address and CRC; an
+/// ASCII frame holds at most 255).
 ///
-/// As a request it holds the unit address and the PDU; the CRC or LRC is cut off once it has been
-/// found good. As a reply it holds what follows the head.
+/// As a request it holds the unit address and the PDU; the receiver removes a valid CRC or LRC. As a reply it holds
+/// the part after the head.
 #[derive(Debug)]
 pub struct Adu {
     bytes: [u8; Adu::CAPACITY],
-    /// Never above `CAPACITY`.
+    /// Number of bytes in use, at most `CAPACITY`.
     len: usize,
 }
 
 impl Adu {
-    /// The most bytes a frame can have.
+    /// Largest number of bytes in a frame.
     pub const CAPACITY: usize = 256;
 
-    /// An empty buffer.
+    /// Returns an empty buffer.
     pub const fn new() -> Self {
         Self {
             bytes: [0; Self::CAPACITY],
@@ -25,7 +24,7 @@ impl Adu {
         }
     }
 
-    /// Appends a byte. `false`: the buffer is full and unchanged.
+    /// Appends a byte. Returns `false` and changes nothing when the buffer is full.
     #[inline]
     pub fn push(&mut self, byte: u8) -> bool {
         let len = self.len;
@@ -39,9 +38,9 @@ impl Adu {
         }
     }
 
-    /// Appends bytes, as many of them as there is room for.
+    /// Appends as many of these bytes as there is room for.
     pub(crate) fn extend(&mut self, bytes: &[u8]) {
-        // A full buffer takes no more: `push` says so, and there is nothing to be done.
+        // `push` reports a full buffer; the remaining bytes are dropped.
         bytes.iter().for_each(|byte| {
             self.push(*byte);
         });
@@ -57,41 +56,41 @@ impl Adu {
         }
     }
 
-    /// How many bytes are in use.
+    /// Returns the number of bytes in use.
     #[inline]
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether none is.
+    /// Returns whether no byte is in use.
     #[inline]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The bytes in use.
+    /// Returns the bytes in use.
     #[inline]
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..self.len).unwrap_or_default()
     }
 
-    /// Forgets the content.
+    /// Discards the content.
     #[inline]
     pub const fn clear(&mut self) {
         self.len = 0;
     }
 
-    /// The byte at `index`, whether in use or not.
+    /// Returns the byte at `index`, whether it is in use or not.
     #[inline]
     pub(crate) fn get(&self, index: u8) -> u8 {
-        // Always there: no check is left of this.
+        // The index is always in range, so the compiler removes this check.
         self.bytes
             .get(usize::from(index))
             .copied()
             .unwrap_or_default()
     }
 
-    /// The bytes from `index` on; none, if there are fewer.
+    /// Returns the bytes from `index` on, or none if there are fewer.
     #[inline]
     pub(crate) fn from(&self, index: u8) -> &[u8] {
         self.bytes
@@ -99,14 +98,14 @@ impl Adu {
             .unwrap_or_default()
     }
 
-    /// Cuts off the last `count` bytes.
+    /// Removes the last `count` bytes.
     #[inline]
     pub(crate) fn cut(&mut self, count: usize) {
         self.len = self.len.saturating_sub(count);
     }
 
-    /// Makes the buffer `len` bytes long (at most [`CAPACITY`](Self::CAPACITY)), whatever they
-    /// hold, and lends them for writing.
+    /// Sets the length to `len`, at most [`CAPACITY`](Self::CAPACITY), with any content, and returns the bytes for
+    /// writing.
     pub(crate) fn resize(&mut self, len: usize) -> &mut [u8] {
         self.len = len.min(Self::CAPACITY);
         self.bytes.get_mut(..self.len).unwrap_or_default()
@@ -124,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_full_buffer_takes_no_more() {
+    fn a_full_buffer_rejects_a_byte() {
         let mut adu = Adu::new();
         assert!(adu.is_empty());
         assert!((0..=255).all(|byte| adu.push(byte)));
@@ -135,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn more_cannot_be_cut_off_than_there_is() {
+    fn cutting_more_bytes_than_in_use_empties_the_buffer() {
         let mut adu = Adu::new();
         adu.extend(&[1, 2, 3]);
         adu.cut(2);
@@ -145,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn only_bytes_in_use_are_overwritten_and_no_more_kept_than_fit() {
+    fn only_bytes_in_use_are_overwritten_and_only_fitting_bytes_are_kept() {
         let mut adu = Adu::new();
         adu.extend(&[1, 2]);
         adu.set(1, 9);
@@ -158,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_reaches_beyond_the_end() {
+    fn reading_after_the_end_returns_nothing() {
         let mut adu = Adu::new();
         assert_eq!(adu.resize(1000).len(), Adu::CAPACITY);
         adu.resize(3);

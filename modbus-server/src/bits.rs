@@ -8,20 +8,20 @@ pub struct Bits<'a> {
 }
 
 impl<'a> Bits<'a> {
-    /// `count` bits from packed bytes; bits that `bytes` does not hold read as 0.
+    /// Creates `count` bits from packed bytes. Bits that `bytes` does not contain read as 0.
     #[inline]
     pub const fn new(bytes: &'a [u8], count: u16) -> Self {
         Self { bytes, count }
     }
 
-    /// How many bits.
+    /// Returns the number of bits.
     #[inline]
     pub const fn count(self) -> u16 {
         self.count
     }
 
-    /// The bit `index` places after the first; `None` beyond the last. Padding in the last byte is
-    /// never seen.
+    /// Returns the bit `index` places after the first, or `None` after the last one. The padding in the last byte
+    /// is never returned.
     #[inline]
     pub fn get(self, index: u16) -> Option<bool> {
         if index >= self.count {
@@ -31,14 +31,14 @@ impl<'a> Bits<'a> {
         Some(byte >> (index % 8) & 1 != 0)
     }
 
-    /// The bits in order.
+    /// Iterates over the bits in order.
     #[inline]
     pub fn iter(self) -> impl Iterator<Item = bool> + 'a {
         (0..self.count).map_while(move |index| self.get(index))
     }
 }
 
-/// Takes the bits of a read reply, in the order of their addresses.
+/// Receives the bits of a read reply, in the order of their addresses.
 #[derive(Debug)]
 pub struct BitsOut<'a> {
     bytes: &'a mut [u8],
@@ -47,8 +47,7 @@ pub struct BitsOut<'a> {
 }
 
 impl<'a> BitsOut<'a> {
-    /// Room for `count` bits (fewer, if `bytes` is shorter). All start as 0, and so does the
-    /// padding.
+    /// Prepares room for `count` bits, or fewer if `bytes` is shorter. All bits start as 0, including the padding.
     #[inline]
     pub fn new(bytes: &'a mut [u8], count: u16) -> Self {
         bytes.fill(0);
@@ -59,7 +58,7 @@ impl<'a> BitsOut<'a> {
         }
     }
 
-    /// Appends a bit; more than there is room for are ignored.
+    /// Appends a bit. Bits without room are ignored.
     #[inline]
     pub fn push(&mut self, bit: bool) {
         if self.next < self.count {
@@ -76,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn there_are_as_many_bits_as_said_and_no_padding() {
+    fn the_count_limits_the_bits_and_hides_the_padding() {
         let bits = Bits::new(&[0b0000_0101, 0b1111_1110], 10);
         assert!(
             bits.iter()
@@ -93,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_pushed_too_much_or_too_little_does_no_harm() {
+    fn too_many_or_too_few_pushed_bits_are_harmless() {
         let mut bytes = [0xFF; 3];
         let mut out = BitsOut::new(&mut bytes, 10);
         (0..12).for_each(|_| out.push(true));

@@ -1,28 +1,27 @@
 //! The diagnostic counters of V1.02 appendix A, wrapping at 16 bits.
 
-/// What the receiver of a line has counted since it was made. Only ever counts up, so that a reader
-/// that keeps an older copy can always tell the difference.
+/// Counters of a line's receiver since it was created. They only count up, so a reader with an older copy can
+/// always compute the difference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-// Whole words: a copy is made of them with every request, without a call of memcpy.
+// Aligned to words: every request copies these counters, and this avoids a call of memcpy.
 #[repr(align(4))]
 pub struct LineCounters {
-    /// Frames with a good CRC or LRC, for whatever unit (sub-function 0B).
+    /// Frames with a valid CRC or LRC, for any unit (sub-function 0B).
     pub bus_messages: u16,
-    /// Frames with a bad CRC or LRC, with a faulty character, of an impossible length, and, in
-    /// ASCII mode, without an end (0C).
+    /// Frames with a wrong CRC or LRC, with a faulty character, of an impossible length, or, in ASCII mode, without an
+    /// end (0C).
     pub communication_errors: u16,
-    /// Frames spoiled because a character was overwritten before it was read (12).
+    /// Frames damaged because a character was overwritten before it was read (12).
     pub overruns: u16,
-    /// Silences above t1.5 inside an RTU frame.
+    /// Silences longer than t1.5 inside an RTU frame.
     pub gaps: u16,
-    /// Good frames for this unit, or for all, that were not served: there was no free buffer, a gap
-    /// above t1.5 is not tolerated, or it was too late for a reply. They are part of
-    /// `bus_messages`.
+    /// Valid frames for this unit or a broadcast that were not served: no buffer was free, a gap longer than t1.5
+    /// is not tolerated, or it was too late for a reply. `bus_messages` includes them.
     pub dropped: u16,
 }
 
 impl LineCounters {
-    /// All zero.
+    /// All counters at zero.
     pub const ZERO: Self = Self {
         bus_messages: 0,
         communication_errors: 0,
@@ -31,7 +30,7 @@ impl LineCounters {
         dropped: 0,
     };
 
-    /// What has been counted since these stood at `then`, less than once around.
+    /// Returns the difference to an older copy `then`, for fewer than 65536 counts.
     #[must_use]
     pub(crate) const fn since(&self, then: &Self) -> Self {
         Self {
@@ -45,35 +44,34 @@ impl LineCounters {
     }
 }
 
-/// All counters of a line and its server since the start, or since function 08 last cleared them, in
-/// the order of its sub-functions.
+/// All counters of a line and its server since the start, or since function 08 last cleared them, in the order of
+/// its sub-functions.
 ///
-/// A request is counted before it is served: the one that asks for 0B or 0E is among those it is
-/// told of.
+/// A request is counted before it is served, so a request for 0B or 0E is included in its own result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// 0B: frames with a good CRC, for whatever unit.
+    /// 0B: frames with a valid CRC, for any unit.
     pub bus_messages: u16,
-    /// 0C: frames with a bad CRC, a faulty character or an impossible length.
+    /// 0C: frames with a wrong CRC, a faulty character or an impossible length.
     pub communication_errors: u16,
-    /// 0D: requests refused with an exception, broadcasts included.
+    /// 0D: requests rejected with an exception, including broadcasts.
     pub exceptions: u16,
-    /// 0E: good frames for this unit, broadcasts included, whether they were served or dropped.
+    /// 0E: valid frames for this unit, including broadcasts, whether they were served or dropped.
     pub unit_messages: u16,
-    /// 0F: those of `unit_messages` that got no reply, broadcasts included.
+    /// 0F: frames of `unit_messages` without a reply, including broadcasts.
     pub no_response: u16,
     /// 10: requests answered with exception 07.
     pub nak: u16,
     /// 11: requests answered with exception 06.
     pub busy: u16,
-    /// 12: frames spoiled by a character overrun.
+    /// 12: frames damaged by a character overrun.
     pub overruns: u16,
-    /// Silences above t1.5 inside a frame (not in the standard).
+    /// Silences longer than t1.5 inside a frame (not in the standard).
     pub gaps: u16,
 }
 
 impl Counters {
-    /// The counters in the order above.
+    /// Returns the counters in the order above.
     pub const fn as_words(&self) -> [u16; 9] {
         [
             self.bus_messages,
@@ -89,7 +87,7 @@ impl Counters {
     }
 }
 
-/// One more, wrapping.
+/// Adds 1, wrapping.
 #[inline]
 pub(crate) const fn count(counter: &mut u16) {
     *counter = counter.wrapping_add(1);
@@ -100,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn they_come_in_the_order_of_their_sub_functions() {
+    fn counters_are_in_the_order_of_their_sub_functions() {
         let counters = Counters {
             bus_messages: 1,
             communication_errors: 2,
@@ -116,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn they_wrap() {
+    fn counters_wrap() {
         let mut counter = 0xFFFF;
         count(&mut counter);
         assert_eq!(counter, 0);

@@ -1,25 +1,25 @@
-//! What the server has decided about a request.
+//! The server's decision about a request.
 
 use crate::diagnostic::Diagnostic;
 use crate::head::Head;
 use crate::identification::ReadCode;
 use crate::{Exception, Span, Table};
 
-/// The answer to a request, decided but not yet carried out.
+/// The answer to a request, decided but not yet executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// The first bytes of the reply. `None`: silence.
+    /// The first bytes of the reply, or `None` for no reply.
     pub(crate) reply: Option<Head>,
-    /// What is left to do, by [`Committed::carry_out`](crate::Committed::carry_out).
+    /// The work left for [`Committed::carry_out`](crate::Committed::carry_out).
     pub work: Work,
-    /// How the request fared, for the counters.
+    /// Result of the request, for the counters.
     pub outcome: Outcome,
-    /// The request was to all units.
+    /// The request was a broadcast.
     pub(crate) broadcast: bool,
 }
 
 impl Decision {
-    /// Whether a reply is sent.
+    /// Returns whether a reply is sent.
     #[inline]
     #[must_use]
     pub const fn is_answered(&self) -> bool {
@@ -27,68 +27,68 @@ impl Decision {
     }
 }
 
-/// The second step of serving a request.
+/// The second step of serving a request: the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Work(pub(crate) Job);
 
-/// What the second step does.
+/// The kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Job {
-    /// Nothing.
+    /// No work.
     None,
     /// Read these bits into the body.
     ReadBits(Table, Span),
     /// Read these words into the body.
     ReadWords(Table, Span),
-    /// Write bits; they are packed in the request from byte `from` on.
+    /// Write bits, which are packed in the request from byte `from` on.
     WriteBits {
-        /// Where to.
+        /// Addresses to write.
         span: Span,
-        /// Where they are in the request, counted from the unit address.
+        /// Position of the bits in the request, counted from the unit address.
         from: u8,
     },
-    /// Write words; they are in the request from byte `from` on.
+    /// Write words, which are in the request from byte `from` on.
     WriteWords {
-        /// Where to.
+        /// Addresses to write.
         span: Span,
-        /// Where they are in the request, counted from the unit address.
+        /// Position of the words in the request, counted from the unit address.
         from: u8,
     },
-    /// Write the word that a mask has made of the one before.
+    /// Write the word that a mask write has computed.
     WriteMasked {
-        /// Where to.
+        /// Address to write.
         address: u16,
-        /// The word.
+        /// Value to write.
         value: u16,
     },
-    /// Write words as [`WriteWords`](Self::WriteWords) does, then read some into the body.
+    /// Write words like [`WriteWords`](Self::WriteWords), then read words into the body.
     WriteThenRead {
-        /// Where to write.
+        /// Addresses to write.
         write: Span,
-        /// Where the words are in the request, counted from the unit address.
+        /// Position of the words in the request, counted from the unit address.
         from: u8,
-        /// What to read then.
+        /// Addresses to read after the write.
         read: Span,
     },
     /// Read file records into the body.
     ReadFile,
-    /// Write file records; the request is the body.
+    /// Write file records; the body of the reply is the request.
     WriteFile,
     /// Put the exception status into the body.
     ExceptionStatus,
-    /// Do what function 08 asks for.
+    /// Execute the sub-function of function 08.
     Diagnose(Diagnostic),
     /// Put the event counter into the body.
     EventCounter,
     /// Put the event log into the body.
     EventLog,
-    /// Put identity and run indicator into the body.
+    /// Put the server ID and the run indicator into the body.
     ServerId,
     /// Put identification objects into the body.
     Identify {
-        /// Which.
+        /// The requested kind of objects.
         code: ReadCode,
-        /// The first of them, if it is known.
+        /// The first object, if it is known.
         object: u8,
     },
     /// Let the model serve a user-defined function.
@@ -96,14 +96,14 @@ pub(crate) enum Job {
 }
 
 impl Work {
-    /// Whether it writes coils or holding registers; file records do not count.
+    /// Returns whether the work writes coils or holding registers. File records do not count.
     #[inline]
     #[must_use]
     pub const fn writes(self) -> bool {
         self.0.writes()
     }
 
-    /// What it reads from the model's tables into the reply, if anything.
+    /// Returns what the work reads from the model's tables into the reply, if anything.
     #[inline]
     #[must_use]
     pub const fn reads(self) -> Option<(Table, Span)> {
@@ -127,9 +127,8 @@ impl Job {
         )
     }
 
-    /// Whether it may be ordered by a broadcast: "necessarily writing commands" (V1.02 2.1). A
-    /// request for data is none, even if it writes as well (17), and one unit's diagnostics are no
-    /// business of all.
+    /// Returns whether a broadcast may order this work: only "necessarily writing commands" (V1.02 2.1). A request
+    /// for data is not one, even if it also writes (17). The diagnostics of one unit do not concern all units.
     pub(crate) const fn can_be_broadcast(self) -> bool {
         matches!(
             self,
@@ -141,18 +140,18 @@ impl Job {
     }
 }
 
-/// How a request fared.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// A function code no request can have (00, 80 and above): silence, counted as unanswered.
+    /// An invalid function code (00, 80 and above): no reply, counted as unanswered.
     NoRequest,
-    /// The unit only listens (function 08, sub-function 04): silence, counted as unanswered.
+    /// The unit is in listen-only mode (function 08, sub-function 04): no reply, counted as unanswered.
     NotObeyed,
-    /// A broadcast of what only a single unit can be asked for: no effect.
+    /// A broadcast of a function that only a single unit can execute: no effect.
     NoEffect,
     /// Accepted.
     Accepted,
-    /// Refused; on a broadcast without saying so.
+    /// Rejected. A broadcast gets no reply, though.
     Refused(Exception),
 }

@@ -3,25 +3,25 @@
 use crate::Exception;
 use crate::line::Framing;
 
-/// A request of function 08 whose form is right.
+/// A request of function 08 with a valid form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Diagnostic {
-    /// 00: send the data back.
+    /// 00: return the data.
     Echo,
-    /// 01: start communication anew, out of listen-only mode too.
+    /// 01: restart communication, which also ends listen-only mode.
     Restart {
-        /// Data FF00: the event log is cleared as well.
+        /// Data FF00: also clear the event log.
         clear_log: bool,
     },
-    /// 02: the diagnostic register.
+    /// 02: return the diagnostic register.
     Register,
-    /// 03: the character that ends an ASCII frame.
+    /// 03: change the character that ends an ASCII frame.
     Delimiter(u8),
-    /// 04: listen only, and say nothing.
+    /// 04: enter listen-only mode, without a reply.
     ListenOnly,
     /// 0A: clear the counters.
     Clear,
-    /// 0B to 12: the counter at this place of [`Counters::as_words`](crate::Counters::as_words).
+    /// 0B to 12: return the counter at this index of [`Counters::as_words`](crate::Counters::as_words).
     Counter(u8),
     /// 14: clear the counter of character overruns.
     ClearOverruns,
@@ -31,15 +31,15 @@ pub(crate) enum Diagnostic {
 const RESTART: u8 = 0x01;
 /// Sub-function 04.
 const LISTEN_ONLY: u8 = 0x04;
-/// The first sub-function that gives a counter.
+/// The first sub-function that returns a counter.
 const FIRST_COUNTER: u8 = 0x0B;
 
 impl Diagnostic {
-    /// Decodes what follows the function code.
+    /// Decodes the bytes after the function code.
     ///
     /// # Errors
-    /// 01 for a sub-function that is not there: 03 needs ASCII mode, 04 a server that
-    /// `can_listen_only`. 03 for data, or a length, that it cannot have.
+    /// 01 for a sub-function that is not supported: 03 needs ASCII mode, 04 a server that `can_listen_only`. 03 for
+    /// data or a length that is not allowed.
     pub(crate) fn decode(
         fields: &[u8],
         framing: Framing,
@@ -52,7 +52,7 @@ impl Diagnostic {
             return Err(Exception::IllegalFunction);
         }
         let diagnostic = match sub {
-            // With data of any length.
+            // The data may have any length.
             0x00 => return Ok(Self::Echo),
             RESTART => match data {
                 [0xFF, 0x00] => return Ok(Self::Restart { clear_log: true }),
@@ -77,12 +77,12 @@ impl Diagnostic {
         }
     }
 
-    /// Whether what follows function code 08 restarts communication.
+    /// Returns whether the bytes after function code 08 restart communication.
     pub(crate) const fn is_restart(fields: &[u8]) -> bool {
         matches!(fields, [0x00, RESTART, 0x00 | 0xFF, 0x00])
     }
 
-    /// Whether what follows function code 08 asks to listen only, which is never answered.
+    /// Returns whether the bytes after function code 08 start listen-only mode, which is never answered.
     pub(crate) const fn is_listen_only(fields: &[u8]) -> bool {
         matches!(fields, [0x00, LISTEN_ONLY, 0x00, 0x00])
     }
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_short_looks_agree_with_the_long_one() {
+    fn the_short_checks_agree_with_decode() {
         for sub in 0..=0x20 {
             for data in [[0, 0], [0xFF, 0], [0, 1], [1, 0], [0xFF, 0xFF]] {
                 for fields in [&[0, sub, data[0], data[1]][..], &[0, sub, data[0]]] {

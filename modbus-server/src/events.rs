@@ -1,15 +1,15 @@
-//! The communication event log: the last 64 events, the newest first (V1.1b3 6.10).
+//! The communication event log: the last 64 events, newest first (V1.1b3 6.10).
 
 use crate::{Adu, Exception};
 
-/// The event bytes, of which [`Event::received`] and [`Event::sent`] are sums of bits.
+/// An event byte. [`Event::received`] and [`Event::sent`] are sums of bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Event(u8);
 
 impl Event {
     /// Communication was restarted.
     pub(crate) const RESTARTED: Self = Self(0x00);
-    /// The unit went into listen-only mode.
+    /// The unit entered listen-only mode.
     pub(crate) const LISTEN_ONLY: Self = Self(0x04);
 
     const RECEIVE: u8 = 1 << 7;
@@ -19,25 +19,25 @@ impl Event {
 
     const SEND: u8 = 1 << 6;
 
-    /// Of receive and send events alike: the unit is in listen-only mode.
+    /// Bit of receive and send events: the unit is in listen-only mode.
     const LISTENING: u8 = 1 << 5;
 
-    /// A request for this unit was received.
+    /// Event: a request for this unit was received.
     pub(crate) const fn received(broadcast: bool, listening: bool) -> Self {
         let broadcast = if broadcast { Self::BROADCAST } else { 0 };
         Self(Self::RECEIVE | broadcast | Self::listening(listening))
     }
 
-    /// Something was received that is no good frame.
+    /// Event: an invalid frame was received.
     pub(crate) const fn faulty(overrun: bool, listening: bool) -> Self {
         let overrun = if overrun { Self::OVERRUN } else { 0 };
         Self(Self::RECEIVE | Self::COMMUNICATION_ERROR | overrun | Self::listening(listening))
     }
 
-    /// A request was dealt with, and answered with this exception, if any.
+    /// Event: a request was served, with this exception, if any.
     pub(crate) const fn sent(exception: Option<Exception>, listening: bool) -> Self {
         let exception = match exception {
-            // The standard has a bit for 01 to 07 only.
+            // The standard has a bit for exceptions 01 to 07 only.
             None
             | Some(
                 Exception::MemoryParityError
@@ -61,17 +61,17 @@ impl Event {
     }
 }
 
-/// The last events.
+/// The last 64 events.
 #[derive(Debug)]
 pub(crate) struct EventLog {
     events: [u8; EventLog::CAPACITY],
-    /// How many there have been; once the log is full that modulo `CAPACITY`, plus `CAPACITY`. The next
-    /// one goes there, modulo `CAPACITY`.
+    /// Number of events so far. Once the log is full, this number modulo `CAPACITY`, plus `CAPACITY`. The next
+    /// event is stored at this number modulo `CAPACITY`.
     added: u8,
 }
 
 impl EventLog {
-    /// As many as the standard says.
+    /// Number of events in the log, as in the standard.
     pub(crate) const CAPACITY: usize = 64;
 
     pub(crate) const fn new() -> Self {
@@ -81,9 +81,9 @@ impl EventLog {
         }
     }
 
-    /// Adds an event; the 65th takes the place of the oldest.
+    /// Adds an event. When the log is full, it replaces the oldest.
     pub(crate) fn push(&mut self, Event(event): Event) {
-        // Always there: no check is left of this.
+        // The index is always in range, so the compiler removes this check.
         let at = usize::from(self.added) % Self::CAPACITY;
         if let Some(slot) = self.events.get_mut(at) {
             *slot = event;
@@ -94,18 +94,18 @@ impl EventLog {
         }
     }
 
-    /// Forgets all events.
+    /// Discards all events.
     pub(crate) const fn clear(&mut self) {
         self.added = 0;
     }
 
-    /// How many events there are.
+    /// Returns the number of events.
     pub(crate) const fn count(&self) -> u8 {
         let full = Self::CAPACITY as u8;
         if self.added < full { self.added } else { full }
     }
 
-    /// Appends the events, the newest first.
+    /// Appends the events to a reply, newest first.
     pub(crate) fn append_to(&self, adu: &mut Adu) {
         for back in 1..=self.count() {
             let at = self.added.wrapping_sub(back) % Self::CAPACITY as u8;
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_comes_first_and_the_65th_costs_the_oldest() {
+    fn the_newest_event_is_first_and_the_65th_replaces_the_oldest() {
         let mut log = EventLog::new();
         assert_eq!(listed(&log), []);
         for n in 1..=200_u8 {

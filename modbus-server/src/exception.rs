@@ -3,25 +3,25 @@
 use core::error::Error;
 use core::fmt;
 
-/// Why a request is refused (V1.1b3 section 7). The reply carries the function code with bit 7 set
-/// and this code.
+/// Reason why a request is rejected (V1.1b3 section 7). The reply contains the function code with bit 7 set and
+/// this code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 #[repr(u8)]
 pub enum Exception {
-    /// 01: the function code is not one this server knows.
+    /// 01: the server does not support the function code.
     IllegalFunction = 1,
-    /// 02: an address of the request does not exist, or cannot be written.
+    /// 02: an address in the request does not exist or cannot be written.
     IllegalDataAddress = 2,
-    /// 03: quantity, byte count, length or value is not allowed.
+    /// 03: a quantity, byte count, length or value is not allowed.
     IllegalDataValue = 3,
-    /// 04: the device failed while it tried to do it.
+    /// 04: the device failed while it executed the request.
     ServerDeviceFailure = 4,
-    /// 05: accepted, and it will take long.
+    /// 05: the request was accepted and will take a long time.
     Acknowledge = 5,
-    /// 06: busy, or the object is locked at the moment; the client may repeat the request later.
+    /// 06: the device is busy or the object is locked; the client may repeat the request later.
     ServerDeviceBusy = 6,
-    /// 07: it cannot be done. In V1.02 appendix A (counted as NAK), no longer in V1.1b3.
+    /// 07: the request cannot be executed. In V1.02 appendix A (counted as NAK), but no longer in V1.1b3.
     NegativeAcknowledge = 7,
     /// 08: the memory behind a file record failed its consistency check.
     MemoryParityError = 8,
@@ -32,7 +32,7 @@ pub enum Exception {
 }
 
 impl Exception {
-    /// The code as it goes over the line.
+    /// Returns the code as it is sent on the line.
     #[inline]
     pub const fn code(self) -> u8 {
         self as u8
@@ -59,8 +59,8 @@ impl fmt::Display for Exception {
 
 impl Error for Exception {}
 
-/// Of two verdicts the exception that comes first in the order of checks: address 02, value 03,
-/// then state, 04 and above. That is the order of the codes.
+/// Returns the exception that is first in the order of checks: address 02, value 03, then state, 04 and above. That
+/// is the order of the codes.
 pub(crate) fn first_of(
     one: Result<(), Exception>,
     other: Result<(), Exception>,
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_exception_is_an_error_with_code_and_name() {
+    fn an_exception_displays_its_code_and_name() {
         let error: Box<dyn Error> = Exception::GatewayPathUnavailable.into();
         assert_eq!(error.to_string(), "exception 0A, gateway path unavailable");
     }

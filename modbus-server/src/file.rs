@@ -1,7 +1,7 @@
 //! File records: functions 14 and 15 (V1.1b3 6.14, 6.15).
 //!
-//! A request has groups of consecutive records; a record is a word. Each group has its header, and in function 15 its
-//! words.
+//! A request contains groups of consecutive records; a record is a word. Each group has a header, and in function
+//! 15 also its words.
 //!
 //! ```text
 //!           +----+------------+----+------+--------+--------+-------+----+---
@@ -13,27 +13,28 @@
 //!           +----+------------+------------+----+-------+------------+---
 //! ```
 //!
-//! The reply to function 15 is its request.
+//! The reply to function 15 repeats the request.
 
 use core::ops::RangeInclusive;
 
 use crate::exception::first_of;
 use crate::{Adu, DataModel, Exception, Span, Words, WordsOut};
 
-/// The only reference type there is.
+/// The only reference type.
 const REFERENCE: u8 = 6;
-/// Records of a file.
+/// Number of records of a file.
 const RECORDS: u32 = 10_000;
 /// Bytes of a group's header.
 const HEADER: usize = 7;
-/// Byte counts of function 14.
+/// Allowed byte counts of function 14.
 const READ: RangeInclusive<u8> = 0x07..=0xF5;
-/// Byte counts of function 15.
+/// Allowed byte counts of function 15.
 const WRITE: RangeInclusive<u8> = 0x09..=0xFB;
-/// The most bytes of a reply's groups: 253 of the PDU, less function code and byte count. The field's range of 07 to F5
-/// in the table of 6.14 cannot be meant: a group of one word has 4 bytes, and 6.14 names 253 bytes as the limit.
+/// Largest number of bytes of a reply's groups: the 253 of the PDU, less function code and byte count. The table of
+/// 6.14 gives a range of 07 to F5 for the byte count of a reply. That must be an error, because a group of one word
+/// has 4 bytes and 6.14 names 253 bytes as the limit.
 const MAX_REPLY: usize = 253 - 2;
-/// Where the groups of a request begin, counted from the unit address.
+/// Position of the groups in a request, counted from the unit address.
 const GROUPS_FROM: u8 = 3;
 
 /// A group of records.
@@ -41,14 +42,14 @@ struct Group<'a> {
     reference: u8,
     file: u16,
     record: u16,
-    /// In records: 1 or more.
+    /// Number of records: 1 or more.
     length: u16,
-    /// As many words, in function 15.
+    /// The same number of words, in function 15.
     words: Words<'a>,
 }
 
 impl Group<'_> {
-    /// The records, if a file can have them.
+    /// Returns the records, if a file can contain them.
     fn records(&self) -> Result<Span, Exception> {
         Span::new(self.record, self.length)
             .filter(|records| records.end() <= RECORDS)
@@ -65,8 +66,8 @@ struct Groups<'a> {
 }
 
 impl<'a> Groups<'a> {
-    /// Takes the next group; `None` at the end, and for a group that is cut short or has no records. Not inlined: it is
-    /// called in four places.
+    /// Returns the next group. Returns `None` at the end, and for a group that is incomplete or has no records. Not
+    /// inlined, because it is called in four places.
     #[inline(never)]
     fn take(&mut self) -> Option<Group<'a>> {
         let (&[reference, f1, f0, r1, r0, l1, l0], rest) =
@@ -89,11 +90,11 @@ impl<'a> Groups<'a> {
     }
 }
 
-/// Checks byte counts and the form of all groups of a request. `fields` are what follows the function code. Returns the
-/// byte count that a reply of function 14 to these groups has.
+/// Checks byte counts and the form of all groups of a request. `fields` are the bytes after the function code.
+/// Returns the byte count of a reply of function 14 to these groups.
 ///
 /// # Errors
-/// 03 where the form is wrong.
+/// 03 when the form is wrong.
 #[inline(never)]
 fn check_form(fields: &[u8], with_words: bool) -> Result<(Groups<'_>, u8), Exception> {
     let byte_counts = if with_words { WRITE } else { READ };
@@ -107,16 +108,16 @@ fn check_form(fields: &[u8], with_words: bool) -> Result<(Groups<'_>, u8), Excep
         let group = left.take().ok_or(Exception::IllegalDataValue)?;
         reply += 2 + 2 * usize::from(group.length);
     }
-    // Function 15 never exceeds it: the groups of a reply are shorter than those of its request.
+    // Function 15 never exceeds it, because the groups of a reply are shorter than those of its request.
     if reply > MAX_REPLY {
         return Err(Exception::IllegalDataValue);
     }
     Ok((groups, reply as u8))
 }
 
-/// Checks a request of function 14, or of function 15, `with_words`. `fields` are what follows the function code. Checks
-/// the form of all groups, then all their addresses, then what the model says. Returns the byte count of a reply of
-/// function 14.
+/// Checks a request of function 14, or of function 15 when `with_words` is set. `fields` are the bytes after the
+/// function code. Checks the form of all groups first, then all their addresses, then asks the model. Returns the
+/// byte count of a reply of function 14.
 ///
 /// # Errors
 /// The exception to answer with.
@@ -143,7 +144,7 @@ pub(crate) fn check(
 #[inline(never)]
 /// Replaces a checked request of function 14 by the groups of its reply.
 pub(crate) fn read(adu: &mut Adu, model: &impl DataModel) {
-    // Lets the compiler leave all of this out for a model without files.
+    // Lets the compiler remove this function for a model without files.
     if !model.has_files() {
         return;
     }
@@ -153,7 +154,7 @@ pub(crate) fn read(adu: &mut Adu, model: &impl DataModel) {
     for (copy, byte) in copy.iter_mut().zip(request) {
         *copy = *byte;
     }
-    // A checked request fits.
+    // A checked request always fits.
     let rest = copy.get(..len).unwrap_or_default();
     adu.clear();
     let with_words = false;

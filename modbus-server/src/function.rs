@@ -1,6 +1,6 @@
 //! Function codes.
 
-/// The functions this server has (V1.1b3 section 6).
+/// The functions of this server (V1.1b3 section 6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 #[repr(u8)]
@@ -39,15 +39,15 @@ pub enum Function {
     MaskWriteRegister = 0x16,
     /// 17 (6.17)
     ReadWriteMultipleRegisters = 0x17,
-    /// 2B (6.19): of it, 0E, read device identification (6.21)
+    /// 2B (6.19): only MEI type 0E, read device identification (6.21).
     EncapsulatedInterface = 0x2B,
 }
 
 impl Function {
-    /// Bit 7 of the function code of a reply says that it is an exception.
+    /// Bit 7 of a reply's function code, which marks an exception.
     pub const EXCEPTION: u8 = 0x80;
 
-    /// The function with this code, if the server has it.
+    /// Returns the function with this code, if the server supports it.
     #[inline]
     pub const fn from_code(code: u8) -> Option<Self> {
         Some(match code {
@@ -73,7 +73,7 @@ impl Function {
         })
     }
 
-    /// The code as it goes over the line.
+    /// Returns the code as it is sent on the line.
     pub const fn code(self) -> u8 {
         self as u8
     }

@@ -1,53 +1,53 @@
-//! The start of a reply, as it is settled by the decision.
+//! The first bytes of a reply, which the decision determines.
 
 use crate::{Exception, Function};
 
-/// The start of a reply: all of it for an exception or the echo of a write; unit, function and as
-/// much as is known at once for all others, whose body follows.
+/// The first bytes of a reply. For an exception or the echo of a write they are the whole reply. For all others
+/// they are unit, function and the other bytes that are known immediately, and a body follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-// Whole words: copied with every reply, without a call of memcpy.
+// Aligned to words: every reply copies the head, and this avoids a call of memcpy.
 #[repr(align(4))]
 pub(crate) struct Head {
     bytes: [u8; Head::CAPACITY],
     len: u8,
-    /// Where in its buffer the body begins; `NO_BODY` for none.
+    /// Index in its buffer at which the body begins; `NO_BODY` for none.
     body: u8,
 }
 
-/// No body begins there.
+/// There is no body.
 const NO_BODY: u8 = u8::MAX;
 
 impl Head {
-    /// The longest reply that needs no body: unit and PDU of a mask write (V1.1b3 6.16).
+    /// Length of the longest reply without a body: unit and PDU of a mask write (V1.1b3 6.16).
     const CAPACITY: usize = 8;
 
-    /// How many bytes, without CRC.
+    /// Returns the number of bytes, without CRC.
     #[inline]
     pub(crate) const fn len(&self) -> u8 {
         self.len
     }
 
-    /// One byte, below [`len`](Self::len).
+    /// Returns the byte at an index below [`len`](Self::len).
     #[inline]
     pub(crate) fn get(&self, index: u8) -> u8 {
-        // Of eight bytes: no check is left of this.
+        // There are eight bytes, so the compiler removes the bounds check.
         let index = usize::from(index) % Self::CAPACITY;
         self.bytes.get(index).copied().unwrap_or_default()
     }
 
-    /// Whether a body follows; if not, the head is the whole reply.
+    /// Returns whether a body follows. If not, the head is the whole reply.
     #[inline]
     pub(crate) const fn has_body(&self) -> bool {
         self.body != NO_BODY
     }
 
-    /// Where the body begins, if there is one.
+    /// Returns the index at which the body begins, if there is one.
     #[inline]
     pub(crate) const fn body_from(&self) -> u8 {
         self.body
     }
 
-    /// Of a reply of which nothing is known but the unit address. More will follow.
+    /// Returns the head of a reply of which only the unit address is known. The rest follows later.
     #[inline]
     pub(crate) const fn opening(unit: u8) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Head {
         }
     }
 
-    /// The reply to a read of `body` bytes.
+    /// Returns the head of a reply to a read, with `body` bytes.
     #[inline]
     pub(crate) const fn read(unit: u8, function: u8, body: u8) -> Self {
         Self {
@@ -67,7 +67,7 @@ impl Head {
         }
     }
 
-    /// A reply whose body is all that follows the function code.
+    /// Returns the head of a reply whose body begins after the function code.
     #[inline]
     pub(crate) const fn plain(unit: u8, function: u8) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl Head {
         }
     }
 
-    /// A reply whose first two bytes after the function code are known; the rest is the body.
+    /// Returns the head of a reply with two known bytes after the function code; the rest is the body.
     #[inline]
     pub(crate) const fn before(unit: u8, function: u8, [a, b]: [u8; 2]) -> Self {
         Self {
@@ -87,8 +87,7 @@ impl Head {
         }
     }
 
-    /// As [`before`](Self::before), with the body where the request had what it replaces or
-    /// repeats.
+    /// Like [`before`](Self::before), but the body replaces or repeats the bytes at the same place of the request.
     #[inline]
     pub(crate) const fn in_place(unit: u8, function: u8, fields: [u8; 2]) -> Self {
         Self {
@@ -97,7 +96,7 @@ impl Head {
         }
     }
 
-    /// The reply to a write: address and value, or address and quantity, as they came.
+    /// Returns the reply to a write: address and value, or address and quantity, as received.
     #[inline]
     pub(crate) const fn echo(unit: u8, function: u8, [a, b, c, d]: [u8; 4]) -> Self {
         Self {
@@ -107,7 +106,7 @@ impl Head {
         }
     }
 
-    /// The reply to a mask write: address and masks, as they came.
+    /// Returns the reply to a mask write: address and masks, as received.
     #[inline]
     pub(crate) const fn masks(unit: u8, function: u8, [a, b, c, d, e, f]: [u8; 6]) -> Self {
         Self {
@@ -117,7 +116,7 @@ impl Head {
         }
     }
 
-    /// The reply to a refused request.
+    /// Returns the reply to a rejected request.
     #[inline]
     pub(crate) const fn exception(unit: u8, function: u8, exception: Exception) -> Self {
         let function = function | Function::EXCEPTION;

@@ -9,7 +9,7 @@
 
 use crate::{Adu, DataModel, Exception, TextOut};
 
-/// What is asked for.
+/// Kind of objects that a request asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum ReadCode {
@@ -26,21 +26,21 @@ pub(crate) enum ReadCode {
 /// The MEI type of read device identification.
 pub(crate) const MEI_TYPE: u8 = 0x0E;
 
-/// Objects 07 to 7F are reserved: those of the device begin here.
+/// First object of the device's own; objects 07 to 7F are reserved.
 const FIRST_EXTENDED: u8 = 0x80;
-/// The last of the standard's own objects.
+/// Last object that the standard defines.
 const LAST_REGULAR: u8 = 0x06;
 
-/// The most bytes of a body: 253 of the PDU, less function code, MEI type and read code.
+/// Largest number of bytes of a body: the 253 of the PDU, less function code, MEI type and read code.
 const MAX_BODY: usize = 253 - 3;
-/// Conformity, more follows, next object, count.
+/// Bytes of conformity, more follows, next object and count.
 const FIXED: usize = 4;
-/// Object and length.
+/// Bytes of an object's number and length.
 const OBJECT: usize = 2;
-/// The longest value that fits a reply; what is beyond is cut off.
+/// Length of the longest value that fits a reply. Longer values are cut.
 const MAX_VALUE: usize = MAX_BODY - FIXED - OBJECT;
 
-/// Where in the body they are.
+/// Positions of these fields in the body.
 const MORE_FOLLOWS: u8 = 1;
 const NEXT_OBJECT: u8 = 2;
 const COUNT: u8 = 3;
@@ -56,7 +56,7 @@ impl ReadCode {
         })
     }
 
-    /// The last object that may be among those asked for.
+    /// Returns the last object that this kind may contain.
     const fn last(self) -> u8 {
         match self {
             Self::Basic => 0x02,
@@ -66,12 +66,12 @@ impl ReadCode {
     }
 }
 
-/// Decodes the MEI type and what follows it.
+/// Decodes the MEI type and the bytes after it.
 ///
 /// # Errors
-/// 01 for a device without identification, whatever the request, and for another MEI type: the
-/// function code is validated first (V1.1b3 4.5). 03 for another length or a code that is not 01 to
-/// 04; 02 for one object that is not there.
+/// 01 for a device without identification, whatever the request contains, and for another MEI type, because the
+/// function code is validated first (V1.1b3 4.5). 03 for a wrong length or a code that is not 01 to 04. 02 for a
+/// single object that does not exist.
 pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode, u8), Exception> {
     if !exists(0, model) {
         return Err(Exception::IllegalFunction);
@@ -85,12 +85,12 @@ pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode,
     let known = object == 0 || (object <= code.last() && exists(object, model));
     match code {
         ReadCode::One if !known => Err(Exception::IllegalDataAddress),
-        // A stream that cannot begin there begins at the beginning.
+        // A stream whose first object does not exist begins with object 0.
         _ => Ok((code, if known { object } else { 0 })),
     }
 }
 
-/// Puts the body together.
+/// Creates the body.
 pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut Adu) {
     adu.clear();
     adu.extend(&[conformity(model), 0x00, 0x00, 0]);
@@ -118,8 +118,8 @@ pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut 
     adu.set(COUNT, count);
 }
 
-/// Appends an object with its length and its value, which is cut off where it fits no reply. `None`
-/// if there is no such object, `Some(false)` if this reply has no room left for it.
+/// Appends an object with its length and value, which is cut when it does not fit any reply. Returns `None` if the
+/// object does not exist, `Some(false)` if this reply has no room for it.
 fn append(object: u8, model: &impl DataModel, adu: &mut Adu) -> Option<bool> {
     let start = adu.len();
     let bytes = adu.resize(MAX_BODY);
@@ -130,24 +130,24 @@ fn append(object: u8, model: &impl DataModel, adu: &mut Adu) -> Option<bool> {
     let fits = exists && end <= MAX_BODY;
     adu.resize(if fits { end } else { start });
     if fits {
-        // Both are below 250.
+        // Both values are below 250.
         adu.set(start as u8, object);
         adu.set(start as u8 + 1, len as u8);
     }
     exists.then_some(fits)
 }
 
-/// Whether there is such an object.
+/// Returns whether the object exists.
 fn exists(object: u8, model: &impl DataModel) -> bool {
     is_known(object) && model.identification(object, &mut TextOut::new(&mut []))
 }
 
-/// Whether the number is not one of the reserved ones.
+/// Returns whether the number is not reserved.
 const fn is_known(object: u8) -> bool {
     object <= LAST_REGULAR || object >= FIRST_EXTENDED
 }
 
-/// Which objects there are at all, and that each can be asked for by itself (bit 7).
+/// Returns which kinds of objects the device has; bit 7 says that each can be read individually.
 fn conformity(model: &impl DataModel) -> u8 {
     let there = |object| exists(object, model);
     let level = if there(FIRST_EXTENDED) {

@@ -1,27 +1,27 @@
-//! Decoding of request PDUs: quantities, byte counts, lengths and value forms, all of them
-//! exception 03, then the wrap at 16 bits (02). What the addresses mean is the model's business.
+//! Decodes request PDUs: checks quantities, byte counts, lengths and the form of values (exception 03), then the
+//! wrap at 16 bits (02). The model checks the addresses.
 
 use crate::{Bits, Exception, Function, Span, Words};
 
-/// The most bits one read may ask for (V1.1b3 6.1).
+/// Largest number of bits that one request may read (V1.1b3 6.1).
 const MAX_READ_BITS: u16 = 2000;
-/// The most words one read may ask for (V1.1b3 6.3).
+/// Largest number of words that one request may read (V1.1b3 6.3).
 const MAX_READ_WORDS: u16 = 125;
-/// The most bits one write may hold (V1.1b3 6.11).
+/// Largest number of bits that one request may write (V1.1b3 6.11).
 const MAX_WRITE_BITS: u16 = 1968;
-/// The most words one write may hold (V1.1b3 6.12).
+/// Largest number of words that one request may write (V1.1b3 6.12).
 const MAX_WRITE_WORDS: u16 = 123;
-/// The most words one write with a read may hold (V1.1b3 6.17).
+/// Largest number of words that one request may write when it also reads (V1.1b3 6.17).
 const MAX_WRITE_WORDS_AND_READ: u16 = 121;
 
-/// Where the value of a single write lies, counted from the unit address.
+/// Position of the value of a single write, counted from the unit address.
 pub(crate) const SINGLE_FROM: u8 = 4;
-/// Where the values of a multiple write lie, counted from the unit address.
+/// Position of the values of a multiple write, counted from the unit address.
 pub(crate) const MULTIPLE_FROM: u8 = 7;
-/// Where the values of a write with a read lie, counted from the unit address.
+/// Position of the values of a write with a read, counted from the unit address.
 pub(crate) const WITH_READ_FROM: u8 = 11;
 
-/// A request whose form is right.
+/// A request with a valid form.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Request<'a> {
     ReadBits(Span),
@@ -47,23 +47,24 @@ pub(crate) enum Request<'a> {
         from: u8,
         read: Span,
     },
-    /// What follows the function code. The model decides first: a device without files has neither function 14 nor 15.
+    /// The bytes after the function code. The model decides first: a device without files has neither function 14
+    /// nor 15.
     ReadFile(&'a [u8]),
     /// As for [`ReadFile`](Self::ReadFile).
     WriteFile(&'a [u8]),
     ExceptionStatus,
-    /// The sub-function and what follows it. What they mean depends on the server's modes.
+    /// The sub-function and the bytes after it. Their meaning depends on the server's modes.
     Diagnose(&'a [u8]),
     EventCounter,
     EventLog,
     ServerId,
-    /// The MEI type and what follows it. The model decides first: a device without identification
-    /// does not have function 2B.
+    /// The MEI type and the bytes after it. The model decides first: a device without identification does not have
+    /// function 2B.
     Identify(&'a [u8]),
 }
 
 impl<'a> Request<'a> {
-    /// Decodes a request by its function and the bytes after the function code.
+    /// Decodes a request from its function and the bytes after the function code.
     ///
     /// # Errors
     /// The exception to answer with.
@@ -93,7 +94,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Address and quantity.
+/// Decodes address and quantity.
 fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
     let &[address_hi, address_lo, quantity_hi, quantity_lo] = fields else {
         return Err(Exception::IllegalDataValue);
@@ -105,7 +106,8 @@ fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
     )
 }
 
-/// Address and FF00 (on) or 0000 (off). The first value byte taken as packed bits is just that bit.
+/// Decodes address and FF00 (on) or 0000 (off). Used as packed bits, the first value byte contains exactly this
+/// bit.
 fn write_single_bit(fields: &[u8]) -> Result<Request<'_>, Exception> {
     let (&[hi, lo], value @ ([0x00, 0x00] | [0xFF, 0x00])) = single(fields)? else {
         return Err(Exception::IllegalDataValue);
@@ -118,7 +120,7 @@ fn write_single_bit(fields: &[u8]) -> Result<Request<'_>, Exception> {
     })
 }
 
-/// Address and value.
+/// Decodes address and value.
 fn write_single_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
     let (&address, value) = single(fields)?;
     let span = Span::single(u16::from_be_bytes(address));
@@ -129,7 +131,7 @@ fn write_single_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
     })
 }
 
-/// The address and the value of a single write.
+/// Returns the address and the value of a single write.
 fn single(fields: &[u8]) -> Result<(&[u8; 2], &[u8; 2]), Exception> {
     let (address, value) = fields
         .split_first_chunk()
@@ -138,7 +140,7 @@ fn single(fields: &[u8]) -> Result<(&[u8; 2], &[u8; 2]), Exception> {
     Ok((address, value))
 }
 
-/// Address, quantity, byte count, packed bits.
+/// Decodes address, quantity, byte count and packed bits.
 fn write_bits(fields: &[u8]) -> Result<Request<'_>, Exception> {
     let (start, quantity, data) = multiple(fields)?;
     if data.len() != usize::from(quantity.div_ceil(8)) {
@@ -152,7 +154,7 @@ fn write_bits(fields: &[u8]) -> Result<Request<'_>, Exception> {
     })
 }
 
-/// Address, quantity, byte count, words.
+/// Decodes address, quantity, byte count and words.
 fn write_words(fields: &[u8]) -> Result<Request<'_>, Exception> {
     let (start, quantity, data) = multiple(fields)?;
     if data.len() != usize::from(quantity) * 2 {
@@ -166,7 +168,7 @@ fn write_words(fields: &[u8]) -> Result<Request<'_>, Exception> {
     })
 }
 
-/// Address, AND mask, OR mask.
+/// Decodes address, AND mask and OR mask.
 fn mask_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
     match *fields {
         [a, b, c, d, e, f] => Ok(Request::MaskWord {
@@ -178,8 +180,8 @@ fn mask_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
     }
 }
 
-/// Address and quantity to read, then as [`write_words`]. Both quantities come before the end of
-/// either range.
+/// Decodes address and quantity to read, then the fields of [`write_words`]. Both quantities are checked before the
+/// end of either range.
 fn write_then_read(fields: &[u8]) -> Result<Request<'_>, Exception> {
     let (to_read, to_write) = fields
         .split_first_chunk::<4>()
@@ -200,7 +202,7 @@ fn write_then_read(fields: &[u8]) -> Result<Request<'_>, Exception> {
     })
 }
 
-/// A function without fields.
+/// Decodes a function without fields.
 fn alone<'a>(fields: &[u8], request: Request<'a>) -> Result<Request<'a>, Exception> {
     if fields.is_empty() {
         Ok(request)
@@ -209,7 +211,7 @@ fn alone<'a>(fields: &[u8], request: Request<'a>) -> Result<Request<'a>, Excepti
     }
 }
 
-/// Address, quantity and data of a multiple write whose byte count is true.
+/// Returns address, quantity and data of a multiple write whose byte count is correct.
 fn multiple(fields: &[u8]) -> Result<(u16, u16, &[u8]), Exception> {
     let &[
         address_hi,
@@ -232,7 +234,7 @@ fn multiple(fields: &[u8]) -> Result<(u16, u16, &[u8]), Exception> {
     ))
 }
 
-/// The span, after the checks of its quantity and then of its end.
+/// Returns the span, after the checks of its quantity and then of its end.
 fn span(start: u16, quantity: u16, most: u16) -> Result<Span, Exception> {
     if quantity == 0 || quantity > most {
         return Err(Exception::IllegalDataValue);
@@ -245,8 +247,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_hold_for_requests_too_long_for_a_frame() {
-        // 124 words with a true byte count: 259 bytes on an RTU line, but other lines may come.
+    fn limits_also_apply_to_requests_too_long_for_a_frame() {
+        // 124 words with a correct byte count: 259 bytes on an RTU line, but other kinds of lines may carry it.
         let fields = |count: u8| {
             let mut fields = [0; 5 + 248];
             fields[3] = count;
@@ -273,8 +275,8 @@ mod tests {
     }
 
     #[test]
-    fn values_are_where_the_request_has_them() {
-        // Without the unit address and the function code.
+    fn values_are_at_their_positions_in_the_request() {
+        // Positions without the unit address and the function code.
         let [single, multiple] = [SINGLE_FROM, MULTIPLE_FROM].map(|from| usize::from(from) - 2);
         let fields = [0, 9, 0xFF, 0x00];
         let Ok(Request::WriteWords { span, words, from }) =

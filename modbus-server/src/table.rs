@@ -1,7 +1,7 @@
 //! The four tables of a device.
 
-/// A table of the Modbus data model (V1.1b3 4.3). Each has addresses of its own from 0 to 0xFFFF;
-/// whether two tables show the same points is up to the device (V1.1b3 4.4).
+/// A table of the Modbus data model (V1.1b3 4.3). Each table has addresses from 0 to 0xFFFF. The device decides
+/// whether two tables contain the same points (V1.1b3 4.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Table {
     /// Bits to read and write: functions 01, 05 and 0F.

@@ -1,17 +1,15 @@
-//! The data model of a device that is nothing more than its tables and files.
+//! The data model of a device that consists only of tables and files.
 
 use crate::{Bits, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut};
 
-/// Four tables and some files in slices: the [`DataModel`] of a device without checks and identification of its
-/// own.
+/// Four tables and some files in slices: the [`DataModel`] of a device without its own checks and identification.
 ///
-/// Each table begins at address 0 and ends with its slice; beyond that is exception 02. An empty
-/// table is one that the device does not have: the functions that need it are exception 01. Every
-/// coil, every holding register and every record of a file can be written with any value.
+/// Each table begins at address 0 and ends with its slice; higher addresses return exception 02. An empty table
+/// means that the device does not have it: the functions that need it return exception 01. Every coil, every
+/// holding register and every record of a file can be written with any value.
 ///
-/// Bits are `bool`, one in a byte. Packed, 2000 of them would save 1750 bytes, but the program would
-/// need a function for each access. A device with more bits implements [`DataModel`] over its
-/// own storage.
+/// Bits are `bool`, one per byte. Packing would save 1750 bytes for 2000 bits, but then the program would need a
+/// function for each access. A device with more bits implements [`DataModel`] over its own storage.
 ///
 /// ```
 /// use modbus_server::{DataModel, Span, Table, Tables};
@@ -36,8 +34,8 @@ pub struct Tables<'a> {
     pub holding_registers: &'a mut [u16],
     /// Function 04.
     pub input_registers: &'a mut [u16],
-    /// Functions 14 and 15: the first is file 1, and each begins with record 0. A file ends with its slice; records above
-    /// 9999 cannot be reached.
+    /// Functions 14 and 15: the first is file 1, and each begins with record 0. A file ends with its slice; records
+    /// above 9999 cannot be accessed.
     pub files: &'a mut [&'a mut [u16]],
 }
 
@@ -58,7 +56,7 @@ impl Tables<'_> {
         }
     }
 
-    /// The records of a file; none, if there is no such file.
+    /// Returns the records of a file, or none if the file does not exist.
     fn file(&self, file: u16) -> &[u16] {
         self.files
             .get(place(file))
@@ -67,13 +65,13 @@ impl Tables<'_> {
     }
 }
 
-/// The place of a file.
+/// Returns the index of a file.
 fn place(file: u16) -> usize {
-    // A request for file 0 is refused.
+    // The server rejects a request for file 0.
     usize::from(file).wrapping_sub(1)
 }
 
-/// The points of `span`, if all of them exist.
+/// Returns the points of `span`, if all of them exist.
 fn points<T>(table: &[T], span: Span) -> Result<&[T], Exception> {
     let points = table.get(usize::from(span.start())..span.end() as usize);
     points.ok_or(Exception::IllegalDataAddress)

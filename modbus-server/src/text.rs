@@ -1,26 +1,25 @@
-//! A text that is made while it is put into a reply.
+//! A text that is written directly into a reply.
 
 use core::fmt;
 
-/// Takes the bytes of a device identification object ([`DataModel::identification`]), also by
-/// [`write!`].
+/// Receives the bytes of a device identification object ([`DataModel::identification`]), also through [`write!`].
 ///
 /// [`DataModel::identification`]: crate::DataModel::identification
 #[derive(Debug)]
 pub struct TextOut<'a> {
     bytes: &'a mut [u8],
-    /// Length of the whole text, whether it fits or not.
+    /// Length of the whole text, including bytes that did not fit.
     len: usize,
 }
 
 impl<'a> TextOut<'a> {
-    /// Room for as many bytes as `bytes` has.
+    /// Prepares room for the length of `bytes`.
     #[inline]
     pub const fn new(bytes: &'a mut [u8]) -> Self {
         Self { bytes, len: 0 }
     }
 
-    /// Appends bytes; more than there is room for are only counted.
+    /// Appends bytes. Bytes without room are only counted.
     pub fn extend(&mut self, text: &[u8]) {
         let room = self.bytes.get_mut(self.len..).unwrap_or_default();
         let slots = room.iter_mut().zip(text);
@@ -28,13 +27,13 @@ impl<'a> TextOut<'a> {
         self.len = self.len.saturating_add(text.len());
     }
 
-    /// Length of all bytes that were appended, whether they fit or not.
+    /// Returns the number of all appended bytes, including those that did not fit.
     #[inline]
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether nothing was appended.
+    /// Returns whether nothing was appended.
     #[inline]
     pub const fn is_empty(&self) -> bool {
         self.len == 0

@@ -1,4 +1,4 @@
-//! Registers as a PDU holds them: 16 bits, high byte first (V1.1b3 4.2).
+//! Registers as they are in a PDU: 16 bits, high byte first (V1.1b3 4.2).
 
 use core::slice;
 
@@ -9,7 +9,7 @@ pub struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    /// The registers in `bytes`; an odd last byte is left out.
+    /// Creates the registers from `bytes`. An odd last byte is ignored.
     #[inline]
     pub const fn new(bytes: &'a [u8]) -> Self {
         Self {
@@ -17,13 +17,13 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// How many registers.
+    /// Returns the number of registers.
     #[inline]
     pub const fn count(self) -> usize {
         self.words.len()
     }
 
-    /// The register `index` places after the first; `None` beyond the last.
+    /// Returns the register `index` places after the first, or `None` after the last one.
     #[inline]
     pub fn get(self, index: u16) -> Option<u16> {
         self.words
@@ -32,7 +32,7 @@ impl<'a> Words<'a> {
             .map(u16::from_be_bytes)
     }
 
-    /// `count` registers from the one `start` places after the first; fewer where they end.
+    /// Returns `count` registers from the one `start` places after the first, or fewer at the end.
     #[inline]
     pub fn slice(self, start: u16, count: u16) -> Self {
         let (_, words) = self
@@ -43,21 +43,21 @@ impl<'a> Words<'a> {
         Self { words }
     }
 
-    /// The registers in order.
+    /// Iterates over the registers in order.
     #[inline]
     pub fn iter(self) -> impl ExactSizeIterator<Item = u16> + 'a {
         self.words.iter().copied().map(u16::from_be_bytes)
     }
 }
 
-/// Takes the registers of a read reply, in the order of their addresses.
+/// Receives the registers of a read reply, in the order of their addresses.
 #[derive(Debug)]
 pub struct WordsOut<'a> {
     slots: slice::IterMut<'a, [u8; 2]>,
 }
 
 impl<'a> WordsOut<'a> {
-    /// Room for as many registers as fit `bytes`.
+    /// Prepares room for as many registers as fit `bytes`.
     #[inline]
     pub fn new(bytes: &'a mut [u8]) -> Self {
         Self {
@@ -65,7 +65,7 @@ impl<'a> WordsOut<'a> {
         }
     }
 
-    /// Appends a register; more than there is room for are ignored.
+    /// Appends a register. Registers without room are ignored.
     #[inline]
     pub fn push(&mut self, word: u16) {
         if let Some(slot) = self.slots.next() {
@@ -73,7 +73,7 @@ impl<'a> WordsOut<'a> {
         }
     }
 
-    /// Sets what has not been pushed to 0, so that nothing old leaves the device.
+    /// Sets the registers that were not pushed to 0, so that no old data is sent.
     pub(crate) fn finish(self) {
         for slot in self.slots {
             *slot = [0; 2];
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_high_byte_comes_first_and_an_odd_byte_is_left_out() {
+    fn the_high_byte_is_first_and_an_odd_byte_is_ignored() {
         let words = Words::new(&[0x12, 0x34, 0x56, 0x78, 0x9A]);
         assert!(words.iter().eq([0x1234, 0x5678]));
         assert_eq!(
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_pushed_too_much_or_too_little_does_no_harm() {
+    fn too_many_or_too_few_pushed_registers_are_harmless() {
         let mut bytes = [0xFF; 5];
         let mut out = WordsOut::new(&mut bytes);
         (0..3).for_each(|_| out.push(0x0102));

@@ -1,4 +1,4 @@
-//! Whose request it is, and life on a line shared with other units (V1.02 2.1, 2.2).
+//! Unit addresses, and traffic of other units on the same line (V1.02 2.1, 2.2).
 
 mod common;
 
@@ -26,7 +26,7 @@ fn nothing_is_answered_or_written_for_another_unit() {
     }
     assert_eq!(unit.points, points);
     let counters = unit.counters();
-    assert_eq!(counters.bus_messages, 254 * 4, "heard, each of them");
+    assert_eq!(counters.bus_messages, 254 * 4, "every frame is counted");
     assert_eq!(
         (
             counters.unit_messages,
@@ -39,8 +39,8 @@ fn nothing_is_answered_or_written_for_another_unit() {
 }
 
 #[test]
-fn the_highest_address_is_one_like_any_other() {
-    // A device may use it for a mode of its own.
+fn the_highest_address_works_like_any_other() {
+    // A device may use address 255 for a special mode.
     let mut unit = Unit::with(255, false, Points::new(1, 1));
     let request = frame(255, &pdu(0x06, &[0, 7]));
     assert_eq!(unit.raw(&request), Some(request));
@@ -50,7 +50,7 @@ fn the_highest_address_is_one_like_any_other() {
 }
 
 #[test]
-fn other_units_replies_are_never_taken_for_requests() {
+fn replies_of_other_units_are_never_treated_as_requests() {
     let mut unit = unit();
     let points = unit.points.clone();
     for reply in [
@@ -69,7 +69,7 @@ fn other_units_replies_are_never_taken_for_requests() {
 }
 
 #[test]
-fn other_units_broken_traffic_makes_the_unit_neither_deaf_nor_talkative() {
+fn damaged_traffic_of_other_units_is_ignored_and_the_next_request_answered() {
     let mut unit = unit();
     let theirs = frame(UNIT + 1, &write_words(0, &[0x1234; 60]));
     for len in 1..theirs.len() {
@@ -79,13 +79,13 @@ fn other_units_broken_traffic_makes_the_unit_neither_deaf_nor_talkative() {
 }
 
 #[test]
-fn set_of_units_is_served_under_each_of_its_addresses() {
+fn a_set_of_units_is_served_under_each_of_its_addresses() {
     const UNITS: UnitSet = UnitSet::new(&[1, 17, 255]);
     let mut adus = [Adu::new(), Adu::new()];
     let mut port = Port::new(Receiver::rtu(UNITS, false), &mut adus);
     port.long_silence(0);
     let mut server = Server::new(Framing::Rtu);
-    // A virtual unit for each address: its register 0 holds the address at first.
+    // One virtual unit per address. Initially, the unit's register 0 holds its address.
     let mut registers: Vec<u16> = (0..256).collect();
     let mut exchange = |to: u8, pdu: &[u8]| {
         for byte in frame(to, pdu) {
@@ -94,7 +94,7 @@ fn set_of_units_is_served_under_each_of_its_addresses() {
         assert_eq!(port.long_silence(0), port.waiting().is_some());
         let unit = port.waiting()?;
         assert_eq!(unit, to);
-        // A broadcast is for all of them.
+        // A broadcast is executed by all of them.
         let mut register = [registers[usize::from(unit)]];
         let mut tables = Tables {
             holding_registers: &mut register,
@@ -129,13 +129,13 @@ fn set_of_units_is_served_under_each_of_its_addresses() {
     assert_eq!(exchange(1, &read), Some(frame(1, &[3, 2, 0, 1])));
     assert_eq!(exchange(0, &pdu(0x06, &[0, 7])), None);
     assert_eq!(exchange(255, &read), Some(frame(255, &[3, 2, 0, 7])));
-    // One event counter for all of them.
+    // All addresses share one event counter.
     let events = exchange(1, &[0x0B]);
     assert_eq!(events, Some(frame(1, &[0x0B, 0, 0, 0, 8])));
 }
 
 #[test]
-fn listen_only_mode_of_one_address_silences_all_and_each_ends_it() {
+fn listen_only_mode_of_one_address_silences_all_and_any_address_ends_it() {
     let units = UnitSet::new(&[1, 17]);
     let mut adus = [Adu::new(), Adu::new()];
     let mut port = Port::new(Receiver::rtu(units, false), &mut adus);

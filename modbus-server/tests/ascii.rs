@@ -1,5 +1,5 @@
-//! ASCII mode (V1.02 2.5.2): what makes a frame, and what spoils one. What comes after the framing
-//! is the same as in RTU mode; the property tests run in both.
+//! ASCII mode (V1.02 2.5.2): valid and damaged frames. Everything above the framing is the same as in RTU mode; the
+//! property tests run in both modes.
 
 mod common;
 
@@ -15,7 +15,7 @@ fn request() -> Vec<u8> {
     ascii_frame(UNIT, &pdu(0x03, &[0, 1]), b'\n')
 }
 
-/// Sends nothing but a frame that must be ignored and counted as an error, by the next at last.
+/// Sends characters that must be ignored and counted as one error, at the latest with the next frame.
 fn is_an_error(unit: &mut Unit, characters: &[u8]) {
     let before = unit.counters().communication_errors;
     assert_eq!(unit.raw(characters), None, "{characters:02X?}");
@@ -28,26 +28,26 @@ fn is_an_error(unit: &mut Unit, characters: &[u8]) {
 }
 
 #[test]
-fn a_request_is_answered_in_kind() {
+fn an_ascii_request_gets_an_ascii_reply() {
     let mut unit = unit();
     unit.points.words[0x6B..0x6E].copy_from_slice(&[0x022B, 0x0000, 0x0063]);
-    // The classic example of the protocol's first description, for unit 17 here: read 006B, 3.
+    // The example of the first protocol description, here for unit 17: read 3 words from 006B.
     let reply = unit.raw(b":1103006B00037E\r\n");
     assert_eq!(reply.as_deref(), Some(&b":110306022B0000006356\r\n"[..]));
-    // And refused: 11 + 83 + 03 = 97, and 69 makes it 100.
+    // A rejected request: 11 + 83 + 03 = 97, and 69 makes it 100.
     let reply = unit.raw(b":110300000000EC\r\n");
     assert_eq!(reply.as_deref(), Some(&b":11830369\r\n"[..]));
 }
 
 #[test]
-fn the_lrc_example_of_the_standard() {
-    // V1.02 6.2.1 has none with numbers; this is the sum it describes.
+fn the_lrc_matches_the_standard() {
+    // V1.02 6.2.1 has no example with numbers; this is the sum that it describes.
     assert_eq!(common::lrc(&[0x02, 0x07]), 0xF7);
     assert_eq!(ascii_frame(2, &[7], b'\n'), b":0207F7\r\n");
 }
 
 #[test]
-fn small_letters_and_other_characters_spoil_a_frame() {
+fn small_letters_and_other_characters_damage_a_frame() {
     let good = request();
     for at in 1..good.len() - 2 {
         for character in (0..=255_u8).filter(|c| !c.is_ascii_hexdigit() || c.is_ascii_lowercase()) {
@@ -65,7 +65,7 @@ fn small_letters_and_other_characters_spoil_a_frame() {
 }
 
 #[test]
-fn a_wrong_lrc_is_bad() {
+fn a_frame_with_a_wrong_lrc_gets_silence() {
     let mut unit = unit();
     let good = request();
     for at in 1..good.len() - 2 {
@@ -80,7 +80,7 @@ fn a_wrong_lrc_is_bad() {
 }
 
 #[test]
-fn a_colon_in_the_middle_starts_anew() {
+fn a_colon_inside_a_frame_starts_a_new_frame() {
     for at in 1..request().len() {
         let mut unit = unit();
         let joined = [&request()[..at], &request()].concat();
@@ -94,7 +94,7 @@ fn a_colon_in_the_middle_starts_anew() {
 }
 
 #[test]
-fn what_comes_before_a_colon_is_nothing() {
+fn characters_before_a_colon_are_ignored() {
     let mut unit = unit();
     for noise in [
         &b"0123456789"[..],
@@ -109,7 +109,7 @@ fn what_comes_before_a_colon_is_nothing() {
 
 #[test]
 fn at_power_up_no_silence_is_needed() {
-    // Even in the middle of another's traffic the next colon is the start of a frame.
+    // Even after the second half of another frame the next colon starts a frame.
     let mut unit = unit();
     unit.characters(&request()[7..]);
     assert!(unit.raw(&request()).is_some());
@@ -135,7 +135,7 @@ fn half_bytes_and_too_few_or_too_many_of_them_are_errors() {
 }
 
 #[test]
-fn the_longest_request_and_reply_get_through() {
+fn the_longest_request_and_reply_are_accepted() {
     let mut unit = unit();
     let words: Vec<u16> = (0..123).map(|n| n * 0x0111).collect();
     let echo = unit.request(&write_words(0, &words));
@@ -148,19 +148,23 @@ fn the_longest_request_and_reply_get_through() {
 }
 
 #[test]
-fn a_second_of_silence_ends_a_frame_badly() {
+fn a_second_of_silence_inside_a_frame_damages_it() {
     for len in 1..request().len() {
         let mut unit = unit();
         assert_eq!(unit.raw(&request()[..len]), None);
         assert_eq!(unit.counters().communication_errors, 1);
-        assert_eq!(unit.raw(&request()[len..]), None, "the rest has no start");
+        assert_eq!(
+            unit.raw(&request()[len..]),
+            None,
+            "the rest of the frame has no start"
+        );
         assert_eq!(unit.counters().communication_errors, 1);
         unit.must_answer();
     }
 }
 
 #[test]
-fn short_silences_mean_nothing() {
+fn short_silences_are_ignored() {
     let mut unit = unit();
     for character in request() {
         unit.pause();
@@ -171,7 +175,7 @@ fn short_silences_mean_nothing() {
 }
 
 #[test]
-fn a_faulty_character_anywhere_spoils_its_frame() {
+fn a_faulty_character_anywhere_damages_its_frame() {
     for at in 0..request().len() {
         let mut unit = unit();
         for (index, character) in request().into_iter().enumerate() {
@@ -189,12 +193,12 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
 }
 
 #[test]
-fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_lrc() {
+fn noise_flag_alone_does_not_damage_a_frame_with_a_valid_lrc() {
     for width in [Width::Seven, Width::Eight] {
         for at in 0..=request().len() {
             let mut unit = Unit::ascii(width, Points::new(4, 4));
             for (index, character) in request().into_iter().enumerate() {
-                // In the last round every character is noisy.
+                // In the last round every character has the noise flag.
                 let noisy = index == at || at == request().len();
                 let faults = if noisy { Faults::NOISE } else { Faults::NONE };
                 unit.character(character, faults);
@@ -207,7 +211,7 @@ fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_lrc() {
 }
 
 #[test]
-fn noisy_colon_in_the_middle_starts_a_frame() {
+fn colon_with_noise_flag_inside_a_frame_starts_a_frame() {
     let mut unit = unit();
     unit.characters(&request()[..7]);
     unit.character(b':', Faults::NOISE);
@@ -216,19 +220,19 @@ fn noisy_colon_in_the_middle_starts_a_frame() {
 }
 
 #[test]
-fn in_seven_bits_what_is_above_them_does_not_matter() {
+fn with_seven_data_bits_the_highest_bit_is_ignored() {
     let with_parity = |characters: Vec<u8>| -> Vec<u8> {
         let even = |c: u8| c | (c.count_ones() as u8 & 1) << 7;
         characters.into_iter().map(even).collect()
     };
     let mut seven = Unit::ascii(Width::Seven, Points::new(4, 4));
     let reply = seven.raw(&with_parity(request())).expect("a reply");
-    assert!(reply.is_ascii(), "its parity is the UART's");
+    assert!(reply.is_ascii(), "the UART adds the parity bit");
     assert_eq!(unit().raw(&with_parity(request())), None);
 }
 
 #[test]
-fn low_stop_bit_in_the_highest_bit_spoils_a_frame() {
+fn low_stop_bit_in_the_highest_bit_damages_a_frame() {
     let with_stop = |characters: Vec<u8>| -> Vec<u8> {
         let set = |c: u8| c | 0x80;
         characters.into_iter().map(set).collect()
@@ -252,11 +256,15 @@ fn the_delimiter_can_be_changed() {
     assert_eq!(
         reply,
         Some(ascii_frame(UNIT, &change, b'\n')),
-        "the old one"
+        "the reply still has the old delimiter"
     );
     assert_eq!(unit.server.framing(), Framing::Ascii { delimiter: b'#' });
     unit.must_answer();
-    assert_eq!(unit.raw(&request()), None, "a line feed is no end any more");
+    assert_eq!(
+        unit.raw(&request()),
+        None,
+        "a line feed no longer ends a frame"
+    );
     unit.must_answer();
 
     for (character, low) in [
@@ -271,7 +279,7 @@ fn the_delimiter_can_be_changed() {
     }
     assert_eq!(unit.refused(&[0x08, 0x00, 0x03, b'!']), 3);
 
-    // A restart brings the line feed back, after its own reply.
+    // A restart sets the delimiter back to line feed, after its own reply.
     let restart = [0x08, 0x00, 0x01, 0x00, 0x00];
     let reply = unit.raw(&ascii_frame(UNIT, &restart, b'#'));
     assert_eq!(reply, Some(ascii_frame(UNIT, &restart, b'#')));
@@ -279,7 +287,7 @@ fn the_delimiter_can_be_changed() {
 }
 
 #[test]
-fn others_frames_and_broadcasts_are_as_in_rtu_mode() {
+fn frames_of_other_units_and_broadcasts_are_handled_as_in_rtu_mode() {
     let mut unit = unit();
     let write = write_words(3, &[7]);
     assert_eq!(unit.raw(&ascii_frame(UNIT + 1, &write, b'\n')), None);
@@ -297,7 +305,7 @@ fn others_frames_and_broadcasts_are_as_in_rtu_mode() {
     );
 }
 
-/// A port whose ASCII line is not silent yet.
+/// Returns a port whose ASCII line has received these characters and is not silent yet.
 fn busy(characters: &[u8]) -> Port<'static> {
     let mut port = port(Receiver::ascii(UNIT, Width::Eight));
     receive(&mut port, characters);
@@ -311,14 +319,14 @@ fn receive(port: &mut Port<'_>, characters: &[u8]) {
 }
 
 #[test]
-fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_colon_alone() {
+fn a_complete_frame_that_was_not_taken_is_lost_only_at_the_next_colon() {
     let mut port = busy(&request());
     receive(&mut port, b"\n\r\x001");
     port.received(0, Faults::FRAMING);
     assert!(port.short_silence(0));
     receive(&mut port, b":0103");
     assert!(!port.short_silence(0) && !port.long_silence(0));
-    // A colon takes its place, and no buffer is lost.
+    // The colon of the next frame drops the request, and no buffer is lost.
     for _ in 0..5 {
         receive(&mut port, &request());
     }
@@ -327,16 +335,16 @@ fn a_frame_that_is_over_and_not_taken_is_lost_with_the_next_colon_alone() {
 }
 
 #[test]
-fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
+fn valid_frame_dropped_by_the_next_colon_is_counted_as_unanswered() {
     let good = [(UNIT, [1, 1]), (0, [1, 1]), (UNIT + 1, [1, 0])];
     for (to, expected) in good {
-        // Complete with CR LF, but the next frame begins before the line is free for a reply.
+        // The frame is complete with CR LF, but the next one begins before the line is free for a reply.
         let mut port = busy(&ascii_frame(to, &pdu(0x06, &[0, 7]), b'\n'));
         receive(&mut port, b":");
         assert!(!port.long_silence(0));
         assert_eq!(port.waiting(), None);
         let counters = port.counters();
-        // The second colon, which the time-out ended.
+        // The frame of the second colon, which the time-out ended.
         assert_eq!(counters.communication_errors, 1);
         let counted = [counters.bus_messages, counters.dropped];
         assert_eq!(counted, expected, "to {to}");

@@ -1,4 +1,4 @@
-//! The diagnostic counters (V1.02 appendix A), and the life of the buffers.
+//! The diagnostic counters (V1.02 appendix A), and the use of the buffers.
 
 mod common;
 
@@ -11,7 +11,7 @@ fn unit() -> Unit {
 }
 
 #[test]
-fn each_request_moves_the_counters_it_should() {
+fn each_request_increments_the_right_counters() {
     let mut unit = unit();
     let mut expected = Counters::default();
     let good = pdu(0x03, &[0, 1]);
@@ -20,13 +20,13 @@ fn each_request_moves_the_counters_it_should() {
     unit.raw(&frame(UNIT, &good));
     expected.bus_messages += 1;
     expected.unit_messages += 1;
-    assert_eq!(unit.counters(), expected, "a good request");
+    assert_eq!(unit.counters(), expected, "a valid request");
 
     unit.raw(&frame(UNIT, &beyond));
     expected.bus_messages += 1;
     expected.unit_messages += 1;
     expected.exceptions += 1;
-    assert_eq!(unit.counters(), expected, "a refused one");
+    assert_eq!(unit.counters(), expected, "a rejected request");
 
     unit.raw(&frame(0, &pdu(0x06, &[0, 1])));
     expected.bus_messages += 1;
@@ -39,15 +39,15 @@ fn each_request_moves_the_counters_it_should() {
     expected.unit_messages += 1;
     expected.no_response += 1;
     expected.exceptions += 1;
-    assert_eq!(unit.counters(), expected, "a bad broadcast");
+    assert_eq!(unit.counters(), expected, "a rejected broadcast");
 
     unit.raw(&frame(UNIT + 1, &good));
     expected.bus_messages += 1;
-    assert_eq!(unit.counters(), expected, "another unit's");
+    assert_eq!(unit.counters(), expected, "a request for another unit");
 
     unit.raw(&frame(UNIT, &good)[..7]);
     expected.communication_errors += 1;
-    assert_eq!(unit.counters(), expected, "a truncated one");
+    assert_eq!(unit.counters(), expected, "a truncated request");
 
     for (state, nak, busy) in [
         (Exception::ServerDeviceFailure, 0, 0),
@@ -64,7 +64,7 @@ fn each_request_moves_the_counters_it_should() {
         assert_eq!(unit.counters(), expected, "{state:?}");
     }
 
-    // On a broadcast neither was returned.
+    // For a broadcast no exception is returned, so neither is counted.
     unit.points.state = Some(Exception::ServerDeviceBusy.code());
     unit.raw(&frame(0, &pdu(0x06, &[0, 1])));
     expected.bus_messages += 1;
@@ -88,14 +88,14 @@ fn counters_wrap() {
     assert_eq!(counters.as_words(), [2, 2, 0, 2, 0, 0, 0, 2, 2]);
 }
 
-/// A receiver that has heard its first silence, and has no buffer.
+/// Returns a receiver that has detected its first silence and has no buffer.
 fn receiver() -> Receiver<'static> {
     let mut receiver = Receiver::rtu(UNIT, false);
     receiver.close();
     receiver
 }
 
-fn hear(receiver: &mut Receiver<'_>, bytes: &[u8]) {
+fn receive(receiver: &mut Receiver<'_>, bytes: &[u8]) {
     bytes
         .iter()
         .for_each(|byte| receiver.character(*byte, Faults::NONE));
@@ -110,21 +110,21 @@ fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     let mut receiver = receiver();
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     receiver.give_back(buffer());
-    hear(&mut receiver, &ours);
-    let first = receiver.close().expect("it had a buffer").adu;
+    receive(&mut receiver, &ours);
+    let first = receiver.close().expect("a buffer was free").adu;
 
-    hear(&mut receiver, &ours);
+    receive(&mut receiver, &ours);
     receiver.pause();
     assert!(receiver.close().is_none());
     assert_eq!(receiver.counters().dropped, 1);
-    // What would not have been served anyway is not counted as dropped.
-    hear(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
+    // Frames that would not have been served anyway are not counted as dropped.
+    receive(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
     assert!(receiver.close().is_none());
-    hear(&mut receiver, &ours[..7]);
+    receive(&mut receiver, &ours[..7]);
     assert!(receiver.close().is_none());
-    hear(&mut receiver, &frame(UNIT, &[]));
+    receive(&mut receiver, &frame(UNIT, &[]));
     assert!(receiver.close().is_none());
-    hear(&mut receiver, &frame(UNIT, &[0x63; 300]));
+    receive(&mut receiver, &frame(UNIT, &[0x63; 300]));
     assert!(receiver.close().is_none());
     receiver.character(UNIT, Faults::PARITY);
     assert!(receiver.close().is_none());
@@ -135,27 +135,27 @@ fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     );
 
     receiver.give_back(first);
-    hear(&mut receiver, &ours);
-    let closed = receiver.close().expect("a buffer again");
+    receive(&mut receiver, &ours);
+    let closed = receiver.close().expect("a buffer is free again");
     assert_eq!(closed.adu.as_slice(), &ours[..6]);
 
     assert_eq!(closed.line.dropped, 1);
 }
 
 #[test]
-fn buffers_that_come_back_in_the_middle_of_a_frame_wait_for_the_next() {
+fn buffers_given_back_during_a_frame_are_used_for_the_next() {
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     for at in 1..ours.len() {
         let mut receiver = receiver();
-        hear(&mut receiver, &ours[..at]);
+        receive(&mut receiver, &ours[..at]);
         receiver.give_back(buffer());
         receiver.give_back(buffer());
-        hear(&mut receiver, &ours[at..]);
+        receive(&mut receiver, &ours[at..]);
         receiver.pause();
         assert!(receiver.close().is_none());
         assert_eq!(receiver.counters().dropped, 1);
         for _ in 0..2 {
-            hear(&mut receiver, &ours);
+            receive(&mut receiver, &ours);
             assert_eq!(
                 receiver.close().expect("a buffer").adu.as_slice(),
                 &ours[..6]
@@ -170,23 +170,23 @@ fn two_requests_can_be_held_at_once() {
     receiver.give_back(buffer());
     receiver.give_back(buffer());
     let [one, two] = [1, 2].map(|count| frame(UNIT, &pdu(0x03, &[0, count])));
-    hear(&mut receiver, &one);
+    receive(&mut receiver, &one);
     let first = receiver.close().expect("the first");
-    hear(&mut receiver, &two);
+    receive(&mut receiver, &two);
     let second = receiver.close().expect("the second");
     assert_eq!(first.adu.as_slice(), &one[..6]);
     assert_eq!(second.adu.as_slice(), &two[..6]);
 }
 
 #[test]
-fn frames_for_others_cost_no_buffer() {
+fn frames_for_other_units_use_no_buffer() {
     let mut receiver = receiver();
     receiver.give_back(buffer());
     for _ in 0..5 {
-        hear(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
+        receive(&mut receiver, &frame(UNIT + 1, &pdu(0x03, &[0, 1])));
         assert!(receiver.close().is_none());
     }
-    hear(&mut receiver, &frame(UNIT, &pdu(0x03, &[0, 1])));
+    receive(&mut receiver, &frame(UNIT, &pdu(0x03, &[0, 1])));
     assert!(receiver.close().is_some());
 }
 
@@ -196,12 +196,12 @@ fn a_third_buffer_does_not_disturb_a_frame() {
     receiver.give_back(buffer());
     receiver.give_back(buffer());
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
-    hear(&mut receiver, &ours);
+    receive(&mut receiver, &ours);
     let first = receiver.close().expect("the first").adu;
-    hear(&mut receiver, &ours[..3]);
+    receive(&mut receiver, &ours[..3]);
     receiver.give_back(first);
     receiver.give_back(buffer());
-    hear(&mut receiver, &ours[3..]);
+    receive(&mut receiver, &ours[3..]);
     assert_eq!(receiver.close().expect("whole").adu.as_slice(), &ours[..6]);
 }
 
@@ -212,7 +212,7 @@ fn counters_read_while_a_request_is_pending_do_not_wrap() {
     unit.characters(&frame(UNIT, &[0x0C]));
     assert!(unit.port.long_silence(0));
     let pending = unit.server.take(&mut unit.port, 0).expect("a request");
-    // A bad frame while the request is pending.
+    // A damaged frame is received while the request is pending.
     unit.characters(&[0x55; 5]);
     assert!(!unit.port.long_silence(0));
     assert_eq!(at_port(&unit), [1, 1, 0, 0, 0, 0, 0, 0, 0]);

@@ -1,4 +1,4 @@
-//! Functions 07, 08, 0B, 0C and 11: what the device tells of itself (V1.1b3 6.7 to 6.10, 6.13).
+//! Functions 07, 08, 0B, 0C and 11: diagnostics and identity of the device (V1.1b3 6.7 to 6.10, 6.13).
 
 mod common;
 
@@ -10,12 +10,12 @@ fn unit() -> Unit {
     Unit::new(Points::new(64, 64))
 }
 
-/// Function 08.
+/// Returns a request of function 08.
 fn diagnose(sub: u16, data: u16) -> Vec<u8> {
     pdu(0x08, &[sub, data])
 }
 
-/// What a sub-function gives back; its reply repeats the rest of the request.
+/// Returns the value in the reply to a sub-function. The rest of the reply must repeat the request.
 fn value(unit: &mut Unit, sub: u16) -> u16 {
     let reply = unit.request(&diagnose(sub, 0)).expect("a reply");
     assert_eq!(reply[..3], diagnose(sub, 0)[..3]);
@@ -23,7 +23,7 @@ fn value(unit: &mut Unit, sub: u16) -> u16 {
     u16::from_be_bytes([reply[3], reply[4]])
 }
 
-/// Status, event count, message count and events of function 0C.
+/// Returns status, event count, message count and events of function 0C.
 fn log(unit: &mut Unit) -> (u16, u16, u16, Vec<u8>) {
     let reply = unit.request(&[0x0C]).expect("a reply");
     assert_eq!((reply[0], usize::from(reply[1])), (0x0C, reply.len() - 2));
@@ -31,7 +31,7 @@ fn log(unit: &mut Unit) -> (u16, u16, u16, Vec<u8>) {
     (word(2), word(4), word(6), reply[8..].to_vec())
 }
 
-/// The count of function 0B.
+/// Returns the count of function 0B.
 fn events(unit: &mut Unit) -> u16 {
     let reply = unit.request(&[0x0B]).expect("a reply");
     assert_eq!((reply.len(), &reply[..3]), (5, &[0x0B, 0, 0][..]));
@@ -39,12 +39,12 @@ fn events(unit: &mut Unit) -> u16 {
 }
 
 #[test]
-fn the_exception_status_is_the_standard_s_example() {
+fn the_exception_status_matches_the_example_of_the_standard() {
     assert_eq!(unit().request(&[0x07]), Some(vec![0x07, 0x6D]));
 }
 
 #[test]
-fn functions_without_fields_take_none() {
+fn functions_without_fields_reject_additional_bytes() {
     for function in [0x07, 0x0B, 0x0C, 0x11] {
         assert_eq!(unit().refused(&[function, 0]), 3);
         assert_eq!(unit().refused(&[function, 0, 0, 0, 0]), 3);
@@ -52,9 +52,9 @@ fn functions_without_fields_take_none() {
 }
 
 #[test]
-fn data_of_any_length_comes_back() {
+fn data_of_any_length_is_echoed() {
     let mut unit = unit();
-    // The standard's example.
+    // The example of the standard.
     let example = [0x08, 0x00, 0x00, 0xA5, 0x37];
     assert_eq!(unit.request(&example), Some(example.to_vec()));
     for len in 0..=250 {
@@ -65,7 +65,7 @@ fn data_of_any_length_comes_back() {
 }
 
 #[test]
-fn sub_functions_that_are_not_there_are_01_and_data_that_is_not_zero_is_03() {
+fn unknown_sub_functions_return_01_and_data_other_than_zero_returns_03() {
     let there = [
         1, 2, 4, 0x0A, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x10, 0x11, 0x12, 0x14,
     ];
@@ -91,29 +91,33 @@ fn sub_functions_that_are_not_there_are_01_and_data_that_is_not_zero_is_03() {
 }
 
 #[test]
-fn the_diagnostic_register_is_the_device_s() {
+fn the_diagnostic_register_is_that_of_the_device() {
     assert_eq!(value(&mut unit(), 0x02), 0xAB6D);
 }
 
 #[test]
-fn a_cleared_bit_of_the_diagnostic_register_stays_so_until_it_is_set_anew() {
+fn a_cleared_bit_of_the_diagnostic_register_stays_0_until_it_is_set_again() {
     let mut unit = unit();
     let clear = diagnose(0x0A, 0);
     assert_eq!(unit.request(&clear), Some(clear));
-    assert_eq!(value(&mut unit, 0x02), 0, "all that was set");
+    assert_eq!(value(&mut unit, 0x02), 0, "all set bits were cleared");
     unit.points.status = 0x6F;
-    assert_eq!(value(&mut unit, 0x02), 0x0002, "a new one");
+    assert_eq!(value(&mut unit, 0x02), 0x0002, "a newly set bit");
     unit.points.status = 0x00;
     assert_eq!(value(&mut unit, 0x02), 0);
     unit.points.status = 0x6F;
-    assert_eq!(value(&mut unit, 0x02), 0x006F, "those that had gone");
-    // A restart of communication clears counters alone.
+    assert_eq!(
+        value(&mut unit, 0x02),
+        0x006F,
+        "the bits that were 0 in between"
+    );
+    // A restart of communication clears only the counters.
     unit.request(&diagnose(0x01, 0)).expect("an echo");
     assert_eq!(value(&mut unit, 0x02), 0x006F);
 }
 
 #[test]
-fn every_counter_can_be_asked_for() {
+fn every_counter_can_be_read() {
     let mut unit = unit();
     for _ in 0..3 {
         unit.raw(&frame(UNIT + 1, &[0x07])); // 3 on the bus
@@ -140,7 +144,7 @@ fn every_counter_can_be_asked_for() {
         unit.refused(&pdu(0x03, &[0, 1])); // 9 busy
     }
     unit.points.state = None;
-    // Each that asks is among those that have been heard.
+    // Each request that reads a counter is itself counted.
     let to_us = 6 + 7 + 8 + 9;
     assert_eq!(value(&mut unit, 0x0B), 3 + to_us + 1);
     assert_eq!(value(&mut unit, 0x0C), 4 + 5);
@@ -151,21 +155,21 @@ fn every_counter_can_be_asked_for() {
     assert_eq!(value(&mut unit, 0x11), 9);
     assert_eq!(value(&mut unit, 0x12), 5);
 
-    // 14 clears the overruns alone.
+    // 14 clears only the overruns.
     unit.request(&diagnose(0x14, 0)).expect("an echo");
     assert_eq!((value(&mut unit, 0x12), value(&mut unit, 0x0C)), (0, 9));
-    // 0A clears all, and the event counter.
+    // 0A clears all counters, including the event counter.
     let clear = diagnose(0x0A, 0);
     assert_eq!(unit.request(&clear), Some(clear));
     assert_eq!(unit.counters().as_words(), [0; 9]);
     assert_eq!(events(&mut unit), 0);
     assert_eq!(value(&mut unit, 0x0B), 2);
     unit.raw(&[UNIT, 1, 2]);
-    assert_eq!(value(&mut unit, 0x0C), 1, "they go on from there");
+    assert_eq!(value(&mut unit, 0x0C), 1, "counting continues from 0");
 }
 
 #[test]
-fn the_event_counter_counts_what_succeeds() {
+fn the_event_counter_counts_successful_requests() {
     let mut unit = unit();
     assert_eq!(events(&mut unit), 0);
     assert_eq!(events(&mut unit), 0, "0B itself does not count");
@@ -178,14 +182,18 @@ fn the_event_counter_counts_what_succeeds() {
     unit.raw(&frame(0, &pdu(0x03, &[0, 1])));
     unit.raw(&frame(0, &write_words(64, &[1])));
     assert_eq!(events(&mut unit), 2, "one without effect does not");
-    assert_eq!(log(&mut unit).1, 2, "0C tells what 0B does");
+    assert_eq!(log(&mut unit).1, 2, "0C returns the same count as 0B");
     assert_eq!(events(&mut unit), 2, "and does not count either");
 }
 
 #[test]
-fn the_log_tells_what_happened_the_newest_first() {
+fn the_log_contains_the_events_newest_first() {
     let mut unit = unit();
-    assert_eq!(log(&mut unit), (0, 0, 1, vec![0x80]), "its own reception");
+    assert_eq!(
+        log(&mut unit),
+        (0, 0, 1, vec![0x80]),
+        "only its own reception"
+    );
     unit.must_answer();
     unit.refused(&[0x63]);
     unit.points.state = Some(Exception::ServerDeviceFailure.code());
@@ -200,9 +208,9 @@ fn the_log_tells_what_happened_the_newest_first() {
         0x80, 0x40, // a read
         0x80, 0x41, // an unknown function
         0x80, 0x42, // a failure
-        0x92, 0x82, // of two bad frames one had an overrun
+        0x92, 0x82, // two damaged frames, one with an overrun
         0xC0, 0x40, // a broadcast
-        0x80, // this
+        0x80, // this request
     ];
     let (_, count, messages, events) = log(&mut unit);
     assert!(events.iter().rev().eq(newest_last.iter()), "{events:02X?}");
@@ -226,7 +234,7 @@ fn the_log_holds_64_events() {
 }
 
 #[test]
-fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
+fn a_unit_in_listen_only_mode_executes_only_the_restart() {
     let mut unit = unit();
     unit.must_answer();
     assert_eq!(unit.request(&diagnose(0x04, 0)), None);
@@ -237,7 +245,7 @@ fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
             pdu(0x03, &[0, 1]),
             write_words(0, &[1]),
             vec![0x63],
-            pdu(0x06, &[1, 0xFF00]), // what follows 06 is what would follow 08 for a restart
+            pdu(0x06, &[1, 0xFF00]), // the bytes after 06 equal those after 08 for a restart
             vec![0x0B],
             diagnose(0x04, 0),
             diagnose(0x0A, 0),
@@ -247,7 +255,7 @@ fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
             assert_eq!(unit.raw(&frame(to, &request)), None, "{request:02X?}");
         }
     }
-    // Nor does a restart for all or for another end it.
+    // A restart by broadcast or for another unit does not end the mode.
     assert_eq!(unit.raw(&frame(0, &diagnose(0x01, 0))), None);
     assert_eq!(unit.raw(&frame(UNIT + 1, &diagnose(0x01, 0))), None);
     assert!(unit.server.is_listen_only());
@@ -260,22 +268,27 @@ fn a_unit_that_only_listens_obeys_nothing_but_the_restart() {
             counters.no_response
         ),
         (22, 21, 20),
-        "it goes on counting"
+        "counting continues"
     );
     assert_eq!(counters.exceptions, 0);
 
-    assert_eq!(unit.request(&diagnose(0x01, 0)), None, "no reply to this");
+    assert_eq!(
+        unit.request(&diagnose(0x01, 0)),
+        None,
+        "the restart is not answered"
+    );
     assert_eq!(unit.counters().as_words(), [0; 9]);
     let (status, count, messages, events) = log(&mut unit);
     assert_eq!((status, count, messages), (0, 0, 1));
-    // This, the restart, its end and its reception, and so on back to where it began.
+    // The newest events first: this request, the restart, the end of the previous request and its reception, and so
+    // on.
     assert_eq!(events[..6], [0x80, 0x00, 0x60, 0xA0, 0x60, 0xE0]);
     assert_eq!(events[events.len() - 5..], [0x04, 0x40, 0x80, 0x40, 0x80]);
     unit.must_answer();
 }
 
 #[test]
-fn a_restart_is_answered_and_clears_counters_and_if_told_the_log() {
+fn a_restart_is_answered_and_clears_counters_and_with_ff00_the_log() {
     for (data, before) in [(0x0000, true), (0xFF00, false)] {
         let mut unit = unit();
         unit.must_answer();
@@ -296,7 +309,7 @@ fn a_restart_is_answered_and_clears_counters_and_if_told_the_log() {
 }
 
 #[test]
-fn a_broadcast_diagnoses_nothing() {
+fn a_broadcast_of_diagnostics_has_no_effect() {
     let mut unit = unit();
     unit.must_answer();
     for sub in [0x00, 0x01, 0x04, 0x0A, 0x14] {
@@ -307,12 +320,12 @@ fn a_broadcast_diagnoses_nothing() {
 }
 
 #[test]
-fn in_rtu_mode_there_is_no_delimiter_to_change() {
+fn in_rtu_mode_changing_the_delimiter_returns_01() {
     assert_eq!(unit().refused(&diagnose(0x03, 0x2300)), 1);
 }
 
 #[test]
-fn the_server_tells_its_identity_and_whether_it_runs() {
+fn the_server_reports_its_identity_and_run_indicator() {
     let mut unit = unit();
     assert_eq!(unit.request(&[0x11]), Some(vec![0x11, 2, 0x42, 0xFF]));
     unit.points.running = false;

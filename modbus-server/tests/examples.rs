@@ -23,7 +23,7 @@ use common::{delimiter, framed, pdu, unframed, write_words};
 use modbus_server::line::Framing;
 use serial2::SerialPort;
 
-/// A master's end of a line.
+/// The master's end of a line.
 struct Master {
     port: SerialPort,
     framing: Framing,
@@ -31,10 +31,10 @@ struct Master {
 }
 
 impl Master {
-    /// A line: a master, and the port of the unit.
+    /// Creates a line: a master, and the port of the unit.
     fn new(framing: Framing, unit: u8) -> (Self, SerialPort) {
         let (mut port, units) = SerialPort::pair().expect("a pseudo-terminal");
-        // Long enough for a busy machine.
+        // Long enough for a machine under load.
         port.set_read_timeout(Duration::from_secs(2)).unwrap();
         let master = Self {
             port,
@@ -44,8 +44,8 @@ impl Master {
         (master, units)
     }
 
-    /// The PDU of the reply. A request is repeated, as by any master: the unit may not be listening
-    /// yet, or the machine may have been too slow to send a frame without a silence in it.
+    /// Returns the PDU of the reply. Like any master, it repeats a request: the unit may not be running yet, or a
+    /// busy machine may have sent the frame with a silence in it.
     fn ask(&self, pdu: &[u8]) -> Vec<u8> {
         for _ in 0..5 {
             let request = framed(delimiter(self.framing), self.unit, pdu);
@@ -71,7 +71,7 @@ impl Master {
         Some(pdu.to_vec())
     }
 
-    /// Whether these bytes end a frame; in RTU mode of a read, a write or an exception.
+    /// Returns whether these bytes are a complete frame; in RTU mode of a read, a write or an exception.
     fn is_whole(&self, reply: &[u8]) -> bool {
         match (self.framing, reply) {
             (Framing::Ascii { .. }, reply) => reply.ends_with(b"\r\n"),
@@ -91,7 +91,7 @@ fn the_rtu_example_serves_its_tables() {
     assert_eq!(master.ask(&pdu(0x03, &[4, 2])), [0x03, 4, 0, 7, 0, 8]);
     master.ask(&pdu(0x05, &[6, 0xFF00]));
     assert_eq!(master.ask(&pdu(0x01, &[0, 8])), [0x01, 1, 0b0100_0000]);
-    assert_eq!(master.ask(&pdu(0x03, &[9, 2])), [0x83, 2], "past the end");
+    assert_eq!(master.ask(&pdu(0x03, &[9, 2])), [0x83, 2], "after the end");
     assert_eq!(master.ask(&pdu(0x02, &[0, 1])), [0x82, 1], "no such table");
     let served = master.ask(&pdu(0x04, &[0, 1]));
     assert!(served[3] >= 7, "{served:02X?}");
@@ -104,7 +104,7 @@ fn the_bare_metal_example_serves_its_registers() {
     assert_eq!(master.ask(&pdu(0x03, &[4, 1])), [0x03, 2, 0x11, 0x11]);
     master.ask(&write_words(4, &[7, 8]));
     assert_eq!(master.ask(&pdu(0x03, &[4, 2])), [0x03, 4, 0, 7, 0, 8]);
-    assert_eq!(master.ask(&pdu(0x03, &[9, 2])), [0x83, 2], "past the end");
+    assert_eq!(master.ask(&pdu(0x03, &[9, 2])), [0x83, 2], "after the end");
 }
 
 #[test]

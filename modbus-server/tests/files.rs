@@ -1,12 +1,12 @@
-//! File records, functions 14 and 15 (V1.1b3 6.14, 6.15): what is checked, in which order, and how long a request and a
-//! reply may be.
+//! File records, functions 14 and 15 (V1.1b3 6.14, 6.15): the checks and their order, and the lengths of requests
+//! and replies.
 
 mod common;
 
 use common::{MAX_WORD, Points, UNIT, Unit, frame, read_files, write_files};
 use modbus_server::Exception;
 
-/// Four files: 1 of 20 records, 2 of none, 3 of all that a file can have, 4 of 10.
+/// Returns a unit with four files: 1 with 20 records, 2 with none, 3 with the maximum, 4 with 10.
 fn unit() -> Unit {
     let mut points = Points::new(1, 1);
     points.files = vec![vec![0x0101; 20], vec![], vec![0x0303; 10_000], vec![0; 10]];
@@ -43,7 +43,7 @@ fn the_standards_example_of_a_write_is_echoed_and_written() {
 }
 
 #[test]
-fn a_byte_count_that_is_not_allowed_or_not_true_returns_illegal_data_value() {
+fn a_byte_count_that_is_not_allowed_or_wrong_returns_illegal_data_value() {
     let mut unit = unit();
     for function in [0x14, 0x15] {
         assert_eq!(unit.refused(&[function]), 3);
@@ -80,7 +80,7 @@ fn a_read_returns_as_many_records_as_fit_253_bytes() {
     assert_eq!(reply[..4], [0x14, 250, 249, 6]);
     assert_eq!(reply[4..], [3; 248]);
     assert_eq!(unit.refused(&read_files(&[(3, 0, 125)])), 3);
-    // The most groups, and as many records as they leave room for.
+    // The largest number of groups, and as many records as then fit.
     let mut groups = vec![(3, 0, 1); 34];
     groups.push((1, 0, 57));
     assert_eq!(unit.refused(&read_files(&groups)), 3);
@@ -96,7 +96,7 @@ fn a_read_returns_as_many_records_as_fit_253_bytes() {
 }
 
 #[test]
-fn a_write_takes_as_many_records_as_a_frame_holds() {
+fn a_write_accepts_as_many_records_as_fit_a_frame() {
     let mut unit = unit();
     let words: Vec<u16> = (0..122).collect();
     let request = write_files(&[(3, 9_878, words.clone())]);
@@ -128,7 +128,7 @@ fn a_group_that_does_not_exist_returns_illegal_data_address() {
                 .iter()
                 .map(|(file, record, count)| (*file, *record, vec![7; usize::from(*count)]))
                 .collect();
-            // Refused as a whole: the good group is not written.
+            // The request is rejected as a whole: the valid group is not written.
             assert_eq!(unit.refused(&write_files(&writes)), 2, "{groups:?}");
         }
     }
@@ -141,7 +141,7 @@ fn a_group_that_does_not_exist_returns_illegal_data_address() {
 }
 
 #[test]
-fn form_comes_before_address_before_value_before_state_in_all_groups() {
+fn form_is_checked_before_address_before_value_before_state_over_all_groups() {
     let mut unit = unit();
     unit.points.state = Some(Exception::MemoryParityError.code());
     let (bad_value, bad_address) = ((1, 0, vec![MAX_WORD + 1]), (9, 0, vec![1]));
@@ -160,7 +160,7 @@ fn form_comes_before_address_before_value_before_state_in_all_groups() {
 }
 
 #[test]
-fn groups_are_written_in_order_and_by_broadcasts_too() {
+fn groups_are_written_in_order_also_by_broadcasts() {
     let mut unit = unit();
     let request = write_files(&[(1, 0, vec![1, 2]), (1, 1, vec![3]), (4, 9, vec![4])]);
     assert_eq!(unit.raw(&frame(0, &request)), None);

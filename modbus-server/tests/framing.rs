@@ -1,5 +1,5 @@
-//! What makes a frame, and what spoils one (V1.02 2.4.2, 2.5.1). After everything that can go
-//! wrong, silence and then a good request must be answered.
+//! Valid and damaged frames (V1.02 2.4.2, 2.5.1). After every kind of damage, a silence and then a valid request
+//! must be answered.
 
 mod common;
 
@@ -15,7 +15,7 @@ fn request() -> Vec<u8> {
     frame(UNIT, &pdu(0x03, &[0, 1]))
 }
 
-/// Sends nothing but a frame that must be ignored and counted as an error.
+/// Sends bytes that must be ignored and counted as one error.
 fn is_an_error(unit: &mut Unit, bytes: &[u8]) {
     let before = unit.counters().communication_errors;
     assert_eq!(unit.raw(bytes), None, "{bytes:02X?}");
@@ -24,7 +24,7 @@ fn is_an_error(unit: &mut Unit, bytes: &[u8]) {
 }
 
 #[test]
-fn every_single_bit_error_is_caught() {
+fn every_single_bit_error_is_detected() {
     let mut unit = unit();
     let good = request();
     for bit in 0..good.len() * 8 {
@@ -36,7 +36,7 @@ fn every_single_bit_error_is_caught() {
 }
 
 #[test]
-fn a_swapped_crc_is_bad() {
+fn a_swapped_crc_gets_silence() {
     let mut swapped = request();
     let len = swapped.len();
     swapped.swap(len - 1, len - 2);
@@ -45,26 +45,26 @@ fn a_swapped_crc_is_bad() {
 }
 
 #[test]
-fn an_unknown_function_with_a_bad_crc_is_not_answered() {
+fn an_unknown_function_with_a_wrong_crc_is_not_answered() {
     let mut bad = frame(UNIT, &[0x63, 0, 0]);
     bad[2] ^= 1;
     is_an_error(&mut unit(), &bad);
 }
 
 #[test]
-fn one_to_three_bytes_are_noise_even_with_a_good_crc() {
+fn one_to_three_bytes_are_an_error_even_with_a_valid_crc() {
     let mut unit = unit();
     for noise in [&[0x00][..], &[0xFF], &[UNIT, 0x03], &[0x00, 0x00, 0x00]] {
         is_an_error(&mut unit, noise);
     }
     let [low, high] = crc(&[UNIT]);
     is_an_error(&mut unit, &[UNIT, low, high]);
-    // Two bytes that are a good CRC of nothing.
+    // Two bytes that are the valid CRC of an empty frame.
     is_an_error(&mut unit, &[0xFF, 0xFF]);
 }
 
 #[test]
-fn four_bytes_are_a_frame() {
+fn four_bytes_are_the_shortest_frame() {
     assert_eq!(unit().request(&[0x07]).unwrap(), [0x07, 0x6D]);
 }
 
@@ -85,7 +85,7 @@ fn longer_frames_are_dropped_up_to_the_next_silence() {
         assert_eq!(too_long.len(), len);
         is_an_error(&mut unit, &too_long);
 
-        // Even if a good request is the end of it.
+        // This also holds when the bytes end with a valid request.
         let joined = [&vec![0x55; len][..], &request()].concat();
         is_an_error(&mut unit, &joined);
     }
@@ -100,13 +100,13 @@ fn requests_without_silence_between_them_are_both_lost() {
 }
 
 #[test]
-fn a_stray_byte_costs_no_more_than_the_frame_it_joins() {
+fn a_stray_byte_damages_only_the_frame_that_it_joins() {
     let joined = [&[0x00][..], &request()].concat();
     is_an_error(&mut unit(), &joined);
 }
 
 #[test]
-fn a_truncated_frame_is_forgotten() {
+fn a_truncated_frame_is_discarded() {
     let mut unit = unit();
     for len in 1..request().len() {
         is_an_error(&mut unit, &request()[..len]);
@@ -114,7 +114,7 @@ fn a_truncated_frame_is_forgotten() {
 }
 
 #[test]
-fn a_faulty_character_anywhere_spoils_its_frame() {
+fn a_faulty_character_anywhere_damages_its_frame() {
     for faults in [
         Faults::PARITY,
         Faults::FRAMING,
@@ -141,12 +141,12 @@ fn a_faulty_character_anywhere_spoils_its_frame() {
 }
 
 #[test]
-fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_crc() {
+fn noise_flag_alone_does_not_damage_a_frame_with_a_valid_crc() {
     for strict in [false, true] {
         for at in 0..=request().len() {
             let mut unit = Unit::with(UNIT, strict, Points::new(64, 64));
             for (index, byte) in request().into_iter().enumerate() {
-                // In the last round every character is noisy.
+                // In the last round every character has the noise flag.
                 let noisy = index == at || at == request().len();
                 let faults = if noisy { Faults::NOISE } else { Faults::NONE };
                 unit.character(byte, faults);
@@ -159,7 +159,7 @@ fn noise_flag_alone_does_not_spoil_a_frame_with_a_good_crc() {
 }
 
 #[test]
-fn noise_flag_does_not_make_a_bad_crc_good() {
+fn noise_flag_does_not_make_a_wrong_crc_valid() {
     let mut unit = unit();
     let mut bad = request();
     bad[3] ^= 1;
@@ -172,24 +172,27 @@ fn noise_flag_does_not_make_a_bad_crc_good() {
 }
 
 #[test]
-fn power_up_in_the_middle_of_traffic_waits_for_silence() {
+fn power_up_during_traffic_waits_for_silence() {
     let mut receiver = Receiver::rtu(UNIT, false);
     receiver.give_back(Box::leak(Box::default()));
-    let mut hear = |bytes: &[u8]| {
+    let mut receive = |bytes: &[u8]| {
         bytes
             .iter()
             .for_each(|byte| receiver.character(*byte, Faults::NONE));
     };
-    hear(&request());
-    hear(&[0x00; 300]);
-    hear(&request());
+    receive(&request());
+    receive(&[0x00; 300]);
+    receive(&request());
     receiver.pause();
     receiver.character(0, Faults::FRAMING);
-    assert!(receiver.close().is_none(), "this silence is the first");
+    assert!(
+        receiver.close().is_none(),
+        "the first silence returns no frame"
+    );
     assert_eq!(
         *receiver.counters(),
         Default::default(),
-        "nothing was heard"
+        "nothing was counted"
     );
     request()
         .iter()
@@ -198,7 +201,7 @@ fn power_up_in_the_middle_of_traffic_waits_for_silence() {
 }
 
 #[test]
-fn silence_without_a_frame_is_nothing() {
+fn silence_without_a_frame_is_ignored() {
     let mut unit = unit();
     for _ in 0..3 {
         assert_eq!(unit.silence(), None);
@@ -222,7 +225,7 @@ fn a_gap_above_t15_is_counted_and_tolerated() {
 }
 
 #[test]
-fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
+fn a_gap_above_t15_drops_the_frame_in_strict_mode() {
     for at in 1..request().len() {
         let mut unit = Unit::with(UNIT, true, Points::new(64, 64));
         unit.characters(&request()[..at]);
@@ -231,7 +234,7 @@ fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
         assert_eq!(unit.silence(), None);
         let counters = unit.counters();
         assert_eq!(counters.gaps, 1);
-        // Its CRC was good: it was a message to this unit, and got no response.
+        // Its CRC was valid: it was a message to this unit and got no response.
         assert_eq!((counters.unit_messages, counters.no_response), (1, 1));
         assert_eq!(
             (counters.bus_messages, counters.communication_errors),
@@ -242,8 +245,8 @@ fn a_gap_above_t15_costs_the_frame_where_that_is_asked_for() {
 }
 
 #[test]
-fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
-    // A good write, and then more characters that make it a good frame of another kind.
+fn a_frame_that_looked_complete_at_t15_may_continue() {
+    // A valid write, and then more characters that make it a valid frame of another kind.
     let mut unit = unit();
     let first = frame(UNIT, &pdu(0x06, &[1, 0x0BAD]));
     unit.characters(&first);
@@ -254,18 +257,18 @@ fn a_frame_that_looked_complete_at_t15_may_still_go_on() {
     unit.characters(&[0x99]);
     unit.pause();
     unit.characters(&end);
-    let reply = unit.silence().expect("a good CRC");
+    let reply = unit.silence().expect("the CRC is valid");
     assert_eq!(
         reply[1..3],
         [0x86, 0x03],
-        "the PDU is longer than function 06 has it"
+        "the PDU is too long for function 06"
     );
     assert_eq!(unit.points.words[1], 0);
     assert_eq!(unit.counters().gaps, 2);
 }
 
 #[test]
-fn a_frame_of_256_bytes_that_goes_on_is_too_long() {
+fn a_frame_of_256_bytes_that_continues_is_too_long() {
     let mut unit = unit();
     unit.characters(&frame(UNIT, &[&[0x63][..], &[0x55; 252]].concat()));
     unit.pause();
@@ -276,7 +279,7 @@ fn a_frame_of_256_bytes_that_goes_on_is_too_long() {
 }
 
 #[test]
-fn t35_alone_closes_a_frame() {
+fn t35_without_t15_ends_a_frame() {
     let mut unit = unit();
     unit.characters(&request());
     assert!(unit.port.long_silence(0));
@@ -285,9 +288,9 @@ fn t35_alone_closes_a_frame() {
 }
 
 #[test]
-fn after_its_own_reply_the_unit_listens_at_once() {
+fn the_unit_receives_immediately_after_its_own_reply() {
     let mut unit = unit();
-    unit.characters(&[0x55, 0x55]); // the echo of what it sent itself, if the receiver was late
+    unit.characters(&[0x55, 0x55]); // the echo of its own reply, if the receiver was late
     unit.port.sent();
     unit.must_answer();
     assert_eq!(unit.counters().communication_errors, 0);

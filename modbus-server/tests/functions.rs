@@ -1,4 +1,4 @@
-//! Each function: what it does, and its limits (V1.1b3 section 6).
+//! The effect and the limits of each function (V1.1b3 section 6).
 
 mod common;
 
@@ -6,26 +6,26 @@ use common::{MAX_WORD, Points, UNIT, Unit, pack, pdu, write_bits, write_words};
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{BitsOut, DataModel, Exception, Span, Table, WordsOut};
 
-/// As many points as there are addresses.
+/// Returns a unit with a point at every address.
 fn full() -> Unit {
     Unit::new(Points::new(0x1_0000, 0x1_0000))
 }
 
 #[test]
-fn bits_are_packed_the_first_lowest_and_the_padding_is_zero() {
+fn bits_are_packed_from_bit_0_and_the_padding_is_zero() {
     for function in [0x01, 0x02] {
         let mut unit = full();
         unit.points.bits_of(function)[20..31].copy_from_slice(&[
             true, false, true, true, false, false, true, true, true, true, false,
         ]);
-        unit.points.bits_of(function)[31] = true; // not asked for: must not show up in the padding
+        unit.points.bits_of(function)[31] = true; // not requested: must not be in the padding
         let reply = unit.request(&pdu(function, &[20, 11])).unwrap();
         assert_eq!(reply, [function, 2, 0b1100_1101, 0b0000_0011]);
     }
 }
 
 #[test]
-fn up_to_2000_bits_are_read_at_once() {
+fn up_to_2000_bits_are_read_in_one_request() {
     for function in [0x01, 0x02] {
         let mut unit = full();
         unit.points
@@ -55,7 +55,7 @@ fn words_are_sent_high_byte_first() {
 }
 
 #[test]
-fn up_to_125_words_are_read_at_once() {
+fn up_to_125_words_are_read_in_one_request() {
     for function in [0x03, 0x04] {
         let mut unit = full();
         (0..125).for_each(|n| unit.points.words_of(function)[n] = (n * 0x0203) as u16);
@@ -101,7 +101,7 @@ fn the_last_address_can_be_used_and_nothing_wraps() {
 }
 
 #[test]
-fn a_single_bit_takes_ff00_and_0000_only() {
+fn a_single_bit_accepts_only_ff00_and_0000() {
     let mut unit = full();
     let on = pdu(0x05, &[172, 0xFF00]);
     assert_eq!(unit.request(&on).unwrap(), on);
@@ -114,7 +114,7 @@ fn a_single_bit_takes_ff00_and_0000_only() {
     assert!(!unit.points.bits[172]);
     assert!(
         unit.points.bits.iter().all(|bit| !bit),
-        "no other bit is touched"
+        "no other bit changes"
     );
 }
 
@@ -143,7 +143,7 @@ fn multiple_bits_are_written_and_padding_is_ignored() {
 }
 
 #[test]
-fn up_to_1968_bits_are_written_at_once() {
+fn up_to_1968_bits_are_written_in_one_request() {
     let mut unit = full();
     let bits: Vec<bool> = (0..1968).map(|n| n % 7 < 3).collect();
     let request = write_bits(5, &bits);
@@ -155,7 +155,7 @@ fn up_to_1968_bits_are_written_at_once() {
 }
 
 #[test]
-fn up_to_123_words_are_written_at_once() {
+fn up_to_123_words_are_written_in_one_request() {
     let mut unit = full();
     let words: Vec<u16> = (0..123).map(|n| n * 0x0101).collect();
     let request = write_words(0xFF00, &words);
@@ -166,8 +166,8 @@ fn up_to_123_words_are_written_at_once() {
 }
 
 #[test]
-fn a_124th_word_is_refused() {
-    // It would need a frame of 257 bytes if it were all there; what fits a frame is refused too.
+fn a_124th_word_is_rejected() {
+    // Complete, it would need a frame of 257 bytes. A truncated request that fits a frame is rejected, too.
     let mut unit = full();
     let mut request = write_words(0, &[1; 124]);
     assert_eq!(request[5], 248);
@@ -178,7 +178,7 @@ fn a_124th_word_is_refused() {
 }
 
 #[test]
-fn a_byte_count_must_fit_the_quantity() {
+fn a_byte_count_must_match_the_quantity() {
     let mut unit = full();
     for (count, data) in [
         (0, 0),
@@ -200,7 +200,7 @@ fn a_byte_count_must_fit_the_quantity() {
 }
 
 #[test]
-fn a_pdu_a_byte_short_or_long_is_refused() {
+fn a_pdu_one_byte_too_short_or_long_is_rejected() {
     let mut unit = full();
     let requests = [
         pdu(0x01, &[0, 8]),
@@ -213,7 +213,7 @@ fn a_pdu_a_byte_short_or_long_is_refused() {
         write_words(0, &[1, 2]),
     ];
     for request in requests {
-        // Every shorter one, down to the function code alone.
+        // Every shorter PDU, down to only the function code.
         for len in 1..request.len() {
             assert_eq!(unit.refused(&request[..len]), 3, "{:02X?}", &request[..len]);
         }
@@ -226,8 +226,8 @@ fn a_pdu_a_byte_short_or_long_is_refused() {
 }
 
 #[test]
-fn a_model_that_gives_too_little_or_too_much_leaks_nothing() {
-    /// Two words whatever is asked for, and more bits than fit.
+fn a_model_that_pushes_too_little_or_too_much_leaks_nothing() {
+    /// Pushes two words for every request, and more bits than fit.
     struct Careless;
     impl DataModel for Careless {
         fn check_read_bits(&self, _: Table, _: Span) -> Result<(), Exception> {

@@ -8,7 +8,7 @@ fn unit() -> Unit {
     Unit::new(Points::new(4, 4))
 }
 
-/// Objects by their numbers, as a reply lists them; and whether and where more follow.
+/// Returns the objects of a reply by their numbers, and the next object if more follow.
 fn stream(unit: &mut Unit, code: u8, first: u8) -> (Vec<(u8, Vec<u8>)>, Option<u8>) {
     let reply = unit.request(&[0x2B, 0x0E, code, first]).expect("a reply");
     assert_eq!(reply[..4], [0x2B, 0x0E, code, 0x83]);
@@ -34,7 +34,7 @@ fn numbers(objects: &[(u8, Vec<u8>)]) -> Vec<u8> {
 }
 
 #[test]
-fn the_standard_s_example_but_for_the_conformity() {
+fn the_reply_matches_the_standards_example_except_for_the_conformity() {
     let reply = unit().request(&[0x2B, 0x0E, 0x01, 0x00]).unwrap();
     let expected = [
         &[0x2B, 0x0E, 0x01, 0x83, 0x00, 0x00, 0x03][..],
@@ -49,13 +49,13 @@ fn the_standard_s_example_but_for_the_conformity() {
 }
 
 #[test]
-fn each_stream_has_its_objects() {
+fn each_stream_contains_its_objects() {
     let mut unit = unit();
     let (basic, more) = stream(&mut unit, 1, 0);
     assert_eq!((numbers(&basic), more), (vec![0, 1, 2], None));
     let (regular, more) = stream(&mut unit, 2, 0);
     assert_eq!((numbers(&regular), more), ((0..=6).collect(), None));
-    assert_eq!(regular[6], (6, vec![]), "an empty value is one as well");
+    assert_eq!(regular[6], (6, vec![]), "an empty value is an object, too");
     for first in 0..=6 {
         let (objects, _) = stream(&mut unit, 2, first);
         assert_eq!(objects, regular[usize::from(first)..]);
@@ -86,9 +86,9 @@ fn a_long_stream_is_split_between_objects() {
 }
 
 #[test]
-fn a_reply_may_be_just_full() {
+fn a_reply_may_be_exactly_full() {
     let mut unit = unit();
-    // 83 and 84 are 120 and 122 bytes: with what is around them, 253.
+    // Objects 83 and 84 have 120 and 122 bytes, in total 253 with the other fields.
     let reply = unit.request(&[0x2B, 0x0E, 0x03, 0x83]).unwrap();
     assert_eq!((reply.len(), reply[4], reply[6]), (253, 0, 2));
     unit.points.objects[0x84].as_mut().unwrap().push(b'!');
@@ -97,7 +97,7 @@ fn a_reply_may_be_just_full() {
 }
 
 #[test]
-fn a_stream_that_cannot_begin_there_begins_at_the_beginning() {
+fn a_stream_with_an_unknown_first_object_begins_with_object_0() {
     let mut unit = unit();
     for (code, first) in [
         (1, 3),
@@ -115,7 +115,7 @@ fn a_stream_that_cannot_begin_there_begins_at_the_beginning() {
 }
 
 #[test]
-fn one_object_can_be_asked_for() {
+fn a_single_object_can_be_read() {
     let mut unit = unit();
     for id in 0..=255 {
         let request = [0x2B, 0x0E, 0x04, id];
@@ -131,7 +131,7 @@ fn one_object_can_be_asked_for() {
 }
 
 #[test]
-fn what_is_not_there_is_refused() {
+fn unknown_objects_codes_and_lengths_are_rejected() {
     let mut unit = unit();
     for mei in (0..=255).filter(|mei| *mei != 0x0E) {
         assert_eq!(unit.refused(&[0x2B, mei, 0x01, 0x00]), 1);
@@ -152,7 +152,7 @@ fn what_is_not_there_is_refused() {
 }
 
 #[test]
-fn the_conformity_is_that_of_the_objects_there_are() {
+fn the_conformity_matches_the_existing_objects() {
     let mut unit = unit();
     let mut conformity = |without: std::ops::Range<usize>| {
         unit.points.objects[without].fill(None);

@@ -1,4 +1,4 @@
-//! Functions 16, mask write, and 17, read and write at once (V1.1b3 6.16, 6.17).
+//! Functions 16, mask write, and 17, read and write in one request (V1.1b3 6.16, 6.17).
 
 mod common;
 
@@ -10,7 +10,7 @@ fn full() -> Unit {
 }
 
 #[test]
-fn the_standard_s_mask_makes_17_of_12() {
+fn the_standards_mask_changes_12_to_17() {
     let mut unit = full();
     unit.points.words[4] = 0x12;
     let request = pdu(0x16, &[4, 0xF2, 0x25]);
@@ -19,7 +19,7 @@ fn the_standard_s_mask_makes_17_of_12() {
 }
 
 #[test]
-fn the_and_mask_says_where_the_or_mask_counts() {
+fn the_and_mask_selects_the_bits_of_the_or_mask() {
     let mut unit = full();
     for (now, and, or, then) in [
         (0xABCD, 0xFFFF, 0xFFFF, 0xABCD),
@@ -34,7 +34,7 @@ fn the_and_mask_says_where_the_or_mask_counts() {
 }
 
 #[test]
-fn a_mask_is_checked_as_the_write_that_it_is() {
+fn a_mask_write_is_checked_like_a_write() {
     let mut unit = full();
     unit.points.read_only_from = 10;
     unit.points.words[9] = 0xFF00;
@@ -42,7 +42,7 @@ fn a_mask_is_checked_as_the_write_that_it_is() {
     assert_eq!(
         unit.refused(&pdu(0x16, &[9, 0xFF00, 0xFFFF])),
         3,
-        "the value"
+        "the value is out of range"
     );
     assert!(unit.request(&pdu(0x16, &[9, 0xFF00, 0xEF])).is_some());
     assert_eq!(unit.points.words[9], 0xFFEF);
@@ -56,7 +56,7 @@ fn a_mask_is_checked_as_the_write_that_it_is() {
     assert_eq!(
         unit.refused(&pdu(0x16, &[10, 0xFFFF, 0])),
         2,
-        "address first"
+        "the address is checked first"
     );
     for len in 1..7 {
         assert_eq!(unit.refused(&pdu(0x16, &[10, 0xFFFF, 0])[..len]), 3);
@@ -73,13 +73,16 @@ fn a_mask_can_be_broadcast_and_a_read_with_a_write_cannot() {
     assert_eq!(unit.raw(&frame(0, &pdu(0x16, &[4, 0xF2, 0x25]))), None);
     assert_eq!(unit.points.words[4], 0x17);
     assert_eq!(unit.raw(&frame(0, &write_then_read(0, 1, 4, &[9]))), None);
-    assert_eq!(unit.points.words[4], 0x17, "it asks for a reply");
+    assert_eq!(
+        unit.points.words[4], 0x17,
+        "a broadcast with a read has no effect"
+    );
     assert_eq!(unit.raw(&frame(UNIT + 1, &pdu(0x16, &[4, 0, 0]))), None);
     assert_eq!(unit.points.words[4], 0x17);
 }
 
 #[test]
-fn the_standard_s_read_with_a_write() {
+fn the_standards_example_of_a_read_with_a_write_returns_its_reply() {
     let mut unit = full();
     unit.points.words[3..9].copy_from_slice(&[0x00FE, 0x0ACD, 1, 3, 0x000D, 0x00FF]);
     let reply = unit
@@ -91,7 +94,7 @@ fn the_standard_s_read_with_a_write() {
 }
 
 #[test]
-fn the_write_comes_before_the_read() {
+fn the_write_is_executed_before_the_read() {
     let mut unit = full();
     let reply = unit.request(&write_then_read(9, 3, 10, &[0x1234, 0x5678]));
     assert_eq!(reply, Some(vec![0x17, 6, 0, 0, 0x12, 0x34, 0x56, 0x78]));
@@ -109,7 +112,7 @@ fn up_to_125_are_read_and_up_to_121_written() {
     assert_eq!(unit.refused(&write_then_read(0, 126, 0, &words)), 3);
     assert_eq!(unit.refused(&write_then_read(0, 0, 0, &words)), 3);
     assert_eq!(unit.refused(&write_then_read(0, 1, 0, &[])), 3);
-    // A 122nd word fits no frame of 256 bytes with all the rest; what fits is refused too.
+    // A frame of 256 bytes has no room for a 122nd word. A truncated request that fits is rejected, too.
     let mut long = write_then_read(0, 1, 0, &[1; 122]);
     assert_eq!(long.len(), 254);
     long.truncate(253);
@@ -123,12 +126,12 @@ fn both_ranges_and_the_values_are_checked_before_anything_is_written() {
     assert_eq!(
         unit.refused(&write_then_read(19, 2, 0, &[1])),
         2,
-        "the read"
+        "the read is out of range"
     );
     assert_eq!(
         unit.refused(&write_then_read(0, 1, 9, &[1, 2])),
         2,
-        "the write"
+        "the write is out of range"
     );
     assert_eq!(unit.refused(&write_then_read(0xFFFF, 2, 0, &[1])), 2);
     assert_eq!(unit.refused(&write_then_read(0, 1, 0xFFFF, &[1, 2])), 2);
@@ -137,12 +140,12 @@ fn both_ranges_and_the_values_are_checked_before_anything_is_written() {
     assert_eq!(
         unit.refused(&write_then_read(20, 1, 9, &[beyond])),
         2,
-        "02 first"
+        "02 is checked first"
     );
     assert_eq!(
         unit.refused(&write_then_read(0xFFFF, 2, 0, &[])),
         3,
-        "03 before both"
+        "03 is checked before both"
     );
     assert_eq!(
         unit.refused(&write_then_read(0xFFFF, 126, 0xFFFF, &[1, 1])),
@@ -155,7 +158,7 @@ fn both_ranges_and_the_values_are_checked_before_anything_is_written() {
 }
 
 #[test]
-fn one_that_is_not_whole_is_never_taken_for_a_success() {
+fn an_incomplete_request_is_rejected() {
     let mut unit = full();
     let whole = write_then_read(0, 2, 4, &[1, 2, 3]);
     for len in 1..whole.len() {

@@ -1,13 +1,13 @@
-//! Which exception wins when several would do: function 01, then quantity, byte count and value
-//! form 03, then address 02, then value range 03, then state 04 or 06 (V1.1b3 section 6, its flow
-//! charts). And nothing is ever written in part.
+//! The priority of exceptions when several apply: function 01, then quantity, byte count and value form 03, then
+//! address 02, then value range 03, then state 04 or 06 (V1.1b3 section 6, flow charts). A request is never
+//! executed partly.
 
 mod common;
 
 use common::{MAX_WORD, Points, Unit, frame, pdu, write_bits, write_words};
 use modbus_server::Exception;
 
-/// Ten of each, of which the last two cannot be written.
+/// Returns a unit with ten points of each kind; the last two cannot be written.
 fn ten() -> Unit {
     let mut points = Points::new(10, 10);
     points.read_only_from = 8;
@@ -42,7 +42,7 @@ fn a_write_that_reaches_a_read_only_point_is_02_and_writes_nothing() {
 }
 
 #[test]
-fn quantity_comes_before_address() {
+fn quantity_is_checked_before_address() {
     let mut unit = ten();
     for function in 0x01..=0x04 {
         assert_eq!(unit.refused(&pdu(function, &[0xFFFF, 0])), 3);
@@ -54,7 +54,7 @@ fn quantity_comes_before_address() {
 }
 
 #[test]
-fn byte_count_comes_before_address() {
+fn byte_count_is_checked_before_address() {
     let mut unit = ten();
     assert_eq!(
         unit.refused(&[0x0F, 0xFF, 0xFF, 0x00, 0x0A, 0x03, 1, 2, 3]),
@@ -67,12 +67,12 @@ fn byte_count_comes_before_address() {
 }
 
 #[test]
-fn the_form_of_a_single_bit_comes_before_its_address() {
+fn the_form_of_a_single_bit_is_checked_before_its_address() {
     assert_eq!(ten().refused(&pdu(0x05, &[0xFFFF, 0x1234])), 3);
 }
 
 #[test]
-fn address_comes_before_value_range() {
+fn address_is_checked_before_value_range() {
     let mut unit = ten();
     assert_eq!(unit.refused(&pdu(0x06, &[10, MAX_WORD + 1])), 2);
     assert_eq!(unit.refused(&write_words(7, &[MAX_WORD + 1, 0])), 2);
@@ -81,7 +81,7 @@ fn address_comes_before_value_range() {
 }
 
 #[test]
-fn value_range_comes_before_state() {
+fn value_range_is_checked_before_state() {
     for state in [
         Exception::ServerDeviceFailure,
         Exception::ServerDeviceBusy,
@@ -106,7 +106,7 @@ fn value_range_comes_before_state() {
 }
 
 #[test]
-fn every_unknown_function_is_01_whatever_follows() {
+fn every_unknown_function_returns_01_with_any_data() {
     let known = [
         1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x2B,
     ];
@@ -120,7 +120,7 @@ fn every_unknown_function_is_01_whatever_follows() {
 }
 
 #[test]
-fn a_function_code_no_request_can_have_is_met_with_silence() {
+fn an_invalid_function_code_gets_silence() {
     let mut unit = ten();
     for function in (0x80..=0xFF).chain([0x00]) {
         assert_eq!(
@@ -134,7 +134,7 @@ fn a_function_code_no_request_can_have_is_met_with_silence() {
 }
 
 #[test]
-fn a_broadcast_is_carried_out_in_silence() {
+fn a_broadcast_is_executed_without_reply() {
     let mut unit = ten();
     assert_eq!(unit.raw(&frame(0, &pdu(0x05, &[3, 0xFF00]))), None);
     assert_eq!(unit.raw(&frame(0, &pdu(0x06, &[1, 0x0111]))), None);
@@ -151,7 +151,7 @@ fn a_broadcast_is_carried_out_in_silence() {
 }
 
 #[test]
-fn a_broadcast_read_or_nonsense_has_no_effect() {
+fn a_broadcast_that_reads_or_is_invalid_has_no_effect() {
     let mut unit = ten();
     let points = unit.points.clone();
     for request in [

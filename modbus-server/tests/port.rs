@@ -1,4 +1,4 @@
-//! A port and its server: when a reply starts, what becomes of it, and where the buffers go.
+//! A port and its server: start and end of a reply, and the use of the buffers.
 
 use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Width};
 use modbus_server::{Adu, Counters, Outcome, Server, Tables};
@@ -19,7 +19,7 @@ impl Registers {
 const UNIT: u8 = 17;
 const READ: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
 const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
-/// A good frame of somebody else: unit 18 reads a register.
+/// A valid frame for another unit: unit 18 reads a register.
 const OTHERS: [u8; 8] = [0x12, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x68];
 
 struct Unit<'a> {
@@ -48,13 +48,13 @@ impl<'a> Unit<'a> {
         }
     }
 
-    /// t1.5, then t3.5. Whether a request waits.
+    /// Passes t1.5, then t3.5. Returns whether a request waits.
     fn silence(&mut self) -> bool {
         assert!(!self.port.short_silence(self.now), "RTU frames end at t3.5");
         self.port.long_silence(self.now)
     }
 
-    fn hear(&mut self, bytes: &[u8]) -> bool {
+    fn receive_frame(&mut self, bytes: &[u8]) -> bool {
         self.receive(bytes);
         self.silence()
     }
@@ -64,7 +64,7 @@ impl<'a> Unit<'a> {
             .serve(&mut self.port, delay, &mut self.registers.tables())
     }
 
-    /// What leaves the unit of a reply that may start; its end included.
+    /// Returns the bytes of a reply that may start, and ends the reply.
     fn sends(&mut self) -> Vec<u8> {
         let mut sent: Vec<u8> = self.port.start().into_iter().collect();
         if sent.is_empty() {
@@ -82,10 +82,10 @@ impl<'a> Unit<'a> {
         self.server.counters_at(self.port.counters())
     }
 
-    /// It answers again, so both its buffers are back and it listens.
+    /// Checks that the unit answers again, so both its buffers are back and it receives.
     fn is_well(&mut self) {
         for _ in 0..3 {
-            assert!(self.hear(&READ));
+            assert!(self.receive_frame(&READ));
             assert_eq!(self.serve(0), Some(Outcome::Accepted));
             assert_eq!(self.sends(), REPLY);
             assert!(!self.port.is_replying());
@@ -97,21 +97,24 @@ impl<'a> Unit<'a> {
 fn a_request_is_served_and_its_reply_sent() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
-    assert_eq!(unit.serve(0), None, "nothing has come");
+    assert_eq!(unit.serve(0), None, "nothing was received");
     assert_eq!(unit.port.start(), None);
     unit.is_well();
 }
 
 #[test]
-fn the_first_byte_leaves_before_anything_is_decided() {
+fn the_first_byte_is_sent_before_anything_is_decided() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
     unit.now = 1234;
-    assert!(unit.hear(&READ));
+    assert!(unit.receive_frame(&READ));
     unit.now = 1300;
-    let request = unit.server.take(&mut unit.port, 0).expect("it waits");
+    let request = unit
+        .server
+        .take(&mut unit.port, 0)
+        .expect("a request waits");
     assert_eq!(unit.port.start(), Some(UNIT));
-    assert_eq!(unit.port.start(), None, "it has started");
+    assert_eq!(unit.port.start(), None, "the reply has already started");
     assert_eq!(unit.port.next(), Next::Wait);
     let answered = request
         .decide(&unit.server, &unit.registers.tables())
@@ -137,9 +140,9 @@ fn a_delayed_reply_starts_after_its_ticks() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
     for delay in [1, 2, 7] {
-        assert!(unit.hear(&READ));
+        assert!(unit.receive_frame(&READ));
         unit.serve(delay);
-        // The request ended somewhere within a tick, so that the first one does not count.
+        // The request ended within a tick, so the first tick does not count.
         for _ in 0..delay {
             unit.port.tick();
             assert_eq!(unit.port.start(), None);
@@ -152,11 +155,11 @@ fn a_delayed_reply_starts_after_its_ticks() {
 }
 
 #[test]
-fn a_delayed_reply_is_given_up_when_the_bus_goes_on() {
+fn a_delayed_reply_is_dropped_when_another_frame_is_received() {
     for frame in [&OTHERS[..], &OTHERS[..3]] {
         let mut adus = [Adu::new(), Adu::new()];
         let mut unit = Unit::rtu(&mut adus);
-        assert!(unit.hear(&READ));
+        assert!(unit.receive_frame(&READ));
         unit.serve(2);
         unit.receive(frame);
         if frame.len() == OTHERS.len() {
@@ -171,39 +174,39 @@ fn a_delayed_reply_is_given_up_when_the_bus_goes_on() {
 }
 
 #[test]
-fn a_request_gives_up_the_delayed_reply_before_it() {
+fn a_new_request_drops_the_delayed_reply_before_it() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
-    assert!(unit.hear(&READ));
+    assert!(unit.receive_frame(&READ));
     unit.serve(5);
     assert!(unit.port.is_replying());
-    assert!(unit.hear(&READ));
-    assert!(!unit.port.is_replying(), "that reply will not come");
+    assert!(unit.receive_frame(&READ));
+    assert!(!unit.port.is_replying(), "that reply is not sent");
     unit.serve(0);
     assert_eq!(unit.sends(), REPLY);
     unit.is_well();
 }
 
 #[test]
-fn a_request_that_nobody_has_taken_is_dropped_for_the_next() {
+fn a_request_that_was_not_taken_is_dropped_for_the_next() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
-    assert!(unit.hear(&READ));
-    assert!(unit.hear(&READ));
+    assert!(unit.receive_frame(&READ));
+    assert!(unit.receive_frame(&READ));
     assert_eq!(unit.serve(0), Some(Outcome::Accepted));
     assert_eq!(unit.sends(), REPLY);
-    assert_eq!(unit.serve(0), None, "the first one is gone");
+    assert_eq!(unit.serve(0), None, "the first one was dropped");
     assert_eq!(unit.port.counters().dropped, 1);
     assert_eq!(unit.counters().no_response, 1);
     unit.is_well();
 }
 
 #[test]
-fn a_reply_that_is_cut_off_gives_its_buffer_back() {
+fn an_aborted_reply_gives_its_buffer_back() {
     for sent in 0..REPLY.len() {
         let mut adus = [Adu::new(), Adu::new()];
         let mut unit = Unit::rtu(&mut adus);
-        assert!(unit.hear(&READ));
+        assert!(unit.receive_frame(&READ));
         unit.serve(0);
         assert_eq!(unit.port.start(), Some(UNIT));
         for byte in &REPLY[1..=sent.min(REPLY.len() - 1)] {
@@ -216,11 +219,14 @@ fn a_reply_that_is_cut_off_gives_its_buffer_back() {
 }
 
 #[test]
-fn a_reply_that_is_cut_off_before_it_is_served_takes_no_body() {
+fn a_reply_aborted_before_it_is_served_takes_no_body() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
-    assert!(unit.hear(&READ));
-    let request = unit.server.take(&mut unit.port, 0).expect("it waits");
+    assert!(unit.receive_frame(&READ));
+    let request = unit
+        .server
+        .take(&mut unit.port, 0)
+        .expect("a request waits");
     assert_eq!(unit.port.start(), Some(UNIT));
     unit.port.sent();
     request
@@ -234,12 +240,12 @@ fn a_reply_that_is_cut_off_before_it_is_served_takes_no_body() {
 }
 
 #[test]
-fn what_gets_silence_starts_no_reply() {
+fn a_request_without_reply_starts_no_reply() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
-    assert!(!unit.hear(&OTHERS));
+    assert!(!unit.receive_frame(&OTHERS));
     // A broadcast writes 7 to register 4.
-    assert!(unit.hear(&[0x00, 0x06, 0x00, 0x04, 0x00, 0x07, 0x88, 0x18]));
+    assert!(unit.receive_frame(&[0x00, 0x06, 0x00, 0x04, 0x00, 0x07, 0x88, 0x18]));
     assert_eq!(unit.serve(0), Some(Outcome::Accepted));
     assert_eq!(unit.port.start(), None);
     assert!(!unit.port.is_replying());
@@ -250,7 +256,7 @@ fn what_gets_silence_starts_no_reply() {
 
 /// An ASCII line: its frames end with a character, and the short silence is t3.5.
 #[test]
-fn an_ascii_request_is_taken_at_the_short_silence_and_is_too_late_at_the_long_one() {
+fn an_ascii_request_is_served_at_the_short_silence_and_too_late_at_the_long_one() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut port = Port::new(Receiver::ascii(UNIT, Width::Eight), &mut adus);
     let mut server = Server::new(Framing::ASCII);
@@ -258,7 +264,7 @@ fn an_ascii_request_is_taken_at_the_short_silence_and_is_too_late_at_the_long_on
     for round in 0..3 {
         for late in [false, true] {
             for byte in b":110300040001E7\r\n" {
-                assert!(!port.short_silence(0), "it is not over");
+                assert!(!port.short_silence(0), "the frame is not complete");
                 port.received(*byte, Faults::NONE);
             }
             if late {
@@ -274,8 +280,8 @@ fn an_ascii_request_is_taken_at_the_short_silence_and_is_too_late_at_the_long_on
             assert!(port.short_silence(0));
             server
                 .serve(&mut port, 0, &mut registers.tables())
-                .expect("it waits");
-            let mut sent = vec![port.start().expect("it is answered")];
+                .expect("a request waits");
+            let mut sent = vec![port.start().expect("the request is answered")];
             while let Next::Byte(byte) = port.next() {
                 sent.push(byte);
             }

@@ -1,5 +1,5 @@
-//! Whatever arrives: no panic, no answer to what is not a good request to this unit, the same
-//! answers as a plain second server gives, and an answer to the next good request.
+//! Properties for any input: no panic, no answer to anything but a valid request to this unit, the same answers as
+//! a simple second server, and an answer to the next valid request.
 
 mod common;
 
@@ -12,18 +12,17 @@ use modbus_server::line::{Faults, Framing, Width};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// More bits than one write may hold, more words than one read may ask for, and an end within
-/// reach.
+/// More bits than one request may write, more words than one request may read, and an end that tests can reach.
 const BITS: usize = 2010;
 const WORDS: usize = 130;
 
-/// A function of the device.
+/// A user-defined function of the device.
 const CUSTOM: u8 = 0x41;
 
-/// What may keep the device from doing what is right otherwise.
+/// Exceptions for states of the device that prevent an otherwise valid request.
 const STATES: &[u8] = &[4, 5, 6, 7, 8, 0x0A, 0x0B];
 
-/// Four tables of different lengths, each about as long as one request may ask for.
+/// Returns four tables of different lengths, each about as long as one request may access.
 fn points() -> impl Strategy<Value = Device> {
     let bits = (vec(any::<bool>(), BITS), vec(any::<bool>(), BITS - 5));
     let words = (vec(any::<u16>(), WORDS), vec(any::<u16>(), WORDS - 3));
@@ -54,7 +53,7 @@ fn points() -> impl Strategy<Value = Device> {
         )
 }
 
-/// An address that exists, the end of the points, or the end of all addresses.
+/// Returns an address that exists, the end of the points, or the end of all addresses.
 fn address() -> impl Strategy<Value = u16> {
     prop_oneof![
         4 => 0_u16..30,
@@ -65,7 +64,7 @@ fn address() -> impl Strategy<Value = u16> {
     ]
 }
 
-/// A quantity, mostly about one of the limits.
+/// Returns a quantity, mostly near one of the limits.
 fn quantity() -> impl Strategy<Value = u16> {
     prop_oneof![
         4 => 0_u16..20,
@@ -76,7 +75,7 @@ fn quantity() -> impl Strategy<Value = u16> {
     ]
 }
 
-/// Request PDUs, most of them right or nearly so.
+/// Returns request PDUs, most of them valid or nearly valid.
 fn request() -> BoxedStrategy<Vec<u8>> {
     let single = prop_oneof![Just(0xFF00_u16), Just(0), any::<u16>(), 0xFFE0_u16..];
     let read = (1_u8..=4, address(), quantity()).prop_map(|(f, a, q)| pdu(f, &[a, q]));
@@ -124,7 +123,7 @@ fn request() -> BoxedStrategy<Vec<u8>> {
         .boxed()
 }
 
-/// What can happen on a line.
+/// An event on a line.
 #[derive(Clone, Debug)]
 enum Event {
     Bytes(Vec<u8>),
@@ -133,7 +132,7 @@ enum Event {
     Silence,
 }
 
-/// Stretches of traffic: good frames, spoiled ones, noise.
+/// Returns sequences of traffic: valid frames, damaged frames, noise.
 fn traffic(framing: Framing) -> BoxedStrategy<Vec<Event>> {
     let unit = prop_oneof![6 => Just(UNIT), 2 => Just(0), 1 => any::<u8>()];
     let whole = (unit, request())
@@ -203,7 +202,7 @@ proptest! {
     }
 
     #[test]
-    fn traffic_is_met_as_by_the_reference(
+    fn traffic_is_handled_as_by_the_reference(
         start in points(),
         strict in any::<bool>(),
         (ascii, traffic) in any::<bool>().prop_flat_map(|ascii| {
@@ -241,8 +240,8 @@ proptest! {
         }
         prop_assert_eq!(unit.silence(), reference.silence());
         prop_assert_eq!(&unit.points.0, &reference.server.device);
-        // One request more, for the counters are told with requests; a restart, if nothing else is
-        // obeyed. The log tells of all that went before.
+        // Send one more request, because counters are copied with requests, and a restart, because a unit in
+        // listen-only mode answers nothing else. The log contains everything that happened before.
         let mut last = vec![vec![0x0C]];
         if reference.server.listening {
             last.insert(0, vec![0x08, 0x00, 0x01, 0x00, 0x00]);
@@ -262,7 +261,7 @@ proptest! {
         ascii in any::<bool>(),
         noise in vec(vec(any::<u8>(), 0..300), 0..20),
     ) {
-        // A chance of 2^-16 apiece is left that noise has a good CRC; the reference would agree.
+        // With a probability of 2^-16 each, noise has a valid CRC; the reference would then answer, too.
         let (mut unit, end) = unit_and_framing(ascii, false, Device::new(BITS, WORDS));
         let mut reference = modbus_reference::Unit::new(end, Device::new(BITS, WORDS), false);
         for bytes in noise {
@@ -274,7 +273,7 @@ proptest! {
     }
 
     #[test]
-    fn words_come_back_as_written(start in 0_u16..7, words in vec(0_u16..0xFFF0, 1..=123)) {
+    fn words_are_read_as_written(start in 0_u16..7, words in vec(0_u16..0xFFF0, 1..=123)) {
         let mut unit = Unit::new(Points::new(BITS, WORDS));
         let count = words.len() as u16;
         let echo = unit.request(&write_words(start, &words));
@@ -284,7 +283,7 @@ proptest! {
     }
 
     #[test]
-    fn bits_come_back_as_written(start in 0_u16..42, bits in vec(any::<bool>(), 1..=1968)) {
+    fn bits_are_read_as_written(start in 0_u16..42, bits in vec(any::<bool>(), 1..=1968)) {
         let mut unit = Unit::new(Points::new(BITS, WORDS));
         let count = bits.len() as u16;
         let echo = unit.request(&write_bits(start, &bits));

@@ -1,4 +1,4 @@
-//! The model made of slices, beside the reference.
+//! The data model made of slices, compared with the reference.
 
 mod common;
 
@@ -15,10 +15,10 @@ fn unit(tables: Tables<'_>) -> Unit<Tables<'_>> {
     Unit::over(Receiver::rtu(UNIT, false), Framing::Rtu, tables)
 }
 
-/// The functions that need a table.
+/// The functions that need each table.
 const FUNCTIONS: [&[u8]; 4] = [&[1, 5, 15], &[2], &[3, 6, 16, 22, 23], &[4]];
 
-/// Tables that may be empty, with a limit on nothing.
+/// Returns tables that may be empty, without limits.
 fn points() -> impl Strategy<Value = Device> {
     let bits = || prop_oneof![1 => Just(vec![]), 4 => vec(any::<bool>(), 1..20)];
     let words = || prop_oneof![1 => Just(vec![]), 4 => vec(any::<u16>(), 1..20)];
@@ -88,7 +88,7 @@ proptest! {
             files: &mut files,
         });
         for pdu in requests {
-            // Without objects there is no function 2B.
+            // Without objects the device does not have function 2B.
             let lacks = points.lacks.contains(&pdu[0]) || pdu[0] == 0x2B;
             let expected = if lacks { Err(1) } else { answer(&mut points, &pdu) };
             let expected = expected.unwrap_or_else(|code| vec![pdu[0] | 0x80, code]);
@@ -106,7 +106,7 @@ proptest! {
 }
 
 #[test]
-fn a_table_of_all_addresses_is_served_to_its_last_one() {
+fn a_table_of_all_addresses_is_served_up_to_the_last_one() {
     let mut words = vec![0; 0x1_0000];
     let mut unit = unit(Tables {
         input_registers: &mut words,
@@ -115,7 +115,7 @@ fn a_table_of_all_addresses_is_served_to_its_last_one() {
     unit.points.input_registers[0xFFFF] = 0x1234;
     let reply = unit.request(&pdu(0x04, &[0xFFFF, 1]));
     assert_eq!(reply, Some(vec![0x04, 2, 0x12, 0x34]));
-    // The functions that need no table are there.
+    // The functions that need no table are still supported.
     assert_eq!(unit.request(&[0x07]), Some(vec![0x07, 0]));
     assert_eq!(unit.request(&[0x11]), Some(vec![0x11, 1, 0xFF]));
 }

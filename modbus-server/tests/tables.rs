@@ -1,4 +1,4 @@
-//! Four tables, and models that have only some of them or only some functions (V1.1b3 4.3, 4.4).
+//! Four tables, and models with only some tables or functions (V1.1b3 4.3, 4.4).
 
 mod common;
 
@@ -8,12 +8,12 @@ use common::{
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{DataModel, Exception, Function, Span, Table, Words, WordsOut};
 
-/// Every function code the server has.
+/// Every function code that the server supports.
 const FUNCTIONS: [u8; 18] = [
     1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x2B,
 ];
 
-/// A good request of this function.
+/// Returns a valid request of this function.
 fn good(function: u8) -> Vec<u8> {
     match function {
         0x05 => pdu(0x05, &[0, 0xFF00]),
@@ -25,13 +25,13 @@ fn good(function: u8) -> Vec<u8> {
         0x16 => pdu(0x16, &[0, 0, 0]),
         0x17 => write_then_read(0, 1, 0, &[1]),
         0x2B => vec![0x2B, 0x0E, 1, 0],
-        // For 08 an echo.
+        // For 08 this is an echo.
         _ => pdu(function, &[0, 1]),
     }
 }
 
 #[test]
-fn each_function_uses_the_table_of_its_name() {
+fn each_function_uses_its_table() {
     let mut points = Points::new(1, 1);
     points.input_bits = vec![true, true];
     points.words = vec![0x0303; 3];
@@ -61,12 +61,12 @@ fn each_function_uses_the_table_of_its_name() {
 }
 
 #[test]
-fn a_function_that_the_model_lacks_returns_illegal_function_before_any_other_check() {
+fn a_function_that_the_model_does_not_have_returns_01_before_any_other_check() {
     for lacked in FUNCTIONS {
         let mut points = Points::new(1, 1);
         points.files = vec![vec![0]];
         points.lacks = vec![lacked];
-        // The state of the device comes last.
+        // The state of the device is checked last.
         points.state = Some(Exception::ServerDeviceBusy.code());
         let mut unit = Unit::new(points);
         for rest in [&[][..], &[0], &[0, 4, 0, 0], &[0, 1, 0, 0], &[0xFF; 252]] {
@@ -102,8 +102,8 @@ fn without_listen_only_mode_its_sub_function_returns_illegal_function() {
 }
 
 #[test]
-fn tables_that_a_model_does_not_mention_are_empty() {
-    /// One register to read, as holding and as input register.
+fn tables_that_a_model_does_not_implement_are_empty() {
+    /// A model with one register to read, as holding and as input register.
     struct Register;
     impl DataModel for Register {
         fn check_read_words(&self, _: Table, span: Span) -> Result<(), Exception> {
@@ -117,7 +117,7 @@ fn tables_that_a_model_does_not_mention_are_empty() {
             out.push(0x1234);
         }
     }
-    /// Nothing at all.
+    /// A model with nothing.
     struct Nothing;
     impl DataModel for Nothing {}
 
@@ -145,7 +145,7 @@ fn tables_that_a_model_does_not_mention_are_empty() {
 }
 
 #[test]
-fn a_function_of_the_model_is_served_and_its_reply_is_cut_off_at_252_bytes() {
+fn a_function_of_the_model_is_served_and_its_reply_is_cut_at_252_bytes() {
     let mut unit = Unit::new(Points::new(1, 1));
     unit.points.custom = Some(0x41);
     let reply = unit.request(&[0x41, 1, 2]);

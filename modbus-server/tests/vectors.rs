@@ -1,18 +1,17 @@
-//! Worked frames from the manuals of other makers' devices, taken over only where their CRC is
-//! right, and from the standard: requests that must be understood, replies that must come out the
-//! same byte for byte.
+//! Frames from the manuals of other devices, used only where their CRC is correct, and from the standard. The
+//! requests must be understood, and the replies must match byte for byte.
 //!
-//! The frames with unit 01 are from the manual of the mightyZAP 17Lf actuator, those with unit 1F
-//! from the manual of a servo drive. Left out: the drive's replies to function 03, which repeat the
-//! address where the standard wants a byte count, and the actuator's `01 86 04 40 F3`, whose CRC is
-//! that of `01 83 04` (right: `43 A3`).
+//! The frames with unit 01 are from the manual of the mightyZAP 17Lf actuator, those with unit 1F from the manual
+//! of a servo drive. Two kinds of frames are left out: the drive's replies to function 03, which repeat the address
+//! where the standard requires a byte count, and the actuator's `01 86 04 40 F3`, whose CRC is that of `01 83 04`
+//! (correct: `43 A3`).
 
 mod common;
 
 use common::{Points, Unit, frame};
 use modbus_server::Exception;
 
-/// Bytes from hexadecimal digits.
+/// Returns bytes from hexadecimal digits.
 fn hex(text: &str) -> Vec<u8> {
     let digits: Vec<u32> = text.chars().filter_map(|c| c.to_digit(16)).collect();
     digits
@@ -21,7 +20,7 @@ fn hex(text: &str) -> Vec<u8> {
         .collect()
 }
 
-/// A unit at `address` with every point there is.
+/// Returns a unit at `address` with a point at every address.
 fn unit(address: u8) -> Unit {
     Unit::with(address, false, Points::new(0x1_0000, 0x1_0000))
 }
@@ -31,7 +30,7 @@ fn exchange(unit: &mut Unit, request: &str, reply: &str) {
 }
 
 #[test]
-fn an_actuator_is_read() {
+fn reads_of_an_actuator_match_its_manual() {
     let mut unit = unit(1);
     unit.points.words[0xD2] = 1000;
     unit.points.words[0xD3] = 426;
@@ -40,7 +39,7 @@ fn an_actuator_is_read() {
 }
 
 #[test]
-fn an_actuator_that_fails_says_so() {
+fn failures_of_an_actuator_match_its_manual() {
     let mut unit = unit(1);
     unit.points.state = Some(Exception::ServerDeviceFailure.code());
     exchange(&mut unit, "01 03 00 D3 00 01 75 F3", "01 83 04 40 F3");
@@ -48,7 +47,7 @@ fn an_actuator_that_fails_says_so() {
 }
 
 #[test]
-fn an_actuator_is_moved() {
+fn writes_to_an_actuator_match_its_manual() {
     let mut unit = unit(1);
     exchange(
         &mut unit,
@@ -73,14 +72,14 @@ fn an_actuator_is_moved() {
 }
 
 #[test]
-fn a_servo_drive_is_set() {
+fn writes_to_a_servo_drive_match_its_manual() {
     let mut unit = unit(0x1F);
     exchange(
         &mut unit,
         "1F 06 00 06 13 88 67 23",
         "1F 06 00 06 13 88 67 23",
     );
-    // The drive's own reply to this is not standard; ours is.
+    // The drive's own reply to this request is not standard; the reply here is.
     let read = unit.raw(&hex("1F 03 00 06 00 01 67 B5"));
     assert_eq!(read, Some(frame(0x1F, &hex("03 02 13 88"))));
     exchange(
@@ -106,7 +105,7 @@ fn a_servo_drive_is_set() {
 }
 
 #[test]
-fn a_servo_drive_s_read_of_nothing_is_refused_as_the_standard_wants() {
+fn a_read_of_no_words_is_rejected_as_the_standard_requires() {
     let mut unit = unit(0x1F);
     for request in ["1F 03 0D 00 00 00 44 D8", "1F 03 0E 01 00 00 15 5C"] {
         assert_eq!(unit.raw(&hex(request)), Some(frame(0x1F, &hex("83 03"))));
@@ -114,8 +113,8 @@ fn a_servo_drive_s_read_of_nothing_is_refused_as_the_standard_wants() {
 }
 
 #[test]
-fn the_standard_s_own_examples() {
-    // V1.1b3 6.1 to 6.12; it gives PDUs, the CRC is added on the way.
+fn the_examples_of_the_standard_match() {
+    // V1.1b3 6.1 to 6.12. The standard lists PDUs; the CRC is added here.
     let mut unit = Unit::new(Points::new(0x1_0000, 0x1_0000));
     let mut pdus = |request: &str, reply: &str, prepare: &dyn Fn(&mut Points)| {
         prepare(&mut unit.points);

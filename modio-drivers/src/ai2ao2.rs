@@ -1,5 +1,5 @@
-//! ModIO-AIAO: two analog inputs on lines 1 and 2, as those of ModIO-AI, and two analog outputs 3 and
-//! 4, as those of ModIO-AO, on the channels C and D of an MCP4728.
+//! ModIO-AIAO: two analog inputs on lines 1 and 2, like those of ModIO-AI, and two analog outputs, 3 and 4, like
+//! those of ModIO-AO, on the channels C and D of an MCP4728.
 
 use crate::analog_inputs::AnalogInputs;
 use crate::ao4::{health, output_code};
@@ -12,13 +12,12 @@ use crate::{
 pub struct Ai2Ao2<'a, S> {
     inputs: AnalogInputs<S>,
     link: &'a DacLink,
-    /// Those of the channels 3 and 4.
+    /// Settings of channels 3 and 4.
     outputs: [ChannelSettings; 2],
 }
 
 impl<'a, S: AnalogSource> Ai2Ao2<'a, S> {
-    /// Takes over the converter, whose lines 1 and 2 are analog inputs by now, and the link to the
-    /// DAC.
+    /// Creates the driver. Lines 1 and 2 of the converter must already be analog inputs.
     pub const fn new(source: S, link: &'a DacLink) -> Self {
         Self {
             inputs: AnalogInputs::new(source, 2),
@@ -28,7 +27,7 @@ impl<'a, S: AnalogSource> Ai2Ao2<'a, S> {
     }
 }
 
-/// Channels 3 and 4, which the DAC serves, channel 1 in bit 0.
+/// Channels 3 and 4, which the DAC drives; channel 1 is bit 0.
 const OUTPUTS: u8 = 0b1100;
 
 impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
@@ -37,20 +36,20 @@ impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
         [WordInput, WordInput, WordOutput, WordOutput]
     }
 
-    /// As for [`Ai4`](crate::Ai4) and [`Ao4`](crate::Ao4).
+    /// The settings have the same meaning as for [`Ai4`](crate::Ai4) and [`Ao4`](crate::Ao4).
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
         self.inputs.configure(settings);
         let [_, _, third, fourth] = *settings;
         self.outputs = [third, fourth];
     }
 
-    /// Reads the inputs, and reports a DAC that does not answer.
+    /// Reads the inputs, and returns an error for a DAC that does not answer.
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
         let inputs = self.inputs.scan(channels);
         ModuleError::in_either(health(self.link, OUTPUTS), inputs)
     }
 
-    /// Leaves the codes in the link. The channels A and B, which are not wired, stay at 0.
+    /// Posts the codes to the link. The DAC channels A and B, which are not connected, stay at 0.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
         let [third, fourth] = &self.outputs;
         self.link.post([

@@ -1,4 +1,4 @@
-//! The analog inputs of a module: which line to sample, and what each channel makes of its samples.
+//! The analog inputs of a module: selects the lines to sample and computes each channel from its samples.
 
 use crate::low_pass::{LOW_PASS_DEFAULT, LowPass};
 use crate::{
@@ -6,27 +6,27 @@ use crate::{
     Scale, input_status, scale::Measured,
 };
 
-/// The calls of [`AnalogSource::read`] a module makes in one scan at most, for all its lines together.
-/// A converter that converts on demand may take about 20 calls for each.
+/// Largest number of calls of [`AnalogSource::read`] that a module makes in one scan, for all its lines together. A
+/// converter that converts on demand may take about 20 calls for each line.
 pub const POLLS_PER_SCAN: u8 = 64;
 
-/// Scans in a row without any answer from the converter after which all its lines count as failed.
+/// Number of scans in a row without an answer from the converter after which all its lines count as failed.
 pub const STALLED_SCANS: u8 = 10;
 
-/// Inputs on the slot's first lines.
+/// Analog inputs on the slot's first lines.
 #[derive(Debug)]
 pub(crate) struct AnalogInputs<S> {
     source: S,
     inputs: [Input; CHANNELS],
-    /// How many of them there are.
+    /// Number of inputs.
     count: usize,
-    /// The line to ask for next, or being asked for.
+    /// Line to sample next, or being sampled.
     line: usize,
     stalled: u8,
 }
 
 impl<S: AnalogSource> AnalogInputs<S> {
-    /// One input for each of the first `count` lines, at most four.
+    /// Creates one input for each of the first `count` lines, at most four.
     pub(crate) const fn new(source: S, count: usize) -> Self {
         Self {
             source,
@@ -48,7 +48,7 @@ impl<S: AnalogSource> AnalogInputs<S> {
         &mut self.source
     }
 
-    /// Samples every line once, or as many as the converter has time for, and shows all channels.
+    /// Samples every line once, or as many as the converter has time for, and updates all channels.
     pub(crate) fn scan(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
         self.sample();
         let mut result = Ok(());
@@ -64,7 +64,7 @@ impl<S: AnalogSource> AnalogInputs<S> {
     fn sample(&mut self) {
         let mut answers = 0;
         for _ in 0..POLLS_PER_SCAN {
-            // At most three, so the cast keeps it.
+            // The line is at most 3, so the cast keeps the value.
             let answer = self.source.read(self.line as u8);
             let Some(input) = self.inputs.get_mut(self.line) else {
                 return;
@@ -89,7 +89,7 @@ impl<S: AnalogSource> AnalogInputs<S> {
         } else if self.stalled < STALLED_SCANS - 1 {
             self.stalled += 1;
         } else {
-            // The converter serves them all.
+            // The converter serves all lines, so all of them fail.
             self.inputs.iter_mut().for_each(Input::fail);
         }
     }
@@ -114,7 +114,7 @@ impl Input {
 
     fn configure(&mut self, settings: &ChannelSettings) {
         if settings.signal != self.settings.signal {
-            // The other range's status says nothing about this one, not even as hysteresis.
+            // The status belongs to the previous range; do not use it for this one, not even for the hysteresis.
             self.status = ChannelStatus::Good;
         }
         self.filter.set_n(settings.filter);
@@ -126,7 +126,7 @@ impl Input {
         self.filter.sample(code);
     }
 
-    /// The channel keeps what it shows. What was filtered is out of date when the line comes back.
+    /// Marks the input as failed. The channel keeps its word, and the filter restarts when the line works again.
     fn fail(&mut self) {
         self.failed = true;
         self.filter.reset();

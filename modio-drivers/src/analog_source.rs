@@ -1,27 +1,27 @@
-//! Where an analog input's codes come from.
+//! The source of an analog input's codes.
 
 use crate::Code;
 
 /// A 12-bit analog-to-digital converter with one input for each line of the slot.
 ///
-/// embedded-hal 0.2 had a trait for this (`OneShot`), embedded-hal 1 has none, so here is ours, polled
-/// in the manner of embedded-hal-nb.
+/// embedded-hal 0.2 had a trait for this (`OneShot`) and embedded-hal 1 has none. This trait is polled like those
+/// of embedded-hal-nb.
 pub trait AnalogSource {
-    /// What can go wrong in the converter.
+    /// Error of the converter.
     type Error;
 
-    /// The code of a slot line, 0 to 3: 0 for ground, 4095 for the reference.
+    /// Returns the code of a slot line, 0 to 3: 0 for ground, 4095 for the reference.
     ///
-    /// A converter that runs by itself, filling a buffer by DMA, answers at once and every line is
-    /// sampled once a millisecond. One that converts on demand starts a conversion at the first call
-    /// and is asked again for the same line, in this scan or the next, until it has an answer. A
-    /// driver makes at most [`POLLS_PER_SCAN`](crate::POLLS_PER_SCAN) calls in a scan, so a call must
-    /// return within a fraction of a microsecond and never wait.
+    /// A converter that runs continuously and fills a buffer by DMA answers immediately; then every line is sampled
+    /// once per millisecond. A converter that converts on demand starts a conversion at the first call, and is
+    /// called again for the same line, in this scan or the next, until it has an answer. A driver makes at most
+    /// [`POLLS_PER_SCAN`](crate::POLLS_PER_SCAN) calls in a scan, so a call must return within a fraction of a
+    /// microsecond and must not wait.
     ///
     /// # Errors
     ///
-    /// `WouldBlock` while the conversion goes on; `Other` when it failed, after which the next call
-    /// may be for another line.
+    /// `WouldBlock` while the conversion is running; `Other` when it failed. After that the next call may be for
+    /// another line.
     fn read(&mut self, line: u8) -> nb::Result<Code, Self::Error>;
 }
 

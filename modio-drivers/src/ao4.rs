@@ -1,4 +1,4 @@
-//! ModIO-AO: four analog outputs, 0-10 V or 4-20 mA, each by its jumper: the channels A to D of an
+//! ModIO-AO: four analog outputs, each set by its jumper to 0-10 V or 4-20 mA. They are the channels A to D of an
 //! MCP4728 whose full scale is 10 V or 20 mA.
 
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
 
 /// Four analog outputs.
 ///
-/// The driver only leaves codes in a [`DacLink`], for a [`DacWorker`](crate::DacWorker) to transfer.
+/// The driver only posts codes to a [`DacLink`]; a [`DacWorker`](crate::DacWorker) transfers them.
 #[derive(Debug)]
 pub struct Ao4<'a> {
     link: &'a DacLink,
@@ -16,7 +16,7 @@ pub struct Ao4<'a> {
 }
 
 impl<'a> Ao4<'a> {
-    /// Drives what is at the other end of the link, from the first
+    /// Creates the driver. It drives the DAC at the other end of the link from the first
     /// [`drive_outputs`](IoModule::drive_outputs) on.
     #[must_use]
     pub const fn new(link: &'a DacLink) -> Self {
@@ -27,7 +27,7 @@ impl<'a> Ao4<'a> {
     }
 }
 
-/// The DAC's channels: all of the module's.
+/// Channels that the DAC drives: all of the module.
 const ALL: u8 = 0b1111;
 
 impl IoModule for Ao4<'_> {
@@ -35,18 +35,18 @@ impl IoModule for Ao4<'_> {
         [Kind::WordOutput; CHANNELS]
     }
 
-    /// Takes range and scale. A word that stands in [`Channels`] is from then on read by these, so
-    /// the caller brings it along; see [`output_rescaled`](crate::scale::output_rescaled).
+    /// Applies range and scale. They also define the meaning of a word that is already in [`Channels`], so the
+    /// caller must convert it; see [`output_rescaled`](crate::scale::output_rescaled).
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
         self.settings = *settings;
     }
 
-    /// There is nothing to read, but a DAC that does not answer is reported.
+    /// There are no inputs. Returns an error for a DAC that does not answer.
     fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
         health(self.link, ALL)
     }
 
-    /// Leaves the codes in the link; an error of all channels while they do not get through.
+    /// Posts the codes to the link. Returns an error for all channels while the codes do not reach the DAC.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
         let mut codes = [Code::default(); CHANNELS];
         for (channel, (code, settings)) in codes.iter_mut().zip(&self.settings).enumerate() {
@@ -57,12 +57,12 @@ impl IoModule for Ao4<'_> {
     }
 }
 
-/// The DAC's code for a channel's word.
+/// Returns the DAC's code for a channel's word.
 pub(crate) fn output_code(channels: &Channels, channel: usize, settings: &ChannelSettings) -> Code {
     output_to_raw(channels.word(channel), settings.signal, settings.scale)
 }
 
-/// What the worker says of the DAC that serves these channels, channel 1 in bit 0.
+/// Returns an error for these channels, channel 1 in bit 0, while their DAC does not answer.
 pub(crate) fn health(link: &DacLink, channels: u8) -> Result<(), ModuleError> {
     if link.failed() {
         Err(ModuleError::chip(channels))
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn raw_words_are_posted_as_they_are_and_never_beyond_the_dac() {
+    fn raw_words_are_posted_unchanged_up_to_the_largest_code() {
         let link = DacLink::new();
         let mut module = Ao4::new(&link);
         assert_eq!(module.kinds(), [Kind::WordOutput; 4]);
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_link_is_reported_and_still_told_what_is_wanted() {
+    fn a_failed_link_is_reported_and_still_receives_codes() {
         let link = DacLink::new();
         let mut module = Ao4::new(&link);
         let mut channels = words([1, 2, 3, 4]);

@@ -1,12 +1,12 @@
-//! The four channels of one module as the rest of the device sees them.
+//! The four channels of one module, as the rest of the device accesses them.
 
-/// Channels of a module.
+/// Number of channels of a module.
 pub const CHANNELS: usize = 4;
 
-/// What a channel is.
+/// Kind of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Nothing: no point stands at its address.
+    /// No channel: there is no point at its address.
     None,
     /// A digital input.
     BitInput,
@@ -18,16 +18,16 @@ pub enum Kind {
     WordOutput,
 }
 
-/// How far an analog input's word is to be trusted; always good for any other channel.
+/// Validity of an analog input's word. Always good for any other kind of channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum ChannelStatus {
-    /// The word is what is measured.
+    /// The word is the measured value.
     #[default]
     Good = 0,
-    /// Below what the signal can be.
+    /// The value is below the range of the signal.
     UnderRange = 1,
-    /// Above what can be measured.
+    /// The value is above the range of the signal or of the converter.
     OverRange = 2,
     /// Nothing is connected, or a wire is broken.
     OpenCircuit = 3,
@@ -36,14 +36,14 @@ pub enum ChannelStatus {
 }
 
 impl ChannelStatus {
-    /// The code of this status, 0 to 4.
+    /// Returns the code of this status, 0 to 4.
     #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
     }
 }
 
-/// What stands in a module's channels: inputs as last scanned, outputs as commanded.
+/// The values of a module's channels: inputs as last scanned, outputs as commanded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Channels {
     /// Digital channels, channel 1 in bit 0.
@@ -53,7 +53,7 @@ pub struct Channels {
 }
 
 impl Channels {
-    /// Everything off, at 0 and good.
+    /// Returns channels that are all off, 0 and good.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -63,13 +63,13 @@ impl Channels {
         }
     }
 
-    /// A digital channel, 0 to 3; `false` for a channel that does not exist.
+    /// Returns a digital channel, 0 to 3; `false` for a channel that does not exist.
     #[must_use]
     pub const fn bit(&self, channel: usize) -> bool {
         channel < CHANNELS && self.bits & (1 << channel) != 0
     }
 
-    /// Sets a digital channel, 0 to 3; one that does not exist is left alone.
+    /// Sets a digital channel, 0 to 3. A channel that does not exist is ignored.
     pub const fn set_bit(&mut self, channel: usize, value: bool) {
         if channel < CHANNELS {
             let mask = 1 << channel;
@@ -81,7 +81,7 @@ impl Channels {
         }
     }
 
-    /// An analog channel, 0 to 3, as its [`Scale`](crate::Scale) says; 0 for a channel that does not
+    /// Returns an analog channel, 0 to 3, in the unit of its [`Scale`](crate::Scale); 0 for a channel that does not
     /// exist.
     #[must_use]
     pub const fn word(&self, channel: usize) -> u16 {
@@ -92,14 +92,14 @@ impl Channels {
         }
     }
 
-    /// Sets an analog channel, 0 to 3; one that does not exist is left alone.
+    /// Sets an analog channel, 0 to 3. A channel that does not exist is ignored.
     pub const fn set_word(&mut self, channel: usize, value: u16) {
         if channel < CHANNELS {
             self.words[channel] = value;
         }
     }
 
-    /// The status of a channel, 0 to 3; good for a channel that does not exist.
+    /// Returns the status of a channel, 0 to 3; good for a channel that does not exist.
     #[must_use]
     pub const fn status(&self, channel: usize) -> ChannelStatus {
         if channel < CHANNELS {
@@ -109,7 +109,7 @@ impl Channels {
         }
     }
 
-    /// Sets the status of a channel, 0 to 3; one that does not exist is left alone.
+    /// Sets the status of a channel, 0 to 3. A channel that does not exist is ignored.
     pub const fn set_status(&mut self, channel: usize, status: ChannelStatus) {
         if channel < CHANNELS {
             self.status[channel] = status;
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bits_are_kept_apart_and_a_fifth_channel_is_nothing() {
+    fn bits_are_independent_and_a_fifth_channel_is_ignored() {
         let mut channels = Channels::new();
         channels.set_bit(0, true);
         channels.set_bit(3, true);
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn words_and_status_are_kept_apart_and_a_fifth_channel_is_nothing() {
+    fn words_and_status_are_independent_and_a_fifth_channel_is_ignored() {
         let mut channels = Channels::new();
         for channel in 0..5 {
             channels.set_word(channel, 100 + channel as u16);

@@ -1,43 +1,44 @@
-//! The slow part of the analog outputs: an MCP4728 quad 12-bit DAC on an I2C bus, which may be absent
-//! or stuck. A background task runs it; the scan never waits for it.
+//! The slow part of the analog outputs: an MCP4728 quad 12-bit DAC on an I2C bus, which may be missing or stuck. A
+//! background task runs it; the scan never waits for it.
 //!
-//! The one command used is Multi-Write (DS22187E, 5.6.2) for all four channels:
+//! The only command used is Multi-Write (DS22187E, 5.6.2) for all four channels:
 //!
 //! ```text
 //! 0 1 0 0 0 ch ch UDAC | Vref PD PD Gx d11-d8 | d7-d0    times four, 12 bytes
 //! ```
 //!
-//! It carries the reference (VDD), the gain (1) and the power-down bits (normal) beside the code, so
-//! after a single transfer a DAC is right whatever its EEPROM had set, and UDAC = 0 puts each channel
-//! out at its last byte, wherever the LDAC pin is. It writes the volatile registers alone: the EEPROM,
-//! which would wear out, is never written.
+//! Besides the code it contains the reference (VDD), the gain (1) and the power-down bits (normal). After one
+//! transfer the DAC is therefore configured correctly, whatever its EEPROM contains. With UDAC = 0 each channel
+//! changes its output at its last byte, whatever the level of the LDAC pin. The command only writes the volatile
+//! registers. The EEPROM, which would wear out, is never written.
 
 use embedded_hal::i2c::{ErrorKind, I2c, NoAcknowledgeSource};
 use mcp4728::{Channel, ChannelState, Error, MCP4728, OutputEnableMode, VoltageReferenceMode};
 
 use crate::{CHANNELS, Code, DacLink};
 
-/// The lowest address that a DAC can be ordered with, and the most usual one (DS22187E, 5.3); the highest is 0x67.
+/// The lowest address that a DAC can be ordered with, and the most common one (DS22187E, 5.3). The highest is 0x67.
 pub const DAC_ADDRESS: u8 = 0x60;
 
-/// Calls from one transfer to the next when nothing has changed: 100 ms at a call every 10 ms. By
-/// then a DAC that has lost its power is found missing, or set right when it is back.
+/// Number of calls between transfers when nothing has changed: 100 ms at one call every 10 ms. Within that time a
+/// DAC that has lost its power is detected, or set again when its power has returned.
 const REFRESH_CALLS: u8 = 10;
 
-/// Failures in a row after which the link counts as failed: a single one may be noise on the bus.
+/// Number of failures in a row after which the link counts as failed. A single failure may be noise on the bus.
 const FAILURES_TO_FAIL: u8 = 2;
 
-/// Calls left out after a failure at most: 160 ms at a call every 10 ms, so that time-outs on a stuck
-/// bus take little of the background's time, and a DAC that comes back is soon found.
+/// Largest number of calls to skip after a failure: 160 ms at one call every 10 ms. Time-outs on a stuck bus then
+/// take little of the background's time, and a DAC that works again is soon detected.
 const PAUSE_MAX_CALLS: u8 = 16;
 
-/// A transfer failed. It will be made again by itself; the variants are what the caller can do.
+/// Error of a transfer. The worker repeats the transfer automatically; the variants differ in what the caller can
+/// do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DacError {
-    /// Nobody answered: the module or its power is missing. There is nothing to do but to go on.
+    /// No device acknowledged the address: the module or its power is missing. The caller can do nothing.
     NotAnswering(NoAcknowledgeSource),
-    /// The bus is held, disturbed or timed out: free it before the next call, by clocking SCL until
-    /// SDA is let go and resetting the peripheral.
+    /// The bus is held, disturbed or timed out. The caller must recover it before the next call: clock SCL until
+    /// SDA is released, and reset the peripheral.
     Bus(ErrorKind),
 }
 
@@ -50,10 +51,10 @@ impl DacError {
                 | ErrorKind::ArbitrationLoss
                 | ErrorKind::Overrun
                 | ErrorKind::Other) => Self::Bus(kind),
-                // The enum may grow; a bus of which nothing is known is worth a reset.
+                // The enum may get more variants. Resetting the bus is safe for an unknown error.
                 kind => Self::Bus(kind),
             },
-            // Checks of the crate that four channels with 12-bit codes always pass.
+            // Four channels with 12-bit codes always pass these checks of the crate.
             Error::ValueOutOfBounds(_)
             | Error::WriteSizeExceeded
             | Error::StartingChannelMismatch => Self::Bus(ErrorKind::Other),
@@ -61,22 +62,22 @@ impl DacError {
     }
 }
 
-/// Brings what a [`DacLink`] wants to one DAC. Several of them, with an address each, may share a bus.
+/// Transfers the codes in a [`DacLink`] to one DAC. Several workers with different addresses may share a bus.
 #[derive(Debug)]
 pub struct DacWorker {
     /// The DAC's address on its bus, 7 bits.
     address: u8,
-    /// What the DAC has, as far as is known.
+    /// The codes in the DAC, if they are known.
     sent: Option<[Code; CHANNELS]>,
     until_refresh: u8,
-    /// Failures in a row.
+    /// Number of failures in a row.
     failures: u8,
-    /// Calls to be left out.
+    /// Number of calls to skip.
     pause: u8,
 }
 
 impl DacWorker {
-    /// For the DAC at this address, 0x60 to 0x67.
+    /// Creates a worker for the DAC at this address, 0x60 to 0x67.
     #[must_use]
     pub const fn new(address: u8) -> Self {
         Self {
@@ -88,16 +89,15 @@ impl DacWorker {
         }
     }
 
-    /// To be called every 10 ms, or as soon as codes have been posted as well. Makes one transfer of
-    /// 13 bytes, 0.3 ms at 400 kHz, when codes have changed, when it is time to refresh, or when a
-    /// failed transfer is to be tried again: at the next call, then after 1, 2, 4, 8 and 16 calls left
-    /// out. Returns whether it made one. Before the first post it leaves the DAC alone. Every transfer of the bus must end
-    /// within a bounded time.
+    /// Transfers codes if needed. Call this every 10 ms, and also as soon as codes have been posted. It makes one
+    /// transfer of 13 bytes, 0.3 ms at 400 kHz, when codes have changed, when a refresh is due, or to repeat a
+    /// failed transfer. A failed transfer is repeated at the next call, and after more failures once 1, 2, 4, 8 and
+    /// then 16 calls have been skipped. Returns whether a transfer was made. Before the first post the DAC is not
+    /// accessed. Every transfer of the bus must end within a bounded time.
     ///
     /// # Errors
-    ///
-    /// [`DacError`] when a transfer was tried and failed; from the second in a row on, until one
-    /// succeeds, [`DacLink::failed`] says so too.
+    /// [`DacError`] when a transfer failed. From the second failure in a row until the next success,
+    /// [`DacLink::failed`] also returns true.
     pub fn work(&mut self, bus: &mut impl I2c, link: &DacLink) -> Result<bool, DacError> {
         if self.pause > 0 {
             self.pause -= 1;
@@ -126,7 +126,8 @@ impl DacWorker {
 
     fn transfer(&self, bus: &mut impl I2c, codes: [Code; CHANNELS]) -> Result<(), DacError> {
         let [a, b, c, d] = codes.map(|code| {
-            // A larger code would reach into the gain bit: the crate does not check.
+            // A code above 12 bits would change the gain bit, because the crate does not check it. [`Code`]
+            // excludes that.
             ChannelState::new()
                 .voltage_reference_mode(VoltageReferenceMode::External)
                 .value(code.get())
@@ -142,7 +143,7 @@ impl DacWorker {
     }
 }
 
-/// The calls to leave out after so many failures: 0, 1, 2, 4, 8, 16, 16 and so on.
+/// Returns the number of calls to skip after this many failures: 0, 1, 2, 4, 8, 16, 16 and so on.
 fn pause_after(failures: u8) -> u8 {
     match failures.checked_sub(2) {
         Some(doublings) => 1_u8

@@ -1,31 +1,31 @@
-//! What goes between the fast side of the analog outputs, a module's driver in the scan, and the slow
-//! side, [`DacWorker`](crate::DacWorker) in a background task.
+//! The link between the fast side of the analog outputs, a module's driver in the scan, and the slow side, a
+//! [`DacWorker`](crate::DacWorker) in a background task.
 
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering::SeqCst};
 
 use crate::{CHANNELS, Code};
 
-/// A mailbox with the codes wanted on the four DAC channels one way and the DAC's health the other.
-/// Made to be a `static`. One driver posts, one worker collects.
+/// A mailbox with the codes for the four DAC channels in one direction and the state of the DAC in the other. It is
+/// meant to be a `static`. One driver posts, one worker collects.
 ///
-/// Codes posted together are collected together: the posts are counted before and after, as in a
-/// seqlock, so a worker that was interrupted by a post notices and reads again.
+/// Codes posted together are collected together. The worker compares the number of posts before and after reading,
+/// as in a seqlock, so it detects a post that interrupted it and reads again.
 #[derive(Debug)]
 pub struct DacLink {
     codes: [AtomicU16; CHANNELS],
-    /// Odd during a post.
+    /// Number of posts times two; odd during a post.
     posts: AtomicU32,
-    /// Something has been posted since the start.
+    /// Codes have been posted since the start.
     posted: AtomicBool,
     failed: AtomicBool,
 }
 
-/// Attempts to collect before it is left to the next call. Posts come once a millisecond, collecting
-/// takes well below a microsecond.
+/// Number of attempts to collect before the next call continues. Posts are made once per millisecond, and
+/// collecting takes well below a microsecond.
 const ATTEMPTS: u8 = 3;
 
 impl DacLink {
-    /// Nothing wanted yet, nothing known to be wrong.
+    /// Returns a link without codes and without a failure.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -36,13 +36,13 @@ impl DacLink {
         }
     }
 
-    /// True while the DAC does not answer or its bus is stuck.
+    /// Returns whether the DAC does not answer or its bus is stuck.
     #[must_use]
     pub fn failed(&self) -> bool {
         self.failed.load(SeqCst)
     }
 
-    /// The codes each channel is to have, A to D.
+    /// Posts the codes for the channels A to D.
     pub(crate) fn post(&self, wanted: [Code; CHANNELS]) {
         let same = self.codes.iter().zip(wanted);
         if self.posted.load(SeqCst) && same.into_iter().all(|(c, w)| c.load(SeqCst) == w.get()) {
@@ -56,13 +56,13 @@ impl DacLink {
         self.posted.store(true, SeqCst);
     }
 
-    /// What was posted last; none before the first post, or in the unlikely case that posts came in
-    /// between at every attempt.
+    /// Returns the codes posted last. Returns `None` before the first post, and in the unlikely case that a post
+    /// interrupted every attempt.
     pub(crate) fn wanted(&self) -> Option<[Code; CHANNELS]> {
         self.collect(|| ())
     }
 
-    /// Collects, calling `interrupt` before each code, where a post may come in.
+    /// Collects the codes, calling `interrupt` before each code to simulate a post at that point.
     fn collect(&self, mut interrupt: impl FnMut()) -> Option<[Code; CHANNELS]> {
         if !self.posted.load(SeqCst) {
             return None;
@@ -99,19 +99,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_posted_last_is_wanted_and_nothing_before_that() {
+    fn the_codes_posted_last_are_collected_and_none_before_the_first_post() {
         let link = DacLink::new();
         assert_eq!(link.wanted(), None);
         link.post([0; 4].map(Code::new));
         assert_eq!(
             link.wanted(),
             Some([0; 4].map(Code::new)),
-            "zeros are a post too"
+            "zeros count as a post, too"
         );
         link.post([1, 2, 3, 4].map(Code::new));
         link.post([1, 2, 3, 4].map(Code::new));
         assert_eq!(link.wanted(), Some([1, 2, 3, 4].map(Code::new)));
-        assert_eq!(link.posts.load(SeqCst), 4, "the same again is no post");
+        assert_eq!(
+            link.posts.load(SeqCst),
+            4,
+            "posting equal codes again is no post"
+        );
         assert!(!link.failed());
         link.set_failed(true);
         assert!(link.failed());
@@ -128,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_post_that_comes_in_anywhere_is_collected_whole() {
+    fn a_post_that_interrupts_at_any_code_is_collected_completely() {
         for place in 0..CHANNELS {
             let link = DacLink::new();
             link.post([1; 4].map(Code::new));
@@ -153,7 +157,7 @@ mod tests {
             calls += 1;
             link.post([calls; 4].map(Code::new));
         });
-        assert_eq!(collected, None, "posts come in all the time");
+        assert_eq!(collected, None, "every attempt was interrupted");
         assert_eq!(calls, u16::from(ATTEMPTS) * 4);
         assert_eq!(link.wanted(), Some([calls; 4].map(Code::new)));
     }

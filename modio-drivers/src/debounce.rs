@@ -1,21 +1,21 @@
 //! The filter of a digital input.
 
-/// Debounce of every input until told otherwise, in milliseconds.
+/// Default debounce of every input, in milliseconds.
 pub const DEBOUNCE_DEFAULT_MS: u16 = 5;
 
 /// The longest debounce, in milliseconds.
 pub const DEBOUNCE_MAX_MS: u16 = 1000;
 
-/// A level counts as changed when it has stood in every one of as many samples as are needed; with 0
-/// it is followed at once. The first sample counts as it stands. A pulse shorter than that is not
-/// seen, and both edges are delayed alike.
+/// Debounces a level. A new level counts after it was seen in `needed` samples in a row; with 0 it counts
+/// immediately. The first sample counts immediately. Shorter pulses are suppressed, and both edges are delayed
+/// equally.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Debounce {
-    /// Samples a new level must stand before it counts.
+    /// Number of samples that a new level needs before it counts.
     needed: u16,
-    /// Samples the new level has stood so far.
+    /// Number of samples with the new level so far.
     seen: u16,
-    /// The level that counts, none before the first sample.
+    /// The level that counts; none before the first sample.
     level: Option<bool>,
 }
 
@@ -28,12 +28,12 @@ impl Debounce {
         }
     }
 
-    /// Sets the samples needed, at most [`DEBOUNCE_MAX_MS`]. A level on its way in keeps what it has.
+    /// Sets the samples needed, at most [`DEBOUNCE_MAX_MS`]. The samples seen so far still count.
     pub(crate) fn set_needed(&mut self, needed: u16) {
         self.needed = needed.min(DEBOUNCE_MAX_MS);
     }
 
-    /// Takes a sample and returns the level that counts.
+    /// Adds a sample and returns the level that counts.
     pub(crate) fn sample(&mut self, now: bool) -> bool {
         let level = self.level.unwrap_or(now);
         self.seen = if now == level {
@@ -60,26 +60,29 @@ mod tests {
     }
 
     #[test]
-    fn a_new_length_counts_what_has_been_seen_already() {
+    fn a_new_length_counts_samples_seen_before() {
         let mut filter = Debounce::new(10);
         assert!(!filter.sample(false));
         assert!(!feed(&mut filter, true, 6));
         filter.set_needed(10);
-        assert!(!feed(&mut filter, true, 3), "nine of ten");
-        assert!(filter.sample(true), "the same again disturbs nothing");
+        assert!(!feed(&mut filter, true, 3), "nine of ten samples");
+        assert!(
+            filter.sample(true),
+            "setting the same length does not disturb"
+        );
 
         assert!(feed(&mut filter, false, 6));
         filter.set_needed(8);
-        assert!(filter.sample(false), "seven of eight");
+        assert!(filter.sample(false), "seven of eight samples");
         assert!(!filter.sample(false));
 
         assert!(!feed(&mut filter, true, 6));
         filter.set_needed(2);
-        assert!(filter.sample(true), "seven are more than two");
+        assert!(filter.sample(true), "seven samples are more than two");
     }
 
     #[test]
-    fn a_length_beyond_the_longest_is_the_longest() {
+    fn a_length_above_the_maximum_becomes_the_maximum() {
         let mut filter = Debounce::new(0);
         filter.set_needed(u16::MAX);
         assert!(!filter.sample(false));

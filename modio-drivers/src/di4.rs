@@ -7,9 +7,9 @@ use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
 
 /// Four debounced digital inputs.
 ///
-/// An input counts as changed when its line has stood at the new level in every one of as many
-/// scans as its debounce has milliseconds; with 0 it follows the line at once. A pulse shorter than
-/// the debounce is not seen, and both edges are delayed alike.
+/// An input counts as changed when its line has had the new level in as many scans in a row as its debounce has
+/// milliseconds; with 0 it follows the line immediately. Shorter pulses are suppressed, and both edges are delayed
+/// equally.
 #[derive(Debug)]
 pub struct Di4<P> {
     lines: [P; CHANNELS],
@@ -17,8 +17,8 @@ pub struct Di4<P> {
 }
 
 impl<P: InputPin> Di4<P> {
-    /// Takes over the four slot lines, which need pull-ups. The first scan takes every input as it
-    /// stands, without waiting.
+    /// Creates the driver with the four slot lines, which need pull-ups. The first scan takes the level of every
+    /// input without a delay.
     pub const fn new(lines: [P; CHANNELS]) -> Self {
         Self {
             lines,
@@ -32,7 +32,7 @@ impl<P: InputPin> IoModule for Di4<P> {
         [Kind::BitInput; CHANNELS]
     }
 
-    /// Takes the debounce from [`ChannelSettings::filter`].
+    /// Applies the debounce in [`ChannelSettings::filter`].
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
         for (filter, settings) in self.filters.iter_mut().zip(settings) {
             filter.set_needed(settings.filter);
@@ -68,7 +68,7 @@ mod tests {
 
     use super::*;
 
-    /// A line that shows these levels, one a scan: `true` is energised, so low.
+    /// Returns a line with these levels, one per scan: `true` is energised, which is low.
     fn line(energised: &[bool]) -> Mock {
         let states = energised
             .iter()
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_scan_takes_the_inputs_as_they_stand() {
+    fn the_first_scan_takes_the_inputs_without_delay() {
         let mut module = Di4::new([true, false, false, true].map(|on| line(&[on])));
         let mut channels = Channels::new();
         module.read_inputs(&mut channels).unwrap();
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulse_shorter_than_the_debounce_is_not_seen_and_does_not_add_up() {
+    fn a_pulse_shorter_than_the_debounce_is_suppressed_and_not_added_up() {
         let levels = [
             false, true, true, true, true, false, true, true, true, true, false,
         ];
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_cannot_be_read_keeps_its_bit_and_leaves_the_others_alone() {
+    fn a_line_that_cannot_be_read_keeps_its_bit_and_does_not_affect_the_others() {
         let failing = Mock::new(&[
             Transaction::get(State::Low),
             Transaction::get(State::High)
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn each_channel_has_its_own_debounce_and_the_same_again_disturbs_none() {
+    fn each_channel_has_its_own_debounce_and_equal_settings_do_not_disturb() {
         let levels = [false, true, true, true, true, true];
         let mut module = Di4::new([(); 4].map(|()| line(&levels)));
         let mut channels = Channels::new();

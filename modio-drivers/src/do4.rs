@@ -1,5 +1,4 @@
-//! ModIO-DO: four open-collector outputs for 5 to 30 V, 200 mA. A line driven high makes its
-//! transistor conduct.
+//! ModIO-DO: four open-collector outputs for 5 to 30 V, 200 mA. A high line makes its transistor conduct.
 
 use embedded_hal::digital::{OutputPin, PinState};
 
@@ -12,8 +11,8 @@ pub struct Do4<P> {
 }
 
 impl<P: OutputPin> Do4<P> {
-    /// Takes over the four slot lines. The caller has made them outputs that drive low, so that no
-    /// output conducts before the first scan.
+    /// Creates the driver with the four slot lines. They must already be outputs that drive low, so that no output
+    /// conducts before the first scan.
     pub const fn new(lines: [P; CHANNELS]) -> Self {
         Self { lines }
     }
@@ -30,8 +29,7 @@ impl<P: OutputPin> IoModule for Do4<P> {
         Ok(())
     }
 
-    /// Drives every line every time, changed or not, so that no output stays wrong for longer than
-    /// a scan.
+    /// Drives every line in every call, changed or not, so that a disturbed output is wrong for one scan at most.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
         let mut result = Ok(());
         for (channel, line) in self.lines.iter_mut().enumerate() {
@@ -85,13 +83,13 @@ mod tests {
         module.drive_outputs(&channels).unwrap();
         assert!(
             channels.bit(1) && channels.bit(3),
-            "outputs are not changed by a scan"
+            "reading does not change outputs"
         );
         module.lines.iter_mut().for_each(Mock::done);
     }
 
     #[test]
-    fn a_line_that_cannot_be_driven_is_named_and_the_others_are_driven() {
+    fn a_line_that_cannot_be_driven_is_reported_and_the_others_are_driven() {
         let failing = Mock::new(&[Transaction::set(State::Low)
             .with_error(MockError::Io(std::io::ErrorKind::NotConnected))]);
         let low = || line(&[State::Low]);

@@ -1,45 +1,42 @@
-//! Whether an analog input's code can be what its signal says: wire breaks, short circuits, signals
-//! outside their range.
+//! Checks whether an analog input's code is plausible for its signal: detects wire breaks, short circuits and
+//! signals out of range.
 //!
-//! Every threshold has a second one a little further in, at which the status goes away again, so that
-//! noise on a threshold does not make it flap.
+//! Every threshold has a second one a little further inside the range, at which the status is cleared, so that
+//! noise near a threshold does not toggle the status.
 
 use crate::scale::Measured;
 use crate::{ChannelStatus, Code, ntc};
 
-/// A 4-20 mA loop below this many uA is under range: a transmitter signals a failure of its own with
-/// 3.6 mA or less, and measures down to 3.8 mA (NAMUR NE 43).
+/// A 4-20 mA loop below this current, in uA, is under range. A transmitter signals its own failure with 3.6 mA or
+/// less, and measures down to 3.8 mA (NAMUR NE 43).
 pub const UNDER_RANGE_UA: u16 = 3_600;
 
-/// A 4-20 mA loop below this many uA is open: no transmitter lives on less, the rest is leakage.
+/// A 4-20 mA loop below this current, in uA, is open. No transmitter can work with less; the rest is leakage.
 pub const OPEN_CIRCUIT_UA: u16 = 1_000;
 
-/// A loop must come this many uA above a threshold to leave it: half of the 0.2 mA that NE 43 keeps
-/// between a failure and a measurement.
+/// Hysteresis of a loop's thresholds, in uA: half of the 0.2 mA that NE 43 keeps between a failure and a
+/// measurement.
 pub const HYSTERESIS_UA: u16 = 100;
 
-/// A voltage or current at this code is over range: the converter is at its end, so the signal can be
-/// anything from here up. Full scale itself, 10 V or 20 mA, counts with it, since nothing tells them
-/// apart.
+/// A voltage or current at this code is over range. The converter is at its limit, so the signal may have any value
+/// from here up. Exactly full scale, 10 V or 20 mA, also counts as over range, because it gives the same code.
 pub const OVER_RANGE_CODE: u16 = Code::MAX.get();
 
-/// A thermistor at this code or below is shorted: 39 ohm, a quarter of what the steepest one has at
-/// 125 degC, and more than wires have.
+/// A thermistor at this code or below is shorted. This is 39 ohm: more than the wires have, and a quarter of the
+/// resistance of the steepest thermistor at 125 degC.
 pub const SHORT_CIRCUIT_CODE: u16 = 16;
 
-/// A thermistor at this code or above is missing: 2.5 Mohm, more than twice what the steepest one has
-/// at -40 degC.
+/// A thermistor at this code or above is missing. This is 2.5 Mohm: more than twice the resistance of the steepest
+/// thermistor at -40 degC.
 pub const OPEN_CIRCUIT_CODE: u16 = Code::MAX.get() - 16;
 
-/// How far a code must come back from one of the thresholds above: two to three times the noise of
-/// the F103's converter.
+/// Hysteresis of the codes above: two to three times the noise of the F103's converter.
 pub const HYSTERESIS_CODE: u16 = 8;
 
-/// How far a thermistor must come back into [`ntc::MIN_TENTHS`] to [`ntc::MAX_TENTHS`], in 0.1 degC.
+/// Hysteresis of a thermistor's limits [`ntc::MIN_TENTHS`] and [`ntc::MAX_TENTHS`], in 0.1 degC.
 pub const HYSTERESIS_TENTHS: i16 = 10;
 
-/// The status of an input with this code, which has been found to mean so much, after it had the
-/// status `before` in the same range.
+/// Returns the status of an input with this code and measured value, whose status in the same range was `before`.
 #[must_use]
 pub fn judge(code: Code, measured: Measured, before: ChannelStatus) -> ChannelStatus {
     match measured {
@@ -92,7 +89,7 @@ fn thermistor(code: Code, tenths: i16, before: ChannelStatus) -> ChannelStatus {
     }
 }
 
-/// The hysteresis, while there is something to come back from.
+/// Returns the hysteresis while the status is active, otherwise 0.
 const fn back_off(active: bool, hysteresis: u16) -> u16 {
     if active { hysteresis } else { 0 }
 }
@@ -149,7 +146,7 @@ mod tests {
     const NEVER: (u16, ChannelStatus) = (u16::MAX, Good);
 
     #[test]
-    fn a_voltage_is_over_range_at_the_converters_end_alone() {
+    fn a_voltage_is_over_range_only_at_the_largest_code() {
         let up = sweep(Signal::Voltage, 3950, 0..=4095);
         assert_eq!(up, [(0, Good), (4095, OverRange), NEVER, NEVER, NEVER]);
         let down = sweep(Signal::Voltage, 3950, (0..=4095).rev());
@@ -180,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thermistor_goes_through_all_five_for_every_beta() {
+    fn a_thermistor_goes_through_all_five_statuses_for_every_beta() {
         for beta in (ntc::BETA_MIN..=ntc::BETA_MAX).step_by(50) {
             let first = |limit: i16| {
                 (0..=4095)
@@ -209,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_out_of_a_break_or_a_short_has_the_hysteresis_of_what_it_jumps_over() {
+    fn a_jump_out_of_a_break_or_a_short_uses_the_hysteresis_of_the_limits_in_between() {
         let loop_ = settings(Signal::Current);
         let ua = |ua: u32| (ua * 4095 / 20_000) as u16;
         for (before, expected) in [

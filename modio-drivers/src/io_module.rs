@@ -1,19 +1,19 @@
-//! What every module's driver can do.
+//! The interface of every module's driver.
 
 use crate::{CHANNELS, ChannelSettings, Channels, Kind};
 
-/// Channels of a module that could not be read or driven. They keep what they had, and are tried again at every
-/// scan. All other channels have been served.
+/// Channels of a module that could not be read or driven. They keep their values and are tried again at every scan.
+/// All other channels have been served.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ModuleError {
-    /// Channels whose own line of the slot failed, channel 1 in bit 0.
+    /// Channels whose own slot line failed, channel 1 in bit 0.
     lines: u8,
     /// Channels whose chip on the module does not answer, channel 1 in bit 0.
     chip: u8,
 }
 
 impl ModuleError {
-    /// A line of the slot could not be read or driven: that of this channel, 0 to 3.
+    /// Returns the error that the slot line of this channel, 0 to 3, could not be read or driven.
     #[must_use]
     pub const fn line(channel: usize) -> Self {
         Self {
@@ -22,7 +22,7 @@ impl ModuleError {
         }
     }
 
-    /// The module's chip, which serves these channels, channel 1 in bit 0, does not answer.
+    /// Returns the error that the module's chip does not answer, which serves these channels, channel 1 in bit 0.
     #[must_use]
     pub const fn chip(channels: u8) -> Self {
         Self {
@@ -31,13 +31,13 @@ impl ModuleError {
         }
     }
 
-    /// Every channel that failed, channel 1 in bit 0.
+    /// Returns every channel that failed, channel 1 in bit 0.
     #[must_use]
     pub const fn channels(self) -> u8 {
         self.lines | self.chip
     }
 
-    /// The first channel, 0 to 3, whose own line failed, when the module's chip answers.
+    /// Returns the first channel, 0 to 3, whose own line failed; `None` when the module's chip does not answer.
     #[must_use]
     pub const fn first_line(self) -> Option<usize> {
         if self.chip == 0 && self.lines != 0 {
@@ -47,11 +47,11 @@ impl ModuleError {
         }
     }
 
-    /// What failed in either of two results.
+    /// Combines two results.
     ///
     /// # Errors
     ///
-    /// The channels of both.
+    /// The channels that failed in either result.
     pub const fn in_either(one: Result<(), Self>, other: Result<(), Self>) -> Result<(), Self> {
         match (one, other) {
             (Err(one), Err(other)) => Err(Self {
@@ -66,32 +66,32 @@ impl ModuleError {
 
 /// A plug-in module in its slot.
 pub trait IoModule {
-    /// What each of the four channels is. Never changes while the module is in use.
+    /// Returns the kinds of the four channels. They never change while the module is in use.
     fn kinds(&self) -> [Kind; CHANNELS];
 
-    /// Sets how each channel is to be read or driven, in force from the next scan on. May come at any
-    /// time between two scans. A channel whose settings have not changed is not disturbed: a debounce
-    /// goes on, a filter keeps its state.
+    /// Sets how each channel is read or driven, in force from the next scan on. May be called at any time between
+    /// two scans. A channel whose settings have not changed is not disturbed: a debounce continues and a filter
+    /// keeps its state.
     ///
-    /// Settings a channel has no use for are ignored, and one outside its range counts as the nearest
-    /// within. Until the first call, [`ChannelSettings::default_for`] is in force.
+    /// Settings that do not apply to a channel are ignored, and a setting out of range becomes the nearest value in
+    /// range. Until the first call, [`ChannelSettings::default_for`] is in force.
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]);
 
-    /// Brings the inputs into `channels`: once a millisecond, which filters count by. Must return
-    /// within a few microseconds.
+    /// Reads the inputs into `channels`. Must be called once per millisecond, which is the unit of the filters.
+    /// Returns within a few microseconds.
     ///
     /// # Errors
     ///
-    /// [`ModuleError`] with the channels that could not be read. Every other channel has been read, and the
-    /// failed ones are tried again the next time.
+    /// [`ModuleError`] with the channels that could not be read. Every other channel has been read, and the failed
+    /// ones are tried again at the next call.
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError>;
 
-    /// Drives the outputs as `channels` says: as often as [`read_inputs`](Self::read_inputs), and at
-    /// once when one has been commanded. Must return within a few microseconds.
+    /// Drives the outputs from `channels`. Must be called as often as [`read_inputs`](Self::read_inputs), and also
+    /// immediately after an output was commanded. Returns within a few microseconds.
     ///
     /// # Errors
     ///
-    /// [`ModuleError`] with the channels that could not be driven; otherwise as above.
+    /// [`ModuleError`] with the channels that could not be driven. Every other channel has been driven.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError>;
 }
 

@@ -1,26 +1,26 @@
-//! The filter of an analog input: a first-order low-pass, y += (x - y) / 2^n a sample.
+//! The filter of an analog input: a first-order low-pass, y += (x - y) / 2^n per sample.
 //!
-//! Its step response is that of an RC filter with a time constant of 2^n samples; n = 0 lets every
-//! sample through. The state is a code in fixed point whose place of the point does not depend on n,
-//! so another n changes the speed and not the value. Dropping bits of the difference leaves the state
-//! at most 2^n - 1 of 65536 below a steady input, so that the rounded code settles exactly.
+//! Its step response is that of an RC filter with a time constant of 2^n samples; with n = 0 it does not filter.
+//! The state is a fixed-point code whose scale does not depend on n, so changing n changes the speed but not the
+//! value. The shift drops bits of the difference, which leaves the state at most (2^n - 1) / 65536 below a steady
+//! input, so the rounded code settles exactly.
 
 use crate::Code;
 
-/// n of every analog input until told otherwise.
+/// Default n of every analog input.
 pub const LOW_PASS_DEFAULT: u16 = 4;
 
 /// The largest n.
 pub const LOW_PASS_MAX: u16 = 8;
 
-/// Bits after the point. With the 12 bits of a code that makes 28, so differences fit an `i32`.
+/// Number of fraction bits. With the 12 bits of a code the state has 28 bits, so differences fit an `i32`.
 const FRACTION: u32 = 16;
 
 /// A low-pass over 12-bit codes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LowPass {
     n: u16,
-    /// None before the first sample, which it takes as it is.
+    /// `None` before the first sample, which is not filtered.
     state: Option<i32>,
 }
 
@@ -34,12 +34,12 @@ impl LowPass {
         self.n = n.min(LOW_PASS_MAX);
     }
 
-    /// Forgets everything: the next sample is taken as it is.
+    /// Discards the state: the next sample is not filtered.
     pub(crate) const fn reset(&mut self) {
         self.state = None;
     }
 
-    /// Takes a sample.
+    /// Adds a sample.
     pub(crate) fn sample(&mut self, code: Code) {
         let input = i32::from(code.get()) << FRACTION;
         self.state = Some(match self.state {
@@ -48,7 +48,7 @@ impl LowPass {
         });
     }
 
-    /// The filtered code; none before the first sample.
+    /// Returns the filtered code, or `None` before the first sample.
     pub(crate) fn code(&self) -> Option<Code> {
         const HALF: i32 = 1 << (FRACTION - 1);
         self.state
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_sample_is_taken_as_it_is() {
+    fn the_first_sample_is_not_filtered() {
         for n in 0..=LOW_PASS_MAX {
             assert_eq!(shown(&LowPass::new(n)), None);
             assert_eq!(shown(&settled(n, 4095)), Some(4095));
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_answered_as_by_an_rc_filter() {
+    fn the_step_response_is_that_of_an_rc_filter() {
         for n in 0..=LOW_PASS_MAX {
             for (from, to) in [(0, 4095), (4095, 0), (1000, 1100), (2048, 2047)] {
                 let mut filter = settled(n, from);
@@ -109,7 +109,7 @@ mod tests {
             for code in (0..=4095).step_by(13).chain([1, 4094, 4095]) {
                 for from in [0, 4095] {
                     let mut filter = settled(n, from);
-                    // 12 bits of step and one of rounding take 13 ln 2 = 9.01 time constants.
+                    // 12 bits of step and one of rounding need 13 ln 2 = 9.01 time constants.
                     (0..10 << n).for_each(|_| filter.sample(Code::new(code)));
                     assert_eq!(shown(&filter), Some(code), "n {n} from {from}");
                 }
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn another_n_does_not_move_the_value() {
+    fn another_n_does_not_change_the_value() {
         let mut filter = settled(8, 0);
         (0..100).for_each(|_| filter.sample(Code::new(4000)));
         let before = shown(&filter);

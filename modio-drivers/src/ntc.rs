@@ -1,5 +1,5 @@
-//! A 10 k thermistor to ground under a 10 k pull-up to the converter's reference: from the code to
-//! the temperature, in integers.
+//! Conversion of a code to a temperature, in integers, for a 10 k thermistor to ground with a 10 k pull-up to the
+//! converter's reference.
 //!
 //! The thermistor's resistance is R = 10 k * exp(B * (1/T - 1/T0)) with T0 = 298.15 K, and the code is
 //! c = 4095 * R / (R + 10 k), so R / 10 k = c / (4095 - c) and
@@ -8,14 +8,13 @@
 //! T = T0 * B / (B + T0 * ln(c / (4095 - c)))
 //! ```
 //!
-//! The logarithm is the difference of two binary ones from a table with interpolation. Numerator and
-//! denominator then fit 32 bits, one division is left (12 cycles at most on a Cortex-M3), and because
-//! 0 degC is 2731.5 tenths of a kelvin, dropping its remainder and taking away 2731 rounds to the
-//! nearest tenth.
+//! The logarithm is the difference of two binary logarithms from a table with interpolation. Numerator and
+//! denominator then fit 32 bits, so one division is enough (at most 12 cycles on a Cortex-M3). 0 degC is 2731.5
+//! tenths of a kelvin, so discarding the remainder and subtracting 2731 rounds to the nearest tenth.
 //!
-//! The table is exact to 2^-16 and interpolation adds at most 1.8e-4, together below 0.01 K up to
-//! 125 degC. With the rounding to a tenth, the test finds 0.06 degC at most for any B and any code
-//! between -40 and 125 degC.
+//! The table is exact to 2^-16 and the interpolation adds at most 1.8e-4, together less than 0.01 K up to 125 degC.
+//! With the rounding to a tenth, the test finds an error of at most 0.06 degC for every B and every code between
+//! -40 and 125 degC.
 
 use crate::Code;
 
@@ -25,35 +24,35 @@ pub const BETA_MIN: u16 = 2000;
 /// The largest B constant, in K.
 pub const BETA_MAX: u16 = 5000;
 
-/// The B constant until told otherwise, in K.
+/// Default B constant, in K.
 pub const BETA_DEFAULT: u16 = 3950;
 
-/// The lowest temperature that is measured, in 0.1 degC: -40 degC, where common 10 k thermistors end.
+/// The lowest measured temperature, in 0.1 degC: -40 degC, the limit of common 10 k thermistors.
 pub const MIN_TENTHS: i16 = -400;
 
-/// The highest temperature that is measured, in 0.1 degC: 125 degC, likewise.
+/// The highest measured temperature, in 0.1 degC: 125 degC, for the same reason.
 pub const MAX_TENTHS: i16 = 1250;
 
-/// What [`tenths_celsius`] says at most, far above any thermistor: 300 degC.
+/// Largest result of [`tenths_celsius`], far above any thermistor: 300 degC.
 const SATURATED: i16 = 3000;
 
-/// What [`tenths_celsius`] says for an infinite resistance: 0 K, rounded into the scale.
+/// Result of [`tenths_celsius`] for an infinite resistance: 0 K, rounded.
 const FROZEN: i16 = -2731;
 
-/// Segments of the logarithm's table.
+/// Number of segments of the logarithm table.
 const SEGMENTS: usize = 32;
 
 /// log2(1 + i / 32) in 1/65536.
 const LOG2: [u32; SEGMENTS + 1] = log2_table();
 
-/// The temperature in 0.1 degC for a code, and a B constant in K, which counts as [`BETA_MIN`] to
-/// [`BETA_MAX`]. Within 0.1 degC of the formula between -40 and 125 degC; far outside it saturates, at
-/// 300 degC above.
+/// Returns the temperature in 0.1 degC for a code. `beta` is the B constant in K, limited to [`BETA_MIN`] to
+/// [`BETA_MAX`]. The result is within 0.1 degC of the formula between -40 and 125 degC. Above that range it is
+/// limited to 300 degC.
 #[must_use]
 pub fn tenths_celsius(code: Code, beta: u16) -> i16 {
     /// Numerator and denominator are in 1/256 K; 2981.5 is T0 in tenths of a kelvin.
     const T0_TENTHS: u32 = 29_815 * 256 / 10;
-    /// T0 * ln 2 in the denominator's unit, 298.15 * 0.693147 * 256, with 8 bits more.
+    /// T0 * ln 2 in the unit of the denominator, 298.15 * 0.693147 * 256, with 8 more bits.
     const T0_LN2: i64 = 13_543_789;
 
     let code = code.get();
@@ -62,7 +61,7 @@ pub fn tenths_celsius(code: Code, beta: u16) -> i16 {
         return if code == 0 { SATURATED } else { FROZEN };
     };
     let beta = beta.clamp(BETA_MIN, BETA_MAX);
-    // The product is below 2^44; 16 bits are the logarithm's fraction, 8 the constant's.
+    // The product is below 2^44. 16 bits are the fraction of the logarithm, 8 that of the constant.
     let t0_ln = ((upper - lower) as i64 * T0_LN2) >> 24;
     let denominator = i64::from(beta) * 256 + t0_ln;
     let tenths_kelvin = u32::try_from(denominator)
@@ -74,10 +73,10 @@ pub fn tenths_celsius(code: Code, beta: u16) -> i16 {
     }
 }
 
-/// The binary logarithm in 1/65536; none of 0.
+/// Returns the binary logarithm in 1/65536, or `None` for 0.
 fn log2(x: u16) -> Option<i32> {
     let exponent = x.checked_ilog2()?;
-    // The mantissa, 1 to 2, in 1/32768: five bits choose the segment, ten the place in it.
+    // The mantissa, 1 to 2, in 1/32768: five bits select the segment, ten the position in it.
     let mantissa = u32::from(x) << (15 - exponent);
     let segment = (mantissa >> 10) as usize % SEGMENTS;
     let place = mantissa & 0x3FF;
@@ -85,16 +84,16 @@ fn log2(x: u16) -> Option<i32> {
     Some(((exponent << 16) + from + (((to - from) * place + 512) >> 10)) as i32)
 }
 
-/// Squaring doubles a logarithm: whether the square reaches 2 is its next bit.
+/// Computes the table. Squaring doubles the logarithm; its next bit is 1 if the square reaches 2.
 const fn log2_table() -> [u32; SEGMENTS + 1] {
     let mut table = [0; SEGMENTS + 1];
     let mut i = 0;
     while i < SEGMENTS {
-        // In 2^-31, from 1 to 2.
+        // In units of 2^-31, from 1 to 2.
         let mut x: u64 = (1 << 31) + (((i as u64) << 31) / SEGMENTS as u64);
         let mut log: u32 = 0;
         let mut bit = 0;
-        // One bit more than is kept, to round by.
+        // One more bit than is kept, for rounding.
         while bit < 17 {
             x = (x * x) >> 31;
             log <<= 1;
@@ -118,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    /// ln(R / 10 k) of every code but 0 and 4095, in floating point.
+    /// Returns ln(R / 10 k) of every code but 0 and 4095, in floating point.
     fn logarithms() -> Vec<(u16, f64)> {
         let ln = |code: u16| (f64::from(code) / (4095.0 - f64::from(code))).ln();
         (1..4095).map(|code| (code, ln(code))).collect()
@@ -130,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_the_logarithm() {
+    fn the_table_holds_binary_logarithms() {
         for (i, &entry) in LOG2.iter().enumerate() {
             let exact = (1.0 + i as f64 / SEGMENTS as f64).log2() * 65536.0;
             assert!((f64::from(entry) - exact).abs() <= 0.51, "{i}");
@@ -170,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_higher_code_is_never_a_higher_temperature_and_the_ends_saturate() {
+    fn a_higher_code_never_gives_a_higher_temperature_and_the_ends_are_limited() {
         for beta in [0, BETA_MIN, BETA_DEFAULT, BETA_MAX, u16::MAX] {
             assert_eq!(tenths_celsius(Code::new(0), beta), SATURATED);
             assert_eq!(tenths_celsius(Code::new(1), beta), SATURATED);

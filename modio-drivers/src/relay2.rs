@@ -1,22 +1,22 @@
-//! ModIO-Relay: two relays for 2 A. Lines 1 and 2 show each relay's mode jumper, low for manual; lines
-//! 3 and 4 drive the coils, high for energised.
+//! ModIO-Relay: two relays for 2 A. Lines 1 and 2 read the mode jumper of each relay, low for manual. Lines 3 and 4
+//! drive the coils, high for energised.
 
 use embedded_hal::digital::{InputPin, OutputPin, PinState};
 
 use crate::debounce::Debounce;
 use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
 
-/// Debounce of the mode jumpers in milliseconds. They are moved by hand, and contacts that are plugged
-/// bounce for longer than a switch.
+/// Debounce of the mode jumpers, in milliseconds. A jumper is moved by hand, and its contacts bounce for longer
+/// than a switch.
 pub const JUMPER_DEBOUNCE_MS: u16 = 20;
 
-/// The channel of the first coil.
+/// Channel of the first coil.
 const FIRST_COIL: usize = 2;
 
-/// Two relays: channels 1 and 2 tell the jumpers, 1 for manual, channels 3 and 4 are the coils.
+/// Two relays: channels 1 and 2 are the jumpers, 1 for manual; channels 3 and 4 are the coils.
 ///
-/// A relay in manual mode is driven by its jumper; the coil's line goes on following its channel, so
-/// that the relay takes its commanded position when the jumper is moved back.
+/// A relay in manual mode is controlled by its jumper. The coil's line still follows its channel, so the relay
+/// takes its commanded position when the jumper is moved back.
 #[derive(Debug)]
 pub struct Relay2<I, O> {
     jumpers: [I; 2],
@@ -25,9 +25,9 @@ pub struct Relay2<I, O> {
 }
 
 impl<I: InputPin, O: OutputPin> Relay2<I, O> {
-    /// Takes over the slot lines: the first two with pull-ups, the others outputs that the caller has
-    /// made drive low, so that no relay pulls in before the first scan. The first scan takes the
-    /// jumpers as they stand.
+    /// Creates the driver with the slot lines. The first two need pull-ups. The others must already be outputs that
+    /// drive low, so that no relay is energised before the first scan. The first scan takes the level of the
+    /// jumpers without a delay.
     pub const fn new(jumpers: [I; 2], coils: [O; 2]) -> Self {
         Self {
             jumpers,
@@ -43,7 +43,7 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
         [BitInput, BitInput, BitOutput, BitOutput]
     }
 
-    /// There is nothing to set: the jumpers' debounce is [`JUMPER_DEBOUNCE_MS`].
+    /// There are no settings: the jumpers' debounce is [`JUMPER_DEBOUNCE_MS`].
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
@@ -60,7 +60,7 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
         result
     }
 
-    /// Drives both coils every time, as [`Do4`](crate::Do4) does.
+    /// Drives both coils in every call, as [`Do4`](crate::Do4) does.
     fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
         let mut result = Ok(());
         for (channel, coil) in (FIRST_COIL..).zip(&mut self.coils) {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn jumpers_show_at_once_at_the_first_scan_and_are_not_taken_for_coils() {
+    fn jumpers_are_read_without_delay_at_the_first_scan_and_do_not_change_coils() {
         let mut module = Relay2::new([jumper(&[true]), jumper(&[false])], [coil(&[]), coil(&[])]);
         use Kind::{BitInput, BitOutput};
         assert_eq!(module.kinds(), [BitInput, BitInput, BitOutput, BitOutput]);
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jumper_counts_when_it_has_stood_for_the_debounce_whatever_is_configured() {
+    fn a_jumper_is_debounced_for_a_fixed_time_independent_of_the_settings() {
         let wait = usize::from(JUMPER_DEBOUNCE_MS);
         let mut levels = std::vec![false; 1];
         levels.resize(wait, true);
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_fails_is_named_and_the_others_go_on() {
+    fn a_line_that_fails_is_reported_and_the_others_still_work() {
         let failing = |transaction: Transaction| Mock::new(&[transaction.with_error(BROKEN)]);
         let mut module = Relay2::new(
             [failing(Transaction::get(State::High)), jumper(&[true])],

@@ -1,11 +1,10 @@
-//! Codes and units of the analog channels: the converters' 12-bit codes, mV, uA and 0.1 degC.
+//! Conversion between the 12-bit codes of the converters and mV, uA and 0.1 degC.
 //!
-//! Full scale, 10 V or 20 mA, is code 4095, for inputs and outputs alike. Everything rounds to the
-//! nearest.
+//! Full scale, 10 V or 20 mA, is code 4095, for inputs and outputs. Every conversion rounds to the nearest value.
 //!
-//! An output's word has two bounds. A master may command what [`output_limits`] says, so 4 mA is the
-//! least current in uA. A raw code is free, so that an output can be left without current
-//! ([`output_from_raw`] then says 0 uA), and every code comes back from its units unchanged.
+//! A master may command an output within [`output_limits`], so the smallest current is 4 mA in uA. A raw code may
+//! be any code, so that an output can also have no current; [`output_from_raw`] then returns 0 uA. Converting any
+//! code to its unit and back returns the same code.
 
 use crate::{ChannelSettings, Code, Scale, Signal, ntc};
 
@@ -15,22 +14,22 @@ pub const FULL_SCALE_MV: u16 = 10_000;
 /// 20 mA in uA.
 pub const FULL_SCALE_UA: u16 = 20_000;
 
-/// The least current an output may be commanded in uA.
+/// The smallest current that an output may be commanded to, in uA.
 pub const OUTPUT_MIN_UA: u16 = 4_000;
 
-/// What an analog input measures, in the units of its signal.
+/// The measured value of an analog input, in the unit of its signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measured {
     /// 0 to 10000 mV.
     Millivolts(u16),
     /// 0 to 20000 uA.
     Microamps(u16),
-    /// In 0.1 degC, as [`ntc::tenths_celsius`] says it.
+    /// In 0.1 degC, from [`ntc::tenths_celsius`].
     TenthsCelsius(i16),
 }
 
 impl Measured {
-    /// What a code of the converter means under these settings.
+    /// Returns the measured value for a code with these settings.
     #[must_use]
     pub fn of(code: Code, settings: &ChannelSettings) -> Self {
         match settings.signal {
@@ -40,8 +39,8 @@ impl Measured {
         }
     }
 
-    /// The word an input shows in engineering units: a temperature in two's complement, and no
-    /// further than [`ntc::MIN_TENTHS`] to [`ntc::MAX_TENTHS`].
+    /// Returns the word of an input in engineering units. A temperature is in two's complement and limited to
+    /// [`ntc::MIN_TENTHS`] to [`ntc::MAX_TENTHS`].
     #[must_use]
     pub fn word(self) -> u16 {
         match self {
@@ -51,8 +50,8 @@ impl Measured {
     }
 }
 
-/// The least and the largest value that the word of an input shows: 0-4095 raw, 0-10000 mV, 0-20000 uA, -400 to 1250 in
-/// 0.1 degC.
+/// Returns the smallest and the largest word of an input: 0 to 4095 raw, 0 to 10000 mV, 0 to 20000 uA, -400 to 1250
+/// in 0.1 degC.
 #[must_use]
 pub const fn input_limits(signal: Signal, scale: Scale) -> (i16, i16) {
     match (scale, signal) {
@@ -63,7 +62,8 @@ pub const fn input_limits(signal: Signal, scale: Scale) -> (i16, i16) {
     }
 }
 
-/// The least and the largest word an output may be commanded: 0-4095 raw, 0-10000 mV, 4000-20000 uA.
+/// Returns the smallest and the largest word that an output may be commanded to: 0 to 4095 raw, 0 to 10000 mV, 4000
+/// to 20000 uA.
 #[must_use]
 pub const fn output_limits(signal: Signal, scale: Scale) -> (u16, u16) {
     match (scale, signal) {
@@ -73,7 +73,7 @@ pub const fn output_limits(signal: Signal, scale: Scale) -> (u16, u16) {
     }
 }
 
-/// The word that stands for a code of the DAC.
+/// Returns the word for a code of the DAC.
 #[must_use]
 pub const fn output_from_raw(code: Code, signal: Signal, scale: Scale) -> u16 {
     match full_scale(signal, scale) {
@@ -82,7 +82,7 @@ pub const fn output_from_raw(code: Code, signal: Signal, scale: Scale) -> u16 {
     }
 }
 
-/// The DAC's code for a word; one above full scale counts as full scale.
+/// Returns the DAC's code for a word. A word above full scale counts as full scale.
 #[must_use]
 pub const fn output_to_raw(word: u16, signal: Signal, scale: Scale) -> Code {
     let full_scale = match full_scale(signal, scale) {
@@ -93,8 +93,8 @@ pub const fn output_to_raw(word: u16, signal: Signal, scale: Scale) -> Code {
     Code::new(rescale(word, Code::MAX.get(), full_scale))
 }
 
-/// An output's word under new settings: the same when signal and scale have not changed, otherwise
-/// what stands for the same code, so that changing them does not move the output.
+/// Converts an output's word to new settings. When signal and scale have not changed, the word is returned
+/// unchanged. Otherwise the new word stands for the same code, so that the output does not change.
 #[must_use]
 pub const fn output_rescaled(word: u16, from: &ChannelSettings, to: &ChannelSettings) -> u16 {
     if from.signal as u8 == to.signal as u8 && from.scale as u8 == to.scale as u8 {
@@ -108,7 +108,7 @@ pub const fn output_rescaled(word: u16, from: &ChannelSettings, to: &ChannelSett
     }
 }
 
-/// The units at code 4095, none for raw.
+/// Returns the value at code 4095 in the unit, or `None` for raw.
 const fn full_scale(signal: Signal, scale: Scale) -> Option<u16> {
     match (scale, signal) {
         (Scale::Raw, _) => None,
@@ -117,12 +117,12 @@ const fn full_scale(signal: Signal, scale: Scale) -> Option<u16> {
     }
 }
 
-/// Units for a code.
+/// Converts a code to the unit.
 const fn units_from_code(code: Code, full_scale: u16) -> u16 {
     rescale(code.get(), full_scale, Code::MAX.get())
 }
 
-/// `value * to / from` to the nearest, for a value of at most `from`; at most 20000 * 4095, which
+/// Returns `value * to / from`, rounded, for a value of at most `from`. The product is at most 20000 * 4095, which
 /// fits. `from` is one of the constants above and never 0.
 const fn rescale(value: u16, to: u16, from: u16) -> u16 {
     let product = value as u32 * to as u32 + from as u32 / 2;
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn voltage_and_current_are_the_nearest_for_every_code() {
+    fn voltage_and_current_are_rounded_to_the_nearest_for_every_code() {
         for code in codes() {
             for (signal, full_scale) in [(Signal::Voltage, 10_000.0), (Signal::Current, 20_000.0)] {
                 let exact = (f64::from(code.get()) * full_scale / 4095.0).round() as u16;
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_temperature_is_in_twos_complement_and_stays_within_what_is_measured() {
+    fn a_temperature_is_in_twos_complement_and_limited_to_the_measured_range() {
         let settings = settings(Signal::Ntc, Scale::Engineering);
         let word = |code| Measured::of(Code::new(code), &settings).word();
         assert_eq!(word(2048), 250, "10 k is 25 degC");
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn every_code_comes_back_from_its_word_and_limits_are_within_full_scale() {
+    fn every_code_is_restored_from_its_word_and_limits_are_within_full_scale() {
         for signal in SIGNALS {
             for scale in SCALES {
                 for code in codes() {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn new_settings_keep_the_output_where_it_is() {
+    fn new_settings_do_not_change_the_output() {
         let all = SIGNALS.map(|signal| SCALES.map(|scale| settings(signal, scale)));
         for from in all.iter().flatten() {
             for to in all.iter().flatten() {
@@ -221,7 +221,11 @@ mod tests {
                 }
             }
             let odd = 5_001;
-            assert_eq!(output_rescaled(odd, from, from), odd, "not rounded in vain");
+            assert_eq!(
+                output_rescaled(odd, from, from),
+                odd,
+                "unchanged settings do not round"
+            );
         }
     }
 }

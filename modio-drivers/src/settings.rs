@@ -1,24 +1,23 @@
-//! How a channel is read or driven.
+//! Settings of a channel.
 
 use crate::{DEBOUNCE_DEFAULT_MS, Kind, LOW_PASS_DEFAULT, ntc};
 
-/// The settings of one channel. Each kind of channel takes what it needs of them.
+/// The settings of one channel. Each kind of channel uses those that apply to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelSettings {
-    /// A digital input's debounce in milliseconds, 0 to [`DEBOUNCE_MAX_MS`](crate::DEBOUNCE_MAX_MS);
-    /// an analog input's low-pass over 2^n samples, n from 0 to
-    /// [`LOW_PASS_MAX`](crate::LOW_PASS_MAX).
+    /// For a digital input the debounce in milliseconds, 0 to [`DEBOUNCE_MAX_MS`](crate::DEBOUNCE_MAX_MS). For an
+    /// analog input the exponent n of a low-pass over 2^n samples, 0 to [`LOW_PASS_MAX`](crate::LOW_PASS_MAX).
     pub filter: u16,
-    /// The thermistor's B constant in kelvin, [`ntc::BETA_MIN`] to [`ntc::BETA_MAX`].
+    /// The thermistor's B constant in K, [`ntc::BETA_MIN`] to [`ntc::BETA_MAX`].
     pub beta: u16,
-    /// The signal of an analog channel, as its jumper says.
+    /// The signal of an analog channel; it must match the position of the jumper.
     pub signal: Signal,
-    /// What an analog channel's word is in.
+    /// The unit of an analog channel's word.
     pub scale: Scale,
 }
 
 impl ChannelSettings {
-    /// What a channel of this kind starts with: 5 ms for a digital input, 2^4 samples for an analog
+    /// Returns the default settings of a channel of this kind: 5 ms for a digital input, 2^4 samples for an analog
     /// one, a thermistor of 3950 K, 0-10 V, raw.
     #[must_use]
     pub const fn default_for(kind: Kind) -> Self {
@@ -44,12 +43,12 @@ pub enum Signal {
     Voltage = 0,
     /// 4 to 20 mA.
     Current = 1,
-    /// A 10 k thermistor. Inputs only; an output counts it as [`Volts`](Self::Voltage).
+    /// A 10 k thermistor. Inputs only; an output treats it as [`Voltage`](Self::Voltage).
     Ntc = 2,
 }
 
 impl Signal {
-    /// The signal with this code, or `None` above 2.
+    /// Returns the signal with this code, or `None` above 2.
     #[must_use]
     pub const fn from_code(code: u16) -> Option<Self> {
         match code {
@@ -60,26 +59,26 @@ impl Signal {
         }
     }
 
-    /// The code of this signal, 0 to 2.
+    /// Returns the code of this signal, 0 to 2.
     #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
     }
 }
 
-/// What an analog channel's word is in.
+/// Unit of an analog channel's word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Scale {
     /// The converter's code, 0 to 4095.
     #[default]
     Raw = 0,
-    /// mV, uA or 0.1 degC, by [`Signal`].
+    /// mV, uA or 0.1 degC, depending on [`Signal`].
     Engineering = 1,
 }
 
 impl Scale {
-    /// The scale with this code, or `None` above 1.
+    /// Returns the scale with this code, or `None` above 1.
     #[must_use]
     pub const fn from_code(code: u16) -> Option<Self> {
         match code {
@@ -89,7 +88,7 @@ impl Scale {
         }
     }
 
-    /// The code of this scale, 0 or 1.
+    /// Returns the code of this scale, 0 or 1.
     #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
@@ -101,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_lead_back_to_what_they_stand_for() {
+    fn every_code_is_restored_by_from_code() {
         for code in 0..=2 {
             assert_eq!(Signal::from_code(code).map(Signal::code), Some(code));
         }

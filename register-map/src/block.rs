@@ -1,39 +1,39 @@
-//! Blocks of registers, each declared once: the numbers for the firmware and the words for people.
+//! Blocks of registers. Each is declared once: the numbers for the firmware and the texts for people.
 
 use crate::points;
 use crate::rule::Rule;
 use crate::value::Value;
 
-/// A register, or a run of like ones, for people: the words beside the numbers of its [`Rule`].
+/// The texts for a register, or for a run of similar ones, in addition to the numbers of its [`Rule`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Text {
     /// Its name.
     pub name: &'static str,
-    /// What its number means.
+    /// Meaning of its number.
     pub value: Value,
-    /// For a setting by point: what its number means for points of the kind of the rule's [`crate::Narrower`], where
-    /// that differs.
+    /// For a setting by point: the meaning of the number for points of the kind of the rule's [`crate::Narrower`],
+    /// if it differs.
     pub narrower: Option<Value>,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
 }
 
-/// A block: a request for registers must lie within one, and within its defined registers.
+/// A block. A request for registers must lie within one block and within its defined registers.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// What it holds.
+    /// Title.
     pub title: &'static str,
-    /// Its first address.
+    /// First address.
     pub first: u16,
-    /// Its last address.
+    /// Last address.
     pub last: u16,
-    /// The rules, in ascending order of the addresses.
+    /// Rules in ascending order of the addresses.
     pub rules: &'static [Rule],
-    /// The words for each rule, in the same order.
+    /// Texts for each rule, in the same order.
     pub texts: &'static [Text],
 }
 
-/// The things that have one value each in a run of registers.
+/// What each value in a run of registers belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// The unit.
@@ -45,7 +45,7 @@ pub enum Scope {
 }
 
 impl Text {
-    /// The things that have one value each in a run of `count` registers.
+    /// Returns what each value in a run of `count` registers belongs to.
     #[must_use]
     pub const fn scope(&self, count: u16) -> Scope {
         let values = match self.value.registers() {
@@ -62,7 +62,7 @@ impl Text {
 }
 
 impl Block {
-    /// Every register or run of registers: numbers and words.
+    /// Iterates over every register or run of registers, with numbers and texts.
     pub fn registers(&self) -> impl Iterator<Item = (&'static Rule, &'static Text)> + use<> {
         self.rules.iter().zip(self.texts)
     }
@@ -76,18 +76,18 @@ pub(crate) const fn first(values: &[Value]) -> Option<Value> {
     }
 }
 
-/// Declares the registers of a block. It makes, in the module it stands in,
+/// Declares the registers of a block. In the module that calls it, it defines
 ///
 /// - a constant for each address, documented by the register's text,
-/// - `RULES`, the numbers, which the firmware uses without the words,
-/// - `BLOCK`, everything, for tools and documentation.
+/// - `RULES`, the numbers, which the firmware uses without the texts,
+/// - `BLOCK`, numbers and texts, for tools and documentation.
 ///
 /// ```text
 /// block! {
 ///     "title", first address ..= last address;
 ///     /// What the register is.
 ///     NAME "name": address x count, Value, Rule;
-///     /// What the setting by point is, whose number means something else for one kind of point.
+///     /// What the setting by point is. Its number has another meaning for one kind of point.
 ///     NAME "name": address x count, Value => Value, Rule;
 /// }
 /// ```
@@ -101,10 +101,10 @@ macro_rules! block {
     ) => {
         $($(#[doc = $about])+ pub const $constant: u16 = $address;)+
 
-        /// What holds for the registers of this block, in ascending order of the addresses.
+        /// The rules of this block, in ascending order of the addresses.
         pub static RULES: &[$crate::Rule] = &[$($rule.at($address, $count)),+];
 
-        /// The block with its words.
+        /// The block with its texts.
         pub static BLOCK: $crate::Block = $crate::Block {
             title: $title,
             first: $first,

@@ -1,4 +1,4 @@
-//! The boards as a master or a tool sees them: codes, names, ports. The pins are in `board-support`.
+//! The boards as a master or a tool sees them: codes, names, ports. `board-support` describes the pins.
 
 use core::fmt;
 use core::ops::Range;
@@ -9,31 +9,31 @@ use crate::points;
 /// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Board {
-    /// Its name, on command lines and in the device identification: `modio-02`.
+    /// Name on command lines and in the device identification, such as `modio-02`.
     pub name: &'static str,
-    /// The value of register BOARD (0x0205).
+    /// Value of register BOARD (0x0205).
     pub code: u16,
-    /// The model name in the device identification: the product whose place the board takes, if there is one.
+    /// Model name in the device identification: the product that the board replaces, if there is one.
     pub model: &'static str,
-    /// The first port with a slot, 1 to 8.
+    /// First port with a slot, 1 to 8.
     pub first_port: u16,
-    /// How many ports from there on have a slot, 1 to 8. All other ports have none.
+    /// Number of consecutive ports with a slot, 1 to 8. All other ports have none.
     pub slots: u16,
-    /// Where the configuration is stored.
+    /// Flash pages that store the configuration.
     pub store: StorePages,
 }
 
-/// The two pages of flash that hold the configuration. Each can be erased without the other.
+/// The two flash pages that hold the configuration. Each can be erased separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StorePages {
-    /// The address of the first page. The second one follows.
+    /// Address of the first page. The second one follows.
     pub first: u32,
-    /// Bytes of a page: what one erase clears (PM0075 2.1).
+    /// Bytes of a page, the smallest unit that can be erased (PM0075 2.1).
     pub bytes: u32,
 }
 
 impl StorePages {
-    /// The addresses of both pages.
+    /// Returns the addresses of both pages.
     #[must_use]
     pub const fn addresses(self) -> [u32; 2] {
         [self.first, self.first + self.bytes]
@@ -83,13 +83,13 @@ impl Board {
         names
     };
 
-    /// The board with this code in register BOARD.
+    /// Returns the board with this code in register BOARD.
     #[must_use]
     pub fn from_code(code: u16) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|board| board.code == code)
     }
 
-    /// The board with this name.
+    /// Returns the board with this name.
     #[must_use]
     pub const fn named(name: &str) -> Option<&'static Self> {
         let mut i = 0;
@@ -102,20 +102,20 @@ impl Board {
         None
     }
 
-    /// The ports that have a slot, in ascending order.
+    /// Returns the ports with a slot, in ascending order.
     #[must_use]
     pub const fn ports(&self) -> Range<u16> {
         self.first_port..self.first_port + self.slots
     }
 
-    /// Whether a port has a slot.
+    /// Returns whether a port has a slot.
     #[inline]
     #[must_use]
     pub const fn has_slot(&self, port: u16) -> bool {
         port.wrapping_sub(self.first_port) < self.slots
     }
 
-    /// The addresses of the points of all ports that have a slot.
+    /// Returns the addresses of the points of all ports with a slot.
     #[must_use]
     pub const fn points(&self) -> Range<u16> {
         let first = points::of_port(self.first_port);
@@ -123,7 +123,7 @@ impl Board {
     }
 }
 
-/// Whether two names are the same, at compile time too.
+/// Compares two names, also at compile time.
 const fn same(one: &[u8], other: &[u8]) -> bool {
     match (one.split_first(), other.split_first()) {
         (Some((a, one)), Some((b, other))) => *a == *b && same(one, other),
@@ -138,7 +138,7 @@ impl fmt::Display for Board {
     }
 }
 
-/// A name that is no board's.
+/// Error for a name that is not that of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownBoard;
 
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_and_names_lead_back_to_the_board() {
+    fn a_board_is_found_by_its_code_and_its_name() {
         for board in Board::ALL {
             assert_eq!(Board::from_code(board.code), Some(board));
             assert_eq!(board.to_string().parse(), Ok(board));
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn slots_are_where_the_hardware_has_them() {
+    fn slots_are_at_the_ports_of_the_hardware() {
         assert_eq!(MODIO_02.points(), 0x10..0x14);
         assert_eq!(MODIO_08.points(), 0x00..0x10);
         let slots = |board: &Board| (0..10).filter(|port| board.has_slot(*port)).count();
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn both_pages_of_a_store_are_whole_pages_of_the_flash() {
+    fn both_pages_of_a_store_are_aligned_pages_of_the_flash() {
         for board in Board::ALL {
             let [first, second] = board.store.addresses();
             assert!(first.is_multiple_of(board.store.bytes), "{board}");

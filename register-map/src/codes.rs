@@ -1,5 +1,5 @@
-//! Registers whose values are codes: one enum for each, with the code and a name for every value. Those that are about
-//! a module's channels are modio-drivers' own, and their names stand here.
+//! Registers whose values are codes: one enum for each, with the code and a name for every value. The enums for a
+//! module's channels belong to modio-drivers; this module has their names.
 
 pub use modio_drivers::{ChannelStatus, Scale, Signal};
 
@@ -25,7 +25,7 @@ pub const CHANNEL_STATUS_NAMES: &[(u16, &str)] = &[
     (ChannelStatus::ShortCircuit.code(), "short circuit"),
 ];
 
-/// Declares an enum of codes; the name of a value is its documentation, too.
+/// Declares an enum of codes. The name of a value is also its documentation.
 macro_rules! codes {
     ($(#[$doc:meta])* $name:ident { $($variant:ident = $code:literal $text:literal,)+ }) => {
         $(#[$doc])*
@@ -43,14 +43,14 @@ macro_rules! codes {
             /// Every code with its name, for people.
             pub const NAMES: &'static [(u16, &'static str)] = &[$(($code, $text)),+];
 
-            /// The code that stands in the register.
+            /// Returns the code in the register.
             #[inline]
             #[must_use]
             pub const fn code(self) -> u16 {
                 self as u16
             }
 
-            /// The value with this code, if there is one.
+            /// Returns the value with this code, if there is one.
             #[inline]
             #[must_use]
             pub const fn from_code(code: u16) -> Option<Self> {
@@ -64,7 +64,7 @@ macro_rules! codes {
 }
 
 codes! {
-    /// BAUD: the speed of the RS-485 line, its code in units of 100 bit/s.
+    /// BAUD: the baud rate of the RS-485 line; its code is in units of 100 bit/s.
     Baud {
         B1200 = 12 "1200 bit/s",
         B2400 = 24 "2400 bit/s",
@@ -81,7 +81,7 @@ codes! {
 }
 
 impl Baud {
-    /// The speed in bit/s, 1200 to 921600.
+    /// Returns the baud rate in bit/s, 1200 to 921600.
     #[inline]
     #[must_use]
     pub const fn bits_per_second(self) -> u32 {
@@ -103,7 +103,7 @@ codes! {
 }
 
 impl Format {
-    /// Data bits of a character: 7 or 8.
+    /// Returns the data bits of a character: 7 or 8.
     #[inline]
     #[must_use]
     pub const fn data_bits(self) -> u8 {
@@ -113,7 +113,7 @@ impl Format {
         }
     }
 
-    /// Whether the mode can use this format: RTU needs 8 data bits (V1.02 2.5.1 and 2.5.2).
+    /// Returns whether the mode can use this format: RTU needs 8 data bits (V1.02 2.5.1 and 2.5.2).
     #[inline]
     #[must_use]
     pub const fn suits(self, mode: Mode) -> bool {
@@ -130,7 +130,7 @@ codes! {
 }
 
 codes! {
-    /// STRICT_T15: what becomes of a frame with a gap above t1.5 in it.
+    /// STRICT_T15: treatment of a frame that contains a gap longer than t1.5.
     GapRule {
         Count = 0 "keep and count",
         Drop = 1 "drop",
@@ -138,7 +138,7 @@ codes! {
 }
 
 codes! {
-    /// COMMAND: what the device is to do once its response is out.
+    /// COMMAND: what the device does after its response has been sent.
     Command {
         Save = 1 "save",
         Restart = 2 "restart",
@@ -151,7 +151,7 @@ codes! {
 }
 
 codes! {
-    /// LORA and the like.
+    /// LORA and other switches.
     Switch {
         Off = 0 "off",
         On = 1 "on",
@@ -159,7 +159,7 @@ codes! {
 }
 
 codes! {
-    /// LORA_AIR_RATE: the speed on the air.
+    /// LORA_AIR_RATE: the data rate of the radio.
     AirRate {
         K0d3 = 0 "0.3 kbit/s",
         K1d2 = 1 "1.2 kbit/s",
@@ -171,7 +171,7 @@ codes! {
 }
 
 codes! {
-    /// LORA_POWER: the power on the air.
+    /// LORA_POWER: the transmit power of the radio.
     Power {
         Dbm20 = 0 "20 dBm",
         Dbm17 = 1 "17 dBm",
@@ -181,7 +181,7 @@ codes! {
 }
 
 codes! {
-    /// How a module fares.
+    /// State of a module.
     ModuleState {
         Good = 0 "good",
         None = 1 "none",
@@ -191,7 +191,7 @@ codes! {
 }
 
 codes! {
-    /// What went wrong before the last fault's reset.
+    /// Kind of the last fault.
     FaultKind {
         None = 0 "none",
         Panic = 1 "panic",
@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_code_leads_back_to_its_value_and_no_other_does() {
+    fn every_code_is_restored_by_from_code_and_others_are_rejected() {
         for baud in Baud::ALL {
             assert_eq!(Baud::from_code(baud.code()), Some(*baud));
         }
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn formats_with_seven_data_bits_suit_ascii_mode_only() {
+    fn formats_with_seven_data_bits_are_allowed_in_ascii_mode_only() {
         for format in Format::ALL {
             let seven = format.code() >= 4;
             assert_eq!(format.data_bits(), if seven { 7 } else { 8 }, "{format:?}");
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_is_a_hundred_times_its_code() {
+    fn a_baud_rate_is_a_hundred_times_its_code() {
         assert_eq!(Baud::B9600.bits_per_second(), 9600);
         assert_eq!(Baud::B921600.bits_per_second(), 921_600);
     }

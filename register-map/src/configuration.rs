@@ -1,4 +1,4 @@
-//! The configuration, 0x0100 to 0x01FF: holding registers behind a lock.
+//! The configuration, 0x0100 to 0x01FF: holding registers protected by a lock.
 
 use crate::Module;
 use crate::block::block;
@@ -9,19 +9,19 @@ use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
 use crate::values::Values;
 
-/// The value of KEY that opens the lock.
+/// Value of KEY that opens the lock.
 pub const OPENING_KEY: u16 = 0x5A17;
 
-/// How long the lock stays open after the last configuration write, in seconds.
+/// Time for which the lock stays open after the last configuration write, in seconds.
 pub const OPEN_S: u32 = 60;
 
-/// The value of SAFE that leaves an output as it is.
+/// Value of SAFE that leaves an output unchanged.
 pub const HOLD: u16 = 0xFFFF;
 
-/// The greatest raw value of a word point: 12 bits.
+/// Largest raw value of a word point: 12 bits.
 pub const RAW_MAX: u16 = 4095;
 
-/// FILTER of a point that is no analog input, as the factory sets it, in ms.
+/// Factory default of FILTER for a point that is not an analog input, in ms.
 pub const DEBOUNCE_DEFAULT_MS: u16 = 5;
 
 const SAFE_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1).or(HOLD), 0);
@@ -35,7 +35,7 @@ const FILTER_RULE: Rule =
     Rule::now(Values::up_to(1000), DEBOUNCE_DEFAULT_MS).but(&FILTER_OF_A_WORD);
 const RANGE_RULE: Rule = Rule::now(Values::up_to(2), 0).but(&RANGE_OF_AN_OUTPUT);
 
-/// Frequency of a channel: 410 MHz and one more a step.
+/// Frequency of a channel: 410 MHz plus 1 MHz per step.
 const LORA_MHZ: Value = Value::Number(Unit {
     code: "MHz",
     exponent: 0,
@@ -112,7 +112,7 @@ pub fn modules<P: Into<u16>>(
 /// The settings by point: FILTER, BETA, RANGE, SCALE, SAFE and START.
 pub const BY_POINT: [u16; 6] = [FILTER, BETA, RANGE, SCALE, SAFE, START];
 
-/// The point that a setting is for, 0 to 31; `None` for a register that is no setting by point.
+/// Returns the point of a setting by point, 0 to 31; `None` for any other register.
 #[inline]
 #[must_use]
 pub fn point_of(address: u16) -> Option<u16> {
@@ -126,7 +126,7 @@ mod tests {
     use crate::points;
 
     #[test]
-    fn a_setting_by_point_knows_its_point() {
+    fn point_of_returns_the_point_of_a_setting() {
         assert_eq!(point_of(FILTER), Some(0));
         assert_eq!(point_of(0x013F), Some(31));
         assert_eq!(point_of(SAFE + points::first(5)), Some(16));
@@ -145,13 +145,13 @@ mod tests {
     }
 
     #[test]
-    fn modules_are_settings_of_their_ports_and_empty_slots_are_none() {
+    fn modules_are_settings_of_their_ports_and_empty_slots_are_omitted() {
         let slots = [(1_u8, Module::Di4), (2, Module::None), (4, Module::Ao4)];
         assert!(modules(slots).eq([(0x0110, 1), (0x0113, 5)]));
     }
 
     #[test]
-    fn there_is_a_setting_for_every_point() {
+    fn every_setting_by_point_exists_for_every_point() {
         for first in BY_POINT {
             let rule = RULES.iter().find(|rule| rule.first == first).unwrap();
             assert_eq!(rule.count, points::COUNT);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn narrower_values_are_some_of_the_wider_ones() {
+    fn narrower_values_are_a_subset_of_the_rules_values() {
         for rule in RULES {
             let Some(narrower) = rule.narrower else {
                 continue;
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn defaults_are_allowed_but_for_key_and_command_which_hold_nothing() {
+    fn defaults_are_allowed_except_for_key_and_command() {
         for rule in RULES {
             let holds = ![KEY, COMMAND].contains(&rule.first);
             assert_eq!(

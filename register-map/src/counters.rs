@@ -1,11 +1,11 @@
-//! The pulse counters of digital inputs, 0x0300 to 0x033F: two registers a point.
+//! The pulse counters of digital inputs, 0x0300 to 0x033F: two registers per point.
 
 use crate::block::block;
 use crate::rule::Rule;
 use crate::value::Value;
 use crate::values::Values;
 
-/// Registers of one counter, high word first.
+/// Number of registers of one counter, high word first.
 pub const WORDS: u16 = 2;
 
 block! {
@@ -15,7 +15,7 @@ block! {
     PULSES "pulses": 0x0300 x 64, Value::LONG, Rule::now(Values::only(0), 0);
 }
 
-/// The first register of a point's counter, for points 0 to 31.
+/// Returns the first register of a point's counter, for points 0 to 31.
 #[inline]
 #[must_use]
 pub const fn of_point(point: u16) -> u16 {

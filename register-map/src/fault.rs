@@ -1,5 +1,5 @@
-//! The fault record, 0x0260 to 0x026F: what went wrong before the last reset that a fault caused. It
-//! outlives every reset but a loss of power.
+//! The fault record, 0x0260 to 0x026F: the last fault that caused a reset. It is kept over every reset but not over
+//! a loss of power.
 
 use crate::block::block;
 use crate::codes::FaultKind;
@@ -8,7 +8,7 @@ use crate::value::Value;
 
 const READ: Rule = Rule::read_only();
 
-/// The bits of MISSING_TASKS with their names.
+/// Names of the bits of MISSING_TASKS.
 const TASKS: &[(u8, &str)] = &[(0, "line"), (1, "serve"), (2, "scan"), (3, "background")];
 
 block! {

@@ -1,13 +1,13 @@
-//! What a Modbus master finds in the device, as data: read by the firmware and by every tool, so that
-//! both mean the same thing by an address.
+//! The registers of the device as data. The firmware and every tool use it, so that an address means the same for
+//! all.
 //!
-//! Addresses are PDU addresses, counted from zero as they stand in the frame.
+//! Addresses are PDU addresses, counted from zero as in the frame.
 //!
-//! Each block of registers is a module with a constant for every address, `RULES`, the numbers that
-//! hold for them ([`Rule`]), and `BLOCK`, the same with the words for people ([`Block`], [`Text`]). The
-//! firmware uses the numbers alone: its image has the words in the self-description only. [`codes`] has an enum for each
-//! register that holds codes, [`record`] the form in which a configuration is stored in flash, and
-//! [`docs`] writes `docs/register-map.md`.
+//! Each block of registers is a module with a constant for every address; `RULES`, the numbers of its registers
+//! ([`Rule`]); and `BLOCK`, the same with the texts for people ([`Block`], [`Text`]). The firmware uses only the
+//! numbers: its image contains the texts only in the self-description. [`codes`] has an enum for each register that
+//! holds codes, [`record`] describes the format of a configuration in flash, and [`docs`] writes
+//! `docs/register-map.md`.
 //!
 //! ```
 //! use register_map::{BLOCKS, InForce, Values, configuration, rule_at};

@@ -1,14 +1,14 @@
-//! The kinds of I/O module a slot can take, with the codes and names that stand for them.
+//! The kinds of I/O module that a slot can contain, with their codes and names.
 
 use core::fmt;
 use core::str::FromStr;
 
 use crate::points::Kind::{self, BitInput, BitOutput, WordInput, WordOutput};
 
-/// Declares the modules: one row for each with its code, its name, and what it makes of the four points of its port.
+/// Declares the modules: one row for each with its code, its name, and the kinds of the four points of its port.
 macro_rules! modules {
     ($($(#[doc = $doc:literal])+ $variant:ident = $code:literal $name:literal $points:expr;)+) => {
-        /// What is plugged into a slot: the value of a MODULE register, and a `--module` name.
+        /// The module in a slot: the value of a MODULE register, and a name for `--module`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr(u8)]
         pub enum Module {
@@ -16,13 +16,13 @@ macro_rules! modules {
         }
 
         impl Module {
-            /// Every module there is, in the order of the codes.
+            /// Every module, in the order of the codes.
             pub const ALL: [Self; Self::NAMES.len()] = [$(Self::$variant),+];
 
             /// Every code with the module's name.
             pub const NAMES: &'static [(u16, &'static str)] = &[$(($code, $name)),+];
 
-            /// What this module makes of the four points of its port.
+            /// Returns the kinds of the four points of this module's port.
             #[inline]
             #[must_use]
             pub const fn points(self) -> [Kind; 4] {
@@ -31,7 +31,7 @@ macro_rules! modules {
                 }
             }
 
-            /// The module with this code, if there is one.
+            /// Returns the module with this code, if there is one.
             #[must_use]
             pub const fn from_code(code: u16) -> Option<Self> {
                 match code {
@@ -40,7 +40,7 @@ macro_rules! modules {
                 }
             }
 
-            /// The name on a command line and in JSON.
+            /// Returns the name on a command line and in JSON.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -52,13 +52,13 @@ macro_rules! modules {
 }
 
 modules! {
-    /// An empty slot, or a port that has no slot.
+    /// An empty slot, or a port without a slot.
     None = 0 "none" [Kind::None; 4];
     /// Four isolated digital inputs.
     Di4 = 1 "4di" [BitInput; 4];
     /// Four open-collector digital outputs.
     Do4 = 2 "4do" [BitOutput; 4];
-    /// Two relays, each with a jumper that says whether it is driven by hand.
+    /// Two relays, each with a jumper for manual operation.
     Relay2 = 3 "2relay" [BitInput, BitInput, BitOutput, BitOutput];
     /// Four analog inputs.
     Ai4 = 4 "4ai" [WordInput; 4];
@@ -69,10 +69,10 @@ modules! {
 }
 
 impl Module {
-    /// The greatest code.
+    /// The largest code.
     pub const LAST: u16 = Self::NAMES.len() as u16 - 1;
 
-    /// The code of this module in the MODULE registers, 0 to [`LAST`](Self::LAST).
+    /// Returns the code of this module in the MODULE registers, 0 to [`LAST`](Self::LAST).
     #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
@@ -85,7 +85,7 @@ impl fmt::Display for Module {
     }
 }
 
-/// A name that is no module's.
+/// Error for a name that is not that of a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownModule;
 
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_and_names_lead_back_to_the_module() {
+    fn a_module_is_found_by_its_code_and_its_name() {
         for (code, module) in (0..).zip(Module::ALL) {
             assert_eq!(module.code(), code);
             assert_eq!(Module::from_code(code), Some(module));

@@ -1,5 +1,5 @@
-//! Where the I/O points of each port stand: `(port - 1) * 4 + (channel - 1)`, for bits and words alike,
-//! and what a point can be.
+//! Addresses of the I/O points of each port: `(port - 1) * 4 + (channel - 1)`, for bits and words, and the kinds of
+//! a point.
 
 use modio_drivers::scale::{input_limits, output_limits};
 
@@ -9,57 +9,57 @@ use crate::rule::Rule;
 use crate::value::{Unit, Value};
 use crate::values::Values;
 
-/// Channels of one port.
+/// Number of channels of a port.
 pub const CHANNELS: u16 = 4;
 
-/// Ports the address space has room for.
+/// Number of ports in the address space.
 pub const PORTS: u16 = 8;
 
-/// The first address of a port's points, for ports 1 to 8.
+/// Returns the first address of a port's points, for ports 1 to 8.
 ///
 /// # Panics
 ///
-/// At compile time where it is used in a constant, for a port outside 1 to 8.
+/// For a port outside 1 to 8; at compile time when it is used in a constant.
 #[must_use]
 pub const fn first(port: u16) -> u16 {
     assert!(port >= 1 && port <= PORTS);
     of_port(port)
 }
 
-/// The same for a port that is known to be 1 to 8, without the check: the firmware has no panics.
+/// Like [`first`], for a port that is known to be 1 to 8, without the check: the firmware must not contain panics.
 #[inline]
 #[must_use]
 pub const fn of_port(port: u16) -> u16 {
     port.wrapping_sub(1).wrapping_mul(CHANNELS)
 }
 
-/// Points of all ports.
+/// Number of points of all ports.
 pub const COUNT: u16 = PORTS * CHANNELS;
 
-/// What a point is: what its module makes of the channel.
+/// The kind of a point, which its module determines.
 pub use modio_drivers::Kind;
 
-/// What an analog output takes from a master: 0-4095 raw, 0-10000 mV or 4000-20000 uA.
+/// Returns the values that a master may write to an analog output: 0-4095 raw, 0-10000 mV or 4000-20000 uA.
 ///
-/// There is no output for [`Signal::Ntc`]; it counts as [`Signal::Voltage`].
+/// Outputs have no [`Signal::Ntc`]; it is treated as [`Signal::Voltage`].
 #[must_use]
 pub const fn output_values(signal: Signal, scale: Scale) -> Values {
     let (min, max) = output_limits(signal, scale);
     Values::range(min, max)
 }
 
-/// What the word of an analog point means while RANGE and SCALE have these values.
+/// Meaning of the word of an analog point for one value of RANGE and SCALE.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
-    /// RANGE.
+    /// Value of RANGE.
     pub signal: Signal,
-    /// SCALE.
+    /// Value of SCALE.
     pub scale: Scale,
-    /// What the word counts.
+    /// Unit of the word.
     pub unit: Unit,
-    /// The least value. Below 0: the word is in two's complement.
+    /// Smallest value. If it is below 0, the word is in two's complement.
     pub min: i32,
-    /// The greatest value.
+    /// Largest value.
     pub max: i32,
 }
 
@@ -111,7 +111,8 @@ const fn reading(signal: Signal, scale: Scale, min: i32, max: i32) -> Reading {
     }
 }
 
-/// What the word of a point of this kind means, for each RANGE and SCALE; empty for a point that is no word.
+/// Returns the meaning of the word of a point of this kind, for each RANGE and SCALE; empty for a point that is not
+/// a word.
 #[must_use]
 pub fn readings(kind: Kind) -> &'static [Reading] {
     match kind {
@@ -133,12 +134,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ports_follow_one_another_from_address_0() {
+    fn ports_are_consecutive_from_address_0() {
         assert_eq!((first(1), first(5), first(8)), (0x0000, 0x0010, 0x001C));
     }
 
     #[test]
-    fn readings_cover_every_range_and_scale_that_a_point_takes() {
+    fn readings_cover_every_range_and_scale_that_a_point_allows() {
         use crate::codes::{SCALE_NAMES, SIGNAL_NAMES};
         for (kind, signals) in [(Kind::WordInput, 3), (Kind::WordOutput, 2)] {
             let readings = readings(kind).iter();

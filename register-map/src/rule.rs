@@ -1,41 +1,41 @@
-//! What holds for a register, in numbers: all the firmware needs of it.
+//! The rules of registers as numbers, which is all that the firmware needs.
 
 use crate::values::Values;
 use modio_drivers::Kind;
 
-/// What a master may do with a register.
+/// How a master may access a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Read it. A write is exception 02.
+    /// Read only. A write returns exception 02.
     ReadOnly,
-    /// Read and write it.
+    /// Read and write.
     ReadWrite,
-    /// What the module in the slot says: [`crate::Module::points`].
+    /// As the module in the slot defines it: [`crate::Module::points`].
     ByModule,
 }
 
-/// When a written value counts.
+/// When a written value takes effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InForce {
-    /// At once.
+    /// Immediately.
     Now,
-    /// After the next start, if it has been saved.
+    /// After the next start, if it was saved.
     Restart,
 }
 
-/// What holds for a point of one kind, where it differs from the rest.
+/// The values of a setting for one kind of point, where they differ from the other kinds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Narrower {
-    /// The kind of point.
+    /// Kind of point.
     pub kind: Kind,
-    /// Its values: some of the rule's.
+    /// Allowed values: a subset of those of the rule.
     pub values: Values,
-    /// Its default.
+    /// Default value.
     pub default: u16,
 }
 
 impl Narrower {
-    /// What holds for points of this kind.
+    /// Returns the values for points of this kind.
     #[must_use]
     pub const fn new(kind: Kind, values: Values, default: u16) -> Self {
         Self {
@@ -46,27 +46,27 @@ impl Narrower {
     }
 }
 
-/// What holds for a run of registers: for each the same.
+/// The rule for a run of registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rule {
-    /// The address of the first.
+    /// Address of the first register.
     pub first: u16,
-    /// How many, 1 or more.
+    /// Number of registers, 1 or more.
     pub count: u16,
-    /// What a master may do.
+    /// How a master may access them.
     pub access: Access,
-    /// When a written value counts.
+    /// When a written value takes effect.
     pub in_force: InForce,
-    /// Which values it takes. For a setting by point: where nothing is known of the point.
+    /// Allowed values. For a setting by point: those for a point of unknown kind.
     pub values: Values,
-    /// The factory default.
+    /// Factory default.
     pub default: u16,
-    /// For a setting by point: the kind of point that takes other values.
+    /// For a setting by point: the kind of point with other values.
     pub narrower: Option<&'static Narrower>,
 }
 
 impl Rule {
-    /// Registers that can only be read.
+    /// Returns a rule for registers that can only be read.
     #[must_use]
     pub const fn read_only() -> Self {
         Self {
@@ -75,7 +75,7 @@ impl Rule {
         }
     }
 
-    /// Registers whose values count at once.
+    /// Returns a rule for registers whose values take effect immediately.
     #[must_use]
     pub const fn now(values: Values, default: u16) -> Self {
         Self {
@@ -89,7 +89,7 @@ impl Rule {
         }
     }
 
-    /// Registers whose values count after the next start.
+    /// Returns a rule for registers whose values take effect after the next start.
     #[must_use]
     pub const fn restart(values: Values, default: u16) -> Self {
         Self {
@@ -98,7 +98,7 @@ impl Rule {
         }
     }
 
-    /// Registers that are what the module says.
+    /// Returns a rule for registers that the module defines.
     #[must_use]
     pub const fn by_module(values: Values) -> Self {
         Self {
@@ -107,14 +107,14 @@ impl Rule {
         }
     }
 
-    /// The same, with other values and another default for points of one kind.
+    /// Returns the rule with other values and another default for points of one kind.
     #[must_use]
     pub const fn but(mut self, narrower: &'static Narrower) -> Self {
         self.narrower = Some(narrower);
         self
     }
 
-    /// The same, at these addresses.
+    /// Returns the rule for these addresses.
     #[must_use]
     pub const fn at(mut self, first: u16, count: u16) -> Self {
         self.first = first;
@@ -122,20 +122,20 @@ impl Rule {
         self
     }
 
-    /// The address after the last.
+    /// Returns the address after the last.
     #[inline]
     #[must_use]
     pub const fn end(&self) -> u16 {
         self.first.wrapping_add(self.count)
     }
 
-    /// Every address, in order.
+    /// Iterates over every address in order.
     #[inline]
     pub fn addresses(&self) -> impl Iterator<Item = u16> + use<> {
         self.first..self.end()
     }
 
-    /// Which values it takes for a point of this kind.
+    /// Returns the allowed values for a point of this kind.
     #[inline]
     #[must_use]
     pub fn values_for(&self, kind: Kind) -> Values {
@@ -145,7 +145,7 @@ impl Rule {
         }
     }
 
-    /// The default for a point of this kind.
+    /// Returns the default for a point of this kind.
     #[inline]
     #[must_use]
     pub fn default_for(&self, kind: Kind) -> u16 {
@@ -156,20 +156,20 @@ impl Rule {
     }
 }
 
-/// Registers next to each other under one rule.
+/// Consecutive registers under one rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// What holds for them.
+    /// Rule of the registers.
     pub rule: &'static Rule,
-    /// How many of the rule's registers come before the first.
+    /// Number of the rule's registers in front of the first.
     pub index: u16,
-    /// How many registers, 1 or more.
+    /// Number of registers, 1 or more.
     pub count: u16,
 }
 
-/// The rule for an address and how many of its registers come before it; `None` in a gap.
+/// Returns the rule for an address and the number of its registers in front of the address; `None` in a gap.
 ///
-/// `rules` must be in ascending order, as those of every block are.
+/// `rules` must be in ascending order, like those of every block.
 #[inline]
 #[must_use]
 pub fn rule_at(rules: &'static [Rule], address: u16) -> Option<(&'static Rule, u16)> {
@@ -177,8 +177,8 @@ pub fn rule_at(rules: &'static [Rule], address: u16) -> Option<(&'static Rule, u
     Some((rule.first()?, index))
 }
 
-/// The registers of a span, run by run, so that a caller decides once for many; `None` when the span
-/// is empty or touches a gap or an address beyond the block.
+/// Returns the registers of a span as runs, so that a caller decides once for many registers. Returns `None` when
+/// the span is empty or contains a gap or an address after the block.
 #[inline]
 #[must_use]
 pub fn runs(rules: &'static [Rule], start: u16, count: u16) -> Option<Runs> {
@@ -201,7 +201,7 @@ pub fn runs(rules: &'static [Rule], start: u16, count: u16) -> Option<Runs> {
     None
 }
 
-/// The rules from the one for `address` on, and how many registers of that come before it.
+/// Returns the rules starting with the one for `address`, and the number of its registers in front of the address.
 #[inline]
 fn from(rules: &'static [Rule], address: u16) -> Option<(&'static [Rule], u16)> {
     let after = rules.partition_point(|rule| rule.first <= address);
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_leads_to_its_rule_and_a_gap_to_none() {
+    fn rule_at_finds_the_rule_of_an_address_and_none_in_a_gap() {
         let place = |address| rule_at(&RULES, address).map(|(rule, index)| (rule.first, index));
         assert_eq!(place(0x100), Some((0x100, 0)));
         assert_eq!(place(0x103), Some((0x100, 3)));
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_span_is_cut_where_the_rule_changes() {
+    fn a_span_is_split_where_the_rule_changes() {
         let whole = std::vec![(0x100, 0, 4), (0x104, 0, 1)];
         assert_eq!(counts(0x100, 5), Some(whole));
         assert_eq!(counts(0x102, 1), Some(std::vec![(0x100, 2, 1)]));
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_span_that_touches_a_gap_does_not_exist() {
+    fn a_span_with_a_gap_is_rejected() {
         for (start, count) in [
             (0x100, 6),
             (0x104, 13),

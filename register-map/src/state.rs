@@ -1,4 +1,4 @@
-//! Identity and state, 0x0200 to 0x025F: registers to read.
+//! Identity and state, 0x0200 to 0x025F: read-only registers.
 
 use crate::block::block;
 use crate::codes::{CHANNEL_STATUS_NAMES, ModuleState};
@@ -8,17 +8,18 @@ use crate::{Board, Module};
 
 const READ: Rule = Rule::read_only();
 
-/// The value of PRODUCT_CODE.
+/// Value of PRODUCT_CODE.
 pub const PRODUCT: u32 = 0x2383_5860;
 
-/// The value of MAP_VERSION: the version of this map.
+/// Value of MAP_VERSION: the version of this map.
 pub const MAP_VERSION_VALUE: u16 = 1;
 
-/// The bits of STATUS.
+/// Bits of STATUS.
 pub mod status {
-    /// The communication watchdog has tripped. Stays until COMMAND 5 or a restart.
+    /// The communication watchdog has tripped. Stays set until COMMAND 5 or a restart.
     pub const COMM_WATCHDOG: u16 = 1 << 0;
-    /// What was stored at the start was not good, all of it or a part: defaults are in force for that.
+    /// The configuration stored at the start was damaged, or a part of it was rejected: defaults are in force
+    /// instead.
     pub const STORED_INVALID: u16 = 1 << 1;
     /// A module has a fault.
     pub const MODULE_FAULT: u16 = 1 << 2;
@@ -43,7 +44,7 @@ pub mod status {
     ];
 }
 
-/// The bits of RESET_CAUSE: the flags of the RCC (RM0008 7.3.10, from bit 26 on), the highest first.
+/// Bits of RESET_CAUSE: the flags of the RCC (RM0008 7.3.10, from bit 26 on), in reverse order.
 pub mod reset_cause {
     /// Low-power management.
     pub const LOW_POWER: u16 = 1 << 0;
@@ -55,7 +56,7 @@ pub mod reset_cause {
     pub const SOFTWARE: u16 = 1 << 3;
     /// Power-on, or a brown-out.
     pub const POWER_ON: u16 = 1 << 4;
-    /// The reset pin; every reset pulls it, too.
+    /// The reset pin, which every reset pulls low.
     pub const PIN: u16 = 1 << 5;
 
     /// Every bit with its name.
@@ -69,7 +70,7 @@ pub mod reset_cause {
     ];
 }
 
-/// The bits of BUILD with their names.
+/// Names of the bits of BUILD.
 const BUILD_NAMES: &[(u8, &str)] = &[
     (0, "sources differ from the commit"),
     (1, "signed with development key"),

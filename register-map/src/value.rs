@@ -1,19 +1,19 @@
-//! What a register's number means, for people and for tools.
+//! Meaning of a register's number, for people and for tools.
 
 use core::fmt;
 
-/// What a register, or a run of like ones, holds.
+/// Kind of content of a register or of a run of similar ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
     /// A number in each register.
     Number(Unit),
     /// A number of 32 bits in each two registers, high word first.
     Long(Unit),
-    /// In each register one of these codes, which have names.
+    /// One of these codes, which have names, in each register.
     Codes(&'static [(u16, &'static str)]),
-    /// Bits with a name each, the lowest being bit 0. The others are 0.
+    /// Bits with names, the lowest being bit 0. All other bits are 0.
     Bits(&'static [(u8, &'static str)]),
-    /// Registers that have a meaning only together, such as an identity. They are shown in hexadecimal.
+    /// Registers that have a meaning only together, such as an identity. Shown in hexadecimal.
     Opaque,
 }
 
@@ -23,13 +23,13 @@ impl Value {
     /// A number of 32 bits without a unit.
     pub const LONG: Self = Self::Long(Unit::NONE);
 
-    /// A number in this unit.
+    /// Returns a number in this unit.
     #[must_use]
     pub const fn number(code: &'static str) -> Self {
         Self::tens(code, 0)
     }
 
-    /// A number in 10^`exponent` of this unit: `tens("ms", -1)` counts tenths of a millisecond.
+    /// Returns a number in 10^`exponent` of this unit: `tens("ms", -1)` counts tenths of a millisecond.
     #[must_use]
     pub const fn tens(code: &'static str, exponent: i8) -> Self {
         Self::Number(Unit {
@@ -39,7 +39,7 @@ impl Value {
         })
     }
 
-    /// A number of 32 bits in this unit.
+    /// Returns a number of 32 bits in this unit.
     #[must_use]
     pub const fn long(code: &'static str) -> Self {
         match Self::number(code) {
@@ -48,7 +48,7 @@ impl Value {
         }
     }
 
-    /// The unit of a number.
+    /// Returns the unit of a number.
     #[must_use]
     pub const fn unit(self) -> Unit {
         match self {
@@ -57,7 +57,7 @@ impl Value {
         }
     }
 
-    /// How many registers make one value; `None` when all of them together do.
+    /// Returns the number of registers of one value, or `None` when all of them together are one value.
     #[must_use]
     pub const fn registers(self) -> Option<u16> {
         match self {
@@ -68,19 +68,19 @@ impl Value {
     }
 }
 
-/// What a number counts: the quantity is `(number + offset) * 10^exponent` in the unit.
+/// Unit of a number: the quantity is `(number + offset) * 10^exponent` in the unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unit {
-    /// Its code in UCUM (the Unified Code for Units of Measure): `ms`, `By` for bytes; empty for a plain number.
+    /// Code in UCUM (the Unified Code for Units of Measure): `ms`, `By` for bytes; empty for a plain number.
     pub code: &'static str,
-    /// The power of ten that one step is.
+    /// Power of ten of one step.
     pub exponent: i8,
-    /// The quantity at the number 0, in steps.
+    /// Quantity for the number 0, in steps.
     pub offset: i16,
 }
 
 impl Unit {
-    /// A plain number.
+    /// No unit, for a plain number.
     pub const NONE: Self = Self {
         code: "",
         exponent: 0,
@@ -88,7 +88,7 @@ impl Unit {
     };
 }
 
-/// As in `100 bit/s`, `0.1 ms` or `410 MHz + n`; nothing for a plain number.
+/// Writes `100 bit/s`, `0.1 ms` or `410 MHz + n`; nothing for a plain number.
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = match self.code {
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn units_are_written_as_people_read_them() {
+    fn units_are_written_with_their_factor_and_offset() {
         let written = |value: Value| value.unit().to_string();
         assert_eq!(written(Value::tens("bit/s", 2)), "100 bit/s");
         assert_eq!(written(Value::tens("ms", -1)), "0.1 ms");

@@ -1,51 +1,51 @@
-//! Which values a register takes.
+//! Sets of values that a register allows.
 
 /// A set of 16-bit values, small enough to be checked in a few instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Values {
     /// `min` to `max`, both included.
     Range {
-        /// The least value.
+        /// Smallest value.
         min: u16,
-        /// The greatest value, not below `min`.
+        /// Largest value, not below `min`.
         max: u16,
     },
     /// `also`, or `min` to `max`.
     RangeOr {
-        /// The value outside the range: off, hold and the like.
+        /// A value outside the range, such as off or hold.
         also: u16,
-        /// The least value of the range.
+        /// Smallest value of the range.
         min: u16,
-        /// The greatest value of the range, not below `min`.
+        /// Largest value of the range, not below `min`.
         max: u16,
     },
-    /// These, in ascending order.
+    /// These values, in ascending order.
     OneOf(&'static [u16]),
 }
 
 impl Values {
-    /// Every value there is.
+    /// Every value.
     pub const ANY: Self = Self::up_to(0xFFFF);
 
-    /// 0 to `max`.
+    /// Returns the values from 0 to `max`.
     #[must_use]
     pub const fn up_to(max: u16) -> Self {
         Self::Range { min: 0, max }
     }
 
-    /// `min` to `max`.
+    /// Returns the values from `min` to `max`.
     #[must_use]
     pub const fn range(min: u16, max: u16) -> Self {
         Self::Range { min, max }
     }
 
-    /// This one.
+    /// Returns a single value.
     #[must_use]
     pub const fn only(value: u16) -> Self {
         Self::range(value, value)
     }
 
-    /// `also` as well, beside this range.
+    /// Returns this range with `also` as an additional value.
     #[must_use]
     pub const fn or(self, also: u16) -> Self {
         match self {
@@ -56,20 +56,20 @@ impl Values {
         }
     }
 
-    /// Whether this value is among them.
+    /// Returns whether the set contains this value.
     #[inline]
     #[must_use]
     pub fn allow(self, value: u16) -> bool {
         self.allow_all([value])
     }
 
-    /// Whether all of these are: one decision about the kind of set for a whole run of registers.
+    /// Returns whether the set contains all of these values. The kind of set is decided only once for all of them.
     #[inline]
     pub fn allow_all(self, values: impl IntoIterator<Item = u16>) -> bool {
         let mut values = values.into_iter();
         let (first, width) = match self {
             Self::Range { min, max } => (min, max.wrapping_sub(min)),
-            // 0xFFFF beside 0 to something: a range, too, when counting wraps.
+            // 0xFFFF in addition to a range from 0 is also a range when the values wrap.
             Self::RangeOr { also, min, max } if also.wrapping_add(1) == min => {
                 (also, max.wrapping_sub(also))
             }
@@ -102,11 +102,11 @@ mod tests {
     }
 
     #[test]
-    fn one_bad_value_spoils_the_run() {
+    fn one_bad_value_rejects_the_run() {
         let values = Values::range(2000, 5000);
         assert!(values.allow_all([2000, 3950, 5000]));
         assert!(!values.allow_all([2000, 1999, 5000]));
         assert!(!Values::OneOf(&[1, 3]).allow_all([1, 2, 3]));
-        assert!(values.allow_all([]), "nothing is wrong with nothing");
+        assert!(values.allow_all([]), "an empty run is allowed");
     }
 }

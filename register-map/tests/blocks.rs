@@ -1,10 +1,9 @@
-//! What must hold for the declarations of all blocks, and the map's own numbers once more, written
-//! out by hand.
+//! Rules for the declarations of all blocks, and the numbers of the map written out by hand for comparison.
 
 use register_map::*;
 
 #[test]
-fn registers_are_in_order_within_their_block_and_apart() {
+fn registers_are_in_order_within_their_block_and_do_not_overlap() {
     let mut next = 0;
     for block in BLOCKS {
         assert!(
@@ -23,7 +22,7 @@ fn registers_are_in_order_within_their_block_and_apart() {
 }
 
 #[test]
-fn every_register_has_words_and_its_codes_are_its_values() {
+fn every_register_has_a_text_and_its_codes_are_its_values() {
     for (rule, text) in BLOCKS.iter().flat_map(|block| block.registers()) {
         assert!(
             !text.name.is_empty() && text.about.trim().len() > 2,
@@ -52,7 +51,7 @@ fn every_register_has_words_and_its_codes_are_its_values() {
     }
 }
 
-/// first, count, some good values, some bad values, default, in force
+/// first, count, some valid values, some invalid values, default, in force
 type Expected = (u16, u16, &'static [u16], &'static [u16], u16, InForce);
 
 const NOW: InForce = InForce::Now;
@@ -85,7 +84,7 @@ const CONFIGURATION: &[Expected] = &[
 ];
 
 #[test]
-fn the_configuration_is_as_the_contract_has_it() {
+fn the_configuration_matches_the_numbers_written_by_hand() {
     assert_eq!(configuration::RULES.len(), CONFIGURATION.len());
     for (rule, expected) in configuration::RULES.iter().zip(CONFIGURATION) {
         let (first, count, good, bad, default, in_force) = *expected;
@@ -104,7 +103,7 @@ fn the_configuration_is_as_the_contract_has_it() {
 }
 
 #[test]
-fn the_state_registers_exist_and_their_gaps_do_not() {
+fn the_state_registers_are_readable_except_for_gaps() {
     let there = |start, count| runs(state::RULES, start, count).is_some();
     for (start, count) in [(0x200, 38), (0x230, 9), (0x240, 32)] {
         assert!(there(start, count), "{start:#06x}");
@@ -118,7 +117,7 @@ fn the_state_registers_exist_and_their_gaps_do_not() {
 }
 
 #[test]
-fn a_module_makes_its_points() {
+fn a_module_defines_the_kinds_of_its_points() {
     use points::Kind::{BitInput, BitOutput, None, WordInput, WordOutput};
     for (module, kinds) in [
         (Module::None, [None; 4]),

@@ -1,9 +1,9 @@
-//! docs/register-map.md says what the register map says.
+//! Checks that docs/register-map.md matches the register map.
 
 use std::{fs, path::Path};
 
 #[test]
-fn the_document_is_not_stale() {
+fn the_document_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/register-map.md");
     let written = fs::read_to_string(&path).unwrap_or_default();
     let mut current = String::new();
@@ -14,6 +14,6 @@ fn the_document_is_not_stale() {
         .find(|(written, current)| written != current);
     assert!(
         written == current,
-        "docs/register-map.md is stale or missing; renew it with: cargo xtask docs\nfirst difference: {stale:#?}"
+        "docs/register-map.md is out of date or missing; write it with: cargo xtask docs\nfirst difference: {stale:#?}"
     );
 }

@@ -1,6 +1,6 @@
-"""Does to a suite what renode-test does before it runs it: Renode's keywords are there, and the fixtures
-that a suite does not name are Renode's (robot_tests_provider.py). To be given to robot as
-`--prerunmodifier`, with the library of the keywords in place of Renode's server."""
+"""Prepares a suite as renode-test does before it runs the suite: adds Renode's keywords, and Renode's default
+fixtures where the suite names none (robot_tests_provider.py). Pass this file to robot as `--prerunmodifier`.
+The keywords come from a library instead of Renode's server."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ class AsRenodeTest(SuiteVisitor):
     """The modifier."""
 
     def start_suite(self, suite):
-        # Directories have no tests of their own, and no fixtures.
+        # Directories have no tests and no fixtures.
         if not suite.tests:
             return
         suite.resource.imports.library(KEYWORDS.as_posix())

@@ -1,4 +1,4 @@
-"""The keywords of Renode that the suites use, carried out on the project's own simulator.
+"""Implements the keywords of Renode that the suites use on the project's own simulator.
 
 A suite that passes here asks and expects the right things of the image, on a machine without Renode. Tests
 with the tag `renode-only` need Renode's models, and tests with the tag `exact-time` need gaps that are exact
@@ -22,7 +22,7 @@ from terminal_tester import TerminalTester
 
 ROBOT_LIBRARY_SCOPE = "GLOBAL"
 
-# The lines of the slots by port: the part's port and pin.
+# Lines of the slots by port: port and pin of the part.
 LINES = {
     "modio-02": {5: ["A0", "A1", "A2", "A3"]},
     "modio-08": {
@@ -32,18 +32,18 @@ LINES = {
         4: ["B0", "B1", "C4", "C5"],
     },
 }
-# The converter's first channel of each of the part's ports.
+# ADC channel of pin 0 of each port of the part.
 ANALOG = {"A": 0, "B": 8, "C": 10}
-# The output data registers.
+# Output data registers.
 OUTPUTS = {0x4001080C: "A", 0x40010C0C: "B", 0x4001100C: "C"}
 
-# Where the log is read from: a control block of RTT made up of the simulator's output.
+# Addresses at which the suites read the log: a simulated RTT control block with the simulator's output.
 _BLOCK = 0x20002000
 _BUFFER = 0x20003000
 
 
 class _Board:
-    """The simulator with a board in it."""
+    """The simulator with a board."""
 
     def __init__(self, program, board, elf, dip, modules):
         command = [program, "--board", board, "--elf", elf, "--dip", str(dip)]
@@ -56,7 +56,7 @@ class _Board:
         command += ["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.log = []
-        # Renode's keyword attaches the tester later; bytes before that are lost there, too.
+        # Renode's keyword attaches the tester later; bytes received before that are lost there, too.
         self.tester = None
         self.lock = threading.Lock()
         self.received = self.sent = self.last_frame = 0
@@ -77,11 +77,11 @@ class _Board:
                 self.log.append(line)
 
     def _endpoint(self, name):
-        """Where the simulator says it listens, on a port that was free."""
+        """Returns the address at which the simulator listens, which it prints."""
         deadline = time.monotonic() + 60
         while name not in self._endpoints:
             if self.process.poll() is not None:
-                raise AssertionError(f"no simulator: {self.process.stderr.read()}")
+                raise AssertionError(f"the simulator has ended: {self.process.stderr.read()}")
             if time.monotonic() > deadline:
                 raise AssertionError(f"the simulator opened no {name} in a minute")
             time.sleep(0.02)
@@ -104,7 +104,7 @@ class _Board:
         return self.get("state")
 
     def channels(self):
-        """The channels of every slot by its port."""
+        """Returns the channels of every slot, by port."""
         state = self.state()
         if "slots" in state:
             return {slot["port"]: slot["channels"] for slot in state["slots"]}
@@ -121,7 +121,7 @@ class _Board:
         self._wait_for_sent_frames()
 
     def _wait_for_sent_frames(self):
-        """Waits until the frames that the unit has sent have crossed the socket, which takes long on a busy
+        """Waits until the frames that the unit has sent were received over the socket. This takes long on a busy
         machine."""
         for frame in self.get(f"frames?since={self.last_frame}")["frames"]:
             self.last_frame = frame["number"]
@@ -137,7 +137,7 @@ class _Board:
 
 
 class RenodeOnSimulator:
-    """The library. Where Renode's server tells a type, so do the arguments here."""
+    """The library. Arguments have the same types as in Renode's server."""
 
     ROBOT_LIBRARY_SCOPE = "GLOBAL"
 
@@ -186,7 +186,7 @@ class RenodeOnSimulator:
     def wait_for_bytes_on_uart(self, content, timeout: float = None, testerId: int = None,
                                treatAsRegex: bool = False, pauseEmulation: bool = None,
                                matchStart: bool = False):
-        assert timeout == 0, "the suites let time go by themselves"
+        assert timeout == 0, "the suites advance the time with RunFor"
         with self._board.lock:
             self._board.tester.wait_for_bytes(content, treatAsRegex, matchStart)
 
@@ -194,7 +194,7 @@ class RenodeOnSimulator:
         for pattern, act in self._commands():
             if match := re.fullmatch(pattern, command):
                 return act(*match.groups())
-        raise AssertionError(f"a command that is not known here: {command}")
+        raise AssertionError(f"unknown command: {command}")
 
     def _commands(self):
         number = r"(0x[0-9A-Fa-f]+|\d+)"
@@ -224,7 +224,7 @@ class RenodeOnSimulator:
         return ""
 
     def _run_for(self, seconds):
-        # Together, so that there is no gap between them, as in Renode while the emulation stands still.
+        # All bytes are sent together without gaps, as in Renode while the emulation does not run.
         step = 1 if self._delay else len(self._keys) or 1
         for at in range(0, len(self._keys), step):
             time.sleep(self._delay)
@@ -244,7 +244,7 @@ class RenodeOnSimulator:
         return ""
 
     def _lines(self):
-        """Every line: the slot's port and the channel, and the pin."""
+        """Yields every line: the slot's port and the channel, and the pin."""
         for slot, pins in self._board.lines.items():
             for channel, pin in enumerate(pins, start=1):
                 yield (slot, channel), pin
@@ -254,7 +254,7 @@ class RenodeOnSimulator:
         return ""
 
     def _reset(self):
-        # The macro `reset` of board.resc drives the switch's position onto the pins again.
+        # The macro `reset` of board.resc also drives the switch's position onto the pins again.
         self._inputs(self._variables["dip"])
         self._board.post("power", cycle=True)
         return ""
@@ -289,5 +289,5 @@ class RenodeOnSimulator:
             [(slot, channel)] = [place for place, pin in self._lines() if ANALOG[pin[0]] + int(pin[1:]) == number]
             self._board.post(f"slots/{slot}/channels/{channel}", millivolts=round(value * 3300 / 4095))
         else:
-            assert address == 0x400213F0, "the flags of the next reset; power is cut here anyway"
+            assert address == 0x400213F0, "only the flags of the next reset can be written"
         return ""

@@ -1,5 +1,5 @@
-"""What exact-line.py uses of .NET and of Renode, for Python 3 and over real sockets. Except TcpClient.Close,
-all calls were seen to work in Renode. Any other name raises AttributeError or ImportError.
+"""Fakes of what exact-line.py uses of .NET and Renode, for Python 3 and with real sockets. Except TcpClient.Close,
+all calls were tested in Renode. Any other name raises AttributeError or ImportError.
 
 A name that begins with an underscore belongs to the fake.
 """
@@ -22,7 +22,7 @@ DELIVERY_US = 10 * 1_000_000 / 9600
 
 
 class Exact:
-    """Has the attributes in `__slots__` and its methods, and refuses every other name."""
+    """Allows only the attributes in `__slots__` and its methods; every other name is an error."""
 
     __slots__ = ()
 
@@ -86,7 +86,7 @@ class Sysbus(Exact):
 
     def ReadDoubleWord(self, address):
         unit = self._board._unit
-        # The rest of the word is as in a running unit.
+        # The remaining bits are as in a running unit.
         registers = {UART_SR: 0xC0 | unit.unread * RXNE, UART_CR1: 0x0128 | unit.receiving * ENABLED_RECEIVER}
         return registers[address]
 
@@ -135,7 +135,7 @@ class TimeStamp(Exact):
 
 
 class Machine(Exact):
-    """The machine, and all that happens to it."""
+    """The machine and its state."""
 
     __slots__ = ("_at_once", "_time", "_unit", "_parts", "_running", "_started", "_set_back", "_zero",
                  "_resets_time", "_written", "_refusal", "_late")
@@ -144,13 +144,13 @@ class Machine(Exact):
         self._at_once = at_once
         self._resets_time = resets_time
         self._running = self._started = False
-        # The time at which the emulation's own time was set back to 0.
+        # Time at which the emulation's own time was reset to 0.
         self._zero = 0
         self._time = VirtualTime()
         self._written = []
-        # The text of the error that RunFor raises, if it is to fail.
+        # Text of the error that RunFor raises, if it is to fail.
         self._refusal = None
-        # Steps by which RunFor stops late.
+        # Number of steps by which RunFor stops too late.
         self._late = 0
         uart = Uart(self)
         self._unit = Unit(self._time, lambda byte: [handler(Byte(byte)) for handler in uart.CharReceived._handlers])
@@ -165,7 +165,7 @@ class Machine(Exact):
 
     def Reset(self):
         assert not self._running
-        # Renode does nothing when the machine has not run yet.
+        # Renode ignores a reset when the machine has not run yet.
         if self._started:
             self._unit.reset()
             self._parts["sysbus.usart1"]._busy_until = 0
@@ -218,7 +218,7 @@ class TcpListener(Exact):
 
 
 class TcpClient(Exact):
-    """System.Net.Sockets.TcpClient. Close is the one call here that was not seen in Renode."""
+    """System.Net.Sockets.TcpClient. Only Close was not tested in Renode."""
 
     __slots__ = ("_socket",)
 
@@ -230,7 +230,7 @@ class TcpClient(Exact):
         return self._socket
 
     def Close(self):
-        # The files made of the socket would keep it open.
+        # The files made from the socket would keep it open.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
@@ -242,7 +242,7 @@ class StreamReader(Exact):
     __slots__ = ("_file",)
 
     def __init__(self, stream):
-        # Like .NET: UTF-8, and a lone carriage return ends a line as well.
+        # Like .NET: UTF-8, and a carriage return alone also ends a line.
         self._file = stream.makefile("r", encoding="utf-8", errors="replace", newline=None)
 
     def ReadLine(self):
@@ -301,7 +301,7 @@ class ThreadStart(Exact):
 
 
 def _modules(manager):
-    """The modules that exact-line.py imports."""
+    """Returns the modules that exact-line.py imports."""
 
     def module(name, **members):
         made = types.ModuleType(name)
@@ -323,9 +323,9 @@ def _modules(manager):
 
 
 class Renode:
-    """Renode with a machine in it, after `include exact-line.py`.
+    """Renode with a machine, after `include exact-line.py`.
 
-    `at_once` is Renode 1.16.1: a byte is delivered at the instant of WriteChar. `resets_time` makes a reset of
+    `at_once` is Renode 1.16.1: a byte is delivered immediately by WriteChar. `resets_time` makes a reset of
     the machine set the emulation's time back to 0.
     """
 
@@ -340,7 +340,7 @@ class Renode:
             exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), self.scope)
 
     def exact_line(self, port):
-        """The monitor's command."""
+        """Runs the monitor's command."""
         assert self.scope["mc_exact_line"](port) is None
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""A small Modbus-RTU unit behind Renode's UART, and the virtual time that it lives in. Both are as simple as
+"""A small Modbus-RTU unit on Renode's UART, and its virtual time. Both are as simple as
 the tests of exact-line.py allow: the firmware's own behaviour is tested elsewhere."""
 
 import heapq
@@ -12,15 +12,15 @@ from ModbusRtu import frame  # noqa: E402
 # Virtual time is counted in steps of 1/8 us, as Renode reports it.
 STEPS = 8
 
-# The unit listens this long after a start.
+# The unit receives this long after a start.
 START_US = 120_000
 # End of a frame, 3.5 characters of 9600 8N2, and the unit's own time after it.
 SILENCE_US, THINKING_US = 4010.5, 108.625
-# A reply's first byte comes this long after the delivery of the request's last byte.
+# Time from the delivery of the request's last byte to a reply's first byte.
 REPLY_US = SILENCE_US + THINKING_US
-# All bytes of a reply leave Renode's UART within microseconds.
+# Renode's UART sends all bytes of a reply within microseconds.
 BETWEEN_BYTES_US = 3.25
-# The firmware reads a byte this long after its delivery.
+# Time from the delivery of a byte until the firmware reads it.
 READING_US = 2
 
 POWER_ON_FLAGS, PIN_FLAG, SOFTWARE_FLAGS = 0x0C000000, 0x04000000, 0x14000000
@@ -29,7 +29,7 @@ CLEARED, IN_RAM, FLAGS = 0, 1, 2
 
 
 class VirtualTime:
-    """Virtual time in steps, and what happens in it."""
+    """Virtual time in steps, with scheduled actions."""
 
     def __init__(self):
         self.now = 0
@@ -37,7 +37,7 @@ class VirtualTime:
         self._count = 0
 
     def after(self, us, action):
-        """Does something later, unless the machine is reset before."""
+        """Runs an action later, unless the machine is reset before."""
         self._count += 1
         heapq.heappush(self._actions, (self.now + round(us * STEPS), self._count, action))
 
@@ -60,12 +60,12 @@ class Unit:
         self.send = send
         self.next_flags = POWER_ON_FLAGS
         self.registers = {IN_RAM: 0}
-        # Bytes that reached the unit, and when.
+        # The bytes that the unit received, with their times.
         self.delivered = []
         self.reset()
 
     def reset(self):
-        """Starts the unit. Its RAM stays as it is."""
+        """Starts the unit. Its RAM keeps its content."""
         self.time.clear()
         self.frame = bytearray()
         self.last_byte = 0

@@ -1,6 +1,6 @@
-"""What Renode's IronPython gives to a Python peripheral and to the monitor's commands, for Python 3.
+"""Fakes of what Renode's IronPython provides for Python peripherals and monitor commands, for Python 3.
 
-Renode runs the whole script at every access, in a scope that stays: so does this.
+Like Renode, this runs the whole script at every access, in a scope that is kept.
 """
 
 import types
@@ -10,7 +10,7 @@ RENODE = Path(__file__).resolve().parent.parent
 
 
 class Request:
-    """The access under way, with the names of Renode 1.16.1 and later."""
+    """The current access, with the names of Renode 1.16.1 and later."""
 
     def __init__(self):
         self.IsInit = self.IsRead = self.IsWrite = self.IsUser = False
@@ -23,7 +23,7 @@ class Request:
 
     @Value.setter
     def Value(self, value):
-        # An unsigned number in Renode: anything else ends the emulation there.
+        # Renode uses an unsigned number: any other value ends the emulation there.
         assert isinstance(value, int) and 0 <= value < 1 << 64, value
         self._value = value
 
@@ -67,7 +67,7 @@ class Peripheral:
         return request.Value
 
     def _check_saved(self):
-        """Renode saves these with the emulation, and can save nothing else."""
+        """Checks that Renode can save all variables: it only saves numbers and dictionaries."""
         given = {"request", "self", "monitor", "size", "__builtins__"}
         for name, value in self.scope.items():
             assert name in given or isinstance(value, (int, dict)), f"{name} cannot be saved"
@@ -91,8 +91,8 @@ class Peripheral:
 
 
 def commands(machine, printed, parsed=None):
-    """The functions of commands.py on a machine. Adds what they print to `printed`, and the commands that
-    they give to the monitor to `parsed`."""
+    """Returns the functions of commands.py for a machine. Their output is added to `printed`, and their
+    monitor commands to `parsed`."""
     path = RENODE / "commands.py"
     monitor = types.SimpleNamespace(Machine=machine)
     if parsed is not None:

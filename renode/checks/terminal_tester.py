@@ -1,11 +1,11 @@
 """The matcher of Renode's terminal tester in binary mode, for waits with `timeout=0`.
 
 The behaviour was read in TerminalTester.cs of renode-infrastructure (commit edb7c2ab) and in UartKeywords.cs of
-renode (commit 4ab6f235), and was seen in Renode 1.16.1. A test that passes here must not depend on a kinder one:
+renode (commit 4ab6f235), and was observed in Renode 1.16.1. It has these properties, which the tests must handle:
 
-- A wait that finds nothing fails, but its pattern stays armed. The byte that completes the pattern later
+- A wait without a match fails, but its pattern stays armed. The byte that completes the pattern later
   removes the match from the buffer, and no keyword reports it.
-- A match removes every byte up to its end from the buffer, also the bytes in front of it.
+- A match removes every byte up to its end from the buffer, including the bytes in front of the match.
 - A new wait replaces the armed pattern.
 - The report of a failure is made once. Every later failure repeats the first report.
 """
@@ -48,11 +48,11 @@ class TerminalTester:
     def _pattern(content, treat_as_regex):
         if not treat_as_regex:
             return re.compile(re.escape(bytes.fromhex(content)), re.DOTALL)
-        # .NET names the very end \z; Python has no \z before 3.14 and names it \Z.
+        # .NET uses \z for the very end; Python before 3.14 has no \z and uses \Z.
         return re.compile(content.replace(r"\z", r"\Z").encode("latin-1"), re.DOTALL)
 
     def _take(self, content, pattern, match_start):
-        """Removes the first match and what is in front of it. Returns the match, or None."""
+        """Removes the first match and the bytes in front of it. Returns the match, or None."""
         match = pattern.search(self.buffer)
         # Only the first match counts, even when a later one would begin at the start.
         if match is None or (match_start and match.start() != 0):

@@ -1,9 +1,9 @@
-"""The image itself starts on the Python models: from the reset vector to the first `wfi`, on Unicorn's
-Cortex-M3, with renode/peripherals where board.resc puts them, ports that behave as Renode's
-(STM32F1GPIOPort.cs), and registers that just keep what is written for the timers and the UART.
+"""Starts the image on the Python models: from the reset vector to the first `wfi`, on Unicorn's
+Cortex-M3, with renode/peripherals at the addresses in board.resc, ports that behave like Renode's
+(STM32F1GPIOPort.cs), and registers that only keep written values for the timers and the UART.
 
-There are no interrupts, so this ends where the tasks begin: clocks, switch, flash store, module and
-watchdog are set up by then. To be called with the board's name and the image's path.
+There are no interrupts, so the test ends where the tasks begin: clocks, switch, flash store, module and
+watchdog are set up by then. Call it with the board's name and the image's path.
 """
 
 import struct
@@ -23,7 +23,7 @@ SECONDS = 60
 
 
 class Port:
-    """A port as Renode has it: no pulls, and a set or reset of a pin that is an input is dropped."""
+    """A port like Renode's: no pull-ups, and setting the output bit of an input has no effect."""
 
     def __init__(self):
         self.levels = 0
@@ -52,7 +52,7 @@ class Port:
 
 
 class Registers(dict):
-    """A block that keeps what is written."""
+    """A block that keeps written values."""
 
     def read(self, offset):
         return self.get(offset, 0)
@@ -62,7 +62,7 @@ class Registers(dict):
 
 
 class Tag:
-    """A block that the platform only names: it reads 0, and writes do nothing."""
+    """A block that the platform only names: it reads 0, and writes have no effect."""
 
     def read(self, offset):
         return 0
@@ -72,7 +72,7 @@ class Tag:
 
 
 class Board:
-    """The part, with the image in its flash."""
+    """The part with the image in its flash."""
 
     def __init__(self, board, elf, module, dip):
         self.flash_size, _, self.ram_size, _ = PARTS[board]
@@ -87,7 +87,7 @@ class Board:
         ports = {name: Port() for name in "ABC"}
         machine = Machine({f"sysbus.gpioPort{name}": port for name, port in ports.items()})
         machine.update({"sysbus": self, "sysbus.flash": self, "sysbus.iwdgCounter": self})
-        # As board.resc has them; platform.rs holds those addresses against the simulator's.
+        # Addresses as in board.resc; platform.rs compares them with the simulator's.
         self.blocks = {int(address, 16): Peripheral(file, machine) for file, address in models()}
         self.blocks.update({0x40010800: ports["A"], 0x40010C00: ports["B"], 0x40011000: ports["C"]})
         for address in (0x40000000, 0x40000800, 0x40012C00, 0x40013800):
@@ -132,7 +132,7 @@ class Board:
         return self.blocks.setdefault(base, Registers()), offset & 0x3FF
 
     def _bit(self, offset, _size):
-        """One bit of a register, as Renode's BitBanding: read, changed, and written, as a word."""
+        """Returns one bit of a register, like Renode's BitBanding: the register is read and written as a word."""
         block, at = self._block(offset >> 5 & ~3, 4)
         bit = offset >> 2 & 31
 
@@ -142,7 +142,7 @@ class Board:
 
         return Bit, at
 
-    # What the models and commands see of the machine.
+    # What the models and commands use of the machine.
 
     def SetRange(self, start, count, value):
         self.erased.append((start, count))
@@ -158,7 +158,7 @@ class Board:
         self.core.mem_write(address, bytes([value]))
 
     def run(self):
-        """Runs to the first `wfi` and gives whether it was reached."""
+        """Runs to the first `wfi`. Returns whether it was reached."""
         reached = []
 
         def look(core, address, _size, _data):
@@ -187,7 +187,7 @@ def models():
 
 
 def writes(board):
-    """What the board's script writes into the models."""
+    """Yields what the board's script writes into the models."""
     for line in (RENODE / f"{board}-board.resc").read_text(encoding="utf-8").splitlines():
         if line.startswith("sysbus WriteDoubleWord "):
             address, value = line.split()[2:]
@@ -199,7 +199,7 @@ class Boot(unittest.TestCase):
     _boards = {}
 
     def board(self, module="4di", dip=1, crystal=1):
-        """A board that has started; the same for the same arguments."""
+        """Returns a board that has started. The same arguments return the same board."""
         how = module, dip, crystal
         if how not in self._boards:
             self._boards[how] = self._started(*how)
@@ -212,18 +212,18 @@ class Boot(unittest.TestCase):
         board = Board(self.BOARD, self.ELF, module, dip)
         board.blocks[0x40021000].write(0x3F4, crystal)
         where = lambda: hex(board.core.reg_read(UC_ARM_REG_PC))
-        self.assertTrue(board.run(), f"it hangs at {where()}")
+        self.assertTrue(board.run(), f"the image hangs at {where()}")
         for base, block in board.blocks.items():
             self.assertEqual(getattr(block, "warnings", []), [], hex(base))
-        self.assertEqual(board.unknown, set(), "blocks that neither a model nor Renode has")
+        self.assertEqual(board.unknown, set(), "accessed blocks without a model")
         return board
 
-    def test_it_runs_on_the_crystal_and_knows_why_it_started(self):
+    def test_it_runs_on_the_crystal_and_logs_the_reset_cause(self):
         board = self.board()
         rcc = board.blocks[0x40021000]
         self.assertEqual(rcc.read(0x04) >> 2 & 3, 2, "SWS: the PLL")
         self.assertTrue(rcc.read(0x00) & 1 << 17, "HSERDY")
-        self.assertEqual(rcc.read(0x24) >> 26, 0, "the reset flags were taken")
+        self.assertEqual(rcc.read(0x24) >> 26, 0, "the reset flags were cleared")
         for line in ("reset: power-on", "reset: pin", "unit address 1", f"slot {self.port()}: 4di"):
             self.assertIn(line, board.log())
         self.assertNotIn("damaged", board.log())
@@ -249,20 +249,20 @@ class Boot(unittest.TestCase):
     def test_the_store_makes_its_spare_page_ready(self):
         # The second page has no mark yet; the first holds the preset.
         size, page, _, _ = PARTS[self.BOARD]
-        # The modio-02 stores where the smaller part of 64 KiB has its last pages.
+        # The modio-02 stores its configuration in the last pages of the smaller part, 64 KiB.
         end = 0x10000 if self.BOARD == "modio-02" else size
         self.assertEqual(self.board().erased, [(end - page, page)])
 
-    def test_the_watchdog_is_started_by_half_words(self):
+    def test_the_watchdog_is_started_by_half_word_writes(self):
         board = self.board()
         self.assertEqual(board.widths[0x40003000], {2})
         keys = [value for offset, value in board.watchdog if offset == 0]
-        # Started with the period of the start-up, then set to that of the running device.
+        # First started with the period of the start-up, then set to that of the running device.
         self.assertEqual(keys, [0xCCCC, 0x5555, 0xAAAA, 0x5555, 0xAAAA])
 
-    def test_uart_and_timers_are_what_the_platforms_clocks_are_for(self):
+    def test_uart_and_timers_are_set_for_the_platforms_clocks(self):
         board = self.board()
-        # 9600 bit/s of 72 MHz; the beat of 1 kHz.
+        # 9600 bit/s from 72 MHz, and the timer at 1 kHz.
         self.assertEqual(board.blocks[0x40013800][0x08], 7500)
         scan = board.blocks[0x40000800]
         self.assertEqual((scan[0x28] + 1) * (scan[0x2C] + 1), 72_000)

@@ -1,4 +1,4 @@
-"""The commands that the platform adds to the monitor, as people and the suites use them."""
+"""Tests of the commands that the platform adds to the monitor."""
 
 import json
 import sys
@@ -20,7 +20,7 @@ PULLED_UP = {
 
 class Commands(unittest.TestCase):
     def levels(self, act):
-        """The levels that `act`, given the commands, drives onto pins."""
+        """Returns the levels that `act`, called with the commands, drives onto pins."""
         levels = {}
 
         class Port:
@@ -33,7 +33,7 @@ class Commands(unittest.TestCase):
         act(commands(Machine({f"sysbus.gpioPort{name}": Port(name) for name in "ABC"}), []))
         return levels
 
-    def test_the_switch_and_what_is_pulled_up(self):
+    def test_inputs_drive_the_switch_and_the_pulled_up_pins(self):
         for board in SWITCH:
 
             def act(run):
@@ -60,12 +60,12 @@ class Commands(unittest.TestCase):
         self.assertEqual(self.levels(act), {"PC4": False, "PA4": True})
         self.assertEqual(self.levels(lambda run: run.mc_modio_input(5, 2, False)), {"PA1": False})
 
-    def test_board_that_is_not_known_is_refused(self):
+    def test_unknown_board_is_rejected(self):
         with self.assertRaisesRegex(ValueError, "modio-02, modio-08"):
             commands(Machine(), []).mc_modio_board("modio-04")
 
     class Bus(dict):
-        """Memory by address, 0xFF where nothing was written."""
+        """Memory by address; 0xFF where nothing was written."""
 
         def ReadByte(self, address):
             return self.get(address, 0xFF)
@@ -79,7 +79,7 @@ class Commands(unittest.TestCase):
         def GetSymbolAddress(self, name):
             return {"_SEGGER_RTT": 0x20002000}[name]
 
-    def test_a_preset_is_stored_only_where_nothing_is(self):
+    def test_a_preset_is_stored_only_in_an_erased_store(self):
         bus = self.Bus()
         run = commands(Machine({"sysbus": bus}), [])
         run.mc_modio_preset("4do")
@@ -97,7 +97,7 @@ class Commands(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "no slot at port 1"):
             run.mc_modio_preset("1=4di")
 
-    def test_the_log_is_shown(self):
+    def test_the_log_is_printed(self):
         bus, printed = self.Bus(), []
         run = commands(Machine({"sysbus": bus}), printed)
         run.mc_modio_log()
@@ -110,7 +110,7 @@ class Commands(unittest.TestCase):
         run.mc_modio_log()
         self.assertEqual(printed[1:], ["modio"])
 
-    def test_warnings_of_an_unused_dma_controller_are_kept_out_of_the_log(self):
+    def test_warnings_of_an_unused_dma_controller_are_disabled(self):
         parsed = []
         self.assertIsNone(commands(Machine({"sysbus.dma1": object()}), [], parsed).mc_modio_quiet())
         self.assertEqual(parsed, ["logLevel 3 sysbus.dma1"])
@@ -120,15 +120,15 @@ class Commands(unittest.TestCase):
         self.assertIsNone(commands(Machine(), [], parsed).mc_modio_quiet())
         self.assertEqual(parsed, [])
 
-    def test_monitor_that_refuses_the_command_stops_nothing(self):
+    def test_monitor_that_rejects_the_command_is_ignored(self):
         self.assertIsNone(commands(Machine({"sysbus.dma1": object()}), []).mc_modio_quiet())
 
 
 class Presets(unittest.TestCase):
-    def test_they_are_those_of_the_register_map(self):
-        """PRESETS is, in JSON, what the crate register-map makes of modules: board, modules, address, bytes."""
+    def test_presets_match_those_of_the_register_map(self):
+        """PRESETS are presets from the crate register-map, as JSON: board, modules, address, bytes."""
         if PRESETS is None:
-            self.skipTest("`cargo xtask test` gives them")
+            self.skipTest("`cargo xtask test` provides the presets")
         self.assertGreater(len(PRESETS), 8)
         for board, modules, address, wanted in PRESETS:
             bus = Commands.Bus()

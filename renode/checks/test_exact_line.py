@@ -1,4 +1,4 @@
-"""exact-line.py against the protocol of docs/conformance.md, on a fake of the calls that it makes of Renode."""
+"""Tests exact-line.py for the protocol in docs/conformance.md, with a fake of the Renode calls that it uses."""
 
 import contextlib
 import socket
@@ -42,7 +42,7 @@ class Client:
 
 
 def now(reply):
-    """The time in a reply, in us."""
+    """Returns the time in a reply, in us."""
     word, at = reply.split(" ")[:2]
     assert word == "ok", reply
     assert len(at.split(".")[1]) == 3, reply
@@ -50,7 +50,7 @@ def now(reply):
 
 
 def events(reply):
-    """The events of a reply: the byte in hexadecimal, its start and its end."""
+    """Returns the events of a reply: the byte in hexadecimal, its start and its end."""
     found = []
     for word in reply.split(" ")[2:]:
         byte, at = word.split("@")
@@ -82,7 +82,7 @@ class Served(unittest.TestCase):
         return client
 
     def connect_after_another(self):
-        """Connects until the server has noticed that the client before it is gone."""
+        """Connects until the server has noticed that the previous client has disconnected."""
         deadline = time.monotonic() + 30
         while True:
             client = self.connect()
@@ -132,7 +132,7 @@ class Requests(Served):
         client = self.start()
         client.ask(f"send {READ}")
         self.assertEqual(events(client.ask("run 4000")), [])
-        # The reply's bytes follow 3.25 us after one another.
+        # The bytes of the reply follow each other every 3.25 us.
         first = events(client.ask("run 125"))
         self.assertIn(len(first), (2, 3))
         seen = first + events(client.ask("send gap:1000")) + events(client.ask("run 10000"))
@@ -222,7 +222,7 @@ class Power(Served):
         client.ask("run 500000")
         self.assertEqual([self.read(client, register) for register in (0, 1, 2)], [0, 0, 0x0C00])
 
-    def test_reset_keeps_the_ram_and_is_the_pin_s(self):
+    def test_reset_keeps_the_ram_and_is_reported_as_a_pin_reset(self):
         client = self.start()
         self.write(client, 0, 5)
         self.write(client, 1, 6)
@@ -239,7 +239,7 @@ class Power(Served):
             self.assertEqual(self.ask_register(client, "03 0000 0001"), [], request)
             self.clients.pop().close()
 
-    def test_time_passes_for_the_line_alone_while_the_power_is_off(self):
+    def test_time_passes_only_for_the_line_while_the_power_is_off(self):
         client = self.start()
         client.ask("power off")
         self.assertEqual(client.ask("run 1000.5"), "ok 501000.500")
@@ -251,7 +251,7 @@ class Power(Served):
         self.assertEqual(self.emulated_us(), 1_000_000)
         self.assertEqual(self.ask_register(client, "03 0000 0001"), REPLY)
 
-    def test_switching_on_what_is_on_changes_nothing(self):
+    def test_power_on_of_a_powered_unit_changes_nothing(self):
         client = self.start()
         self.write(client, 1, 6)
         client.ask("power on")
@@ -266,7 +266,7 @@ class Power(Served):
         client.ask("run 500000")
         self.assertEqual(self.read(client, 2), 0x0C00)
 
-    def test_time_goes_on_when_a_reset_sets_the_emulation_s_time_back(self):
+    def test_time_continues_when_a_reset_sets_the_emulation_s_time_back(self):
         client = self.start(resets_time=True)
         client.ask(f"send {READ}")
         before = now(client.ask("run 20000.4"))
@@ -284,9 +284,9 @@ class Power(Served):
 
 
 class Deliveries(Served):
-    """Renode 1.16.1 delivers at once, and later versions 10 bits later."""
+    """Renode 1.16.1 delivers a byte immediately, and later versions 10 bits later."""
 
-    def test_first_byte_of_every_reply_follows_the_request_s_end_alike(self):
+    def test_first_byte_of_every_reply_has_the_same_delay_after_the_request(self):
         for name, at_once in DELIVERIES.items():
             for line in ("9600 8N2", "9600 8N1"):
                 client = self.start(at_once=at_once)
@@ -301,7 +301,7 @@ class Deliveries(Served):
     def test_bytes_reach_the_unit_at_their_ends(self):
         for name, at_once in DELIVERIES.items():
             client = self.start(at_once=at_once)
-            # Shows the delivery. A later one takes 10 bits once.
+            # The first byte shows the delivery. If it is a later one, this takes 10 bits once.
             first = now(client.ask("send 00"))
             self.assertAlmostEqual(first, 500_000 + CHARACTER_US * (1 if at_once else 21 / 11), delta=0.01)
             start = now(client.ask("run 20000.1"))
@@ -317,7 +317,7 @@ class Deliveries(Served):
                 self.assertAlmostEqual(at / STEPS, expected, delta=1.1, msg=f"{name}, byte {count}")
             self.clients.pop().close()
 
-    def test_bytes_for_a_receiver_that_is_off_show_nothing(self):
+    def test_bytes_for_a_receiver_that_is_off_do_not_show_the_delivery(self):
         for at_once in DELIVERIES.values():
             client = self.start(at_once=at_once)
             client.ask("reset")
@@ -351,8 +351,8 @@ class BadLines(Served):
     BAD = {
         "": "empty",
         "   ": "empty",
-        "go": '"go" is no request',
-        "HELLO 1": "no request",
+        "go": '"go" is not a request',
+        "HELLO 1": "not a request",
         "hello": "newest version",
         "hello 1 2": "newest version",
         "hello 0": "version",
@@ -366,15 +366,15 @@ class BadLines(Served):
         "send 0x01": "even number",
         "send 01 zz": "even number",
         "send +1": "even number",
-        "send gap:": "no time",
-        "send gap:-1": "no time",
-        "send gap:+1": "no time",
-        "send gap:1.0001": "no time",
-        "send gap:1.": "no time",
-        "send gap:.5": "no time",
-        "send gap:1e3": "no time",
-        "send gap:1,5": "no time",
-        "send gap:1.2.3": "no time",
+        "send gap:": "not a time",
+        "send gap:-1": "not a time",
+        "send gap:+1": "not a time",
+        "send gap:1.0001": "not a time",
+        "send gap:1.": "not a time",
+        "send gap:.5": "not a time",
+        "send gap:1e3": "not a time",
+        "send gap:1,5": "not a time",
+        "send gap:1.2.3": "not a time",
         "send gap:600000000.001": "more than",
         "send gap:300000000 gap:300000000.001": "more than",
         "send 01 gap:600000000": "more than",
@@ -382,30 +382,30 @@ class BadLines(Served):
         "send 01 stop:02": "faults",
         "send break:12": "faults",
         "send glitch:3": "faults",
-        "send wait:3": "no piece",
-        "send :": "no piece",
+        "send wait:3": "not a piece",
+        "send :": "not a piece",
         "run": "a time",
         "run 1 2": "a time",
-        "run -1": "no time",
-        "run x": "no time",
-        "run 1.2345": "no time",
+        "run -1": "not a time",
+        "run x": "not a time",
+        "run 1.2345": "not a time",
         "run 600000001": "more than",
         "run " + "9" * 5000: "more than",
-        "run 1." + "0" * 5000: "no time",
+        "run 1." + "0" * 5000: "not a time",
         "line": "a rate and a format",
         "line 9600": "a rate and a format",
         "line 9600 8N2 8N2": "a rate and a format",
-        "line 299 8N2": "no rate",
-        "line 4000001 8N2": "no rate",
-        "line -9600 8N2": "no rate",
-        "line " + "9" * 5000 + " 8N2": "no rate",
+        "line 299 8N2": "not a rate",
+        "line 4000001 8N2": "not a rate",
+        "line -9600 8N2": "not a rate",
+        "line " + "9" * 5000 + " 8N2": "not a rate",
         "line 9600 8E1": "no parity",
         "line 9600 8O1": "no parity",
         "line 9600 8n1": "not supported",
         "power": "on or off",
         "power ON": "on or off",
         "power on off": "on or off",
-        "reset now": "nothing",
+        "reset now": "no arguments",
         "echo on": "the ability echo",
         "echo": "the ability echo",
         "findings": "the ability findings",
@@ -422,11 +422,11 @@ class BadLines(Served):
             self.assertTrue(reply.startswith("error "), f"{line:.30}: {reply}")
             self.assertIn(reason, reply)
             self.assertTrue(reply.isascii() and len(reply) < 220, reply)
-            # One line only: the next one in is the answer to this.
+            # Exactly one line: the next reply answers this request.
             self.assertEqual(client.ask("hello 1"), hello, f"{line:.30}")
         self.assertEqual(self.emulated_us(), emulated)
         self.assertEqual(self.renode.machine._written, written)
-        self.assertEqual(len(events(client.ask("run 20000"))), len(REPLY), "pending events stay")
+        self.assertEqual(len(events(client.ask("run 20000"))), len(REPLY), "pending events are kept")
 
     def test_longest_line_is_accepted(self):
         client = self.start()
@@ -441,7 +441,7 @@ class BadLines(Served):
         client.close()
         self.assertEqual(self.connect_after_another().ask("hello 1"), before)
 
-    def test_error_of_renode_is_reported_and_the_server_goes_on(self):
+    def test_error_of_renode_is_reported_and_the_server_continues(self):
         client = self.start()
         before = client.ask("hello 1")
         self.renode.machine._refusal = "the emulation\nis already started"
@@ -461,7 +461,7 @@ class BadLines(Served):
 
 
 class Clients(Served):
-    def test_second_client_gets_an_error_and_the_first_goes_on(self):
+    def test_second_client_gets_an_error_and_the_first_continues(self):
         first = self.start()
         first.ask(f"send {READ}")
         for _ in range(3):
@@ -493,7 +493,7 @@ class Clients(Served):
         second = self.connect_after_another()
         self.assertEqual([byte for byte, _, _ in events(second.ask("run 20000"))], REPLY)
 
-    def test_settings_stay_for_the_next_client(self):
+    def test_settings_are_kept_for_the_next_client(self):
         first = self.start()
         first.ask("line 19200 8N1")
         first.ask("power off")
@@ -522,7 +522,7 @@ class Command(Served):
             with self.assertRaisesRegex(ValueError, f"cannot listen on 127.0.0.1:{port}: .*in use"):
                 renode.exact_line(port)
         self.assertEqual(renode.printed, [])
-        # The command works after that.
+        # The command works afterwards.
         renode.exact_line(free_port())
 
     def test_port_that_does_not_exist_is_an_error(self):
@@ -543,7 +543,7 @@ class Command(Served):
 
 
 class Fake(unittest.TestCase):
-    def test_unknown_names_are_refused(self):
+    def test_unknown_names_are_errors(self):
         machine = Machine(True, False)
         for get in (lambda: machine.Pause, lambda: machine["sysbus"].ReadByte, lambda: machine["sysbus.usart2"]):
             with self.assertRaises((AttributeError, KeyError)):

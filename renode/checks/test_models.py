@@ -1,4 +1,4 @@
-"""The Python models of the platform, as the firmware uses them."""
+"""Tests of the platform's Python models, used like the firmware does."""
 
 import unittest
 
@@ -6,7 +6,7 @@ from renode_fake import Machine, Memory, Peripheral
 
 
 class Rcc(unittest.TestCase):
-    """The firmware's start-up, step by step (board-support/src/clock.rs)."""
+    """Follows the firmware's start-up step by step (board-support/src/clock.rs)."""
 
     CR, CFGR, CSR, NEXT, CRYSTAL = 0x00, 0x04, 0x24, 0x3F0, 0x3F4
     HSIRDY, HSEON, HSERDY, PLLON, PLLRDY = 1 << 1, 1 << 16, 1 << 17, 1 << 24, 1 << 25
@@ -14,7 +14,7 @@ class Rcc(unittest.TestCase):
     def setUp(self):
         self.rcc = Peripheral("rcc.py")
 
-    def test_as_after_a_reset_it_runs_on_the_internal_oscillator(self):
+    def test_it_starts_on_the_internal_oscillator(self):
         self.assertEqual(self.rcc.read(self.CR), 0x83)
         self.assertEqual(self.rcc.read(self.CFGR), 0)
 
@@ -25,7 +25,7 @@ class Rcc(unittest.TestCase):
         self.assertFalse(rcc.read(self.CR) & self.HSERDY)
         rcc.modify(self.CR, self.HSEON)
         self.assertTrue(rcc.read(self.CR) & self.HSERDY)
-        # HSE as the PLL's source, nine times; APB1 and ADC dividers.
+        # HSE as the PLL's source, factor 9; dividers of APB1 and ADC.
         rcc.write(self.CFGR, 1 << 16 | 7 << 18 | 4 << 8 | 2 << 14)
         self.assertFalse(rcc.read(self.CR) & self.PLLRDY)
         rcc.modify(self.CR, self.PLLON)
@@ -52,7 +52,7 @@ class Rcc(unittest.TestCase):
             self.assertTrue(rcc.read(self.CR) & self.PLLRDY)
             rcc.reset()
 
-    def test_the_reset_flags_are_told_once_and_the_next_reset_is_by_software(self):
+    def test_the_reset_flags_are_cleared_and_the_next_reset_is_by_software(self):
         rcc = self.rcc
         self.assertEqual(rcc.read(self.CSR) >> 26, 0b000011, "power-on and pin")
         rcc.modify(self.CSR, 1 << 24)
@@ -63,7 +63,7 @@ class Rcc(unittest.TestCase):
         rcc.reset()
         self.assertEqual(rcc.read(self.CSR) >> 26, 0b000011)
         rcc.reset()
-        self.assertEqual(rcc.read(self.CSR) >> 26, 0b000101, "it was said for one reset")
+        self.assertEqual(rcc.read(self.CSR) >> 26, 0b000101, "the flags were set for one reset only")
 
     def test_oscillators_of_the_rtc_are_ready_when_on(self):
         self.rcc.modify(self.CSR, 1)
@@ -71,7 +71,7 @@ class Rcc(unittest.TestCase):
         self.rcc.write(0x20, 1)
         self.assertEqual(self.rcc.read(0x20) & 3, 3)
 
-    def test_clock_enables_are_kept_and_a_reset_takes_them_back(self):
+    def test_clock_enables_are_kept_until_a_reset(self):
         self.rcc.modify(0x18, 1 << 2)
         self.assertEqual(self.rcc.read(0x18), 1 << 2)
         self.rcc.reset()
@@ -79,7 +79,7 @@ class Rcc(unittest.TestCase):
 
 
 class Flash(unittest.TestCase):
-    """The controller as board-support/src/flash.rs drives it."""
+    """The controller, used like in board-support/src/flash.rs."""
 
     KEYR, SR, CR, AR = 0x04, 0x0C, 0x10, 0x14
     PG, PER, MER, STRT, LOCK, EOP = 1 << 0, 1 << 1, 1 << 2, 1 << 6, 1 << 7, 1 << 5
@@ -103,7 +103,7 @@ class Flash(unittest.TestCase):
         self.flash.write(self.AR, address)
         self.flash.modify(self.CR, self.STRT)
 
-    def test_it_is_locked_until_both_keys_have_come(self):
+    def test_it_is_locked_until_both_keys_were_written(self):
         self.assertTrue(self.flash.read(self.CR) & self.LOCK)
         self.erase(self.PAGE)
         self.assertEqual(self.erased(), [])
@@ -111,7 +111,7 @@ class Flash(unittest.TestCase):
         self.unlock()
         self.assertFalse(self.flash.read(self.CR) & self.LOCK)
 
-    def test_an_erase_takes_one_page_and_is_over_at_once(self):
+    def test_an_erase_clears_one_page_and_ends_immediately(self):
         self.unlock()
         self.erase(self.PAGE)
         self.assertEqual(self.erased(), [62])
@@ -130,7 +130,7 @@ class Flash(unittest.TestCase):
         self.flash.write(self.SR, 0x34)
         self.assertEqual(self.flash.read(self.SR), 0)
 
-    def test_the_lock_bit_locks_and_takes_the_mode_away(self):
+    def test_the_lock_bit_locks_and_clears_the_mode(self):
         self.unlock()
         self.flash.modify(self.CR, self.PG)
         self.assertEqual(self.flash.read(self.CR), self.PG)
@@ -139,7 +139,7 @@ class Flash(unittest.TestCase):
         self.unlock()
         self.assertEqual(self.flash.read(self.CR), 0)
 
-    def test_wrong_keys_jam_it_until_the_reset(self):
+    def test_wrong_keys_lock_it_until_the_reset(self):
         for keys in ((0xCDEF89AB,), (0x45670123, 0x45670123), (0x45670123, 0xCDEF89AB, 1)):
             self.flash.reset()
             self.unlock(keys)
@@ -175,13 +175,13 @@ class Flash(unittest.TestCase):
         self.flash.modify(self.CR, self.STRT)
         self.assertEqual(self.memory.data.count(0xFF), 0x40000)
 
-    def test_a_mass_erase_takes_all(self):
+    def test_a_mass_erase_clears_all_pages(self):
         self.unlock()
         self.flash.write(self.CR, self.MER)
         self.flash.modify(self.CR, self.STRT)
         self.assertEqual(len(self.erased()), 128)
 
-    def test_an_erase_finds_the_memory_by_the_monitor_too(self):
+    def test_an_erase_finds_the_memory_through_the_monitor_as_well(self):
         machine = Machine({"sysbus.flash": self.memory})
         self.flash = Peripheral("flash.py", machine, has_get_machine=False)
         self.unlock()
@@ -195,7 +195,7 @@ class Flash(unittest.TestCase):
 
 
 class Adc(unittest.TestCase):
-    """ADC1 as board-support/src/adc.rs drives it."""
+    """ADC1, used like in board-support/src/adc.rs."""
 
     SR, CR2, SMPR2, SQR3, DR = 0x00, 0x08, 0x10, 0x34, 0x4C
     ADON, CAL, RSTCAL, EXTSEL_SW, EXTTRIG, SWSTART = 1, 1 << 2, 1 << 3, 7 << 17, 1 << 20, 1 << 22
@@ -204,12 +204,12 @@ class Adc(unittest.TestCase):
         self.adc = Peripheral("adc.py")
         self.adc.write(self.CR2, self.ADON | self.EXTTRIG | self.EXTSEL_SW)
 
-    def test_the_calibration_is_over_when_looked_at(self):
+    def test_the_calibration_ends_immediately(self):
         for bit in (self.RSTCAL, self.CAL):
             self.adc.modify(self.CR2, bit)
             self.assertFalse(self.adc.read(self.CR2) & bit)
 
-    def test_a_conversion_is_of_the_channel_asked_for_and_reading_it_takes_eoc(self):
+    def test_a_conversion_uses_the_selected_channel_and_reading_it_clears_eoc(self):
         for channel in range(4):
             self.adc.write(0x100 + 4 * channel, 0x111 * (channel + 1))
         for channel in (2, 0, 3, 1):
@@ -228,7 +228,7 @@ class Adc(unittest.TestCase):
             self.adc.modify(self.CR2, self.SWSTART)
             self.assertEqual(self.adc.read(self.SR), 0, hex(cr2))
 
-    def test_what_is_applied_outlives_a_reset_and_is_of_12_bits(self):
+    def test_applied_codes_are_kept_over_a_reset_and_have_12_bits(self):
         self.adc.write(0x100, 0xFFFF)
         self.adc.reset()
         self.assertEqual(self.adc.read(0x100), 0xFFF)
@@ -236,7 +236,7 @@ class Adc(unittest.TestCase):
 
 
 class Dac(unittest.TestCase):
-    """I2C1 as board-support/src/i2c/master.rs drives it, and the MCP4728 behind it."""
+    """I2C1, used like in board-support/src/i2c/master.rs, and the MCP4728 on it."""
 
     CR1, DR, SR1, SR2 = 0x00, 0x10, 0x14, 0x18
     PE, START, STOP, SWRST = 1, 1 << 8, 1 << 9, 1 << 15
@@ -256,7 +256,7 @@ class Dac(unittest.TestCase):
 
     def stop(self):
         self.bus.modify(self.CR1, self.STOP)
-        self.assertFalse(self.bus.read(self.CR1) & self.STOP, "made at once")
+        self.assertFalse(self.bus.read(self.CR1) & self.STOP, "the stop condition is sent immediately")
         self.assertFalse(self.bus.read(self.SR2) & self.BUSY)
 
     def transfer(self, data, address=0x60):
@@ -281,7 +281,7 @@ class Dac(unittest.TestCase):
             yield code >> 8
             yield code & 0xFF
 
-    def test_a_multi_write_sets_the_channels_it_names(self):
+    def test_a_multi_write_sets_the_addressed_channels(self):
         self.transfer(self.multi_write(enumerate([0xABC, 0, 0xFFF, 0x123])))
         self.assertEqual(self.outputs(), [0xABC, 0, 0xFFF, 0x123])
         self.transfer(self.multi_write([(2, 0x456)]))
@@ -290,7 +290,7 @@ class Dac(unittest.TestCase):
 
     def test_four_dacs_have_their_own_addresses_and_outputs(self):
         for dac in (1, 2, 3):
-            self.assertTrue(self.start(0x60 + dac) & self.AF, "not plugged yet")
+            self.assertTrue(self.start(0x60 + dac) & self.AF, "not plugged in yet")
             self.bus.modify(self.SR1, 0, self.AF)
             self.stop()
             self.bus.write(0x110 + 0x20 * dac, 1)
@@ -302,11 +302,11 @@ class Dac(unittest.TestCase):
         self.bus.write(self.CR1, self.PE)
         self.assertTrue(self.start(0x64) & self.AF)
 
-    def test_with_udac_set_outputs_wait(self):
+    def test_with_udac_set_outputs_do_not_change(self):
         self.transfer(self.multi_write([(0, 0xABC)], hold=True))
         self.assertEqual(self.outputs(), [0, 0, 0, 0])
 
-    def test_a_fast_write_sets_them_in_turn(self):
+    def test_a_fast_write_sets_all_channels_in_order(self):
         self.transfer([0x01, 0x23, 0x04, 0x56, 0x07, 0x89, 0x0A, 0xBC])
         self.assertEqual(self.outputs(), [0x123, 0x456, 0x789, 0xABC])
 
@@ -315,7 +315,7 @@ class Dac(unittest.TestCase):
         self.transfer([0x58, 0x0F, 0xFF])
         self.assertEqual(self.outputs(), [0, 0, 0, 0])
 
-    def test_another_address_is_not_acknowledged_nor_a_missing_module(self):
+    def test_an_unused_address_or_a_missing_module_is_not_acknowledged(self):
         flags = self.start(0x61)
         self.assertTrue(flags & self.AF)
         self.assertFalse(flags & (self.ADDR | self.TXE))
@@ -329,7 +329,7 @@ class Dac(unittest.TestCase):
         self.bus.write(0x110, 1)
         self.transfer(self.multi_write([(0, 1)]))
 
-    def test_the_reset_of_the_part_leaves_the_dac_alone_and_frees_the_bus(self):
+    def test_the_reset_of_the_part_keeps_the_dac_and_releases_the_bus(self):
         self.transfer(self.multi_write([(1, 0x777)]))
         self.start(0x60)
         self.bus.reset()
@@ -338,19 +338,19 @@ class Dac(unittest.TestCase):
         self.bus.write(self.CR1, self.PE)
         self.transfer(self.multi_write([(1, 0x111)]))
 
-    def test_swrst_takes_it_off_the_bus(self):
+    def test_swrst_takes_the_peripheral_off_the_bus(self):
         self.start(0x60)
         self.bus.write(self.CR1, self.SWRST)
         self.assertEqual((self.bus.read(self.SR1), self.bus.read(self.SR2)), (0, 0))
 
 
 class Watchdog(unittest.TestCase):
-    def test_half_words_go_to_the_model_as_words(self):
-        told = []
+    def test_half_words_are_passed_to_the_model_as_words(self):
+        written = []
 
         class Counter:
             def WriteDoubleWord(self, offset, value):
-                told.append((offset, value))
+                written.append((offset, value))
 
             def ReadDoubleWord(self, offset):
                 return {12: 0}[offset]
@@ -360,9 +360,9 @@ class Watchdog(unittest.TestCase):
             iwdg = Peripheral("iwdg.py", machine, has_get_machine)
             for offset, value in ((0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)):
                 iwdg.write(offset, value)
-            self.assertEqual(told, [(0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)])
+            self.assertEqual(written, [(0, 0xCCCC), (0, 0x5555), (4, 1), (8, 2499)])
             self.assertEqual(iwdg.read(12), 0)
-            told.clear()
+            written.clear()
 
 
 if __name__ == "__main__":

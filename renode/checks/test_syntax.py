@@ -1,4 +1,4 @@
-"""The scripts for Renode are written in what Python 2.7 and Python 3 have in common: Renode runs them in
+"""Checks that the scripts for Renode use only what Python 2.7 and Python 3 share: Renode runs them in
 IronPython 2, and these tests run them in Python 3."""
 
 import ast
@@ -6,7 +6,7 @@ import unittest
 
 from renode_fake import RENODE
 
-# What Python 2.7 does not have, or has otherwise.
+# Syntax that Python 2.7 does not have, or interprets differently.
 REFUSED = {
     "JoinedStr": "f-strings",
     "NamedExpr": ":=",
@@ -27,7 +27,7 @@ NEWER_METHODS = {
     "removesuffix", "to_bytes", "with_traceback",
 }
 
-# What exact-line.py may import: names of .NET and Renode that were seen to work there.
+# Names of .NET and Renode that exact-line.py may import: these were tested there.
 IMPORTS = {
     "clr", "System.Byte", "System.IO.StreamReader", "System.IO.StreamWriter", "System.Net.IPAddress",
     "System.Net.Sockets.TcpListener", "System.Threading.Thread", "System.Threading.ThreadStart",
@@ -44,7 +44,7 @@ def tree_of(file):
 
 
 def problems(tree):
-    """Yields what IronPython 2 does not run, or runs differently."""
+    """Yields what IronPython 2 cannot run, or runs differently."""
     for node in ast.walk(tree):
         name = type(node).__name__
         if name in REFUSED:
@@ -54,7 +54,7 @@ def problems(tree):
         if isinstance(node, ast.arguments) and node.kwonlyargs:
             yield "keyword-only arguments"
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
-            yield f"line {node.lineno}: / drops the fraction there"
+            yield f"line {node.lineno}: / drops the fraction in Python 2"
         if isinstance(node, ast.Raise) and node.cause:
             yield f"line {node.lineno}: raise from"
         if isinstance(node, ast.Attribute) and node.attr in NEWER_METHODS:
@@ -66,7 +66,7 @@ def problems(tree):
 
 
 class Syntax(unittest.TestCase):
-    def test_the_files_have_nothing_that_python_2_lacks(self):
+    def test_the_files_use_only_what_python_2_has(self):
         self.assertGreater(len(files()), 5)
         for file in files():
             text = file.read_text(encoding="utf-8")
@@ -84,7 +84,7 @@ class Syntax(unittest.TestCase):
         for node in ast.walk(tree_of(RENODE / "commands.py")):
             self.assertNotIsInstance(node, (ast.Import, ast.ImportFrom))
 
-    def test_exact_line_imports_only_names_that_were_seen_to_work(self):
+    def test_exact_line_imports_only_tested_names(self):
         imported = set()
         for node in ast.walk(tree_of(RENODE / "exact-line.py")):
             if isinstance(node, ast.Import):
@@ -104,7 +104,7 @@ class Syntax(unittest.TestCase):
         for name in defined - {"mc_exact_line"}:
             self.assertTrue(name.lower().startswith("line"), name)
 
-    def test_each_of_these_is_found(self):
+    def test_every_kind_of_problem_is_found(self):
         for text in (
             "f'{x}'", "x: int = 1", "print('a', 'b')", "a / b", "def f(*, a): pass", "(x := 1)", "class A: pass",
             "bytes.fromhex(x)", "super().f()", "raise A() from b",

@@ -1,4 +1,4 @@
-"""The stand-in for Renode's terminal tester is as unkind as Renode's own, and the suites cope with that."""
+"""Tests that the replacement for Renode's terminal tester behaves like Renode's, and that the suites handle this."""
 
 import re
 import unittest
@@ -10,7 +10,7 @@ REPLY = "01 03 02 00 01 79 84"
 
 
 def wait_in(keyword):
-    """Returns how a keyword of modio.resource waits: the content and the options of its wait."""
+    """Returns the content and the options of the wait in a keyword of modio.resource."""
     text = (RENODE / "tests" / "modio.resource").read_text(encoding="utf-8")
     body = text.split(f"\n{keyword}\n")[1].split("\n\n")[0]
     words = re.split(r"\s{2,}", body[body.index("Wait For Bytes On Uart") :].strip())[1:]
@@ -42,17 +42,17 @@ class Waits(unittest.TestCase):
             self.tester.wait_for_bytes(REPLY, match_start=True)
         self.assertEqual(self.tester.buffer.hex(" "), REPLY[3:])
 
-    def test_nothing_has_come_leaves_the_next_reply_whole(self):
-        wait = wait_in("Nothing Has Come")
+    def test_nothing_was_received_keeps_the_next_reply_complete(self):
+        wait = wait_in("Nothing Was Received")
         self.assertEqual(self.tester.wait_for_bytes(**wait), b"")
         self.receive(REPLY)
         self.assertEqual(self.tester.wait_for_bytes(REPLY, match_start=True).hex(" "), REPLY)
         self.assertEqual(self.tester.wait_for_bytes(**wait), b"")
 
-    def test_nothing_has_come_fails_when_a_byte_was_received(self):
+    def test_nothing_was_received_fails_when_a_byte_was_received(self):
         self.receive("00")
         with self.assertRaises(AssertionError):
-            self.tester.wait_for_bytes(**wait_in("Nothing Has Come"))
+            self.tester.wait_for_bytes(**wait_in("Nothing Was Received"))
 
     def test_match_removes_the_bytes_in_front_of_it(self):
         self.receive("AA BB 01 02 CC")
@@ -97,7 +97,7 @@ class Waits(unittest.TestCase):
 
 class Suites(unittest.TestCase):
     def test_no_suite_expects_a_keyword_to_fail(self):
-        # A failed wait stays armed, so a test that goes on after one loses bytes.
+        # A failed wait stays armed, so a test that continues after one loses bytes.
         expects = re.compile(r"Run Keyword And (Expect|Ignore|Return Status|Warn|Continue)|^\s*(TRY|EXCEPT)\b", re.M)
         files = [*(RENODE / "tests").glob("*.robot"), *(RENODE / "tests").glob("*.resource")]
         self.assertGreater(len(files), 5)

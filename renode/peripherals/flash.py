@@ -1,14 +1,13 @@
-# The flash controller (PM0075): the keys and the lock, and the erase of a page. The memory itself is
-# Renode's, which takes a write whatever PG says: what is written over programmed cells is not refused
-# here, and nothing takes any time.
+# The flash controller (PM0075): keys, lock, and erase of a page. The memory itself is Renode's, which accepts a
+# write with any value of PG: writes over programmed cells are not rejected, and no operation takes time.
 #
-# Beside the part's registers, for scripts and tests:
-#   0x3F0  pages erased since power-on, mass erases among them
-#   0x3F4  KiB of flash, 128 from the start; with more, a page has 2 KiB and not 1 (PM0075 2.1)
-# Both stay across resets.
+# Additional registers for scripts and tests:
+#   0x3F0  pages erased since power-on, including mass erases
+#   0x3F4  KiB of flash, initially 128; with more, a page has 2 KiB instead of 1 (PM0075 2.1)
+# Both are kept across resets.
 #
-# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
-# emulation, and can save numbers and dictionaries only.
+# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the emulation, and
+# can only save numbers and dictionaries.
 
 if request.IsInit:
     try:
@@ -20,22 +19,22 @@ if request.IsInit:
     cr = 0x80
     sr = 0
     address = 0
-    # How many of the two keys have come; -1 after a wrong one, until the next reset.
+    # Number of keys written; -1 after a wrong one, until the next reset.
     keys = 0
 elif request.IsRead:
     offset = int(request.Offset)
     if offset == 0x00:
         request.Value = acr
     elif offset == 0x0C:
-        # A store of a half-word does not come this way. While PG is set, one has been made by the time the
-        # status is read, and it has ended.
+        # The write of a half-word does not pass through here. While PG is set, one was made and has ended before
+        # the status is read.
         if cr & 0x01:
             sr |= 0x20
         request.Value = sr
     elif offset == 0x10:
         request.Value = cr
     elif offset == 0x1C:
-        # No read protection; the option bytes as they come from the factory.
+        # No read protection; the option bytes as delivered.
         request.Value = 0x03FFFFFC
     elif offset == 0x20:
         # No page is write-protected.
@@ -62,14 +61,14 @@ elif request.IsWrite:
             keys = -1
             cr |= 0x80
     elif offset == 0x0C:
-        # EOP, WRPRTERR and PGERR are taken back by writing 1.
+        # Writing 1 clears EOP, WRPRTERR and PGERR.
         sr &= ~(value & 0x34)
     elif offset == 0x14:
         address = value
     elif offset == 0x3F4:
         kib = value
     elif offset == 0x10 and cr & 0x80:
-        self.WarningLog("FLASH_CR is locked: 0x%X is not taken" % value)
+        self.WarningLog("FLASH_CR is locked: 0x%X is ignored" % value)
     elif offset == 0x10:
         # PG, PER, MER, OPTPG, OPTER, OPTWRE and the interrupt enables are kept.
         cr = value & 0x1637
@@ -85,7 +84,7 @@ elif request.IsWrite:
                 try:
                     memory = self.GetMachine()["sysbus.flash"]
                 except AttributeError:
-                    # Not every version gives a model this way to the machine; all give the monitor's.
+                    # Only some versions provide the machine to a model in this way; all provide the monitor's.
                     memory = monitor.Machine["sysbus.flash"]
                 memory.SetRange(page, count, 0xFF)
                 # An object that cannot be saved.
@@ -93,7 +92,7 @@ elif request.IsWrite:
                 erased += 1
                 sr |= 0x20
             else:
-                self.WarningLog("no page of flash is at 0x%08X" % address)
+                self.WarningLog("there is no page of flash at 0x%08X" % address)
         if value & 0x80:
             cr |= 0x80
             keys = 0

@@ -1,16 +1,16 @@
-# I2C1 as a master (RM0008 26.6), with the DACs of the analog-output modules on it: an MCP4728 (Microchip
-# DS22187E) at each of the addresses 0x60 to 0x63. Every byte takes no time. Its outputs follow Multi-Write
-# and Fast Write; writes to the EEPROM are not modelled, and a read is not acknowledged.
+# I2C1 as a master (RM0008 26.6), with the DACs of the analog-output modules: an MCP4728 (Microchip DS22187E) at
+# each of the addresses 0x60 to 0x63. Bytes take no time. The outputs follow Multi-Write and Fast Write; writes to
+# the EEPROM are not modelled, and a read is not acknowledged.
 #
-# Beside the part's registers, for scripts and tests, with d = 0 to 3 for the DAC at address 0x60 + d:
+# Additional registers for scripts and tests, with d = 0 to 3 for the DAC at address 0x60 + d:
 #   0x100 + 0x20 d + 4 n  the code at output n, 0 = A to 3 = D
-#   0x110 + 0x20 d        whether that module is plugged: with 0 the address is not acknowledged. From the
-#                         start it is 1 for the first DAC and 0 for the others
-#   0x114                 transfers to any DAC that a stop condition or a repeated start has ended
-# All of them stay across resets, as the DACs do.
+#   0x110 + 0x20 d        whether that module is plugged in: with 0 the address is not acknowledged.
+#                         Initially 1 for the first DAC and 0 for the others
+#   0x114                 number of transfers to all DACs that ended with a stop or a repeated start
+# All of them are kept across resets, like the state of the DACs.
 #
-# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
-# emulation, and can save numbers and dictionaries only.
+# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the emulation, and
+# can only save numbers and dictionaries.
 
 if request.IsInit:
     try:
@@ -24,13 +24,13 @@ if request.IsInit:
     cr1 = 0
     sr1 = 0
     sr2 = 0
-    # 0 idle, 1 the address is to come, 2 data for the DAC is to come.
+    # 0 idle, 1 waiting for the address, 2 waiting for data for the DAC.
     state = 0
-    # Of the transfer under way: bytes so far, the command, and the first byte of a pair.
+    # The current transfer: number of bytes, the command, and the first byte of a pair.
     count = 0
     command = 0
     first = 0
-    # The DAC that is written to.
+    # The addressed DAC.
     dac = 0
 elif request.IsRead:
     offset = int(request.Offset)
@@ -42,7 +42,7 @@ elif request.IsRead:
         request.Value = sr1
     elif offset == 0x18:
         request.Value = sr2
-        # ADDR goes with a read of SR2 after one of SR1.
+        # Reading SR2 after SR1 clears ADDR.
         sr1 &= ~0x02
     elif offset == 0x114:
         request.Value = transfers
@@ -56,7 +56,7 @@ elif request.IsWrite:
     offset = int(request.Offset)
     value = int(request.Value) & 0xFFFF
     if offset == 0x00:
-        # STOP and START are over at once; SWRST and PE = 0 take the peripheral off the bus.
+        # STOP and START end immediately; SWRST and PE = 0 take the peripheral off the bus.
         cr1 = value & ~0x0300
         if value & 0x8000 or not value & 0x0001:
             sr1 = 0
@@ -86,31 +86,31 @@ elif request.IsWrite:
             count = 0
             command = 0
         else:
-            # AF. The bus stays the master's until its stop condition.
+            # AF. The master keeps the bus until its stop condition.
             sr1 |= 0x0400
             state = 0
     elif offset == 0x10 and state == 2:
         value &= 0xFF
-        # TXE and BTF: the byte has left already.
+        # TXE and BTF: the byte was already sent.
         sr1 |= 0x84
         if command & 0xC0 == 0x00 and count:
-            # Fast Write: two bytes a channel, from A on.
+            # Fast Write: two bytes per channel, starting with A.
             if count & 1:
                 outputs[0x100 + 0x20 * dac + 4 * (count // 2 & 3)] = (first & 0x0F) << 8 | value
             first = value
         elif count % 3 == 0:
-            # The command byte of Multi-Write, which comes before every channel; of others the only.
+            # The command byte of Multi-Write, which precedes every channel, or the only one of other commands.
             if not count or command & 0xF8 == 0x40:
                 command = value
             first = value
         elif command & 0xF8 == 0x40:
-            # UDAC = 0: the output follows at the last byte.
+            # UDAC = 0: the output changes at the last byte.
             if count % 3 == 2 and not command & 0x01:
                 outputs[0x100 + 0x20 * dac + 4 * (command >> 1 & 3)] = (first & 0x0F) << 8 | value
             first = value
         count += 1
     elif offset == 0x14:
-        # rc_w0: a 0 takes an error back.
+        # rc_w0: writing 0 clears an error.
         sr1 &= value | ~0xDF00
     elif 0x100 <= offset < 0x180 and offset & 0x10:
         plugged[(offset - 0x100) // 0x20] = value & 1

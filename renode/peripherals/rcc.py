@@ -1,19 +1,19 @@
-# Reset and clock control (RM0008 7.3), as far as the firmware looks: ready flags follow their ON
-# bits, SWS follows SW, and CSR tells why the part started. Clocks are not gated.
+# Reset and clock control (RM0008 7.3), as far as the firmware uses it: ready flags follow their ON bits, SWS
+# follows SW, and CSR holds the reset flags. Clocks are not gated.
 #
-# Beside the part's registers, for scripts and tests:
-#   0x3F0  the reset flags of the next reset, as CSR has them; a software reset when nothing is
+# Additional registers for scripts and tests:
+#   0x3F0  reset flags of the next reset, in the format of CSR; a software reset when nothing is
 #          written. The first start is a power-on.
-#   0x3F4  0 takes the crystal away: HSERDY stays 0 from then on. It stays so across resets.
+#   0x3F4  0 removes the crystal: HSERDY stays 0 from then on. Kept across resets.
 #
-# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the
-# emulation, and can save numbers and dictionaries only.
+# Runs in Renode's IronPython 2 at every access. No functions: Renode saves the variables with the emulation, and
+# can only save numbers and dictionaries.
 
 if request.IsInit:
     try:
         csr = next_csr
     except NameError:
-        # Power-on, which sets the pin's flag as well.
+        # Power-on, which also sets the pin's flag.
         csr = 0x0C000000
         crystal = 1
     # Software, and the pin's flag.
@@ -54,7 +54,7 @@ elif request.IsWrite:
         cfgr = value
     elif offset == 0x24:
         lsion = value & 1
-        # RMVF takes the flags back.
+        # RMVF clears the flags.
         if value & 0x01000000:
             csr = 0
     elif offset == 0x3F0:

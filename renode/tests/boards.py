@@ -1,6 +1,6 @@
-"""What differs from board to board for the suites, as Robot Framework's variables. Addresses and values are four digits
-of hexadecimal as they stand in a request; P and three digits are the beginning of the addresses of the first slot's
-points, so that ${P}2 is its third point."""
+"""Differences between the boards for the suites, as Robot Framework's variables. Addresses and values have four
+hexadecimal digits, as in a request. P has the first three digits of the addresses of the first slot's points, so
+that ${P}2 is its third point."""
 
 # Register BOARD, first port with a slot, and saves that write through both pages of the store.
 BOARDS = {
@@ -20,12 +20,12 @@ def get_variables(board):
         "BOARD_CODE": word(code),
         "PORT": port,
         "P": word(point)[:3],
-        "BEHIND": word(point + 4),
-        # Registers about the first slot: its module as set and in force, and the module's state.
+        "AFTER": word(point + 4),
+        # Registers of the first slot: its module as set and in force, and the module's state.
         "MODULE": word(0x0110 + port - 1),
         "IN_FORCE": word(0x0210 + port - 1),
         "MODULE_STATE": word(0x0218 + port - 1),
-        # Of its first point, and the pulses of its second.
+        # SAFE of its first point, and the pulses of its second.
         "SAFE": word(0x01C0 + point),
         "PULSES_2": word(0x0300 + 2 * (point + 1)),
         "SAVES": saves,

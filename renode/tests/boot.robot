@@ -1,5 +1,5 @@
 *** Settings ***
-Documentation       What the unit does when it is switched on.
+Documentation       Behaviour of the unit at power-on.
 Resource            modio.resource
 Test Setup          Start Board
 
@@ -8,28 +8,28 @@ Test Setup          Start Board
 Answers Half A Second After Power-On
     Unit Answers
 
-Tells What It Is
-    # Product code, and board.
+Reports Its Identity
+    # Product code and board.
     Request Gives    03 0200 0002    03 04 2383 5860
     Request Gives    03 0205 0001    03 02 ${BOARD_CODE}
 
-Knows Its Own Number
+Reports The Unique Identity
     [Tags]    renode-only
-    # Six half-words of 0x1FFFF7E8, as modio.repl has them.
+    # Six half-words at 0x1FFFF7E8, as in the board's .repl file.
     Request Gives    03 0220 0006    03 0C 1100 3322 5544 7766 1908 3B2A
 
-Tells A Power-On By The Reset Flags
-    # Power-on and the pin; nothing is wrong.
+Reports A Power-On In The Reset Flags
+    # Power-on and the pin; no fault.
     Request Gives    03 0207 0001    03 02 0030
     Request Gives    03 020A 0001    03 02 0000
 
-Counts Its Seconds
+Reports Its Uptime
     Run For    2
-    # 2.5 s, and the time of a request.
+    # 2.5 s plus the time of a request.
     Request Gives    03 0208 0002    03 04 0000 0002
 
-Keeps Quiet While It Starts
-    Nothing Has Come
+Sends Nothing While It Starts
+    Nothing Was Received
 
 Writes A Log
     ${log}=    Read Log

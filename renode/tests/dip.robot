@@ -4,7 +4,7 @@ Resource            modio.resource
 
 
 *** Test Cases ***
-Every Position Of The Switch Has Its Weight
+Every Switch Position Selects Its Address
     [Template]    Address Is The Switch
     1
     2
@@ -23,24 +23,24 @@ Another Unit's Request Gets Silence
     Request Gets Silence    03 0204 0001    18
     Unit Answers    17
 
-255 Is The Loader Mode
+Position 255 Selects The Loader Mode
     Start Board    dip=255
     Unit Answers    255
     Request Gives    03 0206 0001    03 02 00FF    255
 
-A Position That Is No Address Makes The Unit Silent And Its Fault LED Blink
+An Invalid Address Silences The Unit And Blinks The Fault LED
     [Template]    Is Silent And Blinks
     0
     248
     254
 
-A Switch That Moves Counts At The Next Power-On Only
+A New Switch Position Takes Effect At The Next Power-On
     Start Board    dip=5
-    # The pins of a running board: the firmware does not look at them again.
+    # Change the pins of a running board: the firmware does not read them again.
     Execute Command    modio_inputs 9
     Unit Answers    5
     Request Gets Silence    03 0204 0001    9
-    # The switch: every reset drives its position onto the pins.
+    # Move the switch: every reset drives its position onto the pins.
     Execute Command    $dip=9
     Unit Answers    5
     Cut The Power

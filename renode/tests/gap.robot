@@ -1,36 +1,36 @@
 *** Settings ***
-Documentation       What ends a frame: 3.5 characters of silence, 4.01 ms at 9600 8N2. Renode has no
-...                 input capture, so the start bit of a character on its way is not seen here; the gaps
-...                 below stay a character away from the limits.
+Documentation       The end of a frame: 3.5 characters of silence, 4.01 ms at 9600 8N2. Renode has no
+...                 input capture, so the start bit of the next character is not detected here; the gaps
+...                 below differ from the limits by a character or more.
 Resource            modio.resource
 Test Setup          Start Board    4do
 
 
 *** Test Cases ***
-A Gap Below t1.5 Does Not Matter
+A Gap Below t1.5 Is Ignored
     [Tags]    exact-time
     Send In Two Parts    0.0010
     Wait For Bytes On Uart    ${REPLY}    timeout=0    matchStart=true
-    Nothing Has Come
+    Nothing Was Received
 
 A Gap Between t1.5 And t3.5 Is Counted And The Frame Kept
     [Tags]    exact-time
-    Bytes Come Every    0.003
+    Send Bytes Every    0.003
     Expect    ${REPLY}
     # The counter of such gaps; this request has none.
     Request Gives    03 0238 0001    03 02 0007
 
 A Gap Above t3.5 Ends The Frame
     Send In Two Parts    0.020
-    Nothing Has Come
+    Nothing Was Received
     Unit Answers
 
-Bytes That Come One By One Are No Frame
-    Bytes Come Every    0.020
-    Nothing Has Come
+Bytes Separated By Long Silences Are No Frame
+    Send Bytes Every    0.020
+    Nothing Was Received
     Unit Answers
 
-Requests One After Another With A Silence Between Them Are All Answered
+Requests Separated By A Silence Are All Answered
     FOR    ${_}    IN RANGE    10
         Unit Answers
     END
@@ -38,10 +38,10 @@ Requests One After Another With A Silence Between Them Are All Answered
 Two Requests Without A Silence Between Them Are Lost And The Next Is Answered
     Send    ${REQUEST}
     Send And Wait    ${REQUEST}
-    Nothing Has Come
+    Nothing Was Received
     Unit Answers
 
-FRAME_GAP Takes Another Silence After A Restart
+FRAME_GAP Changes The Silence After A Restart
     [Tags]    exact-time
     Unlock
     # 50 ms.
@@ -51,21 +51,21 @@ FRAME_GAP Takes Another Silence After A Restart
     Run For    0.5
     Send In Two Parts    0.020
     Wait For Bytes On Uart    ${REPLY}    timeout=0    matchStart=true
-    Nothing Has Come
+    Nothing Was Received
     Send In Two Parts    0.100
-    Nothing Has Come
+    Nothing Was Received
 
 
 *** Variables ***
-# 03 0204 0001: the version of the register map.
+# 03 0204 0001 reads the version of the register map.
 ${REQUEST}      01 03 02 04 00 01 C4 73
 ${REPLY}        01 03 02 00 01 79 84
 
 
 *** Keywords ***
 Send In Two Parts
-    [Documentation]    A request with one gap of so many seconds in it; where characters take their
-    ...    time, of 3.4 ms less, and of none at the least.
+    [Documentation]    Sends a request with one gap, in seconds. Where characters take their
+    ...    time, the gap is 3.4 ms shorter, but not below 0.
     [Arguments]    ${gap}
     ${first}=    Part    ${REQUEST}    0    3
     ${second}=    Part    ${REQUEST}    3
@@ -74,8 +74,8 @@ Send In Two Parts
     Send    ${second}
     Run For    0.2
 
-Bytes Come Every
-    [Documentation]    A request whose characters begin so many seconds apart.
+Send Bytes Every
+    [Documentation]    Sends a request whose characters begin this many seconds apart.
     [Arguments]    ${seconds}
     Write Char Delay    ${seconds}
     Send    ${REQUEST}

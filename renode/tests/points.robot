@@ -1,13 +1,13 @@
 *** Settings ***
-Documentation       Reading and writing the points of every module.
+Documentation       Reads and writes of the points of every module.
 Resource            modio.resource
 
 
 *** Test Cases ***
-4DI Shows What Its Inputs Are Energised With
+4DI Reports Energised Inputs
     Start Board    4di
     Request Gives    02 ${P}0 0004    02 01 00
-    # Energised, an input pulls its line low.
+    # An energised input pulls its line low.
     Execute Command    sysbus.gpioPortA OnGPIO 0 false
     Execute Command    sysbus.gpioPortA OnGPIO 3 false
     Run For    0.05
@@ -25,10 +25,10 @@ Resource            modio.resource
         Execute Command    sysbus.gpioPortA OnGPIO 1 true
         Run For    0.05
     END
-    # Two words a point, and the counter of channel 2.
+    # Two words per point; this is the counter of channel 2.
     Request Gives    03 ${PULSES_2} 0002    03 04 0000 0003
 
-4DO Drives What Is Written
+4DO Drives Its Outputs
     Start Board    4do
     Request Is Echoed    05 ${P}0 FF00
     Pin Should Be    ${ODR_A}    0    1
@@ -41,20 +41,20 @@ Resource            modio.resource
     Pin Should Be    ${ODR_A}    3    1
     Request Gives    02 ${P}0 0004    02 01 0A
 
-2Relay Drives Its Coils And Shows Its Jumpers
+2Relay Drives Its Coils And Reports Its Jumpers
     Start Board    2relay
     Request Gives    01 ${P}0 0004    01 01 00
     Request Is Echoed    05 ${P}2 FF00
     Pin Should Be    ${ODR_A}    2    1
     Pin Should Be    ${ODR_A}    3    0
-    # The jumper of relay 2 says manual.
+    # Set the jumper of relay 2 to manual.
     Execute Command    sysbus.gpioPortA OnGPIO 1 false
     Run For    0.05
     Request Gives    01 ${P}0 0004    01 01 06
     # A jumper cannot be written.
     Request Gives    05 ${P}0 FF00    85 02
 
-4AI Shows What Its Inputs Are
+4AI Reports The Codes Of Its Inputs
     Start Board    4ai
     Channel Converts To    0    0x0FFF
     Channel Converts To    2    0x0555
@@ -62,20 +62,20 @@ Resource            modio.resource
     Request Gives    04 ${P}0 0004    04 08 0FFF 0000 0555 0000
     Request Gives    03 ${P}2 0001    03 02 0555
 
-4AO Brings What Is Written To The DAC
+4AO Writes Its Outputs To The DAC
     Start Board    4ao
     Request Gives    10 ${P}0 0004 08 0ABC 0000 0FFF 0123    10 ${P}0 0004
     Run For    0.05
-    DAC Gives    0    0x0ABC
-    DAC Gives    1    0x0000
-    DAC Gives    2    0x0FFF
-    DAC Gives    3    0x0123
+    DAC Output Should Be    0    0x0ABC
+    DAC Output Should Be    1    0x0000
+    DAC Output Should Be    2    0x0FFF
+    DAC Output Should Be    3    0x0123
     Request Is Echoed    06 ${P}3 0456
     Run For    0.05
-    DAC Gives    3    0x0456
+    DAC Output Should Be    3    0x0456
     Request Gives    03 ${P}0 0004    03 08 0ABC 0000 0FFF 0456
 
-4AO Tells That Its DAC Does Not Answer And That It Does Again
+4AO Reports When Its DAC Stops Answering And When It Answers Again
     [Tags]    renode-only
     Start Board    4ao
     Request Gives    03 ${MODULE_STATE} 0001    03 02 0000
@@ -88,31 +88,31 @@ Resource            modio.resource
     Request Gives    03 ${MODULE_STATE} 0001    03 02 0000
     Request Is Echoed    06 ${P}0 0001
 
-2AI2AO Has Both
+2AI2AO Has Inputs And Outputs
     Start Board    2ai2ao
     Channel Converts To    1    0x0FFF
     Request Gives    10 ${P}2 0002 04 0321 0ABC    10 ${P}2 0002
     Run For    1
     Request Gives    03 ${P}0 0004    03 08 0000 0FFF 0321 0ABC
     # Its outputs are channels C and D.
-    DAC Gives    2    0x0321
-    DAC Gives    3    0x0ABC
+    DAC Output Should Be    2    0x0321
+    DAC Output Should Be    3    0x0ABC
 
-A Slot With Nothing In It Has No Points
+An Empty Slot Has No Points
     Start Board    none
     Request Gives    01 ${P}0 0001    81 02
     Request Gives    03 ${P}0 0001    83 02
 
-Everything Of A Request Is Done Or Nothing
+A Write Is Executed Completely Or Not At All
     Start Board    4ao
     Request Is Echoed    06 ${P}0 0111
-    # 4096 is above what the DAC takes.
+    # 4096 is above the DAC's range.
     Request Gives    10 ${P}0 0002 04 0222 1000    90 03
     Request Gives    03 ${P}0 0002    03 04 0111 0000
 
-The Longest Frames Fit
+The Longest Frames Are Accepted
     Start Board    4do
-    # 123 registers; there are not so many.
+    # 123 registers, more than exist.
     ${zeros}=    Evaluate    "0000" * 123
     Request Gives    10 0200 007B F6 ${zeros}    90 02
     Request Gives    03 0200 007D    83 02
@@ -121,13 +121,13 @@ The Longest Frames Fit
 
 *** Keywords ***
 Channel Converts To
-    [Documentation]    What the converter makes of an analog line, counted from 0.
+    [Documentation]    Sets the code of an analog line, counted from 0.
     [Arguments]    ${channel}    ${code}
     ${address}=    Evaluate    hex(int($ADC_CODES, 0) + 4 * int($channel))
     Execute Command    sysbus WriteDoubleWord ${address} ${code}
 
-DAC Gives
-    [Documentation]    The code at an output of the MCP4728, counted from 0.
+DAC Output Should Be
+    [Documentation]    Checks the code at an output of the MCP4728, counted from 0.
     [Arguments]    ${channel}    ${code}
     ${address}=    Evaluate    hex(int($DAC_CODES, 0) + 4 * int($channel))
     ${value}=    Read Word    ${address}

@@ -1,20 +1,20 @@
 *** Settings ***
-Documentation       The communication watchdog: outputs go to SAFE when the line falls silent.
+Documentation       The communication watchdog: outputs go to SAFE when the line is silent for too long.
 Resource            modio.resource
 Test Setup          Start Board    4do
 
 
 *** Test Cases ***
-Off It Never Trips
+A Watchdog That Is Off Never Trips
     Request Is Echoed    05 ${P}0 FF00
     Run For    5
     Pin Should Be    ${ODR_A}    0    1
 
-Outputs Go To SAFE When The Line Falls Silent
+Outputs Go To SAFE When The Line Is Silent
     [Tags]    exact-time
     Arm
     Request Is Echoed    05 ${P}0 FF00
-    # The request was followed by 0.1 s of silence already.
+    # 0.1 s of silence have already passed after the request.
     Run For    0.85
     Pin Should Be    ${ODR_A}    0    1
     Run For    0.10
@@ -23,7 +23,7 @@ Outputs Go To SAFE When The Line Falls Silent
     Request Gives    03 020A 0001    03 02 0029
     Request Gives    01 ${P}0 0004    01 01 00
 
-Requests And Broadcasts Keep It From Tripping
+Requests And Broadcasts Prevent A Trip
     Arm
     Request Is Echoed    05 ${P}0 FF00
     FOR    ${_}    IN RANGE    4
@@ -34,7 +34,7 @@ Requests And Broadcasts Keep It From Tripping
     END
     Pin Should Be    ${ODR_A}    0    1
 
-Another Unit's Requests Do Not Keep It From Tripping
+Requests To Another Unit Do Not Prevent A Trip
     [Tags]    exact-time
     Arm
     Request Is Echoed    05 ${P}0 FF00
@@ -44,7 +44,7 @@ Another Unit's Requests Do Not Keep It From Tripping
     END
     Pin Should Be    ${ODR_A}    0    0
 
-Outputs Stay There Until Written To And The Flag Until Cleared
+Outputs Stay At SAFE Until Written And The Flag Stays Until Cleared
     Arm
     Request Is Echoed    05 ${P}0 FF00
     Run For    1.5
@@ -56,7 +56,7 @@ Outputs Stay There Until Written To And The Flag Until Cleared
     Request Is Echoed    06 0108 0005
     Request Gives    03 020A 0001    03 02 0028
 
-SAFE Can Be On
+SAFE Can Switch An Output On
     Unlock
     # SAFE of the port's first point.
     Request Is Echoed    06 ${SAFE} 0001
@@ -64,7 +64,7 @@ SAFE Can Be On
     Run For    1.5
     Pin Should Be    ${ODR_A}    0    1
 
-SAFE Can Hold
+SAFE Can Hold An Output
     Unlock
     Request Is Echoed    06 ${SAFE} FFFF
     Request Is Echoed    06 0104 000A
@@ -76,6 +76,6 @@ SAFE Can Hold
 
 *** Keywords ***
 Arm
-    [Documentation]    COMM_TIMEOUT of one second.
+    [Documentation]    Sets COMM_TIMEOUT to one second.
     Unlock
     Request Is Echoed    06 0104 000A

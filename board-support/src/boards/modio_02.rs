@@ -20,7 +20,7 @@ pub const BOARD: Descriptor = Descriptor {
         Pin::b(14),
         Pin::b(15),
     ],
-    // The last two pages of the smaller part, the 64 KiB one (DS5319 table 2), so that one image fits both.
+    // The last two pages of the smaller part, the 64 KiB one (DS5319 table 2), so that one image fits both parts.
     store: [0x0800_F800, 0x0800_FC00],
     page_bytes: 1024,
 };

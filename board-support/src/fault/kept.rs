@@ -1,4 +1,4 @@
-//! Where the record is kept.
+//! The memory that keeps the fault record over a reset.
 
 use core::{array, cell::UnsafeCell, mem::MaybeUninit, ptr, sync::atomic::AtomicU8};
 
@@ -9,7 +9,7 @@ use super::{
     record::{Noted, WORDS},
 };
 
-/// What a reset leaves alone. Nothing initialises it but [`take_at_start`].
+/// Data that a reset does not change. Only [`take_at_start`] initialises it.
 #[repr(C)]
 struct Kept {
     record: [u32; WORDS],
@@ -20,9 +20,9 @@ struct Kept {
 
 struct Place(UnsafeCell<MaybeUninit<Kept>>);
 
-// SAFETY: record, uptime and dip are accessed by the functions of this module alone, by single volatile
-// accesses of a word, which cannot be torn. They may come between each other: a fault handler stops
-// whatever it interrupts for good. The marks are atomics.
+// SAFETY: only the functions of this module access record, uptime and dip, by single volatile accesses of a word,
+// which cannot be torn. A fault handler may interrupt a sequence of these accesses, but the interrupted code never
+// continues. The marks are atomics.
 unsafe impl Sync for Place {}
 
 #[unsafe(link_section = ".uninit.FAULT")]
@@ -33,25 +33,25 @@ fn place() -> *mut Kept {
 }
 
 fn read() -> Option<Noted> {
-    // SAFETY: the pointers are to the words of a static. It is RAM, so it holds some words, whatever they
-    // are; volatile, so that the compiler does not reason from nobody having initialised them.
+    // SAFETY: the pointers are to the words of a static in RAM, where any content is valid. The reads are volatile,
+    // so that the compiler does not rely on the memory being uninitialised.
     let words =
         array::from_fn(|at| unsafe { ptr::read_volatile(&raw const (*place()).record[at]) });
     Noted::from_words(&words)
 }
 
 fn write(noted: &Noted) {
-    // SAFETY: the pointer is to a static; see `Place` for why nobody else looks.
+    // SAFETY: the pointer is to a static; `Place` explains why no other access is under way.
     unsafe { ptr::write_volatile(&raw mut (*place()).record, noted.words()) };
 }
 
-/// Takes the record of what went wrong before this start, and starts a new account: a power-on clears
-/// it, a watchdog's bite is noted when nothing else was. `reset_cause` as
-/// [`Board::reset_cause`](crate::board::Board::reset_cause) has it. The board calls this once at every start,
-/// before it starts the crystal: how often that has failed is in the record.
+/// Returns the record of the last fault before this start and prepares the memory for the next one. A power-on
+/// clears the record. A watchdog reset is noted when nothing else was. `reset_cause` has the format of
+/// [`Board::reset_cause`](crate::board::Board::reset_cause). The board calls this once at every start, before it
+/// starts the crystal, because the record contains the number of crystal failures.
 #[must_use]
 pub(crate) fn take_at_start(reset_cause: u8) -> FaultRecord {
-    // SAFETY: as in `read`; bytes and words may hold anything.
+    // SAFETY: as in `read`; bytes and words may hold any value.
     let (uptime, marks) = unsafe {
         (
             ptr::read_volatile(&raw const (*place()).uptime),
@@ -62,7 +62,7 @@ pub(crate) fn take_at_start(reset_cause: u8) -> FaultRecord {
     let noted = Noted::at_start(&mut kept, reset_cause, uptime, marks);
     write(noted);
     keep_uptime(0);
-    // SAFETY: as in `write`; volatile, for the same reason as in `read`.
+    // SAFETY: as in `write`; volatile for the same reason as in `read`.
     unsafe {
         ptr::write_volatile(
             (&raw mut (*place()).marks).cast::<[u8; TASKS]>(),
@@ -72,10 +72,10 @@ pub(crate) fn take_at_start(reset_cause: u8) -> FaultRecord {
     noted.record
 }
 
-/// Notes a fault, with the uptime that was kept. For the handlers of panics and faults; only the first
-/// since the start is noted.
+/// Notes a fault, with the last uptime that was kept. For panic and fault handlers. Only the first fault since the
+/// start is noted.
 pub fn note(fault: Fault) {
-    // Words that are no record: the fault came before `take_at_start`, or wrote over them.
+    // If the words are not a valid record, the fault came before `take_at_start` or has overwritten them.
     let mut kept = read();
     let noted = kept.get_or_insert_default();
     // SAFETY: as in `read`.
@@ -84,13 +84,13 @@ pub fn note(fault: Fault) {
     write(noted);
 }
 
-/// Keeps for how long the firmware has run, in seconds: once a second.
+/// Keeps the uptime of the firmware, in seconds. Call this once per second.
 pub fn keep_uptime(seconds: u32) {
     // SAFETY: as in `write`.
     unsafe { ptr::write_volatile(&raw mut (*place()).uptime, seconds) };
 }
 
-/// The DIP switch as it was read at power-on; `None` when nothing valid is kept.
+/// Returns the DIP switch as read at power-on, or `None` when no valid value is kept.
 pub(crate) fn kept_dip() -> Option<u8> {
     // SAFETY: as in `read`; a word may hold anything.
     dip::from_word(unsafe { ptr::read_volatile(&raw const (*place()).dip) })
@@ -102,12 +102,12 @@ pub(crate) fn keep_dip(dip: u8) {
     unsafe { ptr::write_volatile(&raw mut (*place()).dip, dip::to_word(dip)) };
 }
 
-/// The marks of the tasks, all 0 after [`take_at_start`]. Once the watchdog has bitten, the next start
-/// reports the tasks whose mark is not 1, "has run to its end", as missing. A task leaves its mark by a store of
-/// its own; whoever feeds the watchdog takes them all back.
+/// Returns the marks of the tasks, all 0 after [`take_at_start`]. After a watchdog reset the next start reports
+/// every task as missing whose mark is not 1, which means "has run to its end". Each task stores its own mark; the
+/// code that refreshes the watchdog clears all of them.
 #[must_use]
 pub fn marks() -> &'static [AtomicU8; TASKS] {
-    // SAFETY: the static is aligned for it and holds bytes, of which any is a valid `AtomicU8`.
-    // `take_at_start` writes them otherwise than through this, in volatile stores that tear no byte.
+    // SAFETY: the static is aligned for the array and holds bytes, and any byte is a valid `AtomicU8`. Only
+    // `take_at_start` writes the marks in another way, by volatile stores that cannot tear a byte.
     unsafe { &(*place()).marks }
 }

@@ -1,18 +1,18 @@
-//! The record as words, and what a start makes of it.
+//! The layout of the fault record and its changes at a start.
 
 use super::{Fault, FaultRecord, Kind, TASKS};
 
-/// Words of the record, the last of which is the checksum.
+/// Words of the record. The last one is the checksum.
 pub(super) const WORDS: usize = 9;
 
-/// Tells this layout from what RAM holds after power-on, and from other layouts.
+/// Distinguishes this layout from other layouts and from the content of RAM after power-on.
 const MAGIC: u32 = 0x4661_7501;
-/// Bit in the second word, over the kind: noted since the last start.
+/// Bit of the second word, above the kind: the fault was noted since the last start.
 const FRESH: u32 = 1 << 16;
-/// Place of the count of crystal faults in the second word: its highest byte.
+/// Shift of the crystal fault count in the second word: its most significant byte.
 const CRYSTAL_FAULTS: u32 = 24;
 
-/// Bits of the reset cause (RM0008 7.3.10, from LPWRRSTF on).
+/// Bits of the reset cause (RM0008 7.3.10, starting with LPWRRSTF).
 const BY_WATCHDOG: u8 = 1 << 2;
 const BY_POWER_ON: u8 = 1 << 4;
 
@@ -35,7 +35,8 @@ const fn kind_of(number: u8) -> Option<Kind> {
     })
 }
 
-/// A checksum that no zeroed, inverted or shifted record has, and that finds every flipped bit.
+/// Returns a checksum that detects every flipped bit. A record that is all zeros, inverted or shifted never has a
+/// valid checksum.
 fn checksum(words: &[u32; WORDS]) -> u32 {
     let [content @ .., _] = words;
     content.iter().fold(MAGIC, |sum, word| {
@@ -68,7 +69,7 @@ impl Noted {
         words
     }
 
-    /// `None` when these words are no record.
+    /// Returns the record, or `None` when the words are not a valid record.
     pub(super) fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let [magic, kind, count, pc, lr, status, address, uptime, sum] = *words;
         if magic != MAGIC || sum != checksum(words) {
@@ -93,7 +94,8 @@ impl Noted {
         })
     }
 
-    /// Adds a fault. The first since the start counts: one in its handler is its consequence.
+    /// Adds a fault. Only the first one since the start counts, because a fault in a fault handler is a consequence
+    /// of it.
     pub(super) fn add(&mut self, fault: Fault, uptime: u32, missing: u16) {
         if !self.fresh {
             self.fresh = true;
@@ -108,8 +110,8 @@ impl Noted {
         }
     }
 
-    /// What a start for `reset_cause` makes of the record it finds, if any, with the uptime and the marks
-    /// the firmware had left.
+    /// Updates the kept record, if there is a valid one, for a start with this `reset_cause`. `uptime` and `marks`
+    /// are what the firmware kept before the reset.
     pub(super) fn at_start(
         kept: &mut Option<Self>,
         reset_cause: u8,
@@ -120,25 +122,25 @@ impl Noted {
         if power_on {
             *kept = None;
         }
-        // Words that are no record say nothing about what lies beside them either.
+        // Without a valid record, the uptime and the marks beside it are not valid either.
         let (uptime, missing) = match kept {
             Some(_) => (uptime, missing(marks)),
             None => (0, 0),
         };
         let noted = kept.get_or_insert_default();
         if reset_cause & BY_WATCHDOG != 0 && !power_on {
-            let bite = Fault {
+            let watchdog_reset = Fault {
                 kind: Kind::Watchdog,
                 ..Fault::default()
             };
-            noted.add(bite, uptime, missing);
+            noted.add(watchdog_reset, uptime, missing);
         }
         noted.fresh = false;
         noted
     }
 }
 
-/// A bit for each mark that does not say that the task has come to its end.
+/// Returns one bit for each task whose mark does not say that it has run to its end.
 fn missing(marks: [u8; TASKS]) -> u16 {
     marks
         .iter()
@@ -178,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_lead_back_to_their_kinds() {
+    fn every_kind_is_found_by_its_number() {
         for number in 0..=5 {
             assert_eq!(kind_of(number).map(|kind| kind as u8), Some(number));
         }
@@ -186,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_comes_back_from_its_words_and_no_flipped_bit_goes_unnoticed() {
+    fn a_record_is_restored_from_its_words_and_any_flipped_bit_is_detected() {
         let words = noted().words();
         assert_eq!(Noted::from_words(&words), Some(noted()));
         for word in 0..WORDS {
@@ -202,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_outlives_a_reset_and_then_others_without_counting_again() {
+    fn a_fault_is_kept_over_several_resets_and_counted_once() {
         let mut words = noted().words();
         for cause in [BY_SOFTWARE, 1 << 5, BY_SOFTWARE] {
             let start = at_start(&words, cause, 1_000, [1; TASKS]);
@@ -213,14 +215,14 @@ mod tests {
     }
 
     #[test]
-    fn a_power_on_forgets_even_what_is_whole() {
+    fn a_power_on_clears_a_valid_record() {
         let cause = BY_POWER_ON | 1 << 5;
         let start = at_start(&noted().words(), cause, 5, [0; TASKS]);
         assert_eq!(start, Noted::default());
     }
 
     #[test]
-    fn a_bite_tells_the_uptime_and_the_missing_marks() {
+    fn a_watchdog_reset_records_the_uptime_and_the_missing_marks() {
         let words = Noted::default().words();
         let start = at_start(&words, WATCHDOG, 42, [1, 0, 1, 2]);
         assert_eq!(start.record.fault.kind, Kind::Watchdog);
@@ -232,21 +234,21 @@ mod tests {
     }
 
     #[test]
-    fn a_bite_after_a_fault_was_noted_is_that_faults() {
+    fn a_watchdog_reset_after_a_noted_fault_keeps_that_fault() {
         let start = at_start(&noted().words(), WATCHDOG, 42, [0; TASKS]);
         assert_eq!(start.record.fault, fault());
         assert_eq!((start.record.count, start.record.missing), (1, 0));
     }
 
     #[test]
-    fn a_bite_with_nothing_to_trust_in_ram_is_still_one() {
+    fn a_watchdog_reset_without_a_valid_record_is_noted() {
         let start = at_start(&[0xA5A5_A5A5; WORDS], WATCHDOG, 0xA5A5_A5A5, [0xA5; TASKS]);
         assert_eq!(start.record.fault.kind, Kind::Watchdog);
         assert_eq!((start.record.uptime, start.record.missing), (0, 0));
     }
 
     #[test]
-    fn the_first_fault_since_the_start_counts() {
+    fn only_the_first_fault_since_the_start_is_noted() {
         let second = Fault {
             kind: Kind::Panic,
             ..Fault::default()
@@ -258,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn crystal_faults_are_counted_among_others_until_power_on() {
+    fn crystal_faults_are_counted_separately_until_power_on() {
         let crystal = Fault {
             kind: Kind::Crystal,
             ..Fault::default()
@@ -277,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_counted_as_far_as_it_goes() {
+    fn the_count_of_faults_stops_at_its_largest_value() {
         let mut noted = noted();
         noted.record.count = u16::MAX;
         noted.fresh = false;

@@ -1,23 +1,23 @@
-//! What can go wrong on the DAC's bus.
+//! Errors of the DACs' bus.
 
 use embedded_hal::i2c::{Error, ErrorKind, NoAcknowledgeSource};
 
 use super::freeing::Held;
 
-/// Why a transfer failed. All may be tried again; the bus is set right by itself.
+/// Error of a transfer. Every transfer may be tried again; the driver recovers the bus before the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DacBusError {
-    /// Nobody acknowledged the address, or the slave did not take a byte.
+    /// No device acknowledged the address, or the slave did not acknowledge a byte.
     NoAcknowledge(NoAcknowledgeSource),
-    /// The bus did not go where it was driven, as if there were another master.
+    /// The bus did not follow what was driven, as if there were a second master.
     ArbitrationLost,
-    /// A start or stop condition where none should be: a disturbance.
+    /// An unexpected start or stop condition: a disturbance.
     Misplaced,
-    /// A step took too long; the clock was stretched or held.
+    /// A step took too long: a device stretched or held the clock.
     Timeout,
-    /// Somebody holds a wire low and could not be brought to let go.
+    /// A device holds a wire low, and clocking the bus did not release it.
     Held(Held),
-    /// A transaction that reads: not supported.
+    /// The transaction contains a read, which is not supported.
     Reads,
 }
 

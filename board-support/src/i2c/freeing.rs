@@ -1,10 +1,10 @@
-//! Getting a bus back from a slave that holds it.
+//! Recovery of a bus that a slave holds.
 //!
-//! A slave that was interrupted in the middle of a byte of its own goes on to wait for its clock pulses
-//! and may hold SDA low until it has had them: nine at most, then it sees no acknowledge and lets go
-//! (I2C-bus specification UM10204, 3.1.16). A slave that holds SCL cannot be helped from here.
+//! A slave that was interrupted while it sent a byte waits for the remaining clock pulses and may hold SDA low
+//! until it has received them. After at most nine pulses it finds no acknowledge and releases SDA (I2C-bus
+//! specification UM10204, 3.1.16). The master cannot release a wire when a slave holds SCL.
 
-/// A wire that somebody else holds low.
+/// A wire that another device holds low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Held {
     /// SCL.
@@ -13,28 +13,28 @@ pub enum Held {
     Data,
 }
 
-/// The two wires, each let go or pulled low by hand.
+/// The two wires, each released or pulled low by software.
 pub(super) trait Wires {
-    /// Lets SCL go or pulls it low.
+    /// Releases SCL or pulls it low.
     fn set_scl(&mut self, high: bool);
-    /// Lets SDA go or pulls it low.
+    /// Releases SDA or pulls it low.
     fn set_sda(&mut self, high: bool);
-    /// Whether SCL is high.
+    /// Returns whether SCL is high.
     fn scl(&self) -> bool;
-    /// Whether SDA is high.
+    /// Returns whether SDA is high.
     fn sda(&self) -> bool;
-    /// Half a period of SCL goes by.
+    /// Waits for half a period of SCL.
     fn wait(&mut self);
 }
 
-/// Clock pulses until whoever holds SDA must have let go: eight bits and an acknowledge.
+/// Number of clock pulses after which a slave must have released SDA: eight bits and an acknowledge.
 const PULSES: usize = 9;
 
-/// Half periods that a slave may stretch the clock for.
+/// Number of half periods for which a slave may stretch the clock.
 const STRETCH: usize = 16;
 
-/// Clocks SCL until SDA is high, then makes a stop condition. Leaves both wires let go, whatever comes
-/// of it, after 340 half periods of SCL at most.
+/// Clocks SCL until SDA is high, then sends a stop condition. Takes at most 340 half periods of SCL and leaves both
+/// wires released, also on failure.
 pub(super) fn free(wires: &mut impl Wires) -> Result<(), Held> {
     wires.set_sda(true);
     raise_clock(wires)?;
@@ -48,7 +48,7 @@ pub(super) fn free(wires: &mut impl Wires) -> Result<(), Held> {
     if !wires.sda() {
         return Err(Held::Data);
     }
-    // SDA rises while SCL is high.
+    // Stop condition: SDA rises while SCL is high.
     lower_clock(wires);
     wires.set_sda(false);
     wires.wait();
@@ -79,14 +79,14 @@ fn raise_clock(wires: &mut impl Wires) -> Result<(), Held> {
 mod tests {
     use super::*;
 
-    /// A bus with somebody on it who holds a wire.
+    /// A bus with one slave that holds a wire.
     #[derive(Default)]
     struct Bus {
         scl: bool,
         sda: bool,
-        /// Falling edges of SCL after which SDA is let go.
+        /// Number of falling edges of SCL after which the slave releases SDA.
         holds_sda: usize,
-        /// Half periods after each rising edge for which SCL is held.
+        /// Number of half periods after each rising edge for which the slave holds SCL low.
         stretches: usize,
         held_for: usize,
         waits: usize,
@@ -141,41 +141,41 @@ mod tests {
     }
 
     #[test]
-    fn a_free_bus_gets_one_stop_condition_and_no_start() {
+    fn a_free_bus_receives_one_stop_condition_and_no_start() {
         let mut bus = Bus::new(0, 0);
         assert_eq!(free(&mut bus), Ok(()));
         assert_eq!((bus.pulses, bus.starts, bus.stops), (1, 0, 1));
     }
 
     #[test]
-    fn a_slave_gets_its_pulses_and_then_a_stop() {
+    fn a_slave_receives_its_pulses_and_then_a_stop() {
         for holds in 1..=PULSES {
             let mut bus = Bus::new(holds, 0);
             assert_eq!(free(&mut bus), Ok(()), "{holds} pulses");
             assert_eq!((bus.pulses, bus.starts, bus.stops), (holds + 1, 0, 1));
-            assert!(bus.scl && bus.sda, "both are let go");
+            assert!(bus.scl && bus.sda, "both wires are released");
         }
     }
 
     #[test]
-    fn one_that_stretches_the_clock_is_waited_for() {
+    fn a_slave_that_stretches_the_clock_is_waited_for() {
         let mut bus = Bus::new(9, STRETCH - 1);
         assert_eq!(free(&mut bus), Ok(()));
         assert_eq!(bus.stops, 1);
     }
 
     #[test]
-    fn nine_pulses_are_all_there_are() {
+    fn recovery_fails_after_nine_pulses() {
         for holds in [PULSES + 1, usize::MAX] {
             let mut bus = Bus::new(holds, 0);
             assert_eq!(free(&mut bus), Err(Held::Data));
             assert_eq!((bus.pulses, bus.stops), (PULSES, 0));
-            assert!(bus.scl && bus.sda, "both are let go");
+            assert!(bus.scl && bus.sda, "both wires are released");
         }
     }
 
     #[test]
-    fn a_held_clock_is_given_up_at_once() {
+    fn a_held_clock_fails_without_pulses() {
         let mut bus = Bus::new(0, usize::MAX);
         assert_eq!(free(&mut bus), Err(Held::Clock));
         assert_eq!(bus.pulses, 0);
@@ -183,13 +183,13 @@ mod tests {
     }
 
     #[test]
-    fn it_never_takes_longer_than_it_says() {
+    fn recovery_takes_at_most_340_half_periods() {
         for holds in 0..=PULSES + 1 {
             for stretches in 0..=STRETCH + 1 {
                 let mut bus = Bus::new(holds, stretches);
                 let _ = free(&mut bus);
                 assert!(bus.waits <= 340, "{holds} {stretches}: {}", bus.waits);
-                assert!(bus.scl && bus.sda, "both are let go");
+                assert!(bus.scl && bus.sda, "both wires are released");
             }
         }
     }

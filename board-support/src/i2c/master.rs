@@ -1,4 +1,4 @@
-//! The bus's master: RM0008 26.3.3, polled.
+//! The bus master (RM0008 26.3.3), polled.
 
 use embedded_hal::i2c::{ErrorType, I2c, NoAcknowledgeSource, Operation, SevenBitAddress};
 use stm32f1xx_hal::pac;
@@ -21,13 +21,14 @@ mod flag {
     pub const AF: u16 = 1 << 10;
 }
 
-/// What the peripheral is to be told of its clock.
+/// Clock settings of the peripheral.
 #[derive(Clone, Copy)]
 struct Timing {
     mhz: u8,
-    /// A third of a period of SCL, rounded up: fast mode is low for two and high for one (26.6.8).
+    /// A third of the SCL period in clock cycles, rounded up: in fast mode SCL is low for two thirds and high for
+    /// one (RM0008 26.6.8).
     third: u8,
-    /// The longest rise, 0.3 us, and one (26.6.9).
+    /// The longest rise time, 0.3 us, in clock cycles plus 1 (RM0008 26.6.9).
     rise: u8,
 }
 
@@ -43,17 +44,17 @@ impl Timing {
     }
 }
 
-/// The DAC's bus. Its pins stay floating until the first transfer.
+/// The DACs' bus. Its pins float until the first transfer.
 pub struct DacBus {
     i2c: pac::I2C1,
     pins: BusPins,
     timing: Timing,
-    /// The peripheral is on the bus and nothing is known to be wrong.
+    /// The peripheral is enabled on the bus and no error is known.
     ready: bool,
 }
 
 impl DacBus {
-    /// The peripheral has its clock.
+    /// The peripheral's clock must be on.
     pub(crate) const fn new(i2c: pac::I2C1, pins: BusPins, clock: ClockSource) -> Self {
         Self {
             i2c,
@@ -66,10 +67,10 @@ impl DacBus {
         }
     }
 
-    /// Puts the peripheral on a free bus, unless it is there already.
+    /// Recovers the bus and enables the peripheral on it, unless that is already so.
     fn make_ready(&mut self) -> Result<(), DacBusError> {
-        // Busy with no transfer under way: a wire is or was held. The flag may also stick by itself,
-        // which the toggling of the pins and the reset cure (errata sheet, I2C analog filter).
+        // BUSY without a transfer under way means that a wire is or was held low. The flag may also stick without a
+        // cause; toggling the pins and resetting the peripheral clears it (errata sheet, I2C analog filter).
         if self.ready && self.i2c.sr2().read().busy().bit_is_clear() {
             return Ok(());
         }
@@ -77,12 +78,12 @@ impl DacBus {
         self.pins.by_hand();
         free(&mut self.pins).map_err(DacBusError::Held)?;
         self.pins.by_peripheral();
-        // Out of the reset that `leave` put it into.
+        // End the reset that `leave` has begun.
         self.i2c.cr1().write(|w| w.swrst().clear_bit());
         let Timing { mhz, third, rise } = self.timing;
-        // SAFETY: FREQ takes 2 to 36, and the clock is 30 or 36 MHz.
+        // SAFETY: FREQ allows 2 to 36, and the clock is 30 or 36 MHz.
         self.i2c.cr2().write(|w| unsafe { w.freq().bits(mhz) });
-        // SAFETY: at most 40 in a field of twelve bits whose least is 1.
+        // SAFETY: the value is at most 40; the field has twelve bits and a minimum of 1.
         self.i2c
             .ccr()
             .write(|w| unsafe { w.f_s().fast().ccr().bits(third.into()) });
@@ -92,13 +93,14 @@ impl DacBus {
         Ok(())
     }
 
-    /// Takes the peripheral off the bus, whatever it is doing, and keeps it in reset.
+    /// Takes the peripheral off the bus in any state and keeps it in reset.
     fn leave(&mut self) {
         self.i2c.cr1().write(|w| w.swrst().set_bit());
         self.ready = false;
     }
 
-    /// Does a transfer on a bus that is ready, and leaves one that is clean, whatever comes of it.
+    /// Runs a transfer on a bus that is ready. After an error that leaves the peripheral in an unknown state, takes
+    /// it off the bus.
     fn on_bus(
         &mut self,
         transfer: impl FnOnce(&mut Self) -> Result<(), DacBusError>,
@@ -108,7 +110,8 @@ impl DacBus {
         let clean = match result {
             Ok(()) => true,
             Err(DacBusError::NoAcknowledge(source)) => {
-                // After a data byte the next may wait in DR, and would begin the next transfer.
+                // When a data byte was not acknowledged, the next byte may still be in DR and would begin the next
+                // transfer.
                 self.stop_after_no_acknowledge().is_ok() && source == NoAcknowledgeSource::Address
             }
             Err(_) => false,
@@ -119,7 +122,7 @@ impl DacBus {
         result
     }
 
-    /// Writes bytes to a slave, from start condition to stop condition.
+    /// Writes bytes to a slave, from the start condition to the stop condition.
     fn write_all<'a>(
         &mut self,
         address: SevenBitAddress,
@@ -131,7 +134,7 @@ impl DacBus {
         self.wait_for_stop()
     }
 
-    /// Once the start condition is made, calls a slave that is to be written, and that is to acknowledge.
+    /// Waits for the start condition, sends the slave's address for a write, and waits for the acknowledge.
     fn call(&self, address: SevenBitAddress) -> Result<(), DacBusError> {
         self.wait_for(flag::SB, NoAcknowledgeSource::Unknown)?;
         self.put(address << 1);
@@ -153,7 +156,7 @@ impl DacBus {
         Ok(())
     }
 
-    /// Asks for a stop condition.
+    /// Requests a stop condition.
     fn stop(&self) {
         self.i2c.cr1().modify(|_, w| w.stop().set_bit());
     }
@@ -162,12 +165,12 @@ impl DacBus {
         self.i2c.dr().write(|w| w.dr().set(byte));
     }
 
-    /// ADDR is taken back by reading SR1, which showed it, and then SR2.
+    /// Clears ADDR by reading SR1, which showed it, and then SR2.
     fn clear_addr(&self) {
         let _ = self.i2c.sr2().read();
     }
 
-    /// Waits for a flag. `source` is who did not acknowledge, if that is what comes.
+    /// Waits for a flag. `source` is reported when no acknowledge is received instead.
     fn wait_for(&self, wanted: u16, source: NoAcknowledgeSource) -> Result<(), DacBusError> {
         let mut seen = 0;
         within_us(I2C_STEP_US, || {
@@ -187,7 +190,7 @@ impl DacBus {
         }
     }
 
-    /// Waits until the stop condition is made.
+    /// Waits until the stop condition has been sent.
     fn wait_for_stop(&self) -> Result<(), DacBusError> {
         if within_us(I2C_STEP_US, || self.i2c.cr1().read().stop().bit_is_clear()) {
             Ok(())
@@ -196,7 +199,7 @@ impl DacBus {
         }
     }
 
-    /// Ends a transfer that was not acknowledged, as any other is ended.
+    /// Ends a transfer that was not acknowledged with a stop condition, like any other.
     fn stop_after_no_acknowledge(&mut self) -> Result<(), DacBusError> {
         self.i2c.sr1().modify(|_, w| w.af().clear_bit());
         self.stop();
@@ -208,7 +211,7 @@ impl ErrorType for DacBus {
     type Error = DacBusError;
 }
 
-/// Writes alone: the DACs are never read. A transaction that reads is refused with [`DacBusError::Reads`].
+/// Writes only, because the DACs are never read. A transaction with a read fails with [`DacBusError::Reads`].
 impl I2c for DacBus {
     fn transaction(
         &mut self,
@@ -222,7 +225,7 @@ impl I2c for DacBus {
         if operations.is_empty() {
             return Ok(());
         }
-        // Operations in one direction make one run of bytes (embedded-hal's contract).
+        // Consecutive operations in the same direction form one run of bytes (embedded-hal's contract).
         let bytes = operations.iter().flat_map(|operation| match operation {
             Operation::Write(bytes) => *bytes,
             Operation::Read(_) => &[],

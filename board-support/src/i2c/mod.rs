@@ -1,15 +1,14 @@
-//! I2C1 for the DAC of the analog-output modules, on PB6 and PB7.
+//! I2C1 for the DACs of the analog-output modules, on PB6 and PB7.
 //!
-//! A module may be missing, or lose its power in the middle of a byte, and hold SDA or SCL for ever.
-//! Every wait has an end, after [`I2C_STEP_US`](crate::design::I2C_STEP_US), so that a transfer of 13
-//! bytes takes 1.5 ms when all is well and at most 4 when every step takes as long as it may. After
-//! anything but a missing acknowledge of the address the peripheral is taken off the bus, and put back
-//! by the next transfer, which first [frees](freeing::free) the bus by hand: 0.3 ms, or 2 at most. That
-//! it does before the very first one as well: a reset of the chip alone may have left the DAC in the
-//! middle of a byte.
+//! A module may be missing, or lose its power during a byte and hold SDA or SCL low indefinitely. Every wait ends
+//! after [`I2C_STEP_US`](crate::design::I2C_STEP_US). A transfer of 13 bytes normally takes 1.5 ms, and at most 4
+//! ms when every step takes as long as it may. After every error but a missing acknowledge of the address, the
+//! peripheral is taken off the bus. The next transfer enables it again and first [recovers](freeing::free) the bus,
+//! which takes 0.3 ms, or 2 ms at most. The very first transfer does the same, because a reset of the chip alone
+//! may have interrupted a transfer to the DAC.
 //!
-//! Own code over the registers, because the HAL's driver resets itself but frees no bus, whose pins it
-//! keeps; it panics on an empty write or read, and its transactions are `todo!()`.
+//! The HAL's driver is not used: it resets the peripheral but recovers no bus, and it keeps the pins. It panics on
+//! an empty write or read, and its transactions are `todo!()`.
 
 #[cfg(target_os = "none")]
 mod error;

@@ -1,4 +1,4 @@
-//! PB6 and PB7 as the peripheral's, or moved by hand.
+//! PB6 and PB7 as pins of the peripheral or as outputs set by software.
 
 use stm32f1xx_hal::gpio::{Cr, PB6, PB7};
 
@@ -8,12 +8,12 @@ use crate::{design::I2C_HALF_PERIOD_US, pin::Port, wait::delay_us};
 const SCL: u16 = 1 << 6;
 const SDA: u16 = 1 << 7;
 
-/// The two pins, and the register that says what they are. The HAL's pins change their type with their
-/// use, and these change it while they run.
+/// The two pins and their configuration register. The HAL's pins change their type with their mode, but these
+/// change their mode at run time.
 pub(crate) struct BusPins {
     _scl: PB6,
     _sda: PB7,
-    /// The register is shared with other pins; who has this may change it.
+    /// Permission to change the configuration register, which other pins share.
     _cr: Cr<'B', false>,
 }
 
@@ -26,19 +26,19 @@ impl BusPins {
         }
     }
 
-    /// Open-drain outputs moved by hand, both let go.
+    /// Makes both pins open-drain outputs set by software, released.
     pub(super) fn by_hand(&mut self) {
         self.set_scl(true);
         self.set_sda(true);
         self.configure(false);
     }
 
-    /// Open-drain outputs of the peripheral.
+    /// Makes both pins open-drain outputs of the peripheral.
     pub(super) fn by_peripheral(&mut self) {
         self.configure(true);
     }
 
-    /// The slowest slopes, 2 MHz: SCL is far below that.
+    /// Selects the slowest edges, 2 MHz, which is well above SCL.
     fn configure(&mut self, peripheral: bool) {
         Port::B.registers().crl().modify(|_, w| {
             w.mode6().output2().mode7().output2();
@@ -56,8 +56,7 @@ impl BusPins {
         } else {
             u32::from(pin) << 16
         };
-        // SAFETY: changes the pins whose bits are set and no other, in one store, and this value alone
-        // owns them.
+        // SAFETY: one store changes the pins whose bits are set and no other, and only this value owns these pins.
         Port::B
             .registers()
             .bsrr()

@@ -1,4 +1,4 @@
-//! What may be late at no cost: DAC transfers, configuration store, LEDs, log.
+//! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
 use board_support::stack::LowWater;
 use heapless::spsc::Consumer;
@@ -13,7 +13,7 @@ use crate::{
     signals::Signals,
 };
 
-/// What the background works on.
+/// The state of the background task.
 pub struct Background {
     pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,

@@ -1,22 +1,22 @@
-//! The board that this image is for, as masters and tools know it.
+//! The board of this image, as it appears in the register map and the self-description.
 
 use board_support::boards;
 use firmware::device::Fixed;
 use register_map::Board;
 
-/// The board's row in the register map, found by its name.
+/// The board's row in the register map, found by name.
 pub const BOARD: &Board = match Board::named(boards::BOARD.name) {
     Some(board) => board,
     None => panic!("the register map has no row for this board"),
 };
 
-/// What is the same in the self-descriptions of all units with this board.
+/// The fixed part of the self-description of every unit with this board.
 pub const DESCRIPTION: &Fixed = &Fixed::of(BOARD);
 
-/// The device behind this board's line.
+/// The device with this board's number of slots.
 pub type Device = firmware::device::Device<{ boards::SLOTS }>;
 
-// Register map and pins mean the same board.
+// Check that the register map and the pin descriptor mean the same board.
 const _: () = {
     let pins = boards::BOARD;
     assert!(BOARD.slots as usize == boards::SLOTS);

@@ -1,4 +1,4 @@
-//! A slot's analog lines as the drivers take them.
+//! Implements the drivers' analog input trait for a slot's analog lines.
 
 use board_support::{AnalogInputs, NotCalibrated};
 use modio_drivers::{AnalogSource, Code};

@@ -1,4 +1,4 @@
-//! The modules in the slots, whichever they are.
+//! The modules installed in the slots.
 
 use board_support::{AnalogLines, DacBus, Sampler, Slot, SlotInput, SlotOutput, boards::SLOTS};
 use modio_drivers::{
@@ -9,11 +9,11 @@ use register_map::Module;
 
 use crate::converter::Converter;
 
-/// Between the scan, which commands analog outputs, and the background, which brings them to the DACs: one for each
-/// slot.
+/// Links between the scan, which commands analog outputs, and the background, which sends them to the DACs. One for
+/// each slot.
 static DAC_LINKS: [DacLink; SLOTS] = [const { DacLink::new() }; SLOTS];
 
-/// A module with its slot's lines set up for it.
+/// A module and the lines of its slot, configured for it.
 pub enum Installed {
     None(Absent),
     Di4(Di4<SlotInput>),
@@ -25,7 +25,7 @@ pub enum Installed {
 }
 
 impl Installed {
-    /// Sets the slot up for a module. The slot's DAC, if it has one, is at the other end of the link.
+    /// Configures the slot for a module. `link` connects the module to the slot's DAC, if it has one.
     fn new(module: Module, slot: Slot, sampler: &mut Sampler, link: &'static DacLink) -> Self {
         let mut analog = |slot: Slot, lines| {
             let inputs = slot.into_analog(lines);
@@ -89,15 +89,15 @@ impl IoModule for Installed {
     }
 }
 
-/// The slow side of the modules with analog outputs.
+/// The modules' analog outputs, which the background sends to the DACs.
 pub struct AnalogOutputs {
     bus: DacBus,
-    /// By slot; none where the module has no DAC.
+    /// One entry per slot; `None` when the module has no DAC.
     workers: [Option<DacWorker>; SLOTS],
 }
 
 impl AnalogOutputs {
-    /// Brings to the DACs what is to be brought.
+    /// Sends pending output values to the DACs.
     pub fn work(&mut self) {
         for (worker, link) in self.workers.iter_mut().zip(&DAC_LINKS) {
             let Some(worker) = worker else {
@@ -105,14 +105,14 @@ impl AnalogOutputs {
             };
             match worker.work(&mut self.bus, link) {
                 Ok(_) => {}
-                // The bus frees itself before its next transfer.
+                // The driver recovers the bus before its next transfer.
                 Err(DacError::NotAnswering(_) | DacError::Bus(_)) => {}
             }
         }
     }
 }
 
-/// Sets every slot up for its module.
+/// Configures every slot for its module.
 pub fn install(
     modules: [Module; SLOTS],
     slots: [Slot; SLOTS],

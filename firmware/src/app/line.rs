@@ -1,6 +1,6 @@
-//! The UART and the timer of the RS-485 line as a [`Line`](line::Line) takes them.
+//! Connects the UART and the timer of the RS-485 line to [`Line`](line::Line).
 //!
-//! This, too, runs from RAM.
+//! This code also runs from RAM.
 
 use board_support::{GapEvent, Rs485, Status};
 use firmware::line::{self, GapTimer, Silence, Uart};
@@ -82,7 +82,7 @@ impl Uart for Rs485Uart {
     }
 }
 
-/// TIM2, with TIM1 for the start bit and for the limit.
+/// TIM2, and TIM1 for the start bit and the time limit of a reply.
 pub struct Rs485Gap(pub board_support::GapTimer);
 
 impl GapTimer for Rs485Gap {

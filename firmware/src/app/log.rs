@@ -1,5 +1,5 @@
-//! The log: lines on RTT channel 0, for a probe or the simulator. When nobody reads, what no longer
-//! fits is left out; nothing ever waits.
+//! The log: lines on RTT channel 0, for a debug probe or the simulator. When the buffer is full because nobody
+//! reads it, further lines are dropped; the firmware never waits.
 
 use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault, tolerance, uart};
 use firmware::{config, start_up::Address};
@@ -13,7 +13,7 @@ use rtt_target::UpChannel;
 
 use crate::{board::BOARD, rtt};
 
-/// What can happen while the device runs.
+/// Events that are logged while the device runs.
 #[derive(Clone, Copy)]
 pub enum Event {
     /// The module in this port's slot began to fail.
@@ -28,18 +28,18 @@ pub enum Event {
     SaveFailed,
     /// The line's registers were disturbed, or a reply did not end: the line was set up again.
     LineRepaired,
-    /// The supply is too low for the flash: a save, or an erase at the start, waits for it.
+    /// The supply is too low for the flash: a save, or an erase at the start, waits until it has recovered.
     LowSupply,
 }
 
-/// What is known when the device starts.
+/// Data that is logged when the device starts.
 pub struct Start {
     pub address: Address,
     pub dip: u8,
     pub line: config::LineConfig,
-    /// The same, as the UART has it.
+    /// The line settings as the UART uses them.
     pub on_wire: uart::LineSettings,
-    /// By slot.
+    /// The module of each slot.
     pub modules: [Module; SLOTS],
     pub clock: ClockSource,
     pub reset_cause: u8,
@@ -57,11 +57,11 @@ const CAUSES: [&str; 6] = [
     "pin",
 ];
 
-/// Bytes of the longest line, its end included; what is longer is cut.
+/// Bytes of the longest line, including its end. Longer lines are cut.
 const LONGEST: usize = 80;
 
-/// A line in the making. Pieced together by hand: `core::fmt` is large and can panic, and what takes its
-/// place in other firmware expands into code of its own at every line.
+/// A line being composed. It does not use `core::fmt`, which is large and can panic. The usual small replacements
+/// for `core::fmt` expand into more code at every log line.
 struct Text(Vec<u8, LONGEST>);
 
 impl Text {
@@ -78,13 +78,13 @@ impl Text {
         self
     }
 
-    /// A number in decimal.
+    /// Appends a number in decimal.
     fn number(&mut self, number: u32) -> &mut Self {
         let mut place = 1;
         while place <= number / 10 {
             place *= 10;
         }
-        // The last digit's place is 1, and a tenth of that is 0.
+        // The place value of the last digit is 1; dividing it by ten gives 0, which ends the loop.
         while let Some(leading) = number.checked_div(place) {
             self.byte(b'0' + (leading % 10) as u8);
             place /= 10;
@@ -97,7 +97,7 @@ impl Text {
     }
 }
 
-/// A line about the slot of a port.
+/// Begins a line about the slot of a port.
 fn slot(port: u16) -> Text {
     let mut line = Text::of("slot ");
     line.number(port.into()).text(": ");
@@ -113,7 +113,7 @@ impl Log {
         Self(rtt::open())
     }
 
-    /// How the device starts.
+    /// Logs how the device starts.
     pub fn start(&mut self, start: &Start) {
         let format = match start.line.format {
             Format::F8N2 => "8N2",
@@ -178,7 +178,7 @@ impl Log {
         }
     }
 
-    /// Something happened.
+    /// Logs an event.
     pub fn event(&mut self, event: Event) {
         let text = match event {
             Event::ModuleFails(port, error) => {
@@ -203,7 +203,7 @@ impl Log {
         self.write(&mut Text::of(text));
     }
 
-    /// Ends a line and writes it whole, or leaves it out when it does not fit.
+    /// Ends a line and writes it completely, or drops it when it does not fit.
     fn write(&mut self, line: &mut Text) {
         if let Some(channel) = &mut self.0 {
             channel.write(&line.text("\n").0);
@@ -211,7 +211,7 @@ impl Log {
     }
 }
 
-/// What the fault's register calls it.
+/// Returns the code of a fault in the fault record's register.
 const fn kind_of(kind: fault::Kind) -> FaultKind {
     match kind {
         fault::Kind::None => FaultKind::None,
@@ -223,7 +223,7 @@ const fn kind_of(kind: fault::Kind) -> FaultKind {
     }
 }
 
-/// The fault record as its registers have it, from 0x0260 on.
+/// Returns the fault record as its registers, from 0x0260 on.
 pub fn fault_words(record: &fault::FaultRecord) -> [u16; 16] {
     let high = |word: u32| (word >> 16) as u16;
     let low = |word: u32| word as u16;

@@ -1,22 +1,23 @@
-//! The device: tasks, what they share, and nothing else.
+//! The device: the tasks and the resources they share.
 //!
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
-//! | `beat` | TIM4, 1 kHz | 4 | the device's clock; the line's response delay and its check; sets `scan` off. Late, the clock is late |
-//! | `uart` | USART1 | 4 | a byte in or out, driver off at the end. At 921600 bit/s a byte comes every 12 us; later than that and it is lost, which the receiver reports and the frame pays for |
-//! | `gap` | TIM2 | 4 | t1.5 and t3.5. Late, it makes the silence longer, never shorter |
-//! | `limit` | TIM1_CC | 4 | cuts off a reply that does not end. Late, the driver is on for longer |
-//! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | a closed frame becomes a response; an order is carried out when its response is out. Late, the response is late |
-//! | `scan` | EXTI1, pended by `beat` and by a write | 2 | inputs into the device, outputs out of it, its time-outs. Late, it makes up for the time |
-//! | `background` | EXTI0, pended every 10 ms and on orders | 1 | DAC transfers, configuration store, LEDs, log. May be late at no cost |
-//! | `idle` | - | - | feeds the watchdog when all of the above have been alive; sleeps |
+//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan`. If late, the clock is late |
+//! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
+//! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
+//! | `limit` | TIM1_CC | 4 | aborts a reply that does not end. If late, the driver is on for longer |
+//! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
+//! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
+//! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
+//! | `idle` | - | - | refreshes the watchdog when all tasks above have run; sleeps |
 //!
-//! The tasks of priority 4 run from RAM with all they call (`memory.x`): while flash is erased or programmed they go
-//! on, and the others wait, for up to 40 ms.
+//! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
+//! or programmed; the others wait for up to 40 ms.
 //!
-//! `serve`, `scan` and `background` are software tasks in all but name: each is bound to an interrupt that
-//! nothing else uses. Pended while its handler runs, an interrupt comes again, where a second spawn
-//! would be refused and the request left lying; and no executor's panic is linked.
+//! `serve`, `scan` and `background` act as software tasks, but each is bound to an interrupt that nothing else
+//! uses. An interrupt that is pended while its handler runs occurs again afterwards. A second spawn of a running
+//! software task would fail instead, and the request would not be served. With interrupts the image also contains
+//! no panic of an executor.
 
 #![no_std]
 #![no_main]
@@ -55,13 +56,13 @@ mod app {
 
     #[shared]
     struct Shared {
-        /// `None` while SW01 shows no unit address: the line is not served.
+        /// `None` while SW01 is set to no unit address: the line is not served.
         line: Option<Line>,
-        /// Built where it stays: it is too large to be moved over the stack.
+        /// Built in place, because it is too large to be moved over the stack.
         device: &'static mut Device,
-        /// A request for this unit has been served since the LEDs were last set.
+        /// A request for this unit has been served since the LEDs were last updated.
         activity: bool,
-        /// What requests have ordered of the background.
+        /// Commands from requests for the background task.
         orders: Orders,
     }
 
@@ -129,7 +130,7 @@ mod app {
             .line
             .lock(|line| line.as_mut().is_some_and(Line::on_uart));
         if sent {
-            // An order may have waited for this.
+            // A command may have waited for the end of this reply.
             rtic::pend(Interrupt::EXTI3);
         }
     }
@@ -192,7 +193,7 @@ mod app {
         if beat {
             alive::end(fault::marks(), Task::Scan);
         } else {
-            // Only the beats show that it is alive.
+            // Only a scan after a tick of the clock proves that the scan works.
             alive::put_back(fault::marks(), Task::Scan, mark);
         }
     }

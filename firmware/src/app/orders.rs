@@ -1,6 +1,6 @@
-//! What requests order of the background.
+//! Commands from requests for the background task.
 
-/// Several orders may arrive before the background takes them: none replaces another.
+/// Pending commands. Several may arrive before the background task takes them, so each has its own flag.
 #[derive(Default)]
 pub struct Orders {
     pub save: bool,

@@ -1,4 +1,4 @@
-//! The board's flash as the store takes it.
+//! Implements the store's flash trait for the board's flash.
 
 use board_support::flash::{Flash, FlashError};
 use firmware::store::{self, Page};
@@ -17,7 +17,7 @@ const fn address(page: Page) -> u32 {
 }
 
 impl Pages {
-    /// Whether the supply is high enough to change the pages.
+    /// Returns whether the supply is high enough to change the pages.
     pub fn has_supply(&self) -> bool {
         self.0.has_supply()
     }

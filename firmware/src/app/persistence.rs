@@ -1,7 +1,7 @@
-//! Saving the configuration from the background, and restarts, which wait for it.
+//! Saves of the configuration by the background task, and restarts, which wait for a save.
 //!
-//! While the supply is too low for the flash, a save waits where it is, before its first operation or between
-//! two, and goes on once the supply is back. Until then another save is refused as busy.
+//! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
+//! It continues once the supply has recovered. Until then another save is rejected as busy.
 
 use board_support::flash::FlashError;
 use firmware::{
@@ -21,19 +21,19 @@ pub struct Persistence {
     store: Store,
     pages: Pages,
     saving: Option<Saving>,
-    /// The settings that are being saved: a copy, so that requests do not wait while they are encoded.
+    /// A copy of the settings being saved, so that requests do not wait while they are encoded.
     settings: Settings,
-    /// The save's operation that the flash refused because of a low supply.
+    /// The operation of the save that the flash refused because of a low supply.
     refused: Option<Operation>,
-    /// The low supply was logged.
+    /// The low supply has been logged.
     low: bool,
-    /// The page that is no longer needed waits to be erased.
+    /// The page that is no longer needed is to be erased.
     erase: bool,
     restart: bool,
 }
 
 impl Persistence {
-    /// `erase`: the page that is no longer needed could not be erased at the start.
+    /// `erase`: the start could not erase the page that is no longer needed.
     pub fn new(store: Store, pages: Pages, erase: bool) -> Self {
         Self {
             store,
@@ -47,23 +47,23 @@ impl Persistence {
         }
     }
 
-    /// Begins to save what the configuration has set aside for it.
+    /// Begins to save the settings that the configuration has set aside.
     pub fn begin(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
         device.lock(|device| self.settings.clone_from(device.config.to_save()));
         self.saving = Saving::new(&self.store, &self.pages, &self.settings);
         if self.saving.is_none() {
-            // These settings are stored already: no wear.
+            // These settings are already stored, so nothing is written and the flash does not wear.
             self.end(device);
         }
     }
 
-    /// Restarts the device when nothing is being saved, nor waits to be.
+    /// Restarts the device as soon as no save is under way or waiting.
     pub const fn restart_when_done(&mut self) {
         self.restart = true;
     }
 
-    /// Goes on with a save to its end, one flash operation at a time with interrupts in between, or until the
-    /// supply is too low; after its end restarts, if that was ordered.
+    /// Continues a save until its end or until the supply is too low, one flash operation at a time with interrupts
+    /// in between. Then restarts the device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
         let event = self
             .saving
@@ -75,15 +75,15 @@ impl Persistence {
         event
     }
 
-    /// Erases the page that is no longer needed, if there is one, so that the next save that needs it does not have to.
-    /// All but the tasks that run from RAM stand still for up to 40 ms.
+    /// Erases the page that is no longer needed, if there is one, so that the next save does not have to. This
+    /// takes up to 40 ms, during which only the tasks in RAM run.
     pub fn erase(&mut self) {
         if !self.erase || !self.pages.has_supply() {
             return;
         }
         self.erase = false;
-        // When the flash fails, the next save that needs the page tries again; when the supply is too low, this
-        // does.
+        // After a failure of the flash, the next save that needs the page erases it. After a low supply, this
+        // function tries again.
         if let Err(StoreError::Flash(_, FlashError::LowSupply)) =
             self.store.make_spare(&mut self.pages)
         {
@@ -91,7 +91,7 @@ impl Persistence {
         }
     }
 
-    /// The settings are stored. What takes long is worked out while requests are served.
+    /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.
     fn end(&self, device: &mut impl Mutex<T = &'static mut Device>) {
         let started = device.lock(|device| device.config.started());
         let changed = self.settings.needs_restart(&started);
@@ -133,7 +133,7 @@ impl Persistence {
         })
     }
 
-    /// Keeps a save for when the supply is back, which is logged once.
+    /// Keeps a save until the supply has recovered. Returns the event to log, once.
     fn wait(&mut self, saving: Saving) -> Option<Event> {
         self.saving = Some(saving);
         (!core::mem::replace(&mut self.low, true)).then_some(Event::LowSupply)

@@ -1,7 +1,7 @@
-//! The RTT control block that a probe or the simulator looks for in RAM, with one channel up.
+//! The RTT control block, which a debug probe or the simulator finds in RAM, with one up channel.
 //!
-//! As `rtt_target::rtt_init!` does it, but for the panic there when it is called twice: a release image
-//! has none.
+//! This does the same as `rtt_target::rtt_init!`, but that macro panics when it is called twice, and a release
+//! image must not contain a panic.
 
 use core::{
     ffi::CStr,
@@ -15,7 +15,7 @@ use rtt_target::{
     rtt::{RttChannel, RttHeader},
 };
 
-/// Bytes of log that wait for a reader.
+/// Bytes of log kept for the reader.
 const SIZE: usize = 512;
 const NAME: &CStr = c"Terminal";
 
@@ -31,14 +31,14 @@ static mut CONTROL_BLOCK: MaybeUninit<ControlBlock> = MaybeUninit::zeroed();
 static mut BUFFER: [u8; SIZE] = [0; SIZE];
 static OPEN: AtomicBool = AtomicBool::new(false);
 
-/// Opens the channel, which leaves out what no longer fits; `None` when it is open already.
+/// Opens the channel, which drops what does not fit. Returns `None` when it is already open.
 pub fn open() -> Option<UpChannel> {
     if OPEN.swap(true, Ordering::Relaxed) {
         return None;
     }
-    // SAFETY: this comes here once, so nothing else refers to the block and the buffer, which last for
-    // ever. All zeros are a good block, with neither magic number nor channels. Pointer and length are
-    // those of the buffer. The header is last: it is what a reader goes by.
+    // SAFETY: this code runs only once, so nothing else refers to the block and the buffer, which are statics. All
+    // zeros are a valid block, without a magic number or channels. Pointer and length are those of the buffer. The
+    // header is written last, because readers look for it.
     unsafe {
         let block = addr_of_mut!(CONTROL_BLOCK).cast::<ControlBlock>();
         let channel = addr_of_mut!((*block).up).cast::<RttChannel>();

@@ -1,4 +1,4 @@
-//! A scan: inputs into the device, outputs out of it, its time-outs.
+//! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
 use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
 use firmware::{device::IoPort, lamps::TICK_MS};
@@ -15,14 +15,14 @@ use crate::{
     log::Event,
 };
 
-/// Scans between two beats of the background, and between two proofs of life.
+/// Scans per run of the background task, and scans per check that `uart` and `serve` still run.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
 const SCANS_PER_PROOF: u8 = 100;
 
-/// The modules, and what their scans are about.
+/// The modules and the state of their scans.
 pub struct Scanning {
     modules: [Installed; SLOTS],
-    /// Of the settings that the modules were configured with.
+    /// Revision of the settings that the modules were configured with.
     revision: u16,
     sampler: Sampler,
     background_beat: Every,
@@ -30,12 +30,12 @@ pub struct Scanning {
 }
 
 impl Scanning {
-    /// Configures the modules and drives their outputs for the first time. The sampler serves their analog lines.
+    /// Configures the modules and drives their outputs for the first time. The sampler samples their analog lines.
     pub fn new(mut modules: [Installed; SLOTS], sampler: Sampler, device: &Device) -> Self {
         let ports = device.points.ports();
         for (module, port) in modules.iter_mut().zip(ports) {
             module.configure(port.settings());
-            // A module that cannot be driven is told by the first scan.
+            // If a module cannot be driven, the first scan reports it.
             let _ = module.drive_outputs(port.channels());
         }
         Self {
@@ -47,7 +47,8 @@ impl Scanning {
         }
     }
 
-    /// One scan. Whether it is that of a beat, and not only of a write.
+    /// Runs one scan. Returns whether the clock has advanced since the last scan. A write causes a scan without
+    /// that.
     pub fn run(
         &mut self,
         line: &mut impl Mutex<T = Option<Line>>,
@@ -55,7 +56,7 @@ impl Scanning {
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
-        // Filled where they stand: a lock that returns them copies them once more, in every scan.
+        // Filled inside the lock: returning the settings from it would copy them once more in every scan.
         let mut settings = None;
         let (mut channels, revision, uptime_s, beat, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
@@ -63,7 +64,7 @@ impl Scanning {
             let tripped = beat && device.tick(passed);
             let ports = device.points.ports().each_ref();
             let channels = ports.map(|port| *port.channels());
-            // Together with the words, which are in the units that these settings say.
+            // Read under the same lock as the words, because the settings define the units of the words.
             let revision = device.config.revision();
             if revision != self.revision {
                 settings = Some(ports.map(|port| *port.settings()));
@@ -104,7 +105,7 @@ impl Scanning {
 
         for ((port, changed), result) in BOARD.ports().zip(changed).zip(results) {
             if changed {
-                tell(
+                enqueue(
                     events,
                     match result {
                         Ok(()) => Event::ModuleGood(port),
@@ -114,13 +115,13 @@ impl Scanning {
             }
         }
         if tripped {
-            tell(events, Event::CommunicationLost);
+            enqueue(events, Event::CommunicationLost);
         }
         if beat {
             fault::keep_uptime(uptime_s);
             self.look_at_line(line, device, events);
         }
-        // At once when outputs may have changed: they may be the DAC's.
+        // Run the background immediately when outputs may have changed: they may be those of a DAC.
         if self.background_beat.is_due() || !beat || tripped {
             rtic::pend(Interrupt::EXTI0);
         }
@@ -139,28 +140,28 @@ impl Scanning {
                 let repairs = &mut device.state.line_repairs;
                 *repairs = repairs.saturating_add(1);
             });
-            tell(events, Event::LineRepaired);
+            enqueue(events, Event::LineRepaired);
         }
         if self.proof_beat.is_due() {
-            // A silent line gives these two no reason to run. Called for nothing they do
-            // nothing, but show that they could.
+            // On a silent line nothing triggers these two tasks. Without a cause they do nothing but set their
+            // marks.
             rtic::pend(Interrupt::USART1);
             rtic::pend(Interrupt::EXTI3);
         }
     }
 }
 
-/// Takes note of the channels that failed. Whether others did before.
+/// Stores which channels failed. Returns whether that differs from before.
 fn take_failures(port: &mut IoPort, result: Result<(), ModuleError>, beat: bool) -> bool {
     let before = port.failing();
     let failed = result.map_or_else(ModuleError::channels, |()| 0);
-    // Only a whole scan shows that all is well.
+    // Only a scan that also reads the inputs can show that a channel works again.
     let now = if beat { failed } else { failed | before };
     port.set_failing(now);
     now != before
 }
 
-fn tell(events: &mut Producer<'static, Event>, event: Event) {
-    // A full queue loses a log line, no more.
+fn enqueue(events: &mut Producer<'static, Event>, event: Event) {
+    // When the queue is full, only a log line is lost.
     let _ = events.enqueue(event);
 }

@@ -1,11 +1,11 @@
-//! A request from its port to its reply.
+//! Serves a request, from its port to its reply.
 //!
 //! ```text
 //! line    take: reply starts          answer           finish
-//! device  .....................decide........carry out.......   <- what is written or read, in one lock each
+//! device  .....................decide........carry out.......   <- one lock for each phase
 //! ```
 //!
-//! Between the phases no lock is held, and in the line's no more is done than has to be: its interrupts wait.
+//! No lock is held between the phases. The locks of the line are kept short, because its interrupts wait for them.
 
 use board_support::pac::Interrupt;
 use firmware::start_up::LOADER_UNIT;
@@ -18,14 +18,14 @@ use crate::{board::Device, line::Line, orders::Orders};
 /// The server of a line.
 pub struct Serving {
     server: Server,
-    /// The unit address.
+    /// Unit address.
     unit: u8,
-    /// The silence that ends a frame, in ms, rounded up.
+    /// Silence that ends a frame, in ms, rounded up.
     frame_gap_ms: u32,
 }
 
 impl Serving {
-    /// `frame_gap_ms`: the silence that ends a frame, rounded up.
+    /// `frame_gap_ms` is the silence that ends a frame, in ms, rounded up.
     pub const fn new(server: Server, unit: u8, frame_gap_ms: u32) -> Self {
         Self {
             server,
@@ -34,7 +34,8 @@ impl Serving {
         }
     }
 
-    /// Serves the request that waits, if any, after the order of the one before it. Whether there was one.
+    /// Serves the waiting request, if any, after executing the command of the previous request. Returns whether
+    /// there was a request.
     pub fn run(
         &mut self,
         line: &mut impl Mutex<T = Option<Line>>,
@@ -42,14 +43,14 @@ impl Serving {
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
         let delay_ms = self.delay_ms(device);
-        // The unit address leaves while all that follows is being done.
+        // The UART sends the unit address while the code below runs.
         let (silent, request) = line.lock(|line| {
             line.as_mut().map_or((true, None), |line| {
                 (!line.is_replying(), line.take(&self.server, delay_ms))
             })
         });
         if silent {
-            // The reply of the request before is out, or never comes.
+            // The previous reply has been sent, or will never be sent.
             pass_order_on(device, orders);
         }
         request.is_some_and(|request| self.serve(request, line, device))
@@ -57,7 +58,7 @@ impl Serving {
 
     fn delay_ms(&self, device: &mut impl Mutex<T = &'static mut Device>) -> u16 {
         if self.unit == LOADER_UNIT {
-            // A master must find a unit in loader mode, however short the master's time-out is.
+            // In loader mode a unit must be found even by a master with a short time-out.
             0
         } else {
             device.lock(|device| device.config.response_delay_ms())
@@ -82,7 +83,7 @@ impl Serving {
             if Device::shows_counters(&decision.work) {
                 device.state.counters = server.counters();
             }
-            // In listen-only mode the outputs are to fall to SAFE.
+            // In listen-only mode requests do not count, so that the outputs go to SAFE.
             if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
                 device.request_seen(committed.ended().wrapping_sub(self.frame_gap_ms));
             }
@@ -92,7 +93,7 @@ impl Serving {
         if decision.work.writes() {
             rtic::pend(Interrupt::EXTI1);
             if !decision.is_answered() {
-                // No reply to wait for: an order is carried out now.
+                // There is no reply to wait for, so execute the command now.
                 rtic::pend(Interrupt::EXTI3);
             }
         }
@@ -100,7 +101,7 @@ impl Serving {
     }
 }
 
-/// Carries the last request's order out, or passes it on to the background.
+/// Executes the command of the last request, or passes it on to the background task.
 fn pass_order_on(
     device: &mut impl Mutex<T = &'static mut Device>,
     orders: &mut impl Mutex<T = Orders>,

@@ -1,15 +1,15 @@
-//! The LEDs, set once a beat of their patterns.
+//! Sets the LEDs, once per step of their patterns.
 
 use board_support::Leds;
 use firmware::lamps::{Lamps, TICK_MS, Trouble};
 
-/// The LEDs and what they show.
+/// The LEDs and their patterns.
 pub struct Signals {
     leds: Leds,
     lamps: Lamps,
-    /// When they were last set, in milliseconds since the start.
+    /// Time when the LEDs were last set, in milliseconds since the start.
     set_at: u32,
-    /// What is wrong for as long as the device runs.
+    /// A fault that lasts as long as the device runs.
     standing: Trouble,
 }
 
@@ -23,12 +23,13 @@ impl Signals {
         }
     }
 
-    /// COMMAND 6: all LEDs blink for a while.
+    /// COMMAND 6: makes all LEDs blink for 10 s.
     pub const fn identify(&mut self) {
         self.lamps.identify();
     }
 
-    /// Sets them, if it is time. `request`, asked then alone: has one been served since?
+    /// Sets the LEDs, if their next step is due. `request` is only called then and returns whether a request has
+    /// been served since the last call.
     pub fn show(&mut self, millis: u32, module_fails: bool, request: impl FnOnce() -> bool) {
         if millis.wrapping_sub(self.set_at) < u32::from(TICK_MS) {
             return;

@@ -1,4 +1,4 @@
-//! Start-up: from the board and what is stored to everything the tasks need.
+//! Start-up: creates everything that the tasks need from the board and the stored configuration.
 
 use core::mem::MaybeUninit;
 
@@ -33,12 +33,12 @@ use crate::{
 /// The highest priority of a task whose code is in flash.
 const SERVE_PRIORITY: u8 = 3;
 
-/// What start-up brings about.
+/// The result of the start-up.
 pub struct Started {
     pub line: Option<Line>,
-    /// The unit address.
+    /// Unit address.
     pub unit: u8,
-    /// The silence that ends a frame, in ms, rounded up.
+    /// Silence that ends a frame, in ms, rounded up.
     pub frame_gap_ms: u32,
     pub server: Server,
     pub device: &'static mut Device,
@@ -52,8 +52,8 @@ pub struct Started {
     pub trouble: Trouble,
 }
 
-/// Brings everything up, outputs first: they are driven by START as soon as the configuration is
-/// known, and the line is served last, when there is something to serve.
+/// Starts everything. The outputs come first: they are set to START as soon as the configuration is known. The line
+/// is enabled last, when everything that serves it is ready.
 pub fn up(
     device: pac::Peripherals,
     scb: &SCB,
@@ -101,14 +101,14 @@ pub fn up(
         faults: board.faults,
         config_invalid: loaded.invalid,
     });
-    // Erases, where it has to: the line is not served yet.
+    // This may erase pages. The line is not served yet.
     let prepared = store.prepare(&mut pages);
     match prepared {
         Ok(()) => {}
         Err(StoreError::Flash(_, FlashError::LowSupply)) => log.event(log::Event::LowSupply),
         Err(_) => log.event(log::Event::SaveFailed),
     }
-    // An erase that is still missing is done by the background, as after a change of pages.
+    // An erase that failed here is done by the background task, as after a change of pages.
     let erase = prepared.is_err() && !store.has_spare();
 
     let framing = match settings.mode {
@@ -139,7 +139,7 @@ pub fn up(
             limit_us,
         };
         let (uart, gap) = board.line.start(on_wire, times)?;
-        // The count may begin just before a beat.
+        // The count may begin just before a tick.
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
         Some(Line::new(Rs485Uart(uart), Rs485Gap(gap), port, longest_ms))
@@ -162,8 +162,8 @@ pub fn up(
     }
 }
 
-/// The longest reply in microseconds: the longest frame, the half of a millisecond that the server takes for it, and 2 %
-/// for the difference between two clocks.
+/// Returns the duration of the longest reply in microseconds: the longest frame, half a millisecond that the server
+/// takes for it, and 2 % for the difference between two clocks.
 fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {
@@ -171,7 +171,7 @@ fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
         Framing::Ascii { .. } => 513,
     };
     let bits = characters * line.format.bits();
-    // At most 513 * 11 bits, so that the product fits 32 bits.
+    // At most 513 * 11 bits, so the product fits 32 bits.
     let us = bits * 10_000 / (line.baud / 100).max(1);
     us + us / 50 + 500
 }

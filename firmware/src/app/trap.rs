@@ -1,16 +1,15 @@
-//! What happens when the program is wrong, or the crystal dies: outputs safe, a note of what it was for
-//! the next start, and a reset. Nothing here relies on the interrupted program being sound, or on there
-//! being any stack left.
+//! Handles panics, faults and a failure of the crystal: sets the outputs to a safe state, notes the cause for the
+//! next start, and resets the device. Nothing here relies on the interrupted program or on free space on the stack.
 //!
 //! | trap | noted as |
 //! |---|---|
-//! | panic | panic; there is none in a release image, see `cargo xtask build` |
-//! | HardFault, to which every other fault of the core escalates | hard fault, or stack overflow |
-//! | NMI | crystal failed: the clock security system is all that raises it (RM0008 7.2.7, table 63) |
+//! | panic | panic; a release image contains none, see `cargo xtask build` |
+//! | HardFault; every other fault of the core escalates to it | hard fault, or stack overflow |
+//! | NMI | crystal failed; only the clock security system raises the NMI (RM0008 7.2.7, table 63) |
 //! | an interrupt without a handler | hard fault with CFSR 0 |
 //!
-//! Safe is: the lines of all slots floating and the RS-485 driver off. An analog module's DAC is out of reach
-//! and keeps its last codes until the next start writes them.
+//! In the safe state the lines of all slots float and the RS-485 driver is off. The handlers cannot reach the DAC
+//! of an analog module; it keeps its last codes until the next start writes them.
 
 use core::{arch::naked_asm, panic::PanicInfo, ptr};
 
@@ -21,20 +20,20 @@ use board_support::{
 use cortex_m::{interrupt, peripheral::SCB};
 
 unsafe extern "C" {
-    /// The stack's ends, placed by memory.x.
+    /// End of the stack, defined by memory.x.
     static _stack_end: u32;
     static _stack_start: u32;
 }
 
-/// Bytes of stack that [`on_trap`] may use, with what it calls.
+/// Bytes of stack that [`on_trap`] and the functions it calls may use.
 const ROOM: u32 = 512;
 
-/// Words of the frame that an exception stacks (PM0056 2.3.7).
+/// Number of words in the frame that an exception stacks (PM0056 2.3.7).
 const FRAME_WORDS: u32 = 8;
 const FRAME_LR: usize = 5;
 const FRAME_PC: usize = 6;
 
-/// The numbers of the exceptions in ICSR (PM0056 4.4.3).
+/// Exception numbers in ICSR (PM0056 4.4.3).
 const NMI: u32 = 2;
 
 #[panic_handler]
@@ -47,16 +46,16 @@ fn panic(_info: &PanicInfo<'_>) -> ! {
     })
 }
 
-/// The entry of all the traps: on a stack that is at its end the first push of an ordinary function
-/// would fault again, and lock the core up. So first of all, unless the stack pointer is good and has
-/// [`ROOM`] below it, it goes back to the top; nothing returns to what lies there. Then `on_trap` with
+/// Entry point of all traps. When the stack is exhausted, the first push of an ordinary function would fault again
+/// and lock the core up. Therefore this code first sets the stack pointer back to the top, unless it is valid with
+/// at least [`ROOM`] bytes below it; nothing returns to the data that is overwritten. Then it calls `on_trap` with
 /// the stack pointer as the exception left it.
-// SAFETY: cortex-m-rt's vector table has this name for the exception. It never returns.
+// SAFETY: cortex-m-rt's vector table has this name for the exception. The function never returns.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn HardFault() -> ! {
     naked_asm!(
-        // No interrupt comes between any more.
+        // Disable all interrupts.
         "cpsid i",
         "mov r0, sp",
         "ldr r1, ={end}",
@@ -82,7 +81,7 @@ unsafe extern "C" fn NonMaskableInt() -> ! {
     naked_asm!("b {entry}", entry = sym HardFault)
 }
 
-// SAFETY: as above; the name of every vector that has no handler of its own.
+// SAFETY: as above; cortex-m-rt uses this name for every vector without a handler of its own.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn DefaultHandler() -> ! {
@@ -118,15 +117,15 @@ fn end(fault: Fault) -> ! {
     restart()
 }
 
-/// Where the program was, from the frame the exception stacked; `None` when it cannot have been stacked
-/// whole.
+/// Returns where the program was, from the frame that the exception stacked, or `None` when the frame cannot be
+/// complete.
 fn interrupted(stack_pointer: u32) -> Option<(u32, u32)> {
     let whole = stack_pointer >= stack::bottom()
         && stack_pointer <= stack::top().saturating_sub(FRAME_WORDS * 4)
         && stack_pointer.is_multiple_of(4);
     let frame = stack_pointer as *const u32;
-    // SAFETY: eight words of the stack, which is RAM; what they hold may be anything. This function's own
-    // stack is below them, or starts over at the top while they are at the bottom.
+    // SAFETY: these are eight words of the stack, which is RAM and may hold any values. This function's own stack
+    // lies below them. After a stack overflow it starts again at the top, while they are at the bottom.
     whole.then(|| unsafe {
         (
             ptr::read_volatile(frame.add(FRAME_PC)),
@@ -135,7 +134,7 @@ fn interrupted(stack_pointer: u32) -> Option<(u32, u32)> {
     })
 }
 
-/// The address whose access failed, 0 when it is not known (PM0056 4.4.11 to 4.4.14).
+/// Returns the address whose access failed, or 0 when it is not known (PM0056 4.4.11 to 4.4.14).
 fn failed_address(scb: &cortex_m::peripheral::scb::RegisterBlock, status: u32) -> u32 {
     const MMAR_VALID: u32 = 1 << 7;
     const BFAR_VALID: u32 = 1 << 15;

@@ -1,4 +1,4 @@
-//! The settings as the rest of the device takes them: typed, and those in force.
+//! The settings in force, as typed values for the rest of the device.
 
 use modio_drivers::{ChannelSettings, Scale, Signal};
 use register_map::Module;
@@ -8,23 +8,23 @@ use register_map::points::{self, CHANNELS};
 
 use super::Settings;
 
-/// The RS-485 line.
+/// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineConfig {
-    /// Speed.
+    /// Baud rate.
     pub baud: Baud,
     /// Parity and stop bits.
     pub format: Format,
     /// RTU or ASCII.
     pub mode: Mode,
-    /// Silence that ends a frame, in 0.1 ms, 5 to 1000; `None`: t3.5 by the standard.
+    /// Silence that ends a frame, in 0.1 ms, 5 to 1000; `None` stands for t3.5 as in the standard.
     pub frame_gap: Option<u16>,
-    /// What becomes of a frame with a gap above t1.5 in it.
+    /// What to do with a frame that contains a gap longer than t1.5.
     pub gap_rule: GapRule,
 }
 
 impl LineConfig {
-    /// As the factory sets it: 9600 8N2 RTU. The loader mode has this whatever is stored.
+    /// The factory setting: 9600 8N2 RTU. The loader mode always uses it.
     pub const FACTORY: Self = Self {
         baud: Baud::B9600,
         format: Format::F8N2,
@@ -45,17 +45,18 @@ impl LineConfig {
     }
 }
 
-/// The settings by point of one point, for the module in force.
+/// The settings in force of one point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Point {
-    /// How its channel is read or driven.
+    /// Settings of the channel that reads or drives the point.
     pub settings: ChannelSettings,
-    /// Output when the line falls silent: 0 or 1 for a bit, 0 to 4095 raw for a word; `None`: hold.
+    /// Output when the line is silent for too long: 0 or 1 for a bit, 0 to 4095 raw for a word; `None` holds the
+    /// output.
     pub safe: Option<u16>,
 }
 
 impl Point {
-    /// Of a point, 0 to 31.
+    /// Returns the settings of a point, 0 to 31.
     pub(super) fn of(settings: &Settings, point: u16) -> Self {
         let get = |first: u16| settings.get(first.wrapping_add(point));
         Self {
@@ -70,17 +71,17 @@ impl Point {
     }
 }
 
-/// A port's module and its outputs at power-on.
+/// The module of a port and its outputs at power-on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PortConfig {
     /// The module.
     pub module: Module,
-    /// START by channel: 0 or 1 for a bit, 0 to 4095 raw for a word.
+    /// START of each channel: 0 or 1 for a bit, 0 to 4095 raw for a word.
     pub start: [u16; CHANNELS as usize],
 }
 
 impl PortConfig {
-    /// Of a port, 1 to 8.
+    /// Returns the configuration of a port, 1 to 8.
     pub(super) fn of(settings: &Settings, port: u16) -> Self {
         let first = points::of_port(port);
         let mut start = [0; CHANNELS as usize];

@@ -1,18 +1,18 @@
-//! The configuration, registers 0x0100 to 0x01FF: what a master may write when, what has been written,
-//! what is stored, and what is in force.
+//! The configuration, registers 0x0100 to 0x01FF: which writes are allowed, the edited settings, the stored
+//! settings and the settings in force.
 //!
-//! There are three states of a setting:
+//! A setting has three values:
 //!
 //! ```text
 //!   write          COMMAND 1                    restart
-//!   -----> edited -----------> saved (flash) -----------> in force, of those that need a restart
+//!   -----> edited -----------> saved (flash) -----------> in force (settings that need a restart)
 //!            |  ^                  |
 //!            |  +--- COMMAND 4 ----+
-//!            +--> in force at once, of the others
+//!            +--> in force immediately (all other settings)
 //! ```
 //!
-//! A master reads back what was edited. The lock counts as it is when a request comes in, so KEY and
-//! settings in one request need it open already.
+//! A master reads back the edited values. A write is checked against the lock before it opens the lock, so a
+//! request that writes KEY and settings together needs the lock to be open already.
 
 mod in_force;
 mod lock;
@@ -38,36 +38,36 @@ pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, takes_module};
 
-/// The configuration of a running device on a board with so many slots.
+/// The configuration of a running device on a board with `SLOTS` slots.
 #[derive(Debug)]
 pub struct Config<const SLOTS: usize> {
     board: &'static Board,
     edited: Settings,
-    /// What is stored, or what is just being stored.
+    /// The stored settings, or those being stored.
     saved: Settings,
-    /// How many of `edited` differ from `saved`.
+    /// Number of settings in `edited` that differ from `saved`.
     differences: u16,
     /// A save was ordered and is not complete.
     saving: bool,
     lock: Lock,
     line: LineConfig,
-    /// Of the ports with slots.
+    /// Modules and START values of the ports with slots.
     ports: [PortConfig; SLOTS],
-    /// The settings that need a restart, as they were at the start.
+    /// The settings that need a restart, with their values at the start.
     started: [u16; RESTARTS],
-    /// What was stored at the start was not good, or not all of it.
+    /// The stored configuration was damaged or contained rejected values at the start.
     invalid: bool,
-    /// A saved change waits for a restart.
+    /// A saved change takes effect after a restart.
     waiting: bool,
-    /// Ports whose MODULE has been another than the one in force since the start, or since changes were
-    /// last dropped; the board's first port in bit 0.
+    /// Ports whose MODULE has differed from the one in force since the start, or since changes were last dropped.
+    /// Bit 0 is the board's first port.
     left: u8,
     revision: u16,
 }
 
 impl<const SLOTS: usize> Config<SLOTS> {
-    /// The configuration at the start, on a board with `SLOTS` slots. `invalid`: what was stored is not good, or a
-    /// part of it, and has defaults in its place.
+    /// Creates the configuration at the start, on a board with `SLOTS` slots. `invalid` says that the stored
+    /// settings were damaged, or that some were rejected, and defaults are used instead.
     #[must_use]
     #[inline(never)]
     pub fn new(board: &'static Board, stored: Settings, invalid: bool) -> Self {
@@ -94,11 +94,11 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    /// May these registers be read?
+    /// Checks whether these registers can be read.
     ///
     /// # Errors
     ///
-    /// 02 where there is a gap.
+    /// Exception 02 when the span contains a gap.
     pub fn check_read(&self, span: Span) -> Result<(), Exception> {
         match runs(RULES, span.start(), span.count()) {
             Some(_) => Ok(()),
@@ -106,7 +106,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    /// Pushes every register of a span that [`Self::check_read`] found good.
+    /// Appends every register of a span that [`Self::check_read`] has accepted.
     pub fn read(&self, span: Span, out: &mut WordsOut<'_>) {
         let mut values = self.edited.slice(span.start(), span.count()).iter();
         if span.start() == KEY {
@@ -116,13 +116,14 @@ impl<const SLOTS: usize> Config<SLOTS> {
         values.for_each(|value| out.push(*value));
     }
 
-    /// May these registers be written with these values?
+    /// Checks whether these registers can be written with these values.
     ///
     /// # Errors
     ///
-    /// The first of: 02, a gap; 03, a value not allowed, for a setting by point also by its module as
-    /// chosen last, or a FORMAT with seven data bits in RTU mode; 06, the lock is closed and it is not KEY alone, or a save is ordered before the
-    /// last is complete.
+    /// The first that applies: 02 for a gap; 03 for a value that is not allowed, including a setting by point that
+    /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 when the lock is
+    /// closed and the request does not write KEY alone, or when a save is ordered before the previous one is
+    /// complete.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         let runs = runs(RULES, span.start(), span.count());
         let runs = runs.ok_or(Exception::IllegalDataAddress)?;
@@ -145,8 +146,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
         Ok(())
     }
 
-    /// Whether values for points are such as their ports' modules allow, and values for MODULE such as the board's
-    /// slots allow.
+    /// Returns whether values for points are allowed by the modules of their ports, and values for MODULE by the
+    /// board's slots.
     fn suits_the_ports(&self, run: Run, words: Words<'_>) -> bool {
         if run.rule.first == MODULE {
             return (run.index..)
@@ -156,7 +157,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let Some(narrower) = run.rule.narrower else {
             return true;
         };
-        // Points of ports without a slot have no module that could ask for less.
+        // Ports without a slot have no module that could restrict their points.
         self.board.ports().all(|port| {
             let kinds = self.edited.module(port).points();
             (points::of_port(port)..).zip(kinds).all(|(point, kind)| {
@@ -168,7 +169,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         })
     }
 
-    /// Whether FORMAT and MODE can be used together once these values are written.
+    /// Returns whether FORMAT and MODE are compatible once these values are written.
     fn suits_the_mode(&self, span: Span, words: Words<'_>) -> bool {
         let written = |address: u16| words.get(address.wrapping_sub(span.start()));
         match (written(FORMAT), written(MODE)) {
@@ -180,14 +181,15 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    /// Writes registers that [`Self::check_write`] found good, and opens the lock or keeps it open. A
-    /// command is given back: it is to be carried out when the response is out, before the next request.
+    /// Writes registers that [`Self::check_write`] has accepted, and opens the lock or keeps it open. Returns the
+    /// command to execute, if one was written. The caller must execute it after the response has been sent and
+    /// before the next request.
     ///
-    /// - [`Command::Save`]: [`Self::begin_save`] and what follows from it.
+    /// - [`Command::Save`]: [`Self::begin_save`], then the save itself.
     /// - [`Command::LoadDefaults`], [`Command::DropChanges`]: the method of that name.
-    /// - [`Command::Restart`], [`Command::EnterLoader`]: not before a running save is complete,
+    /// - [`Command::Restart`], [`Command::EnterLoader`]: only when no save is running,
     ///   [`Self::is_saving`].
-    #[must_use = "a command is for the caller to carry out"]
+    #[must_use = "the caller must execute the command"]
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
         self.lock.open();
         if span.start() >= FILTER {
@@ -209,7 +211,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         command
     }
 
-    /// Writes registers that have no effect on others.
+    /// Writes registers that do not affect other registers.
     fn write_plain(&mut self, span: Span, words: Words<'_>) {
         let edited = self.edited.slice_mut(span.start(), span.count()).iter_mut();
         let saved = self.saved.slice(span.start(), span.count());
@@ -235,65 +237,65 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    /// COMMAND 3: every setting to its default. Saved are they not.
+    /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
         self.edited = Settings::defaults();
         self.edited_anew();
     }
 
-    /// COMMAND 4: every setting to what is saved.
+    /// COMMAND 4: sets every setting to its saved value.
     pub fn drop_changes(&mut self) {
         self.edited.clone_from(&self.saved);
         self.left = 0;
         self.edited_anew();
     }
 
-    /// COMMAND 1: takes the settings as they are now to be saved; changes made from now on are not
-    /// among them. [`Self::to_save`] has them until [`Self::end_save`] or [`Self::save_failed`].
+    /// COMMAND 1: copies the present settings for a save, which later changes do not affect. [`Self::to_save`]
+    /// returns the copy until [`Self::end_save`] or [`Self::save_failed`].
     pub fn begin_save(&mut self) {
         self.saving = true;
         self.saved.clone_from(&self.edited);
         self.differences = 0;
     }
 
-    /// The settings that [`Self::begin_save`] took.
+    /// Returns the settings that [`Self::begin_save`] copied.
     #[must_use]
     pub const fn to_save(&self) -> &Settings {
         &self.saved
     }
 
-    /// The settings in force since the start that count only after a restart.
+    /// Returns the settings that need a restart, with the values in force since the start.
     #[must_use]
     pub const fn started(&self) -> RestartValues {
         RestartValues(self.started)
     }
 
-    /// The save is complete; `changed` says whether the saved settings need a restart to be in force,
+    /// Ends a successful save. `changed` says whether the saved settings need a restart to be in force, see
     /// [`Settings::needs_restart`].
     pub const fn end_save(&mut self, changed: bool) {
         self.saving = false;
         self.waiting = self.left != 0 || changed;
     }
 
-    /// The save did not succeed; `stored` is what is stored, as before.
+    /// Ends a save that failed. `stored` is what the flash still holds.
     pub fn save_failed(&mut self, stored: Settings) {
         self.saved = stored;
         self.differences = self.edited.differences(&self.saved);
         self.saving = false;
     }
 
-    /// Whether a save was ordered and is not complete.
+    /// Returns whether a save was ordered and is not complete.
     #[must_use]
     pub const fn is_saving(&self) -> bool {
         self.saving
     }
 
-    /// Lets time pass, in milliseconds: the lock closes 60 s after the last write.
+    /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write.
     pub fn tick(&mut self, ms: u32) {
         self.lock.tick(ms);
     }
 
-    /// The bits of the status register that are the configuration's: 1, 3, 4 and 5.
+    /// Returns bits 1, 3, 4 and 5 of the status register, which the configuration defines.
     #[must_use]
     pub const fn status(&self) -> u16 {
         const fn bit(mask: u16, set: bool) -> u16 {
@@ -305,33 +307,36 @@ impl<const SLOTS: usize> Config<SLOTS> {
             | bit(status::UNLOCKED, self.lock.is_open())
     }
 
-    /// Goes up, and wraps, whenever a setting may have changed: to tell what has copies of settings.
+    /// Returns a counter that changes whenever a setting may have changed; it wraps. Code with copies of settings
+    /// compares it.
     #[must_use]
     pub const fn revision(&self) -> u16 {
         self.revision
     }
 
-    /// The RS-485 line in force.
+    /// Returns the settings of the RS-485 line in force.
     #[must_use]
     pub const fn line(&self) -> LineConfig {
         self.line
     }
 
-    /// The board.
+    /// Returns the board.
     #[must_use]
     pub const fn board(&self) -> &'static Board {
         self.board
     }
 
-    /// The modules in force and their outputs at power-on, of every port that has a slot, in the order of the ports.
+    /// Returns the modules in force and their outputs at power-on, for every port with a slot, in the order of the
+    /// ports.
     #[must_use]
     pub const fn ports(&self) -> &[PortConfig; SLOTS] {
         &self.ports
     }
 
-    /// The settings in force of a port's points, by channel; `index` counts the ports that have a slot. `None` once
-    /// the port's MODULE has been changed, up to the restart, even if it was changed back: the settings by point went
-    /// to the new module's defaults, and for what runs those hold that were given here last.
+    /// Returns the settings in force of a port's points, by channel. `index` counts the ports with a slot. Returns
+    /// `None` from a change of the port's MODULE until the restart, even when the change was reverted: the change
+    /// has reset the settings by point to the new module's defaults, so the running module keeps the settings that
+    /// were returned last.
     #[must_use]
     pub fn points(&self, index: usize) -> Option<impl Iterator<Item = Point>> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
@@ -341,14 +346,14 @@ impl<const SLOTS: usize> Config<SLOTS> {
         })
     }
 
-    /// COMM_TIMEOUT in milliseconds, up to an hour; `None`: the communication watchdog is off.
+    /// Returns COMM_TIMEOUT in milliseconds, up to an hour, or `None` when the communication watchdog is off.
     #[must_use]
     pub fn comm_timeout_ms(&self) -> Option<u32> {
         let tenths = self.edited.get(COMM_TIMEOUT);
         (tenths != 0).then_some(u32::from(tenths) * 100)
     }
 
-    /// RESPONSE_DELAY in milliseconds, 0 to 1000.
+    /// Returns RESPONSE_DELAY in milliseconds, 0 to 1000.
     #[must_use]
     pub fn response_delay_ms(&self) -> u16 {
         self.edited.get(RESPONSE_DELAY)

@@ -5,26 +5,26 @@ use register_map::configuration::{self, BY_POINT, COMMAND, FORMAT, KEY, MODE, MO
 use register_map::points::{self, Kind};
 use register_map::{Board, InForce, Module, Rule, rule_at};
 
-/// The high byte of every configuration address; the low byte is the place in [`Settings`].
+/// High byte of every configuration address. The low byte is the index in [`Settings`].
 const PAGE: u16 = KEY >> 8;
 
-/// How many settings count only after a restart.
+/// Number of settings that need a restart.
 pub(super) const RESTARTS: usize = restarts();
 
-/// The values of all settings that count only after a restart, in the order of their addresses.
+/// The values of all settings that need a restart, in the order of their addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RestartValues(pub(super) [u16; RESTARTS]);
 
-/// A value for every register of the configuration. They fit each other: a setting by point is one that
-/// the point's module allows.
+/// A value for every register of the configuration. The values are consistent: a setting by point is always one
+/// that the point's module allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// By the low byte of the address. KEY, COMMAND and gaps hold 0.
+    /// Indexed by the low byte of the address. KEY, COMMAND and gaps hold 0.
     values: [u16; 256],
 }
 
 impl Settings {
-    /// As the factory sets them.
+    /// Returns the factory settings.
     #[must_use]
     pub fn defaults() -> Self {
         let mut settings = Self { values: [0; 256] };
@@ -34,14 +34,13 @@ impl Settings {
         settings
     }
 
-    /// The settings that a record's pairs of address and value amount to, in whatever order they come,
-    /// and how many values were not allowed on this board and have their default instead. Addresses not known here
-    /// are passed over.
+    /// Returns the settings from a record's pairs of address and value, in any order, and the number of values that
+    /// this board does not allow and that have their default instead. Unknown addresses are ignored.
     #[must_use]
     pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)> + Clone) -> (Self, u16) {
         let mut settings = Self::defaults();
         let mut rejected: u16 = 0;
-        // What a setting by point may be depends on the modules, so these come first.
+        // Load the modules first, because they determine which settings by point are allowed.
         for modules in [true, false] {
             for (address, value) in pairs.clone() {
                 let Some((rule, _)) = rule_at(RULES, address).filter(|(rule, _)| holds(rule))
@@ -61,7 +60,7 @@ impl Settings {
                 }
             }
         }
-        // Each of the two may be allowed and the pair not.
+        // Each of the two may be allowed alone but not in combination.
         if !format_suits_mode(settings.get(FORMAT), settings.get(MODE)) {
             settings.put(FORMAT, Format::F8N2.code());
             rejected = rejected.saturating_add(1);
@@ -69,7 +68,7 @@ impl Settings {
         (settings, rejected)
     }
 
-    /// The value of a setting; 0 for an address that holds none.
+    /// Returns the value of a setting, or 0 for an address without one.
     #[inline(never)]
     #[must_use]
     pub fn get(&self, address: u16) -> u16 {
@@ -80,14 +79,14 @@ impl Settings {
         }
     }
 
-    /// The module chosen for a port, 1 to 8.
+    /// Returns the module chosen for a port, 1 to 8.
     #[must_use]
     pub fn module(&self, port: u16) -> Module {
         let address = MODULE.wrapping_add(port.wrapping_sub(1));
         Module::from_code(self.get(address)).unwrap_or(Module::None)
     }
 
-    /// What the modules make of a point, 0 to 31.
+    /// Returns the kind of a point, 0 to 31, with the chosen module.
     #[must_use]
     pub fn kind(&self, point: u16) -> Kind {
         let kinds = self.module(point / points::CHANNELS + 1).points();
@@ -95,7 +94,7 @@ impl Settings {
         kinds.get(channel).copied().unwrap_or(Kind::None)
     }
 
-    /// Every setting that differs from its default, from this address on, in ascending order.
+    /// Returns every setting from this address on that differs from its default, in ascending order.
     #[must_use]
     pub const fn changed_from(&self, first: u16) -> Changed<'_> {
         Changed {
@@ -104,7 +103,7 @@ impl Settings {
         }
     }
 
-    /// Sets a value, which must be allowed. With MODULE go the settings of the port's points.
+    /// Sets a value, which must be allowed. Setting MODULE also changes the settings of the port's points.
     pub(super) fn set(&mut self, address: u16, value: u16) {
         match port_of(address) {
             Some(port) => self.choose_module(port, value),
@@ -112,7 +111,7 @@ impl Settings {
         }
     }
 
-    /// The values from one address to before another, for what neither MODULE, KEY nor COMMAND are in.
+    /// Returns `count` values from an address on, to be changed. The range must not contain MODULE, KEY or COMMAND.
     #[inline]
     pub(super) fn slice_mut(&mut self, start: u16, count: u16) -> &mut [u16] {
         let start = usize::from(start & 0xFF);
@@ -120,7 +119,7 @@ impl Settings {
         self.values.get_mut(start..end).unwrap_or_default()
     }
 
-    /// The values from one address to before another.
+    /// Returns `count` values from an address on.
     #[inline]
     pub(super) fn slice(&self, start: u16, count: u16) -> &[u16] {
         let start = usize::from(start & 0xFF);
@@ -128,33 +127,34 @@ impl Settings {
         self.values.get(start..end).unwrap_or_default()
     }
 
-    /// How many settings differ from those.
+    /// Returns the number of settings that differ from those of `from`.
     pub(super) fn differences(&self, from: &Self) -> u16 {
         let pairs = self.values.iter().zip(&from.values);
-        // There are 256 at most.
+        // There are at most 256.
         pairs.map(|(a, b)| u16::from(a != b)).sum()
     }
 
-    /// Whether these settings differ from those in force since the start in one that counts only after a restart.
+    /// Returns whether a setting that needs a restart differs from its value in force since the start.
     #[must_use]
     pub fn needs_restart(&self, started: &RestartValues) -> bool {
         !self.restart_values().eq(started.0.iter().copied())
     }
 
-    /// The settings that count only after a restart, in the order of their addresses.
+    /// Returns the settings that need a restart, in the order of their addresses.
     pub(super) fn restart_values(&self) -> impl Iterator<Item = u16> {
         Addresses::from(KEY)
             .filter(|(rule, _)| rule.in_force == InForce::Restart)
             .map(|(_, address)| self.get(address))
     }
 
-    /// The kind of the point that a setting is for; none for what is no setting by point.
+    /// Returns the kind of the point of a setting by point, or none for other settings.
     fn kind_at(&self, address: u16) -> Kind {
         configuration::point_of(address).map_or(Kind::None, |point| self.kind(point))
     }
 
-    /// From one module to another, the points' settings go to the defaults: what suited the one could
-    /// switch something on at the other. From none, those made in advance are kept if they suit.
+    /// Chooses a module. A change from one module to another sets the points' settings to the defaults, because a
+    /// value for the old module could switch something on with the new one. A change from no module keeps settings
+    /// that the new module allows.
     fn choose_module(&mut self, port: u16, code: u16) {
         let first = points::of_port(port);
         let before = self.module(port);
@@ -187,7 +187,7 @@ impl Settings {
     }
 }
 
-/// Whether a value of FORMAT can be used with a value of MODE.
+/// Returns whether a value of FORMAT is compatible with a value of MODE.
 pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
     match (Format::from_code(format), Mode::from_code(mode)) {
         (Some(format), Some(mode)) => format.suits(mode),
@@ -195,23 +195,23 @@ pub(super) fn format_suits_mode(format: u16, mode: u16) -> bool {
     }
 }
 
-/// Whether a port's MODULE may have this value: without a slot, it has no module.
+/// Returns whether a port's MODULE may have this value. A port without a slot has no module.
 pub(super) const fn takes_module(board: &Board, port: u16, code: u16) -> bool {
     code == 0 || board.has_slot(port)
 }
 
-/// The port, 1 to 8, whose MODULE stands at this address.
+/// Returns the port, 1 to 8, whose MODULE is at this address.
 pub(super) fn port_of(address: u16) -> Option<u16> {
     let index = address.wrapping_sub(MODULE);
     (index < points::PORTS).then_some(index + 1)
 }
 
-/// Whether the registers of a rule hold a setting.
+/// Returns whether the registers of a rule hold a setting.
 const fn holds(rule: &Rule) -> bool {
     rule.first != KEY && rule.first != COMMAND
 }
 
-/// Every address that holds a setting, with its rule, in ascending order.
+/// Iterates over every address that holds a setting, with its rule, in ascending order.
 struct Addresses {
     rules: &'static [Rule],
     from: u16,
@@ -229,7 +229,7 @@ impl Addresses {
 impl Iterator for Addresses {
     type Item = (&'static Rule, u16);
 
-    // Start-up and every save go through it in several places: one copy for all.
+    // Not inlined: start-up and every save call this from several places, and one copy saves flash.
     #[inline(never)]
     fn next(&mut self) -> Option<Self::Item> {
         loop {
@@ -244,7 +244,7 @@ impl Iterator for Addresses {
     }
 }
 
-/// The settings that differ from their defaults, from [`Settings::changed_from`].
+/// Iterates over the settings that differ from their defaults, see [`Settings::changed_from`].
 pub struct Changed<'a> {
     settings: &'a Settings,
     held: Addresses,
@@ -269,7 +269,7 @@ impl Iterator for Changed<'_> {
     }
 }
 
-/// Worked out by the compiler.
+/// Evaluated at compile time.
 const fn restarts() -> usize {
     let mut rules = RULES;
     let mut count = 0;
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn defaults_are_the_factory_s_and_change_nothing() {
+    fn defaults_are_the_factory_settings_and_count_as_unchanged() {
         let settings = Settings::defaults();
         assert_eq!((settings.get(BAUD), settings.get(FILTER + SLOT)), (96, 5));
         assert_eq!((settings.get(0x0145), settings.get(0x017F)), (50, 3950));
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_changed_leads_back_to_the_same_settings() {
+    fn changed_settings_restore_the_same_settings() {
         let pairs = [
             (BAUD, 1152),
             (MODULE_SLOT, 4),
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_not_allowed_is_counted_and_an_address_not_known_is_not() {
+    fn a_value_not_allowed_is_counted_and_an_unknown_address_is_ignored() {
         let (settings, rejected) = loaded(&[
             (BAUD, 97),
             (MODULE, 1),
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn modules_are_kept_on_the_ports_that_the_board_has_slots_for() {
+    fn modules_are_accepted_only_on_ports_with_a_slot() {
         let pairs = (1..=8).map(|port| (module_of(port), 2));
         let ports = |board| {
             let (settings, rejected) = Settings::load(board, pairs.clone());
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_made_before_the_module_are_kept_if_they_suit() {
+    fn settings_made_before_the_module_are_kept_if_it_allows_them() {
         let mut settings = Settings::defaults();
         settings.set(SAFE + SLOT, 2048);
         settings.set(SAFE + SLOT + 1, HOLD);
@@ -416,7 +416,7 @@ mod tests {
         settings.set(FILTER + SLOT + 1, 100);
         let mut outputs = settings.clone();
         outputs.set(MODULE_SLOT, 2);
-        assert_eq!(outputs.get(SAFE + SLOT), 0, "a bit has no 2048");
+        assert_eq!(outputs.get(SAFE + SLOT), 0, "2048 is not allowed for a bit");
         assert_eq!(outputs.get(SAFE + SLOT + 1), HOLD);
         settings.set(MODULE_SLOT, 4);
         let filters: Vec<_> = (0..4).map(|i| settings.get(FILTER + SLOT + i)).collect();

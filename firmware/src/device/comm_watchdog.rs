@@ -1,19 +1,19 @@
-//! The communication watchdog: when the line falls silent for too long, outputs go to SAFE.
+//! The communication watchdog: sets outputs to SAFE when the line is silent for too long.
 
-/// Looks at the time since the last valid request for this unit, broadcasts among them.
+/// Measures the time since the last valid request for this unit, including broadcasts.
 ///
 /// All times are milliseconds since the start, wrapping.
 #[derive(Debug, Default)]
 pub struct CommWatchdog {
-    /// When the silence began.
+    /// Time when the silence began.
     since: u32,
-    /// SAFE has been commanded for this silence.
+    /// Outputs were set to SAFE in this silence.
     safe: bool,
     tripped: bool,
 }
 
 impl CommWatchdog {
-    /// Not tripped; the silence begins at the start.
+    /// Returns a watchdog that has not tripped; the silence begins at the start.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -23,21 +23,22 @@ impl CommWatchdog {
         }
     }
 
-    /// A valid request ended at `at`.
+    /// Restarts the silence: a valid request ended at `at`.
     pub const fn feed(&mut self, at: u32) {
         self.since = at;
         self.safe = false;
     }
 
-    /// The time is `now`; the time-out is in milliseconds, none when it is off. True once a
-    /// silence, when it has reached the time-out.
+    /// Checks the silence at the time `now`; `timeout_ms` is `None` while the watchdog is off. Returns true once
+    /// per silence, when it has reached the time-out.
     pub const fn look(&mut self, now: u32, timeout_ms: Option<u32>) -> bool {
         let Some(timeout_ms) = timeout_ms else {
-            // Switched on later, it counts from then.
+            // While the watchdog is off, restart the silence, so that it counts from when the watchdog is switched
+            // on.
             self.feed(now);
             return false;
         };
-        // Of a request that ended after the last look, when this one is late, the time may lie ahead.
+        // When an earlier call was late, a request may have ended after `now`, so the difference can be negative.
         let silent_ms = now.wrapping_sub(self.since).cast_signed();
         if self.safe || silent_ms < timeout_ms.cast_signed() {
             return false;
@@ -47,13 +48,13 @@ impl CommWatchdog {
         true
     }
 
-    /// Whether it has tripped since the start or the last [`clear`](Self::clear).
+    /// Returns whether the watchdog has tripped since the start or the last [`clear`](Self::clear).
     #[must_use]
     pub const fn has_tripped(&self) -> bool {
         self.tripped
     }
 
-    /// Takes the flag back. Outputs stay as they are.
+    /// Clears the flag. Outputs do not change.
     pub const fn clear(&mut self) {
         self.tripped = false;
     }
@@ -63,7 +64,7 @@ impl CommWatchdog {
 mod tests {
     use super::*;
 
-    /// When it trips, looked at every millisecond after `now`.
+    /// Returns the time at which the watchdog trips when it is checked every millisecond after `now`.
     fn trips_at(watchdog: &mut CommWatchdog, now: u32, timeout_ms: u32) -> u32 {
         (now + 1..now + 10_000)
             .find(|now| watchdog.look(*now, Some(timeout_ms)))
@@ -71,15 +72,12 @@ mod tests {
     }
 
     #[test]
-    fn it_trips_once_a_silence_and_the_flag_stays() {
+    fn it_trips_once_per_silence_and_the_flag_stays_set() {
         let mut watchdog = CommWatchdog::new();
         assert_eq!(trips_at(&mut watchdog, 0, 100), 100);
         assert!((101..1000).all(|now| !watchdog.look(now, Some(100))));
         watchdog.feed(1000);
-        assert!(
-            watchdog.has_tripped(),
-            "a request does not take the flag back"
-        );
+        assert!(watchdog.has_tripped(), "a request does not clear the flag");
         assert_eq!(trips_at(&mut watchdog, 1000, 100), 1100);
         watchdog.clear();
         assert!(!watchdog.has_tripped());
@@ -87,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn the_time_counts_from_the_request_s_end() {
+    fn the_silence_counts_from_the_end_of_the_request() {
         let mut watchdog = CommWatchdog::new();
         watchdog.feed(1000);
         assert_eq!(trips_at(&mut watchdog, 1033, 100), 1100);
@@ -95,16 +93,16 @@ mod tests {
         assert_eq!(
             trips_at(&mut watchdog, 2100, 10),
             2101,
-            "the silence was longer"
+            "the silence had already been longer"
         );
     }
 
     #[test]
-    fn a_look_that_is_late_counts_the_whole_silence_and_no_more() {
+    fn a_late_check_measures_exactly_the_silence() {
         let mut watchdog = CommWatchdog::new();
         watchdog.feed(1000);
         assert!(!watchdog.look(1090, Some(100)));
-        // For 40 ms nothing could look; a request ended in the middle.
+        // Nothing could be checked for 40 ms; a request ended in the middle of them.
         watchdog.feed(1110);
         assert!(!watchdog.look(1130, Some(100)));
         assert_eq!(trips_at(&mut watchdog, 1130, 100), 1210);
@@ -113,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn time_wraps() {
+    fn the_time_may_wrap() {
         let mut watchdog = CommWatchdog::new();
         watchdog.feed(u32::MAX - 9);
         assert!(!watchdog.look(89, Some(100)));
@@ -121,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn requests_hold_it_off_and_it_counts_from_when_it_is_switched_on() {
+    fn requests_prevent_a_trip_and_the_silence_counts_from_switching_on() {
         let mut watchdog = CommWatchdog::new();
         for n in 0..100 {
             assert!((0..100).all(|ms| !watchdog.look(100 * n + ms, Some(100))));

@@ -1,4 +1,4 @@
-//! The self-description, file 1: what the registers of this unit mean, as CBOR.
+//! The self-description, file 1: the meaning of this unit's registers, as CBOR.
 //!
 //! ```text
 //!  record    0         1      2 ...
@@ -8,8 +8,9 @@
 //!         +--------+-------+----------------------+---------------+
 //! ```
 //!
-//! Only the modules in force differ from unit to unit, and the document has them at its end. So the document is never
-//! in RAM, and its CRC goes on from that of the fixed part. docs/self-description.md has the format.
+//! Only the modules in force differ between units with the same firmware, and they are at the end of the document.
+//! Therefore the document is never stored in RAM, and its CRC is continued from the CRC of the fixed part.
+//! docs/self-description.md describes the format.
 
 use core::array;
 
@@ -20,23 +21,24 @@ use crate::config::Config;
 
 include!(concat!(env!("OUT_DIR"), "/self_description.rs"));
 
-/// The part of a document that is the same for all units with this firmware.
+/// The part of a document that all units with this firmware share.
 #[derive(Clone, Copy, Debug)]
 pub struct Fixed {
     /// The code of the board.
     board: u16,
     /// The document up to its ports.
     bytes: &'static [u8],
-    /// The CRC of these bytes.
+    /// CRC of `bytes`.
     crc: u16,
 }
 
 impl Fixed {
-    /// Returns the one for this board.
+    /// Returns the fixed part for this board.
     ///
     /// # Panics
     ///
-    /// When the register map does not have the board. Call this function in a constant.
+    /// When the register map does not have the board. Call this function in a constant, so that it fails at compile
+    /// time.
     #[must_use]
     pub const fn of(board: &Board) -> Self {
         let mut rest: &[Self] = &BOARDS;
@@ -65,7 +67,7 @@ impl Description {
         Self { fixed, crc }
     }
 
-    /// The CRC of the whole document: register 0x020F.
+    /// Returns the CRC of the whole document, register 0x020F.
     pub(super) const fn crc(&self) -> u16 {
         self.crc
     }
@@ -74,7 +76,7 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// 02 for another file and for records beyond the end.
+    /// Exception 02 for another file and for records after the end.
     pub(super) fn check_read<const SLOTS: usize>(
         &self,
         file: u16,
@@ -88,7 +90,7 @@ impl Description {
         }
     }
 
-    /// Pushes records that [`Self::check_read`] allows.
+    /// Appends records that [`Self::check_read`] has accepted.
     pub(super) fn read<const SLOTS: usize>(
         &self,
         config: &Config<SLOTS>,
@@ -104,13 +106,14 @@ impl Description {
         }
     }
 
-    /// Bytes of the document.
+    /// Returns the length of the document in bytes.
     const fn length<const SLOTS: usize>(&self) -> usize {
         self.fixed.bytes.len() + PORT_BYTES * SLOTS
     }
 }
 
-/// Returns a byte of the file, whose parts these are; 0 after the end. Not inlined: a word has two bytes.
+/// Returns a byte of the file made of these parts, or 0 after its end. Not inlined, because it is called for both
+/// bytes of a word.
 #[inline(never)]
 fn byte(parts: &[&[u8]; 3], mut at: usize) -> u8 {
     for part in parts {
@@ -122,7 +125,7 @@ fn byte(parts: &[&[u8]; 3], mut at: usize) -> u8 {
     0
 }
 
-/// The end of the document: number and module of each port with a slot.
+/// Returns the end of the document: number and module of each port with a slot.
 #[inline(never)]
 fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS] {
     let (first, ports) = (config.board().first_port, config.ports());

@@ -1,11 +1,11 @@
-//! Who the device says it is: functions 11 and 2B/0E (V1.1b3 6.13, 6.21).
+//! Identification of the device: functions 11 and 2B/0E (V1.1b3 6.13, 6.21).
 
 use crate::config::Config;
 
-/// Hexadecimal digits of the unique identity.
+/// Number of hexadecimal digits of the unique identity.
 pub const SERIAL_LEN: usize = 24;
 
-/// The unique identity as text: the half-words in the order of their registers.
+/// Returns the unique identity as text: the half-words in the order of their registers.
 #[must_use]
 pub fn serial(unique_id: [u16; 6]) -> [u8; SERIAL_LEN] {
     let mut text = [b'0'; SERIAL_LEN];
@@ -19,11 +19,11 @@ pub fn serial(unique_id: [u16; 6]) -> [u8; SERIAL_LEN] {
     text
 }
 
-/// The object that names the module of the first slot; those of the other slots follow.
+/// Object ID for the module of the first slot. Those of the other slots follow.
 const FIRST_MODULE: u8 = 0x81;
 
-/// An object of the device identification: 00 to 06 as the standard has them; 80, the unique
-/// identity; from 81 on, the module of each slot.
+/// Returns an object of the device identification: 00 to 06 as in the standard; 80, the unique identity; from 81
+/// on, the module of each slot.
 #[must_use]
 pub fn object<'a, const SLOTS: usize>(
     id: u8,

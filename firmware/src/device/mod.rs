@@ -1,19 +1,18 @@
-//! Everything a master reaches, as one data model: points, counters, configuration, state.
+//! Everything that a master can access, as one data model: points, counters, configuration, state.
 //!
 //! ```text
 //!            requests (serve)
 //!                  |
 //!   +--------------v---------------------------------------------+
-//!   | points    what the modules' channels are: the process image |<--> scan, 1 kHz
+//!   | points    the process image: values of the channels         |<--> scan, 1 kHz
 //!   | pulses    counters of digital inputs                        |
 //!   | config    settings, lock, commands                          |<--> store, in flash
-//!   | state     identity, counters, health                        |<--- whoever knows
+//!   | state     identity, counters, health                        |<--- all tasks
 //!   +-------------------------------------------------------------+
 //! ```
 //!
-//! The scan copies inputs in and outputs out; requests read and write the device alone. Neither ever
-//! waits for the other's hardware, and a request that touches several points sees and leaves one
-//! consistent state.
+//! The scan copies inputs in and outputs out; requests read and write the device only. Neither waits for the
+//! other's hardware. A request that accesses several points reads or writes all of them at the same time.
 
 mod comm_watchdog;
 mod description;
@@ -40,7 +39,7 @@ pub use state::{Identity, State};
 
 use crate::config::Config;
 
-/// The device behind the line, on a board with so many slots.
+/// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
 pub struct Device<const SLOTS: usize> {
     /// The process image.
@@ -51,13 +50,13 @@ pub struct Device<const SLOTS: usize> {
     pub state: State,
     description: Description,
     comm_watchdog: CommWatchdog,
-    /// What a request has ordered, to be carried out when its reply is out.
+    /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
-    /// Of the configuration, when the points' settings were last taken from it.
+    /// Revision of the configuration whose settings the points have.
     revision: u16,
 }
 
-/// Which block of the address space a span of words begins in; it may not leave it.
+/// The block of the address space that contains the start of a span. The span must not leave the block.
 enum Block {
     Points,
     Config,
@@ -68,7 +67,7 @@ enum Block {
 
 impl Block {
     const fn of(span: Span) -> Self {
-        // Asked for most.
+        // Checked first, because most requests are for points.
         if span.start() < 0x0100 {
             return Self::Points;
         }
@@ -83,8 +82,8 @@ impl Block {
 }
 
 impl<const SLOTS: usize> Device<SLOTS> {
-    /// A device with these settings whose slots have channels of these kinds, in the order of the ports; its outputs
-    /// stand at START. `description` is that of the board.
+    /// Creates a device with these settings, whose slots have channels of these kinds, in the order of the ports.
+    /// The outputs are set to START. `description` is that of the board.
     #[must_use]
     #[inline(never)]
     pub fn new(
@@ -110,7 +109,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         device
     }
 
-    /// Brings the points to the settings in force, after these may have changed.
+    /// Applies the settings in force to the points, after the settings may have changed.
     fn configure_points(&mut self) {
         self.revision = self.config.revision();
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
@@ -127,7 +126,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
-    /// Lets `ms` milliseconds pass. Returns whether outputs went to SAFE.
+    /// Advances the time by `ms` milliseconds. Returns whether outputs were set to SAFE.
     pub fn tick(&mut self, ms: u32) -> bool {
         self.state.tick(ms);
         self.config.tick(ms);
@@ -139,12 +138,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
         tripped
     }
 
-    /// A valid request for this unit ended `at_ms` milliseconds after the start.
+    /// Restarts the communication watchdog: a valid request for this unit ended at `at_ms` milliseconds after the
+    /// start.
     pub const fn request_seen(&mut self, at_ms: u32) {
         self.comm_watchdog.feed(at_ms);
     }
 
-    /// Whether this work shows the line's counters, which are to be put into the state before then.
+    /// Returns whether this work reads the line's counters. The caller must then copy them into the state first.
     #[must_use]
     pub const fn shows_counters(work: &Work) -> bool {
         match work.reads() {
@@ -160,8 +160,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.ordered.take()
     }
 
-    /// Carries out what of an order needs nothing but memory; the reply is out. Gives back what is
-    /// left to do: a save that has begun, a restart, identify, or the loader.
+    /// Executes the part of a command that only changes memory; the reply has been sent. Returns what is left to
+    /// do: a save that has begun, a restart, identify, or the loader.
     pub fn carry_out(&mut self, order: Command) -> Option<Command> {
         match order {
             Command::LoadDefaults => self.config.load_defaults(),
@@ -185,7 +185,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
-    /// The status register (0x020A).
+    /// Returns the status register (0x020A).
     fn status(&self) -> u16 {
         use state_map::status;
         let bit = |mask, set| if set { mask } else { 0 };
@@ -207,7 +207,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 }
 
-/// Whether a span lies in a block of read-only registers; the rules know the gaps.
+/// Checks whether a span lies in a block of read-only registers and contains no gap.
 fn check_rules(rules: &'static [register_map::Rule], span: Span) -> Result<(), Exception> {
     match register_map::runs(rules, span.start(), span.count()) {
         Some(_) => Ok(()),
@@ -215,7 +215,7 @@ fn check_rules(rules: &'static [register_map::Rule], span: Span) -> Result<(), E
     }
 }
 
-/// Functions 01 and 02 read the same bits, 03 and 04 the same words.
+/// Functions 01 and 02 read the same bits, and 03 and 04 the same words.
 impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     fn check_read_bits(&self, _: Table, span: Span) -> Result<(), Exception> {
         self.points.check_read_bits(span)
@@ -282,7 +282,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 self.settings_may_have_changed();
             }
             Block::Pulses => self.points.clear_pulses(span),
-            // Refused by the check.
+            // `check_write_words` rejects writes to these blocks.
             Block::State | Block::Fault => {}
         }
     }
@@ -301,12 +301,12 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         self.description.read(&self.config, records, out);
     }
 
-    /// The low byte of the status register.
+    /// Returns the low byte of the status register.
     fn exception_status(&self) -> u8 {
         self.status().to_le_bytes()[0]
     }
 
-    /// The status register.
+    /// Returns the status register.
     fn diagnostic_register(&self) -> u16 {
         self.status()
     }
@@ -315,7 +315,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         self.state.server_id()
     }
 
-    /// Not while the communication watchdog has taken the outputs.
+    /// Returns false while the communication watchdog has set the outputs to SAFE.
     fn is_running(&self) -> bool {
         !self.comm_watchdog.has_tripped()
     }
@@ -327,8 +327,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 }
 
-/// Refuses what this firmware cannot do yet, as a value that is not allowed: there is no loader to
-/// enter, and no LoRa line.
+/// Rejects commands and values that this firmware does not support as not allowed: it has no loader and no LoRa
+/// line.
 fn check_ready(span: Span, words: Words<'_>) -> Result<(), Exception> {
     let wants = |address: u16, value: u16| {
         let index = address.wrapping_sub(span.start());

@@ -1,4 +1,4 @@
-//! The process image: the points of all ports that have a slot.
+//! The process image: the points of all ports with a slot.
 
 use core::ops::Range;
 
@@ -8,16 +8,16 @@ use register_map::counters;
 
 use super::port::IoPort;
 
-/// The points of the board's slots, which are on ports that follow one another.
+/// The points of the board's slots. Their port numbers are consecutive.
 #[derive(Debug)]
 pub struct Points<const SLOTS: usize> {
-    /// The address of the first port's first point.
+    /// Address of the first point of the first port.
     first: u16,
     ports: [IoPort; SLOTS],
 }
 
 impl<const SLOTS: usize> Points<SLOTS> {
-    /// Points of these kinds from an address on, by port; everything off.
+    /// Creates points of these kinds by port, from an address on, with every value 0.
     #[must_use]
     pub fn new(first: u16, kinds: [[Kind; CHANNELS]; SLOTS]) -> Self {
         Self {
@@ -26,44 +26,46 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// The ports that have a slot.
+    /// Returns the ports with a slot.
     #[must_use]
     pub const fn ports(&self) -> &[IoPort; SLOTS] {
         &self.ports
     }
 
-    /// The same, to be changed.
+    /// Returns the ports with a slot, to be changed.
     pub const fn ports_mut(&mut self) -> &mut [IoPort; SLOTS] {
         &mut self.ports
     }
 
-    /// Whether a channel of any port cannot be read or driven.
+    /// Returns whether a channel of any port cannot be read or driven.
     #[must_use]
     pub fn any_fails(&self) -> bool {
         self.ports.iter().any(|port| port.failing() != 0)
     }
 
-    /// Whether any module has a fault: it does not answer, or a channel is out of range.
+    /// Returns whether any module has a fault: it does not answer, or a channel is out of range.
     #[must_use]
     pub fn has_fault(&self) -> bool {
         self.ports.iter().any(IoPort::has_fault)
     }
 
-    /// How many points of ports with slots come before a point. Large when its port comes before all that have a slot.
+    /// Returns how many points of ports with slots precede a point. Returns a large number for a port in front of
+    /// all ports with a slot.
     #[inline]
     fn index(&self, point: u16) -> usize {
         usize::from(point.wrapping_sub(self.first))
     }
 
-    /// The indices of a span's points.
+    /// Returns the indices of a span's points.
     #[inline]
     fn indices(&self, span: Span) -> Range<usize> {
         let start = self.index(span.start());
         start..start + usize::from(span.count())
     }
 
-    /// The port of a point by its index, and which of its channels that is; `None` when its port has no slot.
-    // Left to itself, the compiler calls it for every point of a request.
+    /// Returns the port of a point, given the point's index, and its channel number; `None` when the port has no
+    /// slot.
+    // Without this attribute the compiler emits a call for every point of a request.
     #[inline(always)]
     fn place(&self, index: usize) -> Option<(&IoPort, usize)> {
         Some((self.ports.get(index / CHANNELS)?, index % CHANNELS))
@@ -74,7 +76,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         Some((self.ports.get_mut(index / CHANNELS)?, index % CHANNELS))
     }
 
-    /// The status of a point, 0 to 31: good for one that does not exist.
+    /// Returns the status of a point, 0 to 31: good for a point that does not exist.
     #[must_use]
     pub fn status_of(&self, point: u16) -> ChannelStatus {
         self.place(self.index(point))
@@ -83,11 +85,11 @@ impl<const SLOTS: usize> Points<SLOTS> {
             })
     }
 
-    /// Checks that a span's points exist and are all of one of these kinds, which is 02. Gives whether one of them cannot
-    /// be read or driven.
+    /// Checks that all points of a span exist and have one of these kinds; otherwise exception 02. Returns whether
+    /// one of them cannot be read or driven.
     fn check_kinds(&self, span: Span, kinds: Kinds) -> Result<bool, Exception> {
         let mut fails = false;
-        // A long span fails at the first address beyond the last port.
+        // A long span fails at the first address after the last port.
         for index in self.indices(span) {
             match self.place(index) {
                 Some((port, channel)) if kinds.contain(port.kind(channel)) => {
@@ -99,16 +101,16 @@ impl<const SLOTS: usize> Points<SLOTS> {
         Ok(fails)
     }
 
-    /// Whether these bit points may be read.
+    /// Checks whether these bit points can be read.
     ///
     /// # Errors
     ///
-    /// 02 for points that do not exist, 04 when one of them cannot be read or driven.
+    /// Exception 02 for points that do not exist, 04 when one of them cannot be read or driven.
     pub fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
         answers(self.check_kinds(span, Kinds::BITS)?)
     }
 
-    /// Whether these word points may be read.
+    /// Checks whether these word points can be read.
     ///
     /// # Errors
     ///
@@ -117,21 +119,21 @@ impl<const SLOTS: usize> Points<SLOTS> {
         answers(self.check_kinds(span, Kinds::WORDS)?)
     }
 
-    /// Whether these bit points may be written.
+    /// Checks whether these bit points can be written.
     ///
     /// # Errors
     ///
-    /// As for [`check_read_bits`](Self::check_read_bits); 02 for inputs too.
+    /// As for [`check_read_bits`](Self::check_read_bits), and 02 also for inputs.
     pub fn check_write_bits(&self, span: Span) -> Result<(), Exception> {
         answers(self.check_kinds(span, Kinds::BIT_OUTPUTS)?)
     }
 
-    /// Whether these word points may be written with these values.
+    /// Checks whether these word points can be written with these values.
     ///
     /// # Errors
     ///
-    /// As for [`check_write_bits`](Self::check_write_bits), with 03 for a value out of range between
-    /// the two.
+    /// As for [`check_write_bits`](Self::check_write_bits), and 03 for a value out of range, which is checked after
+    /// 02 and before 04.
     pub fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         let fails = self.check_kinds(span, Kinds::WORD_OUTPUTS)?;
         let allowed = self.indices(span).zip(words.iter()).all(|(index, word)| {
@@ -149,7 +151,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         answers(fails)
     }
 
-    /// Reads bit points that were found good.
+    /// Reads bit points that the check has accepted.
     pub fn read_bits(&self, span: Span, out: &mut BitsOut<'_>) {
         for index in self.indices(span) {
             let place = self.place(index);
@@ -157,7 +159,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// Reads word points that were found good.
+    /// Reads word points that the check has accepted.
     pub fn read_words(&self, span: Span, out: &mut WordsOut<'_>) {
         for index in self.indices(span) {
             let place = self.place(index);
@@ -165,7 +167,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// Writes bit points that were found good.
+    /// Writes bit points that the check has accepted.
     pub fn write_bits(&mut self, span: Span, bits: Bits<'_>) {
         for (index, bit) in self.indices(span).zip(bits.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
@@ -174,7 +176,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// Writes word points that were found good.
+    /// Writes word points that the check has accepted.
     pub fn write_words(&mut self, span: Span, words: Words<'_>) {
         for (index, word) in self.indices(span).zip(words.iter()) {
             if let Some((port, channel)) = self.place_mut(index) {
@@ -183,7 +185,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         }
     }
 
-    /// A register of the pulse counters: 0 for a point that does not exist or is no digital input.
+    /// Returns a register of the pulse counters: 0 for a point that does not exist or is not a digital input.
     #[must_use]
     pub fn pulse_word(&self, address: u16) -> u16 {
         let offset = address.wrapping_sub(counters::PULSES);
@@ -193,7 +195,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         if offset.is_multiple_of(2) { high } else { low }
     }
 
-    /// Clears the counters of a span that `check_clear` found good.
+    /// Clears the counters of a span that `check_clear` has accepted.
     pub fn clear_pulses(&mut self, span: Span) {
         for address in span.addresses() {
             let point = address.wrapping_sub(counters::PULSES) / counters::WORDS;
@@ -204,7 +206,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     }
 }
 
-/// Kinds of points, one bit for each.
+/// A set of point kinds, one bit for each.
 #[derive(Clone, Copy)]
 struct Kinds(u8);
 
@@ -228,7 +230,7 @@ impl Kinds {
     }
 }
 
-/// 04 when points cannot be read or driven.
+/// Returns exception 04 when points cannot be read or driven.
 const fn answers(fails: bool) -> Result<(), Exception> {
     if fails {
         Err(Exception::ServerDeviceFailure)
@@ -237,11 +239,11 @@ const fn answers(fails: bool) -> Result<(), Exception> {
     }
 }
 
-/// Whether a write to the pulse counters is zeros for whole counters.
+/// Checks that a write to the pulse counters writes zeros to whole counters.
 ///
 /// # Errors
 ///
-/// 03 when it is not.
+/// Exception 03 when it does not.
 pub fn check_clear(span: Span, words: Words<'_>) -> Result<(), Exception> {
     let whole = span.start().is_multiple_of(2) && span.count().is_multiple_of(2);
     if whole && words.iter().all(|word| word == 0) {
@@ -251,7 +253,7 @@ pub fn check_clear(span: Span, words: Words<'_>) -> Result<(), Exception> {
     }
 }
 
-/// A 32-bit value as registers, high word first.
+/// Returns a 32-bit value as registers, high word first.
 pub(super) const fn words_of(value: u32) -> [u16; 2] {
     [(value >> 16) as u16, value as u16]
 }

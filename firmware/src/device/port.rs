@@ -1,4 +1,4 @@
-//! The points of one port: what its module's channels are, and the pulse counters of its digital inputs.
+//! The points of one port: the values of its module's channels and the pulse counters of its digital inputs.
 
 use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, scale};
 use register_map::codes::ModuleState;
@@ -8,19 +8,19 @@ use register_map::codes::ModuleState;
 pub struct IoPort {
     kinds: [Kind; CHANNELS],
     settings: [ChannelSettings; CHANNELS],
-    /// Inputs as last scanned, outputs as commanded, words as their SCALE says.
+    /// Inputs as last scanned, outputs as commanded, words in the unit set by SCALE.
     pub(super) channels: Channels,
-    /// SAFE in force, by channel; `None`: hold.
+    /// SAFE in force of each channel; `None` holds the output.
     safe: [Option<u16>; CHANNELS],
     pulses: [u32; CHANNELS],
-    /// Inputs have been scanned once: from then on a rising edge counts.
+    /// The inputs have been scanned once. From then on a rising edge counts.
     scanned: bool,
     /// Channels that cannot be read or driven, channel 1 in bit 0.
     failing: u8,
 }
 
 impl IoPort {
-    /// The points of a port whose channels are of these kinds, everything off.
+    /// Creates the points of a port with channels of these kinds, with every value 0.
     #[must_use]
     pub fn new(kinds: [Kind; CHANNELS]) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl IoPort {
         }
     }
 
-    /// Takes new settings and values of SAFE. Outputs stay where they are: a commanded word is brought to the new scale.
+    /// Applies new settings and SAFE values. Outputs do not change: a commanded word is converted to the new scale.
     pub fn configure(
         &mut self,
         settings: [ChannelSettings; CHANNELS],
@@ -50,20 +50,21 @@ impl IoPort {
         self.safe = safe;
     }
 
-    /// The settings last taken.
+    /// Returns the settings that were applied last.
     #[must_use]
     pub const fn settings(&self) -> &[ChannelSettings; CHANNELS] {
         &self.settings
     }
 
-    /// What stands in the port's channels, for the scan to take its outputs from.
+    /// Returns the values of the port's channels, for the scan to drive the outputs.
     #[must_use]
     pub const fn channels(&self) -> &Channels {
         &self.channels
     }
 
-    /// Takes the inputs a scan has brought. Outputs stay as commanded, which may have happened during the scan. So may
-    /// a change of settings: then words, which were made under the settings before, are not taken (`words` is false).
+    /// Stores the inputs of a scan. Outputs keep their commanded values, which may have changed during the scan.
+    /// The settings may have changed, too: then the words of the scan have the wrong unit and are ignored (`words`
+    /// is false).
     pub fn scanned(&mut self, scanned: &Channels, words: bool) {
         for (channel, (kind, pulses)) in self.kinds.iter().zip(&mut self.pulses).enumerate() {
             match kind {
@@ -84,19 +85,19 @@ impl IoPort {
         self.scanned = true;
     }
 
-    /// Takes note of the channels that cannot be read or driven, channel 1 in bit 0.
+    /// Stores which channels cannot be read or driven, channel 1 in bit 0.
     pub const fn set_failing(&mut self, channels: u8) {
         self.failing = channels;
     }
 
-    /// The channels that cannot be read or driven, channel 1 in bit 0.
+    /// Returns the channels that cannot be read or driven, channel 1 in bit 0.
     #[must_use]
     pub const fn failing(&self) -> u8 {
         self.failing
     }
 
-    /// Commands outputs by raw values, as SAFE and START have them: 0 or 1 for a bit, 0 to 4095 for a
-    /// word, none to leave it as it is.
+    /// Commands outputs with raw values, as SAFE and START have them: 0 or 1 for a bit, 0 to 4095 for a word,
+    /// `None` to leave the output unchanged.
     pub fn command_raw(&mut self, values: [Option<u16>; CHANNELS]) {
         let settings = self.settings.iter().zip(&self.kinds);
         for (channel, (value, (settings, kind))) in values.into_iter().zip(settings).enumerate() {
@@ -111,12 +112,12 @@ impl IoPort {
         }
     }
 
-    /// Commands the outputs to SAFE.
+    /// Sets the outputs to SAFE.
     pub fn go_safe(&mut self) {
         self.command_raw(self.safe);
     }
 
-    /// How the module fares.
+    /// Returns the state of the module.
     #[must_use]
     pub fn module_state(&self) -> ModuleState {
         if self.kinds == [Kind::None; CHANNELS] {
@@ -130,7 +131,7 @@ impl IoPort {
         }
     }
 
-    /// Whether the module has a fault: it does not answer, or a channel is out of range.
+    /// Returns whether the module has a fault: it does not answer, or a channel is out of range.
     #[must_use]
     pub fn has_fault(&self) -> bool {
         match self.module_state() {
@@ -139,22 +140,22 @@ impl IoPort {
         }
     }
 
-    /// What a channel is.
+    /// Returns the kind of a channel.
     pub(super) fn kind(&self, channel: usize) -> Kind {
         self.kinds.get(channel).copied().unwrap_or(Kind::None)
     }
 
-    /// How a channel is read or driven.
+    /// Returns the settings of a channel.
     pub(super) fn setting(&self, channel: usize) -> Option<&ChannelSettings> {
         self.settings.get(channel)
     }
 
-    /// Whether a channel, 0 to 3, cannot be read or driven.
+    /// Returns whether a channel, 0 to 3, cannot be read or driven.
     pub(super) const fn fails(&self, channel: usize) -> bool {
         self.failing >> (channel & 3) & 1 != 0
     }
 
-    /// A channel's pulse counter.
+    /// Returns a channel's pulse counter.
     pub(super) fn pulses(&self, channel: usize) -> u32 {
         self.pulses.get(channel).copied().unwrap_or_default()
     }

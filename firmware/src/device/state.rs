@@ -1,4 +1,4 @@
-//! Identity and health: the registers to read at 0x0200 and the fault record at 0x0260.
+//! Identity and health: the read-only registers at 0x0200 and the fault record at 0x0260.
 
 use modbus_server::Counters;
 use register_map::{Board, Module, codes::ModuleState, fault, points::PORTS, state as at};
@@ -9,15 +9,14 @@ use super::port::IoPort;
 use crate::built;
 use crate::config::Config;
 
-/// What is known of the device when it starts, and never changes.
+/// Data that is known when the device starts and never changes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Identity {
     /// Unit address in force.
     pub unit: u8,
-    /// The RCC's flags: bit 0 low power, 1 window watchdog, 2 independent watchdog, 3 software,
-    /// 4 power-on, 5 pin.
+    /// Reset flags: bit 0 low power, 1 window watchdog, 2 independent watchdog, 3 software, 4 power-on, 5 pin.
     pub reset_cause: u8,
-    /// The 96-bit unique identity, as its half-words stand in memory.
+    /// The 96-bit unique identity, half-words in the order of their addresses.
     pub unique_id: [u16; 6],
     /// The fault record as registers, from 0x0260 on.
     pub fault: [u16; fault_words()],
@@ -29,7 +28,7 @@ const fn fault_words() -> usize {
     (fault::RESERVED + 2 - fault::KIND) as usize
 }
 
-/// The firmware's version as its registers have it: major << 8 | minor, and patch.
+/// The firmware's version as its registers hold it: major << 8 | minor, and patch.
 const VERSION: [u16; 2] = [
     number(env!("CARGO_PKG_VERSION_MAJOR")) << 8 | number(env!("CARGO_PKG_VERSION_MINOR")),
     number(env!("CARGO_PKG_VERSION_PATCH")),
@@ -48,24 +47,24 @@ pub struct State {
     identity: Identity,
     /// The unique identity as text.
     serial: [u8; SERIAL_LEN],
-    /// The identity of function 11: the code of the board. Masters that take a single byte for the identity find the
-    /// run indicator where they look for it.
+    /// The server ID for function 11: the code of the board. It is one byte long, because some masters expect the
+    /// run indicator right after the first byte.
     server_id: [u8; 1],
     /// Milliseconds since the start, wrapping.
     millis: u32,
-    /// Milliseconds of the second that has begun.
+    /// Milliseconds of the current second.
     part_ms: u32,
     uptime_s: u32,
-    /// The line's counters, as the server had them when they were last asked for.
+    /// The line's counters, copied from the server when they were last read.
     pub counters: Counters,
-    /// The least stack left free so far, in bytes.
+    /// The smallest amount of free stack so far, in bytes.
     pub stack_free: u16,
-    /// How often the line was set up again since the start; stops at the largest number.
+    /// Number of times the line was set up again since the start; stops at 65535.
     pub line_repairs: u16,
 }
 
 impl State {
-    /// The state at the start.
+    /// Returns the state at the start.
     #[must_use]
     pub fn new(board: &Board, identity: Identity) -> Self {
         Self {
@@ -81,7 +80,7 @@ impl State {
         }
     }
 
-    /// Lets `ms` milliseconds pass.
+    /// Advances the time by `ms` milliseconds.
     pub const fn tick(&mut self, ms: u32) {
         self.millis = self.millis.wrapping_add(ms);
         self.part_ms = self.part_ms.saturating_add(ms);
@@ -91,35 +90,35 @@ impl State {
         }
     }
 
-    /// The unique identity as text.
+    /// Returns the unique identity as text.
     pub(super) const fn serial(&self) -> &[u8; SERIAL_LEN] {
         &self.serial
     }
 
-    /// The identity of function 11.
+    /// Returns the server ID for function 11.
     pub(super) const fn server_id(&self) -> &[u8] {
         &self.server_id
     }
 
-    /// Milliseconds since the start, wrapping after 49 days.
+    /// Returns the milliseconds since the start, wrapping after 49 days.
     #[must_use]
     pub const fn millis(&self) -> u32 {
         self.millis
     }
 
-    /// Whether the core runs on the internal oscillator.
+    /// Returns whether the core runs on the internal oscillator.
     #[must_use]
     pub const fn on_internal_oscillator(&self) -> bool {
         self.identity.internal_oscillator
     }
 
-    /// Seconds since the start.
+    /// Returns the seconds since the start.
     #[must_use]
     pub const fn uptime_s(&self) -> u32 {
         self.uptime_s
     }
 
-    /// A register that exists, but for the status; 0 for one that does not.
+    /// Returns a register other than the status, or 0 for one that does not exist.
     pub(super) fn word<const SLOTS: usize>(
         &self,
         address: u16,
@@ -150,7 +149,7 @@ impl State {
         }
     }
 
-    /// The registers that stand in rows.
+    /// Returns a register of the blocks with one register per port, counter or point.
     fn by_index<const SLOTS: usize>(
         &self,
         address: u16,
@@ -179,7 +178,7 @@ impl State {
         }
     }
 
-    /// A register of the fault record.
+    /// Returns a register of the fault record.
     pub(super) fn fault_word(&self, address: u16) -> u16 {
         if address == fault::LINE_REPAIRS {
             return self.line_repairs;

@@ -1,4 +1,4 @@
-//! A line over a UART and a timer that are data.
+//! Tests of a line with a simulated UART and timer.
 
 extern crate std;
 use std::boxed::Box;
@@ -9,11 +9,11 @@ use modbus_server::{Adu, Tables};
 
 use super::*;
 
-/// The UART: the bytes that wait in it, and its settings.
+/// A simulated UART: the received bytes and its state.
 #[derive(Default)]
 struct FakeUart {
     waiting: Option<u8>,
-    /// A byte is wanted, or the last one has left: each when that was asked for.
+    /// A byte is wanted, or the last one has been sent; each is only reported when it was asked for.
     wants: bool,
     finishing: bool,
     driver: bool,
@@ -63,7 +63,7 @@ impl Uart for FakeUart {
     }
 
     fn send(&mut self, byte: u8) {
-        assert!(self.driver, "a byte without the driver");
+        assert!(self.driver, "a byte was sent while the driver is off");
         self.sent.push(byte);
     }
 
@@ -96,7 +96,7 @@ impl Uart for FakeUart {
     }
 }
 
-/// The timer, whose silences the test lets pass.
+/// A simulated timer; the tests end its silences.
 #[derive(Default)]
 struct FakeGap {
     running: bool,
@@ -144,7 +144,7 @@ impl GapTimer for FakeGap {
     }
 }
 
-/// Unit 17 with ten registers of 0x1111.
+/// Unit 17 with ten registers of value 0x1111.
 struct Bench {
     line: Line<FakeUart, FakeGap>,
     server: Server,
@@ -167,7 +167,7 @@ impl Bench {
         };
         assert!(
             !bench.silence(Silence::T35),
-            "the port listens from here on"
+            "the port is idle after a long silence"
         );
         bench
     }
@@ -177,7 +177,7 @@ impl Bench {
         self.line.on_gap(0)
     }
 
-    fn hear(&mut self, bytes: &[u8]) {
+    fn receive(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.line.uart.waiting = Some(*byte);
             assert!(!self.line.on_uart());
@@ -200,7 +200,7 @@ impl Bench {
         self.line.finish(served);
     }
 
-    /// The UART's interrupts up to the end of the reply.
+    /// Runs the UART's interrupts up to the end of the reply.
     fn send(&mut self) {
         for _ in 0..600 {
             if self.line.on_uart() {
@@ -218,7 +218,7 @@ impl Bench {
 #[test]
 fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
     let mut bench = Bench::new();
-    bench.hear(&REQUEST);
+    bench.receive(&REQUEST);
     assert!(!bench.line.uart.driver);
     assert!(!bench.silence(Silence::T15));
     assert!(bench.silence(Silence::T35), "a request waits");
@@ -226,12 +226,12 @@ fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
     assert!(bench.line.uart.driver && bench.line.gap.limited);
     assert!(
         !bench.line.gap.running,
-        "no gap is timed after its own reply"
+        "no silence is measured after the unit's own reply"
     );
     assert!(!bench.line.on_uart());
     assert!(
         !bench.line.uart.wants,
-        "nothing is decided yet: it asks no more"
+        "the reply is not decided yet, so no byte is wanted"
     );
     bench.serve(request);
     bench.send();
@@ -241,7 +241,7 @@ fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
 }
 
 #[test]
-fn disturbed_registers_are_set_up_again_within_as_many_milliseconds_as_there_are_parts() {
+fn disturbed_registers_are_set_up_again_within_one_millisecond_per_part() {
     for part in [None, Some(0), Some(1)] {
         let mut bench = Bench::new();
         bench.pass(100);
@@ -255,7 +255,7 @@ fn disturbed_registers_are_set_up_again_within_as_many_milliseconds_as_there_are
         assert!(!bench.line.take_repaired(), "a repair is reported once");
         assert_eq!(bench.line.uart.set_up, 1);
         bench.silence(Silence::T35);
-        bench.hear(&REQUEST);
+        bench.receive(&REQUEST);
         assert!(bench.silence(Silence::T35), "{part:?}");
     }
 }
@@ -263,16 +263,16 @@ fn disturbed_registers_are_set_up_again_within_as_many_milliseconds_as_there_are
 #[test]
 fn timer_that_stopped_in_a_frame_is_started_again() {
     let mut bench = Bench::new();
-    bench.hear(&REQUEST[..3]);
+    bench.receive(&REQUEST[..3]);
     bench.line.gap.running = false;
     bench.pass(3);
     assert!(bench.line.take_repaired() && bench.line.gap.running);
 }
 
 #[test]
-fn reply_that_does_not_end_is_cut_off() {
+fn reply_that_does_not_end_is_aborted() {
     let mut bench = Bench::new();
-    bench.hear(&REQUEST);
+    bench.receive(&REQUEST);
     assert!(bench.silence(Silence::T35));
     let _request = bench.take();
     bench.pass(LONGEST_MS - 1);
@@ -281,11 +281,11 @@ fn reply_that_does_not_end_is_cut_off() {
     assert!(!bench.line.uart.driver && bench.line.take_repaired());
 
     let mut bench = Bench::new();
-    bench.hear(&REQUEST);
+    bench.receive(&REQUEST);
     assert!(bench.silence(Silence::T35));
     let _request = bench.take();
     bench.line.on_limit();
-    assert!(bench.line.uart.driver, "the limit has not passed");
+    assert!(bench.line.uart.driver, "the limit has not been reached");
     bench.line.gap.limit_passed = true;
     bench.line.on_limit();
     assert!(!bench.line.uart.driver && bench.line.take_repaired());

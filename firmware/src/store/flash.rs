@@ -1,4 +1,4 @@
-//! What the store needs of a flash.
+//! The flash interface that the store uses.
 
 /// One of the store's two pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,7 +10,7 @@ pub enum Page {
 }
 
 impl Page {
-    /// The one that this is not.
+    /// Returns the other page.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -22,36 +22,36 @@ impl Page {
 
 /// Two pages of a flash that is programmed by half-words and erased by pages (RM0008 3.3).
 ///
-/// An operation that is cut off may leave anything in the half-word or page it was for, and nothing
-/// anywhere else.
+/// An operation that is interrupted may leave any content in its half-word or page, and does not change anything
+/// else.
 pub trait Flash {
-    /// Why an operation was refused or failed.
+    /// Error of an operation.
     type Error;
 
-    /// The bytes of a page as they are. Both pages have as many, 1024 or more.
+    /// Returns the bytes of a page. Both pages have the same size, 1024 or more.
     fn page(&self, page: Page) -> &[u8];
 
-    /// Programs a half-word, which must be erased unless `half` is 0, at an even offset: 40 to 70 us
+    /// Programs a half-word at an even offset, which must be erased unless `half` is 0. This takes 40 to 70 us,
     /// during which nothing else runs from this flash.
     ///
     /// # Errors
     ///
-    /// When the flash reports one.
+    /// When the flash reports an error.
     fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), Self::Error>;
 
-    /// Erases a page: 20 to 40 ms during which nothing else runs from this flash.
+    /// Erases a page. This takes 20 to 40 ms, during which nothing else runs from this flash.
     ///
     /// # Errors
     ///
-    /// When the flash reports one.
+    /// When the flash reports an error.
     fn erase(&mut self, page: Page) -> Result<(), Self::Error>;
 }
 
-/// Why something could not be stored. Nothing that was stored before is lost by it.
+/// Error of the store. It never damages what was stored before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError<E> {
-    /// The flash refused or failed: with the page, it may be worn out.
+    /// The flash refused the operation or failed. The page may be worn out.
     Flash(Page, E),
-    /// What was programmed at this offset does not read back: the page is worn out.
+    /// The flash does not read back as programmed at this offset: the page is worn out.
     Worn(Page, usize),
 }

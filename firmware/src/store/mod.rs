@@ -1,36 +1,36 @@
-//! The configuration store: two flash pages, so that the last good configuration is never at risk.
+//! The configuration store: two flash pages, so that a power cut never loses the last valid configuration.
 //!
-//! [`register_map::record`] has the layout. Records go one behind the other onto the *active* page; the
-//! newest good one counts. When the page is full the next record goes to the other, which is kept
-//! erased: by [`Store::prepare`] at the start, before the line is served, and by [`Store::make_spare`]
-//! after every change of pages, when the caller can stand still. So a save never erases in normal use,
-//! and never holds up the line for longer than a half-word takes.
+//! [`register_map::record`] describes the layout. Records are appended to the *active* page; the newest valid one
+//! counts. When the page is full, the next record goes to the other page, which is kept erased: by
+//! [`Store::prepare`] at the start, before the line is served, and by [`Store::make_spare`] after every change of
+//! pages, when the caller can wait. So a save does not erase in normal use and delays the line only by the time for
+//! one half-word.
 //!
 //! ```text
 //!   active page                       other page
 //!   +------+---+---+-----+--------+   +------+---------------------------+
-//!   | mark | 1 | 2 | 3   | erased |   | mark | erased                    |   in use: 3 counts
+//!   | mark | 1 | 2 | 3   | erased |   | mark | erased                    |   in use: record 3 counts
 //!   +------+---+---+-----+--------+   +------+---------------------------+
-//!   | mark | 1 | 2 | 3   | 4 |    |   | mark | erased                    |   a save that fits
-//!   | mark | 1 | 2 | 3   | 4 |    |   | mark | 5 |                       |   one that does not
-//!   | mark | erased               |   | mark | 5 |                       |   `make_spare`, or a start
+//!   | mark | 1 | 2 | 3   | 4 |    |   | mark | erased                    |   after a save that fits
+//!   | mark | 1 | 2 | 3   | 4 |    |   | mark | 5 |                       |   after a save that does not fit
+//!   | mark | erased               |   | mark | 5 |                       |   after `make_spare` or a start
 //!   +------+----------------------+   +------+---+-----------------------+
 //! ```
 //!
-//! Why a power cut does no harm, at whatever operation:
+//! Why a power cut during any operation does no harm:
 //!
-//! - A record counts once its first seal is programmed, after its CRC is complete. Until then the one before
-//!   counts, and nothing is erased that holds the newest. So a CRC whose cells read differently from start to
-//!   start decides nothing.
-//! - A start that finds one seal programs both again. The first one reads the same from then on.
-//! - Behind what a cut left over nothing is written: the next start moves the newest record to the
+//! - A record counts once its first seal is programmed, after its CRC is complete. Until then the previous record
+//!   counts, and the page with the newest record is never erased. So a CRC whose cells read differently from
+//!   start to start has no effect.
+//! - A start that finds only one seal programs both again. From then on the first one reads the same every time.
+//! - Nothing is written after the remains of an interrupted write: the next start moves the newest record to the
 //!   other page (*compaction*) and erases this one.
-//! - A page is used only with its mark. The mark is destroyed before an erase and programmed after it,
-//!   so a page that was erased half, and may read as erased, is not taken for one that was.
-//! - A device that never stored anything begins with a record of defaults, so that there is a good one
-//!   before the first save, too.
-//! - Where something was stored but nothing good is found, the defaults hold and that is reported, at
-//!   every start until something is saved: a page is left as it was found as evidence.
+//! - A page is used only when it has its mark. The mark is destroyed before an erase and programmed after it, so a
+//!   page that was erased only partly, and may read as erased, is not mistaken for an erased page.
+//! - A device that never stored anything first stores a record of defaults, so that a valid record exists before
+//!   the first save, too.
+//! - When something was stored but no record is valid, the defaults are in force and the damage is reported at
+//!   every start until something is saved. One page is left unchanged as evidence.
 
 mod flash;
 mod operation;
@@ -47,28 +47,29 @@ use operation::{Readying, Writing};
 pub use saving::{Progress, Saving};
 use survey::{Found, Survey, record_at};
 
-/// With less room than this behind the newest record, and older ones before it, a start makes room.
+/// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede
+/// it.
 const LITTLE_ROOM: usize = 256;
 
-/// What a start found.
+/// The configuration that a start found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loaded {
     /// The stored settings, or the defaults.
     pub settings: Settings,
-    /// Something was stored but nothing good: these are the defaults.
+    /// Something was stored but no record is valid: `settings` are the defaults.
     pub invalid: bool,
-    /// So many stored values are not allowed (any more) and have their defaults instead.
+    /// Number of stored values that this board or firmware does not allow. They have their defaults instead.
     pub rejected: u16,
 }
 
-/// The good record that counts.
+/// The valid record that counts.
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     page: Page,
     found: Found,
 }
 
-/// Where things are on the two pages.
+/// The state of the two pages.
 #[derive(Clone, Debug)]
 pub struct Store {
     first: Survey,
@@ -76,7 +77,7 @@ pub struct Store {
 }
 
 impl Store {
-    /// Looks through both pages.
+    /// Examines both pages.
     #[must_use]
     pub fn open(flash: &impl Flash) -> Self {
         Self {
@@ -85,7 +86,7 @@ impl Store {
         }
     }
 
-    /// The stored configuration, as far as this board allows it. [`Self::prepare`] goes by the same record.
+    /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
     pub fn load(&mut self, board: &Board, flash: &impl Flash) -> Loaded {
         while let Some(Newest { page, found }) = self.newest() {
@@ -97,7 +98,7 @@ impl Store {
                     rejected,
                 };
             }
-            // It has no seal, and cells of it that a power cut left do not read as they did a moment ago.
+            // The record has no seal, and after a power cut its cells may read differently from a moment ago.
             self.survey_mut(page).newest = None;
         }
         Loaded {
@@ -107,18 +108,17 @@ impl Store {
         }
     }
 
-    /// Makes the pages ready for saves: to be called at every start, before the line is served, for it
-    /// may take two erases and the programming of a record, 120 ms in all. Does nothing when nothing
-    /// was saved since the last start.
+    /// Prepares the pages for saves. Call this at every start, before the line is served: it may take 120 ms for
+    /// two erases and the programming of a record. Does nothing when nothing was saved since the last start.
     ///
     /// # Errors
     ///
-    /// When the flash fails. What is stored is still good, and saves are still tried.
+    /// When the flash fails. The stored configuration is still valid, and later saves are still tried.
     pub fn prepare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
-        // The survey that decided what is in force decides here, too. A second look could find another record: a seal
-        // whose program was cut off may read differently every time.
+        // Use the survey that selected the configuration in force. A second survey could find another record,
+        // because a seal whose programming was interrupted may read differently every time.
         let sealed = self.seal_again(flash);
-        // Where a seal is worn out, the record is moved, as from any page that takes no more.
+        // When a seal is worn out, move the record, as from any page that cannot take more records.
         if let Err(StoreError::Flash(..)) = sealed {
             return sealed;
         }
@@ -131,20 +131,20 @@ impl Store {
         result
     }
 
-    /// Whether the page without the newest record is erased, so that a save finds room there. True as
-    /// well while nothing good is stored: then no page may be given up.
+    /// Returns whether the page without the newest record is erased, so that a save finds room there. Also returns
+    /// true while no record is valid, because then no page may be erased.
     #[must_use]
     pub fn has_spare(&self) -> bool {
         self.newest()
             .is_none_or(|newest| self.survey(newest.page.other()).is_ready())
     }
 
-    /// Erases the page without the newest record, unless [`Self::has_spare`]. The erase holds the
-    /// program up for up to 40 ms.
+    /// Erases the page without the newest record, unless [`Self::has_spare`]. This stops the program for up to 40
+    /// ms.
     ///
     /// # Errors
     ///
-    /// When the flash fails. What is stored is still good.
+    /// When the flash fails. The stored configuration is still valid.
     pub fn make_spare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let result = match self.newest() {
             Some(newest) => self.make_ready(newest.page.other(), flash),
@@ -154,15 +154,15 @@ impl Store {
         result
     }
 
-    /// Programs the seals of the newest record again when the power was cut between them: the first one may
-    /// not be steady.
+    /// Programs the seals of the newest record again when the power was cut between them, because the first one may
+    /// not read the same every time.
     fn seal_again<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let Some(Newest { page, found }) = self.newest().filter(|newest| newest.found.sealed == 1)
         else {
             return Ok(());
         };
         for offset in [found.seals, found.seals.saturating_add(2)] {
-            // Zero may be programmed over anything.
+            // 0 can be programmed over any value.
             Operation::Program {
                 page,
                 offset,
@@ -173,8 +173,8 @@ impl Store {
         Ok(())
     }
 
-    /// Clears the page without the newest record, and moves that there if the other cannot take many
-    /// more.
+    /// Clears the page without the newest record, and moves the newest record there if its own page has little room
+    /// left.
     fn make_room<F: Flash>(
         &self,
         newest: Newest,
@@ -191,11 +191,11 @@ impl Store {
         let Some(record) = record_at(flash.page(page), offset) else {
             return Ok(());
         };
-        // As it is: the next start may find a newer firmware, which knows all of it.
+        // Copy the record unchanged: the next start may run a newer firmware, which knows all of its values.
         let count = u16::try_from(record.count()).unwrap_or(u16::MAX);
         let sequence = found.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
-        // Version 0.1 left no room for seals.
+        // Version 0.1 wrote records without seals, so its longest record does not fit with seals.
         if encoder.size() > flash.page(to).len().saturating_sub(FIRST_OFFSET) {
             return Ok(());
         }
@@ -212,7 +212,7 @@ impl Store {
         self.make_ready(page, flash)
     }
 
-    /// Something was stored, but nothing good: one page is made ready, the other left as it is.
+    /// Prepares one page when something was stored but no record is valid. The other page is left unchanged.
     fn make_one_ready<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         if self.first.is_ready() || self.second.is_ready() {
             return Ok(());
@@ -220,10 +220,10 @@ impl Store {
         self.make_ready(self.least_wanted(), flash)
     }
 
-    /// Nothing was ever stored: from now on there is always a good record, so that a cut in the very
-    /// first save finds one, too. It goes where nothing need be erased for it, so that a cut meanwhile
-    /// leaves nothing that looks like a damaged configuration. But the first page, when it alone is
-    /// blank, may be so from an erase that was cut short here, and must not be programmed then.
+    /// Stores a first record when nothing was ever stored, so that there is a valid record even after a power cut
+    /// in the first save. It uses a page that needs no erase, so that a power cut here leaves nothing that looks
+    /// like a damaged configuration. Exception: when only the first page is blank, an erase may have been
+    /// interrupted here before, so the page must be erased again before it is programmed.
     fn begin<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let page = if self.first.blank || self.first.is_ready() || !self.second.blank {
             Page::First
@@ -262,7 +262,7 @@ impl Store {
         *self = Self::open(flash);
     }
 
-    /// Keeps records off a page that has failed, until the next start.
+    /// Excludes a page that has failed from further records, until the next start.
     const fn avoid(&mut self, page: Page) {
         self.survey_mut(page).clean = false;
     }
@@ -293,7 +293,7 @@ impl Store {
         }
     }
 
-    /// Where there is no good record: the page whose content is missed least.
+    /// Returns the page to erase when there is no valid record: the one that is less useful as evidence.
     const fn least_wanted(&self) -> Page {
         if self.first.written {
             Page::Second

@@ -1,19 +1,19 @@
-//! The single operations a store does on its flash.
+//! The single flash operations of the store.
 
 use register_map::record::{Encoder, PAGE_MARK};
 
 use super::{Flash, Page, StoreError};
 
-/// One operation on the flash, the most that is done without a chance for anything else to run.
+/// One flash operation, the longest step during which nothing else can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operation {
     /// Program a half-word.
     Program {
-        /// Where.
+        /// Page of the half-word.
         page: Page,
-        /// At which even offset.
+        /// Even offset of the half-word, in bytes.
         offset: usize,
-        /// With what.
+        /// Value of the half-word.
         half: u16,
     },
     /// Erase a page.
@@ -21,11 +21,11 @@ pub enum Operation {
 }
 
 impl Operation {
-    /// Does it and looks whether it was done.
+    /// Performs the operation and checks the result.
     ///
     /// # Errors
     ///
-    /// When the flash failed, or does not read as it should.
+    /// When the flash failed or does not read back as expected.
     pub fn perform<F: Flash>(self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         match self {
             Self::Program { page, offset, half } => {
@@ -50,8 +50,8 @@ impl Operation {
     }
 }
 
-/// What makes a page ready: its mark destroyed, an erase, a new mark. An erase that was cut off leaves
-/// no page that looks ready.
+/// The steps that prepare a page: destroy its mark, erase it, program a new mark. An interrupted erase never leaves
+/// a page that looks prepared.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Readying {
     Spoil(Page),
@@ -61,7 +61,7 @@ pub(super) enum Readying {
 }
 
 impl Readying {
-    /// For a page that has its mark, or has none.
+    /// Returns the steps for a page; `marked` says whether it has its mark.
     pub(super) const fn new(page: Page, marked: bool) -> Self {
         if marked {
             Self::Spoil(page)
@@ -77,7 +77,7 @@ impl Readying {
             half,
         };
         let (operation, then) = match *self {
-            // Zero may be programmed over anything.
+            // 0 can be programmed over any value.
             Self::Spoil(page) => (mark(page, 0), Self::Erase(page)),
             Self::Erase(page) => (Operation::Erase(page), Self::Mark(page)),
             Self::Mark(page) => (mark(page, PAGE_MARK), Self::Done),
@@ -88,7 +88,7 @@ impl Readying {
     }
 }
 
-/// What writes a record.
+/// The steps that write a record.
 #[derive(Clone, Debug)]
 pub(super) struct Writing {
     pub(super) page: Page,
@@ -105,12 +105,12 @@ impl Writing {
         }
     }
 
-    /// Where the next half-word goes.
+    /// Returns the offset of the next half-word.
     pub(super) const fn offset(&self) -> usize {
         self.offset
     }
 
-    /// The next operation; `None` when the record is complete. For `pair` see [`Encoder::next`].
+    /// Returns the next operation, or `None` when the record is complete. [`Encoder::next`] describes `pair`.
     pub(super) fn next(
         &mut self,
         pair: &mut dyn FnMut() -> Option<(u16, u16)>,

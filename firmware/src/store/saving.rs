@@ -7,27 +7,27 @@ use super::survey::record_at;
 use super::{Flash, Page, Store, StoreError};
 use crate::config::Settings;
 
-/// How far a save has come.
+/// Progress of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// There is more to do.
+    /// More steps are needed.
     More,
     /// The settings are stored.
     Done,
 }
 
-/// A save that is under way. The settings must be the same at every step.
+/// A save under way. Pass the same settings to every step.
 #[derive(Clone, Debug)]
 pub struct Saving {
     readying: Readying,
     writing: Writing,
     sequence: u32,
-    /// The address after the last one stored.
+    /// Address after the setting that was stored last.
     cursor: u16,
 }
 
 impl Saving {
-    /// The save of these settings; `None` when that is what is stored, and nothing is to be done.
+    /// Begins a save of these settings. Returns `None` when they are already stored.
     #[must_use]
     pub fn new(store: &Store, flash: &impl Flash, settings: &Settings) -> Option<Self> {
         let newest = store.newest();
@@ -37,7 +37,7 @@ impl Saving {
             return None;
         }
         let sequence = newest.map_or(1, |newest| newest.found.sequence.wrapping_add(1));
-        // There are as many settings as addresses at most.
+        // There are at most as many settings as addresses.
         let count = settings
             .changed_from(0)
             .fold(0, |count: u16, _| count.saturating_add(1));
@@ -51,10 +51,10 @@ impl Saving {
         })
     }
 
-    /// The next operation, to be performed at once; `None` when that was all.
+    /// Returns the next operation, to be performed immediately, or `None` when all are done.
     ///
-    /// Together with [`Operation::perform`] and [`Self::finish`] this is [`Self::step`] for a caller
-    /// that shares the settings, but does not want to hold them while the flash works.
+    /// Together with [`Operation::perform`] and [`Self::finish`] this replaces [`Self::step`] for a caller that
+    /// shares the settings but does not want to lock them while the flash works.
     pub fn next(&mut self, settings: &Settings) -> Option<Operation> {
         if let Some(operation) = self.readying.next() {
             return Some(operation);
@@ -67,7 +67,7 @@ impl Saving {
         })
     }
 
-    /// Ends the save, after the last operation or after one that failed.
+    /// Ends the save after the last operation, or after one that failed.
     ///
     /// # Errors
     ///
@@ -87,11 +87,11 @@ impl Saving {
         }
     }
 
-    /// One flash operation, or the end.
+    /// Performs one flash operation, or ends the save.
     ///
     /// # Errors
     ///
-    /// When the flash failed: the save is over, what was stored before still is, and the next save
+    /// When the flash failed. The save has ended, the previous configuration is still stored, and the next save
     /// tries another place.
     pub fn step<F: Flash>(
         &mut self,
@@ -103,7 +103,7 @@ impl Saving {
             Some(operation) => {
                 let done = operation.perform(flash);
                 if done.is_err() {
-                    // The operation's error says more than that the settings are not stored.
+                    // The error of the operation is more specific than the one from `finish`.
                     let _ = self.finish(store, flash);
                 }
                 done.map(|()| Progress::More)
@@ -113,8 +113,8 @@ impl Saving {
     }
 }
 
-/// Where a record of that size goes, and what makes the place ready for it: behind the newest, else
-/// onto the other page, which is erased only if nothing fits there either.
+/// Returns where a record of this size goes, and the steps that prepare the place: after the newest record, or else
+/// on the other page, which is erased only if the record does not fit there either.
 fn place(store: &Store, size: usize) -> (Page, usize, Readying) {
     let active = store.newest().map(|newest| newest.page);
     let first = active.unwrap_or(Page::First);

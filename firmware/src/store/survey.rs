@@ -1,18 +1,18 @@
-//! What is on a page.
+//! The content of a page.
 
 use register_map::record::{
     FIRST_OFFSET, PAGE_MARK, Record, SEALS, is_newer, is_vacant, records, used,
 };
 
-/// A good record's place on its page.
+/// The place of a valid record on its page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Found {
-    /// Where it begins.
+    /// Offset of the record, in bytes.
     pub(super) offset: usize,
-    /// Where its seals are.
+    /// Offset of its seals, in bytes.
     pub(super) seals: usize,
     pub(super) sequence: u32,
-    /// How many seals are complete, counted from the first: 0 to 2.
+    /// Number of complete seals, counted from the first: 0 to 2.
     pub(super) sealed: u8,
 }
 
@@ -32,8 +32,8 @@ impl Found {
         }
     }
 
-    /// Whether this record counts rather than the other one. A sealed record counts before any that is not: the
-    /// CRC of that one may not be steady.
+    /// Returns whether this record counts rather than the other one. A sealed record counts before any unsealed
+    /// one, because the CRC of an unsealed record may read differently every time.
     pub(super) const fn counts_before(&self, other: &Self) -> bool {
         match (self.sealed > 0, other.sealed > 0) {
             (true, false) => true,
@@ -43,24 +43,24 @@ impl Found {
     }
 }
 
-/// What the bytes of a page amount to.
+/// A summary of a page's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Survey {
-    /// The good record that counts.
+    /// The valid record that counts.
     pub(super) newest: Option<Found>,
-    /// The page was erased completely, and behind its sealed records, used, if any, it still is.
+    /// The page was erased completely, and the area after its sealed records is still erased.
     pub(super) clean: bool,
-    /// It has the mark of a complete erase.
+    /// The page has the mark of a complete erase.
     pub(super) marked: bool,
-    /// All of it reads as erased, the place of the mark, too.
+    /// Every byte reads as erased, including the place of the mark.
     pub(super) blank: bool,
-    /// Something was stored there, be it good or not: it is not [`is_vacant`].
+    /// Something was stored on the page, valid or not: it is not [`is_vacant`].
     pub(super) written: bool,
-    /// Where the next record goes on a clean page.
+    /// Offset of the next record on a clean page.
     pub(super) end: usize,
     /// Bytes of the page.
     size: usize,
-    /// Good records.
+    /// Number of valid records.
     pub(super) records: usize,
 }
 
@@ -94,12 +94,12 @@ impl Survey {
         survey
     }
 
-    /// Erased completely and nothing written since.
+    /// Returns whether the page was erased completely and nothing was written since.
     pub(super) const fn is_ready(&self) -> bool {
         self.clean && self.records == 0
     }
 
-    /// Bytes free on a clean page.
+    /// Returns the free bytes of a clean page, or 0 for any other page.
     pub(super) const fn room(&self) -> usize {
         if self.clean {
             self.size.saturating_sub(self.end)
@@ -109,7 +109,7 @@ impl Survey {
     }
 }
 
-/// The record at an offset of a page.
+/// Returns the record at an offset of a page, if it is valid.
 pub(super) fn record_at(page: &[u8], offset: usize) -> Option<Record<'_>> {
     Record::decode(page.get(offset..)?)
 }
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_ready_only_with_its_mark_and_nothing_else() {
+    fn a_page_is_ready_only_with_its_mark_and_without_other_content() {
         let mark = PAGE_MARK.to_le_bytes();
         let ready = Survey::of(&page(&mark));
         assert!(ready.is_ready() && !ready.written);
@@ -136,7 +136,7 @@ mod tests {
         let erased = Survey::of(&page(&[]));
         assert!(
             !erased.is_ready() && !erased.written,
-            "without a mark it may be weak"
+            "without a mark the erase may have been incomplete"
         );
         let half_marked = Survey::of(&page(&[mark[0], 0xFF]));
         assert!(!half_marked.is_ready() && !half_marked.written);
@@ -146,8 +146,8 @@ mod tests {
         assert!(!spoilt.is_ready() && spoilt.written && spoilt.room() == 0);
     }
 
-    /// A page with a record of each of these sequence numbers, the first `unsealed` bytes of whose seals are
-    /// still erased.
+    /// Returns a page with a record for each of these sequence numbers, in whose seals the first `unsealed` bytes
+    /// are still erased.
     fn records_of(sequences: &[u32], unsealed: usize) -> [u8; PAGE_SIZE] {
         let mut bytes = page(&PAGE_MARK.to_le_bytes());
         let mut end = FIRST_OFFSET;
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn page_with_an_incomplete_seal_takes_no_more_records() {
+    fn no_record_is_added_to_a_page_with_an_incomplete_seal() {
         for unsealed in [0, 2, 4] {
             let survey = Survey::of(&records_of(&[1, 2], unsealed));
             assert_eq!(survey.clean, unsealed == 0, "{unsealed}");
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_with_something_behind_its_records_takes_no_more() {
+    fn no_record_is_added_to_a_page_with_data_after_its_records() {
         let mut bytes = page(&[]);
         let size = encode_page(0, &[(0x0114, 1)], &mut bytes).unwrap();
         assert!(Survey::of(&bytes).clean);
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_counts_wherever_it_stands_and_across_the_wrap() {
+    fn the_newest_record_counts_at_any_place_and_across_the_wrap() {
         let mut bytes = page(&[]);
         encode_page(0, &[(0x0114, 1)], &mut bytes).unwrap();
         let mut put = |offset: usize, sequence| {

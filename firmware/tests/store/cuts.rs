@@ -1,6 +1,5 @@
-//! The power is cut in every single operation of whole lives of a device, and every mess is tried: the
-//! next start finds the old or the new configuration, whole, and the device goes on as if nothing had
-//! happened.
+//! Cuts the power in every single operation of simulated device histories, and tries every state that the cut may
+//! leave. The next start must find the complete old or new configuration, and later saves must work.
 
 use firmware::config::Settings;
 use firmware::store::{Flash, Operation, Page, Store, StoreError};
@@ -17,8 +16,8 @@ enum Event {
 }
 use Event::{Restart, Save, Spare};
 
-/// A place for a cut: the flash before an operation, the operation, and the configurations that a
-/// start may find after a cut in it.
+/// A place for a power cut: the flash before an operation, the operation, and the configurations that a start may
+/// find after the cut.
 struct Place {
     before: MockFlash,
     operation: Operation,
@@ -26,7 +25,7 @@ struct Place {
     new: Settings,
 }
 
-/// Three of the messes, others for every place.
+/// Returns three of the messes, different ones for each place.
 fn some_messes(index: usize) -> impl Iterator<Item = Mess> {
     MESSES
         .into_iter()
@@ -35,7 +34,7 @@ fn some_messes(index: usize) -> impl Iterator<Item = Mess> {
         .take(3)
 }
 
-/// Lives a life without a cut, from the first start on, and gives every place for one.
+/// Runs a history without a power cut, from the first start on, and returns every place for a cut.
 fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
     let mut flash = flash;
     let mut places = Vec::new();
@@ -79,7 +78,8 @@ fn live(flash: MockFlash, first: &Settings, life: &[Event]) -> Vec<Place> {
     places
 }
 
-/// Cuts, starts again, and expects the old or the new; then that everything still works.
+/// Cuts the power, starts again, and expects the old or the new configuration. Then checks that everything still
+/// works.
 fn cut_and_recover(place: &Place, mess: Mess) {
     let mut flash = place.before.clone();
     flash.cut_in(place.operation, mess);
@@ -95,7 +95,7 @@ fn cut_and_recover(place: &Place, mess: Mess) {
     let (again, mut store) = start_well(&mut flash);
     assert!(
         again.settings == found,
-        "{what}: not the same at the next start"
+        "{what}: the next start finds another configuration"
     );
 
     let next = settings(&[(0x0101, 12), (0x0160, 2000)]);
@@ -117,7 +117,7 @@ fn cut_everywhere(flash: MockFlash, first: &Settings, life: &[Event]) -> usize {
     places.len()
 }
 
-/// How much more fits on a page than on one of 1 KiB.
+/// Number of times a page is larger than one of 1 KiB.
 const PAGES_OF_1_KIB: usize = PAGE_SIZE / 1024;
 
 fn saves(sizes: impl IntoIterator<Item = usize>) -> Vec<Event> {
@@ -128,7 +128,7 @@ fn saves(sizes: impl IntoIterator<Item = usize>) -> Vec<Event> {
 }
 
 #[test]
-fn in_the_first_start_and_the_first_saves() {
+fn cut_in_the_first_start_and_the_first_saves_is_recovered() {
     let mut life = saves([0, 1, 5]);
     life.push(Restart);
     let cuts = cut_everywhere(MockFlash::erased(), &Settings::defaults(), &life);
@@ -136,7 +136,7 @@ fn in_the_first_start_and_the_first_saves() {
 }
 
 #[test]
-fn in_a_save_of_every_setting() {
+fn cut_in_a_save_of_every_setting_is_recovered() {
     let life = [Save(Box::new(fullest_settings(1))), Restart];
     let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     assert!(places.len() > 400, "{}", places.len());
@@ -146,7 +146,7 @@ fn in_a_save_of_every_setting() {
 }
 
 #[test]
-fn in_saves_that_fill_both_pages_without_a_start_between() {
+fn cut_in_saves_that_fill_both_pages_without_a_restart_is_recovered() {
     let life = saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB));
     let places = live(MockFlash::erased(), &Settings::defaults(), &life);
     let erases = places
@@ -161,9 +161,9 @@ fn in_saves_that_fill_both_pages_without_a_start_between() {
     }
 }
 
-/// As a device does that never stops: the other page is erased after every change of pages.
+/// As on a device that never stops: the other page is erased after every change of pages.
 #[test]
-fn in_the_erases_between_saves_which_then_never_have_to() {
+fn cut_in_an_erase_between_saves_is_recovered_and_saves_never_erase() {
     let mut life = Vec::new();
     for save in saves([60, 50, 40, 90, 100, 10, 80, 70, 60].repeat(2 * PAGES_OF_1_KIB)) {
         life.extend([save, Spare]);
@@ -191,13 +191,13 @@ fn in_the_erases_between_saves_which_then_never_have_to() {
 }
 
 #[test]
-fn in_the_compaction_and_the_erases_of_a_start() {
+fn cut_in_the_compaction_and_the_erases_of_a_start_is_recovered() {
     let mut life = saves(vec![25; 9 * PAGES_OF_1_KIB - 3]);
     life.push(Restart);
     life.extend(saves([25, 25]));
     life.push(Restart);
     let places = live(MockFlash::erased(), &Settings::defaults(), &life);
-    // A compaction is of starts alone.
+    // Only a start compacts.
     let in_starts: Vec<_> = places
         .iter()
         .filter(|place| place.old == place.new)
@@ -208,10 +208,10 @@ fn in_the_compaction_and_the_erases_of_a_start() {
     }
 }
 
-/// The first start was cut short on either page, so that one has to be erased; the flash takes no
-/// programming after an erase that was cut short, and that page alone now reads as it was delivered.
+/// The first start was interrupted on either page, so that this page has to be erased. The mock flash refuses
+/// programming after an interrupted erase, and only that page reads as delivered.
 #[test]
-fn in_the_erase_before_the_very_first_record() {
+fn cut_in_the_erase_before_the_very_first_record_is_recovered() {
     let half_marked = MockFlash::with(&[0x6F], &[0x6F]);
     let places = live(half_marked, &Settings::defaults(), &[]);
     assert!(matches!(places[0].operation, Operation::Erase(_)));
@@ -224,9 +224,10 @@ fn in_the_erase_before_the_very_first_record() {
     }
 }
 
-/// A second cut during the start after the first. A start decides between old and new once it is complete.
+/// A second cut during the start after the first cut. A start selects the old or the new configuration once it is
+/// complete.
 #[test]
-fn in_the_start_after_a_cut() {
+fn cut_in_the_start_after_a_cut_is_recovered() {
     let life = saves([2, 3]);
     for place in live(MockFlash::erased(), &Settings::defaults(), &life) {
         for (index, mess) in MESSES.into_iter().enumerate() {
@@ -248,10 +249,10 @@ fn in_the_start_after_a_cut() {
     }
 }
 
-/// The half-word reads as erased at the start and otherwise at the save. No program can foresee that, so the flash refuses
-/// the save. The stored settings stay, and the next save takes another place.
+/// The half-word reads as erased at the start and differently at the save. The program cannot foresee that, so the
+/// flash refuses the save. The stored settings remain, and the next save uses another place.
 #[test]
-fn in_the_first_half_word_of_a_record_which_then_reads_as_erased_for_a_while() {
+fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered() {
     let old = settings(&[(0x0141, 0x1111)]);
     let new = settings(&[(0x0141, 0x2222)]);
     let places = live(
@@ -264,11 +265,11 @@ fn in_the_first_half_word_of_a_record_which_then_reads_as_erased_for_a_while() {
     for starts in 1..1000 {
         let mut flash = first.before.clone();
         flash.cut_in(first.operation, Mess::Noise(1));
-        // What it reads as depends on how often the power has come back.
+        // The half-word's content depends on how often the power has returned.
         for _ in 0..starts {
             flash.power_on();
         }
-        // Every second look finds a page otherwise: here those of the start, and not that of the save.
+        // Every second read finds the page differently: here the reads at the start differ from those of the save.
         if starts % 2 == 0 {
             let _ = Flash::page(&flash, Page::First);
         }
@@ -297,9 +298,9 @@ fn in_the_first_half_word_of_a_record_which_then_reads_as_erased_for_a_while() {
     assert!(refused > 10, "{refused}");
 }
 
-/// A setting that was saved once, long ago, is carried along.
+/// A setting that was saved once, long ago, is copied by every compaction.
 #[test]
-fn a_setting_that_never_changes_survives_any_number_of_compactions() {
+fn a_setting_that_never_changes_is_kept_over_any_number_of_compactions() {
     let mut flash = MockFlash::erased();
     let (_, mut store) = start_well(&mut flash);
     for round in 0..200 * PAGES_OF_1_KIB as u16 {

@@ -1,5 +1,4 @@
-//! A flash that insists on the rules of RM0008 3.3, and whose power can be cut in the middle of any
-//! operation.
+//! A mock flash that enforces the rules of RM0008 3.3, and whose power can be cut in the middle of any operation.
 
 use std::cell::Cell;
 
@@ -7,28 +6,27 @@ use firmware::store::{Flash, Operation, Page};
 
 use crate::PAGE_SIZE;
 
-/// What a cut leaves of the operation it hit.
+/// The state that a power cut leaves of the interrupted operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mess {
-    /// Nothing has happened yet.
+    /// Nothing has changed yet.
     Untouched,
-    /// It was just done; an erased page may still be weak.
+    /// The operation was just complete. An erased page may still be weak.
     Complete,
-    /// It was just done but for one cell of a half-word, which reads as it was at every second
-    /// start, and not at the first. An erase as
-    /// [`Self::Complete`].
+    /// The operation was complete except for one cell of a half-word, which reads as before the operation at every
+    /// second start, but not at the first. For an erase the same as [`Self::Complete`].
     Nearly,
-    /// Any of the bits to be changed have changed.
+    /// A random part of the bits to be changed has changed.
     Sprinkled(u64),
-    /// The bytes up to here have changed.
+    /// The bytes before this index have changed.
     Front(usize),
-    /// The bytes from here on have changed.
+    /// The bytes from this index on have changed.
     Back(usize),
-    /// An erase leaves noise. A half-word as [`Self::Sprinkled`].
+    /// An erase leaves noise. For a half-word the same as [`Self::Sprinkled`].
     Noise(u64),
 }
 
-/// Messes of every sort.
+/// Messes of every kind.
 pub const MESSES: [Mess; 11] = [
     Mess::Untouched,
     Mess::Complete,
@@ -43,7 +41,7 @@ pub const MESSES: [Mess; 11] = [
     Mess::Noise(4),
 ];
 
-/// A half-word whose program was cut off, the cells that were to change, and the value to be programmed.
+/// A half-word whose programming was interrupted, the cells that were to change, and the value to be programmed.
 #[derive(Clone, Copy, Debug)]
 struct Torn {
     page: usize,
@@ -54,7 +52,7 @@ struct Torn {
 }
 
 impl Torn {
-    /// What it reads as: always the same with the same number of the look.
+    /// Returns what the half-word reads as. The same number of the look always returns the same value.
     fn read(&self, look: u64) -> [u8; 2] {
         let cells = match self.mess {
             Mess::Nearly if !look.is_multiple_of(2) => 1 << self.before.trailing_zeros(),
@@ -65,44 +63,44 @@ impl Torn {
     }
 }
 
-/// Why an operation was not done.
+/// Error of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The power was cut in it.
+    /// The power was cut during the operation.
     PowerCut,
-    /// The half-word read as erased a moment ago, but its program was cut off once, and now it does not: the
-    /// controller refuses it (PGERR, RM0008 3.3).
+    /// The half-word read as erased a moment ago, but its programming was once interrupted, and now it reads
+    /// differently. The controller refuses to program it (PGERR, RM0008 3.3).
     NotErased,
 }
 
-/// The flash, and what was done to it.
+/// The mock flash and a log of its operations.
 #[derive(Clone, Debug)]
 pub struct MockFlash {
     pub pages: [[u8; PAGE_SIZE]; 2],
-    /// An erase was cut off: the page, whatever it reads, must not be programmed.
+    /// An erase was interrupted: the page must not be programmed, whatever it reads as.
     weak: [bool; 2],
-    /// Its bits are not even the same at every start.
+    /// The page's bits read differently at every start.
     pub unsteady: [bool; 2],
-    /// Half-words whose program was cut off.
+    /// Half-words whose programming was interrupted.
     torn: Vec<Torn>,
-    /// The pages as every second look finds them: half-words whose program was cut off read differently.
+    /// The pages as every second read finds them: half-words whose programming was interrupted read differently.
     other: [[u8; PAGE_SIZE]; 2],
     looks: Cell<u64>,
-    /// Times the power has come back.
+    /// Number of times the power has returned.
     starts: u64,
-    /// The power is cut in the operation after so many more.
+    /// Number of operations before the one in which the power is cut.
     pub cut: Option<(usize, Mess)>,
     off: bool,
-    /// This half-word keeps its ones.
+    /// A worn-out half-word, whose bits cannot be cleared.
     pub worn: Option<(Page, usize)>,
-    /// What was done, for those who want it replayed, with the flash as it was before.
+    /// The operations so far, each with the flash before it, if they are recorded.
     pub journal: Option<Vec<(MockFlash, Operation)>>,
     pub programs: usize,
     pub erases: [usize; 2],
 }
 
 impl MockFlash {
-    /// As it leaves the factory.
+    /// Returns a flash as it leaves the factory.
     pub fn erased() -> Self {
         Self::holding([[0xFF; PAGE_SIZE]; 2])
     }
@@ -125,7 +123,7 @@ impl MockFlash {
         }
     }
 
-    /// With these bytes at the start of its pages.
+    /// Returns a flash with these bytes at the start of its pages.
     pub fn with(first: &[u8], second: &[u8]) -> Self {
         let mut flash = Self::erased();
         flash.pages[0][..first.len()].copy_from_slice(first);
@@ -137,7 +135,7 @@ impl MockFlash {
         self.programs + self.erases[0] + self.erases[1]
     }
 
-    /// The power comes back. What is unsteady reads a little differently every time.
+    /// Turns the power on again. Unsteady pages read a little differently every time.
     pub fn power_on(&mut self) {
         (self.off, self.cut) = (false, None);
         self.starts += 1;
@@ -157,7 +155,7 @@ impl MockFlash {
         }
     }
 
-    /// Brings what every second look finds on a page up to date.
+    /// Updates what every second read finds on a page.
     fn look_otherwise(&mut self, page: usize) {
         self.other[page] = self.pages[page];
         for torn in self.torn.iter().filter(|torn| torn.page == page) {
@@ -177,7 +175,7 @@ impl MockFlash {
         assert_eq!(result, Err(Fault::PowerCut));
     }
 
-    /// Counts down to the cut; gives the mess when it is there.
+    /// Counts down to the power cut. Returns the mess when the cut is due.
     fn begin(&mut self, operation: Operation) -> Option<Mess> {
         assert!(!self.off, "{operation:?} without power");
         if let Some(mut journal) = self.journal.take() {
@@ -230,7 +228,7 @@ impl Flash for MockFlash {
                 Fault::NotErased
             });
         }
-        // Where a mark cannot be written, nobody can know.
+        // When a mark cannot be written, the program cannot know that the page is weak.
         assert!(
             !self.weak[page as usize] || half == 0 || self.worn.is_some(),
             "{operation:?} on a weak page"
@@ -248,7 +246,7 @@ impl Flash for MockFlash {
             after |= before;
         }
         *place = after.to_le_bytes();
-        // A complete program steadies the cells that it programs.
+        // A complete programming makes its cells steady.
         let index = page as usize;
         self.torn.retain(|torn| {
             (torn.page, torn.offset) != (index, offset) || mess.is_some() || torn.before & half != 0
@@ -305,7 +303,7 @@ impl Flash for MockFlash {
     }
 }
 
-/// Numbers without a pattern, the same in every run (xorshift64*).
+/// Pseudo-random numbers, the same in every run (xorshift64*).
 pub struct Noise(pub u64);
 
 impl Noise {

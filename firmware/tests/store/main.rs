@@ -1,4 +1,4 @@
-//! The configuration store on a strict mock of its flash, with the power cut wherever it can be.
+//! Tests of the configuration store on a strict mock flash, with power cuts at every possible place.
 
 mod cuts;
 mod flash;

@@ -1,4 +1,4 @@
-//! Random lives against the simplest model there is: what was saved last is what is found.
+//! Random device histories compared with the simplest model: a start finds what was saved last.
 
 use firmware::config::Settings;
 use proptest::prelude::*;
@@ -11,7 +11,7 @@ enum Event {
     Save(u64, usize),
     SaveAll(u64),
     Restart,
-    /// The power is cut so many operations later, whatever they are, with this mess.
+    /// The power is cut in the operation after this many, leaving this mess.
     Cut(usize, Mess),
 }
 
@@ -39,9 +39,9 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_was_saved_last_is_found(life in prop::collection::vec(event(), 1..40)) {
+    fn a_start_finds_what_was_saved_last(life in prop::collection::vec(event(), 1..40)) {
         let mut flash = MockFlash::erased();
-        // The next start finds one of these.
+        // The next start must find one of these.
         let (mut old, mut new) = (Settings::defaults(), Settings::defaults());
         let mut store = None;
         for event in life {
@@ -50,7 +50,7 @@ proptest! {
                 prop_assert!(!loaded.invalid && loaded.rejected == 0);
                 prop_assert!(loaded.settings == old || loaded.settings == new);
                 store = started.ok();
-                // A start that is cut short decides nothing.
+                // A start that is interrupted selects neither.
                 if store.is_some() {
                     (old, new) = (loaded.settings.clone(), loaded.settings);
                 }
@@ -69,7 +69,7 @@ proptest! {
                 }
             };
             match store.as_mut().map(|store| save(store, &mut flash, &settings)) {
-                // The power was cut in the start.
+                // The power was cut during the start.
                 None => flash.power_on(),
                 Some(Ok(_)) => (old, new) = (settings.clone(), settings),
                 Some(Err(_)) => {

@@ -1,4 +1,4 @@
-//! A device's life as the store sees it.
+//! The steps of a device's life that concern the store.
 
 use firmware::config::Settings;
 use firmware::store::{Loaded, Progress, Saving, Store, StoreError};
@@ -13,7 +13,7 @@ const MODULE_SLOT: u16 = module_of(5);
 
 pub type Failure = StoreError<Fault>;
 
-/// Starts: what was loaded, and the store made ready.
+/// Starts the device: loads the configuration and prepares the store.
 pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {
     let mut store = Store::open(flash);
     let loaded = store.load(&MODIO_02, flash);
@@ -21,13 +21,13 @@ pub fn start(flash: &mut MockFlash) -> (Loaded, Result<Store, Failure>) {
     (loaded, prepared.map(|()| store))
 }
 
-/// Starts without a cut.
+/// Starts the device without a power cut.
 pub fn start_well(flash: &mut MockFlash) -> (Loaded, Store) {
     let (loaded, store) = start(flash);
     (loaded, store.unwrap())
 }
 
-/// Saves, at most one operation a step; `false` when there was nothing to do.
+/// Saves, with at most one operation per step. Returns `false` when there was nothing to do.
 pub fn save(
     store: &mut Store,
     flash: &mut MockFlash,
@@ -39,7 +39,10 @@ pub fn save(
     loop {
         let before = flash.operations();
         let progress = saving.step(store, flash, settings)?;
-        assert!(flash.operations() <= before + 1, "one operation a step");
+        assert!(
+            flash.operations() <= before + 1,
+            "at most one operation per step"
+        );
         if progress == Progress::Done {
             return Ok(true);
         }
@@ -52,7 +55,8 @@ pub fn settings(pairs: &[(u16, u16)]) -> Settings {
     settings
 }
 
-/// Settings of which about `changed` are not the defaults, always the same for a seed.
+/// Returns settings of which about `changed` differ from the defaults. The same seed always gives the same
+/// settings.
 pub fn random_settings(seed: u64, changed: usize) -> Settings {
     let mut noise = Noise(seed);
     let rules = RULES
@@ -69,7 +73,7 @@ pub fn random_settings(seed: u64, changed: usize) -> Settings {
     Settings::load(&MODIO_02, pairs.into_iter()).0
 }
 
-/// Settings of which none that can be changed is the default.
+/// Returns settings in which every value that can be changed differs from its default.
 pub fn fullest_settings(seed: u64) -> Settings {
     let mut noise = Noise(seed);
     let mut pairs = vec![(MODULE_SLOT, 5)];
@@ -84,7 +88,7 @@ pub fn fullest_settings(seed: u64) -> Settings {
     Settings::load(&MODIO_02, pairs.into_iter()).0
 }
 
-/// An allowed value that is not the default, if there is any among some.
+/// Returns a random allowed value that is not the default, if a few tries find one.
 fn some_value(address: u16, noise: &mut Noise) -> Option<u16> {
     let (rule, _) = rule_at(RULES, address)?;
     let some = [1, 0xFFFE, 2000, 100, 12, 24, 384, 30, 3, 0, 1];

@@ -1,4 +1,4 @@
-//! Stores as literal bytes: what was once in the field is read by every later firmware.
+//! Stored configurations as literal bytes: every later firmware must read what earlier ones have stored.
 
 use firmware::config::Settings;
 use firmware::store::{Page, Saving, Store};
@@ -11,8 +11,8 @@ use crate::PAGE_SIZE;
 use crate::flash::MockFlash;
 use crate::running::{save, settings, start_well};
 
-/// Written by version 0.1: page mark, then two records, the second with another speed. The CRCs are
-/// those of Python's zlib.crc32.
+/// Written by version 0.1: page mark, then two records, the second with another baud rate. The CRCs were computed
+/// by Python's zlib.crc32.
 #[rustfmt::skip]
 const VERSION_0_1: [u8; 64] = [
     0x6F, 0x6B,
@@ -31,7 +31,7 @@ const VERSION_0_1: [u8; 64] = [
     0xFF, 0xFF,
 ];
 
-/// The records of [`VERSION_0_1`] as they are written now, with their seals.
+/// The records of [`VERSION_0_1`] as they are written now, with seals.
 #[rustfmt::skip]
 const SEALED: [u8; 72] = [
     0x6F, 0x6B,
@@ -50,8 +50,8 @@ const SEALED: [u8; 72] = [
     0xFF, 0xFF,
 ];
 
-/// Written by a later firmware with another register map in the same layout: settings that are not
-/// known here, and a speed and a filter that are not allowed here.
+/// Written by a later firmware with another register map in the same layout: it contains unknown settings, and a
+/// baud rate and a filter that are not allowed here.
 #[rustfmt::skip]
 const LATER: [u8; 44] = [
     0x6F, 0x6B,
@@ -59,9 +59,9 @@ const LATER: [u8; 44] = [
     0x01, 0x01, 0x00, 0x48, // BAUD 18432
     0x14, 0x01, 0x04, 0x00, // MODULE of port 5: 4ai
     0x30, 0x01, 0x09, 0x00, // FILTER of point 16: 9
-    0x50, 0x01, 0x34, 0x12, // 0x0150: not known
+    0x50, 0x01, 0x34, 0x12, // 0x0150: unknown
     0x60, 0x01, 0xD0, 0x07, // BETA of point 0: 2000
-    0x00, 0x04, 0x01, 0x00, // 0x0400: not known
+    0x00, 0x04, 0x01, 0x00, // 0x0400: unknown
     0x25, 0x94, 0x0C, 0x04,
     0xFF, 0xFF, 0xFF, 0xFF,
 ];
@@ -89,7 +89,7 @@ fn the_newest_record_of_version_0_1_is_read_on_either_page() {
         assert!(loaded.settings == expected && !loaded.invalid && loaded.rejected == 0);
         assert!(
             !save(&mut store, &mut flash, &expected).unwrap(),
-            "nothing to save"
+            "already stored"
         );
     }
 }
@@ -103,7 +103,7 @@ fn a_later_firmware_s_record_is_read_as_far_as_it_is_known() {
     assert_eq!(loaded.rejected, 2, "BAUD and FILTER");
     assert!(
         save(&mut store, &mut flash, &known).unwrap(),
-        "the stored record is another"
+        "the stored record differs"
     );
     assert_eq!(start_well(&mut flash).0.rejected, 0);
 }
@@ -136,14 +136,14 @@ fn record_without_room_for_seals_stays_where_it_is_and_is_read() {
 }
 
 #[test]
-fn another_layout_is_reported_and_left_alone_until_something_is_saved() {
+fn another_layout_is_reported_and_kept_until_something_is_saved() {
     let mut bytes = page(&LATER);
     bytes[5] = 2;
     let mut flash = MockFlash::holding([bytes, [0xFF; PAGE_SIZE]]);
     for _ in 0..3 {
         let (loaded, _) = start_well(&mut flash);
         assert!(loaded.invalid && loaded.settings == Settings::defaults());
-        assert_eq!(flash.pages[0], bytes, "the evidence");
+        assert_eq!(flash.pages[0], bytes, "the page is kept as evidence");
     }
     let (_, mut store) = start_well(&mut flash);
     assert!(save(&mut store, &mut flash, &Settings::defaults()).unwrap());
@@ -151,7 +151,7 @@ fn another_layout_is_reported_and_left_alone_until_something_is_saved() {
 }
 
 #[test]
-fn a_preset_is_a_stored_configuration() {
+fn a_preset_is_read_as_a_stored_configuration() {
     for module in Module::ALL {
         let mut page = [0xFF; PAGE_SIZE];
         let pairs: Vec<_> = modules([(5_u16, module)]).collect();
@@ -160,7 +160,7 @@ fn a_preset_is_a_stored_configuration() {
         let (loaded, _) = start_well(&mut flash);
         assert_eq!(loaded.settings.module(5), module);
         assert!(!loaded.invalid && loaded.rejected == 0);
-        assert_eq!(flash.erases, [0, 1], "the preset page is good as it is");
+        assert_eq!(flash.erases, [0, 1], "the preset page is not erased");
     }
 }
 

@@ -1,4 +1,4 @@
-//! How much a flash is made to bear, and what happens when it no longer does.
+//! The wear of the flash, and the behaviour when the flash is worn out.
 
 use firmware::config::Settings;
 use firmware::store::{Page, StoreError};
@@ -24,7 +24,7 @@ fn saving_what_is_stored_programs_nothing() {
 }
 
 #[test]
-fn a_start_with_nothing_new_touches_nothing() {
+fn a_start_without_a_new_record_programs_nothing() {
     for settings in [settings(&[(0x0101, 12)]), fullest_settings(2)] {
         let mut flash = MockFlash::erased();
         let (_, mut store) = start_well(&mut flash);
@@ -39,7 +39,7 @@ fn a_start_with_nothing_new_touches_nothing() {
 }
 
 #[test]
-fn a_run_has_an_erased_page_ready_for_even_the_largest_configuration() {
+fn an_erased_page_is_always_ready_for_the_largest_configuration() {
     for earlier in 0..60 {
         let mut flash = MockFlash::erased();
         let (_, mut store) = start_well(&mut flash);
@@ -67,7 +67,7 @@ fn many_small_saves_share_an_erase() {
 }
 
 #[test]
-fn garbage_is_the_defaults_and_reported_until_something_is_saved() {
+fn garbage_gives_the_defaults_and_is_reported_until_something_is_saved() {
     for seed in 0..200 {
         let mut flash = MockFlash::erased();
         let mut noise = Noise(seed);
@@ -87,7 +87,7 @@ fn garbage_is_the_defaults_and_reported_until_something_is_saved() {
 }
 
 #[test]
-fn a_worn_half_word_costs_a_save_but_never_what_is_stored() {
+fn a_worn_half_word_fails_a_save_and_keeps_the_stored_configuration() {
     let old = settings(&[(0x0141, 0x1111)]);
     let new = settings(&[(0x0141, 0x2222)]);
     let mut failures = 0;
@@ -102,7 +102,7 @@ fn a_worn_half_word_costs_a_save_but_never_what_is_stored() {
                 Err(error) => {
                     failures += 1;
                     assert_eq!(error, StoreError::Worn(page, offset));
-                    // The second seal is programmed when the record counts already.
+                    // The record already counts when the second seal is programmed.
                     let stored = store.load(&MODIO_02, &flash).settings;
                     assert!(stored == old || stored == new);
                     save(&mut store, &mut flash, &new).expect("elsewhere");

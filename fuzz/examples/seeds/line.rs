@@ -1,4 +1,4 @@
-//! Traffic, for the receivers: `modio_fuzz::receiver` has the form.
+//! Seeds with line traffic for the receivers. `modio_fuzz::receiver` describes the format.
 
 use modbus_reference::{UNIT, framed};
 
@@ -10,7 +10,7 @@ const GIVE_BACK: u8 = 5;
 const HAS_SENT: u8 = 6;
 const T35: u8 = 7;
 
-/// Frames as manuals of other makers print them.
+/// Frames from the manuals of other devices.
 const PRINTED: &str = include_str!("../../../tools/conformance/data/frames.txt");
 
 fn characters(bytes: &[u8]) -> Vec<u8> {
@@ -20,7 +20,7 @@ fn characters(bytes: &[u8]) -> Vec<u8> {
         .collect()
 }
 
-/// A good frame; unit 0 of a script is this one, 1 is all of them.
+/// Returns a valid frame. In a script unit 0 is this unit and 1 is a broadcast.
 fn good(unit: u8, pdu: &[u8]) -> Vec<u8> {
     [vec![1, unit], string(pdu)].concat()
 }
@@ -29,7 +29,7 @@ fn faulty(byte: u8, faults: u8) -> Vec<u8> {
     vec![2, byte, faults]
 }
 
-/// The printed frames, the CRC of some of which is wrong.
+/// Returns the frames from manuals, some of which have a wrong CRC.
 fn printed() -> impl Iterator<Item = Vec<u8>> {
     PRINTED.lines().filter_map(|line| {
         let digits = line.rsplit('|').next()?.split_whitespace();
@@ -40,7 +40,7 @@ fn printed() -> impl Iterator<Item = Vec<u8>> {
     })
 }
 
-/// What is the same in both modes.
+/// Returns the seeds for both modes.
 fn both(delimiter: Option<u8>) -> Vec<(String, Vec<u8>)> {
     let read = [0x03, 0, 0, 0, 1];
     let frame = framed(delimiter, UNIT, &read);
@@ -190,7 +190,7 @@ fn both(delimiter: Option<u8>) -> Vec<(String, Vec<u8>)> {
     seeds
 }
 
-/// Seeds of target `receiver_rtu`.
+/// Returns the seeds of target `receiver_rtu`.
 pub fn rtu() -> Vec<Seed> {
     let mut seeds: Vec<Seed> = Vec::new();
     for (name, events) in both(None) {
@@ -204,7 +204,7 @@ pub fn rtu() -> Vec<Seed> {
     seeds
 }
 
-/// Seeds of target `receiver_ascii`.
+/// Returns the seeds of target `receiver_ascii`.
 pub fn ascii() -> Vec<Seed> {
     let mut seeds: Vec<Seed> = Vec::new();
     for (name, events) in both(Some(b'\n')) {

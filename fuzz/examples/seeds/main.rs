@@ -1,6 +1,5 @@
-//! Writes the seeds of `corpus/`: what is worth starting from, as scripts of each target, one file for
-//! each. `cargo run --release --example seeds` in this directory, after a change of a script's form or of
-//! what is here.
+//! Writes the seeds in `corpus/`: useful starting points, as scripts of each target, one file per seed. Run `cargo
+//! run --release --example seeds` in this directory after a change of a script's format or of a seed.
 
 use std::path::Path;
 use std::{fs, io};
@@ -21,7 +20,7 @@ fn main() -> io::Result<()> {
         ("store", storage::seeds()),
     ] {
         let directory = corpus.join(target);
-        // What is no seed any more goes.
+        // Remove old seeds first.
         match fs::remove_dir_all(&directory) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => fs::create_dir_all(&directory)?,
@@ -35,8 +34,8 @@ fn main() -> io::Result<()> {
     Ok(())
 }
 
-/// A length in one byte, and so many bytes.
+/// Returns a length in one byte, followed by the bytes.
 fn string(bytes: &[u8]) -> Vec<u8> {
-    let length = u8::try_from(bytes.len()).expect("a string of a script");
+    let length = u8::try_from(bytes.len()).expect("a string has at most 255 bytes");
     [&[length], bytes].concat()
 }

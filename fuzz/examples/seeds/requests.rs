@@ -1,4 +1,4 @@
-//! Requests, for the server: `modio_fuzz::pdu` has the form.
+//! Seeds with requests for the server. `modio_fuzz::pdu` describes the format.
 
 use modbus_reference::{
     UNIT, pdu, read_files, write_bits, write_files, write_then_read, write_words,
@@ -6,8 +6,8 @@ use modbus_reference::{
 
 use crate::{Seed, string};
 
-/// Every function at its smallest and its largest request, about its limits, and wrong in every way
-/// the standard names.
+/// Returns requests of every function: the smallest and the largest, near its limits, and with every error that the
+/// standard names.
 pub fn requests() -> Vec<(String, Vec<u8>)> {
     let mut all: Vec<(String, Vec<u8>)> = Vec::new();
     let mut add = |name: String, pdu: Vec<u8>| all.push((name, pdu));
@@ -125,14 +125,14 @@ pub fn requests() -> Vec<(String, Vec<u8>)> {
     all
 }
 
-/// A request of a script, to this unit.
+/// Returns a request of a script, to this unit.
 fn to_unit(pdu: &[u8]) -> Vec<u8> {
     [vec![0], string(pdu)].concat()
 }
 
-/// Seeds of target `pdu`.
+/// Returns the seeds of target `pdu`.
 pub fn seeds() -> Vec<Seed> {
-    // In RTU and in ASCII mode; every point can be written that a byte can number.
+    // In RTU and in ASCII mode. Every point with an address of one byte can be written.
     const SETTINGS: [u8; 2] = [0, 255];
     const ASCII: [u8; 2] = [1, 255];
     let mut seeds: Vec<Seed> = requests()

@@ -1,5 +1,5 @@
-//! Flash pages and lives of a device, for the store: `modio_fuzz::store` and `modio_fuzz::pages` have
-//! the form.
+//! Seeds with flash pages and device histories for the store. `modio_fuzz::store` and `modio_fuzz::pages` describe
+//! the format.
 
 use crate::{Seed, string};
 
@@ -18,13 +18,13 @@ fn cut(after: u8, kind: u8, operand: u16) -> Vec<u8> {
     vec![3, after, kind, low, high]
 }
 
-/// A record of a page, by sequence number, with settings of this size.
+/// Returns a record of a page with this sequence number, and with settings of this size.
 fn record(sequence: u16, size: u8) -> Vec<u8> {
     let [low, high] = sequence.to_le_bytes();
     vec![2, low, high, 0, sequence as u8, size]
 }
 
-/// A page with a mark and these pieces.
+/// Returns a page with a mark and these pieces.
 fn page(pieces: &[Vec<u8>]) -> Vec<u8> {
     [vec![1], pieces.concat(), vec![0]].concat()
 }
@@ -35,7 +35,7 @@ fn seed(name: &str, pages: [&[u8]; 2], events: &[Vec<u8>]) -> Seed {
     (name.to_owned(), bytes)
 }
 
-/// Seeds of target `store`.
+/// Returns the seeds of target `store`.
 pub fn seeds() -> Vec<Seed> {
     let both = [page(&[record(1, 3), record(2, 9)]), page(&[record(3, 5)])];
     let both = [both[0].as_slice(), both[1].as_slice()];
@@ -106,7 +106,7 @@ pub fn seeds() -> Vec<Seed> {
             &[vec![6, 1, 96, 0, 0x60, 0xD0, 7], vec![START]],
         ),
     ];
-    // Nothing was ever stored, and the first starts were cut short one after another.
+    // Nothing was ever stored, and several starts in a row were interrupted.
     let half_marked = [4, 2, 0x6F, 0xFF, 0];
     for kind in 0..6 {
         let events = [cut(0, kind, 1024), vec![SPARE], save(1, 3)];

@@ -1,7 +1,7 @@
-//! What the examples share: a unit on a serial port of a computer.
+//! Shared by the examples: a unit on a serial port of a computer.
 //!
-//! A computer only estimates the silences of a line: it notices them when no byte has arrived for a
-//! while. A microcontroller restarts a timer with each byte instead.
+//! A computer only estimates the silences of a line: it detects them when no byte has arrived for a while. A
+//! microcontroller restarts a timer with each byte instead.
 
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
@@ -10,13 +10,13 @@ use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Silences, Timed
 use modbus_server::{Adu, DataModel, Server};
 use serial2::SerialPort;
 
-/// A tick of the port's clock is a microsecond. USB adapters hand over what they have received every 16 ms or so,
-/// which must not end a frame.
+/// The long silence. A tick of the port's clock is a microsecond. USB adapters pass on received bytes about every
+/// 16 ms, which must not end a frame.
 const SILENCE: u32 = 20_000;
-/// How long an ASCII frame may be without its end.
+/// Time limit for an ASCII frame without its end.
 const TIME_OUT: u32 = 1_000_000;
 
-/// A serial port, and the unit on it.
+/// A serial port and the unit on it.
 pub struct Line {
     serial: SerialPort,
     begun: Instant,
@@ -26,7 +26,7 @@ pub struct Line {
 
 #[allow(dead_code, reason = "not every example has lines of both modes")]
 impl Line {
-    /// A unit in RTU mode.
+    /// Opens a unit in RTU mode.
     pub fn rtu(serial: SerialPort, unit: u8) -> io::Result<Self> {
         let silences = Silences {
             short: SILENCE,
@@ -36,7 +36,7 @@ impl Line {
         Self::new(serial, Receiver::rtu(unit, false), silences, server)
     }
 
-    /// A unit in ASCII mode, where a frame has an end mark.
+    /// Opens a unit in ASCII mode, where a frame has an end mark.
     pub fn ascii(serial: SerialPort, unit: u8) -> io::Result<Self> {
         let silences = Silences {
             short: SILENCE,
@@ -67,7 +67,7 @@ impl Line {
         })
     }
 
-    /// Waits for the next good request to this unit or to all units.
+    /// Waits for the next valid request to this unit or to all units.
     pub fn request(&mut self) -> io::Result<()> {
         loop {
             let mut byte = [0];

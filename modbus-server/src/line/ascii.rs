@@ -6,31 +6,30 @@
 //!  +---+-----------+------------+---------------+-----------+--------------+
 //! ```
 //!
-//! Each byte is two hexadecimal digits, the high one first, `0`-`9` and `A`-`F`; small letters are
-//! no digits of the standard and spoil a frame. The LRC is the two's complement of the sum of the
-//! bytes (6.2.1), so that the sum over a whole good frame is zero.
+//! Each byte is sent as two hexadecimal digits, the high one first, `0`-`9` and `A`-`F`. The standard does not
+//! allow small letters; they damage a frame. The LRC is the two's complement of the sum of the bytes (6.2.1), so
+//! the sum over a complete valid frame is zero.
 
 use super::{Faults, Framing};
 
 /// Data bits of a character on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
-    /// Seven, the standard's own; what a UART delivers above them, such as a parity bit, is
-    /// ignored.
+    /// Seven, as in the standard. Higher bits from the UART, such as a parity bit, are ignored.
     Seven,
-    /// Seven, from a UART that is set to eight because it has no words of seven: the highest bit is the first of two
-    /// stop bits. A character in which it is 0 has a framing error.
+    /// Seven, from a UART that is set to eight because it has no words of seven: the highest bit is the first of
+    /// two stop bits. A character with 0 in this bit has a framing error.
     SevenAndStop,
-    /// Eight; a character above 7F spoils its frame.
+    /// Eight. A character above 7F damages its frame.
     Eight,
 }
 
-/// The start of every frame, wherever it comes.
+/// The start of every frame, at any place.
 pub(super) const START: u8 = b':';
 /// The character before the delimiter.
 pub(super) const CR: u8 = b'\r';
 
-/// Where in a frame the next character stands.
+/// Position of the next character in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     /// Before the first digit of a byte, or the carriage return.
@@ -43,23 +42,23 @@ enum Place {
     Over,
 }
 
-/// What a character of a frame amounts to.
+/// Meaning of a character in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// A byte is complete.
     Byte(u8),
-    /// Nothing yet, or the end.
+    /// No byte yet, or the end of the frame.
     Nothing,
-    /// It does not belong there.
+    /// The character is not allowed at this place.
     Wrong,
 }
 
-/// Reads the inside of a frame, between the colon and the end.
+/// Decodes a frame between the colon and the end.
 #[derive(Debug)]
 pub(super) struct Reader {
     delimiter: u8,
     mask: u8,
-    /// The bit that is a stop bit, or 0.
+    /// Mask of the bit that is a stop bit, or 0.
     stop: u8,
     place: Place,
 }
@@ -84,12 +83,12 @@ impl Reader {
         self.delimiter = delimiter;
     }
 
-    /// The character without what is not data.
+    /// Returns the character without bits that are not data.
     pub(super) const fn masked(&self, character: u8) -> u8 {
         character & self.mask
     }
 
-    /// The faults of a character with this byte: those that the UART has found, and a low stop bit in the byte.
+    /// Returns the faults of a character with this byte: those that the UART found, and a low stop bit in the byte.
     pub(super) fn faults(&self, byte: u8, found: Faults) -> Faults {
         if !byte & self.stop == 0 {
             found
@@ -98,21 +97,21 @@ impl Reader {
         }
     }
 
-    /// A frame begins.
+    /// Begins a frame.
     pub(super) const fn begin(&mut self) {
         self.place = Place::Byte;
     }
 
-    /// Whether the frame has come to its end.
+    /// Returns whether the frame has ended.
     #[inline]
     pub(super) const fn is_over(&self) -> bool {
         matches!(self.place, Place::Over)
     }
 
-    /// The next character of the frame, masked.
+    /// Decodes the next character of the frame, masked.
     pub(super) fn take(&mut self, character: u8) -> Part {
         self.take_good(character).unwrap_or_else(|| {
-            // Of a spoiled frame, too, these two are the end.
+            // CR and delimiter also end a damaged frame.
             self.place = match character {
                 CR => Place::Delimiter,
                 _ => Place::Byte,
@@ -121,7 +120,7 @@ impl Reader {
         })
     }
 
-    /// The next character of the frame, if it is what can stand there.
+    /// Decodes the next character of the frame, if it is allowed at this place.
     #[inline(always)]
     pub(super) fn take_good(&mut self, character: u8) -> Option<Part> {
         let (place, part) = match (digit(character), self.place) {
@@ -136,7 +135,7 @@ impl Reader {
     }
 }
 
-/// The value of a hexadecimal digit.
+/// Returns the value of a hexadecimal digit.
 #[inline(always)]
 const fn digit(character: u8) -> Option<u8> {
     match character {
@@ -146,7 +145,7 @@ const fn digit(character: u8) -> Option<u8> {
     }
 }
 
-/// The hexadecimal digit of a value, of which the low half counts.
+/// Returns the hexadecimal digit of the low half of a value.
 #[inline(always)]
 pub(super) const fn character(value: u8) -> u8 {
     match value & 0xF {
@@ -160,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_byte_comes_back_from_its_digits() {
+    fn every_byte_is_restored_from_its_digits() {
         let mut reader = Reader::new(Width::Seven);
         for byte in 0..=255 {
             assert_eq!(reader.take(character(byte >> 4)), Part::Nothing);
@@ -170,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_standard_s_digits_are_digits() {
+    fn only_digits_of_the_standard_are_accepted() {
         for character in 0..=255_u8 {
             let standard = char::from(character)
                 .to_digit(16)

@@ -1,33 +1,32 @@
-//! How replies go out, and which end mark requests have.
+//! Framing of replies, and the end mark of requests.
 
-/// The transmission mode (V1.02 2.5), with what of it can change while the unit runs.
+/// The transmission mode (V1.02 2.5), including the part that can change at run time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Framing {
     /// RTU (2.5.1).
     Rtu,
     /// ASCII (2.5.2).
     Ascii {
-        /// The last character of a frame, after the carriage return: a line feed, until function
-        /// 08 sub-function 03 sets another.
+        /// The last character of a frame, after the carriage return: a line feed, until function 08 sub-function 03
+        /// changes it.
         delimiter: u8,
     },
 }
 
 impl Framing {
-    /// ASCII as every unit starts: frames end with CR LF.
+    /// ASCII mode as at the start: frames end with CR LF.
     pub const ASCII: Self = Self::Ascii {
         delimiter: Self::LINE_FEED,
     };
 
     pub(super) const LINE_FEED: u8 = b'\n';
 
-    /// Whether a frame can be told to end with this character: a 7-bit one that is nothing else in
-    /// a frame already.
+    /// Returns whether this character can end a frame: a 7-bit character that has no other meaning in a frame.
     pub(crate) const fn can_end_with(character: u8) -> bool {
         character.is_ascii() && !matches!(character, b':' | b'\r' | b'0'..=b'9' | b'A'..=b'F')
     }
 
-    /// With this character at the end of a frame, if that is what ends one.
+    /// Returns the framing with this end mark. RTU framing does not change.
     pub(crate) const fn ending_with(self, delimiter: u8) -> Self {
         match self {
             Self::Rtu => Self::Rtu,
@@ -35,7 +34,7 @@ impl Framing {
         }
     }
 
-    /// As at the start.
+    /// Returns the framing as at the start.
     pub(crate) const fn restarted(self) -> Self {
         match self {
             Self::Rtu => Self::Rtu,
@@ -49,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_end_mark_is_nothing_else() {
+    fn an_end_mark_has_no_other_meaning_in_a_frame() {
         assert!(Framing::can_end_with(b'\n') && Framing::can_end_with(b'#'));
         assert!(Framing::can_end_with(b'G') && Framing::can_end_with(0x7F));
         for character in [b':', b'\r', b'0', b'9', b'A', b'F', 0x80, 0xFF] {

@@ -2,10 +2,10 @@
 
 /// Silent times in nanoseconds, measured from the end of a character's last stop bit.
 ///
-/// A UART alone sees the end of a character, not the start of the next. Without help (a pin
-/// interrupt on the start bit) a gap above t1.5 is certain only when no character has ended for
-/// `t15 + character`, and a frame that is just going on at the limit can be told from one that has
-/// ended only at `t35 + character`.
+/// A UART only reports the end of a character, not the start of the next. Without other means, such as a pin
+/// interrupt on the start bit, a gap longer than t1.5 is certain only when no character has ended for `t15 +
+/// character`. In the same way, a frame that has ended can be distinguished from a frame that continues at the
+/// limit only after `t35 + character`.
 ///
 /// ```text
 ///   ___________            ___________
@@ -18,12 +18,12 @@ pub struct Gaps {
     pub t15: u32,
     /// t3.5: the shortest silence between frames.
     pub t35: u32,
-    /// One character, start and stop bits included.
+    /// Duration of one character, including start and stop bits.
     pub character: u32,
 }
 
 impl Gaps {
-    /// Above this rate the silent times no longer shrink, in bit/s (V1.02 2.5.1.1).
+    /// Rate above which the silent times are fixed, in bit/s (V1.02 2.5.1.1).
     const FIXED_ABOVE: u32 = 19_200;
     /// t1.5 above 19200 bit/s, in ns.
     const FIXED_T15: u32 = 750_000;
@@ -33,15 +33,15 @@ impl Gaps {
     /// The longest silence within an ASCII frame, in ns (V1.02 2.5.2.1).
     pub const ASCII_TIMEOUT: u32 = 1_000_000_000;
 
-    /// The times of the standard in nanoseconds (V1.02 2.5.1.1), for `baud` in bit/s and characters
-    /// of `bits` bits in all. The length of a bit is rounded up, so that no silence is too short.
+    /// Returns the times of the standard in nanoseconds (V1.02 2.5.1.1), for `baud` in bit/s and characters of
+    /// `bits` bits, including start and stop bits. The duration of a bit is rounded up, so that no silence is too
+    /// short.
     ///
-    /// The standard counts 11-bit characters (2.5.1); with 8N1 a unit may count its own 10-bit ones.
-    /// Between the two values nothing is demanded. With `bits` 10 the unit also serves masters that
-    /// count 10.
+    /// The standard uses 11-bit characters (2.5.1); with 8N1 a unit may use its own 10-bit characters. Between the
+    /// two values the standard requires nothing. With `bits` = 10 the unit also serves masters that use 10.
     ///
-    /// Made for 1200 bit/s and above; below 10 bit/s the times would not fit and stop at the
-    /// largest `u32`.
+    /// Intended for 1200 bit/s and above. Below 10 bit/s the times would not fit and are limited to the largest
+    /// `u32`.
     pub const fn standard(baud: u32, bits: u8) -> Self {
         let bit = ns_per_bit(baud);
         let half_character = bit.saturating_mul(bits as u32).div_ceil(2);
@@ -60,8 +60,8 @@ impl Gaps {
         }
     }
 
-    /// A silence between frames of so many tenths of a millisecond, in ns, in place of t3.5: at least
-    /// as long as a character and a tenth, for until a character has ended the line seems silent.
+    /// Returns a silence between frames of this many tenths of a millisecond, in ns, to be used instead of t3.5. It
+    /// is at least 1.1 characters, because the line seems silent until a character has ended.
     pub const fn frame_gap(&self, tenths_of_ms: u16) -> u32 {
         let gap = (tenths_of_ms as u32).saturating_mul(100_000);
         let shortest = self.character.saturating_add(self.character / 10);
@@ -69,7 +69,7 @@ impl Gaps {
     }
 }
 
-/// The length of a bit in nanoseconds, rounded up.
+/// Returns the duration of a bit in nanoseconds, rounded up.
 const fn ns_per_bit(baud: u32) -> u32 {
     const SECOND: u32 = 1_000_000_000;
     if baud == 0 {
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn up_to_19200_they_follow_the_character() {
+    fn up_to_19200_the_times_are_multiples_of_a_character() {
         for (baud, bits) in [(1200, 11), (2400, 11), (9600, 11), (9600, 10), (19_200, 11)] {
             let gaps = Gaps::standard(baud, bits);
             let character = f64::from(bits) * 1e9 / f64::from(baud);
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn above_19200_they_are_fixed() {
+    fn above_19200_the_times_are_fixed() {
         for baud in [19_201, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600] {
             let gaps = Gaps::standard(baud, 11);
             assert_eq!((gaps.t15, gaps.t35), (750_000, 1_750_000));
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn no_rate_makes_them_overflow() {
+    fn no_rate_makes_the_times_overflow() {
         for baud in [0, 1, 9, u32::MAX] {
             for bits in [0, 1, 255] {
                 let gaps = Gaps::standard(baud, bits);

@@ -1,9 +1,8 @@
-//! The two transmission modes: between the characters on the line and requests and replies
-//! (V1.02 2.5).
+//! The two transmission modes, between the characters on the line and requests and replies (V1.02 2.5).
 //!
-//! RTU frames are bytes, set apart by silence and closed by a CRC. ASCII frames are pairs of
-//! hexadecimal digits between a colon and an end mark, closed by an LRC. A [`Port`] speaks either, as
-//! its [`Receiver`] is made; all that comes after them is the same.
+//! RTU frames are bytes, separated by silence and ended by a CRC. ASCII frames are pairs of hexadecimal digits
+//! between a colon and an end mark, with an LRC. A [`Port`] supports both; its [`Receiver`] selects the mode. All
+//! other parts are the same for both modes.
 
 mod ascii;
 mod faults;

@@ -1,4 +1,4 @@
-//! Characters and silences in, good requests for this unit out.
+//! Turns characters and silences into valid requests for this unit.
 
 use super::ascii::{self, Part, Reader, Width};
 use super::state::{
@@ -10,26 +10,24 @@ use crate::counters::count;
 use crate::server::BROADCAST;
 use crate::{Adu, LineCounters, crc};
 
-/// A good request for this unit, or a broadcast.
+/// A valid request for this unit, or a broadcast.
 #[derive(Debug)]
 pub struct Closed<'a> {
-    /// Unit address and PDU; the CRC or LRC is cut off. Give the buffer back to the receiver when
-    /// it is free again.
+    /// Unit address and PDU, without CRC or LRC. Give the buffer back to the receiver when it is free again.
     pub adu: &'a mut Adu,
-    /// The counters of the line, this frame included.
+    /// The counters of the line, including this frame.
     pub line: LineCounters,
 }
 
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///
-/// A program makes it for its [`Port`](super::Port), which calls all other methods.
+/// A program creates it for its [`Port`](super::Port), which calls all other methods.
 ///
-/// In RTU mode it starts deaf: whatever arrives before the first t3.5 of silence belongs to a frame
-/// whose start was missed. In ASCII mode nothing counts that comes before a colon.
+/// In RTU mode it first ignores everything: characters before the first t3.5 of silence belong to a frame whose
+/// start was missed. In ASCII mode everything in front of a colon is ignored.
 ///
-/// It needs two buffers ([`give_back`](Self::give_back)): one to fill, and a spare to go on with
-/// while the first is away with a request. Without a spare the next frame is followed to its end,
-/// and counted, but not kept.
+/// It needs two buffers ([`give_back`](Self::give_back)): one to fill, and a spare to continue with while the first
+/// one holds a request. Without a spare the next frame is followed to its end and counted, but not stored.
 ///
 /// `U` is a `u8` for a single unit address, or a [`UnitSet`](super::UnitSet).
 #[derive(Debug)]
@@ -37,13 +35,13 @@ pub struct Receiver<'a, U = u8> {
     units: U,
     strict_t15: bool,
     state: u16,
-    /// The first byte of a frame that is not kept: the unit address.
+    /// First byte of a frame that is not stored: the unit address.
     address: u8,
-    /// The CRC of the frame so far; in ASCII mode the sum of its bytes, in the high byte.
+    /// CRC of the frame so far. In ASCII mode the sum of its bytes, in the high byte.
     check: u16,
-    /// Bytes of a frame that is not kept.
+    /// Number of bytes of a frame that is not stored.
     unkept: u16,
-    /// Of the frame, or empty for the next one.
+    /// Buffer of the frame, or empty for the next one.
     filling: Option<&'a mut Adu>,
     spare: Option<&'a mut Adu>,
     counters: LineCounters,
@@ -51,14 +49,14 @@ pub struct Receiver<'a, U = u8> {
 }
 
 impl<'a, U: Units> Receiver<'a, U> {
-    /// A receiver of an RTU line, without buffers, for requests to `units`. `strict_t15`: drop a
-    /// frame with a gap above t1.5 in it, as the standard asks for; otherwise only count the gap.
+    /// Creates a receiver of an RTU line, without buffers, for requests to `units`. With `strict_t15` it drops a
+    /// frame with a gap longer than t1.5, as the standard requires; otherwise it only counts the gap.
     pub const fn rtu(units: U, strict_t15: bool) -> Self {
         Self::new(units, strict_t15, Width::Eight, DEAF | UNKEPT)
     }
 
-    /// A receiver of an ASCII line, without buffers, for requests to `units`. Frames end with CR
-    /// LF, until [`set_framing`](Self::set_framing).
+    /// Creates a receiver of an ASCII line, without buffers, for requests to `units`. Frames end with CR LF, until
+    /// [`set_framing`](Self::set_framing).
     pub const fn ascii(units: U, width: Width) -> Self {
         Self::new(units, false, width, ASCII | IDLE | UNKEPT)
     }
@@ -78,20 +76,20 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// Takes over the end mark of an ASCII line; the mode itself does not change.
+    /// Sets the end mark of an ASCII line. The mode itself does not change.
     pub const fn set_framing(&mut self, framing: Framing) {
         if let Framing::Ascii { delimiter } = framing {
             self.reader.set_delimiter(delimiter);
         }
     }
 
-    /// Gives the receiver a buffer, at the start or after use. A third one at a time is not kept.
+    /// Gives the receiver a buffer, at the start or after use. It holds at most two; a third one is dropped.
     #[inline]
     pub fn give_back(&mut self, adu: &'a mut Adu) {
         adu.clear();
         if self.filling.is_none() {
             self.filling = Some(adu);
-            // A frame that began without one is followed to its end all the same.
+            // A frame that began without a buffer is not stored, even when one is given back before its end.
             if self.state & (DEAF | IDLE) != 0 {
                 self.state &= !UNKEPT;
             }
@@ -100,7 +98,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// Gives back the buffer of a request that nobody has served and counts the request as dropped.
+    /// Gives back the buffer of a request that was not served, and counts the request as dropped.
     #[cold]
     #[inline(never)]
     pub fn drop_request(&mut self, adu: &'a mut Adu) {
@@ -108,7 +106,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.give_back(adu);
     }
 
-    /// A character has arrived.
+    /// Processes a received character.
     #[inline]
     pub fn character(&mut self, byte: u8, faults: Faults) {
         let special = self.state | u16::from(faults.bits());
@@ -116,14 +114,14 @@ impl<'a, U: Units> Receiver<'a, U> {
             if special != IDLE {
                 return self.special(byte, faults);
             }
-            // The first of an RTU frame is as good as any other: all is ready for it.
+            // The first character of an RTU frame needs no other treatment, because everything is prepared for it.
             self.state = 0;
         }
         self.check = crc::step(self.check, byte);
         self.keep(byte);
     }
 
-    /// 1.5 characters of silence have passed, in RTU mode; in ASCII mode it means nothing.
+    /// Notes that 1.5 characters of silence have passed, in RTU mode. Has no effect in ASCII mode.
     #[inline]
     pub const fn pause(&mut self) {
         if self.state & (DEAF | IDLE | ASCII) == 0 {
@@ -131,26 +129,25 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// In ASCII mode, whether the last character was the end of a frame, which
-    /// [`close`](Self::close) takes, at once or when the line is free for a reply. Another frame's
-    /// colon before that, and it is lost; other characters are ignored. Always `false` in RTU mode,
-    /// where silence ends a frame.
+    /// Returns whether the last character was the end of an ASCII frame. [`close`](Self::close) takes that frame,
+    /// immediately or when the line is free for a reply. If the colon of another frame is received first, the frame
+    /// is lost; other characters are ignored. Always `false` in RTU mode, where silence ends a frame.
     #[inline]
     pub fn is_over(&self) -> bool {
-        // The reader keeps the place of the last frame until the next one begins.
+        // The decoder keeps its state after a frame until the next one begins.
         self.state & ASCII_IDLE == ASCII && self.reader.is_over()
     }
 
-    /// Whether no frame has begun.
+    /// Returns whether no frame has begun.
     pub const fn is_idle(&self) -> bool {
         self.state & IDLE != 0
     }
 
-    /// The frame is at its end. In RTU mode: 3.5 characters of silence have passed. In ASCII mode:
-    /// it [`is_over`](Self::is_over), or one second has passed without any character, which makes
-    /// what there is of a frame a faulty one.
+    /// Ends the frame. In RTU mode, call this when 3.5 characters of silence have passed. In ASCII mode, call this
+    /// when the frame [`is_over`](Self::is_over), or when one second has passed without a character; the partial
+    /// frame is then counted as damaged.
     ///
-    /// `Some` only for a good one to this unit or to all; everything else is counted and dropped.
+    /// Returns `Some` only for a valid frame to this unit or a broadcast. All other frames are counted and dropped.
     #[inline]
     pub fn close(&mut self) -> Option<Closed<'a>> {
         let request = self.judge(self.state);
@@ -158,8 +155,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         request
     }
 
-    /// The unit has been sending, with its receiver off, and is done: the next character starts a
-    /// frame.
+    /// Continues after the unit has sent with its receiver off: the next character starts a frame.
     #[inline(always)]
     pub fn resume(&mut self) {
         self.state = IDLE | (self.state & ASCII);
@@ -172,7 +168,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             adu.clear();
             return;
         }
-        // A spare buffer is empty already.
+        // A spare buffer is already empty.
         self.filling = self.spare.take();
         if self.filling.is_none() {
             self.state |= UNKEPT;
@@ -180,7 +176,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// What becomes of what has been received.
+    /// Decides about the received frame.
     #[inline]
     fn judge(&mut self, state: u16) -> Option<Closed<'a>> {
         if state & (DEAF | IDLE) != 0 {
@@ -200,7 +196,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         } else {
             NOT_ENDED
         };
-        // Over a frame with its CRC or LRC, CRC and sum alike are zero.
+        // Over a valid frame including its CRC or LRC, both CRC and sum are zero.
         let good = self.check == crc::GOOD && shortest <= len && len <= longest;
         if state & SPOILED != 0 || !good {
             count(&mut self.counters.communication_errors);
@@ -223,12 +219,12 @@ impl<'a, U: Units> Receiver<'a, U> {
         })
     }
 
-    /// What has been counted so far.
+    /// Returns the counters.
     pub const fn counters(&self) -> &LineCounters {
         &self.counters
     }
 
-    /// Sees to a character that is not just the next good one of an RTU frame.
+    /// Processes a character that is not the next valid one of an RTU frame.
     #[cold]
     #[inline(never)]
     fn special(&mut self, byte: u8, faults: Faults) {
@@ -244,7 +240,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// Takes a character inside an ASCII frame that is kept and good so far, if it is good, too.
+    /// Processes a character inside an ASCII frame that is stored and valid so far, if the character is valid, too.
     #[inline(always)]
     fn ascii_inside(&mut self, character: u8) -> bool {
         let part = self.reader.take_good(character);
@@ -255,7 +251,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         part.is_some()
     }
 
-    /// Sees to what is not a good character of a good frame, and to frames that are not kept.
+    /// Processes faulty characters, characters of damaged frames, and frames that are not stored.
     #[inline(never)]
     fn rare(&mut self, byte: u8, faults: Faults) {
         if self.state & ASCII != 0 {
@@ -279,12 +275,12 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.keep_or_follow(byte);
     }
 
-    /// A character in ASCII mode.
+    /// Processes a character in ASCII mode.
     fn ascii_character(&mut self, character: u8, faults: Faults) {
         let idle = self.state & IDLE != 0;
         if character == ascii::START && (idle || !faults.spoil()) {
-            // A frame without its end is counted as faulty. A complete one is dropped: its reply
-            // would be sent too late.
+            // A frame without its end is counted as damaged. A complete frame is dropped, because its reply would
+            // be sent too late.
             if let Some(late) = self.close() {
                 self.drop_request(late.adu);
             }
@@ -293,7 +289,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             self.note(faults);
             return;
         }
-        // A frame that is over is complete, whatever comes before it is taken.
+        // Characters between a complete frame and the next colon are ignored.
         if idle || self.reader.is_over() {
             return;
         }
@@ -308,13 +304,13 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// Adds a byte to the sum that the LRC makes zero.
+    /// Adds a byte to the sum, which the LRC makes zero.
     #[inline]
     const fn add(&mut self, byte: u8) {
         self.check = self.check.wrapping_add((byte as u16) << 8);
     }
 
-    /// Starts a frame: all is ready for it.
+    /// Starts a frame.
     fn begin(&mut self) {
         self.state &= ASCII | UNKEPT;
     }
@@ -328,7 +324,7 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// Keeps a byte of the frame.
+    /// Stores a byte of the frame.
     #[inline(always)]
     fn keep(&mut self, byte: u8) {
         if let Some(adu) = &mut self.filling
@@ -338,14 +334,14 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
-    /// There are more bytes than a frame can have.
+    /// Marks a frame with too many bytes as damaged.
     #[cold]
     #[inline(never)]
     fn overflow(&mut self) {
         self.state |= SPOILED;
     }
 
-    /// Keeps a byte of the frame, or only counts it.
+    /// Stores a byte of the frame, or only counts it.
     fn keep_or_follow(&mut self, byte: u8) {
         if self.state & UNKEPT == 0 {
             self.keep(byte);

@@ -1,4 +1,4 @@
-//! A port whose silences are measured by a clock that is looked at now and then.
+//! A port whose silences are measured by comparing times.
 
 use super::{Faults, Gaps, Port, Units};
 
@@ -12,7 +12,7 @@ pub struct Silences {
 }
 
 impl Silences {
-    /// Those of an RTU line, in ticks of so many nanoseconds, rounded up.
+    /// Returns the silences of an RTU line, in ticks of `tick_ns` nanoseconds, rounded up.
     #[must_use]
     pub const fn rtu(gaps: &Gaps, tick_ns: u32) -> Self {
         Self {
@@ -21,7 +21,7 @@ impl Silences {
         }
     }
 
-    /// Those of an ASCII line, in ticks of so many nanoseconds, rounded up.
+    /// Returns the silences of an ASCII line, in ticks of `tick_ns` nanoseconds, rounded up.
     #[must_use]
     pub const fn ascii(gaps: &Gaps, tick_ns: u32) -> Self {
         Self {
@@ -31,25 +31,25 @@ impl Silences {
     }
 }
 
-/// A [`Port`] with the instant of the last character, for a caller that has a clock but no timer for silences: one that
-/// reads a serial port of an operating system, or polls a UART.
+/// A [`Port`] with the time of the last character, for a caller that has a clock but no timer for silences. Such a
+/// caller reads a serial port of an operating system, or polls a UART.
 ///
 /// Its time is a count of ticks that wraps. A silence counts once [`poll`](Self::poll) or
-/// [`received`](Self::received) is called after its end, so that it should be called at each
-/// [`deadline`](Self::deadline), and at least once in half a round of the count.
+/// [`received`](Self::received) is called after its end. So `poll` should be called at each
+/// [`deadline`](Self::deadline), and at least twice while the count goes round.
 #[derive(Debug)]
 pub struct TimedPort<'a, U = u8> {
     port: Port<'a, U>,
     silences: Silences,
-    /// When the silence began that is being measured.
+    /// Start of the silence that is being measured.
     since: Option<u32>,
     /// The short silence has passed.
     short_has_passed: bool,
 }
 
 impl<'a, U: Units> TimedPort<'a, U> {
-    /// Starts in tick `now`. On an RTU line, characters before the first long silence are ignored: they may be the rest
-    /// of a frame that began earlier.
+    /// Starts in tick `now`. On an RTU line, characters before the first long silence are ignored, because they may
+    /// be the rest of a frame that began earlier.
     #[must_use]
     pub const fn new(port: Port<'a, U>, silences: Silences, now: u32) -> Self {
         Self {
@@ -60,12 +60,12 @@ impl<'a, U: Units> TimedPort<'a, U> {
         }
     }
 
-    /// The port, to serve its request and to send its reply.
+    /// Returns the port, to serve its request and to send its reply.
     pub const fn port(&mut self) -> &mut Port<'a, U> {
         &mut self.port
     }
 
-    /// A character has come, and ended in tick `now`. Whether a request waits to be served.
+    /// Processes a character that ended in tick `now`. Returns whether a request waits to be served.
     pub fn received(&mut self, byte: u8, faults: Faults, now: u32) -> bool {
         let waits = self.poll(now);
         self.port.received(byte, faults);
@@ -74,7 +74,7 @@ impl<'a, U: Units> TimedPort<'a, U> {
         waits
     }
 
-    /// Ends silences that have passed by tick `now`. Whether a request waits to be served.
+    /// Ends silences that have passed by tick `now`. Returns whether a request waits to be served.
     pub fn poll(&mut self, now: u32) -> bool {
         let Some(since) = self.since else {
             return false;
@@ -92,13 +92,13 @@ impl<'a, U: Units> TimedPort<'a, U> {
         waits
     }
 
-    /// The last stop bit of a reply has left the unit ([`Port::sent`]).
+    /// Ends the reply: its last stop bit was sent ([`Port::sent`]).
     pub fn sent(&mut self) {
         self.port.sent();
         self.since = None;
     }
 
-    /// The tick in which [`poll`](Self::poll) has something to do, if no character comes before.
+    /// Returns the tick at which [`poll`](Self::poll) must be called next if no character is received before.
     #[must_use]
     pub const fn deadline(&self) -> Option<u32> {
         let Some(since) = self.since else {
@@ -145,7 +145,7 @@ mod tests {
             assert!(!port.poll(at(15)));
             assert_eq!(port.deadline(), Some(at(35)));
             assert!(!port.poll(at(35)));
-            assert_eq!(port.deadline(), None, "it listens");
+            assert_eq!(port.deadline(), None, "the port is idle");
             for (n, byte) in (0..).zip(REQUEST) {
                 assert!(!port.received(byte, Faults::NONE, at(50 + 10 * n)));
             }
@@ -158,11 +158,11 @@ mod tests {
     }
 
     #[test]
-    fn a_character_that_comes_late_ends_the_frame_before_it() {
+    fn a_character_after_a_silence_ends_the_frame_before_it() {
         let mut adus = [Adu::new(), Adu::new()];
         let port = Port::new(Receiver::rtu(17, false), &mut adus);
         let mut port = TimedPort::new(port, SILENCES, 0);
-        // Nobody has polled since the start.
+        // `poll` was not called since the start.
         assert!(!port.received(REQUEST[0], Faults::NONE, 40));
         for byte in &REQUEST[1..] {
             assert!(!port.received(*byte, Faults::NONE, 50));
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(
             port.deadline(),
             None,
-            "the unit has sent: nothing is measured"
+            "after sending no silence is measured"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! The reply on its way out: head, body, and the CRC or LRC made as they leave.
+//! Sends a reply: head, body, and the CRC or LRC, which are computed during sending.
 
 use super::{Framing, ascii};
 use crate::head::Head;
@@ -9,43 +9,43 @@ use crate::{Adu, crc};
 pub enum Next {
     /// Send this character.
     Byte(u8),
-    /// The rest is not here yet: ask again once the reply has been [answered](crate::Decided::answer) or
+    /// The rest is not ready yet. Ask again once the reply has been [answered](crate::Decided::answer) or
     /// [finished](crate::Served::finish).
     Wait,
     /// The frame is complete: release the line after the last stop bit.
     Done,
 }
 
-/// Gives out one reply character by character.
+/// Returns one reply character by character.
 #[derive(Debug)]
 pub(crate) struct Transmitter<'a> {
     framing: Framing,
     stage: Stage,
-    /// In RTU mode: how many bytes of the head have gone. In ASCII mode: `ELSEWHERE`.
+    /// In RTU mode: number of bytes of the head that were sent. In ASCII mode: `ELSEWHERE`.
     sent: u8,
-    /// In ASCII mode: the byte whose first digit has gone.
+    /// In ASCII mode: the byte whose first digit was sent.
     half: Option<u8>,
     head: Head,
     body: Option<&'a mut Adu>,
-    /// In RTU mode: how many bytes of the body are left. In ASCII mode: 0.
+    /// In RTU mode: number of bytes left in the body. In ASCII mode: 0.
     left: u16,
-    /// In RTU mode: the next byte of the body. In ASCII mode: the next of head and body.
+    /// In RTU mode: index of the next byte of the body. In ASCII mode: index of the next byte of head and body.
     at: u16,
-    /// The CRC of the bytes sent; in ASCII mode their sum.
+    /// CRC of the bytes sent; in ASCII mode their sum.
     check: u16,
 }
 
-/// More than a head is long.
+/// Larger than the length of any head.
 const ELSEWHERE: u8 = u8::MAX;
 
-/// What of a frame comes next.
+/// Next part of the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// Nothing. The first, so that it is the 0 that [`Transmitter::take_buffer`] has at hand.
+    /// Nothing. It is the first variant, because [`Transmitter::take_buffer`] already has a 0 in a register.
     Over,
     /// In ASCII mode, the colon.
     Start,
-    /// Head and body, and after them the LRC or the first byte of the CRC.
+    /// Head and body, then the LRC or the first byte of the CRC.
     Bytes,
     /// The second byte of the CRC, or the carriage return.
     End,
@@ -54,7 +54,7 @@ enum Stage {
 }
 
 impl<'a> Transmitter<'a> {
-    /// Nothing to send.
+    /// Returns a transmitter with nothing to send.
     pub(crate) const fn idle() -> Self {
         Self {
             stage: Stage::Over,
@@ -63,8 +63,8 @@ impl<'a> Transmitter<'a> {
         }
     }
 
-    /// A reply of `unit`, of which no more is known yet. Its first byte, the unit address, is ready
-    /// at once.
+    /// Begins a reply of `unit`, of which nothing else is known yet. Its first byte, the unit address, can be sent
+    /// immediately.
     #[inline]
     pub(crate) const fn open(unit: u8, framing: Framing) -> Self {
         let (stage, sent, check) = match framing {
@@ -84,16 +84,16 @@ impl<'a> Transmitter<'a> {
         }
     }
 
-    /// Hands over how the reply begins, once.
+    /// Sets the head of the reply. Call this once.
     #[inline]
     pub(crate) const fn head(&mut self, head: Head) {
         self.head = head;
     }
 
-    /// Hands over the body, after the head: what the server has left in the buffer. A buffer that is not needed, because the head is the whole reply or
-    /// the body is here already, comes straight back, for the receiver.
+    /// Sets the body, after the head: the buffer that the server has filled. Returns the buffer for the receiver
+    /// when it is not needed, because the head is the whole reply or there already is a body.
     #[inline]
-    #[must_use = "a buffer that is not needed belongs back in the receiver"]
+    #[must_use = "a buffer that is not needed must be given back to the receiver"]
     pub(crate) fn body(&mut self, adu: &'a mut Adu) -> Option<&'a mut Adu> {
         if !self.head.has_body() || self.body.is_some() || self.stage == Stage::Over {
             return Some(adu);
@@ -107,8 +107,8 @@ impl<'a> Transmitter<'a> {
         None
     }
 
-    /// The next thing to do. Called at each "transmit register empty"; in the end it is
-    /// [`Next::Done`] as often as asked.
+    /// Returns what to do next. Call this at each "transmit register empty". After the end it returns
+    /// [`Next::Done`] every time.
     #[inline(always)]
     pub(crate) fn next(&mut self) -> Next {
         let byte = if self.sent < self.head.len() {
@@ -118,7 +118,7 @@ impl<'a> Transmitter<'a> {
         } else if self.left > 0
             && let Some(adu) = &self.body
         {
-            // Below 256, with something left.
+            // The index is below 256, because bytes are left.
             let byte = adu.get(self.at as u8);
             self.at += 1;
             self.left -= 1;
@@ -130,7 +130,7 @@ impl<'a> Transmitter<'a> {
         Next::Byte(byte)
     }
 
-    /// What is not the next byte of an RTU reply.
+    /// Returns what follows when the next byte is not a byte of an RTU body.
     #[inline(never)]
     fn rest(&mut self) -> Next {
         if let Framing::Ascii { delimiter } = self.framing {
@@ -142,13 +142,13 @@ impl<'a> Transmitter<'a> {
             Stage::End => Stage::Over,
             _ => return Next::Done,
         };
-        // Low byte first; a CRC fed with its own low byte moves its high byte down to be the next.
+        // Low byte first. Updating a CRC with its own low byte shifts its high byte down, which is sent next.
         let [low, _] = self.check.to_le_bytes();
         self.check = crc::step(self.check, low);
         Next::Byte(low)
     }
 
-    /// The next character in ASCII mode.
+    /// Returns the next character in ASCII mode.
     #[inline(always)]
     fn ascii(&mut self, delimiter: u8) -> Next {
         if let Some(byte) = self.half.take() {
@@ -160,7 +160,7 @@ impl<'a> Transmitter<'a> {
                 None if self.must_wait() => return Next::Wait,
                 None => {
                     self.stage = Stage::End;
-                    // Nothing after this counts.
+                    // The sum is not used after this.
                     self.check.to_le_bytes()[0].wrapping_neg()
                 }
             },
@@ -180,7 +180,7 @@ impl<'a> Transmitter<'a> {
         Next::Byte(character)
     }
 
-    /// The byte at this place of head and body, if it is here and not beyond the end.
+    /// Returns the byte at this index of head and body, if it is ready and not after the end.
     #[inline(always)]
     fn byte_at(&self, at: u16) -> Option<u8> {
         let head = u16::from(self.head.len());
@@ -192,14 +192,13 @@ impl<'a> Transmitter<'a> {
         (usize::from(at) < adu.len()).then(|| adu.get(at as u8))
     }
 
-    /// Whether there is more to come than is here.
+    /// Returns whether the rest of the reply is not ready yet.
     fn must_wait(&self) -> bool {
         self.head.has_body() && self.body.is_none()
     }
 
-    /// Takes the buffer of the body back, for the receiver, and ends the reply. Before
-    /// [`Next::Done`] this cuts the reply short: at most the rest of its head is still sent, and
-    /// no CRC or LRC, so that no master accepts it.
+    /// Returns the buffer of the body for the receiver and ends the reply. Before [`Next::Done`] this aborts the
+    /// reply: at most the rest of its head is still sent, and no CRC or LRC, so that no master accepts it.
     #[inline]
     pub(crate) fn take_buffer(&mut self) -> Option<&'a mut Adu> {
         self.stage = Stage::Over;
@@ -224,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_address_goes_before_anything_else_is_known() {
+    fn the_unit_address_is_sent_before_anything_else_is_known() {
         let head = Head::exception(1, 3, Exception::ServerDeviceFailure);
         let mut transmitter = Transmitter::open(1, Framing::Rtu);
         is_next(&mut transmitter, &[0x01]);
@@ -239,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn it_waits_for_the_body_as_long_as_it_takes() {
+    fn it_waits_until_the_body_is_ready() {
         let mut adu = Adu::new();
         adu.extend(&[0x03, 0xE8]);
         let mut transmitter = Transmitter::open(1, Framing::Rtu);
@@ -256,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ascii_reply_has_its_own_clothes() {
+    fn an_ascii_reply_has_colon_digits_lrc_and_end_mark() {
         let mut adu = Adu::new();
         adu.extend(&[0x03, 0xE8]);
         let mut transmitter = Transmitter::open(1, Framing::ASCII);
@@ -277,7 +276,7 @@ mod tests {
         assert_eq!(transmitter.next(), Next::Done);
     }
 
-    /// What was left of the reply to send, CRC or LRC included, is not sent but for the head.
+    /// Checks that the remaining bytes of a reply, including CRC or LRC, are not sent, except for the head.
     fn is_cut_short(transmitter: &mut Transmitter<'_>, framing: Framing, left: &[u8]) {
         let mut sent = 0;
         while let Next::Byte(byte) = transmitter.next() {
@@ -285,7 +284,7 @@ mod tests {
             sent += 1;
         }
         assert_eq!(transmitter.next(), Next::Done, "{framing:?} {left:02X?}");
-        // In RTU mode three bytes of head, in ASCII mode the second digit of a byte.
+        // At most three bytes of the head in RTU mode, or the second digit of a byte in ASCII mode.
         let most = match framing {
             Framing::Rtu => left.len().saturating_sub(6),
             Framing::Ascii { .. } => 1,
@@ -294,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn taking_the_buffer_in_the_middle_of_a_reply_ends_the_reply() {
+    fn taking_the_buffer_during_a_reply_aborts_the_reply() {
         let rtu: &[u8] = &[0x01, 0x03, 0x04, 1, 2, 3, 4, 0x5B, 0x3C];
         let ascii: &[u8] = b":01030401020304EE\r\n";
         for (framing, whole) in [(Framing::Rtu, rtu), (Framing::ASCII, ascii)] {
@@ -314,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn taking_the_buffer_before_the_body_is_here_ends_the_reply() {
+    fn taking_the_buffer_before_the_body_is_ready_aborts_the_reply() {
         for framing in [Framing::Rtu, Framing::ASCII] {
             for head_is_known in [false, true] {
                 for sent in [0, 1, 8] {
@@ -329,7 +328,7 @@ mod tests {
                     assert!(transmitter.take_buffer().is_none());
                     while let Next::Byte(_) = transmitter.next() {}
                     assert_eq!(transmitter.next(), Next::Done, "{framing:?} {sent}");
-                    // The rest of the reply is handed over too late.
+                    // The rest of the reply is passed too late.
                     transmitter.head(Head::read(1, 3, 4));
                     assert!(transmitter.body(&mut adu).is_some(), "not needed");
                     while let Next::Byte(_) = transmitter.next() {}

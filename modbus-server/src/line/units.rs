@@ -2,7 +2,7 @@
 
 /// The unit addresses whose requests a [`Receiver`](super::Receiver) takes: a `u8` for a single one, or a [`UnitSet`].
 pub trait Units {
-    /// Whether requests to this unit address are taken. All broadcasts are.
+    /// Returns whether requests to this unit address are taken. Broadcasts are always taken.
     fn contains(&self, unit: u8) -> bool;
 }
 
@@ -25,13 +25,13 @@ impl Units for u8 {
 pub struct UnitSet([u32; 8]);
 
 impl UnitSet {
-    /// The set of these addresses: 1-247, or 248-255, which the standard leaves to the device.
+    /// Creates the set of these addresses: 1-247, or 248-255, which the standard leaves to the device.
     #[must_use]
     pub const fn new(units: &[u8]) -> Self {
         let mut words = [0; 8];
         let mut rest = units;
         while let [unit, others @ ..] = rest {
-            // Of eight words: no check is left of this.
+            // There are eight words, so the compiler removes the bounds check.
             words[(*unit / 32) as usize] |= 1 << (*unit % 32);
             rest = others;
         }
@@ -42,7 +42,7 @@ impl UnitSet {
 impl Units for UnitSet {
     #[inline(always)]
     fn contains(&self, unit: u8) -> bool {
-        // Of eight words: no check is left of this.
+        // There are eight words, so the compiler removes the bounds check.
         let word = self.0.get(usize::from(unit / 32));
         word.is_some_and(|word| word >> (unit % 32) & 1 != 0)
     }
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn set_contains_the_addresses_it_was_made_of() {
+    fn set_contains_exactly_its_addresses() {
         let units = [1, 31, 32, 64, 247, 255];
         let set = UnitSet::new(&units);
         for unit in 0..=255 {

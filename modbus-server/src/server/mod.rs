@@ -1,7 +1,7 @@
-//! Requests in, decisions and replies out.
+//! The server: takes requests, returns decisions and replies.
 
+mod accept;
 mod serving;
-mod settle;
 mod tally;
 mod work;
 
@@ -17,46 +17,47 @@ use tally::Tally;
 /// The unit address of a broadcast (V1.02 2.2).
 pub(crate) const BROADCAST: u8 = 0;
 
-/// The server of one line: serves the requests that its [`Port`](crate::line::Port) has received, for one data model.
+/// The server of one line. It serves the requests that its [`Port`](crate::line::Port) has received, for one data
+/// model.
 ///
-/// [`serve`](Self::serve) serves a request, and [`take`](Self::take) begins to serve one step by step.
+/// [`serve`](Self::serve) serves a request; [`take`](Self::take) begins to serve one step by step.
 ///
-/// A port may have several unit addresses ([`UnitSet`](crate::line::UnitSet)). Its reply has the address of the request.
-/// For the standard's diagnostics they are one unit: counters, event log and listen-only mode belong to all of them
-/// together. A request to any address is counted, one puts all of them into listen-only mode, and one restarts them.
-/// [`Port::waiting`](crate::line::Port::waiting) and [`Request::unit`] say which address a request is for, so that the
-/// caller can give the server a model that depends on it.
+/// A port may have several unit addresses ([`UnitSet`](crate::line::UnitSet)). Its reply has the address of the
+/// request. For the standard's diagnostics all addresses are one unit: they share counters, event log and
+/// listen-only mode. A request to any address is counted, one request puts all addresses into listen-only mode, and
+/// one request restarts them. [`Port::waiting`](crate::line::Port::waiting) and [`Request::unit`] return the
+/// address of a request, so that the caller can pass the server a model that depends on the address.
 #[derive(Debug)]
 pub struct Server {
     framing: Framing,
-    /// Function 08, sub-function 04, was obeyed, and 01 not since then.
+    /// Function 08, sub-function 04, was executed, and 01 not since then.
     listen_only: bool,
-    /// Function 08, sub-function 04, can be obeyed.
+    /// Function 08, sub-function 04, is supported.
     can_listen_only: bool,
     /// The line's counters as last seen, and as they were when they were last cleared.
     line: LineCounters,
     cleared: LineCounters,
-    /// Bits of the diagnostic register that were set when it was cleared and have stayed so.
+    /// Bits of the diagnostic register that were set when it was cleared and have been set ever since.
     cleared_bits: u16,
     tally: Tally,
     log: EventLog,
 }
 
-/// What becomes of a request, by its first bytes.
+/// Treatment of a request, which its first bytes determine.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Hearing {
-    /// Nothing.
+enum Handling {
+    /// It is ignored.
     Dismissed(Outcome),
     /// It is decided upon and answered.
     Answered,
-    /// It is to all units.
+    /// It is a broadcast.
     Broadcast,
-    /// It is carried out in silence.
+    /// It is executed without a reply.
     Silent,
 }
 
 impl Server {
-    /// A server for a line that starts with `framing`.
+    /// Creates a server for a line that starts with `framing`.
     pub const fn new(framing: Framing) -> Self {
         Self {
             framing,
@@ -70,11 +71,11 @@ impl Server {
         }
     }
 
-    /// The same server without listen-only mode (function 08, sub-function 04, which silences the
-    /// unit until sub-function 01 restarts it): the request for it is answered with exception 01.
+    /// Disables listen-only mode (function 08, sub-function 04, which silences the unit until sub-function 01
+    /// restarts it). A request for it is then answered with exception 01.
     ///
-    /// A server whose model does not [have](DataModel::has) function 08 must be without it: whether a request is
-    /// answered at all is decided without the model, and one for listen-only mode never is.
+    /// This is required for a model that does not [have](DataModel::has) function 08. The server decides whether a
+    /// request is answered without asking the model, and it never answers a request for listen-only mode.
     #[must_use]
     pub const fn without_listen_only(self) -> Self {
         Self {
@@ -83,51 +84,51 @@ impl Server {
         }
     }
 
-    /// How the next reply is to be framed, and how the request after it will be. It changes when a
-    /// request that changes it is carried out, whose own reply is under way by then.
+    /// Returns the framing of the next reply and of the request after it. A request that changes it takes effect
+    /// when it is executed; its own reply has already begun by then.
     pub const fn framing(&self) -> Framing {
         self.framing
     }
 
-    /// Whether the unit is in listen-only mode (V1.1b3 6.8, sub-function 04).
+    /// Returns whether the unit is in listen-only mode (V1.1b3 6.8, sub-function 04).
     pub const fn is_listen_only(&self) -> bool {
         self.listen_only
     }
 
-    /// Whether `request` (unit address and PDU, without CRC) will be answered at all, be it with an
-    /// exception. Takes the same few instructions for every request, where
-    /// [`decide`](Self::decide) takes longer the more values there are to check: so the first byte
-    /// of the reply, the unit address, can go out before the rest is decided.
+    /// Returns whether `request` (unit address and PDU, without CRC) will be answered, including with an exception.
+    /// This takes the same few instructions for every request, while [`decide`](Self::decide) takes longer the more
+    /// values there are to check. So the first byte of the reply, the unit address, can be sent before the rest is
+    /// decided.
     fn answers(&self, request: &Adu) -> bool {
-        self.hear(request) == Hearing::Answered
+        self.handling(request) == Handling::Answered
     }
 
-    fn hear(&self, request: &Adu) -> Hearing {
+    fn handling(&self, request: &Adu) -> Handling {
         let (unit, function) = (request.get(0), request.get(1));
         let broadcast = unit == BROADCAST;
         if !matches!(function, 1..Function::EXCEPTION) {
-            return Hearing::Dismissed(Outcome::NoRequest);
+            return Handling::Dismissed(Outcome::NoRequest);
         }
         let diagnostics = !broadcast && function == Function::Diagnostics.code();
         if self.listen_only {
             return if diagnostics && Diagnostic::is_restart(request.from(2)) {
-                Hearing::Silent
+                Handling::Silent
             } else {
-                Hearing::Dismissed(Outcome::NotObeyed)
+                Handling::Dismissed(Outcome::NotObeyed)
             };
         }
         if broadcast {
-            Hearing::Broadcast
+            Handling::Broadcast
         } else if self.can_listen_only && diagnostics && Diagnostic::is_listen_only(request.from(2))
         {
-            Hearing::Silent
+            Handling::Silent
         } else {
-            Hearing::Answered
+            Handling::Answered
         }
     }
 
-    /// Settles the reply to `request` (unit address and PDU, without CRC): everything that can be
-    /// refused is refused here. Changes nothing.
+    /// Decides the reply to `request` (unit address and PDU, without CRC). Everything that can be rejected is
+    /// rejected here. Changes nothing.
     fn decide(&self, request: &Adu, model: &impl DataModel) -> Decision {
         let (unit, function) = (request.get(0), request.get(1));
         let broadcast = unit == BROADCAST;
@@ -137,12 +138,12 @@ impl Server {
             outcome,
             broadcast,
         };
-        let hearing = match self.hear(request) {
-            Hearing::Dismissed(outcome) => return silence(outcome),
-            hearing => hearing,
+        let handling = match self.handling(request) {
+            Handling::Dismissed(outcome) => return silence(outcome),
+            handling => handling,
         };
-        let settled = settle::settle(self, unit, function, request.from(2), model);
-        let (head, work, outcome) = match settled {
+        let accepted = accept::accept(self, unit, function, request.from(2), model);
+        let (head, work, outcome) = match accepted {
             Ok((_, work)) if broadcast && !work.can_be_broadcast() => {
                 return silence(Outcome::NoEffect);
             }
@@ -153,22 +154,22 @@ impl Server {
             }
         };
         Decision {
-            reply: (hearing == Hearing::Answered).then_some(head),
+            reply: (handling == Handling::Answered).then_some(head),
             work: Work(work),
             outcome,
             broadcast,
         }
     }
 
-    /// All counters as they stood when the last request was [committed](Answered::commit), less what function 08 has
-    /// cleared.
+    /// Returns all counters as of the last request that was [committed](Answered::commit), less what function 08
+    /// has cleared.
     pub const fn counters(&self) -> Counters {
         self.counters_at(&self.line)
     }
 
-    /// All counters with those of the line as they stand now
-    /// ([`Receiver::counters`](crate::line::Receiver::counters)), less what function 08 has cleared.
-    /// May be called at any time, also while a request is pending.
+    /// Returns all counters with the present counters of the line
+    /// ([`Receiver::counters`](crate::line::Receiver::counters)), less what function 08 has cleared. May be called
+    /// at any time, also while a request is pending.
     pub const fn counters_at(&self, line: &LineCounters) -> Counters {
         let line = line.since(&self.cleared);
         let tally = &self.tally;
@@ -176,8 +177,8 @@ impl Server {
             bus_messages: line.bus_messages,
             communication_errors: line.communication_errors,
             exceptions: tally.exceptions,
-            // A dropped frame was a message to this unit and got no reply. It is not in `busy`, which
-            // counts exceptions 06 that were sent (V1.1b3 6.8.1).
+            // A dropped frame was a message to this unit and got no reply. It is not part of `busy`, which counts
+            // exceptions 06 that were sent (V1.1b3 6.8.1).
             unit_messages: tally.unit_messages.wrapping_add(line.dropped),
             no_response: tally.no_response.wrapping_add(line.dropped),
             nak: tally.nak,

@@ -1,11 +1,11 @@
-//! The steps of serving a request, in the only order there is.
+//! The steps of serving a request, in their only possible order.
 
 use super::Server;
 use crate::line::{Framing, Port, Units};
 use crate::{Adu, DataModel, Decision, LineCounters, Outcome};
 
-/// A request that was taken from its port. The unit address of its reply may be on its way.
-#[must_use = "its buffer is the port's"]
+/// A request that was taken from its port. The unit address of its reply may already be sent.
+#[must_use = "its buffer belongs to the port"]
 #[derive(Debug)]
 pub struct Request<'a> {
     adu: &'a mut Adu,
@@ -13,26 +13,26 @@ pub struct Request<'a> {
     ended: u32,
 }
 
-/// A request that has been decided upon.
-#[must_use = "its buffer is the port's"]
+/// A request about which the server has decided.
+#[must_use = "its buffer belongs to the port"]
 #[derive(Debug)]
 pub struct Decided<'a> {
     request: Request<'a>,
     decision: Decision,
 }
 
-/// A request whose reply has its beginning.
-#[must_use = "its buffer is the port's"]
+/// A request whose reply has its head.
+#[must_use = "its buffer belongs to the port"]
 #[derive(Debug)]
 pub struct Answered<'a>(Decided<'a>);
 
 /// A request that counters and event log include.
-#[must_use = "its buffer is the port's"]
+#[must_use = "its buffer belongs to the port"]
 #[derive(Debug)]
 pub struct Committed<'a>(Decided<'a>);
 
-/// A request that has been carried out.
-#[must_use = "its buffer is the port's"]
+/// A request that has been executed.
+#[must_use = "its buffer belongs to the port"]
 #[derive(Debug)]
 pub struct Served<'a> {
     adu: &'a mut Adu,
@@ -41,12 +41,12 @@ pub struct Served<'a> {
 }
 
 impl Server {
-    /// Takes the request that waits at `port`, if any, and lets its reply start, at once or after `delay` ticks
-    /// ([`Port::start`]): the unit address leaves while the rest is being decided.
+    /// Takes the request that waits at `port`, if any, and lets its reply start, immediately or after `delay` ticks
+    /// ([`Port::start`]). The unit address is sent while the rest is decided.
     ///
-    /// What follows has to be done step by step, each in a lock of what it needs if there is one:
-    /// [`Request::decide`] (model), [`Decided::answer`] (port), [`Answered::commit`],
-    /// [`Committed::carry_out`] (model), [`Served::finish`] (port). [`serve`](Self::serve) does it all at once.
+    /// The following steps must be called one by one, each under a lock of what it needs: [`Request::decide`]
+    /// (model), [`Decided::answer`] (port), [`Answered::commit`], [`Committed::carry_out`] (model),
+    /// [`Served::finish`] (port). [`serve`](Self::serve) calls them all.
     #[inline]
     pub fn take<'a, U: Units>(&self, port: &mut Port<'a, U>, delay: u16) -> Option<Request<'a>> {
         let (closed, ended) = port.take_request()?;
@@ -60,7 +60,7 @@ impl Server {
         })
     }
 
-    /// Serves the request that waits at `port`, if any; how it fared.
+    /// Serves the request that waits at `port`, if any, and returns its result.
     pub fn serve(
         &mut self,
         port: &mut Port<'_, impl Units>,
@@ -79,14 +79,14 @@ impl Server {
 }
 
 impl<'a> Request<'a> {
-    /// The unit address that the request is for; 0 for a broadcast.
+    /// Returns the unit address of the request; 0 for a broadcast.
     #[inline]
     #[must_use]
     pub fn unit(&self) -> u8 {
         self.adu.get(0)
     }
 
-    /// Settles the reply: everything that can be refused is refused here. Changes nothing.
+    /// Decides the reply. Everything that can be rejected is rejected here. Changes nothing.
     #[inline]
     pub fn decide(self, server: &Server, model: &impl DataModel) -> Decided<'a> {
         Decided {
@@ -97,7 +97,7 @@ impl<'a> Request<'a> {
 }
 
 impl<'a> Decided<'a> {
-    /// Gives the port the beginning of the reply, if there is one.
+    /// Passes the head of the reply to the port, if there is a reply.
     #[inline]
     pub fn answer(self, port: &mut Port<'a, impl Units>) -> Answered<'a> {
         if let Some(head) = self.decision.reply {
@@ -117,21 +117,21 @@ impl<'a> Answered<'a> {
 }
 
 impl<'a> Committed<'a> {
-    /// What was decided.
+    /// Returns the decision.
     #[inline]
     #[must_use]
     pub const fn decision(&self) -> &Decision {
         &self.0.decision
     }
 
-    /// The tick in which the request ended.
+    /// Returns the tick in which the request ended.
     #[inline]
     #[must_use]
     pub const fn ended(&self) -> u32 {
         self.0.request.ended
     }
 
-    /// Does the work: points and registers are written, and the rest of the reply is put together.
+    /// Executes the request: writes points and registers, and creates the rest of the reply.
     #[inline]
     pub fn carry_out(self, server: &mut Server, model: &mut impl DataModel) -> Served<'a> {
         let Decided { request, decision } = self.0;
@@ -145,7 +145,7 @@ impl<'a> Committed<'a> {
 }
 
 impl<'a> Served<'a> {
-    /// Gives the port the rest of the reply, and the buffer back.
+    /// Passes the rest of the reply to the port, or gives the buffer back.
     #[inline]
     pub fn finish(self, port: &mut Port<'a, impl Units>) {
         port.finish(self.adu, self.replying, self.framing);

@@ -1,4 +1,4 @@
-//! What is counted and logged of each request (V1.1b3 6.8 to 6.10).
+//! Counters and event log of the requests (V1.1b3 6.8 to 6.10).
 
 use super::Server;
 use crate::counters::count;
@@ -31,10 +31,10 @@ impl Tally {
 }
 
 impl Server {
-    /// Takes note of a decision that is now being acted upon, and of the line's counters as they
-    /// came with its request: counters and event log include it from here on.
+    /// Counts and logs a decision that is now executed, with the line's counters at the end of its request.
+    /// Counters and event log include the request from now on.
     ///
-    /// Requests are committed in the order in which the receiver has closed them.
+    /// Requests are committed in the order in which the receiver has received them.
     pub(super) fn commit(&mut self, decision: &Decision, line: &LineCounters) {
         self.note_line(line);
         self.log
@@ -45,8 +45,8 @@ impl Server {
             count(&mut tally.no_response);
         }
         match decision.outcome {
-            // "Not incremented for exception responses, poll commands, or fetch event counter
-            // commands" (6.9), of which the log is one: its count is that of function 0B (6.10).
+            // "Not incremented for exception responses, poll commands, or fetch event counter commands" (6.9).
+            // Reading the log counts as such a command, because it returns the same count as function 0B (6.10).
             Outcome::Accepted if matches!(decision.work.0, Job::EventCounter | Job::EventLog) => {}
             Outcome::Accepted => count(&mut tally.events),
             Outcome::Refused(exception) => {
@@ -62,9 +62,9 @@ impl Server {
         }
     }
 
-    /// Takes note of what the line had counted when a request was closed, and logs the bad frames
-    /// before that request. Private, because a copy that is older than the last one would make the
-    /// differences wrap: while a request is pending, its copy is older than the receiver's counters.
+    /// Stores the line's counters at the end of a request, and logs the damaged frames before that request.
+    /// Private, because with a copy older than the last one the differences would wrap: while a request is pending,
+    /// its copy is older than the receiver's counters.
     fn note_line(&mut self, line: &LineCounters) {
         let seen = &self.line;
         let errors = line
@@ -79,9 +79,8 @@ impl Server {
         self.line = *line;
     }
 
-    /// The request has been dealt with: its reply is as good as sent, and what is to happen after
-    /// it happens.
-    pub(super) fn conclude(&mut self, decision: &Decision) {
+    /// Ends a request after its work is done: logs its reply and executes what must happen after it.
+    pub(super) fn finish(&mut self, decision: &Decision) {
         let exception = match decision.outcome {
             Outcome::Refused(exception) if decision.reply.is_some() => Some(exception),
             _ => None,
@@ -111,7 +110,7 @@ impl Server {
         }
     }
 
-    /// All counters to zero.
+    /// Sets all counters to zero.
     fn clear(&mut self) {
         self.tally = Tally::ZERO;
         self.cleared = self.line;

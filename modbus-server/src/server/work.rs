@@ -1,4 +1,4 @@
-//! The work: points and registers written, the body of the reply put together.
+//! The work of a request: writes points and registers and creates the body of the reply.
 
 use super::Server;
 use crate::decision::Job;
@@ -7,18 +7,18 @@ use crate::{
     Adu, Bits, BitsOut, DataModel, Decision, Span, Table, Words, WordsOut, file, identification,
 };
 
-/// Of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). There are none.
+/// Status of functions 0B and 0C: no program command is being processed (V1.1b3 6.9). This server has none.
 const NOT_BUSY: [u8; 2] = [0x00, 0x00];
-/// The longest data of a reply in a PDU of 253 bytes, beside the function code.
+/// Longest data of a reply in a PDU of 253 bytes, without the function code.
 const MAX_CUSTOM: usize = 252;
-/// The longest identity and additional data of function 11, beside its byte count and run indicator.
+/// Longest server ID with additional data of function 11, without its byte count and run indicator.
 const MAX_SERVER_ID: usize = MAX_CUSTOM - 2;
-/// Where the data of function 08 begin in its request, counted from the unit address.
+/// Position of the data of function 08 in its request, counted from the unit address.
 const DIAGNOSTIC_DATA: u8 = 4;
 
 impl Server {
-    /// Does the work of a decision. `adu` is the request it was made on; afterwards, if the reply
-    /// has a body, `adu` holds it, from [`Head::body_from`](crate::head::Head::body_from) on.
+    /// Does the work of a decision. `adu` is the request of this decision. Afterwards, if the reply has a body,
+    /// `adu` holds it from [`Head::body_from`](crate::head::Head::body_from) on.
     pub(super) fn carry_out(
         &mut self,
         decision: &Decision,
@@ -61,14 +61,14 @@ impl Server {
                 let counter = self.counters().as_words().get(usize::from(index)).copied();
                 diagnostic_data(adu, counter.unwrap_or_default());
             }
-            // The reply is the request as it is; the rest comes after it.
+            // The reply repeats the request; the remaining bytes are in the body.
             Job::Diagnose(_) => {}
             Job::EventCounter => {
                 body(adu, &NOT_BUSY);
                 adu.extend(&self.tally.events.to_be_bytes());
             }
             Job::EventLog => {
-                // Up to 6 + 64.
+                // At most 6 + 64.
                 body(adu, &[6 + self.log.count()]);
                 adu.extend(&NOT_BUSY);
                 adu.extend(&self.tally.events.to_be_bytes());
@@ -80,7 +80,7 @@ impl Server {
                 let id = id.get(..MAX_SERVER_ID).unwrap_or(id);
                 let more = model.additional_data();
                 let more = more.get(..MAX_SERVER_ID - id.len()).unwrap_or(more);
-                // Up to 251.
+                // At most 251.
                 body(adu, &[(id.len() + more.len()) as u8 + 1]);
                 adu.extend(id);
                 adu.extend(&[if model.is_running() { 0xFF } else { 0x00 }]);
@@ -92,11 +92,11 @@ impl Server {
                 adu.cut(adu.len().saturating_sub(MAX_CUSTOM));
             }
         }
-        self.conclude(decision);
+        self.finish(decision);
     }
 }
 
-/// The words of a request.
+/// Returns the words of a request.
 fn words(adu: &Adu, span: Span, from: u8) -> Words<'_> {
     Words::new(adu.from(from)).slice(0, span.count())
 }
@@ -113,7 +113,7 @@ fn read_words(table: Table, span: Span, adu: &mut Adu, model: &impl DataModel) {
     out.finish();
 }
 
-/// Puts a value where function 08 has its data.
+/// Stores a value at the position of the data of function 08.
 fn diagnostic_data(adu: &mut Adu, value: u16) {
     let [high, low] = value.to_be_bytes();
     adu.set(DIAGNOSTIC_DATA, high);

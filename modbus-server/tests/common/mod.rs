@@ -1,4 +1,4 @@
-//! What the tests share: a unit made of the crate's parts, driven as a device would drive them.
+//! Shared by the tests: a unit made of the crate's parts, driven in the same way as in a device.
 
 #![allow(dead_code)] // each test file uses its own part of it
 
@@ -14,7 +14,7 @@ use modbus_server::{Adu, Counters, DataModel, Server};
 #[allow(unused_imports)] // as above
 pub use points::Points;
 
-/// The end mark of frames in ASCII mode, as the reference takes it.
+/// Returns the end mark of frames in ASCII mode, as the reference takes it.
 pub fn delimiter(framing: Framing) -> Option<u8> {
     match framing {
         Framing::Rtu => None,
@@ -34,13 +34,13 @@ pub struct UnitOn<'a, M = Points> {
 /// A unit whose buffers are never freed.
 pub type Unit<M = Points> = UnitOn<'static, M>;
 
-/// A port whose buffers are never freed.
+/// Returns a port whose buffers are never freed.
 pub fn port(receiver: Receiver<'static>) -> Port<'static> {
     Port::new(receiver, Box::leak(Box::new([Adu::new(), Adu::new()])))
 }
 
 impl Unit {
-    /// An RTU unit.
+    /// Creates an RTU unit.
     pub fn new(points: Points) -> Self {
         Self::with(UNIT, false, points)
     }
@@ -57,19 +57,19 @@ impl Unit {
         Self::on(port(receiver), framing, points).without_what_it_lacks()
     }
 
-    /// A request that must be refused.
+    /// Sends a request that must be rejected and returns the exception code.
     pub fn refused(&mut self, pdu: &[u8]) -> u8 {
         let points = self.points.clone();
         let reply = self.request(pdu).expect("a reply");
         assert_eq!(reply.len(), 2, "{reply:02X?} to {pdu:02X?}");
         assert_eq!(reply[0], pdu[0] | 0x80);
-        assert_eq!(self.points, points, "refused, so nothing changes");
+        assert_eq!(self.points, points, "a rejected request changes nothing");
         reply[1]
     }
 }
 
 impl UnitOn<'_> {
-    /// The unit without listen-only mode, unless it has function 08.
+    /// Disables listen-only mode if the model does not have function 08.
     pub fn without_what_it_lacks(mut self) -> Self {
         if self.points.lacks.contains(&0x08) {
             self.server = self.server.without_listen_only();
@@ -79,14 +79,14 @@ impl UnitOn<'_> {
 }
 
 impl<M: DataModel> Unit<M> {
-    /// A unit with a data model of its own.
+    /// Creates a unit with this data model.
     pub fn over(receiver: Receiver<'static>, framing: Framing, points: M) -> Self {
         Self::on(port(receiver), framing, points)
     }
 }
 
 impl<'a, M: DataModel> UnitOn<'a, M> {
-    /// A unit on this port, after the first silence.
+    /// Creates a unit on this port, after the first silence.
     pub fn on(mut port: Port<'a>, framing: Framing, points: M) -> Self {
         assert!(!port.long_silence(0));
         Self {
@@ -97,7 +97,7 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
         }
     }
 
-    /// One character; an ASCII frame that it ends is served.
+    /// Receives one character. An ASCII frame that it ends is served.
     pub fn character(&mut self, byte: u8, faults: Faults) {
         self.port.received(byte, faults);
         if self.server.framing() != Framing::Rtu && self.port.short_silence(0) {
@@ -105,20 +105,20 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
         }
     }
 
-    /// Good characters.
+    /// Receives characters without faults.
     pub fn characters(&mut self, bytes: &[u8]) {
         bytes
             .iter()
             .for_each(|byte| self.character(*byte, Faults::NONE));
     }
 
-    /// Silence of 1.5 characters on an RTU line.
+    /// Passes a silence of 1.5 characters on an RTU line.
     pub fn pause(&mut self) {
         assert!(!self.port.short_silence(0));
     }
 
-    /// Silence of 3.5 characters, in ASCII mode of a second, and the reply to what came before it,
-    /// as it goes over the line.
+    /// Passes a silence of 3.5 characters, or in ASCII mode of a second. Returns the reply to the frame before it,
+    /// as it is sent on the line.
     pub fn silence(&mut self) -> Option<Vec<u8>> {
         self.pause();
         match self.said.take() {
@@ -128,21 +128,24 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
         }
     }
 
-    /// The reply to an ASCII frame, whose end was the last character.
+    /// Returns the reply to an ASCII frame that the last character has ended.
     pub fn take_said(&mut self) -> Option<Vec<u8>> {
         self.said.take()
     }
 
-    /// Serves the request that waits, step by step, and sends as early as each step allows.
+    /// Serves the waiting request step by step, and sends as early as each step allows.
     fn serve(&mut self) -> Option<Vec<u8>> {
         let waiting = self.port.waiting();
-        let request = self.server.take(&mut self.port, 0).expect("it waits");
+        let request = self
+            .server
+            .take(&mut self.port, 0)
+            .expect("a request waits");
         assert_eq!(waiting, Some(request.unit()));
         let mut reply: Vec<u8> = self.port.start().into_iter().collect();
         let answers = !reply.is_empty();
         let rest = send(&mut self.port, &mut reply);
         let expected = if answers { Next::Wait } else { Next::Done };
-        assert_eq!(rest, expected, "the unit address goes at once");
+        assert_eq!(rest, expected, "the unit address is sent immediately");
         let decided = request.decide(&self.server, &self.points);
         let answered = decided.answer(&mut self.port);
         send(&mut self.port, &mut reply);
@@ -156,13 +159,13 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
         answers.then_some(reply)
     }
 
-    /// A whole frame with a good CRC or LRC; the reply, if any.
+    /// Receives a whole frame including its CRC or LRC. Returns the reply, if any.
     pub fn raw(&mut self, bytes: &[u8]) -> Option<Vec<u8>> {
         self.characters(bytes);
         self.silence()
     }
 
-    /// A request to this unit; the PDU of its reply, whose frame is checked.
+    /// Receives a request to this unit. Checks the frame of the reply and returns its PDU.
     pub fn request(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
         let delimiter = delimiter(self.server.framing());
         let reply = self.raw(&framed(delimiter, UNIT, pdu))?;
@@ -178,7 +181,7 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
         self.server.counters_at(self.port.counters())
     }
 
-    /// The next good request must be answered.
+    /// Checks that the next valid request is answered.
     pub fn must_answer(&mut self) {
         let reply = self.request(&pdu(0x03, &[0, 1])).expect("a reply");
         assert_eq!(reply[..2], [0x03, 0x02]);

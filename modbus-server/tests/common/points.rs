@@ -1,4 +1,4 @@
-//! The device of the tests.
+//! The device for the tests.
 
 use std::ops::{Deref, DerefMut};
 
@@ -25,7 +25,7 @@ impl DerefMut for Points {
     }
 }
 
-/// Every exception by its code.
+/// Every exception, to find one by its code.
 const EXCEPTIONS: [Exception; 10] = [
     Exception::IllegalFunction,
     Exception::IllegalDataAddress,
@@ -40,12 +40,12 @@ const EXCEPTIONS: [Exception; 10] = [
 ];
 
 impl Points {
-    /// Coils and discrete inputs, holding and input registers, as many of each kind.
+    /// Creates a device with `bits` coils and discrete inputs and `words` holding and input registers each.
     pub fn new(bits: usize, words: usize) -> Self {
         Self(Device::new(bits, words))
     }
 
-    /// The bits that function 01 or 02 reads.
+    /// Returns the bits that function 01 or 02 reads.
     pub fn bits_of(&mut self, function: u8) -> &mut Vec<bool> {
         match function {
             1 => &mut self.bits,
@@ -54,7 +54,7 @@ impl Points {
         }
     }
 
-    /// The words that function 03 or 04 reads.
+    /// Returns the words that function 03 or 04 reads.
     pub fn words_of(&mut self, function: u8) -> &mut Vec<u16> {
         match function {
             3 => &mut self.words,
@@ -90,7 +90,7 @@ impl Points {
         EXCEPTIONS.iter().find(state).copied().map_or(Ok(()), Err)
     }
 
-    /// How many records a file has.
+    /// Returns the number of records in a file.
     fn records(&self, file: u16) -> usize {
         assert!(file > 0, "no file has the number 0");
         self.files.get(usize::from(file) - 1).map_or(0, Vec::len)
@@ -226,7 +226,7 @@ impl DataModel for Points {
     fn identification(&self, object: u8, text: &mut TextOut<'_>) -> bool {
         assert!(!(0x07..=0x7F).contains(&object), "{object:02X} is reserved");
         let value = self.objects[usize::from(object)].as_deref();
-        // In two parts, for a model that makes its text may need several.
+        // The text is appended in two parts, because a model may need several calls.
         let (front, back) = value
             .unwrap_or(b"none")
             .split_at(value.map_or(0, |v| v.len() / 2));

@@ -1,4 +1,4 @@
-//! The driver over a link that is posted to and a converter that answers at once.
+//! Tests of the driver with a link and a converter that answers immediately.
 
 extern crate std;
 use std::vec::Vec;
@@ -8,7 +8,7 @@ use crate::{ChannelStatus, DAC_ADDRESS, DacWorker, Scale, Signal};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
 
-/// Two lines; any other fails the test.
+/// A converter with two lines. Any other line fails the test.
 struct Lines([u16; 2], Vec<u8>);
 
 impl AnalogSource for Lines {
@@ -19,7 +19,7 @@ impl AnalogSource for Lines {
         match self.0.get(usize::from(line)) {
             Some(&u16::MAX) => Err(nb::Error::Other(())),
             Some(&code) => Ok(Code::new(code)),
-            None => panic!("line {line} is not this module's"),
+            None => panic!("the module has no line {line}"),
         }
     }
 }
@@ -40,7 +40,7 @@ fn commanded(third: u16, fourth: u16) -> Channels {
 }
 
 #[test]
-fn inputs_are_lines_1_and_2_and_outputs_are_not_touched_by_them() {
+fn inputs_are_lines_1_and_2_and_reading_does_not_change_outputs() {
     let link = DacLink::new();
     let mut module = Ai2Ao2::new(Lines([1000, 2000], Vec::new()), &link);
     use Kind::{WordInput, WordOutput};
@@ -53,7 +53,7 @@ fn inputs_are_lines_1_and_2_and_outputs_are_not_touched_by_them() {
         assert_eq!(module.read_inputs(&mut channels), Ok(()));
     }
     assert_eq!([0, 1, 2, 3].map(|c| channels.word(c)), [1000, 2000, 7, 8]);
-    assert_eq!(link.wanted(), None, "reading drives nothing");
+    assert_eq!(link.wanted(), None, "reading posts nothing");
     assert_eq!(module.inputs.source_mut().1, [0, 1, 0, 1, 0, 1]);
 }
 
@@ -81,7 +81,7 @@ fn outputs_are_the_channels_c_and_d_in_their_own_units() {
 }
 
 #[test]
-fn a_dac_that_does_not_answer_fails_the_module_while_its_inputs_are_read() {
+fn a_dac_that_does_not_answer_is_an_error_while_inputs_are_still_read() {
     let bytes = |high, low| std::vec![0x40, 0, 0, 0x42, 0, 0, 0x44, high, low, 0x46, 0x0F, 0xFF];
     let refused = || {
         Transaction::write(DAC_ADDRESS, bytes(0, 5))
@@ -106,13 +106,17 @@ fn a_dac_that_does_not_answer_fails_the_module_while_its_inputs_are_read() {
     assert_eq!([0, 1].map(|c| channels.word(c)), [1, 2]);
     module.inputs.source_mut().0 = [u16::MAX, 3];
     let both = module.read_inputs(&mut channels).unwrap_err();
-    assert_eq!(both.channels(), 0b1101, "the DAC's channels and the line's");
+    assert_eq!(
+        both.channels(),
+        0b1101,
+        "the DAC's channels and that of the line"
+    );
     assert_eq!(both.first_line(), None);
 
     assert_eq!(
         worker.work(&mut bus, &link),
         Ok(false),
-        "left out after two failures"
+        "skipped after two failures"
     );
     assert_eq!(worker.work(&mut bus, &link), Ok(true));
     assert_eq!(module.drive_outputs(&channels), Ok(()));

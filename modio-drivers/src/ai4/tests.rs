@@ -1,4 +1,4 @@
-//! The driver over a converter of our own: embedded-hal-mock has none for embedded-hal 1.
+//! Tests of the driver with a mock converter; embedded-hal-mock has none for embedded-hal 1.
 
 extern crate std;
 use std::vec::Vec;
@@ -6,17 +6,17 @@ use std::vec::Vec;
 use super::*;
 use crate::{ChannelStatus, Code, POLLS_PER_SCAN, STALLED_SCANS, Scale, Signal};
 
-/// A converter: what stands on each line, and how often it has to be asked.
+/// A mock converter: the code of each line and the number of calls that a conversion takes.
 #[derive(Default)]
 struct Converter {
     codes: [u16; 4],
     broken: [bool; 4],
-    /// Calls that a conversion blocks.
+    /// Number of calls during which a conversion blocks.
     delay: u32,
     asked: u32,
     converting: Option<u8>,
     calls: u32,
-    /// Lines answered for, in order.
+    /// Lines whose conversions have ended, in order.
     answered: Vec<u8>,
 }
 
@@ -26,7 +26,10 @@ impl AnalogSource for Converter {
     fn read(&mut self, line: u8) -> nb::Result<Code, Self::Error> {
         self.calls += 1;
         let under_way = *self.converting.get_or_insert(line);
-        assert_eq!(under_way, line, "another line while a conversion goes on");
+        assert_eq!(
+            under_way, line,
+            "another line was asked for during a conversion"
+        );
         self.asked += 1;
         if self.asked <= self.delay {
             return Err(nb::Error::WouldBlock);
@@ -61,14 +64,14 @@ fn statuses(channels: &Channels) -> [ChannelStatus; 4] {
     [0, 1, 2, 3].map(|channel| channels.status(channel))
 }
 
-/// Scans with these codes on the lines, without an error, and returns the words.
+/// Scans with these codes on the lines, expects no error, and returns the words.
 fn scan(module: &mut Ai4<&mut Converter>, channels: &mut Channels) -> [u16; 4] {
     module.read_inputs(channels).unwrap();
     words(channels)
 }
 
 #[test]
-fn every_line_is_sampled_once_a_scan_and_shows_at_once() {
+fn every_line_is_sampled_once_per_scan_and_shown_immediately() {
     let mut converter = Converter {
         codes: [0, 1, 2048, 4095],
         ..Converter::default()
@@ -107,7 +110,7 @@ fn each_channel_has_its_own_range_and_scale() {
 }
 
 #[test]
-fn status_tells_breaks_and_shorts_and_goes_when_they_go() {
+fn status_reports_breaks_and_shorts_while_they_last() {
     use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
     let settings = [
         with(0, Signal::Voltage, Scale::Engineering),
@@ -141,7 +144,7 @@ fn status_tells_breaks_and_shorts_and_goes_when_they_go() {
         assert_eq!(statuses(&channels), expected, "{codes:?}");
     }
 
-    // One module through all of them, as the wires are moved.
+    // One module for all cases, as when its wires are moved.
     let mut module = Ai4::new(Converter::default());
     module.configure(&settings);
     let mut channels = Channels::new();
@@ -153,7 +156,7 @@ fn status_tells_breaks_and_shorts_and_goes_when_they_go() {
 }
 
 #[test]
-fn configuring_the_same_again_disturbs_no_filter_and_another_filter_does_not_jump() {
+fn equal_settings_do_not_disturb_a_filter_and_a_new_filter_does_not_jump() {
     let step = |again: bool| {
         let mut module = Ai4::new(Converter::default());
         module.configure(&raw(6));
@@ -190,7 +193,7 @@ fn configuring_the_same_again_disturbs_no_filter_and_another_filter_does_not_jum
 }
 
 #[test]
-fn another_range_does_not_inherit_a_status() {
+fn another_range_starts_with_status_good() {
     let mut module = Ai4::new(Converter::default());
     let mut channels = Channels::new();
     let mut show = |signal, codes: [u16; 4]| {
@@ -200,7 +203,7 @@ fn another_range_does_not_inherit_a_status() {
         statuses(&channels)
     };
     use ChannelStatus::{Good, OpenCircuit, OverRange, UnderRange};
-    // 3650 uA at code 747, and 4090 of 4095: good, unless it has been worse before.
+    // 3650 uA is code 747. It is good, and so is code 4090, unless the status before was worse.
     let worse = [UnderRange, OpenCircuit, Good, Good];
     assert_eq!(show(Signal::Ntc, [4060, 4090, 2048, 2048]), worse);
     assert_eq!(
@@ -216,7 +219,7 @@ fn another_range_does_not_inherit_a_status() {
 }
 
 #[test]
-fn a_conversion_on_demand_is_asked_again_for_the_same_line_within_the_scans_budget() {
+fn a_slow_conversion_is_polled_for_the_same_line_within_the_budget_of_a_scan() {
     let mut module = Ai4::new(Converter {
         codes: [10, 20, 30, 40],
         delay: 20,
@@ -232,7 +235,7 @@ fn a_conversion_on_demand_is_asked_again_for_the_same_line_within_the_scans_budg
         before = calls;
     }
     assert_eq!(words(&channels), [10, 20, 30, 40]);
-    // 6400 calls of which 21 make one answer.
+    // 6400 calls, of which 21 give one answer.
     let answered = &module.inputs.source_mut().answered;
     assert_eq!(answered.len(), 304);
     assert!(
@@ -243,14 +246,14 @@ fn a_conversion_on_demand_is_asked_again_for_the_same_line_within_the_scans_budg
     );
 }
 
-/// Every line has failed.
+/// Returns the error in which every line has failed.
 fn all_lines() -> ModuleError {
     let each = (0..CHANNELS).map(|channel| Err(ModuleError::line(channel)));
     each.fold(Ok(()), ModuleError::in_either).unwrap_err()
 }
 
 #[test]
-fn a_converter_that_never_answers_is_reported_in_time_and_taken_back() {
+fn a_converter_that_does_not_answer_is_reported_until_it_answers() {
     let mut module = Ai4::new(Converter {
         codes: [1, 2, 3, 4],
         ..Converter::default()
@@ -274,11 +277,11 @@ fn a_converter_that_never_answers_is_reported_in_time_and_taken_back() {
     );
     module.inputs.source_mut().delay = 0;
     assert_eq!(module.read_inputs(&mut channels), Ok(()));
-    assert_eq!(channels.word(0), 9, "what was filtered before is forgotten");
+    assert_eq!(channels.word(0), 9, "the old filter state is discarded");
 }
 
 #[test]
-fn stalls_that_end_in_time_do_not_add_up() {
+fn short_stalls_are_not_added_up() {
     let mut module = Ai4::new(Converter::default());
     let mut channels = Channels::new();
     for _ in 0..10 {
@@ -292,7 +295,7 @@ fn stalls_that_end_in_time_do_not_add_up() {
 }
 
 #[test]
-fn a_line_whose_conversion_fails_is_named_keeps_its_word_and_starts_afresh() {
+fn a_failed_line_is_reported_keeps_its_word_and_restarts_its_filter() {
     let mut module = Ai4::new(Converter {
         codes: [100; 4],
         ..Converter::default()
@@ -319,7 +322,7 @@ fn a_line_whose_conversion_fails_is_named_keeps_its_word_and_starts_afresh() {
 }
 
 #[test]
-fn a_slow_converters_failing_line_stays_failed_in_the_scans_between() {
+fn a_failed_line_of_a_slow_converter_stays_failed_until_its_next_answer() {
     let mut module = Ai4::new(Converter {
         codes: [1, 2, 3, 4],
         broken: [false, true, false, false],

@@ -1,5 +1,5 @@
-//! The worker over the bus of embedded-hal-mock for every transfer and failure, and over a model of
-//! the MCP4728 for what a transfer does to it.
+//! Tests of the worker: with the bus of embedded-hal-mock for every transfer and failure, and with a model of the
+//! MCP4728 for the effect of a transfer.
 
 extern crate std;
 use std::vec::Vec;
@@ -11,7 +11,7 @@ use super::*;
 
 const NO_ANSWER: ErrorKind = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
 
-/// Multi-Write of four codes: VDD as reference, gain 1, not powered down, put out at once.
+/// Multi-Write of four codes: VDD as reference, gain 1, not powered down, output updated immediately.
 fn transfer(codes: [u16; 4]) -> Transaction {
     transfer_to(0x60, codes)
 }
@@ -54,7 +54,7 @@ fn a_transfer_is_one_multi_write_of_codes_and_configuration() {
 }
 
 #[test]
-fn a_code_beyond_the_dac_does_not_reach_into_its_configuration() {
+fn a_code_above_the_range_does_not_change_the_configuration() {
     let mut bus = Mock::new(&[transfer([0xFFF, 0xFFF, 0xFFF, 1])]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
     assert_eq!(
@@ -65,7 +65,7 @@ fn a_code_beyond_the_dac_does_not_reach_into_its_configuration() {
 }
 
 #[test]
-fn a_change_goes_at_the_next_call_and_everything_again_at_every_tenth() {
+fn a_change_is_sent_at_the_next_call_and_all_codes_at_every_tenth() {
     let mut bus = Mock::new(&[
         transfer([1, 2, 3, 4]),
         transfer([1, 2, 3, 5]),
@@ -86,7 +86,7 @@ fn a_change_goes_at_the_next_call_and_everything_again_at_every_tenth() {
 }
 
 #[test]
-fn failures_are_sorted_by_what_can_be_done() {
+fn failures_are_classified_by_what_the_caller_can_do() {
     let no_answer = [
         NoAcknowledgeSource::Address,
         NoAcknowledgeSource::Data,
@@ -116,7 +116,7 @@ fn failures_are_sorted_by_what_can_be_done() {
 }
 
 #[test]
-fn one_failure_is_noise_and_two_are_a_fault_until_a_transfer_succeeds() {
+fn the_link_fails_after_two_failures_until_a_transfer_succeeds() {
     let mut bus = Mock::new(&[
         transfer([9; 4]).with_error(NO_ANSWER),
         transfer([9; 4]),
@@ -138,18 +138,18 @@ fn one_failure_is_noise_and_two_are_a_fault_until_a_transfer_succeeds() {
     assert!(link.failed());
     link.post([8; 4].map(Code::new));
     assert_eq!(worker.work(&mut bus, &link), Ok(false));
-    assert!(link.failed(), "nothing has been tried");
+    assert!(link.failed(), "no transfer was tried");
     assert_eq!(
         worker.work(&mut bus, &link),
         Ok(true),
-        "with what is wanted by now"
+        "with the newest codes"
     );
     assert!(!link.failed());
     bus.done();
 }
 
 #[test]
-fn tries_thin_out_to_one_in_seventeen_calls_and_never_end() {
+fn tries_become_rarer_down_to_one_in_seventeen_calls_and_never_stop() {
     let mut bus = Mock::new(&std::vec![transfer([1; 4]).with_error(NO_ANSWER); 300]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
     let link = posted([1; 4]);
@@ -161,26 +161,27 @@ fn tries_thin_out_to_one_in_seventeen_calls_and_never_end() {
     assert_eq!(
         tries.len(),
         300,
-        "far beyond where a counter of 8 bits ends"
+        "far more failures than a counter of 8 bits holds"
     );
     assert!(tries[5..].windows(2).all(|pair| pair[1] - pair[0] == 17));
     bus.done();
 }
 
-/// An MCP4728 as far as Multi-Write goes; every other command fails the test, those that write the
-/// EEPROM among them.
+/// A model of the MCP4728 with Multi-Write only. Every other command fails the test, including those that write the
+/// EEPROM.
 struct Dac {
     powered: bool,
-    /// Of each channel: reference, power-down, gain and code as they stand in the register.
+    /// For each channel: reference, power-down, gain and code, as in its register.
     eeprom: [u16; 4],
     input: [u16; 4],
     output: [u16; 4],
-    /// The bus loses its acknowledge after so many bytes.
+    /// The bus loses the acknowledge after this many bytes.
     cut_after: usize,
 }
 
 impl Dac {
-    /// With internal reference, gain 2 and powered down: the most wrong EEPROM there can be.
+    /// Creates a DAC whose EEPROM selects the internal reference, gain 2 and power-down, so that every setting is
+    /// wrong.
     fn new() -> Self {
         let eeprom = [0b1111_1000_0000_0000; 4];
         Self {
@@ -210,7 +211,7 @@ impl I2c for Dac {
     ) -> Result<(), ErrorKind> {
         assert_eq!(address, 0x60);
         let [Operation::Write(bytes)] = operations else {
-            panic!("only writes are expected");
+            panic!("the worker must only write");
         };
         if !self.powered {
             return Err(NO_ANSWER);
@@ -231,14 +232,14 @@ impl I2c for Dac {
 }
 
 #[test]
-fn a_dac_with_any_eeprom_is_right_after_one_transfer_and_again_after_a_loss_of_power() {
+fn a_dac_is_configured_by_one_transfer_and_again_after_a_loss_of_power() {
     let mut worker = DacWorker::new(DAC_ADDRESS);
     let mut bus = Dac::new();
     let link = posted([0, 819, 2048, 4095]);
     assert_eq!(worker.work(&mut bus, &link), Ok(true));
     assert_eq!(bus.output, [0, 819, 2048, 4095]);
 
-    // Too short an absence to be noticed on the bus.
+    // The power is lost for too short a time to be noticed on the bus.
     bus.power(false);
     bus.power(true);
     assert_ne!(bus.output, [0, 819, 2048, 4095]);
@@ -247,7 +248,7 @@ fn a_dac_with_any_eeprom_is_right_after_one_transfer_and_again_after_a_loss_of_p
     }
     assert_eq!(bus.output, [0, 819, 2048, 4095]);
 
-    // A long one, and other codes meanwhile.
+    // The power is lost for longer, and the codes change.
     bus.power(false);
     for _ in 0..1000 {
         let _ = worker.work(&mut bus, &link);
@@ -264,7 +265,7 @@ fn a_dac_with_any_eeprom_is_right_after_one_transfer_and_again_after_a_loss_of_p
 }
 
 #[test]
-fn a_transfer_cut_short_anywhere_is_made_again_whole() {
+fn an_interrupted_transfer_is_repeated_completely() {
     for cut_after in 0..12 {
         let mut worker = DacWorker::new(DAC_ADDRESS);
         let mut bus = Dac::new();
@@ -281,7 +282,7 @@ fn a_transfer_cut_short_anywhere_is_made_again_whole() {
 }
 
 #[test]
-fn a_change_that_failed_half_way_is_undone_when_it_is_taken_back() {
+fn a_change_that_failed_half_way_is_undone_when_the_old_codes_are_posted() {
     let mut worker = DacWorker::new(DAC_ADDRESS);
     let mut bus = Dac::new();
     let link = posted([1; 4]);
@@ -301,7 +302,7 @@ fn a_change_that_failed_half_way_is_undone_when_it_is_taken_back() {
 }
 
 #[test]
-fn workers_with_an_address_each_share_a_bus() {
+fn workers_with_different_addresses_share_a_bus() {
     let mut bus = Mock::new(&[
         transfer_to(0x60, [1; 4]).with_error(NO_ANSWER),
         transfer_to(0x63, [2; 4]),

@@ -1,23 +1,23 @@
-//! Writing records.
+//! Encoding of records.
 
 use crc::{Digest, NoTable};
 
 use super::{CRC, FIRST_OFFSET, HEAD, MARK, OVERHEAD, PAGE_MARK, SCHEMA, SEALS};
 
-/// Brings a record half-word by half-word, the unit in which this flash is programmed.
+/// Returns a record half-word by half-word, the unit in which this flash is programmed.
 #[derive(Clone)]
 pub struct Encoder {
     head: [u16; HEAD / 2],
     crc: Digest<'static, u32, NoTable>,
-    /// The value of the pair whose address was the last half-word.
+    /// Value of the pair whose address was the last half-word.
     value: Option<u16>,
-    /// Half-words brought.
+    /// Number of half-words returned so far.
     at: usize,
     count: u16,
 }
 
 impl Encoder {
-    /// A record of `count` pairs.
+    /// Creates a record of `count` pairs.
     #[must_use]
     pub fn new(schema: u16, sequence: u32, count: u16) -> Self {
         let [q0, q1, q2, q3] = sequence.to_le_bytes();
@@ -36,19 +36,19 @@ impl Encoder {
         }
     }
 
-    /// Bytes of the whole record with its seals.
+    /// Returns the bytes of the whole record with its seals.
     #[must_use]
     pub const fn size(&self) -> usize {
         self.unsealed() + SEALS
     }
 
-    /// Bytes of the record without its seals.
+    /// Returns the bytes of the record without its seals.
     const fn unsealed(&self) -> usize {
         OVERHEAD + self.count as usize * 4
     }
 
-    /// The next half-word; `None` after the last. Asks for the next pair of address and value when it
-    /// comes to one, `count` times in all; where `pair` has none, an address that nobody knows is stored.
+    /// Returns the next half-word, or `None` after the last. Calls `pair` for each next pair of address and value,
+    /// `count` times in total. If `pair` returns none, an unknown address is stored.
     pub fn next(&mut self, pair: &mut dyn FnMut() -> Option<(u16, u16)>) -> Option<u16> {
         let body = self.unsealed().saturating_sub(4) / 2;
         let half = if let Some(half) = self.head.get(self.at) {
@@ -88,9 +88,9 @@ impl core::fmt::Debug for Encoder {
     }
 }
 
-/// Writes a page's mark and one record into `page`, and gives how many bytes they take; `None`, and
-/// nothing of use in `page`, when there is not so much room. At the start of the store's first page, which is erased, it
-/// is what a device that never stored anything starts with: so a simulator or a programmer presets a device.
+/// Writes a page mark and one record into `page` and returns the number of bytes. Returns `None`, with undefined
+/// content in `page`, when there is not enough room. At the start of the store's first page, with the rest erased,
+/// these bytes preset a device that has never stored anything: a simulator or a programmer writes them.
 pub fn encode_page(sequence: u32, pairs: &[(u16, u16)], page: &mut [u8]) -> Option<usize> {
     let mut encoder = Encoder::new(SCHEMA, sequence, u16::try_from(pairs.len()).ok()?);
     let size = encoder.size().checked_add(FIRST_OFFSET)?;
@@ -104,7 +104,7 @@ pub fn encode_page(sequence: u32, pairs: &[(u16, u16)], page: &mut [u8]) -> Opti
     Some(size)
 }
 
-/// A sealed record of defaults with sequence number 0: what a device stores that never stored anything.
+/// A sealed record of defaults with sequence number 0: the first record of a device that has never stored anything.
 pub const BEGINNING: [u8; OVERHEAD + SEALS] = [
     0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 0, 0, // head
     0xE9, 0xA2, 0x94, 0x2E, // CRC
@@ -120,7 +120,7 @@ mod tests {
     use crate::record::records;
     use crate::{Module, configuration};
 
-    /// Worked out by hand but for the CRC, which is that of Python's zlib.crc32.
+    /// Computed by hand, except for the CRC, which is from Python's zlib.crc32.
     const DI4_IN_PORT_5: [u8; 24] = [
         0x6F, 0x6B, // page mark
         0x6D, 0x6F, 0x01, 0x01, 0, 0, 0, 0, 1, 0, // head: schema 0x0101, sequence 0, one pair
@@ -130,7 +130,7 @@ mod tests {
     ];
 
     #[test]
-    fn the_layout_is_as_drawn() {
+    fn the_layout_matches_the_documentation() {
         let mut page = [0xFF; 100];
         assert_eq!(encode_page(0, &[(0x0114, 1)], &mut page), Some(24));
         assert_eq!(page[..24], DI4_IN_PORT_5);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_not_written() {
+    fn a_record_that_does_not_fit_is_not_written() {
         assert_eq!(encode_page(0, &[(1, 1)], &mut [0; 23]), None);
         assert_eq!(encode_page(0, &[], &mut []), None);
     }

@@ -1,8 +1,8 @@
-//! The form in which a configuration is stored: two flash pages that hold records.
+//! The format of a stored configuration: two flash pages that hold records.
 //!
-//! A record holds the settings that differ from their defaults as pairs of address and value. So it is
-//! small, and an address keeps its meaning whatever firmware reads it: what a record does not name has
-//! its default, what a firmware does not know it passes over. All numbers are little-endian.
+//! A record holds the settings that differ from their defaults, as pairs of address and value. So it is small, and
+//! an address has the same meaning for every firmware that reads it. A setting that is not in the record has its
+//! default, and a firmware ignores addresses that it does not know. All numbers are little-endian.
 //!
 //! ```text
 //!  a page            offset   bytes
@@ -25,13 +25,12 @@
 //!                       +----------+
 //! ```
 //!
-//! A record counts once its first seal is programmed. A power cut in the program of the CRC may leave cells
-//! that read differently from read to read, so that the CRC matches at one start and not at the next. The seal
-//! is programmed after the CRC is complete, so no cell of a sealed record is unsteady. A record without seals
-//! counts only when no record is sealed: version 0.1 wrote none. A start that finds the second seal missing
-//! programs both again, which steadies the first.
-//! A page without its mark was left by
-//! an interrupted erase: its cells may read as erased and yet be weak, so it is erased again before use.
+//! A record counts once its first seal is programmed. A power cut during the programming of the CRC may leave cells
+//! that read differently from read to read, so that the CRC matches at one start and not at the next. The seal is
+//! programmed after the CRC is complete, so every cell of a sealed record reads the same every time. A record
+//! without seals counts only when no record is sealed: version 0.1 wrote none. A start that finds the second seal
+//! missing programs both again, so that the first reads the same every time. A page without its mark was left by an
+//! interrupted erase: its cells may read as erased and still be weak, so it is erased again before use.
 
 mod encode;
 
@@ -39,19 +38,19 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 pub use encode::{BEGINNING, Encoder, encode_page};
 
-/// The first half-word of a page that was erased completely.
+/// First half-word of a page that was erased completely.
 pub const PAGE_MARK: u16 = u16::from_le_bytes(*b"ok");
 
-/// Where the first record of a page stands.
+/// Offset of the first record of a page, in bytes.
 pub const FIRST_OFFSET: usize = 2;
 
-/// The first half-word of a record.
+/// First half-word of a record.
 pub const MARK: u16 = u16::from_le_bytes(*b"mo");
 
-/// How records are written today: layout 1, the settings of register map 1.
+/// Schema of the records that this version writes: layout 1, the settings of register map 1.
 pub const SCHEMA: u16 = 0x0101;
 
-/// Bytes of a record beside its pairs.
+/// Bytes of a record without its pairs and seals.
 pub const OVERHEAD: usize = HEAD + 4;
 
 /// Bytes of the seals after a record.
@@ -59,22 +58,22 @@ pub const SEALS: usize = 4;
 
 const HEAD: usize = 10;
 
-/// Without a table: the 1 to 2 ms this takes at the start are worth the kilobyte it saves.
+/// Without a table: the computation takes 1 to 2 ms at the start, and saves a kilobyte of flash.
 static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// A good record.
+/// A valid record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record<'a> {
     /// Layout (high byte; always that of [`SCHEMA`]) and register map (low byte) of the writer.
     pub schema: u16,
-    /// Greater than that of every record written before, but for the wrap.
+    /// Greater than the number of every record written before, except when it wraps.
     pub sequence: u32,
     pairs: &'a [[u8; 4]],
 }
 
 impl<'a> Record<'a> {
-    /// The record that `bytes` begin with; `None` when there is none, or none that is good and of a
-    /// layout known here.
+    /// Returns the record at the start of `bytes`, or `None` when there is none, or it is not valid or has an
+    /// unknown layout.
     #[must_use]
     pub fn decode(bytes: &'a [u8]) -> Option<Self> {
         let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
@@ -96,31 +95,31 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Bytes of the record without its seals.
+    /// Returns the bytes of the record without its seals.
     #[must_use]
     pub const fn size(&self) -> usize {
         OVERHEAD + size_of_val(self.pairs)
     }
 
-    /// How many pairs.
+    /// Returns the number of pairs.
     #[must_use]
     pub const fn count(&self) -> usize {
         self.pairs.len()
     }
 
-    /// One pair of address and value; `None` beyond the last.
+    /// Returns one pair of address and value, or `None` after the last.
     #[must_use]
     pub fn pair(&self, index: usize) -> Option<(u16, u16)> {
         self.pairs.get(index).copied().map(pair)
     }
 
-    /// Every pair of address and value, in the order of the record.
+    /// Iterates over every pair of address and value, in the order of the record.
     pub fn pairs(&self) -> impl ExactSizeIterator<Item = (u16, u16)> + Clone + use<'a> {
         self.pairs.iter().copied().map(pair)
     }
 }
 
-/// Whether a record with the one sequence number was written after one with the other.
+/// Returns whether a record with the first sequence number was written after one with the second.
 #[inline]
 #[must_use]
 pub const fn is_newer(sequence: u32, than: u32) -> bool {
@@ -128,7 +127,7 @@ pub const fn is_newer(sequence: u32, than: u32) -> bool {
     ahead != 0 && ahead < 1 << 31
 }
 
-/// A pair of a record that is known to be good: the one that `bytes` begin with.
+/// Returns a pair of the valid record at the start of `bytes`.
 #[must_use]
 pub fn pair_of(bytes: &[u8], index: usize) -> Option<(u16, u16)> {
     let (pairs, _) = bytes.get(HEAD..)?.as_chunks();
@@ -139,8 +138,8 @@ fn pair([a0, a1, v0, v1]: [u8; 4]) -> (u16, u16) {
     (u16::from_le_bytes([a0, a1]), u16::from_le_bytes([v0, v1]))
 }
 
-/// Bytes of a page up to the last one that is not erased. Erased bytes are passed over by words: a start looks through
-/// whole pages several times.
+/// Returns the number of bytes of a page up to the last one that is not erased. It skips erased bytes by words,
+/// because a start examines whole pages several times.
 #[must_use]
 pub fn used(page: &[u8]) -> usize {
     let is_used = |byte: &u8| *byte != 0xFF;
@@ -151,7 +150,8 @@ pub fn used(page: &[u8]) -> usize {
     let Some(word) = words.iter().rposition(|word| *word != [0xFF; 4]) else {
         return 0;
     };
-    // Cells whose program was cut off may read as erased this time, and did not a moment ago: then the whole word is.
+    // Cells whose programming was interrupted may read as erased now and differently a moment ago. In that case the
+    // whole word counts as used.
     let last = words
         .get(word)
         .and_then(|bytes| bytes.iter().rposition(is_used));
@@ -160,7 +160,7 @@ pub fn used(page: &[u8]) -> usize {
         .saturating_add(1)
 }
 
-/// Every good record of a page with its offset, whatever lies between them.
+/// Iterates over every valid record of a page with its offset, skipping anything between them.
 pub fn records(page: &[u8]) -> impl Iterator<Item = (usize, Record<'_>)> {
     let mut offset = 0;
     let end = used(page);
@@ -178,12 +178,12 @@ pub fn records(page: &[u8]) -> impl Iterator<Item = (usize, Record<'_>)> {
     })
 }
 
-/// Whether nothing was ever stored on this page, so that a preset may go there: it is erased, or has no
-/// more than its mark and the [`BEGINNING`], complete or cut off.
+/// Returns whether nothing was ever stored on this page, so that a preset may be written there: it is erased, or
+/// contains only its mark and the [`BEGINNING`], complete or interrupted.
 #[must_use]
 pub fn is_vacant(page: &[u8]) -> bool {
     let beginning = BEGINNING.iter().chain(core::iter::repeat(&0xFF));
-    // A cut leaves ones where there should be zeros, never the other way round.
+    // A power cut leaves ones instead of zeros, never the reverse.
     let mut bytes = page.iter().skip(FIRST_OFFSET).zip(beginning);
     bytes.all(|(byte, full)| byte & full == *full)
 }
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_is_read_back() {
+    fn an_encoded_record_is_decoded() {
         let pairs = [(0x0101, 1152), (0x01C0, 0xFFFF), (0xFFFF, 0)];
         let bytes = encoded(0xFFFF_FFFF, &pairs);
         let record = Record::decode(&bytes).unwrap();
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn any_wrong_bit_and_any_missing_byte_make_it_no_record() {
+    fn a_record_with_a_wrong_bit_or_missing_byte_is_rejected() {
         let bytes = encoded(7, &[(0x0101, 1152), (0x0141, 0xFFFF)]);
         for bit in 0..bytes.len() * 8 {
             let mut wrong = bytes.clone();
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn another_layout_is_no_record_but_another_register_map_is() {
+    fn another_layout_is_rejected_and_another_register_map_accepted() {
         let mut encoder = Encoder::new(SCHEMA + 1, 0, 0);
         let bytes: Vec<u8> = std::iter::from_fn(|| encoder.next(&mut || None))
             .flat_map(u16::to_le_bytes)
@@ -243,19 +243,19 @@ mod tests {
     }
 
     #[test]
-    fn the_beginning_is_a_record_of_nothing_and_leaves_room_for_a_preset() {
+    fn the_beginning_is_an_empty_record_on_a_vacant_page() {
         assert_eq!(encoded(0, &[]), BEGINNING[..OVERHEAD]);
         assert!(is_vacant(&[0xFF; PAGE_SIZE]) && is_vacant(&[0; FIRST_OFFSET]));
         let mut page = [0xFF; PAGE_SIZE];
         encode_page(0, &[], &mut page);
         assert!(is_vacant(&page));
         page[5] |= 0xFE;
-        assert!(is_vacant(&page), "cut off");
+        assert!(is_vacant(&page), "interrupted");
         page[PAGE_SIZE - 1] = 0xFE;
-        assert!(!is_vacant(&page), "garbage is something");
+        assert!(!is_vacant(&page), "a page with garbage is not vacant");
         let mut page = [0xFF; PAGE_SIZE];
         encode_page(1, &[], &mut page);
-        assert!(!is_vacant(&page), "defaults that someone has saved");
+        assert!(!is_vacant(&page), "defaults that were saved are not vacant");
         let size = encode_page(0, &[(0x0114, 1)], &mut page).unwrap();
         assert!(!is_vacant(&page[..size]));
     }

@@ -4,13 +4,13 @@ Resource            ../modio.resource
 
 
 *** Test Cases ***
-Four Modules Answer Side By Side
+Four Modules Answer At Their Own Addresses
     Start Board    1=4di,2=4do,3=4ai,4=4ao
     # BOARD, the modules in force and their states.
     Request Gives    03 0205 0001    03 02 0002
     Request Gives    03 0210 0008    03 10 0001 0002 0004 0005 0000 0000 0000 0000
     Request Gives    03 0218 0008    03 10 0000 0000 0000 0000 0001 0001 0001 0001
-    # Energised, an input pulls its line low.
+    # An energised input pulls its line low.
     Execute Command    modio_input 1 3 false
     Request Gives    0F 0004 0004 01 09    0F 0004 0004
     Request Gives    10 000C 0004 08 0001 0014 0FA0 0FFF    10 000C 0004
@@ -23,12 +23,12 @@ Four Modules Answer Side By Side
     Pin Should Be    ${ODR_A}    4    1
     Pin Should Be    ${ODR_A}    5    0
     Pin Should Be    ${ODR_A}    7    1
-    DAC Gives    4    3    0x0FFF
+    DAC Output Should Be    4    3    0x0FFF
     # A span must not leave the slots with points of its kind.
     Request Gives    02 0000 0009    82 02
     Request Gives    0F 0003 0002 01 03    8F 02
 
-Outputs Of Every Slot Have Their Lines
+Outputs Of Every Slot Drive Their Own Lines
     Start Board    1=4do,2=4do,3=4do,4=4do
     Request Gives    0F 0000 0010 02 21 84    0F 0000 0010
     Pin Should Be    ${ODR_A}    0    1
@@ -48,11 +48,11 @@ Every Slot Has A DAC
         ${code}=    Evaluate    '%04X' % (0x111 * $port)
         Request Is Echoed    06 ${address} ${code}
         Run For    0.1
-        DAC Gives    ${port}    0    0x${code}
+        DAC Output Should Be    ${port}    0    0x${code}
     END
-    DAC Gives    1    0    0x111
+    DAC Output Should Be    1    0    0x111
 
-Ports Without A Slot Take No Module
+Ports Without A Slot Accept No Module
     Start Board
     Unlock
     FOR    ${address}    IN    0114    0115    0116    0117
@@ -62,7 +62,7 @@ Ports Without A Slot Take No Module
     Request Is Echoed    06 0113 0001
     Request Gives    03 0110 0008    03 10 0001 0000 0000 0001 0000 0000 0000 0000
 
-The Switch Is On Its Own Pins
+The Switch Is Read From The Pins Of This Board
     Start Board    dip=165
     Unit Answers    165
     Request Gets Silence    03 0204 0001    1
@@ -70,13 +70,13 @@ The Switch Is On Its Own Pins
 
 *** Keywords ***
 Channel Converts To
-    [Documentation]    What the converter makes of one of its channels.
+    [Documentation]    Sets the code of one of the converter's channels.
     [Arguments]    ${channel}    ${code}
     ${address}=    Evaluate    hex(int($ADC_CODES, 0) + 4 * int($channel))
     Execute Command    sysbus WriteDoubleWord ${address} ${code}
 
-DAC Gives
-    [Documentation]    The code at an output of a port's MCP4728, counted from 0.
+DAC Output Should Be
+    [Documentation]    Checks the code at an output of a port's MCP4728, counted from 0.
     [Arguments]    ${port}    ${channel}    ${code}
     ${address}=    Evaluate    hex(int($DAC_CODES, 0) + 0x20 * (int($port) - 1) + 4 * int($channel))
     ${value}=    Read Word    ${address}

@@ -1,4 +1,4 @@
-//! The clothes of a request and its response on the line, in either transmission mode (V1.02 2.5).
+//! Framing of a request and its response on the line, in both transmission modes (V1.02 2.5).
 
 use crc::{CRC_16_MODBUS, Crc};
 use register_map::codes::Mode;
@@ -7,7 +7,7 @@ use crate::requests::UNIT;
 
 const MODBUS: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
-/// The ADU for the unit: bytes and a CRC in RTU mode, hexadecimal digits and an LRC in ASCII mode.
+/// Returns the ADU for the unit: bytes and a CRC in RTU mode, hexadecimal digits and an LRC in ASCII mode.
 #[must_use]
 pub fn adu(mode: Mode, pdu: &[u8]) -> Vec<u8> {
     let mut adu = vec![UNIT];
@@ -27,13 +27,13 @@ pub fn adu(mode: Mode, pdu: &[u8]) -> Vec<u8> {
     }
 }
 
-/// Whether these bytes are an ADU of the unit, its CRC or LRC good.
+/// Returns whether these bytes are an ADU of the unit with a valid CRC or LRC.
 #[must_use]
 pub fn is_adu(mode: Mode, bytes: &[u8]) -> bool {
     inside(mode, bytes).is_some_and(|pdu| !pdu.is_empty() && adu(mode, &pdu) == bytes)
 }
 
-/// What stands where the PDU of an ADU stands.
+/// Returns the PDU of an ADU.
 fn inside(mode: Mode, bytes: &[u8]) -> Option<Vec<u8>> {
     match mode {
         Mode::Rtu => bytes
@@ -52,8 +52,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_of_both_modes_are_told_from_others() {
-        // From the standard's appendix B: 02 07 with the CRC 41 12; ours is unit 1.
+    fn frames_of_both_modes_are_recognised() {
+        // The standard's appendix B has 02 07 with the CRC 41 12; here the unit is 1.
         let rtu = adu(Mode::Rtu, &[0x07]);
         assert_eq!(rtu, [0x01, 0x07, 0x41, 0xE2]);
         // 01 + 03 + 10 + 01 = 15, and EB makes it 100.

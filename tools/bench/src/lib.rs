@@ -1,8 +1,8 @@
-//! Measures the release image on the virtual board, in instructions: the same image gives the same
-//! figures on every machine. Beside it, minimal servers on other crates are given the same requests.
+//! Measures the release image on the virtual board, in instructions, so that the same image gives the same figures
+//! on every machine. Minimal servers on other crates receive the same requests for comparison.
 //!
-//! `cargo xtask bench` builds the images, runs this, adds the sizes, shows it all and holds it against the
-//! baseline; what is here only measures.
+//! `cargo xtask bench` builds the images, runs this crate, adds the sizes, shows the result and compares it with
+//! the baseline. This crate only measures.
 
 mod framing;
 pub mod load;
@@ -19,21 +19,21 @@ use sim::{Corner, Image};
 use rival::Rival;
 use unit::Unit;
 
-/// The rates of [`load`], in units of 100 bit/s.
+/// The baud rates of [`load`], in units of 100 bit/s.
 const RATES: [u16; 3] = [96, 1152, 9216];
 
-/// What a request costs, in instructions.
+/// Cost of a request, in instructions.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// The function and what is asked for.
+    /// The function and its parameters.
     pub request: String,
-    /// From t3.5's expiry to the first byte of the response in the UART's data register.
+    /// From the end of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
-    /// The same to the second byte, the first that depends on what the request is.
+    /// From the end of t3.5 to the second byte, the first that depends on the request.
     pub to_second_byte: u32,
-    /// The line's three interrupt handlers, from the request's first byte until the driver is off.
+    /// The three interrupt handlers of the line, from the request's first byte until the driver is off.
     pub transaction: u32,
-    /// The same, by the address of the instruction.
+    /// The instructions of `transaction`, by address.
     pub addresses: BTreeMap<u32, u32>,
     /// The longest handler for a byte received.
     pub byte_in: u32,
@@ -41,24 +41,24 @@ pub struct Row {
     pub byte_out: u32,
     /// The handler at the end of the reply, which switches the driver off.
     pub reply_end: u32,
-    /// The rivals', from complete frame to complete response; `None` where one does not answer.
+    /// Cost on each rival, from complete frame to complete response; `None` when the rival does not answer.
     pub rivals: BTreeMap<String, Option<u32>>,
 }
 
-/// All that is measured.
+/// All results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The requests.
     pub requests: Vec<Row>,
-    /// The processor under load.
+    /// The load of the processor.
     pub load: Vec<load::Load>,
 }
 
-/// Measures the image of a board, and rivals by name.
+/// Measures the image of a board, and the rivals with their names.
 ///
 /// # Errors
 ///
-/// When the image does not serve a request as it should: which, and what it did.
+/// When the image does not serve a request correctly: names the request and the error.
 pub fn measure(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Result<Report, String> {
     let mut units: BTreeMap<(&str, u16), Unit> = BTreeMap::new();
     let mut rivals = rivals

@@ -1,5 +1,5 @@
-//! What the line asks of the processor when a master leaves it no rest: requests back to back, each sent
-//! as soon as t3.5 has passed since the last response.
+//! Load of the processor while a master sends requests without a pause: each request is sent as soon as t3.5 has
+//! passed after the last response.
 
 use register_map::codes::Mode;
 use register_map::configuration::BETA;
@@ -10,10 +10,10 @@ use sim::{Corner, Image, Time};
 use crate::framing::{adu, is_adu};
 use crate::unit::{BYTE, GAP, SERVE, Unit};
 
-/// How long it goes on.
+/// Duration of the measurement.
 const SPAN: Time = Time::from_ms(1_000);
 
-/// The exceptions of the image's tasks (RM0008 table 63) and what they are for.
+/// Exceptions of the image's tasks (RM0008 table 63) and their purpose.
 const TASKS: [(u32, &str); 6] = [
     (BYTE, "byte (USART1)"),
     (GAP, "frame gap (TIM2)"),
@@ -23,28 +23,28 @@ const TASKS: [(u32, &str); 6] = [
     (16 + 6, "background (EXTI0)"),
 ];
 
-/// The processor under load.
+/// The load of the processor in one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Load {
-    /// The corner of the part.
+    /// Corner of the part.
     pub corner: &'static str,
-    /// Bits per second.
+    /// Baud rate in bit/s.
     pub baud: u32,
-    /// What is asked.
+    /// The request.
     pub request: &'static str,
-    /// Requests in [`SPAN`], all answered.
+    /// Number of requests in [`SPAN`], all answered.
     pub answered: u32,
-    /// The part of its time that the processor was awake, in percent.
+    /// Part of the time during which the processor was awake, in percent.
     pub awake_percent: f64,
-    /// The longest wait of every interrupt, in microseconds of virtual time.
+    /// Longest latency of every interrupt, in microseconds of virtual time.
     pub longest_waits_us: Vec<(&'static str, f64)>,
 }
 
-/// Loads the unit at a corner of the part and a rate in units of 100 bit/s.
+/// Measures the load at a corner of the part and a rate in units of 100 bit/s.
 ///
 /// # Errors
 ///
-/// When it leaves a request unanswered.
+/// When the unit does not answer a request.
 pub fn measure(
     image: &Image,
     board: &Board,
@@ -67,7 +67,7 @@ pub fn measure(
     while unit.board.now() < end {
         if !is_adu(Mode::Rtu, &unit.back_to_back(&request)) {
             return Err(format!(
-                "request {} of those back to back at {hundreds}00 bit/s is not answered",
+                "request {} at {hundreds}00 bit/s without pauses is not answered",
                 answered + 1
             ));
         }

@@ -1,43 +1,43 @@
-//! The requests that are measured: every function at its smallest and its largest.
+//! The measured requests: every function with its smallest and its largest request.
 //!
-//! The addresses are modio's. A rival has its points from address 0 on, so a request goes to it with
-//! its addresses changed and all else the same.
+//! The addresses are those of modio. A rival has its points from address 0 on, so its requests have other addresses
+//! and are otherwise the same.
 
 use register_map::codes::Mode;
 use register_map::configuration::{BETA, FILTER, KEY, OPENING_KEY};
 use register_map::{Board, Module};
 
-/// The unit that is asked.
+/// Address of the unit.
 pub const UNIT: u8 = 1;
 
-/// The longest run of registers that can be written, from here on: BETA to START.
+/// First register of the longest range that can be written: BETA to START.
 const LONG: u16 = BETA;
 
-/// A request, and what it takes to make it.
+/// A request and the conditions for it.
 #[derive(Clone, Debug)]
 pub struct Request {
-    /// The function and what is asked for, as the table shows it.
+    /// The function and its parameters, as shown in the table.
     pub name: String,
     /// The transmission mode of the line.
     pub mode: Mode,
     /// The module in all slots.
     pub module: Module,
-    /// What is asked first, not measured: opens the lock where the request needs it.
+    /// A request that is sent first and not measured. It opens the lock if needed.
     pub before: Option<Vec<u8>>,
     /// The PDU for modio.
     pub pdu: Vec<u8>,
-    /// The same for a rival; `None` when it has no such function.
+    /// The PDU for a rival; `None` when the rival does not have the function.
     pub rival: Option<Vec<u8>>,
 }
 
-/// A PDU: the function code and 16-bit fields, high byte first.
+/// Returns a PDU: the function code and 16-bit fields, high byte first.
 fn pdu(function: u8, fields: &[u16]) -> Vec<u8> {
     let mut pdu = vec![function];
     pdu.extend(fields.iter().flat_map(|field| field.to_be_bytes()));
     pdu
 }
 
-/// A PDU with a byte count and data behind its fields.
+/// Returns a PDU with a byte count and data after its fields.
 fn with_data(function: u8, fields: &[u16], data: &[u8]) -> Vec<u8> {
     let mut pdu = pdu(function, fields);
     pdu.push(u8::try_from(data.len()).expect("a PDU has 253 bytes"));
@@ -45,7 +45,7 @@ fn with_data(function: u8, fields: &[u16], data: &[u8]) -> Vec<u8> {
     pdu
 }
 
-/// Values that these settings take, `count` from [`LONG`] on: those of the factory.
+/// Returns allowed values for `count` settings from [`LONG`] on: the factory defaults.
 fn settings(count: usize) -> Vec<u8> {
     let rules = register_map::configuration::RULES;
     let values = (LONG..)
@@ -53,7 +53,7 @@ fn settings(count: usize) -> Vec<u8> {
     values.take(count).flat_map(u16::to_be_bytes).collect()
 }
 
-/// All of them, for a board.
+/// Returns all requests for a board.
 #[must_use]
 pub fn all(board: &Board) -> Vec<Request> {
     let mut requests = of_any_board(board.points().start);
@@ -63,7 +63,7 @@ pub fn all(board: &Board) -> Vec<Request> {
     requests
 }
 
-/// Requests for the points of all slots of a board.
+/// Returns the requests for the points of all slots of a board.
 fn of_all_slots(board: &Board) -> Vec<Request> {
     let points = board.points();
     let count = points.end - points.start;
@@ -95,7 +95,7 @@ fn of_all_slots(board: &Board) -> Vec<Request> {
     ]
 }
 
-/// Requests that every board serves, the points from `first` on.
+/// Returns the requests that every board serves, with its points from `first` on.
 fn of_any_board(first: u16) -> Vec<Request> {
     let of = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
         name: name.to_owned(),

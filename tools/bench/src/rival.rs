@@ -1,5 +1,5 @@
-//! A minimal server on another crate, and what serving a request costs there: from the complete frame
-//! in memory to the complete response in memory, CRC checked and made, nothing sent.
+//! The cost of a request on a minimal server with another crate: from the complete frame in memory to the complete
+//! response in memory. The CRCs are checked and computed, and nothing is sent.
 
 use register_map::codes::Mode;
 use sim::machine::memory::RAM_BASE;
@@ -7,12 +7,12 @@ use sim::{Board, Config, Image, Time};
 
 use crate::framing::{adu, is_adu};
 
-/// The mailbox of the rivals' `lib.rs`: lengths, then request and response.
+/// Layout of the rivals' mailbox, see their `lib.rs`: lengths, then request and response.
 const RESPONSE_LEN: u32 = 4;
 const REQUEST: u32 = 8;
 const RESPONSE: u32 = REQUEST + 256;
 
-/// The longest that any rival takes.
+/// Time limit for a rival.
 const LONGEST: Time = Time::from_ms(100);
 
 /// A rival's program on the virtual board.
@@ -24,11 +24,11 @@ pub struct Rival {
 }
 
 impl Rival {
-    /// Starts it.
+    /// Starts the program.
     ///
     /// # Errors
     ///
-    /// When the image does not fit the board, or is none of the rivals'.
+    /// When the image does not fit the board or is not that of a rival.
     pub fn new(image: &Image) -> Result<Self, String> {
         let symbol = |name: &str| {
             let address = image.symbol(name);
@@ -50,12 +50,12 @@ impl Rival {
         })
     }
 
-    /// The instructions it takes for a request; `None` when it does not answer with a good frame, or
-    /// with an exception where there is nothing wrong.
+    /// Returns the instructions for a request. Returns `None` when the response is not a valid frame, or is an
+    /// exception although the request is valid.
     ///
     /// # Errors
     ///
-    /// When it hangs.
+    /// When the program hangs.
     pub fn measure(&mut self, pdu: &[u8]) -> Result<Option<u32>, String> {
         let request = adu(Mode::Rtu, pdu);
         let too_long = |_| "a request longer than the mailbox".to_owned();
@@ -72,7 +72,7 @@ impl Rival {
         }
         let begun = self.board.instructions();
         if !self.board.run_until_pc(self.end, limit) {
-            // It panicked, most likely.
+            // The program has most likely panicked.
             return Ok(None);
         }
         let taken = self.board.instructions() - begun;
@@ -87,7 +87,8 @@ impl Rival {
     }
 }
 
-/// Whether a response, its CRC behind it, has the form that answers a good request of 01 to 06, 0F or 10.
+/// Returns whether a response, followed by its CRC, has the form of an answer to a valid request of 01 to 06, 0F or
+/// 10.
 fn answers(response: &[u8], request: &[u8]) -> bool {
     let data = match request {
         [1 | 2, .., high, low] => usize::from(u16::from_be_bytes([*high, *low])).div_ceil(8),
@@ -103,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_an_answer_counts() {
+    fn only_a_matching_response_is_an_answer() {
         let check = [0, 0];
         let ok = |response: &[u8], request: &[u8]| answers(&[response, &check].concat(), request);
         assert!(ok(&[3, 2, 0, 7], &[3, 0, 0, 0, 1]));

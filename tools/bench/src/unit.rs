@@ -1,4 +1,4 @@
-//! The image on the virtual board, and what serving a request costs there.
+//! The image on the virtual board, and the cost of a request.
 
 use std::collections::BTreeMap;
 
@@ -11,33 +11,33 @@ use sim::{Board, Config, Corner, Image, Time};
 use crate::framing::{adu, is_adu};
 use crate::requests::Request;
 
-/// The exceptions that serve the line (RM0008 table 63): USART1, TIM2 (the frame gap), EXTI3 (the server).
+/// The exceptions of the line (RM0008 table 63): USART1, TIM2 (the frame gap), EXTI3 (the server).
 pub(crate) const BYTE: u32 = 16 + 37;
 pub(crate) const GAP: u32 = 16 + 28;
 pub(crate) const SERVE: u32 = 16 + 9;
 
-/// Time for the image to start in.
+/// Time for the image to start.
 const START: Time = Time::from_ms(150);
-/// The longest that any response takes at 115200 bit/s.
+/// Duration of the longest response at 115200 bit/s.
 const LONGEST: Time = Time::from_ms(100);
-/// What the unit takes to answer after t3.5, at any corner.
+/// Time within which the unit starts to answer after t3.5, at any corner.
 const ANSWER: Time = Time::from_us(100);
-/// By so much the pauses between the counted runs of a request differ: no simple fraction of a millisecond.
+/// Difference between the pauses before the counted runs of a request: not a simple fraction of a millisecond.
 const PAUSE: Time = Time::from_us(137);
-/// More instructions than anything measured needs: then it hangs.
+/// More instructions than any measurement needs: the image hangs.
 const TOO_MANY: u32 = 1_000_000;
 
-/// What one request costs, in instructions.
+/// Cost of one request, in instructions.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// From the expiry of t3.5 to the first byte of the response in the UART's data register.
+    /// From the end of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
-    /// The same to the second byte, which is the first that depends on what the request is: the first byte, the
+    /// From the end of t3.5 to the second byte, which is the first that depends on the request: the first byte, the
     /// unit address, is sent before the request is decoded.
     pub to_second_byte: u32,
-    /// The line's three interrupt handlers, from the request's first byte until the driver is off.
+    /// The three interrupt handlers of the line, from the request's first byte until the driver is off.
     pub transaction: u32,
-    /// The same, by the address of the instruction.
+    /// The instructions of `transaction`, by address.
     pub addresses: BTreeMap<u32, u32>,
     /// The longest handler for a byte received.
     pub byte_in: u32,
@@ -47,18 +47,18 @@ pub struct Cost {
     pub reply_end: u32,
 }
 
-/// A board with the image on it.
+/// A board with the image.
 pub struct Unit {
     pub(crate) board: Board,
     settings: Settings,
     mode: Mode,
-    /// When a master may send again.
+    /// Time at which a master may send again.
     free: Time,
 }
 
 impl Unit {
-    /// A board with this module in all of its slots, at a corner of the part, at a rate in units of 100 bit/s in this
-    /// mode, started.
+    /// Starts a board with this module in all of its slots, at a corner of the part, at a rate in units of 100
+    /// bit/s in this mode.
     ///
     /// # Errors
     ///
@@ -100,7 +100,7 @@ impl Unit {
         })
     }
 
-    /// Sends a request; the unit's response once it is complete, empty when there is none.
+    /// Sends a request. Returns the unit's complete response, or an empty one when there is none.
     pub fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
         let now = self.board.now();
         let end = self.board.line().send(now, &adu(self.mode, pdu));
@@ -109,10 +109,10 @@ impl Unit {
             self.board.run_for(self.settings.characters(1));
         }
         self.board.run_for(self.silence());
-        self.heard()
+        self.received()
     }
 
-    /// Sends an ADU the moment t3.5 has passed since the last response, and gives the unit time to answer.
+    /// Sends an ADU exactly t3.5 after the last response, and gives the unit time to answer.
     pub(crate) fn back_to_back(&mut self, adu: &[u8]) -> Vec<u8> {
         let start = self.board.now().max(self.free);
         let end = self.board.line().send(start, adu);
@@ -126,32 +126,33 @@ impl Unit {
             self.board.run_for(step);
         }
         self.free = self.board.now() + self.settings.frame_silence();
-        self.heard()
+        self.received()
     }
 
     fn silence(&self) -> Time {
-        // At the highest rates what the unit takes to answer is more than two characters.
+        // At the highest rates the unit needs more than two characters to start to answer.
         self.settings.frame_silence() + self.settings.characters(2) + ANSWER
     }
 
-    fn heard(&mut self) -> Vec<u8> {
-        let heard = self.board.line().take_received();
-        heard.iter().map(|character| character.byte).collect()
+    fn received(&mut self) -> Vec<u8> {
+        let received = self.board.line().take_received();
+        received.iter().map(|character| character.byte).collect()
     }
 
-    /// What it costs to serve a request.
+    /// Measures the cost of a request.
     ///
     /// # Errors
     ///
-    /// When the unit does not answer, or not with a good frame, or hangs.
+    /// When the unit does not answer, answers with an invalid frame, or hangs.
     pub fn measure(&mut self, request: &Request) -> Result<Cost, String> {
         if let Some(before) = &request.before
             && !is_adu(self.mode, &self.ask(before))
         {
-            return Err("the lock does not open".to_owned());
+            return Err("the unit does not answer the write that opens the lock".to_owned());
         }
-        // The first is not like the others, as for a value that changes. Of the others the one in the
-        // middle: the interrupt of the millisecond may fall into any. Pauses that grow keep it from falling into most.
+        // Do not use the first run, which may differ from the others, for example because a value changes. Use the
+        // median of the others: the millisecond interrupt may fall into any run. The increasing pauses prevent that
+        // it falls into most of them.
         self.count(&request.pdu)?;
         let mut costs: [Cost; 5] = Default::default();
         let mut pause = Time::ZERO;
@@ -165,7 +166,7 @@ impl Unit {
         Ok(middle)
     }
 
-    /// Counts every instruction of a transaction by the handler it is of.
+    /// Counts every instruction of a transaction by its interrupt handler.
     fn count(&mut self, pdu: &[u8]) -> Result<Cost, String> {
         let now = self.board.now();
         let end = self.board.line().send(now, &adu(self.mode, pdu));
@@ -210,7 +211,8 @@ impl Unit {
                 }
                 handler.instructions += retired;
                 handler.out |= self.board.line_bytes_written() > written;
-                // One that is pending again is entered at once, without a return to the program.
+                // A handler whose interrupt is pending again is entered immediately, without a return to the
+                // program.
                 if self.exception() != BYTE || self.board.pc() == handler.entry {
                     handler.end(on, &mut cost);
                 }
@@ -221,28 +223,30 @@ impl Unit {
                 break;
             }
             if cost.to_first_byte > TOO_MANY {
-                return Err("the response never begins".to_owned());
+                return Err("the response does not begin".to_owned());
             }
             if self.board.now() > end + LONGEST {
                 return Err("there is no response".to_owned());
             }
         }
         self.board.run_for(self.silence());
-        let response = self.heard();
+        let response = self.received();
         if is_adu(self.mode, &response) {
             Ok(cost)
         } else {
-            Err(format!("the response is no frame: {response:02X?}"))
+            Err(format!(
+                "the response is not a valid frame: {response:02X?}"
+            ))
         }
     }
 
-    /// The exception whose handler runs; 0 in the program itself.
+    /// Returns the exception whose handler runs; 0 in the program itself.
     fn exception(&self) -> u32 {
         self.board.register(16).unwrap_or_default() & 0x1FF
     }
 }
 
-/// Where the counting to the first two bytes stands.
+/// State of counting up to the first two bytes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Expiry {
     Before,
@@ -263,17 +267,17 @@ impl Expiry {
 /// A run of the byte handler.
 #[derive(Default)]
 struct Handler {
-    /// Where it starts.
+    /// Address of its first instruction.
     entry: u32,
     instructions: u32,
-    /// The reply has begun: nothing comes in any more.
+    /// The reply has begun: the handler sends and no longer receives.
     out: bool,
-    /// The driver was on when it began.
+    /// The driver was on when the handler began.
     driving: bool,
 }
 
 impl Handler {
-    /// The handler has ended, with the driver on or off.
+    /// Ends the run of the handler, with the driver on or off.
     fn end(&mut self, driving: bool, cost: &mut Cost) {
         let longest = match self {
             Self { driving: true, .. } if !driving => &mut cost.reply_end,

@@ -1,4 +1,4 @@
-//! From CBOR to a description. The decoder passes over fields that a later version of the format has appended.
+//! Decodes CBOR into a description. The decoder skips fields that a later version of the format has appended.
 
 use minicbor::Decoder;
 
@@ -53,7 +53,7 @@ impl<'d, 'b> Fields<'d, 'b> {
             .ok_or_else(|| form(format!("an array ends too early (byte {at})")))
     }
 
-    /// Reads a field that may be left out, with all that follow.
+    /// Reads a field that may be missing, together with all fields after it.
     fn option<T>(&mut self, read: impl FnOnce(&mut Decoder<'b>) -> Read<T>) -> Read<Option<T>> {
         if self.left == 0 {
             return Ok(None);
@@ -62,8 +62,8 @@ impl<'d, 'b> Fields<'d, 'b> {
         read(self.d).map(Some)
     }
 
-    /// Reads all fields that are left as elements of a list. Memory grows with what is there, not with what the array's
-    /// length says.
+    /// Reads all remaining fields as elements of a list. Memory grows with the elements that exist, not with the
+    /// length that the array claims.
     fn all<T>(mut self, mut read: impl FnMut(&mut Decoder<'b>) -> Read<T>) -> Read<Vec<T>> {
         let mut list = Vec::new();
         while let Some(element) = self.option(&mut read)? {
@@ -72,7 +72,7 @@ impl<'d, 'b> Fields<'d, 'b> {
         Ok(list)
     }
 
-    /// Passes over the fields that this program does not know.
+    /// Skips the fields that this program does not know.
     fn end(mut self) -> Read<()> {
         while self.option(|d| Ok(d.skip()?))?.is_some() {}
         Ok(())
@@ -110,7 +110,7 @@ fn document(d: &mut Decoder<'_>) -> Read<Description> {
     Ok(description)
 }
 
-/// What the firmware says: all but the ports.
+/// Reads the part that the firmware determines: everything except the ports.
 fn firmware(d: &mut Decoder<'_>) -> Read<Description> {
     let mut fields = Fields::of(d)?;
     let board = fields.next(text)?;
@@ -175,7 +175,7 @@ fn reading(d: &mut Decoder<'_>) -> Read<Reading> {
     })
 }
 
-/// Reads the place of a kind of point, one of `kinds`.
+/// Reads the index of a kind of point, one of `kinds`.
 fn place(d: &mut Decoder<'_>, kinds: usize) -> Read<u8> {
     known(u8(d)?, kinds)
 }
@@ -184,7 +184,7 @@ fn known(place: u8, kinds: usize) -> Read<u8> {
     if usize::from(place) < kinds {
         Ok(place)
     } else {
-        Err(form(format!("there is no kind of point {place}")))
+        Err(form(format!("unknown kind of point {place}")))
     }
 }
 
@@ -240,7 +240,7 @@ fn narrower(d: &mut Decoder<'_>, kinds: usize) -> Read<Narrower> {
     Ok(narrower)
 }
 
-/// Reads what a number means. A kind of value that this program does not know is without meaning.
+/// Reads the meaning of a number. An unknown kind of value becomes a value without meaning.
 fn value(d: &mut Decoder<'_>) -> Read<Value> {
     let mut fields = Fields::of(d)?;
     let value = match fields.next(u8)? {
@@ -278,7 +278,7 @@ fn unit(fields: &mut Fields<'_, '_>) -> Read<Unit> {
     })
 }
 
-/// Reads a set of values. A kind of set that this program does not know counts as every value.
+/// Reads a set of values. An unknown kind of set becomes the set of all values.
 fn values(d: &mut Decoder<'_>) -> Read<Values> {
     let mut fields = Fields::of(d)?;
     let values = match fields.next(u8)? {

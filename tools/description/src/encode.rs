@@ -1,4 +1,4 @@
-//! From a description to CBOR. docs/self-description.md has the format.
+//! Encodes a description as CBOR. docs/self-description.md describes the format.
 
 use std::convert::Infallible;
 
@@ -67,7 +67,7 @@ fn module_type(e: &mut Out<'_>, module: &ModuleType) -> Done {
     Ok(())
 }
 
-/// Fields at the end that have their default are left out.
+/// Trailing fields with default values are omitted.
 fn register(e: &mut Out<'_>, register: &Register) -> Done {
     let access = format::access_code(register.writable, register.restart);
     let fields = match register {
@@ -145,7 +145,7 @@ fn value(e: &mut Out<'_>, value: &Value) -> Done {
     }
 }
 
-/// How many fields a unit takes at the end of an array: none for a plain number.
+/// Returns the number of fields of a unit at the end of an array: none for a plain number.
 fn unit_fields(unit: &Unit) -> u64 {
     match unit {
         Unit { offset, .. } if *offset != 0 => 3,

@@ -1,17 +1,17 @@
-//! Why bytes are not a self-description.
+//! Errors when bytes are not a self-description.
 
 use std::fmt;
 
-/// Why bytes cannot be read as a self-description.
+/// Error when bytes cannot be decoded as a self-description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
     /// The document has this version of the format, which is newer than [`crate::VERSION`].
     Version(u64),
-    /// The bytes are not CBOR, or not CBOR of this form: what is wrong.
+    /// The bytes are not CBOR, or not CBOR of this form. Contains the reason.
     Form(String),
     /// The file has fewer bytes than the document should have.
     Short {
-        /// The length of the document, from the first word of the file. 0: the file has no two words.
+        /// The length of the document, from the first word of the file. 0 if the file has fewer than two words.
         length: u16,
         /// Bytes of the file after its first two words.
         found: usize,
@@ -36,11 +36,11 @@ impl fmt::Display for Error {
             Self::Form(what) => write!(f, "not a self-description: {what}"),
             Self::Short { length, found } => write!(
                 f,
-                "the file has {found} bytes after its first two words, and the self-description has {length}: read the whole file"
+                "the file has {found} bytes after its first two words, but the self-description has {length}: read the whole file"
             ),
             Self::Crc { stored, computed } => write!(
                 f,
-                "the CRC of the self-description is {computed:#06X}, and the file says {stored:#06X}: read the file again"
+                "the CRC of the self-description is {computed:#06X}, but the file contains {stored:#06X}: read the file again"
             ),
         }
     }

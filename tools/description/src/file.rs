@@ -1,4 +1,4 @@
-//! File 1 of a unit: the document with its length and its CRC in front.
+//! File 1 of a unit: the document, preceded by its length and its CRC.
 //!
 //! ```text
 //!  record    0         1      2 ...
@@ -7,19 +7,19 @@
 //!         +--------+-------+---------------+-----+
 //! ```
 //!
-//! A record is a word, high byte first. A document of an odd length has a byte 0 after it.
+//! A record is a word, high byte first. A document with an odd length is followed by a byte 0.
 
 use crc::{CRC_16_MODBUS, Crc};
 
 use crate::{Description, Error};
 
-/// The number of the file.
+/// File number.
 pub const FILE: u16 = 1;
 
-/// Records in front of the document: its length in bytes, and its CRC.
+/// Number of records in front of the document: its length in bytes, and its CRC.
 pub const HEAD: u16 = 2;
 
-/// Records of a file whose document has this length in bytes.
+/// Returns the number of records of a file whose document has this length in bytes.
 #[must_use]
 pub const fn records(length: u16) -> u16 {
     HEAD + length.div_ceil(2)
@@ -48,11 +48,11 @@ impl Description {
         file
     }
 
-    /// Reads the bytes of file 1: its words, the high byte of each first. Bytes after the document are ignored.
+    /// Decodes the bytes of file 1: its words, high byte first. Bytes after the document are ignored.
     ///
     /// # Errors
     ///
-    /// [`Error::Short`] when not all of the file is there, [`Error::Crc`] when its CRC is wrong, and the errors of
+    /// [`Error::Short`] when the file is incomplete, [`Error::Crc`] when its CRC is wrong, and the errors of
     /// [`Description::decode`].
     pub fn open(file: &[u8]) -> Result<Self, Error> {
         let missing = Error::Short {

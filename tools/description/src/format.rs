@@ -20,12 +20,12 @@ pub(crate) const RANGE: u8 = 0;
 pub(crate) const RANGE_OR: u8 = 1;
 pub(crate) const ONE_OF: u8 = 2;
 
-/// What the fields of a register are when the document leaves them out.
+/// Default values of register fields that the document omits.
 pub(crate) const COUNT: u16 = 1;
 pub(crate) const SCOPE: Scope = Scope::Unit;
 pub(crate) const ANY: Values = Values::Range(0, 0xFFFF);
 
-/// The bits of a register's access.
+/// Bits of a register's access.
 const WRITABLE: u8 = 1 << 0;
 const RESTART: u8 = 1 << 1;
 
@@ -33,7 +33,7 @@ pub(crate) const fn access_code(writable: bool, restart: bool) -> u8 {
     (if writable { WRITABLE } else { 0 }) | (if restart { RESTART } else { 0 })
 }
 
-/// Whether a register is writable, and whether a change is in force only after a restart.
+/// Returns whether a register is writable, and whether a change takes effect only after a restart.
 pub(crate) const fn access_of(code: u8) -> (bool, bool) {
     (code & WRITABLE != 0, code & RESTART != 0)
 }
@@ -46,7 +46,7 @@ pub(crate) const fn scope_code(scope: Scope) -> u8 {
     }
 }
 
-/// A scope that this program does not know counts as that of the unit.
+/// Returns the scope with this code. An unknown scope becomes that of the unit.
 pub(crate) const fn scope_of(code: u8) -> Scope {
     match code {
         1 => Scope::Port,
@@ -63,7 +63,7 @@ pub(crate) const fn table_code(table: Option<Table>) -> u8 {
     }
 }
 
-/// A table that this program does not know counts as none.
+/// Returns the table with this code. An unknown table becomes none.
 pub(crate) const fn table_of(code: u8) -> Option<Table> {
     match code {
         1 => Some(Table::Bit),

@@ -1,4 +1,4 @@
-//! The description of a unit as crate register-map knows it.
+//! Descriptions of the units in crate register-map.
 
 use register_map::points::{self, Kind};
 use register_map::state::MAP_VERSION_VALUE;
@@ -18,7 +18,8 @@ const KINDS: [Kind; 5] = [
     Kind::WordOutput,
 ];
 
-/// Describes a unit of this board with firmware of this version. `module` says what is in force at a port, 1 to 8.
+/// Describes a unit of this board with firmware of this version. `module` returns the module in force at a port, 1
+/// to 8.
 pub fn describe(board: &Board, firmware: &str, module: impl Fn(u16) -> Module) -> Description {
     let blocks = BLOCKS
         .iter()
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn an_analog_input_reads_as_range_and_scale_say() {
+    fn an_analog_input_has_a_reading_for_each_range_and_scale() {
         let unit = describe(&MODIO_02, "0.1.0", |_| Module::Ai4);
         let [first, ..] = unit.modules[4].points;
         let kind = &unit.kinds[usize::from(first)];

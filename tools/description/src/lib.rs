@@ -1,11 +1,11 @@
-//! What a unit's registers and points mean, in a form that a tool can work with: read from the unit, or made from
-//! crate register-map for a unit without a description of its own.
+//! The meaning of a unit's registers and points, as data for tools: read from the unit, or created from crate
+//! register-map for a unit without its own description.
 //!
-//! A tool that uses nothing but a [`Description`] can show, check and name every value of a unit that is newer than
-//! itself.
+//! A tool that relies only on a [`Description`] can show, check and name every value of a unit that is newer than
+//! the tool.
 //!
-//! A unit has its description in file 1, as CBOR: [`Description::open`] reads the file, [`Description::decode`] the
-//! CBOR. docs/self-description.md has the format.
+//! A unit has its description in file 1, as CBOR: [`Description::open`] decodes the file, [`Description::decode`]
+//! the CBOR. docs/self-description.md describes the format.
 
 #![forbid(unsafe_code)]
 
@@ -21,55 +21,55 @@ pub use file::{FILE, HEAD, checksum, records};
 pub use format::{PORT_BYTES, VERSION};
 pub use known::describe;
 
-/// What a unit says of itself.
+/// The description of a unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
-    /// The board's name: `modio-02`.
+    /// Name of the board, such as `modio-02`.
     pub board: String,
-    /// The model in the device identification.
+    /// Model in the device identification.
     pub model: String,
-    /// The firmware's version: `0.1.0`.
+    /// Version of the firmware, such as `0.1.0`.
     pub firmware: String,
-    /// The version of the register map.
+    /// Version of the register map.
     pub map_version: u16,
-    /// Its registers but for the points, in ascending order of the addresses.
+    /// Registers other than the points, in ascending order of the addresses.
     pub registers: Vec<Register>,
-    /// What a point can be. [`ModuleType::points`] counts from 0 in here.
+    /// Kinds of point. [`ModuleType::points`] contains indices of this list, from 0.
     pub kinds: Vec<PointKind>,
-    /// The modules it knows, in the order of their codes.
+    /// Known modules, in the order of their codes.
     pub modules: Vec<ModuleType>,
-    /// Its ports that have a slot, in ascending order, with what is in force there.
+    /// Ports with a slot, in ascending order, with their modules in force.
     pub ports: Vec<Port>,
 }
 
-/// A register, or a run of registers that mean the same.
+/// A register, or a run of registers with the same meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Register {
-    /// The first address, counted from 0.
+    /// First address, counted from 0.
     pub address: u16,
-    /// How many, 1 or more.
+    /// Number of registers, 1 or more.
     pub count: u16,
-    /// Its name: `BAUD`, `reset cause`.
+    /// Name, such as `BAUD` or `reset cause`.
     pub name: String,
-    /// The things that have one value each.
+    /// What each value belongs to.
     pub scope: Scope,
-    /// What the number means.
+    /// Meaning of the number.
     pub value: Value,
-    /// Whether a master may write it.
+    /// Whether a master can write it.
     pub writable: bool,
-    /// Whether what is written counts after a restart only.
+    /// Whether a written value takes effect only after a restart.
     pub restart: bool,
-    /// Which values it takes, where it can be written.
+    /// Allowed values, if it can be written.
     pub values: Values,
-    /// What the factory sets, where it can be written.
+    /// Factory default, if it can be written.
     pub default: u16,
-    /// For a setting by point: the kind of point that takes other values.
+    /// For a setting by point: the kind of point with other values.
     pub narrower: Option<Narrower>,
-    /// What it is, in one line.
+    /// Description in one line.
     pub about: String,
 }
 
-/// The things that have one value each in a run of registers.
+/// What each value in a run of registers belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// The unit.
@@ -80,70 +80,70 @@ pub enum Scope {
     Point,
 }
 
-/// What holds for points of one kind, where it differs from the rest.
+/// Values of a setting for one kind of point, where they differ from the other kinds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Narrower {
-    /// The kind: its place in [`Description::kinds`].
+    /// Kind of point: its index in [`Description::kinds`].
     pub kind: u8,
-    /// The values.
+    /// Allowed values.
     pub values: Values,
-    /// The default.
+    /// Default value.
     pub default: u16,
-    /// What the number means. `None`: the same as for the other points, [`Register::value`].
+    /// Meaning of the number; `None` when it is the same as for the other points, [`Register::value`].
     pub value: Option<Value>,
 }
 
-/// What a number means.
+/// Meaning of a number.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A number in each register.
     Number(Unit),
     /// A number of 32 bits in each two registers, high word first.
     Long(Unit),
-    /// In each register one of these codes.
+    /// One of these codes in each register.
     Codes(Vec<(u16, String)>),
-    /// Bits with a name each.
+    /// Bits with names.
     Bits(Vec<(u8, String)>),
-    /// All registers of the run as one value without further meaning.
+    /// All registers of the run are one value without further meaning.
     Opaque,
 }
 
-/// What a number counts: the quantity is `(number + offset) * 10^exponent` in the unit.
+/// Unit of a number: the quantity is `(number + offset) * 10^exponent` in the unit.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unit {
-    /// Its code in UCUM; empty for a plain number.
+    /// Code in UCUM; empty for a plain number.
     pub code: String,
-    /// The power of ten that one step is.
+    /// Power of ten of one step.
     pub exponent: i8,
-    /// The quantity at the number 0, in steps.
+    /// Quantity for the number 0, in steps.
     pub offset: i16,
 }
 
-/// Which values a register takes.
+/// Set of values that a register allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Values {
     /// From the first to the second, both included.
     Range(u16, u16),
     /// The first, or from the second to the third.
     RangeOr(u16, u16, u16),
-    /// These.
+    /// One of these values.
     OneOf(Vec<u16>),
 }
 
-/// What a point can be.
+/// Kind of a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointKind {
-    /// Its name: `digital input`.
+    /// Name, such as `digital input`.
     pub name: String,
-    /// Whether it is a bit or a word. `None`: no point stands at the address.
+    /// Whether it is a bit or a word; `None` when there is no point at the address.
     pub table: Option<Table>,
-    /// Whether a master may write it.
+    /// Whether a master can write it.
     pub writable: bool,
-    /// For a word: how the values of registers RANGE and SCALE make it be read.
+    /// For a word: its meaning for the values of registers RANGE and SCALE.
     pub readings: Vec<Reading>,
 }
 
-/// Where a point is read and written.
+/// Table in which a point is read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Table {
     /// By functions 01, 02, 05 and 0F.
@@ -152,37 +152,37 @@ pub enum Table {
     Word,
 }
 
-/// What the word of a point means while RANGE and SCALE have these values.
+/// Meaning of a point's word for one value of RANGE and SCALE.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// The value of RANGE.
     pub range: u16,
     /// The value of SCALE.
     pub scale: u16,
-    /// What the word counts.
+    /// Unit of the word.
     pub unit: Unit,
-    /// The least value. Below 0: the word is in two's complement.
+    /// Smallest value. If it is below 0, the word is in two's complement.
     pub min: i32,
-    /// The greatest value.
+    /// Largest value.
     pub max: i32,
 }
 
 /// A kind of module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModuleType {
-    /// Its code in MODULE.
+    /// Code in register MODULE.
     pub code: u16,
-    /// Its name: `4ai`.
+    /// Name, such as `4ai`.
     pub name: String,
-    /// What it makes of the four points of its port: places in [`Description::kinds`].
+    /// Kinds of the four points of its port, as indices of [`Description::kinds`].
     pub points: [u8; 4],
 }
 
 /// A port with a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Port {
-    /// Its number, 1 to 8.
+    /// Number of the port, 1 to 8.
     pub number: u8,
-    /// The code of the module in force.
+    /// Code of the module in force.
     pub module: u16,
 }

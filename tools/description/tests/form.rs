@@ -1,4 +1,4 @@
-//! The CBOR form: what is encoded is decoded, whatever the unit, and no bytes make the decoder panic.
+//! Tests of the CBOR form: every unit is restored after encoding and decoding, and no bytes make the decoder panic.
 
 use minicbor::Encoder;
 use modio_description::{
@@ -61,7 +61,7 @@ fn the_file_begins_with_length_and_crc() {
 }
 
 #[test]
-fn a_damaged_or_short_file_is_refused() {
+fn a_damaged_or_short_file_is_rejected() {
     let file = unit(Module::Ai4).file();
     let length = u16::from_be_bytes([file[0], file[1]]);
     let short = |found| Error::Short { length, found };
@@ -77,7 +77,7 @@ fn a_damaged_or_short_file_is_refused() {
 }
 
 #[test]
-fn a_newer_version_of_the_format_is_refused_with_its_number() {
+fn a_newer_version_of_the_format_is_rejected_with_its_number() {
     let mut document = unit(Module::Ai4).encode();
     assert_eq!(document[1], VERSION as u8);
     document[1] = 7;
@@ -95,14 +95,14 @@ fn a_newer_version_of_the_format_is_refused_with_its_number() {
 }
 
 #[test]
-fn bytes_after_the_document_are_refused() {
+fn bytes_after_the_document_are_rejected() {
     let document = [unit(Module::Ai4).encode(), vec![0]].concat();
     let error = Description::decode(&document).unwrap_err();
     assert!(matches!(error, Error::Form(_)), "{error}");
 }
 
-/// Appends a field to each array of a document that a later version may extend, and a kind of value, a scope, a table
-/// and a kind of set that are new.
+/// Appends a field to each array of a document that a later version may extend, and adds a new kind of value,
+/// scope, table and kind of set.
 fn of_a_later_version() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut e = Encoder::new(&mut bytes);
@@ -131,7 +131,7 @@ fn of_a_later_version() -> Vec<u8> {
         e.array(4)?.u16(0x500)?.str("PLAIN")?;
         e.array(3)?.u8(2)?.map(1)?.u8(1)?.str("one")?.bool(false)?;
         e.str("")?;
-        // More of the firmware, the ports, more of the unit.
+        // More fields of the firmware, the ports, and more fields of the unit.
         e.u8(1)?.bytes(&[2, 1, 44])?.str("for a later reader")?;
         Ok(())
     })();
@@ -140,13 +140,13 @@ fn of_a_later_version() -> Vec<u8> {
 }
 
 #[test]
-fn fields_and_kinds_of_a_later_version_are_passed_over() {
+fn fields_and_kinds_of_a_later_version_are_skipped() {
     let mut bytes = of_a_later_version();
-    // The narrower of MATRIX has the values 2 alone in place of a range: that is no form of the format.
+    // The narrower values of MATRIX are a single 2 instead of a range, which the format does not allow.
     assert!(Description::decode(&bytes).is_err());
     let range = [0x85, 0x00, 0x82, 0x01, 0x02, 0x03];
     let at = bytes.windows(6).position(|window| window == range).unwrap();
-    // A set of kind 2, which has any number of values.
+    // A set of kind 2 may have any number of values.
     bytes[at + 3] = 2;
     let unit = Description::decode(&bytes).unwrap();
     assert_eq!(
@@ -186,7 +186,7 @@ fn fields_and_kinds_of_a_later_version_are_passed_over() {
 }
 
 #[test]
-fn errors_name_the_byte() {
+fn errors_contain_the_byte_position() {
     let error = Description::decode(&[0x83, 1, 0x61]).unwrap_err();
     assert!(error.to_string().contains("(byte 2)"), "{error}");
     let error = Description::decode(&[0x9F, 1, 0xFF]).unwrap_err();
@@ -197,8 +197,8 @@ fn errors_name_the_byte() {
 }
 
 #[test]
-fn a_length_beyond_the_bytes_takes_no_memory() {
-    // An outer array, and a list of kinds, that say 2^60 elements.
+fn a_length_beyond_the_bytes_allocates_no_memory() {
+    // An outer array, and a list of kinds, that claim 2^60 elements.
     let long = [0x9B, 0x10, 0, 0, 0, 0, 0, 0, 0];
     assert!(Description::decode(&long).is_err());
     let kinds = [&[0x83, 1, 0x87, 0x60, 0x60, 0x60, 1], &long[..]].concat();
@@ -206,7 +206,7 @@ fn a_length_beyond_the_bytes_takes_no_memory() {
 }
 
 #[test]
-fn an_index_of_no_kind_is_refused() {
+fn an_index_of_an_unknown_kind_is_rejected() {
     let mut unit = unit(Module::Ai4);
     unit.modules[1].points[2] = unit.kinds.len() as u8;
     assert!(Description::decode(&unit.encode()).is_err());

@@ -1,4 +1,4 @@
-//! What a server replies.
+//! Replies of a server.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -8,7 +8,7 @@ use crate::VERSION;
 use crate::request::Request;
 use crate::time::{Micros, parse};
 
-/// Something a server can do, or that its line has.
+/// An ability of a server or of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Ability {
     /// It changes rate and format of the master's end.
@@ -23,11 +23,11 @@ pub enum Ability {
     Echo,
     /// It reports when the unit's driver is switched.
     Driver,
-    /// Characters that the unit sends take their time on the line.
+    /// Characters that the unit sends have a duration on the line.
     CharacterTime,
-    /// The unit notices a start bit when it begins.
+    /// The unit detects a start bit when it begins.
     StartBit,
-    /// It reports what the unit did that a real part would not take well.
+    /// It reports actions of the unit that could damage or disturb a real part.
     Findings,
 }
 
@@ -45,7 +45,7 @@ impl Ability {
         Self::Findings,
     ];
 
-    /// Its name on the line.
+    /// Returns the name in the protocol.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -62,44 +62,44 @@ impl Ability {
     }
 }
 
-/// What the server is.
+/// Description of the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// Rate of the master's end in bit/s.
     pub baud: u32,
     /// Format of the master's end, such as `8N2`.
     pub format: String,
-    /// What it can do. A client ignores abilities that it does not know.
+    /// Abilities of the server. A client ignores abilities that it does not know.
     pub abilities: BTreeSet<Ability>,
-    /// What it is, for people.
+    /// Name of the server, for people.
     pub name: String,
 }
 
-/// Something that happened on the line.
+/// An event on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The unit sent a byte.
     Byte {
-        /// Its data.
+        /// The data of the byte.
         byte: u8,
-        /// The beginning of its start bit.
+        /// Beginning of the start bit.
         start: Duration,
-        /// The end of its last stop bit.
+        /// End of the last stop bit.
         end: Duration,
-        /// Parity and stop bits were right.
+        /// Whether parity and stop bits were correct.
         good: bool,
     },
     /// The unit switched its driver.
     Driver {
-        /// When.
+        /// Time of the event.
         at: Duration,
-        /// Whether it was on afterwards.
+        /// Whether the driver was on afterwards.
         on: bool,
     },
 }
 
 impl Event {
-    /// When it was over.
+    /// Returns the time at which the event was complete.
     #[must_use]
     pub const fn at(&self) -> Duration {
         match self {
@@ -109,7 +109,7 @@ impl Event {
     }
 }
 
-/// What a server replies to a request that it has carried out.
+/// Reply to a request that the server has executed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// To `hello`.
@@ -123,7 +123,7 @@ pub enum Reply {
 }
 
 impl Reply {
-    /// The time after the request.
+    /// Returns the time after the request.
     #[must_use]
     pub const fn now(&self) -> Duration {
         match self {
@@ -134,11 +134,11 @@ impl Reply {
         }
     }
 
-    /// Reads the line that answers `request`.
+    /// Parses the reply line to `request`.
     ///
     /// # Errors
     ///
-    /// The server's reason after `error`, or what is wrong with the line.
+    /// The server's reason after `error`, or a description of what is wrong with the line.
     pub fn read(request: &Request, line: &str) -> Result<Self, String> {
         let strange = || format!("the server replied {line:?} to {request}");
         let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
@@ -187,7 +187,7 @@ fn hello(text: &str) -> Result<Hello, String> {
         .split_once(',')
         .and_then(|(baud, format)| Some((baud.parse().ok()?, format.to_owned())))
         .ok_or_else(|| {
-            format!("{line:?} in the server's hello is no rate and format such as 9600,8N2")
+            format!("{line:?} in the server's hello is not a rate and format such as 9600,8N2")
         })?;
     let abilities = value("abilities=")?;
     let known = |ability: &Ability| abilities.split(',').any(|name| name == ability.name());
@@ -200,7 +200,7 @@ fn hello(text: &str) -> Result<Hello, String> {
     })
 }
 
-/// Reads an event: `Some(None)` when it is of a kind that is not known here.
+/// Parses an event. Returns `Some(None)` for an unknown kind of event.
 fn event(word: &str) -> Option<Option<Event>> {
     let (what, when) = word.split_once('@')?;
     match what {
@@ -288,7 +288,7 @@ mod tests {
     const NOW: Duration = Duration::from_micros(100_000);
 
     #[test]
-    fn every_reply_is_read_as_it_was_written() {
+    fn every_reply_is_parsed_as_it_was_written() {
         let hello = Hello {
             baud: 9600,
             format: "8N2".to_owned(),
@@ -339,7 +339,7 @@ mod tests {
     fn unknown_abilities_and_events_are_ignored() {
         let line = "ok 0 version=1 line=9600,8N2 abilities=power,teleport name=x y";
         let Ok(Reply::Hello(_, hello)) = Reply::read(&Request::Hello(1), line) else {
-            panic!("a hello");
+            panic!("expected a hello reply");
         };
         assert_eq!(hello.abilities, BTreeSet::from([Ability::Power]));
         assert_eq!(hello.name, "x y");

@@ -1,4 +1,4 @@
-//! What a client asks for.
+//! Requests of a client.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::time::{Micros, parse};
 use crate::{LONGEST_LINE, LONGEST_RUN};
 
-/// Something to put on the line.
+/// Something to send on the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Piece {
     /// Characters without a gap between them.
@@ -18,30 +18,31 @@ pub enum Piece {
     BadParity(u8),
     /// A character whose stop bits are low.
     BadStop(u8),
-    /// The line low for 1 to 15 bits, then high for one.
+    /// The line is low for 1 to 15 bits, then high for one.
     Break(u8),
-    /// The line inverted for this time.
+    /// The line is inverted for this time.
     Glitch(Duration),
 }
 
 /// A request line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Asks what the server is; the number is the newest version of the protocol that the client knows.
+    /// Asks for the description of the server; the number is the newest version of the protocol that the client
+    /// knows.
     Hello(u32),
-    /// Puts pieces on the line, one after another, and lets time pass until the last has ended.
+    /// Sends pieces on the line, one after another, and lets time pass until the last one has ended.
     Send(Vec<Piece>),
     /// Lets time pass.
     Run(Duration),
-    /// Changes the rate, in bit/s, and the format, such as `8E1`, of the master's end.
+    /// Changes the baud rate, in bit/s, and the format, such as `8E1`, of the master's end.
     Line(u32, String),
     /// Switches the unit's power.
     Power(bool),
     /// Resets the unit by its reset pin.
     Reset,
-    /// Lets the unit receive what it sends, or not.
+    /// Selects whether the unit receives what it sends.
     Echo(bool),
-    /// Asks what the unit did that a real part would not take well.
+    /// Asks for actions of the unit that could damage or disturb a real part.
     Findings,
 }
 
@@ -67,7 +68,7 @@ impl fmt::Display for Request {
                 f.write_str("send")?;
                 pieces
                     .iter()
-                    // No bytes have no text.
+                    // An empty piece has no text.
                     .filter(|piece| !matches!(piece, Piece::Bytes(bytes) if bytes.is_empty()))
                     .try_for_each(|piece| write!(f, " {piece}"))
             }
@@ -100,11 +101,11 @@ impl FromStr for Piece {
                 Ok(bits @ 1..=15) if value.starts_with(|c: char| c.is_ascii_digit()) => {
                     Ok(Self::Break(bits))
                 }
-                _ => Err(format!("{value:?} is no number of bits from 1 to 15")),
+                _ => Err(format!("{value:?} is not a number of bits from 1 to 15")),
             },
             "glitch" => parse(value).map(Self::Glitch),
             _ => Err(format!(
-                "{kind:?} is no piece: use hexadecimal bytes, gap, parity, stop, break or glitch"
+                "{kind:?} is not a piece: use hexadecimal bytes, gap, parity, stop, break or glitch"
             )),
         }
     }
@@ -126,7 +127,7 @@ fn bytes(text: &str) -> Result<Vec<u8>, String> {
     }
 }
 
-/// The beginning of a text that may be very long.
+/// Returns the beginning of a text that may be very long.
 fn shortened(text: &str) -> String {
     text.chars().take(40).collect()
 }
@@ -134,7 +135,7 @@ fn shortened(text: &str) -> String {
 impl FromStr for Request {
     type Err = String;
 
-    /// Reads a request line without its line end.
+    /// Parses a request line without its line end.
     fn from_str(line: &str) -> Result<Self, String> {
         if line.len() > LONGEST_LINE {
             return Err(format!("the line is longer than {LONGEST_LINE} characters"));
@@ -149,7 +150,7 @@ impl FromStr for Request {
             ("hello", [version]) => match version.parse() {
                 Ok(version @ 1..) => Ok(Self::Hello(version)),
                 _ => Err(format!(
-                    "{version:?} is no version of the protocol, such as 1"
+                    "{version:?} is not a version of the protocol, such as 1"
                 )),
             },
             ("hello", _) => takes("the newest version that the client knows"),
@@ -169,7 +170,7 @@ impl FromStr for Request {
             ("run", _) => takes("a time in microseconds"),
             ("line", [baud, format]) => match baud.parse() {
                 Ok(baud @ 1..) => Ok(Self::Line(baud, (*format).to_owned())),
-                _ => Err(format!("{baud:?} is no rate in bit/s")),
+                _ => Err(format!("{baud:?} is not a rate in bit/s")),
             },
             ("line", _) => takes("a rate and a format, such as 9600 8N2"),
             ("power", ["on"]) => Ok(Self::Power(true)),
@@ -179,9 +180,9 @@ impl FromStr for Request {
             ("power" | "echo", _) => takes("on or off"),
             ("reset", []) => Ok(Self::Reset),
             ("findings", []) => Ok(Self::Findings),
-            ("reset" | "findings", _) => takes("nothing"),
+            ("reset" | "findings", _) => takes("no arguments"),
             _ => Err(format!(
-                "{:?} is no request: use hello, send, run, line, power, reset, echo or findings",
+                "{:?} is not a request: use hello, send, run, line, power, reset, echo or findings",
                 shortened(name)
             )),
         }
@@ -193,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_request_is_read_as_it_was_written() {
+    fn every_request_is_parsed_as_it_was_written() {
         let us = Duration::from_nanos;
         for request in [
             Request::Hello(1),
@@ -219,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_typed_by_hand_are_understood() {
+    fn lines_with_extra_spaces_and_lower_case_are_parsed() {
         let typed: Request = "  send  01ab   gap:10  FF ".parse().unwrap();
         let pieces = vec![
             Piece::Bytes(vec![1, 0xAB]),
@@ -230,13 +231,13 @@ mod tests {
     }
 
     #[test]
-    fn bad_lines_are_refused_with_a_reason() {
+    fn bad_lines_are_rejected_with_a_reason() {
         let long = format!("send {}", "00".repeat(LONGEST_LINE / 2));
         for (line, reason) in [
             ("", "empty"),
             ("   ", "empty"),
-            ("go", "\"go\" is no request"),
-            ("SEND 01", "no request"),
+            ("go", "\"go\" is not a request"),
+            ("SEND 01", "not a request"),
             ("hello", "newest version"),
             ("hello 0", "\"0\""),
             ("hello x", "\"x\""),
@@ -245,7 +246,7 @@ mod tests {
             ("send 0x01", "even number"),
             ("send 01 zz", "\"zz\""),
             ("send \u{e9}\u{e9}", "even number"),
-            ("send wait:1", "\"wait\" is no piece"),
+            ("send wait:1", "\"wait\" is not a piece"),
             ("send gap:-1", "\"-1\""),
             ("send parity:0102", "not one byte"),
             ("send break:0", "1 to 15"),
@@ -259,7 +260,7 @@ mod tests {
             ("line fast 8N2", "\"fast\""),
             ("power", "on or off"),
             ("echo maybe", "on or off"),
-            ("reset now", "nothing"),
+            ("reset now", "no arguments"),
             (&long, "longer than"),
         ] {
             let told = line.parse::<Request>().unwrap_err();

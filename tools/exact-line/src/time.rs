@@ -1,9 +1,9 @@
-//! Times as the protocol writes them: microseconds with at most three decimals.
+//! Times in the protocol: microseconds with at most three decimals.
 
 use std::fmt;
 use std::time::Duration;
 
-/// Writes a time in microseconds with three decimals; what is below a nanosecond is cut off.
+/// Writes a time in microseconds with three decimals, truncated to nanoseconds.
 pub(crate) struct Micros(pub(crate) Duration);
 
 impl fmt::Display for Micros {
@@ -13,13 +13,13 @@ impl fmt::Display for Micros {
     }
 }
 
-/// Reads a time in microseconds with at most three decimals.
+/// Parses a time in microseconds with at most three decimals.
 ///
 /// # Errors
 ///
-/// When the text is no such number, in one line.
+/// A line of text when the text is not such a number.
 pub(crate) fn parse(text: &str) -> Result<Duration, String> {
-    let wrong = || format!("{text:?} is no time in microseconds, such as 4010 or 4010.417");
+    let wrong = || format!("{text:?} is not a time in microseconds, such as 4010 or 4010.417");
     let (whole, decimals) = text.split_once('.').unwrap_or((text, "0"));
     let digits = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
     if !digits(whole) || !digits(decimals) || decimals.len() > 3 {
@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn written_times_are_read_back_to_the_nanosecond() {
+    fn written_times_are_restored_to_the_nanosecond() {
         for ns in [0, 1, 999, 1000, 4_010_417, u64::from(u32::MAX) * 1000] {
             let time = Duration::from_nanos(ns);
             assert_eq!(parse(&Micros(time).to_string()), Ok(time));
@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_that_are_no_times_are_refused() {
+    fn texts_that_are_not_times_are_rejected() {
         for text in [
             "",
             ".",

@@ -1,18 +1,18 @@
-//! Frames: a unit address and a PDU as they go over the line (Modbus over Serial Line V1.02, 2.5; Modbus Messaging on
+//! Frames: a unit address and a PDU as sent on the line (Modbus over Serial Line V1.02, 2.5; Modbus Messaging on
 //! TCP/IP V1.0b, 3.1).
 
 use crc::{CRC_16_MODBUS, Crc};
 
 const CRC16: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
-/// The longest RTU frame in bytes.
+/// Length of the longest RTU frame in bytes.
 pub const RTU_MOST: usize = 256;
-/// The longest ASCII frame in characters: `:`, two digits for each byte and the LRC, CR and LF.
+/// Length of the longest ASCII frame in characters: `:`, two digits for each byte and the LRC, CR and LF.
 pub const ASCII_MOST: usize = 513;
-/// Bytes in front of the PDU on TCP.
+/// Number of bytes in front of the PDU on TCP.
 pub const MBAP: usize = 7;
 
-/// How frames are marked off.
+/// Framing of a Modbus message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Framing {
@@ -26,8 +26,8 @@ pub enum Framing {
 }
 
 impl Framing {
-    /// Returns how a frame on a serial line is marked off, by its own form; `None` when its check is wrong. Each byte of
-    /// an ASCII frame has to fit, so an RTU frame is not mistaken for one.
+    /// Returns the framing of a frame from a serial line, judged by its content; `None` when its CRC or LRC is
+    /// wrong. Each byte of an ASCII frame must be valid, so an RTU frame is not mistaken for one.
     #[must_use]
     pub fn on_line(frame: &[u8]) -> Option<Self> {
         [Self::Ascii, Self::Rtu]
@@ -35,7 +35,7 @@ impl Framing {
             .find(|framing| framing.open(frame).is_some())
     }
 
-    /// The frame with this address and PDU. `transaction` counts for Modbus TCP only.
+    /// Returns the frame with this address and PDU. `transaction` is only used for Modbus TCP.
     #[must_use]
     pub fn frame(self, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
         let mut frame = vec![unit];
@@ -62,7 +62,7 @@ impl Framing {
         }
     }
 
-    /// The address and the PDU of a whole frame; `None` when it is damaged.
+    /// Returns the address and the PDU of a complete frame; `None` when it is damaged.
     #[must_use]
     pub fn open(self, frame: &[u8]) -> Option<(u8, Vec<u8>)> {
         let bytes = match self {
@@ -87,19 +87,19 @@ impl Framing {
     }
 }
 
-/// The CRC as it stands on the line, low byte first (V1.02, 6.2.2).
+/// Returns the CRC in the order of the line, low byte first (V1.02, 6.2.2).
 #[must_use]
 pub fn crc(bytes: &[u8]) -> [u8; 2] {
     CRC16.checksum(bytes).to_le_bytes()
 }
 
-/// What makes the sum of all bytes 0 (V1.02, 6.2.1).
+/// Returns the byte that makes the sum of all bytes 0 (V1.02, 6.2.1).
 fn lrc(bytes: &[u8]) -> u8 {
     let sum = bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
     sum.wrapping_neg()
 }
 
-/// The bytes of hexadecimal digits; `None` when one is none, or is missing.
+/// Returns the bytes of hexadecimal digits; `None` when a digit is invalid or missing.
 fn hex(digits: &[u8]) -> Option<Vec<u8>> {
     let (pairs, rest) = digits.as_chunks::<2>();
     let digit = |digit: u8| char::from(digit).to_digit(16).map(|value| value as u8);
@@ -107,8 +107,8 @@ fn hex(digits: &[u8]) -> Option<Vec<u8>> {
     rest.is_empty().then(|| pairs.iter().map(byte).collect())?
 }
 
-/// The length in bytes of the RTU response to this request, CRC included, from the beginning of the response. `None`
-/// when more bytes are needed, or when only the silence after the frame shows its end.
+/// Returns the length in bytes of the RTU response to this request, CRC included, from the beginning of the
+/// response. Returns `None` when more bytes are needed, or when only the silence after the frame shows its end.
 #[must_use]
 pub fn response_length(request: &[u8], frame: &[u8]) -> Option<usize> {
     let function = *frame.get(1)?;
@@ -118,7 +118,7 @@ pub fn response_length(request: &[u8], frame: &[u8]) -> Option<usize> {
         0x01..=0x04 | 0x0C | 0x11 | 0x14 | 0x17 => counted(2),
         0x05 | 0x06 | 0x0B | 0x0F | 0x10 => Some(8),
         0x07 => Some(5),
-        // They send the request's own bytes back, or as many others.
+        // These return the request's own bytes, or the same number of others.
         0x08 | 0x15 => Some(request.len() + 3),
         0x16 => Some(10),
         0x18 => fifo_length(frame),
@@ -153,7 +153,7 @@ fn fifo_length(frame: &[u8]) -> Option<usize> {
     Some(4 + usize::from(u16::from_be_bytes(*count)) + 2)
 }
 
-/// The length of a response with objects of the device identification (V1.1b3 6.21).
+/// Returns the length of a response with objects of the device identification (V1.1b3 6.21).
 fn identification_length(frame: &[u8]) -> Option<usize> {
     let objects = *frame.get(7)?;
     let mut end = 8;
@@ -168,8 +168,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_those_of_the_standards_examples() {
-        // V1.02 6.2.2 has the CRC of 02 07 as 41 12, low byte first.
+    fn frames_match_the_examples_of_the_standard() {
+        // V1.02 6.2.2 gives the CRC of 02 07 as 41 12, low byte first.
         assert_eq!(Framing::Rtu.frame(0, 2, &[7]), [2, 7, 0x41, 0x12]);
         let ascii = Framing::Ascii.frame(0, 0x11, &[3, 0, 0x6B, 0, 3]);
         assert_eq!(ascii, b":1103006B00037E\r\n");
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_leads_back_to_its_pdu_and_a_damaged_one_to_none() {
+    fn open_returns_the_pdu_of_a_frame_and_none_for_a_damaged_one() {
         for framing in [Framing::Rtu, Framing::Ascii, Framing::Mbap] {
             let frame = framing.frame(7, 17, &[3, 2, 0xAB, 0xCD]);
             assert_eq!(framing.open(&frame), Some((17, vec![3, 2, 0xAB, 0xCD])));
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn form_of_a_frame_shows_how_it_is_marked_off() {
+    fn framing_is_recognised_by_the_content_of_a_frame() {
         for framing in [Framing::Rtu, Framing::Ascii] {
             // Unit 0x3A has the code of the colon.
             let frame = framing.frame(0, 0x3A, &[3, 0, 0, 0, 1]);
@@ -199,7 +199,7 @@ mod tests {
             assert_eq!(Framing::on_line(&frame[..frame.len() - 1]), None);
         }
         assert_eq!(Framing::on_line(&Framing::Mbap.frame(1, 1, &[7])), None);
-        // 0xFFFF is the CRC of no byte at all.
+        // 0xFFFF is the CRC of an empty frame.
         for short in [&[0xFF, 0xFF][..], &[1, 0x7E, 0x80], &[1], &[], b":\r\n"] {
             assert_eq!(Framing::on_line(short), None, "{short:02X?}");
         }

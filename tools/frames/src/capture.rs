@@ -48,17 +48,18 @@ const CRC_ERROR: u32 = 1 << 24;
 pub struct Packet<'a> {
     /// Time of the first byte, since 1970.
     pub time: Duration,
-    /// Which way the bytes went, if that is known. Only a frame with a known direction becomes a Modbus packet.
+    /// Direction of the bytes, if known. Only a frame with a known direction becomes a Modbus packet.
     pub direction: Option<Direction>,
-    /// How frames are marked off. Bytes that are no such frame become a packet of protocol "data".
+    /// Framing of the line. Bytes that are not such a frame become a packet of protocol "data".
     pub framing: Framing,
     /// The bytes as received.
     pub bytes: &'a [u8],
-    /// Shown as the comment of the packet.
+    /// Comment of the packet.
     pub comment: &'a str,
 }
 
-/// A capture file. Each packet is written at once and in full, so the file is valid whenever the program ends.
+/// A capture file. Each packet is written immediately and completely, so the file is valid whenever the program
+/// ends.
 pub struct Recorder<W: Write> {
     writer: PcapNgWriter<BufWriter<W>>,
 }
@@ -160,7 +161,7 @@ fn frame(direction: Direction, unit: u8, pdu: &[u8]) -> Vec<u8> {
     packet
 }
 
-/// Returns the packet for bytes that are no frame.
+/// Returns the packet for bytes that are not a frame.
 fn garbled(bytes: &[u8]) -> Vec<u8> {
     let mut packet = Vec::new();
     tag(&mut packet, 12, b"data");
@@ -198,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn capture_file_reads_back_with_times_dissectors_and_directions() {
+    fn capture_file_is_read_back_with_times_dissectors_and_directions() {
         let (rtu, ascii) = (Framing::Rtu, Framing::Ascii);
         let request = [3, 0, 0, 0, 1];
         let (way, back) = (Some(Direction::Request), Some(Direction::Response));
@@ -237,7 +238,7 @@ mod tests {
 
     #[test]
     fn every_packet_reaches_the_file_in_one_piece() {
-        /// Keeps what each call writes.
+        /// Stores what each call writes.
         #[derive(Default)]
         struct Calls(Vec<Vec<u8>>);
         impl Write for &mut Calls {

@@ -1,10 +1,10 @@
-//! What requests and responses say, in words: for people who read along.
+//! Describes requests and responses in words, for people.
 
 use crate::adu::Framing;
 use crate::{Direction, names};
 
-/// A frame in words: the unit, and the request or response. `request` is the PDU of the request before, if that is known:
-/// it has the addresses that a response does not repeat.
+/// Describes a frame in words: the unit, and the request or response. `request` is the PDU of the preceding
+/// request, if known: it has the addresses that a response does not repeat.
 #[must_use]
 pub fn frame(
     framing: Framing,
@@ -13,7 +13,7 @@ pub fn frame(
     request: Option<&[u8]>,
 ) -> String {
     match framing.open(bytes) {
-        None => format!("no whole frame, {} bytes", bytes.len()),
+        None => format!("not a complete frame, {} bytes", bytes.len()),
         Some((unit, pdu)) => {
             let text = match direction {
                 Direction::Request => self::request(&pdu),
@@ -27,7 +27,7 @@ pub fn frame(
     }
 }
 
-/// Bytes as they are, in hexadecimal; an ASCII frame as its characters.
+/// Returns bytes in hexadecimal, and an ASCII frame as characters.
 #[must_use]
 pub fn bytes(framing: Framing, bytes: &[u8]) -> String {
     if framing == Framing::Ascii && bytes.starts_with(b":") && bytes.is_ascii() {
@@ -45,7 +45,7 @@ fn named(code: u8) -> String {
     names::function(code).map_or_else(|| format!("function {code:02X}"), str::to_owned)
 }
 
-/// A request in words.
+/// Describes a request in words.
 #[must_use]
 pub fn request(pdu: &[u8]) -> String {
     let Some(code) = pdu.first() else {
@@ -62,7 +62,7 @@ fn with_rest(name: &str, pdu: &[u8]) -> String {
     }
 }
 
-/// What a request asks for; `None` when its form is not the function's.
+/// Describes the parameters of a request; `None` when its form does not match the function.
 fn told(code: u8, pdu: &[u8]) -> Option<String> {
     let (first, second) = (word(pdu, 1), word(pdu, 3));
     Some(match code {
@@ -104,7 +104,7 @@ fn told(code: u8, pdu: &[u8]) -> Option<String> {
     })
 }
 
-/// A response in words.
+/// Describes a response in words.
 #[must_use]
 pub fn response(pdu: &[u8], request: Option<&[u8]>) -> String {
     let Some(code) = pdu.first() else {
@@ -150,7 +150,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
     })
 }
 
-/// The counters and the events in a response of function 0C (V1.1b3, 6.10): the latest event first.
+/// Returns the counters and events in a response of function 0C (V1.1b3, 6.10), newest event first.
 fn log(pdu: &[u8]) -> Option<String> {
     let [status, events, messages] = [word(pdu, 2)?, word(pdu, 4)?, word(pdu, 6)?];
     let latest = match bytes(Framing::Rtu, counted(pdu)?.get(6..)?) {
@@ -162,8 +162,8 @@ fn log(pdu: &[u8]) -> Option<String> {
     ))
 }
 
-/// The identity in a response of function 11, which the device chooses, and the run indicator after it, if the device
-/// sends just that (V1.1b3, 6.13).
+/// Returns the server ID in a response of function 11, which the device defines, and the run indicator after it, if
+/// the response contains only these (V1.1b3, 6.13).
 fn identity(pdu: &[u8]) -> Option<String> {
     let data = counted(pdu)?;
     let (identity, state) = match data.split_last()? {
@@ -179,12 +179,12 @@ fn identity(pdu: &[u8]) -> Option<String> {
     Some(format!("= {identity}{state}"))
 }
 
-/// The records in a response of function 14, one group for each that was asked for (V1.1b3, 6.14).
+/// Returns the records in a response of function 14, one group for each requested group (V1.1b3, 6.14).
 fn groups(pdu: &[u8]) -> Option<String> {
     let mut rest = counted(pdu)?;
     let mut groups = Vec::new();
     while let Some((length, after)) = rest.split_first() {
-        // The length counts the reference type, which is 6.
+        // The length includes the reference type, which is 6.
         let (group, after) = after.split_at_checked((*length).into())?;
         groups.push(words(group.strip_prefix(&[6])?));
         rest = after;
@@ -192,13 +192,13 @@ fn groups(pdu: &[u8]) -> Option<String> {
     Some(format!("= {}", groups.join("; ")))
 }
 
-/// The bytes that the second byte of a PDU counts; `None` when there are more or fewer.
+/// Returns the bytes that the second byte of a PDU counts; `None` when their number differs.
 fn counted(pdu: &[u8]) -> Option<&[u8]> {
     let data = pdu.get(2..)?;
     (data.len() == usize::from(*pdu.get(1)?)).then_some(data)
 }
 
-/// The objects in a response of function 2B/0E (V1.1b3, 6.21).
+/// Returns the objects in a response of function 2B/0E (V1.1b3, 6.21).
 #[must_use]
 pub fn objects(pdu: &[u8]) -> Option<Vec<(u8, Vec<u8>)>> {
     let mut rest = pdu.get(7..)?;
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_and_responses_say_what_they_are_about() {
+    fn requests_and_responses_are_described() {
         let asked = [3, 1, 1, 0, 2];
         assert_eq!(request(&asked), "read holding registers 0x0101 x 2");
         let answer = response(&[3, 4, 0, 96, 0, 0], Some(&asked));
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn responses_with_a_byte_count_are_taken_apart() {
+    fn responses_with_a_byte_count_are_decoded() {
         for (pdu, text) in [
             // The example of V1.1b3, 6.10.
             (
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_of_any_form_are_shown_and_nothing_panics() {
+    fn any_bytes_are_shown_without_a_panic() {
         for code in 0..=0xFF {
             for length in 0..12 {
                 let pdu = [&[code], &[0xFF; 12][..length]].concat();
@@ -314,6 +314,6 @@ mod tests {
         }
         assert_eq!(request(&[0x41, 1, 2]), "function 41: 01 02");
         let damaged = frame(Framing::Rtu, Direction::Response, &[1, 2, 3], None);
-        assert_eq!(damaged, "no whole frame, 3 bytes");
+        assert_eq!(damaged, "not a complete frame, 3 bytes");
     }
 }

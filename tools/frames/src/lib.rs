@@ -1,15 +1,16 @@
-//! Modbus frames for people: what a frame on a serial line or a TCP connection says, in words, and capture files.
+//! Modbus frames for people: describes a frame from a serial line or a TCP connection in words, and writes capture
+//! files.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`adu`] | frames in RTU, ASCII and TCP form: made, checked and measured |
+//! | [`adu`] | frames in RTU, ASCII and TCP form: created, checked and measured |
 //! | [`names`] | names of functions and exceptions |
-//! | [`decode`] | requests and responses in words, as `modioctl sniff` shows them |
-//! | [`sentence`] | a frame as a sentence, as the simulator's log shows it |
+//! | [`decode`] | requests and responses in words, as in `modioctl sniff` |
+//! | [`sentence`] | a frame as a sentence, as in the simulator's log |
 //! | [`capture`] | capture files that Wireshark reads |
 //!
-//! The crate knows the standard only: no device, no line and no clock. The host tool and the simulator both use it, and
-//! it depends on neither.
+//! The crate only implements the standard: it knows no device, line or clock. The host tool and the simulator both
+//! use it, and it depends on neither.
 //!
 //! ```
 //! use modbus_frames::{Direction, adu::Framing, decode, sentence};
@@ -33,7 +34,7 @@ mod waiting;
 
 pub use waiting::Waiting;
 
-/// Which way a frame went.
+/// Direction of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// To the unit.

@@ -1,6 +1,6 @@
-//! Names of functions and exceptions, as the standard has them (Modbus Application Protocol V1.1b3, 6 and 7).
+//! Names of functions and exceptions, as in the standard (Modbus Application Protocol V1.1b3, 6 and 7).
 
-/// Returns the name of a function. Bit 7, which marks an exception, does not count.
+/// Returns the name of a function. Bit 7, which marks an exception, is ignored.
 #[must_use]
 pub const fn function(code: u8) -> Option<&'static str> {
     Some(match code & 0x7F {
@@ -27,7 +27,7 @@ pub const fn function(code: u8) -> Option<&'static str> {
     })
 }
 
-/// Returns the name of an exception, if the standard has it.
+/// Returns the name of an exception, if the standard defines it.
 #[must_use]
 pub const fn exception(code: u8) -> Option<&'static str> {
     Some(match code {

@@ -1,12 +1,12 @@
-//! A frame as a sentence: the form of the simulator's log.
+//! Describes a frame as a sentence, the form of the simulator's log.
 //!
-//! What the points are read and written with (functions 01 to 06, 0F and 10) has a sentence of its own; the other
-//! functions are told in the words of [`decode`].
+//! The functions that read and write points (01 to 06, 0F and 10) have their own sentences; [`decode`] describes
+//! the other functions.
 
 use crate::adu::{Framing, RTU_MOST};
 use crate::{Direction, decode, names};
 
-/// Returns what a frame on a serial line says. The frame's own form shows whether it is RTU or ASCII.
+/// Describes a frame from a serial line. Its content shows whether it is RTU or ASCII.
 #[must_use]
 pub fn frame(direction: Direction, bytes: &[u8]) -> String {
     let opened = Framing::on_line(bytes).and_then(|framing| framing.open(bytes));
@@ -25,7 +25,7 @@ pub fn frame(direction: Direction, bytes: &[u8]) -> String {
     format!("{to}: {what}")
 }
 
-/// What is wrong with bytes that are no frame.
+/// Describes what is wrong with bytes that are not a frame.
 fn damaged(bytes: &[u8]) -> String {
     let length = bytes.len();
     match bytes {
@@ -68,11 +68,11 @@ fn exception(pdu: &[u8]) -> String {
             Some(name) => format!("exception {code:02x}, {name}, to {to}"),
             None => format!("exception {code:02x} to {to}"),
         },
-        _ => format!("a broken exception to {to}"),
+        _ => format!("an invalid exception to {to}"),
     }
 }
 
-/// The verb and the noun of a function that reads or writes points.
+/// Returns the verb and the noun of a function that reads or writes points.
 const fn points(function: u8) -> Option<(&'static str, &'static str)> {
     Some(match function {
         0x01 => ("read", "coils"),
@@ -87,14 +87,15 @@ const fn points(function: u8) -> Option<(&'static str, &'static str)> {
     })
 }
 
-/// The request to read points; `None` when the PDU is another one, or too short.
+/// Describes a request to read points; `None` when the PDU is another one, or too short.
 fn read(pdu: &[u8]) -> Option<String> {
     let (verb, noun) = points(pdu[0])?;
     let (at, count) = (decode::word(pdu, 1)?, decode::word(pdu, 3)?);
     matches!(pdu[0], 0x01..=0x04).then(|| format!("{verb} {count} {noun} from {at:#06x}"))
 }
 
-/// The request to write points, or the response, which repeats its beginning; `None` when the PDU is another one.
+/// Describes a request to write points, or its response, which repeats the beginning; `None` when the PDU is
+/// another one.
 fn written(pdu: &[u8]) -> Option<String> {
     let (verb, noun) = points(pdu[0])?;
     let (at, value) = (decode::word(pdu, 1)?, decode::word(pdu, 3)?);
@@ -109,7 +110,7 @@ fn written(pdu: &[u8]) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// The sentence, which RTU and ASCII frames with the same content share.
+    /// Returns the sentence, which is the same for RTU and ASCII frames with the same content.
     fn told(unit: u8, pdu: &[u8], direction: Direction) -> String {
         let [rtu, ascii] = [Framing::Rtu, Framing::Ascii].map(|f| f.frame(0, unit, pdu));
         let text = frame(direction, &rtu);
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn requests_are_told() {
+    fn requests_are_described() {
         for (unit, pdu, text) in [
             (
                 1,
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn responses_are_told() {
+    fn responses_are_described() {
         for (pdu, text) in [
             (&[1, 1, 0x05][..], "unit 1: coils: 05"),
             (
@@ -184,7 +185,7 @@ mod tests {
             (&[0x94, 0x77], "unit 1: exception 77 to read file record"),
             (
                 &[0x83, 2, 2],
-                "unit 1: a broken exception to read holding registers",
+                "unit 1: an invalid exception to read holding registers",
             ),
         ] {
             assert_eq!(told(1, pdu, Direction::Response), text);
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_no_frame_are_told_as_such() {
+    fn bytes_that_are_not_a_frame_are_described_as_damaged() {
         for (bytes, text) in [
             (&[1, 2, 3][..], "3 bytes, too short for a frame"),
             (&[], "0 bytes, too short for a frame"),

@@ -2,24 +2,24 @@
 
 use crate::adu::{Framing, MBAP, response_length};
 
-/// Bytes in front of an answer that are forgiven: what a driver that is switched on makes of the line.
+/// Number of bytes in front of an answer that are tolerated: a driver that is switched on can create them.
 const NOISE: usize = 3;
 
 /// A request that waits for its answer.
 #[derive(Debug)]
 pub struct Waiting<'a> {
-    /// How frames are marked off.
+    /// Framing of the line.
     pub framing: Framing,
-    /// The number of the request, on Modbus TCP.
+    /// Transaction number of the request, on Modbus TCP.
     pub transaction: u16,
-    /// The unit that was asked.
+    /// Address of the unit.
     pub unit: u8,
-    /// The request.
+    /// PDU of the request.
     pub pdu: &'a [u8],
 }
 
 impl Waiting<'_> {
-    /// The answer in `bytes`, and where it stands there; `None` while there is none.
+    /// Returns the answer in `bytes` and its position there; `None` while there is none.
     #[must_use]
     pub fn find(&self, bytes: &[u8]) -> Option<(Vec<u8>, std::ops::Range<usize>)> {
         match self.framing {
@@ -59,7 +59,8 @@ impl Waiting<'_> {
         }
     }
 
-    /// The answer, if all bytes before a silence are one frame. For functions whose length only the silence shows.
+    /// Returns the answer, if all bytes before a silence are one frame. For functions whose length only the silence
+    /// shows.
     #[must_use]
     pub fn whole(&self, bytes: &[u8]) -> Option<Vec<u8>> {
         (self.framing == Framing::Rtu).then(|| self.answer(bytes))?
@@ -77,7 +78,7 @@ impl Waiting<'_> {
         (unit == self.unit && self.fits(&pdu)).then_some(pdu)
     }
 
-    /// Whether a response can be that to this request, and not a late one to another.
+    /// Returns whether a response can belong to this request, and not be a late one to another.
     #[must_use]
     pub fn fits(&self, response: &[u8]) -> bool {
         let (Some(asked), Some(answered)) = (self.pdu.first(), response.first()) else {
@@ -96,7 +97,7 @@ impl Waiting<'_> {
             && match asked {
                 0x01 | 0x02 => counted(count(3).div_ceil(8)),
                 0x03 | 0x04 | 0x17 => counted(count(3) * 2),
-                // The groups' lengths and types, and two bytes for each record.
+                // Lengths and types of the groups, and two bytes for each record.
                 0x14 => {
                     let groups = self.pdu.get(2..).unwrap_or_default().chunks_exact(7);
                     let bytes = groups
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_found_behind_noise_and_before_it_is_whole_nothing_is() {
+    fn an_answer_is_found_after_noise_once_it_is_complete() {
         for framing in [Framing::Rtu, Framing::Ascii, Framing::Mbap] {
             let waiting = waiting(framing, READ);
             let answer = framing.frame(9, 1, &[3, 2, 0, 5]);
@@ -145,12 +146,12 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_the_answer_is_none() {
+    fn frames_that_cannot_be_the_answer_are_ignored() {
         for framing in [Framing::Rtu, Framing::Ascii, Framing::Mbap] {
             let find = |unit, pdu: &[u8]| waiting(framing, READ).find(&framing.frame(9, unit, pdu));
-            assert_eq!(find(2, &[3, 2, 0, 5]), None, "another unit's");
+            assert_eq!(find(2, &[3, 2, 0, 5]), None, "from another unit");
             assert_eq!(find(1, &[3, 4, 0, 5, 0, 6]), None, "to another request");
-            assert_eq!(find(1, &[4, 2, 0, 5]), None, "another function's");
+            assert_eq!(find(1, &[4, 2, 0, 5]), None, "of another function");
             assert!(find(1, &[0x83, 2]).is_some(), "an exception");
         }
         let write = waiting(Framing::Rtu, &[6, 1, 0, 0x5A, 0x17]);

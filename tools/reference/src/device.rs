@@ -1,4 +1,4 @@
-//! What a server serves.
+//! The data that a server serves.
 
 /// Four tables from address 0 on.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,22 +15,22 @@ pub struct Device {
     pub files: Vec<Vec<u16>>,
     /// Function codes that the device does not have.
     pub lacks: Vec<u8>,
-    /// Coils, holding registers and records of files from here on cannot be written.
+    /// First address of coils, holding registers and records of files that cannot be written.
     pub read_only_from: u32,
-    /// Larger words are refused.
+    /// Largest value that can be written to a word; larger values are rejected.
     pub max_word: u16,
-    /// If set, everything that has a right address and value is refused with this exception.
+    /// If set, every request with valid addresses and values is rejected with this exception.
     pub state: Option<u8>,
     /// Exception status, and the low byte of the diagnostic register.
     pub status: u8,
-    /// The identity of function 11.
+    /// The server ID of function 11.
     pub server_id: Vec<u8>,
     /// The run indicator of function 11.
     pub running: bool,
-    /// Of function 11, after the run indicator.
+    /// The additional data of function 11, after the run indicator.
     pub additional_data: Vec<u8>,
-    /// A function that the server does not know: it keeps its data, and answers with them backwards,
-    /// three times. Without data it is refused.
+    /// A user-defined function. The device stores the data of its request and replies with the data reversed, three
+    /// times. It rejects a request without data.
     pub custom: Option<u8>,
     /// The data of the last request of that function.
     pub kept: Vec<u8>,
@@ -38,8 +38,8 @@ pub struct Device {
     pub objects: Vec<Option<Vec<u8>>>,
 }
 
-/// The objects of the device identification in the tests: short ones, an empty one, and some that
-/// do not fit one reply together.
+/// Returns the objects of the device identification in the tests: short ones, an empty one, and some that do not
+/// fit one reply together.
 pub fn object(id: u8) -> Option<Vec<u8>> {
     let text = |text: &str| Some(text.as_bytes().to_vec());
     match id {
@@ -59,11 +59,11 @@ pub fn object(id: u8) -> Option<Vec<u8>> {
     }
 }
 
-/// The largest word that a new [`Device`] takes.
+/// Largest word that a new [`Device`] allows.
 pub const MAX_WORD: u16 = 0xFFF0;
 
 impl Device {
-    /// Coils and discrete inputs, holding and input registers, as many of each kind.
+    /// Creates a device with `bits` coils and discrete inputs and `words` holding and input registers each.
     pub fn new(bits: usize, words: usize) -> Self {
         Self {
             bits: vec![false; bits],

@@ -1,9 +1,9 @@
-//! Frames and requests, as a master makes them.
+//! Frames and requests, as a master creates them.
 
 /// The unit address of the tests.
 pub const UNIT: u8 = 17;
 
-/// CRC-16/MODBUS bit by bit, as V1.02 6.2.2 describes it, low byte first.
+/// Computes the CRC-16/MODBUS bit by bit, as in V1.02 6.2.2, low byte first.
 pub fn crc(bytes: &[u8]) -> [u8; 2] {
     let mut register = 0xFFFF_u16;
     for byte in bytes {
@@ -19,7 +19,7 @@ pub fn crc(bytes: &[u8]) -> [u8; 2] {
     register.to_le_bytes()
 }
 
-/// A frame: unit, PDU, CRC.
+/// Returns an RTU frame: unit, PDU, CRC.
 pub fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
     let mut frame = vec![unit];
     frame.extend(pdu);
@@ -27,13 +27,13 @@ pub fn frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The LRC as V1.02 6.2.1 describes it.
+/// Computes the LRC as in V1.02 6.2.1.
 pub fn lrc(bytes: &[u8]) -> u8 {
     let sum: u32 = bytes.iter().map(|byte| u32::from(*byte)).sum();
     (0x100 - sum % 0x100) as u8
 }
 
-/// An ASCII frame: colon, unit, PDU and LRC in hexadecimal, carriage return, end mark.
+/// Returns an ASCII frame: colon, unit, PDU and LRC in hexadecimal, carriage return, end mark.
 pub fn ascii_frame(unit: u8, pdu: &[u8], delimiter: u8) -> Vec<u8> {
     let mut bytes = vec![unit];
     bytes.extend(pdu);
@@ -42,7 +42,7 @@ pub fn ascii_frame(unit: u8, pdu: &[u8], delimiter: u8) -> Vec<u8> {
     [b":", digits.as_bytes(), b"\r", &[delimiter]].concat()
 }
 
-/// A frame in ASCII mode with this end mark, or in RTU mode.
+/// Returns a frame in ASCII mode with this end mark, or in RTU mode for `None`.
 pub fn framed(delimiter: Option<u8>, unit: u8, pdu: &[u8]) -> Vec<u8> {
     match delimiter {
         None => frame(unit, pdu),
@@ -50,11 +50,11 @@ pub fn framed(delimiter: Option<u8>, unit: u8, pdu: &[u8]) -> Vec<u8> {
     }
 }
 
-/// Unit and PDU of a good frame.
+/// Returns unit and PDU of a valid frame.
 ///
 /// # Panics
 ///
-/// When the frame is not good.
+/// When the frame is not valid.
 pub fn unframed(delimiter: Option<u8>, frame: &[u8]) -> Vec<u8> {
     let bytes = match delimiter {
         None => judge_rtu(frame),
@@ -63,12 +63,12 @@ pub fn unframed(delimiter: Option<u8>, frame: &[u8]) -> Vec<u8> {
             .and_then(|rest| rest.strip_suffix(&[b'\r', delimiter]))
             .and_then(judge_ascii),
     };
-    let bytes = bytes.expect("a good frame");
+    let bytes = bytes.expect("a valid frame");
     assert_eq!(framed(delimiter, bytes[0], &bytes[1..]), frame);
     bytes
 }
 
-/// Unit and PDU of an RTU frame, if it is good.
+/// Returns unit and PDU of an RTU frame, if it is valid.
 pub fn judge_rtu(text: &[u8]) -> Option<Vec<u8>> {
     if !(4..=256).contains(&text.len()) {
         return None;
@@ -77,7 +77,7 @@ pub fn judge_rtu(text: &[u8]) -> Option<Vec<u8>> {
     (crc(body) == check).then(|| body.to_vec())
 }
 
-/// Unit and PDU of what is between the colon and the end of an ASCII frame, if it is good.
+/// Returns unit and PDU of the characters between the colon and the end of an ASCII frame, if they are valid.
 pub fn judge_ascii(inside: &[u8]) -> Option<Vec<u8>> {
     let text = std::str::from_utf8(inside).ok()?;
     let fits = text.len() % 2 == 0 && (6..=510).contains(&text.len());
@@ -93,7 +93,7 @@ pub fn judge_ascii(inside: &[u8]) -> Option<Vec<u8>> {
     let check = bytes.pop()?;
     (check == lrc(&bytes)).then_some(bytes)
 }
-/// Function code and 16-bit fields.
+/// Returns a PDU of function code and 16-bit fields.
 pub fn pdu(function: u8, fields: &[u16]) -> Vec<u8> {
     let mut pdu = vec![function];
     fields
@@ -102,7 +102,7 @@ pub fn pdu(function: u8, fields: &[u16]) -> Vec<u8> {
     pdu
 }
 
-/// The PDU of function 0F.
+/// Returns the PDU of function 0F.
 pub fn write_bits(start: u16, bits: &[bool]) -> Vec<u8> {
     let mut pdu = pdu(0x0F, &[start, bits.len() as u16]);
     let packed = pack(bits);
@@ -111,7 +111,7 @@ pub fn write_bits(start: u16, bits: &[bool]) -> Vec<u8> {
     pdu
 }
 
-/// The PDU of function 10.
+/// Returns the PDU of function 10.
 pub fn write_words(start: u16, words: &[u16]) -> Vec<u8> {
     let mut pdu = pdu(0x10, &[start, words.len() as u16]);
     pdu.push((words.len() * 2) as u8);
@@ -119,14 +119,14 @@ pub fn write_words(start: u16, words: &[u16]) -> Vec<u8> {
     pdu
 }
 
-/// The PDU of function 17.
+/// Returns the PDU of function 17.
 pub fn write_then_read(read: u16, count: u16, write: u16, words: &[u16]) -> Vec<u8> {
     let mut request = pdu(0x17, &[read, count]);
     request.extend(&write_words(write, words)[1..]);
     request
 }
 
-/// The PDU of function 14: file, first record and count of each group.
+/// Returns the PDU of function 14: file, first record and count of each group.
 pub fn read_files(groups: &[(u16, u16, u16)]) -> Vec<u8> {
     let groups: Vec<Vec<u8>> = groups
         .iter()
@@ -136,7 +136,7 @@ pub fn read_files(groups: &[(u16, u16, u16)]) -> Vec<u8> {
     [&[0x14, groups.len() as u8], &groups[..]].concat()
 }
 
-/// The PDU of function 15: file, first record and words of each group.
+/// Returns the PDU of function 15: file, first record and words of each group.
 pub fn write_files(groups: &[(u16, u16, Vec<u16>)]) -> Vec<u8> {
     let groups: Vec<Vec<u8>> = groups
         .iter()
@@ -153,7 +153,7 @@ pub fn write_files(groups: &[(u16, u16, Vec<u16>)]) -> Vec<u8> {
     [&[0x15, groups.len() as u8], &groups[..]].concat()
 }
 
-/// Eight bits to a byte, the first lowest.
+/// Packs eight bits into a byte, the first bit lowest.
 pub fn pack(bits: &[bool]) -> Vec<u8> {
     let packed = |bits: &[bool]| {
         bits.iter()

@@ -1,33 +1,34 @@
-//! What a unit must have received, from the whole text of a frame at its end: plain where real receivers are quick.
+//! Returns what a unit must have received, from all characters of a frame at its end. Simple, where real receivers
+//! must be fast.
 
 use crate::{UNIT, judge_ascii, judge_rtu};
 
-/// What a line has counted (V1.02 appendix A, and what a receiver drops).
+/// Counters of a line (V1.02 appendix A, and dropped frames).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounters {
-    /// Frames with a good check.
+    /// Frames with a valid CRC or LRC.
     pub bus_messages: u16,
-    /// Bad frames.
+    /// Damaged frames.
     pub communication_errors: u16,
-    /// Bad frames with an overrun.
+    /// Damaged frames with an overrun.
     pub overruns: u16,
-    /// Silences above t1.5 within frames.
+    /// Silences longer than t1.5 within frames.
     pub gaps: u16,
-    /// Good frames for this unit that it could not take.
+    /// Valid frames for this unit that it could not take.
     pub dropped: u16,
 }
 
-/// What was at the end of a frame.
+/// The content of a frame at its end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Closed {
     /// No frame.
     Nothing,
-    /// A bad frame.
+    /// A damaged frame.
     Bad {
         /// A character was lost.
         overrun: bool,
     },
-    /// A good frame: unit address and PDU.
+    /// A valid frame.
     Good {
         /// Unit address and PDU.
         body: Vec<u8>,
@@ -37,7 +38,7 @@ pub enum Closed {
 }
 
 impl Closed {
-    /// Unit address and PDU of a request that this unit serves.
+    /// Returns unit address and PDU of a request that this unit serves.
     pub fn request(self) -> Option<Vec<u8>> {
         match self {
             Self::Good {
@@ -53,19 +54,19 @@ fn is_for_us(body: &[u8]) -> bool {
     [0, UNIT].contains(&body[0])
 }
 
-/// The line a unit listens to.
+/// Mode of the unit's line.
 #[derive(Clone, Copy, Debug)]
 pub enum Mode {
     /// RTU.
     Rtu {
-        /// A gap above t1.5 costs the frame.
+        /// A gap longer than t1.5 makes the frame invalid.
         strict: bool,
     },
     /// ASCII.
     Ascii {
-        /// The top bit of a character is not data.
+        /// The highest bit of a character is not data.
         seven_bits: bool,
-        /// The highest bit of a byte is a stop bit, and a character in which it is 0 is damaged.
+        /// The highest bit of a byte is a stop bit. A character in which it is 0 is damaged.
         stop_in_byte: bool,
         /// The last character of a frame.
         delimiter: u8,
@@ -75,17 +76,17 @@ pub enum Mode {
 /// A receiver with two buffers.
 #[derive(Debug)]
 pub struct Receiver {
-    /// How the line is used.
+    /// Mode of the line.
     pub mode: Mode,
     /// What has been counted.
     pub counters: LineCounters,
-    /// Buffers that are not away.
+    /// Number of free buffers.
     pub free: usize,
     deaf: bool,
     frame: Option<Frame>,
 }
 
-/// A frame under way.
+/// A frame that is being received.
 #[derive(Debug, Default)]
 struct Frame {
     text: Vec<u8>,
@@ -93,12 +94,12 @@ struct Frame {
     overrun: bool,
     torn: bool,
     paused: bool,
-    /// There was a buffer when it began.
+    /// A buffer was free when the frame began.
     kept: bool,
 }
 
 impl Receiver {
-    /// A receiver of a line where a frame may be under way.
+    /// Creates a receiver of a line on which a frame may be under way.
     #[must_use]
     pub fn new(mode: Mode) -> Self {
         Self {
@@ -110,8 +111,8 @@ impl Receiver {
         }
     }
 
-    /// A character, with faults as the bits of `modbus_server::line::Faults`, of which noise (4) does not count. Returns
-    /// the ASCII frame that a colon cut off.
+    /// Processes a character. `faults` are the bits of `modbus_server::line::Faults`, of which noise (4) is
+    /// ignored. Returns the ASCII frame that a colon has ended.
     pub fn character(&mut self, byte: u8, faults: u8) -> Closed {
         let faults = faults & 11;
         match self.mode {
@@ -135,7 +136,7 @@ impl Receiver {
                 let byte = if seven_bits { byte % 128 } else { byte };
                 if byte == b':' && (self.frame.is_none() || faults == 0) {
                     let closed = self.close();
-                    // A complete frame that nobody took in time is dropped; its buffer is free again.
+                    // A complete frame that was not taken in time is dropped; its buffer is free again.
                     if closed.clone().request().is_some() {
                         self.counters.dropped = self.counters.dropped.wrapping_add(1);
                         self.free += 1;
@@ -167,14 +168,14 @@ impl Receiver {
         self.frame = Some(frame);
     }
 
-    /// t1.5 has passed.
+    /// Passes t1.5 of silence.
     pub fn pause(&mut self) {
         if let (Mode::Rtu { .. }, Some(frame)) = (self.mode, &mut self.frame) {
             frame.paused = true;
         }
     }
 
-    /// Whether the last character was the end of an ASCII frame.
+    /// Returns whether the last character was the end of an ASCII frame.
     #[must_use]
     pub fn is_over(&self) -> bool {
         match (self.mode, &self.frame) {
@@ -185,7 +186,7 @@ impl Receiver {
         }
     }
 
-    /// The end of a frame.
+    /// Ends the frame.
     pub fn close(&mut self) -> Closed {
         self.deaf = false;
         let Some(frame) = self.frame.take() else {
@@ -214,7 +215,7 @@ impl Receiver {
         Closed::Good { body, dropped }
     }
 
-    /// The unit was sending itself.
+    /// Continues after the unit has been sending.
     pub fn resume(&mut self) {
         self.deaf = false;
         self.frame = None;

@@ -1,35 +1,35 @@
-//! What a server does with good and bad frames (V1.1b3 6, V1.02 appendix A).
+//! Behaviour of a server for valid and damaged frames (V1.1b3 6, V1.02 appendix A).
 
 use crate::{Device, UNIT, framed};
 
 /// A server and its counters.
 pub struct Server {
-    /// What it serves.
+    /// The device that it serves.
     pub device: Device,
     /// The end mark of frames in ASCII mode; `None` in RTU mode.
     pub delimiter: Option<u8>,
-    /// It is in listen-only mode.
+    /// The unit is in listen-only mode.
     pub listening: bool,
-    /// Listen-only mode can be entered.
+    /// Listen-only mode is supported.
     pub can_listen_only: bool,
-    /// In the order of their sub-functions, from 0B on; the gaps last.
+    /// Counters in the order of their sub-functions, from 0B on; the gaps are last.
     pub counters: [u16; 9],
     /// The event counter of function 11.
     pub events: u16,
-    /// The newest last.
+    /// The event log, newest event last.
     pub log: Vec<u8>,
-    /// Bad frames, and overruns, that the log does not know of yet.
+    /// Number of damaged frames, and of overruns among them, that are not in the log yet.
     pub unlogged: (u16, u16),
-    /// Bits of the diagnostic register that have not gone since they were cleared.
+    /// Bits of the diagnostic register that have not been 0 since they were cleared.
     cleared: [u8; 2],
 }
 
-// The places of the counters.
-/// Good frames on the bus.
+// Indices of the counters.
+/// Valid frames on the bus.
 pub const BUS: usize = 0;
-/// Bad frames.
+/// Damaged frames.
 pub const ERRORS: usize = 1;
-/// Requests refused.
+/// Rejected requests.
 pub const EXCEPTIONS: usize = 2;
 /// Requests for this unit.
 pub const UNIT_MESSAGES: usize = 3;
@@ -39,13 +39,13 @@ pub const NO_RESPONSE: usize = 4;
 pub const NAK: usize = 5;
 /// Exceptions 06.
 pub const BUSY: usize = 6;
-/// Bad frames with an overrun.
+/// Damaged frames with an overrun.
 pub const OVERRUNS: usize = 7;
 /// Gaps within frames.
 pub const GAPS: usize = 8;
 
 impl Server {
-    /// A server that starts, in ASCII mode with this end mark or in RTU mode.
+    /// Creates a server, in ASCII mode with this end mark or in RTU mode.
     pub fn new(delimiter: Option<u8>, device: Device) -> Self {
         Self {
             delimiter,
@@ -60,7 +60,7 @@ impl Server {
         }
     }
 
-    /// A bad frame was heard.
+    /// Counts a damaged frame.
     pub fn bad(&mut self, overrun: bool) {
         self.counters[ERRORS] += 1;
         self.counters[OVERRUNS] += u16::from(overrun);
@@ -68,7 +68,7 @@ impl Server {
         self.unlogged.1 += u16::from(overrun);
     }
 
-    /// A good frame was heard; `torn`: it must not be obeyed. The frame of the reply.
+    /// Serves a valid frame and returns the frame of the reply. With `torn` the frame must not be served.
     pub fn good(&mut self, unit: u8, pdu: &[u8], torn: bool) -> Option<Vec<u8>> {
         self.counters[BUS] += 1;
         if unit != UNIT && unit != 0 {
@@ -88,13 +88,13 @@ impl Server {
         Some(framed(delimiter, UNIT, &reply))
     }
 
-    /// A good frame for this unit is not served.
+    /// Counts a valid frame for this unit that is not served.
     fn drop_good(&mut self) {
         self.counters[UNIT_MESSAGES] += 1;
         self.counters[NO_RESPONSE] += 1;
     }
 
-    /// A request to this unit or to all, which `answer` serves: the PDU of the reply.
+    /// Serves a request to this unit or a broadcast by calling `answer`. Returns the PDU of the reply.
     pub fn request(
         &mut self,
         broadcast: bool,
@@ -103,7 +103,7 @@ impl Server {
     ) -> Option<Vec<u8>> {
         let listening = |me: &Self| if me.listening { 0x20 } else { 0 };
         let (bad, overruns) = std::mem::take(&mut self.unlogged);
-        // Of more than the log holds nobody knows which were the last: overruns are told first.
+        // When there are more than the log holds, their order is unknown: overruns are logged first.
         for n in 0..bad.min(64) {
             let overrun = if n < overruns { 0x10 } else { 0 };
             self.log.push(0x82 + overrun + listening(self));
@@ -116,10 +116,10 @@ impl Server {
             && [[8, 0, 1, 0, 0], [8, 0, 1, 0xFF, 0]]
                 .iter()
                 .any(|r| r == pdu);
-        let hushes = !broadcast && pdu == [8, 0, 4, 0, 0] && !self.listening;
-        let hushes = hushes && self.can_listen_only;
+        let enters_listen_only = !broadcast && pdu == [8, 0, 4, 0, 0] && !self.listening;
+        let enters_listen_only = enters_listen_only && self.can_listen_only;
         let obeyed = (1..=127).contains(&pdu[0]) && (!self.listening || restarts);
-        let silent = broadcast || hushes || self.listening || !obeyed;
+        let silent = broadcast || enters_listen_only || self.listening || !obeyed;
         self.counters[NO_RESPONSE] += u16::from(silent);
 
         let can_be_broadcast = [5, 6, 15, 16, 21, 22].contains(&pdu[0]);
@@ -127,7 +127,7 @@ impl Server {
         let mut reply = None;
         if obeyed {
             let before = self.device.clone();
-            // What is asked for is read after the request has been counted.
+            // Counters are read after the request has been counted.
             self.events += u16::from(!matches!(pdu[0], 11 | 12));
             match answer(self, pdu) {
                 Ok(pdu) => reply = Some(pdu),
@@ -165,7 +165,7 @@ impl Server {
         reply.filter(|_| !silent)
     }
 
-    /// What function 08 does once its reply is out.
+    /// Executes the effects of function 08 after its reply.
     fn afterwards(&mut self, pdu: &[u8]) {
         let gone = |me: &mut Self| {
             me.counters = [0; 9];
@@ -195,7 +195,7 @@ impl Server {
         }
     }
 
-    /// The PDU of the reply, or an exception code.
+    /// Returns the PDU of the reply, or an exception code.
     pub fn answer(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
         let (events, bus) = (self.events.to_be_bytes(), self.counters[BUS].to_be_bytes());
         if self.device.lacks.contains(&pdu[0]) {
@@ -238,7 +238,7 @@ impl Server {
         }
     }
 
-    /// The diagnostic register of the device, all of it.
+    /// Returns the diagnostic register of the device, including cleared bits.
     fn register(&self) -> [u8; 2] {
         [0xAB, self.device.status]
     }
@@ -276,10 +276,10 @@ impl Server {
     }
 }
 
-/// The longest value that fits a reply by itself.
+/// Length of the longest value that fits a reply alone.
 const LONGEST: usize = 253 - 7 - 2;
 
-/// Function 2B/0E: whole objects, as many as fit.
+/// Function 2B/0E: returns whole objects, as many as fit.
 pub(crate) fn identify(device: &Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     match pdu {
         [_] => return Err(3),

@@ -1,9 +1,9 @@
-//! The reference's reading and writing of device.
+//! Reads and writes the device for the reference server.
 
 use crate::Device;
 use crate::server::identify;
 
-/// Serves the PDU of a request that reads or writes points, or identification.
+/// Serves the PDU of a request that reads or writes points, or reads the identification.
 pub fn answer(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     let function = pdu[0];
     match function {
@@ -24,7 +24,7 @@ pub fn answer(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
             if at >= there {
                 return Err(2);
             }
-            // What cannot be read cannot be masked.
+            // A word that cannot be read cannot be masked.
             device.state.map_or(Ok(()), Err)?;
             let now = usize::from(device.words[at]);
             let [and, or] = [3, 5].map(|from| field(pdu, from));
@@ -117,7 +117,7 @@ fn write_one(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     Ok(pdu.to_vec())
 }
 
-/// Start and count of a multiple write that can be done.
+/// Checks a multiple write. Returns its start and count.
 fn check_many(device: &Device, pdu: &[u8], bits: bool, limit: usize) -> Result<(), u8> {
     let (start, count) = (field(pdu, 1), field(pdu, 3));
     let bytes = if bits { count.div_ceil(8) } else { count * 2 };
@@ -156,7 +156,7 @@ fn write_many(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     Ok(pdu[..5].to_vec())
 }
 
-/// Form of both halves, then the addresses of both, then values, then the write and the read.
+/// Checks the form of both halves, then both address ranges, then values; then writes and reads.
 fn read_and_write(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     if pdu.len() < 10 {
         return Err(3);
@@ -174,7 +174,8 @@ fn read_and_write(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     read(device, 23, start, count)
 }
 
-/// The groups of a request of function 20 or 21: reference type, file, first record, count, and where its data begin.
+/// Returns the groups of a request of function 20 or 21: reference type, file, first record, count, and start of
+/// the data.
 fn groups(pdu: &[u8]) -> Result<Vec<[usize; 5]>, u8> {
     let (least, most) = if pdu[0] == 20 { (7, 245) } else { (9, 251) };
     if pdu.len() < 2 || pdu[1] < least || pdu[1] > most || pdu.len() != 2 + pdu[1] as usize {
@@ -202,7 +203,7 @@ fn groups(pdu: &[u8]) -> Result<Vec<[usize; 5]>, u8> {
     Ok(groups)
 }
 
-/// All groups are there; `writing`: and can be written.
+/// Checks that all groups exist and, if `writing`, that they can be written.
 fn check_groups(device: &Device, groups: &[[usize; 5]], writing: bool) -> Result<(), u8> {
     for [reference, file, record, count, _] in groups {
         if *reference != 6 || *file == 0 || record + count > 10_000 {

@@ -1,18 +1,18 @@
-//! A whole unit on a line.
+//! A complete unit on a line.
 
 use crate::server::GAPS;
 use crate::{Closed, Device, Mode, Receiver, Server};
 
 /// Receives, serves and replies.
 pub struct Unit {
-    /// What it does with frames.
+    /// The server part.
     pub server: Server,
     receiver: Receiver,
 }
 
 impl Unit {
-    /// A unit after the first silence; `delimiter`: in ASCII mode with this end mark, else in RTU mode. `strict`: a gap
-    /// above t1.5 costs an RTU frame.
+    /// Creates a unit after the first silence. `delimiter` selects ASCII mode with this end mark, `None` RTU mode.
+    /// With `strict` a gap longer than t1.5 makes an RTU frame invalid.
     pub fn new(delimiter: Option<u8>, device: Device, strict: bool) -> Self {
         let server = Server::new(delimiter, device);
         let mut receiver = Receiver::new(mode(delimiter, strict));
@@ -20,7 +20,8 @@ impl Unit {
         Self { server, receiver }
     }
 
-    /// A character, with faults as for [`Receiver::character`]. The reply to an ASCII frame that it ended.
+    /// Processes a character, with faults as for [`Receiver::character`]. Returns the reply to an ASCII frame that
+    /// it ended.
     pub fn character(&mut self, byte: u8, faults: u8) -> Option<Vec<u8>> {
         let gaps = self.receiver.counters.gaps;
         let cut_off = self.receiver.character(byte, faults);
@@ -33,12 +34,12 @@ impl Unit {
         }
     }
 
-    /// 1.5 characters of silence.
+    /// Passes 1.5 characters of silence.
     pub fn pause(&mut self) {
         self.receiver.pause();
     }
 
-    /// The reply to what was received before this silence.
+    /// Passes a silence. Returns the reply to the frame before it.
     pub fn silence(&mut self) -> Option<Vec<u8>> {
         let closed = self.receiver.close();
         self.serve(closed)

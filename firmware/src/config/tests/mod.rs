@@ -1,4 +1,4 @@
-//! The configuration as a master sees it.
+//! The configuration as a master reads and writes it.
 
 extern crate std;
 
@@ -18,13 +18,13 @@ const VALUE: Result<Option<Command>, Exception> = Err(Exception::IllegalDataValu
 const LOCKED: Result<Option<Command>, Exception> = Err(Exception::ServerDeviceBusy);
 const DONE: Result<Option<Command>, Exception> = Ok(None);
 
-/// On the board with one slot, port 5.
+/// The configuration on the board with one slot, port 5.
 type Config = super::Config<1>;
 
 const SLOT: u16 = points::first(5);
 const MODULE_SLOT: u16 = module_of(5);
 
-/// Writes as the server does: only what was found good.
+/// Writes like the server: only when the check accepts the request.
 fn write<const SLOTS: usize>(
     config: &mut super::Config<SLOTS>,
     start: u16,
@@ -83,7 +83,7 @@ fn save(config: &mut Config) {
 }
 
 #[test]
-fn everything_reads_its_default_key_and_command_nothing() {
+fn every_setting_reads_its_default_and_key_and_command_read_0() {
     let config = config(&[]);
     let first = read(&config, KEY, 9).unwrap();
     assert_eq!(first, [0, 96, 0, 0, 0, 0, 0, 0, 0]);
@@ -95,7 +95,7 @@ fn everything_reads_its_default_key_and_command_nothing() {
 }
 
 #[test]
-fn gaps_are_no_addresses_neither_to_read_nor_to_write() {
+fn gaps_cannot_be_read_or_written() {
     let mut config = unlocked(&[]);
     for (start, count) in [
         (0x0108, 2),
@@ -124,7 +124,7 @@ fn gaps_are_no_addresses_neither_to_read_nor_to_write() {
 }
 
 #[test]
-fn a_gap_comes_before_a_bad_value_and_that_before_the_lock() {
+fn a_gap_is_reported_before_a_bad_value_and_that_before_the_lock() {
     let mut config = config(&[]);
     assert_eq!(write(&mut config, COMMAND, &[99, 99]), ADDRESS);
     assert_eq!(write(&mut config, BAUD, &[97]), VALUE);
@@ -147,7 +147,7 @@ fn the_lock_stays_open_for_sixty_seconds_after_the_last_write() {
     assert_eq!(
         write(&mut config, BAUD, &[1]),
         VALUE,
-        "refused: it keeps nothing open"
+        "a rejected write does not keep the lock open"
     );
     assert_eq!(read(&config, KEY, 1).unwrap(), [1]);
     config.tick(1);
@@ -158,14 +158,14 @@ fn the_lock_stays_open_for_sixty_seconds_after_the_last_write() {
 }
 
 #[test]
-fn the_key_does_not_open_for_its_own_request() {
+fn key_does_not_unlock_settings_in_its_own_request() {
     let mut config = config(&[]);
     let values = [OPENING_KEY, 1152, 1];
     assert_eq!(write(&mut config, KEY, &values), LOCKED);
     assert_eq!(
         read(&config, KEY, 3).unwrap(),
         [0, 96, 0],
-        "nothing has happened"
+        "nothing was written"
     );
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
     assert_eq!(write(&mut config, KEY, &values), DONE);
@@ -174,7 +174,7 @@ fn the_key_does_not_open_for_its_own_request() {
 }
 
 #[test]
-fn one_bad_value_among_many_and_nothing_is_written() {
+fn one_bad_value_rejects_the_whole_write() {
     let mut config = unlocked(&[(MODULE_SLOT, 2)]);
     let before = all(&config);
     let good: Vec<u16> = [[2000; 32], [1; 32], [1; 32]].concat();
@@ -209,7 +209,7 @@ fn format_with_seven_data_bits_is_refused_in_rtu_mode() {
 }
 
 #[test]
-fn now_is_now_and_restart_is_after_the_restart() {
+fn settings_take_effect_immediately_or_after_the_restart() {
     let mut config = unlocked(&[(MODULE_SLOT, 6)]);
     assert_eq!(write(&mut config, BAUD, &[1152, 1, 0, 36_000, 7, 5]), DONE);
     assert_eq!(write(&mut config, RANGE + SLOT, &[1, 0, 1]), DONE);
@@ -249,16 +249,16 @@ fn now_is_now_and_restart_is_after_the_restart() {
     assert_eq!(all(&restarted), all(&config));
 }
 
-/// FILTER in force of the first point, if the settings by point are.
+/// Returns FILTER in force of the first point, or `None` while the settings by point are not in force.
 #[test]
-fn unsaved_is_what_differs_from_what_is_saved() {
+fn unsaved_is_reported_while_settings_differ_from_the_saved_ones() {
     let mut config = unlocked(&[]);
     assert_eq!(write(&mut config, BETA, &[2000, 3950, 2000]), DONE);
     assert_eq!(status(&config), status::UNSAVED);
     assert_eq!(write(&mut config, BETA, &[3950, 3950]), DONE);
     assert_eq!(status(&config), status::UNSAVED);
     assert_eq!(write(&mut config, BETA + 2, &[3950]), DONE);
-    assert_eq!(status(&config), 0, "as it was");
+    assert_eq!(status(&config), 0, "back to the saved value");
     assert_eq!(write(&mut config, MODULE_SLOT, &[4]), DONE);
     assert_eq!(status(&config), status::UNSAVED);
     assert_eq!(write(&mut config, MODULE_SLOT, &[0]), DONE);
@@ -270,7 +270,7 @@ fn a_saved_change_waits_for_the_restart_if_it_needs_one() {
     let mut config = unlocked(&[]);
     assert_eq!(write(&mut config, COMM_TIMEOUT, &[5]), DONE);
     save(&mut config);
-    assert_eq!(status(&config), 0, "in force at once");
+    assert_eq!(status(&config), 0, "in force immediately");
     assert_eq!(write(&mut config, START, &[5]), DONE);
     assert_eq!(status(&config), status::UNSAVED);
     save(&mut config);
@@ -282,11 +282,15 @@ fn a_saved_change_waits_for_the_restart_if_it_needs_one() {
 }
 
 #[test]
-fn a_save_takes_the_settings_of_its_moment() {
+fn a_save_stores_the_settings_at_the_time_of_the_command() {
     let mut config = unlocked(&[]);
     assert_eq!(write(&mut config, BETA, &[2000]), DONE);
     assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
-    assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED, "one at a time");
+    assert_eq!(
+        write(&mut config, COMMAND, &[1]),
+        LOCKED,
+        "one save at a time"
+    );
     config.begin_save();
     assert_eq!(write(&mut config, BETA, &[3000]), DONE);
     assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);
@@ -304,7 +308,7 @@ fn a_save_takes_the_settings_of_its_moment() {
 }
 
 #[test]
-fn unsaved_stays_until_the_save_is_complete_or_when_it_fails() {
+fn unsaved_is_reported_until_the_save_is_complete_and_after_a_failure() {
     let mut config = unlocked(&[]);
     assert_eq!(write(&mut config, BETA, &[2000]), DONE);
     assert_eq!(write(&mut config, COMMAND, &[1]), Ok(Some(Command::Save)));
@@ -318,7 +322,7 @@ fn unsaved_stays_until_the_save_is_complete_or_when_it_fails() {
 }
 
 #[test]
-fn defaults_are_loaded_and_changes_dropped_as_if_written() {
+fn loading_defaults_and_dropping_changes_act_like_writes() {
     let mut config = unlocked(&[(BAUD, 1152), (BETA, 2000)]);
     assert_eq!(
         write(&mut config, COMMAND, &[3]),
@@ -327,7 +331,7 @@ fn defaults_are_loaded_and_changes_dropped_as_if_written() {
     assert_eq!(
         read(&config, BAUD, 1).unwrap(),
         [1152],
-        "not before the response is out"
+        "not before the response has been sent"
     );
     let revision = config.revision();
     config.load_defaults();
@@ -346,7 +350,7 @@ fn defaults_are_loaded_and_changes_dropped_as_if_written() {
 }
 
 #[test]
-fn every_command_is_given_back_and_changes_nothing_itself() {
+fn every_command_is_returned_and_writing_it_changes_nothing() {
     let mut config = unlocked(&[(BAUD, 1152)]);
     let before = all(&config);
     for command in Command::ALL {

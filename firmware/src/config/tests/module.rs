@@ -1,9 +1,9 @@
-//! MODULE and the settings by point, which are made for one module.
+//! MODULE and the settings by point, which depend on the module.
 
 use super::*;
 
 #[test]
-fn the_module_as_written_last_says_what_its_points_take() {
+fn the_module_written_last_determines_the_allowed_values_of_its_points() {
     let mut config = unlocked(&[(MODULE_SLOT, 1)]);
     for (module, address, good, bad) in [
         (1, FILTER, 1000, 1001),
@@ -65,7 +65,7 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
     assert_eq!(config.ports()[3].start, [1, 0, 0, 0]);
 
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
-    // A run over the points of ports 1 to 4: each is judged by its own module.
+    // A write over the points of ports 1 to 4: each is checked against its own module.
     let mut values = [5; 16];
     assert_eq!(write(&mut config, FILTER, &values), DONE);
     values[3] = 1000;
@@ -82,7 +82,11 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
     config.drop_changes();
     assert_eq!(write(&mut config, module_of(2), &[5]), DONE);
     let left: Vec<_> = (0..4).map(|index| config.points(index).is_none()).collect();
-    assert_eq!(left, [false, true, false, false], "port 2 alone waits");
+    assert_eq!(
+        left,
+        [false, true, false, false],
+        "only port 2 waits for the restart"
+    );
 }
 
 fn filter(config: &Config) -> Option<u16> {
@@ -91,16 +95,20 @@ fn filter(config: &Config) -> Option<u16> {
 }
 
 #[test]
-fn settings_by_point_wait_with_the_module_they_are_made_for() {
+fn settings_by_point_take_effect_together_with_their_module() {
     let mut config = unlocked(&[(MODULE_SLOT, 4), (FILTER + SLOT, 7)]);
     assert_eq!(filter(&config).unwrap(), 7);
     assert_eq!(write(&mut config, MODULE_SLOT, &[1]), DONE);
     assert_eq!(write(&mut config, FILTER + SLOT, &[1000]), DONE);
     assert_eq!(filter(&config), None);
     assert_eq!(write(&mut config, MODULE_SLOT, &[4]), DONE);
-    assert_eq!(filter(&config), None, "defaults by now, which do not run");
+    assert_eq!(
+        filter(&config),
+        None,
+        "edited settings are defaults now and not in force"
+    );
     config.drop_changes();
-    assert_eq!(filter(&config).unwrap(), 7, "as saved");
+    assert_eq!(filter(&config).unwrap(), 7, "the saved value");
     for module in [1, 4] {
         assert_eq!(write(&mut config, MODULE_SLOT, &[module]), DONE);
     }

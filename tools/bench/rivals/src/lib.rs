@@ -1,5 +1,5 @@
-//! What every rival has in common: a mailbox in RAM, where the bench leaves a request and finds the
-//! response, and the data that is served.
+//! Shared by all rivals: a mailbox in RAM, in which the bench writes a request and reads the response, and the
+//! data.
 
 #![no_std]
 
@@ -12,17 +12,17 @@ use core::{
 
 /// Unit address of every rival.
 pub const UNIT: u8 = 1;
-/// Bit points that can be read and written, each kind.
+/// Number of bit points of each kind that can be read and written.
 pub const BITS: usize = 2000;
-/// Word points that can be read and written, each kind.
+/// Number of word points of each kind that can be read and written.
 pub const WORDS: usize = 128;
-/// The longest ADU.
+/// Length of the longest ADU.
 pub const ADU: usize = 256;
 
-/// Where the bench and a rival meet. Little-endian, without padding.
+/// Exchanges requests and responses between the bench and a rival. Little-endian, without padding.
 #[repr(C)]
 pub struct Mailbox {
-    /// Not 0: there is a request.
+    /// Length of the request; 0 when there is none.
     request_len: AtomicU32,
     response_len: AtomicU32,
     request: [u8; ADU],
@@ -38,11 +38,11 @@ static mut MAILBOX: Mailbox = Mailbox {
     response: [0; ADU],
 };
 
-/// Serves what comes, for ever: `serve` gets a complete frame, CRC included, and leaves the complete
-/// response, CRC included, whose length it gives; 0 for none.
+/// Serves requests forever. `serve` receives a complete frame including CRC, writes the complete response including
+/// CRC, and returns its length, 0 for none.
 pub fn run(mut serve: impl FnMut(&[u8], &mut [u8; ADU]) -> usize) -> ! {
-    // SAFETY: this does not return and is called by `main` alone, so there is one reference. The bench
-    // writes to the mailbox only while the request's length is 0, and looks at its end below.
+    // SAFETY: this function does not return and only `main` calls it, so there is one reference. The bench writes
+    // to the mailbox only while the request's length is 0, and reads it only at `bench_end`.
     let mailbox = unsafe { &mut *ptr::addr_of_mut!(MAILBOX) };
     loop {
         let len = mailbox.request_len.load(Ordering::Acquire) as usize;
@@ -60,16 +60,17 @@ pub fn run(mut serve: impl FnMut(&[u8], &mut [u8; ADU]) -> usize) -> ! {
     }
 }
 
-/// Its address is where the counting begins.
+/// The bench counts from the address of this function.
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn bench_begin() {
     hint::black_box(());
-    // SAFETY: does nothing, but tells this function from the other, or they would be one.
+    // SAFETY: does nothing. It makes this function differ from the other one; otherwise the linker would merge
+    // them.
     unsafe { core::arch::asm!("nop") }
 }
 
-/// Its address is where the counting ends.
+/// The bench counts up to the address of this function.
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn bench_end() {
@@ -82,7 +83,7 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     bench_panicked()
 }
 
-/// The bench looks out for it.
+/// The bench detects that this function is called.
 #[unsafe(no_mangle)]
 #[inline(never)]
 extern "C" fn bench_panicked() -> ! {

@@ -1,4 +1,4 @@
-//! A server on crate modbus-core, as far as that goes: it does not decode a good request of 0F or 10.
+//! A server on crate modbus-core, as far as the crate supports it: it does not decode a valid request of 0F or 10.
 
 #![no_std]
 #![no_main]
@@ -13,7 +13,7 @@ use modbus_core::{
 };
 use rivals::{ADU, BITS, UNIT, WORDS};
 
-/// The points. Bits are a byte each, as rmodbus has them.
+/// The points. Each bit is a byte, as in rmodbus.
 struct Points {
     bits: [bool; BITS],
     words: [u16; WORDS],

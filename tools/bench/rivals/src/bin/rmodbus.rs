@@ -1,4 +1,4 @@
-//! A server on crate rmodbus, as its documentation shows one.
+//! A server on crate rmodbus, as in its documentation.
 
 #![no_std]
 #![no_main]

@@ -1,4 +1,4 @@
-//! The decision: is the request right, does the model agree, how does the reply begin.
+//! The decision: checks the request, asks the model, and creates the head of the reply.
 
 use super::Server;
 use crate::decision::Job;
@@ -8,12 +8,12 @@ use crate::head::Head;
 use crate::pdu::Request;
 use crate::{DataModel, Exception, Function, Span, Table, Words, WordsOut, file, identification};
 
-/// The start of the reply of `unit`, and the work, of an accepted request. `fields` are what follows
-/// the function code `function`.
+/// Returns the head of the reply of `unit`, and the work, for an accepted request. `fields` are the bytes after the
+/// function code `function`.
 ///
 /// # Errors
 /// The exception to answer with.
-pub(super) fn settle(
+pub(super) fn accept(
     server: &Server,
     unit: u8,
     function: u8,
@@ -97,7 +97,7 @@ pub(super) fn settle(
                 ..
             } = *server;
             let diagnostic = Diagnostic::decode(fields, framing, can_listen_only)?;
-            // The reply begins as the request does; what follows is the request's, or replaces it.
+            // The reply begins like the request; the rest repeats or replaces the request's data.
             let head = Head::in_place(unit, function, first(fields)?);
             (head, Job::Diagnose(diagnostic))
         }
@@ -117,7 +117,7 @@ fn read_words(unit: u8, function: u8, span: Span) -> Head {
     Head::read(unit, function, (span.count() * 2) as u8)
 }
 
-/// The first bytes after the function code, as they came.
+/// Returns the first bytes after the function code, as received.
 fn first<const N: usize>(fields: &[u8]) -> Result<[u8; N], Exception> {
     fields
         .first_chunk()
@@ -125,15 +125,15 @@ fn first<const N: usize>(fields: &[u8]) -> Result<[u8; N], Exception> {
         .ok_or(Exception::IllegalDataValue)
 }
 
-/// What a mask makes of a word: (current AND and) OR (or AND NOT and), V1.1b3 6.16.
+/// Returns the result of a mask write: (current AND and) OR (or AND NOT and), V1.1b3 6.16.
 ///
 /// # Errors
-/// As for a write of that; where the word cannot be read now, the reason for it.
+/// The exception of a write of the result, or of the read when the word cannot be read now.
 fn masked(address: u16, and: u16, or: u16, model: &impl DataModel) -> Result<u16, Exception> {
     let span = Span::single(address);
     let mut bytes = [0; 2];
     if let Err(unreadable) = model.check_read_words(Table::HoldingRegisters, span) {
-        // What would be written is not known, so that only the address can be worse.
+        // The value to write is not known, so only an address error can have a higher priority than this exception.
         let write = model.check_write_words(span, Words::new(&bytes));
         return Err(match write {
             Err(Exception::IllegalDataAddress) => Exception::IllegalDataAddress,

@@ -1,0 +1,139 @@
+//! The device as a master accesses it, through a server and a port.
+
+extern crate std;
+
+mod files;
+mod points;
+mod state;
+
+use std::vec::Vec;
+
+use modbus_server::line::{Faults, Framing, Next, Port, Receiver};
+use modbus_server::{Adu, Server};
+use modio_drivers::ChannelStatus;
+use modio_drivers::Scale;
+use register_map::board::{MODIO_02, MODIO_08};
+use register_map::{Board, Module, configuration as at};
+
+use super::*;
+use crate::config::Settings;
+
+/// A device with these modules in its slots, these stored settings, and a server.
+struct Bench<const SLOTS: usize = 1> {
+    device: Device<SLOTS>,
+    server: Server,
+}
+
+/// CRC-16/MODBUS (V1.02 6.2.2), low byte first.
+fn crc(bytes: &[u8]) -> [u8; 2] {
+    let mut register = 0xFFFF;
+    for byte in bytes {
+        register ^= u16::from(*byte);
+        for _ in 0..8 {
+            let carry = register & 1;
+            register = (register >> 1) ^ (carry * 0xA001);
+        }
+    }
+    register.to_le_bytes()
+}
+
+impl Bench {
+    fn new(module: Module, settings: &[(u16, u16)]) -> Self {
+        Self::on(&MODIO_02, [module], settings)
+    }
+}
+
+impl<const SLOTS: usize> Bench<SLOTS> {
+    fn on(board: &'static Board, modules: [Module; SLOTS], settings: &[(u16, u16)]) -> Self {
+        let ports = board.ports().map(at::module_of);
+        let mut pairs: Vec<_> = ports.zip(modules.map(Module::code)).collect();
+        pairs.extend_from_slice(settings);
+        let (settings, rejected) = Settings::load(board, pairs.into_iter());
+        assert_eq!(rejected, 0);
+        let identity = Identity {
+            unit: 1,
+            reset_cause: 0b11_0000,
+            unique_id: [1, 2, 3, 4, 5, 6],
+            fault: [3; 16],
+            internal_oscillator: false,
+        };
+        Self {
+            device: Device::new(
+                modules.map(Module::points),
+                Config::new(board, settings, false),
+                identity,
+                if *board == MODIO_02 {
+                    const { &Fixed::of(&MODIO_02) }
+                } else {
+                    const { &Fixed::of(&MODIO_08) }
+                },
+            ),
+            server: Server::new(Framing::Rtu),
+        }
+    }
+
+    /// Sends a PDU to this unit, executes the resulting command, and returns the reply's PDU.
+    fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let mut adus = [Adu::new(), Adu::new()];
+        let mut port = Port::new(Receiver::rtu(1, false), &mut adus);
+        port.long_silence(0);
+        let body = [&[1], pdu].concat();
+        for byte in body.iter().chain(&crc(&body)) {
+            port.received(*byte, Faults::NONE);
+        }
+        assert!(port.long_silence(0));
+        let request = self.server.take(&mut port, 0).expect("a request waits");
+        let answered = request.decide(&self.server, &self.device).answer(&mut port);
+        let committed = answered.commit(&mut self.server);
+        if Device::<SLOTS>::shows_counters(&committed.decision().work) {
+            self.device.state.counters = self.server.counters();
+        }
+        let served = committed.carry_out(&mut self.server, &mut self.device);
+        served.finish(&mut port);
+        if let Some(order) = self.device.take_order() {
+            self.device.carry_out(order);
+        }
+        let mut reply: Vec<u8> = port.start().into_iter().collect();
+        while let Next::Byte(byte) = port.next() {
+            reply.push(byte);
+        }
+        reply[1..reply.len() - 2].to_vec()
+    }
+
+    fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>, u8> {
+        let [[a, b], [c, d]] = [address, count].map(u16::to_be_bytes);
+        let reply = self.ask(&[3, a, b, c, d]);
+        if reply[0] & 0x80 != 0 {
+            return Err(reply[1]);
+        }
+        let words = reply[2..].chunks(2);
+        Ok(words.map(|w| u16::from_be_bytes([w[0], w[1]])).collect())
+    }
+
+    fn write(&mut self, address: u16, values: &[u16]) -> Result<(), u8> {
+        let [[a, b], [c, d]] = [address, values.len() as u16].map(u16::to_be_bytes);
+        let mut pdu = std::vec![16, a, b, c, d, values.len() as u8 * 2];
+        pdu.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+        let reply = self.ask(&pdu);
+        if reply[0] & 0x80 != 0 {
+            return Err(reply[1]);
+        }
+        Ok(())
+    }
+
+    fn unlock(&mut self) {
+        assert_eq!(self.ask(&[6, 1, 0, 0x5A, 0x17])[0], 6);
+    }
+
+    fn scan(&mut self, set: impl FnOnce(&mut modio_drivers::Channels)) {
+        self.scan_port(0, set);
+    }
+
+    /// Runs a scan of the port with this index.
+    fn scan_port(&mut self, index: usize, set: impl FnOnce(&mut modio_drivers::Channels)) {
+        let port = &mut self.device.points.ports_mut()[index];
+        let mut channels = *port.channels();
+        set(&mut channels);
+        port.scanned(&channels, true);
+    }
+}
