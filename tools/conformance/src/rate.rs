@@ -10,9 +10,11 @@ use crate::case::{Check, Stop};
 use crate::line::LineFormat;
 use crate::points::{pdu, write_words};
 
-/// For the unit to store its configuration, and to start.
+/// Time for the unit to store its configuration.
 const STORING: Duration = Duration::from_millis(200);
+/// Longest time that a restart may take, and the interval at which the unit is asked whether it has restarted.
 const START: Duration = Duration::from_millis(1500);
+const INTERVAL: Duration = Duration::from_millis(250);
 
 /// How often the way back is tried: on a poor line one lost frame must not leave the unit elsewhere.
 const ATTEMPTS: u32 = 3;
@@ -105,11 +107,18 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
         bench.reply_is(&request, &request)?;
         bench.rest(STORING)?;
     }
-    bench.rest(START)?;
     bench.endpoint.set_line(to)?;
     bench.patience.quiet = bench.patience.quiet.max(to.t35() + to.characters(2));
     bench.patience.reply = bench.patience.reply.max(to.t35() * 2 + to.characters(4));
-    bench.alive(format!("the change to {to}"))
+    let latest = bench.endpoint.now() + START;
+    loop {
+        bench.rest(INTERVAL)?;
+        let answered = bench.alive(format!("the change to {to}"));
+        let silent = matches!(answered, Err(Stop::Fail(_)));
+        if !silent || bench.endpoint.now() >= latest {
+            return answered;
+        }
+    }
 }
 
 /// The value of FORMAT for a format; [`Stop::Skip`] when the device does not have it.

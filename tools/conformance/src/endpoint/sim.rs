@@ -38,6 +38,23 @@ pub struct Fitting {
     pub settings: Vec<(u16, u16)>,
 }
 
+impl Fitting {
+    /// A board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
+    #[must_use]
+    pub fn new(elf: PathBuf, board: &'static register_map::Board) -> Self {
+        Self {
+            elf,
+            board,
+            module: Module::None,
+            slots: Vec::new(),
+            dip: 1,
+            line: LineFormat::default(),
+            mode: Mode::Rtu,
+            settings: Vec::new(),
+        }
+    }
+}
+
 /// The virtual board, which carries out the requests of the exact-line protocol.
 pub struct InProcess {
     board: Board,
