@@ -54,20 +54,17 @@ pub struct Failure {
 }
 
 /// Why a case stops before its end.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Stop {
-    /// The unit did wrong.
+    /// The unit made a mistake.
+    #[error("sent {}; received {}; expected {}", .0.sent, .0.came, .0.wanted)]
     Fail(Failure),
-    /// The case does not apply, as was found on the way: why.
+    /// The case does not apply: the reason, which the case found while it ran.
+    #[error("{0}")]
     Skip(String),
-    /// The endpoint is gone.
-    Broken(Broken),
-}
-
-impl From<Broken> for Stop {
-    fn from(broken: Broken) -> Self {
-        Self::Broken(broken)
-    }
+    /// The endpoint no longer works.
+    #[error(transparent)]
+    Broken(#[from] Broken),
 }
 
 /// What a step of a case results in.

@@ -3,6 +3,8 @@
 
 use crc::{CRC_16_MODBUS, Crc};
 
+use crate::decode::bytes;
+
 const CRC16: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
 /// The longest RTU frame in bytes.
@@ -12,7 +14,7 @@ pub const ASCII_MOST: usize = 513;
 /// Bytes in front of the PDU on TCP.
 pub const MBAP: usize = 7;
 
-/// How frames are marked off.
+/// The form of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Framing {
@@ -26,7 +28,7 @@ pub enum Framing {
 }
 
 impl Framing {
-    /// Returns how a frame on a serial line is marked off, by its own form; `None` when its check is wrong. Each byte of
+    /// Returns the form of a frame on a serial line, by its bytes; `None` when its check is wrong. Each byte of
     /// an ASCII frame has to fit, so an RTU frame is not mistaken for one.
     #[must_use]
     pub fn on_line(frame: &[u8]) -> Option<Self> {
@@ -62,49 +64,86 @@ impl Framing {
         }
     }
 
-    /// The address and the PDU of a whole frame; `None` when it is damaged.
+    /// Returns the address and the PDU of a whole frame; `None` when the frame is damaged.
     #[must_use]
     pub fn open(self, frame: &[u8]) -> Option<(u8, Vec<u8>)> {
+        self.check(frame).ok()
+    }
+
+    /// Returns the address and the PDU of a whole frame.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the frame, for people.
+    pub fn check(self, frame: &[u8]) -> Result<(u8, Vec<u8>), String> {
         let bytes = match self {
             Self::Rtu => {
-                let (body, check) = frame.split_last_chunk::<2>()?;
-                (frame.len() <= RTU_MOST && crc(body) == *check).then(|| body.to_vec())?
+                let check = frame.split_last_chunk::<2>();
+                let (body, check) = check.ok_or("too short for a CRC")?;
+                if frame.len() > RTU_MOST {
+                    return Err(format!("longer than {RTU_MOST} bytes"));
+                }
+                fits("CRC", check, &crc(body))?;
+                body.to_vec()
             }
             Self::Ascii => {
-                let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
-                let mut bytes = hex(digits)?;
-                (lrc(&bytes) == 0).then(|| bytes.pop())?;
-                bytes
+                let digits = frame.strip_prefix(b":");
+                let digits = digits.ok_or("it does not begin with ':'")?;
+                let digits = digits.strip_suffix(b"\r\n");
+                let bytes = hex(digits.ok_or("it does not end in CR LF")?)?;
+                let (check, body) = bytes.split_last().ok_or("nothing in it")?;
+                fits("LRC", &[*check], &[lrc(body)])?;
+                body.to_vec()
             }
             Self::Mbap => {
-                let (header, rest) = frame.split_at_checked(MBAP - 1)?;
+                let header = frame.split_at_checked(MBAP - 1);
+                let (header, rest) = header.ok_or("too short for a header")?;
                 let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
-                (header[2..4] == [0, 0] && rest.len() == length).then(|| rest.to_vec())?
+                if header[2..4] != [0, 0] || rest.len() != length {
+                    return Err("its header is wrong".to_owned());
+                }
+                rest.to_vec()
             }
         };
-        let (unit, pdu) = bytes.split_first()?;
-        (!pdu.is_empty()).then(|| (*unit, pdu.to_vec()))
+        match bytes.split_first() {
+            Some((unit, pdu)) if !pdu.is_empty() => Ok((*unit, pdu.to_vec())),
+            _ => Err("too short for an address and a function code".to_owned()),
+        }
     }
 }
 
-/// The CRC as it stands on the line, low byte first (V1.02, 6.2.2).
+/// Compares a check with the right one.
+fn fits(name: &str, check: &[u8], right: &[u8]) -> Result<(), String> {
+    if check == right {
+        return Ok(());
+    }
+    let [check, right] = [check, right].map(|check| bytes(Framing::Rtu, check));
+    Err(format!("its {name} {check} is wrong, {right} is right"))
+}
+
+/// Returns the CRC in the order of the line, low byte first (V1.02, 6.2.2).
 #[must_use]
 pub fn crc(bytes: &[u8]) -> [u8; 2] {
     CRC16.checksum(bytes).to_le_bytes()
 }
 
-/// What makes the sum of all bytes 0 (V1.02, 6.2.1).
-fn lrc(bytes: &[u8]) -> u8 {
+/// Returns the LRC, with which the sum of all bytes is 0 (V1.02, 6.2.1).
+#[must_use]
+pub fn lrc(bytes: &[u8]) -> u8 {
     let sum = bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
     sum.wrapping_neg()
 }
 
-/// The bytes of hexadecimal digits; `None` when one is none, or is missing.
-fn hex(digits: &[u8]) -> Option<Vec<u8>> {
+/// The bytes of hexadecimal digits.
+fn hex(digits: &[u8]) -> Result<Vec<u8>, &'static str> {
     let (pairs, rest) = digits.as_chunks::<2>();
+    if !rest.is_empty() {
+        return Err("an odd number of digits");
+    }
     let digit = |digit: u8| char::from(digit).to_digit(16).map(|value| value as u8);
     let byte = |[high, low]: &[u8; 2]| Some(digit(*high)? << 4 | digit(*low)?);
-    rest.is_empty().then(|| pairs.iter().map(byte).collect())?
+    let bytes: Option<_> = pairs.iter().map(byte).collect();
+    bytes.ok_or("not only hexadecimal digits")
 }
 
 /// The length in bytes of the RTU response to this request, CRC included, from the beginning of the response. `None`
@@ -187,11 +226,12 @@ mod tests {
             let mut damaged = frame.clone();
             damaged[5] ^= 1;
             assert_eq!(framing.open(&damaged), None, "{framing:?}");
+            assert!(framing.check(&damaged).unwrap_err().contains("wrong"));
         }
     }
 
     #[test]
-    fn form_of_a_frame_shows_how_it_is_marked_off() {
+    fn bytes_of_a_frame_show_its_form() {
         for framing in [Framing::Rtu, Framing::Ascii] {
             // Unit 0x3A has the code of the colon.
             let frame = framing.frame(0, 0x3A, &[3, 0, 0, 0, 1]);

@@ -6,7 +6,6 @@ pub mod sim;
 pub mod stream;
 pub mod trace;
 
-use std::fmt;
 use std::time::Duration;
 
 use crate::line::LineFormat;
@@ -51,17 +50,10 @@ pub struct Abilities {
     pub asks_again: bool,
 }
 
-/// The endpoint itself does not work any more, or cannot do what was asked: why, in one line.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Error when the endpoint no longer works, or cannot do what was asked: the reason in one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct Broken(pub String);
-
-impl fmt::Display for Broken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Broken {}
 
 /// A master's end of a serial line. Its clock starts at 0 some time before the first call.
 ///

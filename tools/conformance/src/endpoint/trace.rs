@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::time::Duration;
 
+use delegate::delegate;
+
 use super::{Abilities, Broken, Endpoint, Heard, Piece};
 use crate::bench::shown;
 use crate::frame::hex;
@@ -38,29 +40,9 @@ impl<W: Write> Trace<W> {
 }
 
 impl<W: Write> Endpoint for Trace<W> {
-    fn name(&self) -> String {
-        self.endpoint.name()
-    }
-
-    fn abilities(&self) -> Abilities {
-        self.endpoint.abilities()
-    }
-
-    fn line(&self) -> LineFormat {
-        self.endpoint.line()
-    }
-
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
         self.note(self.endpoint.now(), &format!("line at {line}"));
         self.endpoint.set_line(line)
-    }
-
-    fn now(&self) -> Duration {
-        self.endpoint.now()
-    }
-
-    fn rest(&mut self, time: Duration) -> Result<(), Broken> {
-        self.endpoint.rest(time)
     }
 
     fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
@@ -97,11 +79,15 @@ impl<W: Write> Endpoint for Trace<W> {
         self.endpoint.set_echo(echo)
     }
 
-    fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
-        self.endpoint.take_driver_edges()
-    }
-
-    fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
-        self.endpoint.take_complaints()
+    delegate! {
+        to self.endpoint {
+            fn name(&self) -> String;
+            fn abilities(&self) -> Abilities;
+            fn line(&self) -> LineFormat;
+            fn now(&self) -> Duration;
+            fn rest(&mut self, time: Duration) -> Result<(), Broken>;
+            fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken>;
+            fn take_complaints(&mut self) -> Result<Vec<String>, Broken>;
+        }
     }
 }

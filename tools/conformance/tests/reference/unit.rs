@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use conformance::endpoint::Heard;
-use conformance::frame::{Mode, crc, lrc};
+use conformance::frame::Mode;
 use conformance::line::LineFormat;
 
-use modbus_reference::Server as Reference;
 use modbus_reference::server::{BUS, ERRORS};
+use modbus_reference::{Server as Reference, crc, framed, lrc};
 
 use super::fault::Fault;
 use super::modio::{self, Modio};
@@ -396,10 +396,8 @@ impl Unit {
     }
 
     fn say(&mut self, body: &[u8], at: Duration) {
-        let mut frame = match self.mode {
-            Mode::Rtu => [body, &crc(body)].concat(),
-            Mode::Ascii => conformance::frame::ascii(body, lrc(body)),
-        };
+        let delimiter = (self.mode == Mode::Ascii).then_some(b'\n');
+        let mut frame = framed(delimiter, body[0], &body[1..]);
         if self.server.has(Fault::TrailingZero) {
             frame.push(0);
         }
