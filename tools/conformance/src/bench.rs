@@ -361,6 +361,16 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// Returns a frame in which the character at `index` is damaged in this way.
+#[must_use]
+pub fn damaged_at(frame: &[u8], index: usize, damage: fn(u8) -> Piece) -> [Piece; 3] {
+    [
+        Piece::Bytes(frame[..index].to_vec()),
+        damage(frame[index]),
+        Piece::Bytes(frame[index + 1..].to_vec()),
+    ]
+}
+
 /// Pieces for people.
 pub(crate) fn shown(pieces: &[Piece]) -> String {
     let texts: Vec<String> = pieces

@@ -70,6 +70,15 @@ pub enum Stop {
 /// What a step of a case results in.
 pub type Check<T = ()> = Result<T, Stop>;
 
+/// Skips the case, for this reason.
+///
+/// # Errors
+///
+/// [`Stop::Skip`] always.
+pub fn skip<T>(why: impl Into<String>) -> Check<T> {
+    Err(Stop::Skip(why.into()))
+}
+
 /// Where the demand of a case comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {

@@ -72,6 +72,16 @@ impl Bench<'_> {
         self.target.words.ok_or_else(lacking)
     }
 
+    /// A value that the registers to write to refuse.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Skip`] when no such value is known.
+    pub fn refused_value(&self) -> Check<u16> {
+        let lacking = || Stop::Skip("no value is known that is refused".to_owned());
+        self.words()?.refused.ok_or_else(lacking)
+    }
+
     /// The longest run that a function (1 to 4) reads.
     ///
     /// # Errors
@@ -80,6 +90,37 @@ impl Bench<'_> {
     pub fn readable(&self, function: u8) -> Check<Span> {
         let lacking = || Stop::Skip(format!("nothing to read by function {function:02X}"));
         self.target.longest(function).ok_or_else(lacking)
+    }
+
+    /// An address that a function (1 to 4) cannot read.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Skip`] when the function can read every address.
+    pub fn nowhere(&self, function: u8) -> Check<u16> {
+        let lacking = || Stop::Skip("every address exists".to_owned());
+        self.target.nowhere(function).ok_or_else(lacking)
+    }
+
+    /// Checks that a register still has this value.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the register has another value, [`Stop::Broken`].
+    pub fn word_is(&mut self, address: u16, value: u16) -> Check {
+        let now = self.read_word(address)?;
+        let wanted = format!("register {address:04X} still is {value:04X}");
+        self.ensure(now == value, wanted)
+    }
+
+    /// Checks that coils are still off.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when a coil is on, [`Stop::Broken`].
+    pub fn is_off(&mut self, coils: Span) -> Check {
+        let now = self.read_bits(coils)?;
+        self.ensure(!now.contains(&true), "the coil is still off")
     }
 
     /// Reads coils by function 01, at most 2000.
@@ -115,10 +156,7 @@ impl Bench<'_> {
     ///
     /// As [`Bench::read_words`].
     pub fn read_word(&mut self, address: u16) -> Check<u16> {
-        let one = Span {
-            first: address,
-            last: address,
-        };
+        let one = Span::one(address);
         Ok(self.read_words(one)?[0])
     }
 

@@ -6,7 +6,7 @@ use register_map::codes::{Command, Format};
 use register_map::configuration::{BAUD, COMMAND};
 
 use crate::bench::Bench;
-use crate::case::{Check, Stop};
+use crate::case::{Check, Stop, skip};
 use crate::line::LineFormat;
 use crate::points::{pdu, write_words};
 
@@ -77,7 +77,7 @@ fn takes_all(bench: &mut Bench<'_>, lines: &[LineFormat], home: LineFormat) -> C
         let taken = bench.endpoint.set_line(*line);
         bench.endpoint.set_line(home)?;
         if let Err(why) = taken {
-            return Err(Stop::Skip(why.to_string()));
+            return skip(why.to_string());
         }
     }
     Ok(())

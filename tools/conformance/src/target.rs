@@ -18,6 +18,15 @@ pub struct Span {
 }
 
 impl Span {
+    /// A span of one address.
+    #[must_use]
+    pub const fn one(address: u16) -> Self {
+        Self {
+            first: address,
+            last: address,
+        }
+    }
+
     /// How many addresses it has, 1 to 65536.
     #[must_use]
     pub fn len(self) -> u32 {
@@ -114,10 +123,7 @@ impl Modio {
         for (address, _) in self.points().filter(|(_, kind)| kinds.contains(kind)) {
             match runs.last_mut() {
                 Some(run) if run.last + 1 == address => run.last = address,
-                _ => runs.push(Span {
-                    first: address,
-                    last: address,
-                }),
+                _ => runs.push(Span::one(address)),
             }
         }
         runs

@@ -148,8 +148,7 @@ fn other_units_write(bench: &mut Bench<'_>) -> Check {
     for unit in few_others(bench) {
         silent_to(bench, unit, &pdu(5, span.first, 0xFF00))?;
         silent_to(bench, unit, &write_bits(span.first, &[true], false))?;
-        let now = bench.read_bits(span)?;
-        bench.ensure(now == [false], "the coil is still off")?;
+        bench.is_off(span)?;
     }
     Ok(())
 }
@@ -161,8 +160,7 @@ fn other_units_write_words(bench: &mut Bench<'_>) -> Check {
     for unit in few_others(bench) {
         silent_to(bench, unit, &pdu(6, at, words.high))?;
         silent_to(bench, unit, &write_words(at, &[words.high]))?;
-        let now = bench.read_word(at)?;
-        bench.ensure(now == words.low, "the register is as it was")?;
+        bench.word_is(at, words.low)?;
     }
     Ok(())
 }
@@ -309,8 +307,7 @@ fn refused_writes(bench: &mut Bench<'_>) -> Check {
             continue;
         }
         silent_to(bench, 0, &request)?;
-        let now = bench.read_bits(span)?;
-        bench.ensure(now == [false], "the coil is still off")?;
+        bench.is_off(span)?;
     }
     Ok(())
 }

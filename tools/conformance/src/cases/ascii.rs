@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
+use crate::cases::damage::one_by_one;
 use crate::cases::diagnostics::diagnose;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
@@ -171,24 +172,11 @@ fn lower_case(bench: &mut Bench<'_>) -> Check {
 }
 
 fn damaged(bench: &mut Bench<'_>) -> Check {
-    let frame = bench.ping();
-    let with_parity = bench.endpoint.line().parity != Parity::None;
-    let mut kinds: Vec<fn(u8) -> Piece> = vec![Piece::BadStop];
-    if with_parity {
-        kinds.push(Piece::BadParity);
+    one_by_one(bench, Piece::BadStop)?;
+    if bench.endpoint.line().parity == Parity::None {
+        return Ok(());
     }
-    for damage in kinds {
-        for index in 0..frame.len() {
-            let pieces = [
-                Piece::Bytes(frame[..index].to_vec()),
-                damage(frame[index]),
-                Piece::Bytes(frame[index + 1..].to_vec()),
-            ];
-            bench.silence(&pieces, "a damaged character spoils its frame")?;
-            bench.alive("a damaged character")?;
-        }
-    }
-    Ok(())
+    one_by_one(bench, Piece::BadParity)
 }
 
 fn truncated(bench: &mut Bench<'_>) -> Check {

@@ -155,8 +155,7 @@ fn reply_is_no_request(bench: &mut Bench<'_>) -> Check {
     for frame in [frame.clone(), frame, rtu(&body)] {
         bench.silence_to(&frame, "it is another unit's")?;
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.is_off(span)
 }
 
 fn stray_zero(bench: &mut Bench<'_>) -> Check {

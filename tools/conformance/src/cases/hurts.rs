@@ -223,11 +223,7 @@ fn wrong_settings(bench: &mut Bench<'_>) -> Check {
         for value in values {
             bench.exception(&pdu(6, register, *value), 3)?;
         }
-        let now = bench.read_word(register)?;
-        bench.ensure(
-            now == before,
-            format!("register {register:04X} still is {before}"),
-        )?;
+        bench.word_is(register, before)?;
     }
     Ok(())
 }

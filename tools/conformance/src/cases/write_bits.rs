@@ -1,7 +1,7 @@
 //! Writing coils: functions 05 and 0F.
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_bits};
 
 pub(super) const CASES: &[Case] = &[
@@ -161,8 +161,7 @@ fn length(bench: &mut Bench<'_>) -> Check {
         bench.exception_03_or_silence(&request[..cut])?;
     }
     bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.is_off(span)
 }
 
 fn every_quantity(bench: &mut Bench<'_>) -> Check {
@@ -195,9 +194,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
 }
 
 fn quantity_first(bench: &mut Bench<'_>) -> Check {
-    let Some(nowhere) = bench.target.nowhere(1) else {
-        return Err(Stop::Skip("every coil exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(1)?;
     for (quantity, count) in [(0, 0_u8), (0, 1), (1969, 247), (1, 0), (1, 2), (9, 1)] {
         let data = vec![0; usize::from(count)];
         let request = [pdu(0x0F, nowhere, quantity), vec![count], data].concat();
@@ -210,7 +207,7 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
     let span = bench.target.bits;
     if let Some(span) = span.filter(|span| span.len() >= 1968) {
         if !bench.target.has(1) {
-            return Err(Stop::Skip("the coils cannot be read first".to_owned()));
+            return skip("the coils cannot be read first");
         }
         // What the coils hold is written back to them.
         let values = bench.read_bits(span.up_to(1968))?;
@@ -230,8 +227,7 @@ fn byte_count(bench: &mut Bench<'_>) -> Check {
         let head = [pdu(0x0F, span.first, quantity), vec![count]].concat();
         bench.exception_03_with(&head, &vec![0xFF; bytes])?;
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(!now.contains(&true), "no coil has been written")
+    bench.is_off(span)
 }
 
 fn data_length(bench: &mut Bench<'_>) -> Check {
@@ -245,8 +241,7 @@ fn data_length(bench: &mut Bench<'_>) -> Check {
     for spare in [1, 2, 240] {
         bench.exception_03_or_silence(&[request.clone(), vec![0xFF; spare]].concat())?;
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(!now.contains(&true), "no coil has been written")
+    bench.is_off(span)
 }
 
 fn padding(bench: &mut Bench<'_>) -> Check {

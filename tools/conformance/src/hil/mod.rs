@@ -19,7 +19,7 @@ use anyhow::{Context as _, Error, Result, bail};
 use register_map::{Module, state};
 
 use crate::bench::{Bench, Patience};
-use crate::case::{Case, Check, Stop};
+use crate::case::{Case, Check, Stop, skip};
 use crate::endpoint::Endpoint;
 use crate::frame::Mode;
 use crate::line::LineFormat;
@@ -176,7 +176,7 @@ fn timing_at_each_rate(
     let toured = tour(bench, stops, |bench| {
         if stop.load(Ordering::Relaxed) {
             interrupted = true;
-            return Err(Stop::Skip("interrupted".to_owned()));
+            return skip("interrupted");
         }
         let line = bench.endpoint.line();
         let least = timing::least(bench, plan.requests).as_secs();
