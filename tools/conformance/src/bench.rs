@@ -285,6 +285,22 @@ impl<'a> Bench<'a> {
         )
     }
 
+    /// Sends every beginning of a PDU that is shorter than the PDU, and the PDU with some bytes added. Each must get
+    /// exception 03 or silence.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit replies in another way, [`Stop::Broken`].
+    pub fn wrong_lengths(&mut self, pdu: &[u8], added: &[usize]) -> Check {
+        for length in 1..pdu.len() {
+            self.exception_03_or_silence(&pdu[..length])?;
+        }
+        for count in added {
+            self.exception_03_or_silence(&[pdu, &vec![0; *count]].concat())?;
+        }
+        Ok(())
+    }
+
     /// Puts pieces on the line, and wants silence.
     ///
     /// # Errors
@@ -324,6 +340,16 @@ impl<'a> Bench<'a> {
         }
     }
 
+    /// Sends pieces that end with the request of [`Bench::alive`]. The unit has to reply to that request.
+    ///
+    /// # Errors
+    ///
+    /// [`Stop::Fail`] when the unit does not reply, [`Stop::Broken`].
+    pub fn answers(&mut self, pieces: &[Piece], wanted: impl Display) -> Check {
+        let reply = self.exchange_due(pieces)?;
+        self.ensure(self.is_pong(&reply), wanted)
+    }
+
     /// The request that [`Bench::alive`] asks with, as a frame.
     #[must_use]
     pub fn ping(&self) -> Vec<u8> {
@@ -359,6 +385,16 @@ impl<'a> Bench<'a> {
     pub fn rest(&mut self, time: Duration) -> Result<(), Broken> {
         self.endpoint.rest(time)
     }
+}
+
+/// Returns bytes, a gap, and other bytes.
+#[must_use]
+pub fn apart(first: &[u8], gap: Duration, second: &[u8]) -> [Piece; 3] {
+    [
+        Piece::Bytes(first.to_vec()),
+        Piece::Gap(gap),
+        Piece::Bytes(second.to_vec()),
+    ]
 }
 
 /// Returns a frame in which the character at `index` is damaged in this way.

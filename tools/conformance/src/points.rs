@@ -102,6 +102,19 @@ impl Bench<'_> {
         self.target.nowhere(function).ok_or_else(lacking)
     }
 
+    /// The addresses next to what a function (1 to 4) reads, and 0xFFFF, as far as the function cannot read them.
+    #[must_use]
+    pub fn outside(&self, function: u8) -> Vec<u16> {
+        let spans = self.target.readable(function);
+        let mut outside = vec![0xFFFF];
+        for span in spans {
+            outside.extend(span.last.checked_add(1));
+            outside.extend(span.first.checked_sub(1));
+        }
+        outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
+        outside
+    }
+
     /// Checks that a register still has this value.
     ///
     /// # Errors

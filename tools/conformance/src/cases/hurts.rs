@@ -7,7 +7,7 @@ use register_map::{configuration, state};
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
-use crate::endpoint::Piece;
+use crate::cases::timing::hundred_requests;
 use crate::frame::{Mode, Reply, crc, rtu};
 use crate::points::{pdu, words_of};
 
@@ -190,18 +190,8 @@ fn restarts(bench: &mut Bench<'_>) -> Check {
 }
 
 fn no_gaps(bench: &mut Bench<'_>) -> Check {
-    let ping = bench.ping();
-    let reply = bench.raw(&ping)?;
-    bench.ensure(bench.is_pong(&reply), "a reply")?;
-    let length = bench.heard.len();
     let bit = bench.endpoint.line().bits(1);
-    for n in 0..100 {
-        let pieces = [Piece::Gap(bit), Piece::Bytes(ping.clone())];
-        let reply = bench.exchange_until(&pieces, length)?;
-        bench.ensure(bench.is_pong(&reply), format!("a reply to request {n}"))?;
-    }
-    let late = bench.listen_until(usize::MAX)?;
-    bench.ensure(late == Reply::Silence, "silence after the last reply")
+    hundred_requests(bench, |_| bit)
 }
 
 fn wrong_settings(bench: &mut Bench<'_>) -> Check {

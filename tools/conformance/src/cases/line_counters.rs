@@ -77,8 +77,8 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// A counter as it stands, reading it included; by 08, or by a modio's register.
-fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
+/// Reads a counter by function 08, or by a modio's register. The counter includes this request.
+pub(super) fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
     if bench.target.has(8) {
         let reply = bench.reply_unless_lacking(&diagnose(sub, &[0, 0]), "such a counter")?;
         let [8, _, echoed, high, low] = reply[..] else {

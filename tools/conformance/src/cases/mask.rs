@@ -149,10 +149,7 @@ fn mask_length(bench: &mut Bench<'_>) -> Check {
     let at = words.span.first;
     bench.set_words(at, &[words.low])?;
     let request = mask(at, 0, words.high);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    bench.wrong_lengths(&request, &[1])?;
     bench.word_is(at, words.low)
 }
 
@@ -297,10 +294,7 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
     let one = words.span.up_to(1);
     bench.set_words(one.first, &[words.low])?;
     let request = both(one, one.first, &[words.high]);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    bench.wrong_lengths(&request, &[1])?;
     still_low(bench)
 }
 

@@ -192,11 +192,7 @@ fn quantity_first<const F: u8>(bench: &mut Bench<'_>) -> Check {
 
 fn length<const F: u8>(bench: &mut Bench<'_>) -> Check {
     let request = pdu(F, bench.readable(F)?.first, 1);
-    for shorter in 1..request.len() {
-        bench.exception_03_or_silence(&request[..shorter])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
-    bench.exception_03_or_silence(&[&request[..], &[0, 1]].concat())
+    bench.wrong_lengths(&request, &[1, 2])
 }
 
 fn alike<const A: u8, const B: u8>(bench: &mut Bench<'_>) -> Check {

@@ -5,6 +5,7 @@ use std::time::Duration;
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
+use crate::frame::Reply;
 
 pub(super) const CASES: &[Case] = &[
     case(
@@ -189,22 +190,27 @@ fn driver_off(bench: &mut Bench<'_>) -> Check {
 }
 
 fn back_to_back(bench: &mut Bench<'_>) -> Check {
+    let t35 = bench.endpoint.line().t35_limits().most;
+    hundred_requests(bench, |bench| {
+        let end = bench.heard.last().map_or(Duration::ZERO, |heard| heard.end);
+        (end + t35).saturating_sub(bench.endpoint.now())
+    })
+}
+
+/// Sends a hundred requests, each as soon as the reply before it has been received and the gap after it has passed.
+pub(super) fn hundred_requests(
+    bench: &mut Bench<'_>,
+    gap: impl Fn(&Bench<'_>) -> Duration,
+) -> Check {
     let ping = bench.ping();
     let reply = bench.raw(&ping)?;
     bench.ensure(bench.is_pong(&reply), "a reply")?;
     let length = bench.heard.len();
-    let t35 = bench.endpoint.line().t35_limits().most;
     for n in 0..100 {
-        let end = bench.heard.last().map_or(Duration::ZERO, |heard| heard.end);
-        let now = bench.endpoint.now();
-        let gap = (end + t35).saturating_sub(now);
-        let pieces = [Piece::Gap(gap), Piece::Bytes(ping.clone())];
+        let pieces = [Piece::Gap(gap(bench)), Piece::Bytes(ping.clone())];
         let reply = bench.exchange_until(&pieces, length)?;
         bench.ensure(bench.is_pong(&reply), format!("a reply to request {n}"))?;
     }
     let late = bench.listen_until(usize::MAX)?;
-    bench.ensure(
-        late == crate::frame::Reply::Silence,
-        "silence after the last reply",
-    )
+    bench.ensure(late == Reply::Silence, "silence after the last reply")
 }

@@ -134,14 +134,7 @@ fn value(bench: &mut Bench<'_>) -> Check {
 }
 
 fn address(bench: &mut Bench<'_>) -> Check {
-    let spans = bench.target.readable(1).to_vec();
-    let mut outside = vec![0xFFFF];
-    for span in &spans {
-        outside.extend(span.last.checked_add(1));
-        outside.extend(span.first.checked_sub(1));
-    }
-    outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
-    for address in outside {
+    for address in bench.outside(1) {
         bench.exception(&pdu(5, address, 0xFF00), 2)?;
         bench.exception(&pdu(5, address, 0), 2)?;
     }
@@ -157,10 +150,7 @@ fn length(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(1);
     bench.set_bits(span.first, &[false])?;
     let request = pdu(5, span.first, 0xFF00);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    bench.wrong_lengths(&request, &[1])?;
     bench.is_off(span)
 }
 
@@ -235,12 +225,7 @@ fn data_length(bench: &mut Bench<'_>) -> Check {
     let quantity = span.len() as u16;
     bench.set_bits(span.first, &vec![false; usize::from(quantity)])?;
     let request = write_bits(span.first, &vec![true; usize::from(quantity)], false);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    for spare in [1, 2, 240] {
-        bench.exception_03_or_silence(&[request.clone(), vec![0xFF; spare]].concat())?;
-    }
+    bench.wrong_lengths(&request, &[1, 2, 240])?;
     bench.is_off(span)
 }
 

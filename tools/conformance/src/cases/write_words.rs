@@ -142,14 +142,7 @@ fn refused(bench: &mut Bench<'_>) -> Check {
 }
 
 fn address(bench: &mut Bench<'_>) -> Check {
-    let spans = bench.target.readable(3).to_vec();
-    let mut outside = vec![0xFFFF];
-    for span in &spans {
-        outside.extend(span.last.checked_add(1));
-        outside.extend(span.first.checked_sub(1));
-    }
-    outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
-    for address in outside {
+    for address in bench.outside(3) {
         bench.exception(&pdu(6, address, 0), 2)?;
     }
     Ok(())
@@ -159,10 +152,7 @@ fn length(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
     bench.set_words(words.span.first, &[words.low])?;
     let request = pdu(6, words.span.first, words.high);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    bench.wrong_lengths(&request, &[1])?;
     bench.word_is(words.span.first, words.low)
 }
 
@@ -298,13 +288,7 @@ fn data_length(bench: &mut Bench<'_>) -> Check {
     let count = span.len() as usize;
     bench.set_words(span.first, &vec![words.low; count])?;
     let request = write_words(span.first, &vec![words.high; count]);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    for spare in [1, 2, 100] {
-        let spare = words.high.to_be_bytes().repeat(spare)[..spare].to_vec();
-        bench.exception_03_or_silence(&[request.clone(), spare].concat())?;
-    }
+    bench.wrong_lengths(&request, &[1, 2, 100])?;
     unchanged(bench, span.first, words.low, count)
 }
 
