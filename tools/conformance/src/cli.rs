@@ -1,4 +1,4 @@
-//! The command line: which endpoint, which unit, which cases, which reports.
+//! The command line: the endpoint, the unit, the cases and the reports.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -41,17 +41,17 @@ pub struct Cli {
     #[arg(long, value_name = "ELF", group = "endpoint")]
     pub sim: Option<PathBuf>,
 
-    /// The simulated board, for which the image is: modio-02 or modio-08
+    /// The simulated board: modio-02 or modio-08. The image must be for this board
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub board: &'static register_map::Board,
 
-    /// What is in the simulated board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// The module in the simulated board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub module: register_map::Module,
 
-    /// What is in the simulated board's slot at a port, such as 3=4ai; may be repeated
+    /// The module in the simulated board's slot at a port, such as 3=4ai; may be repeated
     #[cfg(feature = "sim")]
     #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim_options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub slots: Vec<(u8, register_map::Module)>,

@@ -132,7 +132,7 @@ fn first_answer(
             return Ok(reply);
         }
         // Discard a late reply, so that it is not read as the reply to the next request.
-        endpoint.hear(patience.silence, patience.silence, usize::MAX)?;
+        endpoint.receive(patience.silence, patience.silence, usize::MAX)?;
     }
     ask(endpoint, target, patience, pdu)
 }

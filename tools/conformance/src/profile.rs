@@ -1,10 +1,10 @@
-//! A profile: what a device other than a modio has, in TOML, so that any Modbus server can be tested.
+//! A profile describes a device other than a modio in TOML, so that any Modbus server can be tested.
 //!
 //! ```toml
 //! unit = 17
 //! mode = "rtu"                      # or "ascii"; "rtu" when left out
 //! functions = [1, 3, 5, 6, 15, 16]  # probed when left out
-//! strict_t15 = true                 # frames with a gap above t1.5 are dropped; either way when left out
+//! strict_t15 = true                 # frames with a gap above t1.5 are dropped; both are right when left out
 //!
 //! [coils]
 //! read = ["0-99"]
@@ -13,8 +13,8 @@
 //! [holding_registers]
 //! read = ["0x0000-0x00FF"]
 //! write = ["0x0010-0x0013"]
-//! values = [1, 4000]                # two values that they take
-//! refused = 5000                    # one that they refuse with exception 03, if any
+//! values = [1, 4000]                # two values that they accept
+//! refused = 5000                    # a value that they refuse with exception 03, if there is one
 //!
 //! [discrete_inputs]
 //! read = ["0-7"]
@@ -23,7 +23,7 @@
 //! read = ["0-9"]
 //! ```
 //!
-//! Each run is one that a single request may span; the addresses before and after it do not exist.
+//! One request can span a whole run. The addresses before and after a run do not exist.
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use serde::Deserialize;

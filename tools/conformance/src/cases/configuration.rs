@@ -154,9 +154,9 @@ fn response_delay(bench: &mut Bench<'_>) -> Check {
         result = result.and_then(|()| bench.alive("a new RESPONSE_DELAY"));
         let least = bench.endpoint.line().t35_limits().least + Duration::from_millis(u64::from(ms));
         let first = bench
-            .heard
+            .received
             .first()
-            .map_or(Duration::ZERO, |heard| heard.start);
+            .map_or(Duration::ZERO, |received| received.start);
         let took = first.saturating_sub(bench.sent_end);
         result = result.and_then(|()| {
             let right = took >= least && took < least + Duration::from_millis(3);

@@ -70,7 +70,7 @@ pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
 
 /// From the end of the last request to the first start bit of the reply.
 fn turnaround(bench: &Bench<'_>) -> Duration {
-    let first = bench.heard.first().map_or(Duration::ZERO, |h| h.start);
+    let first = bench.received.first().map_or(Duration::ZERO, |h| h.start);
     first.saturating_sub(bench.sent_end)
 }
 
@@ -123,7 +123,7 @@ fn no_gap(bench: &mut Bench<'_>) -> Check {
         let request = crate::points::pdu(function, span.first, span.len().min(most) as u16);
         bench.reply(&request)?;
         let gaps = bench
-            .heard
+            .received
             .windows(2)
             .map(|two| two[1].start.saturating_sub(two[0].end));
         let longest = gaps.max().unwrap_or_default();
@@ -147,7 +147,7 @@ fn driver(bench: &mut Bench<'_>) -> Check {
                 "the driver goes on once and off once, not {edges:?}"
             ));
         };
-        let (Some(first), Some(last)) = (bench.heard.first(), bench.heard.last()) else {
+        let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) else {
             return bench.fail("a reply");
         };
         bench.ensure(
@@ -192,7 +192,10 @@ fn driver_off(bench: &mut Bench<'_>) -> Check {
 fn back_to_back(bench: &mut Bench<'_>) -> Check {
     let t35 = bench.endpoint.line().t35_limits().most;
     hundred_requests(bench, |bench| {
-        let end = bench.heard.last().map_or(Duration::ZERO, |heard| heard.end);
+        let end = bench
+            .received
+            .last()
+            .map_or(Duration::ZERO, |received| received.end);
         (end + t35).saturating_sub(bench.endpoint.now())
     })
 }
@@ -205,7 +208,7 @@ pub(super) fn hundred_requests(
     let ping = bench.ping();
     let reply = bench.raw(&ping)?;
     bench.ensure(bench.is_pong(&reply), "a reply")?;
-    let length = bench.heard.len();
+    let length = bench.received.len();
     for n in 0..100 {
         let pieces = [Piece::Gap(gap(bench)), Piece::Bytes(ping.clone())];
         let reply = bench.exchange_until(&pieces, length)?;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use delegate::delegate;
 
-use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use super::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::bench::shown;
 use crate::frame::hex;
 use crate::line::LineFormat;
@@ -27,10 +27,12 @@ impl<W: Write> Trace<W> {
         let _ = writeln!(self.log, "{:12.6} s {what}", at.as_secs_f64());
     }
 
-    fn note_heard(&mut self, heard: &[Heard], what: &str) {
-        let Some(first) = heard.first() else { return };
-        let bytes: Vec<u8> = heard.iter().map(|heard| heard.byte).collect();
-        let damaged = if heard.iter().all(|heard| heard.good) {
+    fn note_received(&mut self, received: &[Received], what: &str) {
+        let Some(first) = received.first() else {
+            return;
+        };
+        let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+        let damaged = if received.iter().all(|received| received.good) {
             ""
         } else {
             " (damaged)"
@@ -50,20 +52,20 @@ impl<W: Write> Endpoint for Trace<W> {
         self.endpoint.send(pieces)
     }
 
-    fn hear(
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        let heard = self.endpoint.hear(patience, quiet, enough)?;
-        self.note_heard(&heard, "received");
-        Ok(heard)
+    ) -> Result<Vec<Received>, Broken> {
+        let received = self.endpoint.receive(patience, quiet, enough)?;
+        self.note_received(&received, "received");
+        Ok(received)
     }
 
-    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
+    fn flush(&mut self) -> Result<Vec<Received>, Broken> {
         let late = self.endpoint.flush()?;
-        self.note_heard(&late, "received too late, discarded:");
+        self.note_received(&late, "received too late, discarded:");
         Ok(late)
     }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context as _, Result, ensure};
 use delegate::delegate;
 
-use crate::endpoint::{Abilities, Broken, Endpoint, Heard, Piece};
+use crate::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::line::LineFormat;
 
 /// How the image is written.
@@ -116,8 +116,8 @@ impl Endpoint for Powered {
             fn now(&self) -> Duration;
             fn rest(&mut self, time: Duration) -> Result<(), Broken>;
             fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken>;
-            fn hear(&mut self, patience: Duration, quiet: Duration, enough: usize) -> Result<Vec<Heard>, Broken>;
-            fn flush(&mut self) -> Result<Vec<Heard>, Broken>;
+            fn receive(&mut self, patience: Duration, quiet: Duration, enough: usize) -> Result<Vec<Received>, Broken>;
+            fn flush(&mut self) -> Result<Vec<Received>, Broken>;
         }
     }
 }

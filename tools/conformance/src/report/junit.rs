@@ -8,7 +8,7 @@ use crate::case::Kind;
 use crate::report::asked_again;
 use crate::run::{Outcome, Verdict};
 
-/// Returns the outcomes as a JUnit report; `suite` is what was tested.
+/// Returns the outcomes as a JUnit report; `name` is the name of the endpoint.
 #[must_use]
 pub fn report(name: &str, outcomes: &[Outcome]) -> Report {
     let mut report = Report::new("modio-conformance");
