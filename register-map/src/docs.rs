@@ -62,7 +62,7 @@ stop at 65535.
 ///
 /// # Errors
 ///
-/// Those of `out`.
+/// The errors of `out`.
 pub fn write_markdown(out: &mut impl Write) -> Result {
     out.write_str(INTRODUCTION)?;
     for block in BLOCKS {

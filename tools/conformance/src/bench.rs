@@ -1,25 +1,30 @@
-//! What a case works with: the endpoint, what is known of the unit, and the words to ask and judge in.
+//! The tools of a case: the endpoint, what is known about the unit, and steps that send requests and check replies.
 
 use std::fmt::Display;
 use std::time::Duration;
 
 use crate::case::{Check, Failure, Stop};
-use crate::endpoint::{Broken, Endpoint, Heard, Piece};
+use crate::endpoint::{Broken, Endpoint, Piece, Received};
 use crate::frame::{Reply, hex};
 use crate::target::Target;
 
-/// How long to wait.
+/// Waiting times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// For the first character of a reply where there should be one.
+    /// Time to wait for the first character of a reply that is due.
     pub reply: Duration,
-    /// For the first character where there should be none: what stays silent so long is silent.
+    /// Time without a character after which the unit counts as silent, where no reply is due.
     pub silence: Duration,
-    /// Silence after which a reply is over.
+    /// Silence that ends a reply.
     pub quiet: Duration,
 }
 
-/// A case's tools.
+/// The tools of a case.
+///
+/// # Errors
+///
+/// The steps that return a [`Check`] fail with [`Stop::Broken`] when the endpoint no longer works, with [`Stop::Fail`]
+/// when the unit does something else than the step demands, and with [`Stop::Skip`] when the unit lacks what it needs.
 pub struct Bench<'a> {
     /// The line.
     pub endpoint: &'a mut dyn Endpoint,
@@ -29,19 +34,19 @@ pub struct Bench<'a> {
     pub patience: Patience,
     /// Whether a modio's configuration may be written.
     pub allow_config: bool,
-    /// Number of due replies that did not come and were asked for once more.
+    /// Number of due replies that were missing, so that the request was repeated.
     pub asked_again: u32,
-    /// What was sent last, and the answer to it, for people.
+    /// The last request and the reply, for people.
     sent: String,
     came: String,
-    /// The end of the last request, and what was heard after it.
+    /// The end of the last request.
     pub sent_end: Duration,
     /// The characters of the last reply.
-    pub heard: Vec<Heard>,
+    pub received: Vec<Received>,
 }
 
 impl<'a> Bench<'a> {
-    /// Tools for this line and unit.
+    /// Returns the tools for this line and unit.
     pub fn new(
         endpoint: &'a mut dyn Endpoint,
         target: &'a Target,
@@ -57,7 +62,7 @@ impl<'a> Bench<'a> {
             sent: String::new(),
             came: String::new(),
             sent_end: Duration::ZERO,
-            heard: Vec::new(),
+            received: Vec::new(),
         }
     }
 
@@ -79,7 +84,7 @@ impl<'a> Bench<'a> {
         self.target.mode.frame(self.target.unit, pdu)
     }
 
-    /// A case has gone wrong with the last exchange; `wanted` is what should have been.
+    /// Fails the case at its last exchange. `wanted` is what should have been received.
     pub fn fail<T>(&self, wanted: impl Display) -> Check<T> {
         Err(Stop::Fail(Failure {
             sent: self.sent.clone(),
@@ -88,29 +93,17 @@ impl<'a> Bench<'a> {
         }))
     }
 
-    /// Passes on when something holds, else fails as [`Bench::fail`] does.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`].
+    /// Fails like [`Bench::fail`] unless the condition is true.
     pub fn ensure(&self, holds: bool, wanted: impl Display) -> Check {
         if holds { Ok(()) } else { self.fail(wanted) }
     }
 
-    /// Puts pieces on the line and hears what comes of it.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends pieces and receives the reply.
     pub fn exchange(&mut self, pieces: &[Piece]) -> Check<Reply> {
         self.exchange_until(pieces, usize::MAX)
     }
 
-    /// The same, but as soon as `enough` characters have come it goes on.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends pieces and receives the reply. Returns as soon as `enough` characters have been received.
     pub fn exchange_until(&mut self, pieces: &[Piece], enough: usize) -> Check<Reply> {
         self.sent = shown(pieces);
         // A late reply to an earlier request must not look like the reply to this one.
@@ -119,12 +112,8 @@ impl<'a> Bench<'a> {
         self.listen_until(enough)
     }
 
-    /// Puts pieces on the line to which a reply is due. Where requests may get lost on the way, they are sent
-    /// once more when none comes.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends pieces to which a reply is due. Where requests may get lost on the way, they are repeated once when there is
+    /// no reply.
     pub fn exchange_due(&mut self, pieces: &[Piece]) -> Check<Reply> {
         let reply = self.exchange(pieces)?;
         if reply != Reply::Silence || !self.endpoint.abilities().asks_again {
@@ -134,20 +123,16 @@ impl<'a> Bench<'a> {
         self.exchange(pieces)
     }
 
-    /// Hears what comes now, without sending.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Receives a reply without sending a request.
     pub fn listen_until(&mut self, enough: usize) -> Check<Reply> {
-        self.heard = self
+        self.received = self
             .endpoint
-            .hear(self.patience.reply, self.patience.quiet, enough)?;
-        let mut bytes: Vec<u8> = self.heard.iter().map(|heard| heard.byte).collect();
-        // An operating system may deliver a frame in pieces: what is none yet may become one.
+            .receive(self.patience.reply, self.patience.quiet, enough)?;
+        let mut bytes: Vec<u8> = self.received.iter().map(|received| received.byte).collect();
+        // An operating system may deliver a frame in parts: wait for the rest of a part.
         let whole = |bytes: &[u8]| bytes.is_empty() || self.target.mode.decode(bytes).is_ok();
         while !self.endpoint.abilities().exact && bytes.len() < enough && !whole(&bytes) {
-            let more = self.endpoint.hear(
+            let more = self.endpoint.receive(
                 self.patience.quiet * 5,
                 self.patience.quiet,
                 enough - bytes.len(),
@@ -155,12 +140,12 @@ impl<'a> Bench<'a> {
             if more.is_empty() {
                 break;
             }
-            bytes.extend(more.iter().map(|heard| heard.byte));
-            self.heard.extend(more);
+            bytes.extend(more.iter().map(|received| received.byte));
+            self.received.extend(more);
         }
         let reply = if bytes.is_empty() {
             Reply::Silence
-        } else if self.heard.iter().any(|heard| !heard.good) {
+        } else if self.received.iter().any(|received| !received.good) {
             Reply::Wrong(bytes, "damaged characters".to_owned())
         } else {
             match self.target.mode.decode(&bytes) {
@@ -173,58 +158,34 @@ impl<'a> Bench<'a> {
         Ok(reply)
     }
 
-    /// Sends bytes as they are.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends raw bytes.
     pub fn raw(&mut self, bytes: &[u8]) -> Check<Reply> {
         self.exchange(&[Piece::Bytes(bytes.to_vec())])
     }
 
-    /// Sends bytes as they are, to which a reply is due.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends raw bytes to which a reply is due.
     pub fn raw_due(&mut self, bytes: &[u8]) -> Check<Reply> {
         self.exchange_due(&[Piece::Bytes(bytes.to_vec())])
     }
 
-    /// Sends a PDU in a good frame to a unit, whichever it is.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends a PDU in a good frame to any unit.
     pub fn ask_unit(&mut self, unit: u8, pdu: &[u8]) -> Check<Reply> {
         let frame = self.target.mode.frame(unit, pdu);
         self.raw(&frame)
     }
 
     /// Sends a PDU to the unit under test.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
     pub fn ask(&mut self, pdu: &[u8]) -> Check<Reply> {
         self.ask_unit(self.target.unit, pdu)
     }
 
-    /// Sends a PDU to the unit under test, which has to reply.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
+    /// Sends a PDU to the unit under test. A reply is due.
     pub fn ask_due(&mut self, pdu: &[u8]) -> Check<Reply> {
         let frame = self.frame(pdu);
         self.raw_due(&frame)
     }
 
-    /// Asks, and wants an ordinary reply: a PDU that begins with the function code.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    /// Sends a PDU and expects an ordinary reply, which begins with the function code. Returns the reply.
     pub fn reply(&mut self, pdu: &[u8]) -> Check<Vec<u8>> {
         match self.ask_due(pdu)? {
             Reply::Pdu(reply) if reply[0] == pdu[0] => Ok(reply),
@@ -232,11 +193,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Asks, and wants exactly this PDU.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    /// Sends a PDU and expects exactly this PDU in reply.
     pub fn reply_is(&mut self, pdu: &[u8], wanted: &[u8]) -> Check {
         let reply = self.ask_due(pdu)?;
         self.ensure(
@@ -245,23 +202,15 @@ impl<'a> Bench<'a> {
         )
     }
 
-    /// Asks, and wants this exception.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    /// Sends a PDU and expects this exception.
     pub fn exception(&mut self, pdu: &[u8], code: u8) -> Check {
         let reply = self.ask_due(pdu)?;
         let wanted = format!("exception {code:02X} to function {:02X}", pdu[0]);
         self.ensure(reply.exception(pdu[0]) == Some(code), wanted)
     }
 
-    /// Asks with a PDU whose last byte before the data announces their number, and wants exception 03. Where it
-    /// announces another number than there is, silence is right as well: the frame is not whole.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    /// Sends a PDU whose last byte before the data is the byte count, and expects exception 03. If the byte count differs
+    /// from the number of data bytes, silence is right as well, because the frame is not complete.
     pub fn exception_03_with(&mut self, head: &[u8], data: &[u8]) -> Check {
         let request = [head, data].concat();
         if head.last().copied().map(usize::from) == Some(data.len()) {
@@ -271,11 +220,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Asks with a PDU of the wrong length: exception 03 or silence.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything else comes, [`Stop::Broken`].
+    /// Sends a PDU of the wrong length and expects exception 03 or silence.
     pub fn exception_03_or_silence(&mut self, pdu: &[u8]) -> Check {
         let reply = self.ask(pdu)?;
         let right = reply == Reply::Silence || reply.exception(pdu[0]) == Some(3);
@@ -285,11 +230,19 @@ impl<'a> Bench<'a> {
         )
     }
 
-    /// Puts pieces on the line, and wants silence.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything comes, [`Stop::Broken`].
+    /// Sends every beginning of a PDU that is shorter than the PDU, and the PDU with some bytes added. Each must get
+    /// exception 03 or silence.
+    pub fn wrong_lengths(&mut self, pdu: &[u8], added: &[usize]) -> Check {
+        for length in 1..pdu.len() {
+            self.exception_03_or_silence(&pdu[..length])?;
+        }
+        for count in added {
+            self.exception_03_or_silence(&[pdu, &vec![0; *count]].concat())?;
+        }
+        Ok(())
+    }
+
+    /// Sends pieces and expects silence.
     pub fn silence(&mut self, pieces: &[Piece], why: impl Display) -> Check {
         let patience = self.patience;
         self.patience.reply = patience.silence;
@@ -298,20 +251,12 @@ impl<'a> Bench<'a> {
         self.ensure(reply? == Reply::Silence, format!("silence: {why}"))
     }
 
-    /// Sends bytes as they are, and wants silence.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when anything comes, [`Stop::Broken`].
+    /// Sends raw bytes and expects silence.
     pub fn silence_to(&mut self, bytes: &[u8], why: impl Display) -> Check {
         self.silence(&[Piece::Bytes(bytes.to_vec())], why)
     }
 
-    /// The unit answers its ordinary request.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when it does not, [`Stop::Broken`].
+    /// Sends an ordinary request, which the unit must answer.
     pub fn alive(&mut self, after: impl Display) -> Check {
         let ping = self.target.ping.clone();
         let before = self.sent.clone();
@@ -324,23 +269,26 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The request that [`Bench::alive`] asks with, as a frame.
+    /// Sends pieces that end with the request of [`Bench::alive`]. The unit has to reply to that request.
+    pub fn answers(&mut self, pieces: &[Piece], wanted: impl Display) -> Check {
+        let reply = self.exchange_due(pieces)?;
+        self.ensure(self.is_pong(&reply), wanted)
+    }
+
+    /// The frame of the request of [`Bench::alive`].
     #[must_use]
     pub fn ping(&self) -> Vec<u8> {
         self.frame(&self.target.ping)
     }
 
-    /// Whether a reply is a good one to that request.
+    /// Whether a reply is right for the request of [`Bench::alive`].
     #[must_use]
     pub fn is_pong(&self, reply: &Reply) -> bool {
         matches!(reply, Reply::Pdu(pdu) if pdu[0] == self.target.ping[0])
     }
 
-    /// Asks something and then says that the case does not apply when the answer is exception 01.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Skip`] then, [`Stop::Fail`] when it is no ordinary reply, [`Stop::Broken`].
+    /// Sends a PDU and returns the reply. Skips the case when the reply is exception 01, because then the unit has no
+    /// `what`.
     pub fn reply_unless_lacking(&mut self, pdu: &[u8], what: &str) -> Check<Vec<u8>> {
         match self.ask_due(pdu)? {
             reply if reply.exception(pdu[0]) == Some(1) => {
@@ -352,16 +300,32 @@ impl<'a> Bench<'a> {
     }
 
     /// Lets time pass.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Broken`].
     pub fn rest(&mut self, time: Duration) -> Result<(), Broken> {
         self.endpoint.rest(time)
     }
 }
 
-/// Pieces for people.
+/// Returns two runs of bytes with a gap between them.
+#[must_use]
+pub fn apart(first: &[u8], gap: Duration, second: &[u8]) -> [Piece; 3] {
+    [
+        Piece::Bytes(first.to_vec()),
+        Piece::Gap(gap),
+        Piece::Bytes(second.to_vec()),
+    ]
+}
+
+/// Returns a frame in which the character at `index` is damaged in this way.
+#[must_use]
+pub fn damaged_at(frame: &[u8], index: usize, damage: fn(u8) -> Piece) -> [Piece; 3] {
+    [
+        Piece::Bytes(frame[..index].to_vec()),
+        damage(frame[index]),
+        Piece::Bytes(frame[index + 1..].to_vec()),
+    ]
+}
+
+/// Returns pieces as text for people.
 pub(crate) fn shown(pieces: &[Piece]) -> String {
     let texts: Vec<String> = pieces
         .iter()

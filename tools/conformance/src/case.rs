@@ -1,4 +1,4 @@
-//! A case: its name, the section it comes from, what it needs, and how it is judged.
+//! A case: its name, the section that it tests, its needs, and the function that runs it.
 
 use crate::bench::Bench;
 use crate::endpoint::Broken;
@@ -22,13 +22,13 @@ pub enum Need {
     Parity,
     /// The endpoint can switch the unit's power.
     Power,
-    /// The endpoint sees the driver.
+    /// The endpoint records the driver.
     Driver,
-    /// Characters that the unit sends take their time on the endpoint's line.
+    /// Characters that the unit sends have their duration on the endpoint's line.
     CharacterTime,
-    /// The unit notices a start bit when it begins.
+    /// The unit detects a character at its start bit.
     StartBit,
-    /// The endpoint can let the unit hear itself.
+    /// The endpoint can let the unit receive its own frames.
     Echo,
     /// The endpoint can change rate and format.
     SetLine,
@@ -42,50 +42,56 @@ pub enum Need {
     Ascii,
 }
 
-/// What was sent, what came of it, and what the standard wants.
+/// What was sent, what was received, and what should have been received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// What was sent.
     pub sent: String,
-    /// What came.
+    /// What was received.
     pub came: String,
-    /// What should have come.
+    /// What should have been received.
     pub wanted: String,
 }
 
 /// Why a case stops before its end.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Stop {
-    /// The unit did wrong.
+    /// The unit made a mistake.
+    #[error("sent {}; received {}; expected {}", .0.sent, .0.came, .0.wanted)]
     Fail(Failure),
-    /// The case does not apply, as was found on the way: why.
+    /// The case does not apply: the reason, which the case found while it ran.
+    #[error("{0}")]
     Skip(String),
-    /// The endpoint is gone.
-    Broken(Broken),
+    /// The endpoint no longer works.
+    #[error(transparent)]
+    Broken(#[from] Broken),
 }
 
-impl From<Broken> for Stop {
-    fn from(broken: Broken) -> Self {
-        Self::Broken(broken)
-    }
-}
-
-/// What a step of a case results in.
+/// The result of a step of a case.
 pub type Check<T = ()> = Result<T, Stop>;
+
+/// Skips the case, for this reason.
+///
+/// # Errors
+///
+/// [`Stop::Skip`] always.
+pub fn skip<T>(why: impl Into<String>) -> Check<T> {
+    Err(Stop::Skip(why.into()))
+}
 
 /// Where the demand of a case comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The words of the standards.
+    /// The text of the standards.
     Standard,
-    /// A reading of the standards, where they leave a choice or say nothing.
+    /// An interpretation of the standards, where they leave a choice or say nothing.
     Interpretation,
     /// The register map and the documents of the modio.
     Modio,
 }
 
 impl Kind {
-    /// Its name in lists and reports.
+    /// The name in lists and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -99,22 +105,22 @@ impl Kind {
 /// A named case.
 #[derive(Clone, Copy)]
 pub struct Case {
-    /// Its name: what it is about, a slash, what is tried. Never used twice.
+    /// The name: a group, a slash, and what is tried. Each name is used once.
     pub name: &'static str,
-    /// Where it is written that it must be so.
+    /// The section that the demand comes from.
     pub section: &'static str,
-    /// Where the demand comes from.
+    /// The kind of source that the demand comes from.
     pub kind: Kind,
-    /// What must be so, in one line.
+    /// The demand, in one line.
     pub about: &'static str,
-    /// What it needs.
+    /// What the case needs of the unit and the endpoint.
     pub needs: &'static [Need],
-    /// Tries it.
+    /// Runs the case.
     pub run: fn(&mut Bench<'_>) -> Check,
 }
 
 impl Case {
-    /// The same case, whose demand is a reading of the standards.
+    /// The same case as an interpretation of the standards.
     #[must_use]
     pub const fn interpretation(mut self) -> Self {
         self.kind = Kind::Interpretation;

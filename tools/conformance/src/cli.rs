@@ -1,15 +1,16 @@
-//! The command line: which endpoint, which unit, which cases, which reports.
+//! The command line: the endpoint, the unit, the cases and the reports.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::{Context as _, Result, bail, ensure};
 use clap::Parser;
 
 use crate::bench::Patience;
 use crate::case::{Case, Kind};
+use crate::endpoint::Endpoint;
 use crate::endpoint::exact_line;
 use crate::endpoint::stream::Stream;
-use crate::endpoint::{Broken, Endpoint};
 use crate::frame::Mode;
 use crate::line::{CharacterFormat, LineFormat};
 use crate::profile::Profile;
@@ -40,17 +41,17 @@ pub struct Cli {
     #[arg(long, value_name = "ELF", group = "endpoint")]
     pub sim: Option<PathBuf>,
 
-    /// The simulated board, for which the image is: modio-02 or modio-08
+    /// The simulated board: modio-02 or modio-08. The image must be for this board
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub board: &'static register_map::Board,
 
-    /// What is in the simulated board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// The module in the simulated board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[cfg(feature = "sim")]
     #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub module: register_map::Module,
 
-    /// What is in the simulated board's slot at a port, such as 3=4ai; may be repeated
+    /// The module in the simulated board's slot at a port, such as 3=4ai; may be repeated
     #[cfg(feature = "sim")]
     #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim_options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub slots: Vec<(u8, register_map::Module)>,
@@ -81,16 +82,16 @@ pub struct Cli {
     #[arg(long)]
     pub ascii: bool,
 
-    /// What the unit has, in TOML, when it is no modio
+    /// Description of a unit that is not a modio, in TOML
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
 
-    /// Run the cases too that write a modio's configuration; they put it back
+    /// Run also the cases that write a modio's configuration; they restore it
     #[arg(long)]
     pub allow_config: bool,
 
-    /// What stays silent for so long, in ms, is silent [default: 250, exact 25]; a reply that is due is
-    /// waited for four times as long where time is not exact
+    /// Time to wait, in ms, before a unit that must not reply counts as silent [default: 250, exact 25]. Where time is
+    /// not exact, a reply that is due is waited for four times as long
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     pub patience: Option<u64>,
 
@@ -102,12 +103,11 @@ pub struct Cli {
     #[arg(long, value_name = "PATTERN")]
     pub exclude: Vec<String>,
 
-    /// Run only the cases whose demand stands in the standards: no interpretations, nothing about the modio
+    /// Run only the cases of the kind standard: no interpretations, and no cases about the modio
     #[arg(long, conflicts_with = "strict")]
     pub standard_only: bool,
 
-    /// Count failed interpretations of the standard, too: the exit status is then 1. On a modio they always
-    /// count
+    /// End with status 1 also when an interpretation of the standard fails. On a modio interpretations always count
     #[arg(long)]
     pub strict: bool,
 
@@ -119,7 +119,7 @@ pub struct Cli {
     #[arg(long)]
     pub list: bool,
 
-    /// Where the results go
+    /// Files for the results
     #[command(flatten)]
     pub reports: Files,
 }
@@ -146,55 +146,51 @@ impl Cli {
     ///
     /// # Errors
     ///
-    /// What is wrong with the profile.
-    pub fn mode(&self, profile: Option<&Profile>) -> Result<Mode, String> {
-        let told = match profile {
-            Some(profile) => profile.known()?.mode,
-            None => None,
-        };
-        Ok(if self.ascii {
-            Mode::Ascii
-        } else {
-            told.unwrap_or_default()
-        })
+    /// When the profile is wrong.
+    pub fn mode(&self, profile: Option<&Profile>) -> Result<Mode> {
+        if self.ascii {
+            return Ok(Mode::Ascii);
+        }
+        let mode = profile.map(Profile::mode).transpose()?.flatten();
+        Ok(mode.unwrap_or_default())
     }
 
     /// The unit's address.
     #[must_use]
     pub fn unit(&self, profile: Option<&Profile>) -> u8 {
-        let told = self.unit.or_else(|| profile.and_then(|p| p.unit));
+        let unit = self.unit.or_else(|| profile.and_then(|p| p.unit));
         #[cfg(feature = "sim")]
-        let told = told.or_else(|| self.sim.as_ref().map(|_| self.dip));
-        told.unwrap_or(1)
+        let unit = unit.or_else(|| self.sim.as_ref().map(|_| self.dip));
+        unit.unwrap_or(1)
     }
 
     /// The profile, if one is given.
     ///
     /// # Errors
     ///
-    /// When it cannot be read or is wrong, in one line.
-    pub fn read_profile(&self) -> Result<Option<Profile>, String> {
+    /// When the profile cannot be read or is wrong.
+    pub fn read_profile(&self) -> Result<Option<Profile>> {
         let Some(path) = &self.profile else {
             return Ok(None);
         };
-        let told = |why: String| format!("{}: {why}", path.display());
-        let text = std::fs::read_to_string(path).map_err(|error| told(error.to_string()))?;
-        let profile = Profile::parse(&text).map_err(told)?;
-        profile.known().map_err(told)?;
-        Ok(Some(profile))
+        let read = || {
+            let profile = Profile::parse(&std::fs::read_to_string(path)?)?;
+            profile.known()?;
+            anyhow::Ok(Some(profile))
+        };
+        read().with_context(|| path.display().to_string())
     }
 
     /// Opens the endpoint.
     ///
     /// # Errors
     ///
-    /// When none is named, or it cannot be opened: what is wrong and what to do, in one line.
-    pub fn open(&self, mode: Mode) -> Result<Box<dyn Endpoint>, Broken> {
-        if self.format.data_bits == 7 && mode == Mode::Rtu {
-            return Err(Broken(
-                "RTU needs 8 data bits: give another --format, or --ascii".to_owned(),
-            ));
-        }
+    /// When no endpoint is named, or when it cannot be opened.
+    pub fn open(&self, mode: Mode) -> Result<Box<dyn Endpoint>> {
+        ensure!(
+            self.format.data_bits != 7 || mode == Mode::Ascii,
+            "RTU needs 8 data bits: give another --format, or --ascii"
+        );
         if let Some(path) = &self.serial {
             return Ok(Box::new(Stream::serial(path, self.line())?));
         }
@@ -223,31 +219,32 @@ impl Cli {
         } else {
             ""
         };
-        Err(Broken(format!(
+        bail!(
             "nothing to test: name an endpoint with --serial PORT, --tcp HOST:PORT, --exact-line HOST:PORT{sim}"
-        )))
+        )
     }
 
-    /// How long to wait on this endpoint.
+    /// The waiting times on this endpoint.
     #[must_use]
     pub fn waits(&self, endpoint: &dyn Endpoint) -> Patience {
         waits(endpoint, self.patience.map(Duration::from_millis))
     }
 
-    /// The cases that are wanted.
+    /// The cases to run.
     ///
     /// # Errors
     ///
-    /// When none is left.
-    pub fn cases(&self) -> Result<Vec<Case>, String> {
+    /// When no case is left.
+    pub fn cases(&self) -> Result<Vec<Case>> {
         let mut cases = chosen(&self.only)?;
         cases.retain(|case| {
             let excluded = self.exclude.iter().any(|part| case.name.contains(part));
             !excluded && (!self.standard_only || case.kind == Kind::Standard)
         });
-        if cases.is_empty() {
-            return Err("--exclude and --standard-only leave no case to run".to_owned());
-        }
+        ensure!(
+            !cases.is_empty(),
+            "--exclude and --standard-only leave no case to run"
+        );
         Ok(cases)
     }
 }
@@ -256,20 +253,21 @@ impl Cli {
 ///
 /// # Errors
 ///
-/// When none is left.
-pub fn chosen(parts: &[String]) -> Result<Vec<Case>, String> {
+/// When no case is left.
+pub fn chosen(parts: &[String]) -> Result<Vec<Case>> {
     let mut cases = crate::cases::all();
     if !parts.is_empty() {
         cases.retain(|case| parts.iter().any(|part| case.name.contains(part)));
     }
-    if cases.is_empty() {
-        return Err("no case has such a name: modio-conformance --list shows them".to_owned());
-    }
+    ensure!(
+        !cases.is_empty(),
+        "no case has such a name: modio-conformance --list shows them"
+    );
     Ok(cases)
 }
 
-/// How long to wait on an endpoint: by its line when its time is exact, else long enough for an operating
-/// system, or a simulator that does not keep up.
+/// The waiting times on an endpoint. Where time is exact, the line sets them. Elsewhere they allow for a slow operating
+/// system, and for a simulator that is slower than its clock.
 #[must_use]
 pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
     let line = endpoint.line();
@@ -286,7 +284,7 @@ pub fn waits(endpoint: &dyn Endpoint, reply: Option<Duration>) -> Patience {
             .unwrap_or(Duration::from_millis(250))
             .max(line.t35() * 3);
         Patience {
-            // A reply that is due ends the wait when it comes: this costs nothing.
+            // A reply ends the wait, so a long wait costs time only when no reply is received.
             reply: wait * 4,
             silence: wait,
             quiet: Duration::from_millis(40).max(line.t35() * 2),
@@ -312,14 +310,14 @@ mod tests {
     }
 
     #[test]
-    fn without_an_endpoint_it_is_told_what_to_do() {
-        let text = parse(&[]).open(Mode::Rtu).err().unwrap().0;
+    fn missing_endpoint_is_an_error_that_names_the_options() {
+        let text = parse(&[]).open(Mode::Rtu).err().unwrap().to_string();
         assert!(
             text.contains("--serial") && text.contains("--tcp"),
             "{text}"
         );
-        let text = parse(&["--format", "7E1"]).open(Mode::Rtu).err().unwrap().0;
-        assert!(text.contains("--ascii"), "{text}");
+        let wrong = parse(&["--format", "7E1"]).open(Mode::Rtu).err().unwrap();
+        assert!(wrong.to_string().contains("--ascii"), "{wrong}");
     }
 
     #[test]
@@ -348,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_is_told_or_1() {
+    fn unit_is_that_of_the_option_then_of_the_profile_then_1() {
         assert_eq!(parse(&[]).unit(None), 1);
         assert_eq!(parse(&["--unit", "9"]).unit(None), 9);
         let profile = Profile::parse("unit = 17").unwrap();

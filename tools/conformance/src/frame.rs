@@ -1,28 +1,13 @@
-//! Frames of the serial line, RTU and ASCII (Modbus over Serial Line V1.02, 2.5), written for this suite
-//! alone: a mistake in the server's own codec must not hide in its test.
+//! Frames of the serial line, RTU and ASCII (Modbus over Serial Line V1.02, 2.5), by the crate `modbus-frames`. The
+//! server under test does not use that crate, so a mistake in the server's own codec does not hide in its test.
 
 use std::fmt;
 
-use crc::{CRC_16_MODBUS, Crc};
+use modbus_frames::adu::Framing;
+pub use modbus_frames::adu::{crc, lrc};
+use modbus_frames::decode::bytes;
 
-const CRC16: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
-
-/// The CRC of an RTU frame as it stands on the line, low byte first (V1.02, 6.2.2).
-#[must_use]
-pub fn crc(bytes: &[u8]) -> [u8; 2] {
-    CRC16.checksum(bytes).to_le_bytes()
-}
-
-/// The LRC of an ASCII frame's bytes: the two's complement of their sum (V1.02, 6.2.1).
-#[must_use]
-pub fn lrc(bytes: &[u8]) -> u8 {
-    bytes
-        .iter()
-        .fold(0_u8, |sum, byte| sum.wrapping_add(*byte))
-        .wrapping_neg()
-}
-
-/// How PDUs are put on the line.
+/// The form of a frame on the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// Bytes, ended by silence.
@@ -33,127 +18,73 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// The bytes of a frame with this unit address and PDU.
-    #[must_use]
-    pub fn frame(self, unit: u8, pdu: &[u8]) -> Vec<u8> {
-        let body = [&[unit], pdu].concat();
+    const fn framing(self) -> Framing {
         match self {
-            Self::Rtu => rtu(&body),
-            Self::Ascii => ascii(&body, lrc(&body)),
+            Self::Rtu => Framing::Rtu,
+            Self::Ascii => Framing::Ascii,
         }
     }
 
-    /// What a frame says: unit address and PDU.
+    /// Returns the bytes of a frame with this unit address and PDU.
+    #[must_use]
+    pub fn frame(self, unit: u8, pdu: &[u8]) -> Vec<u8> {
+        self.framing().frame(0, unit, pdu)
+    }
+
+    /// Returns the unit address and the PDU of a frame.
     ///
     /// # Errors
     ///
-    /// Why it is no frame, for people.
+    /// What is wrong with the frame, for people.
     pub fn decode(self, frame: &[u8]) -> Result<(u8, Vec<u8>), String> {
-        let body = match self {
-            Self::Rtu => decode_rtu(frame)?,
-            Self::Ascii => decode_ascii(frame)?,
-        };
-        match body.split_first() {
-            Some((unit, pdu)) if !pdu.is_empty() => Ok((*unit, pdu.to_vec())),
-            _ => Err("too short for an address and a function code".to_owned()),
+        // V1.02, 2.5.2 names the digits "0-9, A-F".
+        if self == Self::Ascii && frame.iter().any(u8::is_ascii_lowercase) {
+            return Err("not only digits 0-9 A-F".to_owned());
         }
+        self.framing().check(frame)
     }
 }
 
-/// These bytes and their CRC.
+/// Returns these bytes and their CRC.
 #[must_use]
 pub fn rtu(body: &[u8]) -> Vec<u8> {
     [body, &crc(body)].concat()
 }
 
-/// These bytes in ASCII framing with a check byte, right or not.
+/// Returns these bytes in ASCII framing with a check byte, right or not.
 #[must_use]
 pub fn ascii(body: &[u8], check: u8) -> Vec<u8> {
-    let mut frame = vec![b':'];
-    for byte in body.iter().chain([&check]) {
-        frame.extend(format!("{byte:02X}").bytes());
-    }
-    frame.extend(*b"\r\n");
-    frame
+    let digits = body.iter().chain([&check]);
+    let digits: String = digits.map(|byte| format!("{byte:02X}")).collect();
+    format!(":{digits}\r\n").into_bytes()
 }
 
-fn decode_rtu(frame: &[u8]) -> Result<Vec<u8>, String> {
-    let Some((body, check)) = frame.split_last_chunk::<2>() else {
-        return Err("too short for a CRC".to_owned());
-    };
-    let right = crc(body);
-    if *check == right {
-        Ok(body.to_vec())
-    } else {
-        let right = hex(&right);
-        Err(format!("its CRC {} is wrong, {right} is right", hex(check)))
-    }
-}
-
-fn decode_ascii(frame: &[u8]) -> Result<Vec<u8>, String> {
-    let digits = frame
-        .strip_prefix(b":")
-        .ok_or("it does not begin with ':'")?
-        .strip_suffix(b"\r\n")
-        .ok_or("it does not end in CR LF")?;
-    if digits.len() % 2 != 0 {
-        return Err("an odd number of digits".to_owned());
-    }
-    let bytes: Option<Vec<u8>> = digits
-        .chunks(2)
-        .map(|pair| Some(digit(pair[0])? << 4 | digit(pair[1])?))
-        .collect();
-    let bytes = bytes.ok_or("something that is no digit 0-9 A-F")?;
-    let (check, body) = bytes.split_last().ok_or("nothing in it")?;
-    if *check == lrc(body) {
-        Ok(body.to_vec())
-    } else {
-        let right = lrc(body);
-        Err(format!(
-            "its LRC {check:02X} is wrong, {right:02X} is right"
-        ))
-    }
-}
-
-/// Upper case only: V1.02, 2.5.2 names "0-9, A-F".
-const fn digit(character: u8) -> Option<u8> {
-    match character {
-        b'0'..=b'9' => Some(character - b'0'),
-        b'A'..=b'F' => Some(character - b'A' + 10),
-        _ => None,
-    }
-}
-
-/// Bytes for people: `01 03 00 10`; long runs are cut in the middle.
+/// Returns bytes for people, such as `01 03 00 10`; long runs are cut in the middle.
 #[must_use]
-pub fn hex(bytes: &[u8]) -> String {
+pub fn hex(run: &[u8]) -> String {
     const ENDS: usize = 24;
-    let join = |bytes: &[u8]| {
-        let pairs: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-        pairs.join(" ")
-    };
-    if bytes.len() <= 2 * ENDS {
-        return join(bytes);
+    let join = |run: &[u8]| bytes(Framing::Rtu, run);
+    let middle = run.len().saturating_sub(2 * ENDS);
+    if middle == 0 {
+        return join(run);
     }
-    let (head, rest) = bytes.split_at(ENDS);
-    let (middle, tail) = rest.split_at(rest.len() - ENDS);
-    let (head, tail) = (join(head), join(tail));
-    format!("{head} ... {} bytes ... {tail}", middle.len())
+    let (head, tail) = (join(&run[..ENDS]), join(&run[ENDS + middle..]));
+    format!("{head} ... {middle} bytes ... {tail}")
 }
 
-/// What came back for a request.
+/// What was received after a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
-    /// Nothing at all.
+    /// No byte.
     Silence,
-    /// A frame of the unit that was asked: its PDU.
+    /// The PDU of a good frame of the unit that was asked.
     Pdu(Vec<u8>),
-    /// Bytes that are no good reply: what they are, and what is wrong with them.
+    /// Bytes that are no good reply, and what is wrong with them.
     Wrong(Vec<u8>, String),
 }
 
 impl Reply {
-    /// The exception code, when it is the exception to `function`.
+    /// Returns the exception code, if this is an exception reply to `function`.
     #[must_use]
     pub fn exception(&self, function: u8) -> Option<u8> {
         match self {
@@ -187,15 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn checks_are_those_of_the_standard() {
-        // V1.02, 6.2.2: the CRC of 02 07 is 0x1241, on the line 41 12.
-        assert_eq!(crc(&[2, 7]), [0x41, 0x12]);
-        // V1.1b3, 6.1's request to unit 17: sum 0x4A, LRC 0xB6.
-        assert_eq!(lrc(&[0x11, 1, 0, 0x13, 0, 0x25]), 0xB6);
-    }
-
-    #[test]
-    fn frames_go_there_and_back_in_both_modes() {
+    fn frame_is_decoded_to_its_pdu_and_a_damaged_frame_is_refused() {
         for mode in [Mode::Rtu, Mode::Ascii] {
             let frame = mode.frame(17, &[3, 0, 0x6B, 0, 3]);
             assert_eq!(mode.decode(&frame), Ok((17, vec![3, 0, 0x6B, 0, 3])));
@@ -208,10 +131,13 @@ mod tests {
         }
         assert_eq!(Mode::Ascii.frame(17, &[7]), b":1107E8\r\n");
         assert!(Mode::Ascii.decode(b":1107e8\r\n").is_err(), "lower case");
+        // V1.1b3, 6.1's request to unit 17 has the sum 0x4A.
+        let request = [0x11, 1, 0, 0x13, 0, 0x25];
+        assert_eq!(ascii(&request, lrc(&request)), b":110100130025B6\r\n");
     }
 
     #[test]
-    fn exceptions_are_known_by_function_and_length() {
+    fn exception_reply_has_the_function_and_one_byte() {
         let pdu = |bytes: &[u8]| Reply::Pdu(bytes.to_vec());
         assert_eq!(pdu(&[0x83, 2]).exception(3), Some(2));
         assert_eq!(pdu(&[0x84, 2]).exception(3), None);
@@ -220,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn long_bytes_are_cut_for_people() {
+    fn long_runs_of_bytes_are_cut_in_the_middle() {
         assert_eq!(hex(&[1, 0xAB]), "01 AB");
         assert!(hex(&[0; 256]).contains("... 208 bytes ..."));
     }

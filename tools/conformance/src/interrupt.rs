@@ -1,25 +1,27 @@
-//! Ctrl-C and SIGTERM: noted, so that what is under way ends and the unit is put back; the second time
-//! the program ends at once.
+//! Ctrl-C and SIGTERM. The first one sets a flag, so that the running case can end and the unit is restored. The second
+//! one ends the program immediately.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The exit status of a program that Ctrl-C ended, as shells have it.
+use anyhow::{Context as _, Result};
+
+/// The exit status that shells use for a program that Ctrl-C ended.
 pub const STATUS: u8 = 130;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// From now on these signals are noted; gives where.
+/// Catches these signals from now on. Returns the flag that they set.
 ///
 /// # Errors
 ///
-/// When the system has no such handler left, in one line.
-pub fn catch() -> Result<&'static AtomicBool, String> {
+/// When the handler cannot be installed.
+pub fn catch() -> Result<&'static AtomicBool> {
     ctrlc::set_handler(|| {
         if ASKED.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(STATUS));
         }
-        eprintln!("interrupted: ending what is under way and putting the unit back; once more to end at once");
+        eprintln!("interrupted: the running case ends and the unit is restored; press Ctrl-C again to end immediately");
     })
-    .map_err(|error| format!("no handler for Ctrl-C: {error}"))?;
+    .context("cannot install a handler for Ctrl-C")?;
     Ok(&ASKED)
 }

@@ -1,21 +1,21 @@
-//! A suite of cases that a Modbus serial-line server must pass, run from outside: raw bytes on a line,
-//! whatever the line is.
+//! A suite of cases that a Modbus serial-line server must pass. The suite tests the server from outside, by raw bytes on
+//! a serial line, a socket or a simulated line.
 //!
-//! Each case cites the section it comes from: *V1.02* is Modbus over Serial Line V1.02, *V1.1b3* the
-//! Modbus Application Protocol V1.1b3, *map* the register map of the modio. A case says what it needs of
-//! the unit and of the endpoint, and is skipped with the reason where that is missing.
+//! Each case cites its source: *V1.02* is Modbus over Serial Line V1.02, *V1.1b3* the Modbus Application Protocol
+//! V1.1b3, *map* the register map of the modio. A case lists what it needs of the unit and of the endpoint. If something
+//! is missing, the case is skipped with the reason.
 //!
 //! ```text
-//! main, cli,     the command                 case, cases/   what is tried
+//! main, cli,     the command                  case, cases/   the cases
 //! program
-//! probe, profile what the unit has: Target   bench, points  what cases ask and judge with
-//! endpoint/      what carries the bytes      run, report/   one after another; table, JUnit, JSON
-//! frame          CRC, LRC, RTU, ASCII        vectors        worked frames of manuals
-//! hil/           a board on a bench: timing,  rate           to another rate and back
-//!                wires; command modio-hil    interrupt      Ctrl-C, with the unit put back first
+//! probe, profile the unit under test: Target  bench, points  steps of cases: requests and checks
+//! endpoint/      the lines                    run, report/   runs cases; table, JUnit, JSON
+//! frame          RTU and ASCII frames         vectors        worked frames of manuals
+//! hil/           a board on a bench: timing,  rate           changes the rate and restores it
+//!                wires; command modio-hil     interrupt      Ctrl-C
 //! ```
 //!
-//! Nothing here is shared with the server that it judges.
+//! The suite shares no code with the server that it tests.
 
 #![forbid(unsafe_code)]
 

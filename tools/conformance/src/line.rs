@@ -1,4 +1,4 @@
-//! How characters stand on a serial line, and the silences of Modbus that follow from it.
+//! Rate and character format of a serial line, and the silences of Modbus that follow from them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,16 +9,16 @@ use std::time::Duration;
 pub enum Parity {
     /// No parity bit.
     None,
-    /// The ones, parity bit included, are even in number.
+    /// The number of ones, including the parity bit, is even.
     Even,
-    /// The ones, parity bit included, are odd in number.
+    /// The number of ones, including the parity bit, is odd.
     Odd,
 }
 
 /// Rate and character format of one end of a serial line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineFormat {
-    /// Bits a second.
+    /// Bits per second.
     pub baud: u32,
     /// Data bits, 7 (ASCII only) or 8.
     pub data_bits: u8,
@@ -28,7 +28,7 @@ pub struct LineFormat {
     pub stop_bits: u8,
 }
 
-/// The frame format alone, as in `8N2`.
+/// The character format without the rate, such as `8N2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CharacterFormat {
     /// Data bits, 7 or 8.
@@ -40,7 +40,7 @@ pub struct CharacterFormat {
 }
 
 impl LineFormat {
-    /// Rate and format put together.
+    /// Combines a rate and a format.
     #[must_use]
     pub const fn new(baud: u32, format: CharacterFormat) -> Self {
         Self {
@@ -61,13 +61,13 @@ impl LineFormat {
         }
     }
 
-    /// The time of `n` bits.
+    /// The duration of `n` bits.
     #[must_use]
     pub fn bits(self, n: u64) -> Duration {
         Duration::from_nanos(n * 1_000_000_000 / u64::from(self.baud))
     }
 
-    /// The time of `n` characters without a gap, start, parity and stop bits included.
+    /// The duration of `n` characters without gaps, including start, parity and stop bits.
     #[must_use]
     pub fn characters(self, n: usize) -> Duration {
         let parity = u64::from(self.parity != Parity::None);
@@ -162,7 +162,8 @@ impl FromStr for CharacterFormat {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("{text:?} is no format such as 8N2, 8E1, 8O1, 8N1 or 7E1");
+        let wrong =
+            || format!("{text:?} is not a format; use one such as 8N2, 8E1, 8O1, 8N1 or 7E1");
         let [data, parity, stop] = text.as_bytes() else {
             return Err(wrong());
         };
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn formats_are_read_and_written() {
+    fn format_is_parsed_and_displayed() {
         for (text, bits) in [("8N1", 10), ("8N2", 11), ("8e1", 11), ("7O1", 10)] {
             let line = LineFormat::new(1000, text.parse().unwrap());
             assert_eq!(line.characters(1), Duration::from_millis(bits), "{text}");

@@ -1,4 +1,4 @@
-//! `modio-conformance`: runs the suite against a unit and tells what it found.
+//! `modio-conformance`: runs the suite against a unit and reports the results.
 
 use std::io;
 use std::process::ExitCode;
@@ -16,8 +16,8 @@ fn main() -> ExitCode {
     program::run("modio-conformance", test)
 }
 
-/// Tests, and gives the exit status.
-fn test(cli: &Cli) -> Result<u8, String> {
+/// Tests the unit, and returns the exit status.
+fn test(cli: &Cli) -> anyhow::Result<u8> {
     let cases = cli.cases()?;
     if cli.list {
         program::say(table::list(&cases).trim_end());
@@ -26,7 +26,7 @@ fn test(cli: &Cli) -> Result<u8, String> {
     cli.reports.check()?;
     let profile = cli.read_profile()?;
     let mode = cli.mode(profile.as_ref())?;
-    let mut endpoint = cli.open(mode).map_err(|broken| broken.to_string())?;
+    let mut endpoint = cli.open(mode)?;
     if cli.trace {
         endpoint = Box::new(Trace::new(endpoint, io::stderr()));
     }
@@ -45,7 +45,7 @@ fn test(cli: &Cli) -> Result<u8, String> {
         allow_config: cli.allow_config,
     };
     let mut outcomes = Vec::new();
-    let tell = |outcome: &run::Outcome| program::say(table::row(outcome));
+    let report = |outcome: &run::Outcome| program::say(table::row(outcome));
     let stop = interrupt::catch()?;
     let go_on = || !stop.load(Ordering::Relaxed);
     let ended = run::run_while(
@@ -54,27 +54,24 @@ fn test(cli: &Cli) -> Result<u8, String> {
         options,
         &cases,
         go_on,
-        tell,
+        report,
         &mut outcomes,
     );
-    // What was found before it could not go on is worth having, too.
+    // The results up to an error are reported, too.
     program::say(table::summary(&outcomes));
-    let (junit, json) = (
-        junit::document(&name, &outcomes),
-        json::value(&name, &outcomes),
-    );
-    let written = cli.reports.write(&junit, &json);
-    ended.map_err(|broken| broken.to_string())?;
+    let json = json::value(&name, &outcomes);
+    let written = cli.reports.write(&junit::report(&name, &outcomes), &json);
+    ended?;
     written?;
     if !go_on() {
         return Ok(interrupt::STATUS);
     }
-    // The modio's documents promise the interpretations.
+    // The documents of the modio promise what the interpretations demand.
     let strict = cli.strict || target.modio.is_some();
     Ok(u8::from(Totals::of(&outcomes).counted(strict) > 0))
 }
 
-/// What the probe has found, in one line.
+/// The results of the probe, in one line.
 fn found(target: &Target) -> String {
     let functions: Vec<String> = target
         .functions

@@ -1,5 +1,4 @@
-//! Reading and writing the unit's points for a case, by whatever function it has for that; and putting
-//! them back.
+//! Reads, writes and restores the unit's points for a case, by the functions that the unit has.
 
 use register_map::configuration::{KEY, OPENING_KEY};
 
@@ -44,7 +43,7 @@ pub fn words_of(reply: &[u8]) -> Vec<u16> {
     pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
 }
 
-/// What the points that cases write to held before.
+/// The values of the points that cases write to, before a case.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
     bits: Option<Vec<bool>>,
@@ -53,40 +52,62 @@ pub struct Snapshot {
 
 impl Bench<'_> {
     /// Coils to write to.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Skip`] when there are none.
     pub fn bits(&self) -> Check<Span> {
         let lacking = || Stop::Skip("no coil to write to".to_owned());
         self.target.bits.ok_or_else(lacking)
     }
 
     /// Registers to write to.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Skip`] when there are none.
     pub fn words(&self) -> Check<Words> {
         let lacking = || Stop::Skip("no register to write to".to_owned());
         self.target.words.ok_or_else(lacking)
     }
 
+    /// A value that the registers to write to refuse.
+    pub fn refused_value(&self) -> Check<u16> {
+        let lacking = || Stop::Skip("no value is known that is refused".to_owned());
+        self.words()?.refused.ok_or_else(lacking)
+    }
+
     /// The longest run that a function (1 to 4) reads.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Skip`] when there is none.
     pub fn readable(&self, function: u8) -> Check<Span> {
         let lacking = || Stop::Skip(format!("nothing to read by function {function:02X}"));
         self.target.longest(function).ok_or_else(lacking)
     }
 
+    /// An address that a function (1 to 4) cannot read.
+    pub fn nowhere(&self, function: u8) -> Check<u16> {
+        let lacking = || Stop::Skip("every address exists".to_owned());
+        self.target.nowhere(function).ok_or_else(lacking)
+    }
+
+    /// The addresses next to what a function (1 to 4) reads, and 0xFFFF, as far as the function cannot read them.
+    #[must_use]
+    pub fn outside(&self, function: u8) -> Vec<u16> {
+        let spans = self.target.readable(function);
+        let mut outside = vec![0xFFFF];
+        for span in spans {
+            outside.extend(span.last.checked_add(1));
+            outside.extend(span.first.checked_sub(1));
+        }
+        outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
+        outside
+    }
+
+    /// Checks that a register still has this value.
+    pub fn word_is(&mut self, address: u16, value: u16) -> Check {
+        let now = self.read_word(address)?;
+        let wanted = format!("register {address:04X} still is {value:04X}");
+        self.ensure(now == value, wanted)
+    }
+
+    /// Checks that coils are still off.
+    pub fn is_off(&mut self, coils: Span) -> Check {
+        let now = self.read_bits(coils)?;
+        self.ensure(!now.contains(&true), "the coil is still off")
+    }
+
     /// Reads coils by function 01, at most 2000.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when the unit does not give them, [`Stop::Broken`].
     pub fn read_bits(&mut self, span: Span) -> Check<Vec<bool>> {
         let count = span.len() as usize;
         let reply = self.reply(&pdu(1, span.first, count as u16))?;
@@ -97,10 +118,6 @@ impl Bench<'_> {
     }
 
     /// Reads registers by function 03, at most 125.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when the unit does not give them, [`Stop::Broken`].
     pub fn read_words(&mut self, span: Span) -> Check<Vec<u16>> {
         let count = span.len() as usize;
         let reply = self.reply(&pdu(3, span.first, count as u16))?;
@@ -110,23 +127,12 @@ impl Bench<'_> {
     }
 
     /// Reads one register by function 03.
-    ///
-    /// # Errors
-    ///
-    /// As [`Bench::read_words`].
     pub fn read_word(&mut self, address: u16) -> Check<u16> {
-        let one = Span {
-            first: address,
-            last: address,
-        };
+        let one = Span::one(address);
         Ok(self.read_words(one)?[0])
     }
 
     /// Sets coils from `first` on, by 0F or 05.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when the unit does not do it, [`Stop::Broken`].
     pub fn set_bits(&mut self, first: u16, values: &[bool]) -> Check {
         if self.target.has(0x0F) {
             return self.reply(&write_bits(first, values, false)).map(drop);
@@ -139,10 +145,6 @@ impl Bench<'_> {
     }
 
     /// Sets registers from `first` on, by 10 or 06.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when the unit does not do it, [`Stop::Broken`].
     pub fn set_words(&mut self, first: u16, values: &[u16]) -> Check {
         if self.target.has(0x10) {
             return self.reply(&write_words(first, values)).map(drop);
@@ -154,19 +156,11 @@ impl Bench<'_> {
     }
 
     /// Opens a modio's configuration lock.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when it does not open, [`Stop::Broken`].
     pub fn unlock(&mut self) -> Check {
         self.reply(&pdu(6, KEY, OPENING_KEY)).map(drop)
     }
 
-    /// What the points that cases write to hold.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when they cannot be read, [`Stop::Broken`].
+    /// Reads the values of the points that cases write to.
     pub fn snapshot(&mut self) -> Check<Snapshot> {
         let mut snapshot = Snapshot::default();
         if let Some(span) = self.target.bits.filter(|_| self.target.has(1)) {
@@ -178,11 +172,7 @@ impl Bench<'_> {
         Ok(snapshot)
     }
 
-    /// Puts the points back to what they held, where they do not hold it any more.
-    ///
-    /// # Errors
-    ///
-    /// [`Stop::Fail`] when the unit does not let it, [`Stop::Broken`].
+    /// Restores the points whose values have changed.
     pub fn restore(&mut self, before: &Snapshot) -> Check {
         let now = self.snapshot()?;
         if let (Some(bits), Some(span)) = (&before.bits, self.target.bits)

@@ -1,20 +1,21 @@
-//! Finds out what the unit under test has: that it answers, its functions, where its points are.
+//! Asks the unit under test whether it answers, and which functions and points it has.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use anyhow::{Context as _, Result, bail, ensure};
 use register_map::points::{self, Kind, output_values};
 use register_map::{BLOCKS, Board, Module, Values, codes, configuration, state};
 
 use crate::bench::{Bench, Patience};
-use crate::case::{Check, Stop};
+use crate::case::Check;
 use crate::endpoint::Endpoint;
 use crate::frame::{Mode, Reply};
 use crate::points::pdu;
 use crate::profile::Profile;
 use crate::target::{Modio, Span, Support, Target, Words};
 
-/// What is known before the unit is asked.
+/// What the user has given, before the unit is asked.
 #[derive(Clone, Debug)]
 pub struct Given<'a> {
     /// The unit's address.
@@ -23,13 +24,13 @@ pub struct Given<'a> {
     pub mode: Mode,
     /// How long to wait.
     pub patience: Patience,
-    /// What it has, when it is no modio.
+    /// Description of a unit that is not a modio.
     pub profile: Option<&'a Profile>,
     /// Whether its configuration may be written.
     pub allow_config: bool,
 }
 
-/// How often a unit is asked before it counts as silent.
+/// Number of requests without a reply after which a unit counts as silent.
 const ATTEMPTS: u32 = 4;
 
 /// Every function that cases are about.
@@ -37,12 +38,12 @@ pub const FUNCTIONS: [u8; 18] = [
     1, 2, 3, 4, 5, 6, 7, 8, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x14, 0x15, 0x16, 0x17, 0x2B,
 ];
 
-/// Asks the unit.
+/// Asks the unit. Returns what the unit has, and the waiting times with the unit's own delay.
 ///
 /// # Errors
 ///
-/// Why it cannot be tested and what to do, in one line.
-pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, Patience), String> {
+/// Why the unit cannot be tested, and what to do.
+pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, Patience)> {
     let mut target = Target {
         unit: given.unit,
         mode: given.mode,
@@ -56,44 +57,28 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
     };
     let mut patience = given.patience;
     let line = endpoint.line();
-    let told = |stop: Stop| match stop {
-        Stop::Broken(broken) => broken.to_string(),
-        Stop::Skip(why) => why,
-        Stop::Fail(failure) => format!(
-            "the unit cannot be made out: to {} came {}; wanted: {}",
-            failure.sent, failure.came, failure.wanted
-        ),
-    };
     if let Some(profile) = given.profile {
         let known = profile.known()?;
         target.readable = known.readable;
         (target.bits, target.words) = (known.bits, known.words);
     } else {
-        let reply = first_answer(endpoint, &target, patience, &pdu(3, state::PRODUCT_CODE, 2))
-            .map_err(told)?;
+        let reply = first_answer(endpoint, &target, patience, &pdu(3, state::PRODUCT_CODE, 2))?;
         let product = state::PRODUCT.to_be_bytes();
+        let unit = given.unit;
         match reply {
             Reply::Pdu(reply) if reply.get(2..) == Some(&product) => {}
-            Reply::Silence => {
-                let unit = given.unit;
-                return Err(format!(
-                    "unit {unit} does not answer at {line}: check its address, rate, format, mode and wiring"
-                ));
-            }
-            Reply::Wrong(..) => {
-                return Err(format!(
-                    "what comes at {line} is no Modbus frame ({reply}): check rate, format and mode"
-                ));
-            }
+            Reply::Silence => bail!(
+                "unit {unit} does not answer at {line}: check its address, rate, format, mode and wiring"
+            ),
+            Reply::Wrong(..) => bail!(
+                "the reply at {line} is not a Modbus frame ({reply}): check rate, format and mode"
+            ),
             Reply::Pdu(_) => {
-                return Err(format!(
-                    "unit {} answers but is no modio: tell what it has with --profile FILE",
-                    given.unit
-                ));
+                bail!("unit {unit} answers but is not a modio: describe it with --profile FILE")
             }
         }
         let mut bench = Bench::new(endpoint, &target, patience, false);
-        let (found, slower) = modio(&mut bench, given.allow_config).map_err(told)?;
+        let (found, slower) = modio(&mut bench, given.allow_config)?;
         target = found;
         patience.reply += slower;
         patience.silence += slower;
@@ -105,7 +90,7 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
             Some(_) => Support::Refused,
             None => {
                 let request = harmless(&target, function)?;
-                match ask(endpoint, &target, patience, &request).map_err(told)? {
+                match ask(endpoint, &target, patience, &request)? {
                     Reply::Silence => Support::Silent,
                     reply if reply.exception(function) == Some(1) => Support::Refused,
                     _ => Support::Yes,
@@ -114,17 +99,15 @@ pub fn probe(endpoint: &mut dyn Endpoint, given: &Given<'_>) -> Result<(Target, 
         };
         target.functions.insert(function, support);
     }
-    target.ping = ping(&target).ok_or_else(|| {
-        "nothing is known that the unit could be asked for: let the profile name something to read"
-            .to_owned()
-    })?;
-    let reply = ask(endpoint, &target, patience, &target.ping).map_err(told)?;
-    if !matches!(&reply, Reply::Pdu(pdu) if pdu[0] == target.ping[0]) {
-        return Err(format!(
-            "unit {} at {line} does not answer an ordinary request: it gives {reply}",
-            given.unit
-        ));
-    }
+    target.ping = ping(&target).context(
+        "no request is known that the unit answers: name something to read in the profile",
+    )?;
+    let reply = ask(endpoint, &target, patience, &target.ping)?;
+    ensure!(
+        matches!(&reply, Reply::Pdu(pdu) if pdu[0] == target.ping[0]),
+        "unit {} at {line} does not answer an ordinary request: the reply is {reply}",
+        given.unit
+    );
     Ok((target, patience))
 }
 
@@ -137,7 +120,7 @@ fn ask(
     Bench::new(endpoint, target, patience, false).ask_due(pdu)
 }
 
-/// Asks a unit that may be starting, or have something in its receiver from before.
+/// Asks a unit that may be starting, or may still have earlier bytes in its receiver.
 fn first_answer(
     endpoint: &mut dyn Endpoint,
     target: &Target,
@@ -148,18 +131,18 @@ fn first_answer(
         if let reply @ Reply::Pdu(_) = ask(endpoint, target, patience, pdu)? {
             return Ok(reply);
         }
-        // What comes late is not to stand before the next reply.
-        endpoint.hear(patience.silence, patience.silence, usize::MAX)?;
+        // Discard a late reply, so that it is not read as the reply to the next request.
+        endpoint.receive(patience.silence, patience.silence, usize::MAX)?;
     }
     ask(endpoint, target, patience, pdu)
 }
 
 /// A request that shows whether the unit has a function, and changes nothing.
-fn harmless(target: &Target, function: u8) -> Result<Vec<u8>, String> {
+fn harmless(target: &Target, function: u8) -> Result<Vec<u8>> {
     let nowhere = || {
-        target.nowhere_to_write(function).ok_or_else(|| {
-            "every address exists: let the profile list the unit's functions".to_owned()
-        })
+        target
+            .nowhere_to_write(function)
+            .context("every address exists: list the unit's functions in the profile")
     };
     let first = |function| target.readable(function).first().map_or(0, |s| s.first);
     Ok(match function {
@@ -184,7 +167,7 @@ fn ping(target: &Target) -> Option<Vec<u8>> {
     read.or_else(|| target.has(8).then(|| vec![8, 0, 0, 0xA5, 0x37]))
 }
 
-/// What a modio has, by its own registers; and how much longer than by the standard it may take to answer.
+/// Reads from a modio's registers what the modio has, and how much longer than t3.5 its reply may take.
 fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)> {
     let board = Board::from_code(bench.read_word(state::BOARD)?);
     let codes = bench.read_words(Span {
@@ -244,7 +227,7 @@ fn modio(bench: &mut Bench<'_>, allow_config: bool) -> Check<(Target, Duration)>
     Ok((target, slower))
 }
 
-/// What analog outputs take, by their scale and signal: the first of these, and those behind it that take the same.
+/// Reads the values that analog outputs accept. Returns the first outputs of the span that accept the same values.
 fn outputs(bench: &mut Bench<'_>, span: Span) -> Check<Words> {
     let mut of_point = |point: u16| {
         let scale = bench.read_word(configuration::SCALE + point)?;

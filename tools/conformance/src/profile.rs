@@ -1,10 +1,10 @@
-//! A profile: what a device other than a modio has, in TOML, so that any Modbus server can be tested.
+//! A profile describes a device other than a modio in TOML, so that any Modbus server can be tested.
 //!
 //! ```toml
 //! unit = 17
 //! mode = "rtu"                      # or "ascii"; "rtu" when left out
 //! functions = [1, 3, 5, 6, 15, 16]  # probed when left out
-//! strict_t15 = true                 # frames with a gap above t1.5 are dropped; either way when left out
+//! strict_t15 = true                 # frames with a gap above t1.5 are dropped; both are right when left out
 //!
 //! [coils]
 //! read = ["0-99"]
@@ -13,8 +13,8 @@
 //! [holding_registers]
 //! read = ["0x0000-0x00FF"]
 //! write = ["0x0010-0x0013"]
-//! values = [1, 4000]                # two values that they take
-//! refused = 5000                    # one that they refuse with exception 03, if any
+//! values = [1, 4000]                # two values that they accept
+//! refused = 5000                    # a value that they refuse with exception 03, if there is one
 //!
 //! [discrete_inputs]
 //! read = ["0-7"]
@@ -23,14 +23,15 @@
 //! read = ["0-9"]
 //! ```
 //!
-//! Each run is one that a single request may span; the addresses before and after it do not exist.
+//! One request can span a whole run. The addresses before and after a run do not exist.
 
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use serde::Deserialize;
 
 use crate::frame::Mode;
 use crate::target::{Span, Words};
 
-/// The profile as it stands in its file.
+/// The contents of a profile's file.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
@@ -40,7 +41,7 @@ pub struct Profile {
     mode: Option<String>,
     /// The functions that it has.
     pub functions: Option<Vec<u8>>,
-    /// What becomes of a frame with a gap above t1.5.
+    /// Whether the unit drops a frame with a gap above t1.5.
     pub strict_t15: Option<bool>,
     #[serde(default)]
     coils: Table,
@@ -63,11 +64,9 @@ struct Table {
     refused: Option<u16>,
 }
 
-/// A profile, understood.
+/// The points that a profile describes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Known {
-    /// The mode it tells.
-    pub mode: Option<Mode>,
     /// What can be read, by function 1 to 4.
     pub readable: [Vec<Span>; 4],
     /// Coils to write to.
@@ -81,56 +80,62 @@ impl Profile {
     ///
     /// # Errors
     ///
-    /// What is wrong with it, in one line.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        toml::from_str(text).map_err(|error| error.to_string().trim().replace('\n', " "))
+    /// When the text is not a profile, in one line.
+    pub fn parse(text: &str) -> Result<Self> {
+        toml::from_str(text).map_err(|error| anyhow!(error.to_string().trim().replace('\n', " ")))
     }
 
-    /// What it says about the unit's points.
+    /// The mode, if the profile names it.
     ///
     /// # Errors
     ///
-    /// What is wrong with it, in one line.
-    pub fn known(&self) -> Result<Known, String> {
-        let mode = match self.mode.as_deref() {
+    /// When the mode is neither `rtu` nor `ascii`.
+    pub fn mode(&self) -> Result<Option<Mode>> {
+        Ok(match self.mode.as_deref() {
             None => None,
             Some("rtu") => Some(Mode::Rtu),
             Some("ascii") => Some(Mode::Ascii),
-            Some(other) => return Err(format!("mode {other:?} is neither \"rtu\" nor \"ascii\"")),
-        };
+            Some(other) => bail!("mode {other:?} is neither \"rtu\" nor \"ascii\""),
+        })
+    }
+
+    /// The unit's points.
+    ///
+    /// # Errors
+    ///
+    /// When the profile contradicts itself, in one line.
+    pub fn known(&self) -> Result<Known> {
+        self.mode()?;
+        ensure!(
+            self.unit != Some(0),
+            "unit 0 is the broadcast address: a unit has an address from 1"
+        );
         for (table, name) in [
             (&self.discrete_inputs, "discrete_inputs"),
             (&self.input_registers, "input_registers"),
         ] {
-            if !table.write.is_empty() {
-                return Err(format!("{name} cannot be written"));
-            }
-        }
-        if self.unit == Some(0) {
-            return Err("unit 0 is everybody: a unit has an address from 1".to_owned());
+            ensure!(table.write.is_empty(), "{name} cannot be written");
         }
         for (table, name) in [
             (&self.coils, "coils"),
             (&self.discrete_inputs, "discrete_inputs"),
             (&self.input_registers, "input_registers"),
         ] {
-            if table.values.is_some() || table.refused.is_some() {
-                return Err(format!("{name} take no `values` and no `refused`"));
-            }
+            ensure!(
+                table.values.is_none() && table.refused.is_none(),
+                "{name} take no `values` and no `refused`"
+            );
         }
         let bits = self.coils.one_to_write("coils")?;
         let holding = &self.holding_registers;
         let to_write = holding.one_to_write("holding_registers")?;
         let words = match (to_write, holding.values) {
             (None, _) => None,
-            (Some(_), None) => {
-                return Err(
-                    "holding_registers need `values`: two values that those in `write` take"
-                        .to_owned(),
-                );
-            }
+            (Some(_), None) => bail!(
+                "holding_registers need `values`: two values that the registers in `write` accept"
+            ),
             (Some(_), Some([low, high])) if low == high => {
-                return Err("the two `values` of holding_registers must differ".to_owned());
+                bail!("the two `values` of holding_registers must differ");
             }
             (Some(span), Some([low, high])) => Some(Words {
                 span: span.up_to(123),
@@ -141,7 +146,6 @@ impl Profile {
             }),
         };
         Ok(Known {
-            mode,
             readable: [
                 spans(&self.coils.read)?,
                 spans(&self.discrete_inputs.read)?,
@@ -155,45 +159,46 @@ impl Profile {
 }
 
 impl Table {
-    /// The run to write to, if there is one: it must be readable, for it is put back.
-    fn one_to_write(&self, name: &str) -> Result<Option<Span>, String> {
+    /// The run to write to, if there is one. It must be readable, because its values are restored.
+    fn one_to_write(&self, name: &str) -> Result<Option<Span>> {
         let run = match spans(&self.write)?[..] {
             [] => return Ok(None),
             [run] => run,
-            _ => return Err(format!("{name} take one run to `write`, not several")),
+            _ => bail!("{name} take one run to `write`, not several"),
         };
         let readable = spans(&self.read)?;
         let is_readable = readable
             .iter()
             .any(|span| span.first <= run.first && run.last <= span.last);
-        is_readable.then_some(Some(run)).ok_or_else(|| {
-            format!("{name}: what is in `write` must lie in one run of `read`, to be put back")
-        })
+        ensure!(
+            is_readable,
+            "{name}: the run in `write` must be part of one run in `read`, so that it can be restored"
+        );
+        Ok(Some(run))
     }
 }
 
-fn spans(texts: &[String]) -> Result<Vec<Span>, String> {
+fn spans(texts: &[String]) -> Result<Vec<Span>> {
     texts.iter().map(|text| span(text)).collect()
 }
 
 /// `0x0010-0x0013`, `16-19` or `16`.
-fn span(text: &str) -> Result<Span, String> {
-    let wrong = || format!("{text:?} is no run of addresses such as \"0x0010-0x0013\"");
+fn span(text: &str) -> Result<Span> {
+    let wrong = || format!("{text:?} is not a run of addresses such as \"0x0010-0x0013\"");
     let number = |text: &str| {
         let text = text.trim();
         match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
             Some(digits) => u16::from_str_radix(digits, 16),
             None => text.parse(),
         }
-        .map_err(|_| wrong())
+        .ok()
+        .with_context(wrong)
     };
     let (first, last) = match text.split_once('-') {
         Some((first, last)) => (number(first)?, number(last)?),
         None => (number(text)?, number(text)?),
     };
-    if first > last {
-        return Err(wrong());
-    }
+    ensure!(first <= last, wrong());
     Ok(Span { first, last })
 }
 
@@ -202,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_example_in_the_documentation_is_understood() {
+    fn example_in_the_documentation_is_a_profile() {
         let text: String = include_str!("profile.rs")
             .lines()
             .skip_while(|line| *line != "//! ```toml")
@@ -212,7 +217,8 @@ mod tests {
             .collect();
         let profile = Profile::parse(&text).unwrap();
         let known = profile.known().unwrap();
-        assert_eq!((profile.unit, known.mode), (Some(17), Some(Mode::Rtu)));
+        assert_eq!(profile.unit, Some(17));
+        assert_eq!(profile.mode().unwrap(), Some(Mode::Rtu));
         assert_eq!(
             known.readable[2],
             [Span {
@@ -227,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told() {
+    fn wrong_profile_is_an_error_in_one_line() {
         for (text, part) in [
             ("unit = 300", "unit"),
             ("colour = 1", "colour"),
@@ -240,7 +246,7 @@ mod tests {
             ),
             ("unit = 0", "unit 0"),
             ("[coils]\nrefused = 3", "no `refused`"),
-            ("[coils]\nread = [\"0-9\"]\nwrite = [\"5-10\"]", "put back"),
+            ("[coils]\nread = [\"0-9\"]\nwrite = [\"5-10\"]", "restored"),
             (
                 "[coils]\nread = [\"0-9\"]\nwrite = [\"1\", \"3\"]",
                 "not several",
@@ -251,8 +257,9 @@ mod tests {
             ),
             ("[input_registers]\nwrite = [\"1\"]", "cannot be written"),
         ] {
-            let told = Profile::parse(text).and_then(|p| p.known()).unwrap_err();
-            assert!(told.contains(part) && !told.contains('\n'), "{told}");
+            let error = Profile::parse(text).and_then(|p| p.known()).unwrap_err();
+            let error = format!("{error:#}");
+            assert!(error.contains(part) && !error.contains('\n'), "{error}");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! What the commands of this package have in common: arguments in, one line and exit status 2 when nothing
-//! could be tested, reports into files.
+//! What the commands of this package share: they parse their arguments, print one line and end with status 2 when
+//! nothing could be tested, and write reports to files.
 
 use std::fmt::Display;
 use std::fs::{self, OpenOptions};
@@ -7,72 +7,70 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Parser;
 
-/// Runs a command of this name by its arguments. `test` gives the exit status, or says in a line why it could
-/// not test.
-pub fn run<Cli: Parser>(name: &str, test: impl FnOnce(&Cli) -> Result<u8, String>) -> ExitCode {
+/// Runs a command of this name with its arguments. `test` returns the exit status, or why nothing could be tested.
+pub fn run<Cli: Parser>(name: &str, test: impl FnOnce(&Cli) -> Result<u8>) -> ExitCode {
     let tested = match Cli::try_parse() {
         Ok(cli) => test(&cli),
-        Err(error) if error.use_stderr() => Err(one_line(&error)),
+        Err(error) if error.use_stderr() => Err(anyhow!(one_line(&error))),
         Err(help) => help.exit(),
     };
     match tested {
         Ok(status) => ExitCode::from(status),
-        Err(what) => {
-            eprintln!("{name}: {what}");
+        Err(error) => {
+            eprintln!("{name}: {error:#}");
             ExitCode::from(2)
         }
     }
 }
 
-/// Tells people a line or more. A reader that has gone, as `head` goes, is no failure: the unit is still to be
-/// put back, and the reports are to be written.
+/// Prints one or more lines. A reader that has closed the pipe, as `head` does, is no error: the unit must still be
+/// restored, and the reports written.
 pub fn say(text: impl Display) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
-/// The files that reports are to go to.
+/// The files to which reports are written.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Files {
-    /// Write what came out as JUnit XML
+    /// Write the results as JUnit XML
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
 
-    /// Write what came out as JSON
+    /// Write the results as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
 }
 
 impl Files {
-    /// Makes sure that they can be written, before the time that a test takes is spent.
+    /// Checks that the files can be written. A test takes long, so a wrong path must not show at its end only.
     ///
     /// # Errors
     ///
-    /// Which cannot, and why; or that both are the same.
-    pub fn check(&self) -> Result<(), String> {
+    /// The file that cannot be written, and why; or that both options name the same file.
+    pub fn check(&self) -> Result<()> {
         if self.junit.is_some() && self.junit == self.json {
-            return Err("--junit and --json name the same file".to_owned());
+            bail!("--junit and --json name the same file");
         }
-        for path in [&self.junit, &self.json].into_iter().flatten() {
-            check(path).map_err(|error| cannot_write(path, &error))?;
-        }
-        Ok(())
+        let mut paths = [&self.junit, &self.json].into_iter().flatten();
+        paths.try_for_each(|path| check(path).with_context(|| cannot_write(path)))
     }
 
-    /// Writes both, one even if the other fails.
+    /// Writes both reports, the second also when the first cannot be written.
     ///
     /// # Errors
     ///
-    /// The first that cannot be written: where and why.
-    pub fn write(&self, junit: &str, json: &serde_json::Value) -> Result<(), String> {
-        let junit = write(self.junit.as_deref(), junit);
+    /// The first file that cannot be written, and why.
+    pub fn write(&self, junit: &quick_junit::Report, json: &serde_json::Value) -> Result<()> {
+        let junit = write(self.junit.as_deref(), &junit.to_string()?);
         let json = write(self.json.as_deref(), &format!("{json:#}\n"));
         junit.and(json)
     }
 }
 
-/// Opens a file for writing and leaves all as it was.
+/// Opens a file for writing, and leaves the file as it was.
 fn check(path: &Path) -> io::Result<()> {
     let is_new = !path.exists();
     OpenOptions::new().append(true).create(true).open(path)?;
@@ -82,17 +80,17 @@ fn check(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-fn write(path: Option<&Path>, text: &str) -> Result<(), String> {
+fn write(path: Option<&Path>, text: &str) -> Result<()> {
     path.map_or(Ok(()), |path| {
-        fs::write(path, text).map_err(|error| cannot_write(path, &error))
+        fs::write(path, text).with_context(|| cannot_write(path))
     })
 }
 
-fn cannot_write(path: &Path, error: &io::Error) -> String {
-    format!("cannot write {}: {error}", path.display())
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
 }
 
-/// What is wrong with a command line, in one line.
+/// The error of a command line, in one line.
 fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines: Vec<&str> = text

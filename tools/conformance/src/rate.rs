@@ -1,4 +1,4 @@
-//! Takes a modio, and the endpoint after it, to another rate and format, and back again.
+//! Changes a modio and the endpoint to another rate and format, and back.
 
 use std::time::Duration;
 
@@ -6,25 +6,28 @@ use register_map::codes::{Command, Format};
 use register_map::configuration::{BAUD, COMMAND};
 
 use crate::bench::Bench;
-use crate::case::{Check, Stop};
+use crate::case::{Check, Stop, skip};
 use crate::line::LineFormat;
 use crate::points::{pdu, write_words};
 
-/// For the unit to store its configuration, and to start.
+/// Time for the unit to store its configuration.
 const STORING: Duration = Duration::from_millis(200);
+/// Longest time that a restart may take, and the interval at which the unit is asked whether it has restarted.
 const START: Duration = Duration::from_millis(1500);
+const INTERVAL: Duration = Duration::from_millis(250);
 
-/// How often the way back is tried: on a poor line one lost frame must not leave the unit elsewhere.
+/// Number of attempts to restore the rate. One frame lost on a poor line must not leave the unit at another rate.
 const ATTEMPTS: u32 = 3;
 
-/// Visits each of these rates and formats, and goes back to the first whatever happens on the way. Where
-/// the unit is lost, the endpoint looks for it. Ends early when `visit` fails.
+/// Sets each of these rates and formats, calls `visit` there, and restores the first rate and format, also after a
+/// failure. If the unit does not answer after a change, the endpoint tries the rates where the unit may be. The tour ends
+/// when `visit` fails.
 ///
 /// # Errors
 ///
-/// [`Stop::Skip`] when the endpoint does not take one of them, before the unit is touched; else that of the
-/// first change or visit that failed, or of the way back: then the unit may be at another rate than
-/// before, and the endpoint is where it was heard last.
+/// [`Stop::Skip`] when the endpoint does not support one of the rates and formats; then the unit is not changed.
+/// Otherwise the error of the first change or visit that failed, or of restoring the rate. In the last case the unit may
+/// be at another rate than before, and the endpoint is at the rate at which the unit last answered.
 pub fn tour(
     bench: &mut Bench<'_>,
     stops: impl IntoIterator<Item = LineFormat>,
@@ -35,7 +38,7 @@ pub fn tour(
     let stops: Vec<LineFormat> = stops.into_iter().collect();
     takes_all(bench, &stops, home)?;
     let mut result = Ok(());
-    // Whether the unit's stored rate is the one that it is at.
+    // Whether the unit's stored rate is the rate in force.
     let mut settled = true;
     for to in stops {
         let from = bench.endpoint.line();
@@ -69,13 +72,13 @@ pub fn tour(
     result.and(back)
 }
 
-/// Whether the endpoint can follow the unit everywhere: an adapter may lack a rate, a pseudo-terminal parity.
+/// Checks that the endpoint supports these rates and formats. An adapter may lack a rate, a pseudo-terminal parity.
 fn takes_all(bench: &mut Bench<'_>, lines: &[LineFormat], home: LineFormat) -> Check {
     for line in lines.iter().filter(|line| **line != home) {
         let taken = bench.endpoint.set_line(*line);
         bench.endpoint.set_line(home)?;
         if let Err(why) = taken {
-            return Err(Stop::Skip(why.to_string()));
+            return skip(why.to_string());
         }
     }
     Ok(())
@@ -92,27 +95,34 @@ fn look_for_it(bench: &mut Bench<'_>, lines: [LineFormat; 3]) -> Check {
     Ok(())
 }
 
-/// Changes, saves and restarts the unit, and follows it.
+/// Writes, saves and restarts the unit with another rate and format, and sets the endpoint to them.
 fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     bench.unlock()?;
     let values = [(to.baud / 100) as u16, format_code(to)?];
     let request = write_words(BAUD, &values);
     bench.reply_is(&request, &request[..5])?;
     // The old rate is in force until the restart.
-    bench.alive("a new rate that waits for the restart")?;
+    bench.alive("a new rate that is in force after the restart")?;
     for command in [Command::Save, Command::Restart] {
         let request = pdu(6, COMMAND, command.code());
         bench.reply_is(&request, &request)?;
         bench.rest(STORING)?;
     }
-    bench.rest(START)?;
     bench.endpoint.set_line(to)?;
     bench.patience.quiet = bench.patience.quiet.max(to.t35() + to.characters(2));
     bench.patience.reply = bench.patience.reply.max(to.t35() * 2 + to.characters(4));
-    bench.alive(format!("the change to {to}"))
+    let latest = bench.endpoint.now() + START;
+    loop {
+        bench.rest(INTERVAL)?;
+        let answered = bench.alive(format!("the change to {to}"));
+        let silent = matches!(answered, Err(Stop::Fail(_)));
+        if !silent || bench.endpoint.now() >= latest {
+            return answered;
+        }
+    }
 }
 
-/// The value of FORMAT for a format; [`Stop::Skip`] when the device does not have it.
+/// The value of the register FORMAT for a format; [`Stop::Skip`] when the device does not have the format.
 fn format_code(line: LineFormat) -> Check<u16> {
     let name = line.format().to_string();
     let known = Format::NAMES.iter().find(|(_, known)| *known == name);

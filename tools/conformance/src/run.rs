@@ -16,15 +16,15 @@ use crate::target::{Support, Target};
 /// How a case ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// As it should.
+    /// The unit did what the case demands.
     Passed,
-    /// It does not apply here: why.
+    /// The case does not apply here: the reason.
     Skipped(String),
-    /// The unit did wrong.
+    /// The unit made a mistake.
     Failed(Failure),
 }
 
-/// A case that has been run, or skipped.
+/// The result of a case.
 #[derive(Clone)]
 pub struct Outcome {
     /// The case.
@@ -33,11 +33,11 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// How long it took by the endpoint's clock.
     pub time: Duration,
-    /// Number of due replies that did not come and were asked for once more.
+    /// Number of due replies that were missing, so that the request was repeated.
     pub asked_again: u32,
 }
 
-/// What runs need to know beside the cases.
+/// Options of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// How long to wait.
@@ -46,17 +46,17 @@ pub struct Options {
     pub allow_config: bool,
 }
 
-/// Runs these cases; `tell` hears of each as it ends.
+/// Runs these cases. Calls `report` with the outcome of each case.
 ///
 /// # Errors
 ///
-/// When the endpoint breaks; the outcomes told up to then stand.
+/// When the endpoint no longer works.
 pub fn run(
     endpoint: &mut dyn Endpoint,
     target: &Target,
     options: Options,
     cases: &[Case],
-    tell: impl FnMut(&Outcome),
+    report: impl FnMut(&Outcome),
 ) -> Result<Vec<Outcome>, Broken> {
     let mut outcomes = Vec::new();
     run_while(
@@ -65,24 +65,25 @@ pub fn run(
         options,
         cases,
         || true,
-        tell,
+        report,
         &mut outcomes,
     )?;
     Ok(outcomes)
 }
 
-/// The same, as long as `go_on` before a case says so: what a case has begun it ends and puts back.
+/// Runs these cases until `go_on` returns false. `go_on` is called before each case, so a case that has begun also
+/// ends and restores the unit. Adds each outcome to `outcomes`, and calls `report` with it.
 ///
 /// # Errors
 ///
-/// When the endpoint breaks; what there is in `outcomes` by then stands.
+/// When the endpoint no longer works. `outcomes` has the outcomes up to then.
 pub fn run_while(
     endpoint: &mut dyn Endpoint,
     target: &Target,
     options: Options,
     cases: &[Case],
     mut go_on: impl FnMut() -> bool,
-    mut tell: impl FnMut(&Outcome),
+    mut report: impl FnMut(&Outcome),
     outcomes: &mut Vec<Outcome>,
 ) -> Result<(), Broken> {
     for case in cases {
@@ -104,15 +105,15 @@ pub fn run_while(
             time: endpoint.now().saturating_sub(begin),
             asked_again,
         };
-        tell(&outcome);
+        report(&outcome);
         outcomes.push(outcome);
     }
     if options.allow_config && target.modio.is_some() {
-        // What cases have changed and put back still counts as changed: drop it.
+        // Settings that cases have changed and restored still count as unsaved changes. Drop these changes.
         let mut bench = Bench::new(endpoint, target, options.patience, true);
         if bench.unlock().is_ok() {
             let drop_changes = pdu(6, COMMAND, Command::DropChanges.code());
-            // It is an unclean end at worst: every case has put back what it changed.
+            // A failure is harmless: every case has restored what it changed.
             let _ = bench.ask(&drop_changes);
         }
     }
@@ -160,7 +161,7 @@ fn one(
     Ok((verdict, bench.asked_again))
 }
 
-/// Why a need is not met, if it is not.
+/// Returns the reason why a need is not met, if it is not met.
 fn lacking(
     need: Need,
     endpoint: &dyn Endpoint,
@@ -190,7 +191,7 @@ fn lacking(
         ),
         Need::Exact => (
             able.exact,
-            "the endpoint's time is not exact: it holds no silence below 100 ms",
+            "the endpoint's time is not exact: its silences last 100 ms or more",
         ),
         Need::Faults => (able.faults, "the endpoint cannot send damaged characters"),
         Need::Parity => (
@@ -198,14 +199,14 @@ fn lacking(
             "the line has no parity",
         ),
         Need::Power => (able.power, "the endpoint cannot switch the power"),
-        Need::Driver => (able.driver, "the endpoint does not see the driver"),
+        Need::Driver => (able.driver, "the endpoint does not record the driver"),
         Need::CharacterTime => (
             able.character_time,
-            "characters take no time on the endpoint's line",
+            "characters have no duration on the endpoint's line",
         ),
         Need::StartBit => (
             able.start_bit,
-            "the unit does not notice a start bit here before the character has ended",
+            "the unit detects a character here at its end, not at its start bit",
         ),
         Need::Echo => (able.echo, "the endpoint has no echo to switch"),
         Need::SetLine => (able.set_line, "the endpoint cannot change rate and format"),

@@ -1,4 +1,4 @@
-//! What the unit under test has, as far as the cases need to know: found by the probe, told by a profile.
+//! The unit under test, as far as the cases need it: its address, functions and points, from the probe or a profile.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,7 +8,7 @@ use register_map::{Board, Module};
 
 use crate::frame::Mode;
 
-/// A run of addresses that one request may ask for.
+/// A run of addresses that one request can ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     /// The first address.
@@ -18,19 +18,28 @@ pub struct Span {
 }
 
 impl Span {
-    /// How many addresses it has, 1 to 65536.
+    /// A span of one address.
+    #[must_use]
+    pub const fn one(address: u16) -> Self {
+        Self {
+            first: address,
+            last: address,
+        }
+    }
+
+    /// Number of addresses, 1 to 65536.
     #[must_use]
     pub fn len(self) -> u32 {
         u32::from(self.last - self.first) + 1
     }
 
-    /// Never: a span has at least one address.
+    /// Always false: a span has at least one address.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         false
     }
 
-    /// Its first `most` addresses at most.
+    /// The first addresses, `most` at most.
     #[must_use]
     pub fn up_to(self, most: u16) -> Self {
         let last = self.first.saturating_add(most.saturating_sub(1));
@@ -40,32 +49,32 @@ impl Span {
         }
     }
 
-    /// Whether the address is in it.
+    /// Whether the span contains the address.
     #[must_use]
     pub const fn has(self, address: u16) -> bool {
         self.first <= address && address <= self.last
     }
 }
 
-/// Words that may be written, and what they take.
+/// Registers that cases write to, and the values that they accept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
     /// Their addresses, at most 123.
     pub span: Span,
-    /// A value they take.
+    /// A value that they accept.
     pub low: u16,
-    /// Another.
+    /// Another value that they accept.
     pub high: u16,
-    /// A value they refuse with exception 03, if there is one.
+    /// A value that they refuse with exception 03, if one is known.
     pub refused: Option<u16>,
-    /// They are the device's configuration: its lock is to be opened first.
+    /// They belong to the configuration, whose lock must be opened first.
     pub locked: bool,
 }
 
-/// How a unit took the probe's harmless request for a function.
+/// The reply to the probe's request for a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
-    /// It did something else than refuse the function.
+    /// A reply other than exception 01.
     Yes,
     /// Exception 01.
     Refused,
@@ -73,7 +82,7 @@ pub enum Support {
     Silent,
 }
 
-/// What is known of a modio beyond its points.
+/// The board and the modules of a modio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Modio {
     /// The board, by its register BOARD; `None` for a board that the register map does not know.
@@ -83,7 +92,7 @@ pub struct Modio {
 }
 
 impl Modio {
-    /// The ports that have a slot, with the modules in force. Of a board that is not known, those that have a module.
+    /// The ports that have a slot, with the modules in force. For an unknown board, the ports that have a module.
     pub fn slots(&self) -> impl Iterator<Item = (u16, Module)> {
         let ports = (1..).zip(self.modules);
         ports.filter(|(port, module)| match self.board {
@@ -100,7 +109,7 @@ impl Modio {
             .map_or(Module::None, |(_, module)| module)
     }
 
-    /// The points of all modules with what they are, in ascending order of their addresses.
+    /// The points of all modules with their kinds, in ascending order of their addresses.
     pub fn points(&self) -> impl Iterator<Item = (u16, Kind)> {
         let of_slot = |(port, module): (u16, Module)| (points::first(port)..).zip(module.points());
         let points = self.slots().flat_map(of_slot);
@@ -114,10 +123,7 @@ impl Modio {
         for (address, _) in self.points().filter(|(_, kind)| kinds.contains(kind)) {
             match runs.last_mut() {
                 Some(run) if run.last + 1 == address => run.last = address,
-                _ => runs.push(Span {
-                    first: address,
-                    last: address,
-                }),
+                _ => runs.push(Span::one(address)),
             }
         }
         runs
@@ -147,18 +153,18 @@ pub struct Target {
     pub mode: Mode,
     /// The functions that were probed.
     pub functions: BTreeMap<u8, Support>,
-    /// What can be read, by function 1 to 4; the runs in ascending order, none touching another unless a
-    /// request may not span both.
+    /// The readable addresses, for functions 1 to 4. The runs are in ascending order. Two runs follow each other without
+    /// an address between them only when one request cannot span both.
     pub readable: [Vec<Span>; 4],
     /// Coils to write to: at most 1968.
     pub bits: Option<Span>,
     /// Registers to write to.
     pub words: Option<Words>,
-    /// Whether a frame with a gap between t1.5 and t3.5 is dropped; `None`: either way is right.
+    /// Whether the unit drops a frame with a gap between t1.5 and t3.5. `None`: both are right.
     pub strict_t15: Option<bool>,
-    /// What is known of a modio.
+    /// The board and modules, if the unit is a modio.
     pub modio: Option<Modio>,
-    /// A request that is answered without effect: its PDU.
+    /// The PDU of a request that the unit answers, and that has no effect.
     pub ping: Vec<u8>,
 }
 
@@ -185,7 +191,7 @@ impl Target {
         self.functions.get(&function) == Some(&Support::Yes)
     }
 
-    /// An address of which this function (1 to 4) knows nothing; the highest there is.
+    /// The highest address that this function (1 to 4) cannot read.
     #[must_use]
     pub fn nowhere(&self, function: u8) -> Option<u16> {
         let spans = self.readable(function);
@@ -194,7 +200,7 @@ impl Target {
             .find(|address| !spans.iter().any(|span| span.has(*address)))
     }
 
-    /// An address where nothing can be read or written as a coil, or as a register: the highest.
+    /// The highest address without a coil, or without a register, for a function that writes.
     #[must_use]
     pub fn nowhere_to_write(&self, function: u8) -> Option<u16> {
         match function {
@@ -229,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_points_go_from_slot_to_slot_and_end_where_the_kind_changes() {
+    fn run_of_points_spans_slots_and_ends_where_the_kind_changes() {
         let mut modules = [Module::None; 8];
         modules[..4].copy_from_slice(&[Module::Relay2, Module::Do4, Module::None, Module::Ai2Ao2]);
         let modio = Modio {
@@ -257,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_are_counted_and_cut() {
+    fn span_has_a_length_and_can_be_cut() {
         assert_eq!(span(0, u16::MAX).len(), 65_536);
         assert_eq!(span(10, 19).up_to(4), span(10, 13));
         assert_eq!(span(10, 12).up_to(4), span(10, 12));
@@ -265,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_run_and_an_address_outside_are_found() {
+    fn longest_run_and_highest_address_outside_are_found() {
         let target = target(vec![span(0, 3), span(10, 20), span(0xFFF0, 0xFFFF)]);
         assert_eq!(target.longest(3), Some(span(0xFFF0, 0xFFFF)));
         assert_eq!(target.nowhere(3), Some(0xFFEF));

@@ -1,6 +1,6 @@
-//! Worked frames of manuals: those whose CRC is right are vectors, the others errata.
+//! Worked frames of manuals. Frames with a right CRC are test vectors, the others errata.
 //!
-//! The frames stand in `data/frames.txt` as they are printed.
+//! `data/frames.txt` has the frames as they are printed.
 
 use std::fmt::Write as _;
 
@@ -13,11 +13,11 @@ const DATA: &str = include_str!("../data/frames.txt");
 pub struct Worked {
     /// The manual.
     pub source: &'static str,
-    /// Where in it.
+    /// The place in the manual.
     pub place: &'static str,
-    /// A request, or else a reply.
+    /// Whether the frame is a request; otherwise it is a reply.
     pub request: bool,
-    /// The frame, printed CRC included.
+    /// The frame, including the printed CRC.
     pub bytes: Vec<u8>,
 }
 
@@ -67,7 +67,7 @@ pub fn errata() -> String {
     table.push_str("|---|---|---|---|---|\n");
     for worked in frames().filter(|worked| !worked.crc_ok()) {
         let (body, printed) = worked.parts();
-        // A String takes everything.
+        // Writing to a String cannot fail.
         let _ = writeln!(
             table,
             "| {} | {} | `{}` | `{}` | `{}` |",
@@ -89,13 +89,13 @@ mod tests {
     #[test]
     fn every_line_of_the_data_is_a_frame() {
         let lines = DATA.lines().filter(|line| line.contains('|'));
-        // The comment on top has bars, too.
+        // The comment at the top of the file has bars, too.
         assert_eq!(frames().count(), lines.count() - 1);
         assert!(frames().all(|worked| worked.bytes.len() >= 5));
     }
 
     #[test]
-    fn right_frames_are_decoded_and_encoded_and_wrong_ones_refused() {
+    fn frame_with_a_right_crc_is_decoded_and_encoded_and_a_wrong_one_refused() {
         let mut right = 0;
         for worked in frames() {
             let decoded = Mode::Rtu.decode(&worked.bytes);

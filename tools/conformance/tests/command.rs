@@ -28,7 +28,7 @@ use std::time::{Duration, Instant};
 use conformance::frame::Mode;
 use conformance::line::LineFormat;
 use fault::Fault;
-use unit::{Sign, Unit};
+use unit::{Character, Unit};
 
 const PROFILE: &str = r#"
 unit = 9
@@ -71,7 +71,7 @@ fn serve(mut stream: TcpStream, fault: Option<Fault>) {
             Ok(length) => {
                 for byte in &buffer[..length] {
                     let at = begin.elapsed();
-                    unit.hear(Sign {
+                    unit.receive(Character {
                         byte: *byte,
                         start: at,
                         end: at,
@@ -82,7 +82,7 @@ fn serve(mut stream: TcpStream, fault: Option<Fault>) {
             }
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
                 unit.close(begin.elapsed());
-                let reply: Vec<u8> = unit.said.drain(..).map(|heard| heard.byte).collect();
+                let reply: Vec<u8> = unit.sent.drain(..).map(|received| received.byte).collect();
                 if stream.write_all(&reply).is_err() {
                     return;
                 }

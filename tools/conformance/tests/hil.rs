@@ -10,7 +10,6 @@ use std::time::Duration;
 use conformance::cli::{chosen, waits};
 use conformance::endpoint::Endpoint as _;
 use conformance::endpoint::sim::{Fitting, start};
-use conformance::frame::Mode;
 use conformance::hil::report::Report;
 use conformance::hil::{Plan, run};
 use conformance::line::LineFormat;
@@ -23,14 +22,10 @@ fn the_image_loses_nothing_at_any_rate_and_is_back_at_its_own() {
     let elf = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
     let home = LineFormat::default();
     let mut endpoint = start(&Fitting {
-        elf: PathBuf::from(elf),
-        board: &MODIO_02,
         module: Module::Do4,
-        slots: Vec::new(),
         dip: 3,
         line: home,
-        mode: Mode::Rtu,
-        settings: Vec::new(),
+        ..Fitting::new(PathBuf::from(elf), &MODIO_02)
     })
     .expect("the image can be read");
     let rates = vec![9600, 19_200, 115_200, 921_600];

@@ -3,6 +3,8 @@
 
 use crc::{CRC_16_MODBUS, Crc};
 
+use crate::decode::bytes;
+
 const CRC16: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
 /// Length of the longest RTU frame in bytes.
@@ -65,26 +67,58 @@ impl Framing {
     /// Returns the address and the PDU of a complete frame; `None` when it is damaged.
     #[must_use]
     pub fn open(self, frame: &[u8]) -> Option<(u8, Vec<u8>)> {
+        self.check(frame).ok()
+    }
+
+    /// Returns the address and the PDU of a whole frame.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the frame, for people.
+    pub fn check(self, frame: &[u8]) -> Result<(u8, Vec<u8>), String> {
         let bytes = match self {
             Self::Rtu => {
-                let (body, check) = frame.split_last_chunk::<2>()?;
-                (frame.len() <= RTU_MOST && crc(body) == *check).then(|| body.to_vec())?
+                let check = frame.split_last_chunk::<2>();
+                let (body, check) = check.ok_or("too short for a CRC")?;
+                if frame.len() > RTU_MOST {
+                    return Err(format!("longer than {RTU_MOST} bytes"));
+                }
+                fits("CRC", check, &crc(body))?;
+                body.to_vec()
             }
             Self::Ascii => {
-                let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
-                let mut bytes = hex(digits)?;
-                (lrc(&bytes) == 0).then(|| bytes.pop())?;
-                bytes
+                let digits = frame.strip_prefix(b":");
+                let digits = digits.ok_or("it does not begin with ':'")?;
+                let digits = digits.strip_suffix(b"\r\n");
+                let bytes = hex(digits.ok_or("it does not end in CR LF")?)?;
+                let (check, body) = bytes.split_last().ok_or("nothing in it")?;
+                fits("LRC", &[*check], &[lrc(body)])?;
+                body.to_vec()
             }
             Self::Mbap => {
-                let (header, rest) = frame.split_at_checked(MBAP - 1)?;
+                let header = frame.split_at_checked(MBAP - 1);
+                let (header, rest) = header.ok_or("too short for a header")?;
                 let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
-                (header[2..4] == [0, 0] && rest.len() == length).then(|| rest.to_vec())?
+                if header[2..4] != [0, 0] || rest.len() != length {
+                    return Err("its header is wrong".to_owned());
+                }
+                rest.to_vec()
             }
         };
-        let (unit, pdu) = bytes.split_first()?;
-        (!pdu.is_empty()).then(|| (*unit, pdu.to_vec()))
+        match bytes.split_first() {
+            Some((unit, pdu)) if !pdu.is_empty() => Ok((*unit, pdu.to_vec())),
+            _ => Err("too short for an address and a function code".to_owned()),
+        }
     }
+}
+
+/// Compares a check with the right one.
+fn fits(name: &str, check: &[u8], right: &[u8]) -> Result<(), String> {
+    if check == right {
+        return Ok(());
+    }
+    let [check, right] = [check, right].map(|check| bytes(Framing::Rtu, check));
+    Err(format!("its {name} {check} is wrong, {right} is right"))
 }
 
 /// Returns the CRC in the order of the line, low byte first (V1.02, 6.2.2).
@@ -94,17 +128,22 @@ pub fn crc(bytes: &[u8]) -> [u8; 2] {
 }
 
 /// Returns the byte that makes the sum of all bytes 0 (V1.02, 6.2.1).
-fn lrc(bytes: &[u8]) -> u8 {
+#[must_use]
+pub fn lrc(bytes: &[u8]) -> u8 {
     let sum = bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_add(*byte));
     sum.wrapping_neg()
 }
 
-/// Returns the bytes of hexadecimal digits; `None` when a digit is invalid or missing.
-fn hex(digits: &[u8]) -> Option<Vec<u8>> {
+/// Returns the bytes of hexadecimal digits.
+fn hex(digits: &[u8]) -> Result<Vec<u8>, &'static str> {
     let (pairs, rest) = digits.as_chunks::<2>();
+    if !rest.is_empty() {
+        return Err("an odd number of digits");
+    }
     let digit = |digit: u8| char::from(digit).to_digit(16).map(|value| value as u8);
     let byte = |[high, low]: &[u8; 2]| Some(digit(*high)? << 4 | digit(*low)?);
-    rest.is_empty().then(|| pairs.iter().map(byte).collect())?
+    let bytes: Option<_> = pairs.iter().map(byte).collect();
+    bytes.ok_or("not only hexadecimal digits")
 }
 
 /// Returns the length in bytes of the RTU response to this request, CRC included, from the beginning of the
@@ -187,6 +226,7 @@ mod tests {
             let mut damaged = frame.clone();
             damaged[5] ^= 1;
             assert_eq!(framing.open(&damaged), None, "{framing:?}");
+            assert!(framing.check(&damaged).unwrap_err().contains("wrong"));
         }
     }
 

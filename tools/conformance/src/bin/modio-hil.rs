@@ -1,4 +1,4 @@
-//! `modio-hil`: tests a modio on a bench and reports what it found.
+//! `modio-hil`: tests a modio on a bench and reports the results.
 
 use std::process::ExitCode;
 
@@ -12,13 +12,13 @@ fn main() -> ExitCode {
     program::run("modio-hil", test)
 }
 
-/// Gets the board ready and tests it; returns the exit status.
-fn test(cli: &Cli) -> Result<u8, String> {
+/// Prepares the board and tests it. Returns the exit status.
+fn test(cli: &Cli) -> anyhow::Result<u8> {
     let setup = cli.setup()?;
     cli.reports.check()?;
-    let mut endpoint = setup.open().map_err(|broken| broken.to_string())?;
+    let mut endpoint = setup.open()?;
     let plan = setup.plan(endpoint.as_ref())?;
-    // A mistake has been reported by now: nothing was done to the board yet.
+    // Wrong arguments have been reported by now, before anything is done to the board.
     if let Some(flash) = setup.flash() {
         flash.write()?;
     }
@@ -30,9 +30,9 @@ fn test(cli: &Cli) -> Result<u8, String> {
         about: About::here(setup.port()),
         ..Report::default()
     };
-    let mut tell = |line: &str| program::say(line);
-    let ended = hil::run(endpoint.as_mut(), &plan, stop, &mut report, &mut tell);
-    // What was found before it could not go on is worth having, too.
+    let mut print = |line: &str| program::say(line);
+    let ended = hil::run(endpoint.as_mut(), &plan, stop, &mut report, &mut print);
+    // The results up to an error are reported, too.
     let written = cli.reports.write(&report.junit(), &report.json());
     let totals = report.totals();
     let early = if report.interrupted {

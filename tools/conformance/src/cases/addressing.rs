@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::cases::diagnostics::diagnose;
+use crate::cases::line_counters::count;
 use crate::points::{pdu, write_bits, write_words};
 
 pub(super) const CASES: &[Case] = &[
@@ -148,8 +149,7 @@ fn other_units_write(bench: &mut Bench<'_>) -> Check {
     for unit in few_others(bench) {
         silent_to(bench, unit, &pdu(5, span.first, 0xFF00))?;
         silent_to(bench, unit, &write_bits(span.first, &[true], false))?;
-        let now = bench.read_bits(span)?;
-        bench.ensure(now == [false], "the coil is still off")?;
+        bench.is_off(span)?;
     }
     Ok(())
 }
@@ -161,8 +161,7 @@ fn other_units_write_words(bench: &mut Bench<'_>) -> Check {
     for unit in few_others(bench) {
         silent_to(bench, unit, &pdu(6, at, words.high))?;
         silent_to(bench, unit, &write_words(at, &[words.high]))?;
-        let now = bench.read_word(at)?;
-        bench.ensure(now == words.low, "the register is as it was")?;
+        bench.word_is(at, words.low)?;
     }
     Ok(())
 }
@@ -260,18 +259,11 @@ fn nonsense(bench: &mut Bench<'_>) -> Check {
 }
 
 fn broadcast_restart(bench: &mut Bench<'_>) -> Check {
-    let messages = |bench: &mut Bench<'_>| -> Check<u16> {
-        let reply = bench.reply_unless_lacking(&diagnose(0x0B, &[0, 0]), "08/0B")?;
-        let [8, 0, 0x0B, high, low] = reply[..] else {
-            return bench.fail("08 00 0B and two bytes");
-        };
-        Ok(u16::from_be_bytes([high, low]))
-    };
     bench.alive("nothing")?;
     for data in [[0, 0], [0xFF, 0]] {
-        let before = messages(bench)?;
+        let before = count(bench, 0x0B)?;
         silent_to(bench, 0, &diagnose(1, &data))?;
-        let after = messages(bench)?;
+        let after = count(bench, 0x0B)?;
         bench.ensure(
             after == before.wrapping_add(2),
             format!(
@@ -309,8 +301,7 @@ fn refused_writes(bench: &mut Bench<'_>) -> Check {
             continue;
         }
         silent_to(bench, 0, &request)?;
-        let now = bench.read_bits(span)?;
-        bench.ensure(now == [false], "the coil is still off")?;
+        bench.is_off(span)?;
     }
     Ok(())
 }

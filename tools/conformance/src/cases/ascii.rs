@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
+use crate::cases::damage::one_by_one;
 use crate::cases::diagnostics::diagnose;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
@@ -125,8 +126,7 @@ fn bad_lrc(bench: &mut Bench<'_>) -> Check {
 fn before_colon(bench: &mut Bench<'_>) -> Check {
     for noise in [&b"0"[..], b"\r\n", b"0103", b"\x00\xFF", b"hello"] {
         let frame = [noise, &bench.ping()].concat();
-        let reply = bench.raw_due(&frame)?;
-        bench.ensure(bench.is_pong(&reply), "a reply to what follows the colon")?;
+        bench.answers(&[Piece::Bytes(frame)], "a reply to what follows the colon")?;
     }
     Ok(())
 }
@@ -134,9 +134,8 @@ fn before_colon(bench: &mut Bench<'_>) -> Check {
 fn colon_restarts(bench: &mut Bench<'_>) -> Check {
     for open in [&b":"[..], b":0", b":0103", b":010300000001"] {
         let frame = [open, &bench.ping()].concat();
-        let reply = bench.raw_due(&frame)?;
-        bench.ensure(
-            bench.is_pong(&reply),
+        bench.answers(
+            &[Piece::Bytes(frame)],
             "a reply to what follows the last colon",
         )?;
     }
@@ -171,24 +170,11 @@ fn lower_case(bench: &mut Bench<'_>) -> Check {
 }
 
 fn damaged(bench: &mut Bench<'_>) -> Check {
-    let frame = bench.ping();
-    let with_parity = bench.endpoint.line().parity != Parity::None;
-    let mut kinds: Vec<fn(u8) -> Piece> = vec![Piece::BadStop];
-    if with_parity {
-        kinds.push(Piece::BadParity);
+    one_by_one(bench, Piece::BadStop)?;
+    if bench.endpoint.line().parity == Parity::None {
+        return Ok(());
     }
-    for damage in kinds {
-        for index in 0..frame.len() {
-            let pieces = [
-                Piece::Bytes(frame[..index].to_vec()),
-                damage(frame[index]),
-                Piece::Bytes(frame[index + 1..].to_vec()),
-            ];
-            bench.silence(&pieces, "a damaged character spoils its frame")?;
-            bench.alive("a damaged character")?;
-        }
-    }
-    Ok(())
+    one_by_one(bench, Piece::BadParity)
 }
 
 fn truncated(bench: &mut Bench<'_>) -> Check {
@@ -203,11 +189,7 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
 fn with_gap(bench: &Bench<'_>, gap: Duration) -> [Piece; 3] {
     let frame = bench.ping();
     let (first, rest) = frame.split_at(5);
-    [
-        Piece::Bytes(first.to_vec()),
-        Piece::Gap(gap),
-        Piece::Bytes(rest.to_vec()),
-    ]
+    apart(first, gap, rest)
 }
 
 fn short_gap(bench: &mut Bench<'_>) -> Check {
@@ -215,11 +197,7 @@ fn short_gap(bench: &mut Bench<'_>) -> Check {
     let longest = if exact { 980 } else { 500 };
     for ms in [10, 100, longest] {
         let pieces = with_gap(bench, Duration::from_millis(ms));
-        let reply = bench.exchange_due(&pieces)?;
-        bench.ensure(
-            bench.is_pong(&reply),
-            format!("a reply: a gap of {ms} ms is allowed"),
-        )?;
+        bench.answers(&pieces, format!("a reply: a gap of {ms} ms is allowed"))?;
     }
     Ok(())
 }

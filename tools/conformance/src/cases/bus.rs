@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::{Reply, rtu};
@@ -128,15 +128,14 @@ fn right_after(bench: &mut Bench<'_>) -> Check {
     let line = bench.endpoint.line();
     let gap = line.t35_limits().most + line.bits(3).max(Duration::from_micros(20));
     for frame in traffic(bench) {
-        let reply = bench.exchange(&[
-            Piece::Bytes(frame.clone()),
-            Piece::Gap(gap),
-            Piece::Bytes(frame),
-            Piece::Gap(gap),
-            Piece::Bytes(bench.ping()),
-        ])?;
-        bench.ensure(
-            bench.is_pong(&reply),
+        bench.answers(
+            &[
+                Piece::Bytes(frame.clone()),
+                Piece::Gap(gap),
+                Piece::Bytes(frame),
+                Piece::Gap(gap),
+                Piece::Bytes(bench.ping()),
+            ],
             format!("a reply, {gap:?} after other traffic"),
         )?;
     }
@@ -155,8 +154,7 @@ fn reply_is_no_request(bench: &mut Bench<'_>) -> Check {
     for frame in [frame.clone(), frame, rtu(&body)] {
         bench.silence_to(&frame, "it is another unit's")?;
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.is_off(span)
 }
 
 fn stray_zero(bench: &mut Bench<'_>) -> Check {
@@ -166,16 +164,9 @@ fn stray_zero(bench: &mut Bench<'_>) -> Check {
         let right = reply == Reply::Silence || bench.is_pong(&reply);
         bench.ensure(right, "silence, or the reply")?;
         bench.alive("a stray byte in front of a request")?;
-        let apart = [
-            Piece::Bytes(stray.to_vec()),
-            Piece::Gap(bench.endpoint.line().t35_limits().most * 2),
-            Piece::Bytes(bench.ping()),
-        ];
-        let reply = bench.exchange_due(&apart)?;
-        bench.ensure(
-            bench.is_pong(&reply),
-            "a reply: the stray byte was a frame of its own",
-        )?;
+        let silence = bench.endpoint.line().t35_limits().most * 2;
+        let apart = apart(stray, silence, &bench.ping());
+        bench.answers(&apart, "a reply: the stray byte was a frame of its own")?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use register_map::{codes::Command, configuration, points, state};
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_words};
 
 pub(super) const CASES: &[Case] = &[
@@ -62,15 +62,14 @@ pub(super) const CASES: &[Case] = &[
 
 fn locked(bench: &mut Bench<'_>) -> Check {
     if bench.read_word(configuration::KEY)? != 0 {
-        return Err(Stop::Skip("the lock is open".to_owned()));
+        return skip("the lock is open");
     }
     let before = bench.read_word(configuration::RESPONSE_DELAY)?;
     for value in [before, before ^ 1] {
         bench.exception(&pdu(6, configuration::RESPONSE_DELAY, value), 6)?;
         bench.exception(&write_words(configuration::RESPONSE_DELAY, &[value]), 6)?;
     }
-    let now = bench.read_word(configuration::RESPONSE_DELAY)?;
-    bench.ensure(now == before, format!("RESPONSE_DELAY still is {before}"))
+    bench.word_is(configuration::RESPONSE_DELAY, before)
 }
 
 fn wrong_key(bench: &mut Bench<'_>) -> Check {
@@ -97,11 +96,7 @@ fn value_first(bench: &mut Bench<'_>) -> Check {
     for (register, value) in wrong {
         let before = bench.read_word(register)?;
         bench.exception(&pdu(6, register, value), 3)?;
-        let now = bench.read_word(register)?;
-        bench.ensure(
-            now == before,
-            format!("register {register:04X} still is {before}"),
-        )?;
+        bench.word_is(register, before)?;
     }
     Ok(())
 }
@@ -159,9 +154,9 @@ fn response_delay(bench: &mut Bench<'_>) -> Check {
         result = result.and_then(|()| bench.alive("a new RESPONSE_DELAY"));
         let least = bench.endpoint.line().t35_limits().least + Duration::from_millis(u64::from(ms));
         let first = bench
-            .heard
+            .received
             .first()
-            .map_or(Duration::ZERO, |heard| heard.start);
+            .map_or(Duration::ZERO, |received| received.start);
         let took = first.saturating_sub(bench.sent_end);
         result = result.and_then(|()| {
             let right = took >= least && took < least + Duration::from_millis(3);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, damaged_at};
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::Reply;
@@ -62,14 +62,11 @@ pub(super) const CASES: &[Case] = &[
     .interpretation(),
 ];
 
-fn one_by_one(bench: &mut Bench<'_>, damaged: fn(u8) -> Piece) -> Check {
+/// Damages each character of a request in turn. The unit is silent to that request, and answers the next one.
+pub(super) fn one_by_one(bench: &mut Bench<'_>, damaged: fn(u8) -> Piece) -> Check {
     let frame = bench.ping();
     for index in 0..frame.len() {
-        let pieces = [
-            Piece::Bytes(frame[..index].to_vec()),
-            damaged(frame[index]),
-            Piece::Bytes(frame[index + 1..].to_vec()),
-        ];
+        let pieces = damaged_at(&frame, index, damaged);
         bench.silence(&pieces, "a damaged character spoils its frame")?;
         bench.alive("a damaged character")?;
     }
@@ -90,15 +87,10 @@ fn damaged_write(bench: &mut Bench<'_>) -> Check {
     let [high, low] = span.first.to_be_bytes();
     let frame = bench.target.mode.frame(0, &[5, high, low, 0xFF, 0]);
     for index in 0..frame.len() {
-        let pieces = [
-            Piece::Bytes(frame[..index].to_vec()),
-            Piece::BadStop(frame[index]),
-            Piece::Bytes(frame[index + 1..].to_vec()),
-        ];
+        let pieces = damaged_at(&frame, index, Piece::BadStop);
         bench.silence(&pieces, "a broadcast")?;
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.is_off(span)
 }
 
 fn line_break(bench: &mut Bench<'_>) -> Check {
@@ -119,9 +111,8 @@ fn glitch(bench: &mut Bench<'_>) -> Check {
     for width in [Duration::from_micros(1), bit / 20, bit / 4, bit * 2 / 5] {
         let width = width.max(Duration::from_nanos(100));
         let ping = Piece::Bytes(bench.ping());
-        let reply = bench.exchange(&[Piece::Glitch(width), apart.clone(), ping])?;
-        bench.ensure(
-            bench.is_pong(&reply),
+        bench.answers(
+            &[Piece::Glitch(width), apart.clone(), ping],
             format!("a reply after a glitch of {width:?}"),
         )?;
     }

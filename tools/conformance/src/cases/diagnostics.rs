@@ -3,7 +3,7 @@
 use super::dispatch::unknown_function;
 use super::line_counters;
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::frame::Reply;
 
 const N: &[Need] = &[Need::Function(8)];
@@ -207,9 +207,7 @@ pub(super) fn needs_listen_only(bench: &mut Bench<'_>) -> Check {
     // Data that the unit refuses shows whether it has the sub-function, without entering the mode.
     let reply = bench.ask_due(&diagnose(4, &[0, 1]))?;
     if reply.exception(8) == Some(1) {
-        return Err(crate::case::Stop::Skip(
-            "the unit answers 01: it has no 08/04".to_owned(),
-        ));
+        return skip("the unit answers 01: it has no 08/04");
     }
     Ok(())
 }
@@ -270,8 +268,7 @@ fn listen_only_writes(bench: &mut Bench<'_>) -> Check {
         }
     }
     leave(bench, tried)?;
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.is_off(span)
 }
 
 fn clear(bench: &mut Bench<'_>) -> Check {

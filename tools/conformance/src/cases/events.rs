@@ -2,8 +2,8 @@
 
 use register_map::configuration::{FORMAT, KEY};
 
-use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::bench::{Bench, damaged_at};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::cases::diagnostics::{self, diagnose};
 use crate::cases::line_counters;
 use crate::endpoint::Piece;
@@ -365,7 +365,7 @@ fn log_exceptions(bench: &mut Bench<'_>) -> Check {
 
 fn log_busy(bench: &mut Bench<'_>) -> Check {
     if bench.read_word(KEY)? != 0 {
-        return Err(Stop::Skip("the lock is open".to_owned()));
+        return skip("the lock is open");
     }
     let format = bench.read_word(FORMAT)?;
     logs(bench, "exception 06", &[&[0x44, 0x80]], |bench| {
@@ -396,11 +396,7 @@ fn log_bad_check(bench: &mut Bench<'_>) -> Check {
 
 fn log_bad_character(bench: &mut Bench<'_>) -> Check {
     let frame = bench.ping();
-    let pieces = [
-        Piece::Bytes(frame[..2].to_vec()),
-        Piece::BadStop(frame[2]),
-        Piece::Bytes(frame[3..].to_vec()),
-    ];
+    let pieces = damaged_at(&frame, 2, Piece::BadStop);
     logs(bench, "a damaged character", &[&[0x82]], |bench| {
         bench.silence(&pieces, "a stop bit is low")
     })

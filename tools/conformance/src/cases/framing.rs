@@ -2,9 +2,8 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
-use crate::endpoint::Piece;
 use crate::frame::{Reply, rtu};
 
 const N: &[Need] = &[Need::Rtu];
@@ -144,8 +143,7 @@ fn bad_crc_write(bench: &mut Bench<'_>) -> Check {
             bench.silence_to(&bad, "its CRC is wrong")?;
         }
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.is_off(span)
 }
 
 fn short_noise(bench: &mut Bench<'_>) -> Check {
@@ -218,11 +216,11 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
     }
     // The other half does not complete it.
     let half = ping.len() / 2;
-    let pieces = [
-        Piece::Bytes(ping[..half].to_vec()),
-        Piece::Gap(bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20)),
-        Piece::Bytes(ping[half..].to_vec()),
-    ];
+    let pieces = apart(
+        &ping[..half],
+        bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20),
+        &ping[half..],
+    );
     bench.silence(&pieces, "a silence in the middle makes two frames of it")?;
     bench.alive("two halves")
 }

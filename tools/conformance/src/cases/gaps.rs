@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::Reply;
@@ -86,11 +86,7 @@ fn margin(bench: &Bench<'_>) -> Duration {
 fn with_gap(bench: &mut Bench<'_>, index: usize, gap: Duration) -> Check<Reply> {
     let frame = bench.ping();
     let (first, rest) = frame.split_at(index);
-    bench.exchange(&[
-        Piece::Bytes(first.to_vec()),
-        Piece::Gap(gap),
-        Piece::Bytes(rest.to_vec()),
-    ])
+    bench.exchange(&apart(first, gap, rest))
 }
 
 fn places(bench: &Bench<'_>) -> [usize; 4] {
@@ -115,8 +111,7 @@ fn below_t15(bench: &mut Bench<'_>) -> Check {
         pieces.extend([Piece::Bytes(vec![byte]), Piece::Gap(t15 / 2)]);
     }
     pieces.pop();
-    let reply = bench.exchange(&pieces)?;
-    bench.ensure(bench.is_pong(&reply), "a reply: all gaps are below t1.5")
+    bench.answers(&pieces, "a reply: all gaps are below t1.5")
 }
 
 /// A gap between t1.5 and t3.5 that ends more than a character below t3.5, at any rate and format.
@@ -187,11 +182,7 @@ fn joined_after(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
     let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
     for first in [mine.clone(), others] {
         for &gap in gaps {
-            let pieces = [
-                Piece::Bytes(first.clone()),
-                Piece::Gap(gap),
-                Piece::Bytes(mine.clone()),
-            ];
+            let pieces = apart(&first, gap, &mine);
             bench.silence(&pieces, format!("{gap:?} is less than t3.5"))?;
             bench.alive("joined requests")?;
         }
@@ -204,13 +195,8 @@ fn soon_enough(bench: &mut Bench<'_>) -> Check {
     let mine = bench.ping();
     let others = bench.target.mode.frame(bench.other(), &bench.target.ping);
     for gap in [t35 + margin(bench), t35 * 2] {
-        let reply = bench.exchange(&[
-            Piece::Bytes(others.clone()),
-            Piece::Gap(gap),
-            Piece::Bytes(mine.clone()),
-        ])?;
-        bench.ensure(
-            bench.is_pong(&reply),
+        bench.answers(
+            &apart(&others, gap, &mine),
             format!("a reply: {gap:?} is above t3.5"),
         )?;
     }
@@ -221,13 +207,9 @@ fn after_noise(bench: &mut Bench<'_>) -> Check {
     let gap = bench.endpoint.line().t35_limits().most + margin(bench);
     let mine = bench.ping();
     for length in [1, 2, 3, 8, 100, 255, 256, 257, 600] {
-        let reply = bench.exchange(&[
-            Piece::Bytes(vec![0xA7; length]),
-            Piece::Gap(gap),
-            Piece::Bytes(mine.clone()),
-        ])?;
-        bench.ensure(
-            bench.is_pong(&reply),
+        let noise = vec![0xA7; length];
+        bench.answers(
+            &apart(&noise, gap, &mine),
             format!("a reply, {gap:?} after {length} bytes of noise"),
         )?;
     }

@@ -1,7 +1,7 @@
 //! Device identification: function 2B, MEI type 0E.
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, case};
+use crate::case::{Case, Check, Need, case, skip};
 
 const N: &[Need] = &[Need::Function(0x2B)];
 const S: &str = "V1.1b3 6.21";
@@ -206,9 +206,7 @@ fn extended(bench: &mut Bench<'_>) -> Check {
 
 fn needs_individual_access(bench: &mut Bench<'_>) -> Check {
     if page(bench, 1, 0)?.conformity & 0x80 == 0 {
-        return Err(crate::case::Stop::Skip(
-            "its conformity level has no individual access".to_owned(),
-        ));
+        return skip("its conformity level has no individual access");
     }
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 use register_map::state;
 
-use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::bench::{Bench, damaged_at};
+use crate::case::{Case, Check, Need, Stop, case, skip};
 use crate::cases::diagnostics::diagnose;
 use crate::cases::dispatch::unknown_function;
 use crate::endpoint::Piece;
@@ -77,8 +77,8 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// A counter as it stands, reading it included; by 08, or by a modio's register.
-fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
+/// Reads a counter by function 08, or by a modio's register. The counter includes this request.
+pub(super) fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
     if bench.target.has(8) {
         let reply = bench.reply_unless_lacking(&diagnose(sub, &[0, 0]), "such a counter")?;
         let [8, _, echoed, high, low] = reply[..] else {
@@ -90,7 +90,7 @@ fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
     if bench.target.modio.is_some() {
         return bench.read_word(state::BUS_MESSAGES + (sub - 0x0B));
     }
-    Err(Stop::Skip("the unit has no line counters".to_owned()))
+    skip("the unit has no line counters")
 }
 
 /// By how much a counter moves while something is done; reading it once is in it where that counts.
@@ -121,12 +121,10 @@ fn ping_other(bench: &mut Bench<'_>) -> Check {
 fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
     let function = [6, 5, 0x10].into_iter().find(|f| bench.target.has(*f));
     let Some(function) = function else {
-        return Err(Stop::Skip(
-            "the unit has no function to broadcast".to_owned(),
-        ));
+        return skip("the unit has no function to broadcast");
     };
     let Some(nowhere) = bench.target.nowhere_to_write(function) else {
-        return Err(Stop::Skip("every address exists".to_owned()));
+        return skip("every address exists");
     };
     let mut request = pdu(function, nowhere, 0);
     if function == 0x10 {
@@ -189,11 +187,7 @@ fn damaged_characters(bench: &mut Bench<'_>) -> Check {
         "1 frame with a damaged character",
         |bench| {
             let frame = bench.ping();
-            let pieces = [
-                Piece::Bytes(frame[..2].to_vec()),
-                Piece::BadStop(frame[2]),
-                Piece::Bytes(frame[3..].to_vec()),
-            ];
+            let pieces = damaged_at(&frame, 2, Piece::BadStop);
             bench.silence(&pieces, "a stop bit is low")
         },
     )
@@ -257,7 +251,7 @@ fn others(bench: &mut Bench<'_>) -> Check {
         });
         match moved {
             Ok(()) => has_one = true,
-            Err(Stop::Skip(why)) => lacking = Err(Stop::Skip(why)),
+            skipped @ Err(Stop::Skip(_)) => lacking = skipped,
             failed => return failed,
         }
     }

@@ -1,7 +1,7 @@
 //! Mask write, 16, and read/write multiple registers, 17.
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, words_of};
 use crate::target::Span;
 
@@ -132,23 +132,15 @@ fn formula(bench: &mut Bench<'_>) -> Check {
 
 fn mask_refused(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
-    let Some(bad) = words.refused else {
-        return Err(Stop::Skip("no value is known that is refused".to_owned()));
-    };
+    let bad = bench.refused_value()?;
     let at = words.span.first;
     bench.set_words(at, &[words.low])?;
     bench.exception(&mask(at, 0, bad), 3)?;
-    let now = bench.read_word(at)?;
-    bench.ensure(
-        now == words.low,
-        format!("the register still is {:04X}", words.low),
-    )
+    bench.word_is(at, words.low)
 }
 
 fn mask_address(bench: &mut Bench<'_>) -> Check {
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(3)?;
     bench.exception(&mask(nowhere, 0xFFFF, 0), 2)
 }
 
@@ -157,15 +149,8 @@ fn mask_length(bench: &mut Bench<'_>) -> Check {
     let at = words.span.first;
     bench.set_words(at, &[words.low])?;
     let request = mask(at, 0, words.high);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
-    let now = bench.read_word(at)?;
-    bench.ensure(
-        now == words.low,
-        format!("the register still is {:04X}", words.low),
-    )
+    bench.wrong_lengths(&request, &[1])?;
+    bench.word_is(at, words.low)
 }
 
 /// Read a span, write values.
@@ -198,14 +183,11 @@ fn write_first(bench: &mut Bench<'_>) -> Check {
 fn two_places(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
     if words.span.len() < 2 {
-        return Err(Stop::Skip("one register alone".to_owned()));
+        return skip("one register alone");
     }
     let (first, second) = (words.span.first, words.span.first + 1);
     bench.set_words(first, &[words.low, words.low])?;
-    let at = |address| Span {
-        first: address,
-        last: address,
-    };
+    let at = |address| Span::one(address);
     let reply = bench.reply(&both(at(first), second, &[words.high]))?;
     bench.ensure(
         words_of(&reply) == [words.low],
@@ -246,9 +228,7 @@ fn quantities_most(bench: &mut Bench<'_>) -> Check {
     let wide = super::write_words::wide(bench)?;
     let run = bench.target.longest(3).filter(|run| run.len() >= 125);
     let (Some(wide), Some(run)) = (wide.filter(|_| bench.target.has(3)), run) else {
-        let Some(nowhere) = bench.target.nowhere(3) else {
-            return Err(Stop::Skip("every register exists".to_owned()));
-        };
+        let nowhere = bench.nowhere(3)?;
         let read = Span {
             first: nowhere.saturating_sub(124),
             last: nowhere.saturating_sub(124) + 124,
@@ -267,17 +247,8 @@ fn quantities_most(bench: &mut Bench<'_>) -> Check {
 }
 
 fn quantity_first(bench: &mut Bench<'_>) -> Check {
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
-    let good = both(
-        Span {
-            first: nowhere,
-            last: nowhere,
-        },
-        nowhere,
-        &[0],
-    );
+    let nowhere = bench.nowhere(3)?;
+    let good = both(Span::one(nowhere), nowhere, &[0]);
     let with = |changes: &[(usize, u8)]| {
         let mut request = good.clone();
         for (at, byte) in changes {
@@ -303,11 +274,7 @@ fn quantity_first(bench: &mut Bench<'_>) -> Check {
 
 fn still_low(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
-    let now = bench.read_word(words.span.first)?;
-    bench.ensure(
-        now == words.low,
-        format!("the register still is {:04X}", words.low),
-    )
+    bench.word_is(words.span.first, words.low)
 }
 
 fn byte_count(bench: &mut Bench<'_>) -> Check {
@@ -327,23 +294,15 @@ fn truncated(bench: &mut Bench<'_>) -> Check {
     let one = words.span.up_to(1);
     bench.set_words(one.first, &[words.low])?;
     let request = both(one, one.first, &[words.high]);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
+    bench.wrong_lengths(&request, &[1])?;
     still_low(bench)
 }
 
 fn address(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(3)?;
     let one = words.span.up_to(1);
-    let out = Span {
-        first: nowhere,
-        last: nowhere,
-    };
+    let out = Span::one(nowhere);
     bench.set_words(one.first, &[words.low])?;
     bench.exception(&both(out, one.first, &[words.high]), 2)?;
     bench.exception(&both(one, nowhere, &[words.high]), 2)?;

@@ -31,7 +31,11 @@ use crate::case::Case;
 #[must_use]
 pub fn all() -> Vec<Case> {
     [
-        read::CASES,
+        read::FC01,
+        read::FC02,
+        read::FC03,
+        read::FC04,
+        read::ALIKE,
         write_bits::CASES,
         write_words::CASES,
         mask::CASES,

@@ -69,9 +69,9 @@ fn mid_traffic(bench: &mut Bench<'_>) -> Check {
 
 fn no_byte(bench: &mut Bench<'_>) -> Check {
     cycle(bench)?;
-    let heard = bench.endpoint.hear(START, START, usize::MAX)?;
+    let received = bench.endpoint.receive(START, START, usize::MAX)?;
     bench.ensure(
-        heard.is_empty(),
-        format!("silence while the unit starts: {heard:?}"),
+        received.is_empty(),
+        format!("silence while the unit starts: {received:?}"),
     )
 }

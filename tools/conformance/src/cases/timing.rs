@@ -5,6 +5,7 @@ use std::time::Duration;
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
+use crate::frame::Reply;
 
 pub(super) const CASES: &[Case] = &[
     case(
@@ -69,7 +70,7 @@ pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
 
 /// From the end of the last request to the first start bit of the reply.
 fn turnaround(bench: &Bench<'_>) -> Duration {
-    let first = bench.heard.first().map_or(Duration::ZERO, |h| h.start);
+    let first = bench.received.first().map_or(Duration::ZERO, |h| h.start);
     first.saturating_sub(bench.sent_end)
 }
 
@@ -122,7 +123,7 @@ fn no_gap(bench: &mut Bench<'_>) -> Check {
         let request = crate::points::pdu(function, span.first, span.len().min(most) as u16);
         bench.reply(&request)?;
         let gaps = bench
-            .heard
+            .received
             .windows(2)
             .map(|two| two[1].start.saturating_sub(two[0].end));
         let longest = gaps.max().unwrap_or_default();
@@ -146,7 +147,7 @@ fn driver(bench: &mut Bench<'_>) -> Check {
                 "the driver goes on once and off once, not {edges:?}"
             ));
         };
-        let (Some(first), Some(last)) = (bench.heard.first(), bench.heard.last()) else {
+        let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) else {
             return bench.fail("a reply");
         };
         bench.ensure(
@@ -189,22 +190,30 @@ fn driver_off(bench: &mut Bench<'_>) -> Check {
 }
 
 fn back_to_back(bench: &mut Bench<'_>) -> Check {
+    let t35 = bench.endpoint.line().t35_limits().most;
+    hundred_requests(bench, |bench| {
+        let end = bench
+            .received
+            .last()
+            .map_or(Duration::ZERO, |received| received.end);
+        (end + t35).saturating_sub(bench.endpoint.now())
+    })
+}
+
+/// Sends a hundred requests, each as soon as the reply before it has been received and the gap after it has passed.
+pub(super) fn hundred_requests(
+    bench: &mut Bench<'_>,
+    gap: impl Fn(&Bench<'_>) -> Duration,
+) -> Check {
     let ping = bench.ping();
     let reply = bench.raw(&ping)?;
     bench.ensure(bench.is_pong(&reply), "a reply")?;
-    let length = bench.heard.len();
-    let t35 = bench.endpoint.line().t35_limits().most;
+    let length = bench.received.len();
     for n in 0..100 {
-        let end = bench.heard.last().map_or(Duration::ZERO, |heard| heard.end);
-        let now = bench.endpoint.now();
-        let gap = (end + t35).saturating_sub(now);
-        let pieces = [Piece::Gap(gap), Piece::Bytes(ping.clone())];
+        let pieces = [Piece::Gap(gap(bench)), Piece::Bytes(ping.clone())];
         let reply = bench.exchange_until(&pieces, length)?;
         bench.ensure(bench.is_pong(&reply), format!("a reply to request {n}"))?;
     }
     let late = bench.listen_until(usize::MAX)?;
-    bench.ensure(
-        late == crate::frame::Reply::Silence,
-        "silence after the last reply",
-    )
+    bench.ensure(late == Reply::Silence, "silence after the last reply")
 }

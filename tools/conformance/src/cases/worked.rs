@@ -1,7 +1,7 @@
 //! The worked frames of manuals, played against the unit.
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::frame::{Reply, crc, rtu};
 use crate::vectors::{Worked, frames};
 
@@ -87,7 +87,7 @@ fn for_this(bench: &mut Bench<'_>) -> Check {
         .filter(|w| w.crc_ok() && w.bytes[0] == unit)
         .collect();
     if mine.is_empty() {
-        return Err(Stop::Skip(format!("no worked frame is for unit {unit}")));
+        return skip(format!("no worked frame is for unit {unit}"));
     }
     for worked in mine {
         // An echo is request and reply at once.

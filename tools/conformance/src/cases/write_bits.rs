@@ -1,7 +1,7 @@
 //! Writing coils: functions 05 and 0F.
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_bits};
 
 pub(super) const CASES: &[Case] = &[
@@ -134,14 +134,7 @@ fn value(bench: &mut Bench<'_>) -> Check {
 }
 
 fn address(bench: &mut Bench<'_>) -> Check {
-    let spans = bench.target.readable(1).to_vec();
-    let mut outside = vec![0xFFFF];
-    for span in &spans {
-        outside.extend(span.last.checked_add(1));
-        outside.extend(span.first.checked_sub(1));
-    }
-    outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
-    for address in outside {
+    for address in bench.outside(1) {
         bench.exception(&pdu(5, address, 0xFF00), 2)?;
         bench.exception(&pdu(5, address, 0), 2)?;
     }
@@ -157,12 +150,8 @@ fn length(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(1);
     bench.set_bits(span.first, &[false])?;
     let request = pdu(5, span.first, 0xFF00);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
-    let now = bench.read_bits(span)?;
-    bench.ensure(now == [false], "the coil is still off")
+    bench.wrong_lengths(&request, &[1])?;
+    bench.is_off(span)
 }
 
 fn every_quantity(bench: &mut Bench<'_>) -> Check {
@@ -195,9 +184,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
 }
 
 fn quantity_first(bench: &mut Bench<'_>) -> Check {
-    let Some(nowhere) = bench.target.nowhere(1) else {
-        return Err(Stop::Skip("every coil exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(1)?;
     for (quantity, count) in [(0, 0_u8), (0, 1), (1969, 247), (1, 0), (1, 2), (9, 1)] {
         let data = vec![0; usize::from(count)];
         let request = [pdu(0x0F, nowhere, quantity), vec![count], data].concat();
@@ -210,7 +197,7 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
     let span = bench.target.bits;
     if let Some(span) = span.filter(|span| span.len() >= 1968) {
         if !bench.target.has(1) {
-            return Err(Stop::Skip("the coils cannot be read first".to_owned()));
+            return skip("the coils cannot be read first");
         }
         // What the coils hold is written back to them.
         let values = bench.read_bits(span.up_to(1968))?;
@@ -230,8 +217,7 @@ fn byte_count(bench: &mut Bench<'_>) -> Check {
         let head = [pdu(0x0F, span.first, quantity), vec![count]].concat();
         bench.exception_03_with(&head, &vec![0xFF; bytes])?;
     }
-    let now = bench.read_bits(span)?;
-    bench.ensure(!now.contains(&true), "no coil has been written")
+    bench.is_off(span)
 }
 
 fn data_length(bench: &mut Bench<'_>) -> Check {
@@ -239,14 +225,8 @@ fn data_length(bench: &mut Bench<'_>) -> Check {
     let quantity = span.len() as u16;
     bench.set_bits(span.first, &vec![false; usize::from(quantity)])?;
     let request = write_bits(span.first, &vec![true; usize::from(quantity)], false);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    for spare in [1, 2, 240] {
-        bench.exception_03_or_silence(&[request.clone(), vec![0xFF; spare]].concat())?;
-    }
-    let now = bench.read_bits(span)?;
-    bench.ensure(!now.contains(&true), "no coil has been written")
+    bench.wrong_lengths(&request, &[1, 2, 240])?;
+    bench.is_off(span)
 }
 
 fn padding(bench: &mut Bench<'_>) -> Check {

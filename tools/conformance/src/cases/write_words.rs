@@ -1,7 +1,7 @@
 //! Writing registers: functions 06 and 10.
 
 use crate::bench::Bench;
-use crate::case::{Case, Check, Need, Stop, case};
+use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_words};
 use crate::target::Span;
 
@@ -135,27 +135,14 @@ fn echo(bench: &mut Bench<'_>) -> Check {
 
 fn refused(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
-    let Some(value) = words.refused else {
-        return Err(Stop::Skip("no value is known that is refused".to_owned()));
-    };
+    let value = bench.refused_value()?;
     bench.set_words(words.span.first, &[words.low])?;
     bench.exception(&pdu(6, words.span.first, value), 3)?;
-    let now = bench.read_word(words.span.first)?;
-    bench.ensure(
-        now == words.low,
-        format!("the register still is {}", words.low),
-    )
+    bench.word_is(words.span.first, words.low)
 }
 
 fn address(bench: &mut Bench<'_>) -> Check {
-    let spans = bench.target.readable(3).to_vec();
-    let mut outside = vec![0xFFFF];
-    for span in &spans {
-        outside.extend(span.last.checked_add(1));
-        outside.extend(span.first.checked_sub(1));
-    }
-    outside.retain(|address| !spans.iter().any(|span| span.has(*address)));
-    for address in outside {
+    for address in bench.outside(3) {
         bench.exception(&pdu(6, address, 0), 2)?;
     }
     Ok(())
@@ -165,15 +152,8 @@ fn length(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
     bench.set_words(words.span.first, &[words.low])?;
     let request = pdu(6, words.span.first, words.high);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    bench.exception_03_or_silence(&[&request[..], &[0]].concat())?;
-    let now = bench.read_word(words.span.first)?;
-    bench.ensure(
-        now == words.low,
-        format!("the register still is {}", words.low),
-    )
+    bench.wrong_lengths(&request, &[1])?;
+    bench.word_is(words.span.first, words.low)
 }
 
 fn every_quantity(bench: &mut Bench<'_>) -> Check {
@@ -228,9 +208,7 @@ pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
 }
 
 fn quantity_first(bench: &mut Bench<'_>) -> Check {
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(3)?;
     for (quantity, count) in [(0, 0), (124, 246), (1, 0), (1, 1), (1, 4)] {
         let data = vec![0; usize::from(count)];
         let request = [pdu(0x10, nowhere, quantity), vec![count], data].concat();
@@ -239,26 +217,16 @@ fn quantity_first(bench: &mut Bench<'_>) -> Check {
     bench.exception(&write_words(nowhere, &[0]), 2)
 }
 
-/// A value that the registers refuse, or the case is skipped.
-fn refused_value(bench: &Bench<'_>) -> Check<u16> {
-    let refused = bench.words()?.refused;
-    refused.ok_or_else(|| Stop::Skip("no value is known that is refused".to_owned()))
-}
-
 fn address_first(bench: &mut Bench<'_>) -> Check {
-    let bad = refused_value(bench)?;
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
+    let bad = bench.refused_value()?;
+    let nowhere = bench.nowhere(3)?;
     bench.exception(&pdu(6, nowhere, bad), 2)
 }
 
 fn range_first(bench: &mut Bench<'_>) -> Check {
-    let bad = refused_value(bench)?;
+    let bad = bench.refused_value()?;
     let words = bench.words()?;
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(3)?;
     bench.exception(&write_words(nowhere, &[bad]), 2)?;
     let last = words.span.last;
     let next = last.checked_add(1);
@@ -268,8 +236,7 @@ fn range_first(bench: &mut Bench<'_>) -> Check {
     }
     let before = bench.read_word(last)?;
     bench.exception(&write_words(last, &[bad, words.low]), 2)?;
-    let now = bench.read_word(last)?;
-    bench.ensure(now == before, format!("the register still is {before:04X}"))
+    bench.word_is(last, before)
 }
 
 fn quantity_most(bench: &mut Bench<'_>) -> Check {
@@ -281,9 +248,7 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
         return bench.ensure(now == values, "the registers hold what was written");
     }
     // Off the end of what there is, wherever that is.
-    let Some(nowhere) = bench.target.nowhere(3) else {
-        return Err(Stop::Skip("every register exists".to_owned()));
-    };
+    let nowhere = bench.nowhere(3)?;
     let first = nowhere.saturating_sub(122);
     bench.exception(&write_words(first, &[0; 123]), 2)
 }
@@ -323,13 +288,7 @@ fn data_length(bench: &mut Bench<'_>) -> Check {
     let count = span.len() as usize;
     bench.set_words(span.first, &vec![words.low; count])?;
     let request = write_words(span.first, &vec![words.high; count]);
-    for cut in 1..request.len() {
-        bench.exception_03_or_silence(&request[..cut])?;
-    }
-    for spare in [1, 2, 100] {
-        let spare = words.high.to_be_bytes().repeat(spare)[..spare].to_vec();
-        bench.exception_03_or_silence(&[request.clone(), spare].concat())?;
-    }
+    bench.wrong_lengths(&request, &[1, 2, 100])?;
     unchanged(bench, span.first, words.low, count)
 }
 
@@ -374,9 +333,7 @@ fn partly_out(bench: &mut Bench<'_>) -> Check {
 fn one_bad_value(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
     let (Some(bad), count @ 2..) = (words.refused, words.span.up_to(4).len() as usize) else {
-        return Err(Stop::Skip(
-            "no value is known that is refused, or one register alone".to_owned(),
-        ));
+        return skip("no value is known that is refused, or one register alone");
     };
     let at = words.span.first;
     bench.set_words(at, &vec![words.low; count])?;

@@ -1,5 +1,5 @@
 //! The exact-line protocol as an endpoint: an emulator or simulator in which time passes on request only.
-//! The protocol is described in docs/conformance.md.
+//! docs/conformance.md describes the protocol.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Write};
@@ -9,22 +9,22 @@ use std::time::{Duration, Instant};
 
 use ::exact_line::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
 
-use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use super::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::line::LineFormat;
 
-/// How long a server may take to carry out a request: the longest one is ten minutes of virtual time.
+/// Time that a server may take for a request. The longest request is ten minutes of virtual time.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// How long to wait for the server to notice that an earlier client has disconnected.
 const HANDOVER: Duration = Duration::from_secs(5);
 
-/// What carries requests to a server and its replies back.
+/// A connection to a server.
 pub trait Transport {
-    /// Has the server carry out a request.
+    /// Sends a request to the server and returns the reply.
     ///
     /// # Errors
     ///
-    /// The server's reason not to, or why the server cannot be reached, in one line.
+    /// Why the server has refused the request, or why the server cannot be reached, in one line.
     fn ask(&mut self, request: &Request) -> Result<Reply, String>;
 }
 
@@ -34,17 +34,17 @@ pub struct ExactLine<T> {
     hello: Hello,
     line: LineFormat,
     now: Duration,
-    /// Bytes that were reported and not yet returned by `hear`.
-    bytes: VecDeque<Heard>,
+    /// Bytes that were reported and not yet returned by `receive`.
+    bytes: VecDeque<Received>,
     driver_edges: Vec<(Duration, bool)>,
 }
 
 impl<T: Transport> ExactLine<T> {
-    /// Greets the server.
+    /// Sends `hello` to the server.
     ///
     /// # Errors
     ///
-    /// When it cannot be reached or does not speak the protocol, in one line.
+    /// When the server cannot be reached or does not support the protocol.
     pub fn new(mut server: T) -> Result<Self, Broken> {
         let reply = server.ask(&Request::Hello(VERSION)).map_err(Broken)?;
         let Reply::Hello(now, hello) = reply else {
@@ -65,7 +65,8 @@ impl<T: Transport> ExactLine<T> {
         self.hello.abilities.contains(&ability)
     }
 
-    /// Has a request carried out; fails when the server lacks the ability that it needs.
+    /// Sends a request and stores the reported events. Fails when the server does not have the ability that the request
+    /// needs. Returns the findings, if the request asks for them.
     fn ask(&mut self, request: &Request, needs: Option<Ability>) -> Result<Vec<String>, Broken> {
         if let Some(ability) = needs.filter(|ability| !self.can(*ability)) {
             let (name, ability) = (&self.hello.name, ability.name());
@@ -88,7 +89,7 @@ impl<T: Transport> ExactLine<T> {
                     start,
                     end,
                     good,
-                } => self.bytes.push_back(Heard {
+                } => self.bytes.push_back(Received {
                     byte,
                     start,
                     end,
@@ -158,29 +159,29 @@ impl<T: Transport> Endpoint for ExactLine<T> {
         Ok(self.now)
     }
 
-    fn hear(
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        let mut heard: Vec<Heard> = Vec::new();
+    ) -> Result<Vec<Received>, Broken> {
+        let mut received: Vec<Received> = Vec::new();
         let mut until = self.now + patience;
         loop {
-            while heard.len() < enough {
+            while received.len() < enough {
                 // A byte after the silence that ends a reply belongs to the next call.
-                let belongs = |next: &&Heard| heard.is_empty() || next.start <= until;
+                let belongs = |next: &&Received| received.is_empty() || next.start <= until;
                 let Some(next) = self.bytes.front().filter(belongs).copied() else {
                     break;
                 };
                 self.bytes.pop_front();
                 until = next.end + quiet;
-                heard.push(next);
+                received.push(next);
             }
-            if heard.len() >= enough || self.now >= until {
-                return Ok(heard);
+            if received.len() >= enough || self.now >= until {
+                return Ok(received);
             }
-            // Where a number of bytes is waited for, time must not pass much beyond the last of them.
+            // When the caller waits for a number of bytes, time must not pass much beyond the last byte.
             let most = if enough == usize::MAX {
                 Duration::MAX
             } else {
@@ -202,7 +203,9 @@ impl<T: Transport> Endpoint for ExactLine<T> {
 
     fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
         if !self.can(Ability::Driver) {
-            return Err(Broken("this endpoint does not see the driver".to_owned()));
+            return Err(Broken(
+                "this endpoint does not record the driver".to_owned(),
+            ));
         }
         Ok(std::mem::take(&mut self.driver_edges))
     }
@@ -221,11 +224,11 @@ pub struct Tcp {
 }
 
 impl Tcp {
-    /// Connects to a server and greets it.
+    /// Connects to a server and sends `hello`.
     ///
     /// # Errors
     ///
-    /// When nothing answers there, or another client uses the line, in one line.
+    /// When no server answers at the address, or when another client uses the line.
     pub fn connect(address: &str) -> Result<ExactLine<Self>, Broken> {
         let cannot = |why: String| Broken(format!("no exact line at {address}: {why}"));
         let begin = Instant::now();
@@ -273,7 +276,7 @@ impl Transport for Tcp {
         let mut line = String::new();
         let read = self.stream.read_line(&mut line);
         match (written, read) {
-            // The server's last words count more than a failed write.
+            // A reply of the server takes precedence over a failed write.
             (_, Ok(1..)) => Reply::read(request, line.trim_end()),
             (Ok(()), Ok(_)) => Err("the server has closed the connection".to_owned()),
             (Err(error), _) | (_, Err(error)) => Err(format!("the connection broke: {error}")),

@@ -1,4 +1,4 @@
-//! What the suite speaks through: raw bytes to one serial line, whatever carries them.
+//! The lines on which the suite tests a unit: raw bytes on one serial line, over different connections.
 
 pub mod exact_line;
 #[cfg(feature = "sim")]
@@ -6,157 +6,118 @@ pub mod sim;
 pub mod stream;
 pub mod trace;
 
-use std::fmt;
 use std::time::Duration;
 
 use crate::line::LineFormat;
 
-/// Something to put on the line. A gap lasts exactly as long as asked where time is exact, elsewhere at least
-/// as long. Damaged characters, breaks and glitches need [`Abilities::faults`].
+/// Something to send. Where time is exact, a gap has exactly the length asked for; elsewhere it may be longer. Damaged
+/// characters, breaks and glitches need [`Abilities::faults`].
 pub use ::exact_line::Piece;
 
-/// A character that came, by the endpoint's clock.
+/// A received character, with the times of the endpoint's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Heard {
-    /// Its data.
+pub struct Received {
+    /// The data.
     pub byte: u8,
-    /// Its start bit.
+    /// Begin of the start bit.
     pub start: Duration,
-    /// The end of its last stop bit.
+    /// End of the last stop bit.
     pub end: Duration,
-    /// Parity, stop bits and levels were right, as far as the endpoint can tell.
+    /// Parity, stop bits and levels were right, as far as the endpoint checks them.
     pub good: bool,
 }
 
-/// What an endpoint can do. All `false`: raw bytes, and silences that last at least as long as asked.
+/// What an endpoint can do. With none of these it sends and receives bytes, with silences of at least the length asked
+/// for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Abilities {
-    /// Its times are exact to a microsecond, those of gaps inside what it sends included.
+    /// Its times are exact to a microsecond, including the gaps between the bytes that it sends.
     pub exact: bool,
     /// It can send damaged characters, breaks and glitches.
     pub faults: bool,
-    /// It can cut and restore the unit's power.
+    /// It can switch the unit's power off and on.
     pub power: bool,
-    /// It sees when the unit's driver goes on and off.
+    /// It records when the unit's driver is switched on and off.
     pub driver: bool,
-    /// It can let the unit hear itself, as with DE and RE tied together.
+    /// It can let the unit receive its own frames, as with DE and RE tied together.
     pub echo: bool,
     /// It can change its rate and format.
     pub set_line: bool,
-    /// Characters that the unit sends take their time on its line.
+    /// Characters that the unit sends have their duration on its line.
     pub character_time: bool,
-    /// The unit notices a start bit when it begins, not only when the character has ended.
+    /// The unit detects a character at its start bit, not only at its end.
     pub start_bit: bool,
-    /// A request may get lost on the way to the unit: it is sent once more when a due reply does not come.
+    /// A request may get lost on the way to the unit: it is repeated once when a due reply is missing.
     pub asks_again: bool,
 }
 
-/// The endpoint itself does not work any more, or cannot do what was asked: why, in one line.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Error when the endpoint no longer works, or cannot do what was asked: the reason in one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct Broken(pub String);
 
-impl fmt::Display for Broken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Broken {}
-
-/// A master's end of a serial line. Its clock starts at 0 some time before the first call.
+/// The master's end of a serial line. Its clock starts at 0, at an instant before the first call.
 ///
-/// Every method fails with [`Broken`] when the line is gone, and those that need an ability when it is
-/// not there.
+/// # Errors
+///
+/// Every method fails with [`Broken`] when the line no longer works, or when the endpoint does not have the ability that
+/// the method needs.
 pub trait Endpoint {
-    /// What it is, for people: `the simulator, 4do`.
+    /// Its name for people, such as `the simulator, 4do`.
     fn name(&self) -> String;
 
-    /// What it can do.
+    /// Its abilities.
     fn abilities(&self) -> Abilities;
 
-    /// The rate and format it speaks, or is told that the line has.
+    /// The rate and format of the line, as set or as given by the user.
     fn line(&self) -> LineFormat;
 
     /// Changes rate and format.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken>;
 
-    /// The time.
+    /// The time of its clock.
     fn now(&self) -> Duration;
 
     /// Lets time pass.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
     fn rest(&mut self, time: Duration) -> Result<(), Broken>;
 
-    /// Sends, and returns with the end of the last stop bit: measured when time is exact, else estimated.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
+    /// Sends pieces. Returns the end of the last stop bit: measured where time is exact, estimated elsewhere.
     fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken>;
 
-    /// What has come since the last call, and what comes until `quiet` has passed in silence; gives up
-    /// after `patience` without a character. Stops early at `enough` characters.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
-    fn hear(
+    /// Returns the characters received since the last call, and those that follow until the line is silent for `quiet`.
+    /// Returns early after `enough` characters, and with none when none is received within `patience`.
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         enough: usize,
-    ) -> Result<Vec<Heard>, Broken>;
+    ) -> Result<Vec<Received>, Broken>;
 
-    /// Discards the characters that were received and not yet returned by `hear`, such as those of a late reply,
+    /// Discards the characters that were received and not yet returned by `receive`, such as those of a late reply,
     /// and returns them. Does nothing where time is exact: there a late character is a finding.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
-    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
+    fn flush(&mut self) -> Result<Vec<Received>, Broken> {
         Ok(Vec::new())
     }
 
     /// Switches the unit's power. After switching on, the unit starts while time passes.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
     fn set_power(&mut self, _on: bool) -> Result<(), Broken> {
         Err(Broken("this endpoint cannot switch the power".to_owned()))
     }
 
-    /// Lets the unit hear itself, or not.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
+    /// Switches the echo: whether the unit receives its own frames.
     fn set_echo(&mut self, _echo: bool) -> Result<(), Broken> {
         Err(Broken("this endpoint has no echo to switch".to_owned()))
     }
 
-    /// When the unit's driver went on and off since the last call.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
+    /// When the unit's driver was switched on and off since the last call.
     fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
-        Err(Broken("this endpoint does not see the driver".to_owned()))
+        Err(Broken(
+            "this endpoint does not record the driver".to_owned(),
+        ))
     }
 
-    /// What the unit's parts complain about since the last call, such as a byte lost because the driver
-    /// was off: only a simulator knows.
-    ///
-    /// # Errors
-    ///
-    /// See the trait.
+    /// What the firmware has done since the last call that a real part would not accept, such as a byte that was lost
+    /// because the driver was off. Only a simulator reports this.
     fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
         Ok(Vec::new())
     }

@@ -14,7 +14,7 @@ use super::exact_line::{ExactLine, Transport};
 use crate::frame::Mode;
 use crate::line::LineFormat;
 
-/// Time for the unit to start in after power comes on.
+/// Time that the unit has to start after power-on.
 const START: Time = Time::from_ms(150);
 
 /// How the virtual board is fitted and set.
@@ -24,9 +24,9 @@ pub struct Fitting {
     pub elf: PathBuf,
     /// The board.
     pub board: &'static register_map::Board,
-    /// What is in its first slot, unless `slots` names it.
+    /// The module in the first slot, unless `slots` names that slot.
     pub module: Module,
-    /// What is in the slots of these ports. A slot that is not named is empty.
+    /// The modules in the slots of these ports. A slot that is not named is empty.
     pub slots: Vec<(u8, Module)>,
     /// SW01: the unit address.
     pub dip: u8,
@@ -38,13 +38,30 @@ pub struct Fitting {
     pub settings: Vec<(u16, u16)>,
 }
 
+impl Fitting {
+    /// A board with this image and empty slots, set as in the factory: address 1, 9600 8N2, RTU.
+    #[must_use]
+    pub fn new(elf: PathBuf, board: &'static register_map::Board) -> Self {
+        Self {
+            elf,
+            board,
+            module: Module::None,
+            slots: Vec::new(),
+            dip: 1,
+            line: LineFormat::default(),
+            mode: Mode::Rtu,
+            settings: Vec::new(),
+        }
+    }
+}
+
 /// The virtual board, which carries out the requests of the exact-line protocol.
 pub struct InProcess {
     board: Board,
     session: Session,
 }
 
-/// A board fitted like this, switched on and started, with a master on its line.
+/// Starts a board fitted like this. Returns the master's end of its line.
 ///
 /// # Errors
 ///
@@ -77,7 +94,7 @@ impl Transport for InProcess {
     }
 }
 
-/// A flash in which these settings are stored.
+/// The contents of a flash in which these settings are stored.
 fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
     let mut pairs: Vec<_> = configuration::modules(config.plugged()).collect();
     pairs.extend(line_settings(fitting.line)?);
@@ -89,7 +106,7 @@ fn flash(fitting: &Fitting, config: &Config) -> Result<Vec<u8>, Broken> {
     flash.ok_or_else(|| Broken("too many settings for a page of the store".to_owned()))
 }
 
-/// The registers and values that stand for this rate and format.
+/// The registers and values for this rate and format.
 fn line_settings(line: LineFormat) -> Result<[(u16, u16); 2], Broken> {
     let baud = Baud::ALL
         .iter()

@@ -1,5 +1,4 @@
-//! A serial port, a pseudo-terminal or a TCP socket: bytes there and back, times only as good as the
-//! operating system's.
+//! A serial port, a pseudo-terminal or a TCP socket. Its times are those of the operating system, which are not exact.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -9,20 +8,20 @@ use std::time::{Duration, Instant};
 
 use serial2::{CharSize, FlowControl, Parity as SerialParity, SerialPort, Settings, StopBits};
 
-use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use super::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::line::{LineFormat, Parity};
 
-/// So long a read may wait before the clock is looked at again.
+/// Longest time that one read waits, before the clock is read again.
 const SLICE: Duration = Duration::from_millis(5);
 
-/// The shortest silence that is sure to end a frame, however busy the host is and whatever carries the bytes.
+/// The shortest silence that ends a frame on every host and every connection, however busy they are.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// The longest frame, in characters (V1.02 2.5.2.1), and the time after which there is a silence on any line.
+/// The longest frame, in characters (V1.02 2.5.2.1), and additional time after which every line has had a silence.
 const LONGEST: usize = 513;
 const GRACE: Duration = Duration::from_secs(2);
 
-/// What carries the bytes.
+/// The connection.
 enum Carrier {
     Serial(SerialPort),
     Tcp(TcpStream),
@@ -37,18 +36,18 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// A serial port, or something that looks like one.
+    /// Opens a serial port or a pseudo-terminal.
     ///
     /// # Errors
     ///
-    /// When it cannot be opened, or does not take the format; why and what to do, in one line.
+    /// When the port cannot be opened, or does not support the format.
     pub fn serial(path: &Path, line: LineFormat) -> Result<Self, Broken> {
         let port = SerialPort::open(path, |settings: Settings| configured(settings, line)).map_err(
             |error| {
                 let path = path.display();
                 Broken(match error.kind() {
                     ErrorKind::NotFound => {
-                        format!("{path} is not there: is the adapter plugged in, the simulator running?")
+                        format!("{path} is not there: is the adapter plugged in, or the simulator running?")
                     }
                     ErrorKind::PermissionDenied => format!(
                         "{path} may not be opened: on Linux, join the group that owns it (often dialout)"
@@ -63,11 +62,11 @@ impl Stream {
         Ok(Self::over(Carrier::Serial(port), name, line))
     }
 
-    /// A socket that carries the line's bytes; `line` is what the line behind it is known to be.
+    /// Connects to a socket; `line` is the rate and format of the line behind the socket.
     ///
     /// # Errors
     ///
-    /// When nobody answers there; why, in one line.
+    /// When no server answers at the address.
     pub fn tcp(address: &str, line: LineFormat) -> Result<Self, Broken> {
         let cannot = |why: String| Broken(format!("cannot connect to {address}: {why}"));
         let found: Vec<_> = address
@@ -78,7 +77,7 @@ impl Stream {
         for one in found {
             match TcpStream::connect_timeout(&one, Duration::from_secs(5)) {
                 Ok(socket) => {
-                    // A request must leave as it is written.
+                    // Send a request immediately, not together with later bytes.
                     socket
                         .set_nodelay(true)
                         .map_err(|error| cannot(error.to_string()))?;
@@ -108,20 +107,20 @@ impl Stream {
         written.map_err(|error| Broken(format!("{}: cannot send: {error}", self.name)))
     }
 
-    /// Bytes with the time at which they were received: now.
-    fn received(&self, bytes: Vec<u8>) -> Vec<Heard> {
+    /// Returns bytes that were received at this instant, with their times.
+    fn with_times(&self, bytes: Vec<u8>) -> Vec<Received> {
         let end = self.begin.elapsed();
         let start = end.saturating_sub(self.line.characters(1));
-        let heard = bytes.into_iter().map(|byte| Heard {
+        let received = bytes.into_iter().map(|byte| Received {
             byte,
             start,
             end,
             good: true,
         });
-        heard.collect()
+        received.collect()
     }
 
-    /// What comes within `wait`; nothing is no error.
+    /// Returns the bytes that are received within `wait`; there may be none.
     fn read(&mut self, wait: Duration) -> Result<Vec<u8>, Broken> {
         let wait = wait.max(Duration::from_millis(1));
         let mut buffer = [0; 512];
@@ -134,7 +133,10 @@ impl Stream {
                 .and_then(|()| socket.read(&mut buffer)),
         };
         match read {
-            Ok(0) => Err(Broken(format!("{}: the other end is gone", self.name))),
+            Ok(0) => Err(Broken(format!(
+                "{}: the other end has closed the connection",
+                self.name
+            ))),
             Ok(length) => Ok(buffer[..length].to_vec()),
             Err(error) => match error.kind() {
                 ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => {
@@ -176,7 +178,7 @@ impl Endpoint for Stream {
             set_line: matches!(self.carrier, Carrier::Serial(_)),
             character_time: true,
             start_bit: true,
-            // On a serial port a lost reply is a finding. A socket's bytes wait for the host's threads.
+            // On a serial port a lost reply is a finding. On a socket the host may delay bytes.
             asks_again: matches!(self.carrier, Carrier::Tcp(_)),
             ..Abilities::default()
         }
@@ -215,7 +217,7 @@ impl Endpoint for Stream {
                 Piece::Bytes(bytes) => waiting.extend_from_slice(bytes),
                 Piece::Gap(gap) => {
                     self.write(&waiting)?;
-                    // Bytes are on the line some time after they are written.
+                    // The line carries the bytes for some time after they are written.
                     thread::sleep(self.line.characters(waiting.len()) + (*gap).max(SILENCE));
                     waiting.clear();
                 }
@@ -231,8 +233,8 @@ impl Endpoint for Stream {
         Ok(self.now())
     }
 
-    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
-        // A line that is never silent ends the wait as well: the next `hear` reports it.
+    fn flush(&mut self) -> Result<Vec<Received>, Broken> {
+        // Return also when the line is never silent. The next `receive` reports that.
         let latest = Instant::now() + SILENCE;
         let mut late = Vec::new();
         while Instant::now() < latest {
@@ -240,21 +242,21 @@ impl Endpoint for Stream {
             if bytes.is_empty() {
                 break;
             }
-            late.extend(self.received(bytes));
+            late.extend(self.with_times(bytes));
         }
         Ok(late)
     }
 
-    fn hear(
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        let mut heard: Vec<Heard> = Vec::new();
+    ) -> Result<Vec<Received>, Broken> {
+        let mut received: Vec<Received> = Vec::new();
         let mut until = Instant::now() + patience;
         let longest = until + self.line.characters(LONGEST) * 2 + GRACE;
-        while heard.len() < enough {
+        while received.len() < enough {
             if Instant::now() > longest {
                 return Err(Broken(format!(
                     "{} is never silent: is there another master on the line, or has it another rate?",
@@ -269,10 +271,10 @@ impl Endpoint for Stream {
                 }
                 continue;
             }
-            heard.extend(self.received(bytes));
+            received.extend(self.with_times(bytes));
             until = Instant::now() + quiet;
         }
-        Ok(heard)
+        Ok(received)
     }
 }
 
@@ -282,7 +284,7 @@ mod tests {
     use std::net::TcpListener;
 
     #[test]
-    fn a_line_that_is_never_silent_is_told() {
+    fn line_that_is_never_silent_is_an_error() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap().to_string();
         let line = LineFormat::new(115_200, "8N1".parse().unwrap());
@@ -291,12 +293,12 @@ mod tests {
         thread::spawn(move || while peer.write_all(&[0x55; 20]).is_ok() {});
         // A busy host may run the other thread only after a pause, which must not look like silence.
         let wait = Duration::from_secs(1);
-        let told = stream.hear(wait, wait, usize::MAX).unwrap_err();
-        assert!(told.to_string().contains("never silent"), "{told}");
+        let error = stream.receive(wait, wait, usize::MAX).unwrap_err();
+        assert!(error.to_string().contains("never silent"), "{error}");
     }
 
     #[test]
-    fn a_socket_carries_bytes_and_notices_silence_and_the_end() {
+    fn socket_sends_and_receives_bytes_and_detects_silence_and_the_end() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap().to_string();
         let mut stream = Stream::tcp(&address, LineFormat::default()).unwrap();
@@ -313,16 +315,16 @@ mod tests {
         assert_eq!(got, [1, 2, 3]);
 
         let short = Duration::from_millis(10);
-        assert_eq!(stream.hear(short, short, usize::MAX).unwrap(), []);
+        assert_eq!(stream.receive(short, short, usize::MAX).unwrap(), []);
         peer.write_all(&[9, 8]).unwrap();
-        let heard = stream
-            .hear(Duration::from_secs(5), short, usize::MAX)
+        let received = stream
+            .receive(Duration::from_secs(5), short, usize::MAX)
             .unwrap();
-        let bytes: Vec<u8> = heard.iter().map(|h| h.byte).collect();
+        let bytes: Vec<u8> = received.iter().map(|h| h.byte).collect();
         assert_eq!(bytes, [9, 8]);
         drop(peer);
-        let gone = stream.hear(Duration::from_secs(5), short, usize::MAX);
-        assert!(gone.unwrap_err().0.contains("gone"));
+        let gone = stream.receive(Duration::from_secs(5), short, usize::MAX);
+        assert!(gone.unwrap_err().0.contains("closed"));
     }
 
     #[test]
@@ -336,7 +338,7 @@ mod tests {
         let late: Vec<u8> = stream.flush().unwrap().iter().map(|h| h.byte).collect();
         assert_eq!(late, [1, 2, 3]);
         let short = Duration::from_millis(10);
-        assert_eq!(stream.hear(short, short, usize::MAX).unwrap(), []);
+        assert_eq!(stream.receive(short, short, usize::MAX).unwrap(), []);
     }
 
     #[test]
@@ -349,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_there_is_one_clear_line() {
+    fn line_without_a_server_is_an_error_in_one_line() {
         let taken = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = taken.local_addr().unwrap().to_string();
         drop(taken);

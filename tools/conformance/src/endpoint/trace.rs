@@ -3,7 +3,9 @@
 use std::io::Write;
 use std::time::Duration;
 
-use super::{Abilities, Broken, Endpoint, Heard, Piece};
+use delegate::delegate;
+
+use super::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::bench::shown;
 use crate::frame::hex;
 use crate::line::LineFormat;
@@ -25,10 +27,12 @@ impl<W: Write> Trace<W> {
         let _ = writeln!(self.log, "{:12.6} s {what}", at.as_secs_f64());
     }
 
-    fn note_heard(&mut self, heard: &[Heard], what: &str) {
-        let Some(first) = heard.first() else { return };
-        let bytes: Vec<u8> = heard.iter().map(|heard| heard.byte).collect();
-        let damaged = if heard.iter().all(|heard| heard.good) {
+    fn note_received(&mut self, received: &[Received], what: &str) {
+        let Some(first) = received.first() else {
+            return;
+        };
+        let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
+        let damaged = if received.iter().all(|received| received.good) {
             ""
         } else {
             " (damaged)"
@@ -38,29 +42,9 @@ impl<W: Write> Trace<W> {
 }
 
 impl<W: Write> Endpoint for Trace<W> {
-    fn name(&self) -> String {
-        self.endpoint.name()
-    }
-
-    fn abilities(&self) -> Abilities {
-        self.endpoint.abilities()
-    }
-
-    fn line(&self) -> LineFormat {
-        self.endpoint.line()
-    }
-
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
         self.note(self.endpoint.now(), &format!("line at {line}"));
         self.endpoint.set_line(line)
-    }
-
-    fn now(&self) -> Duration {
-        self.endpoint.now()
-    }
-
-    fn rest(&mut self, time: Duration) -> Result<(), Broken> {
-        self.endpoint.rest(time)
     }
 
     fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
@@ -68,20 +52,20 @@ impl<W: Write> Endpoint for Trace<W> {
         self.endpoint.send(pieces)
     }
 
-    fn hear(
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        let heard = self.endpoint.hear(patience, quiet, enough)?;
-        self.note_heard(&heard, "received");
-        Ok(heard)
+    ) -> Result<Vec<Received>, Broken> {
+        let received = self.endpoint.receive(patience, quiet, enough)?;
+        self.note_received(&received, "received");
+        Ok(received)
     }
 
-    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
+    fn flush(&mut self) -> Result<Vec<Received>, Broken> {
         let late = self.endpoint.flush()?;
-        self.note_heard(&late, "received too late, discarded:");
+        self.note_received(&late, "received too late, discarded:");
         Ok(late)
     }
 
@@ -97,11 +81,15 @@ impl<W: Write> Endpoint for Trace<W> {
         self.endpoint.set_echo(echo)
     }
 
-    fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken> {
-        self.endpoint.take_driver_edges()
-    }
-
-    fn take_complaints(&mut self) -> Result<Vec<String>, Broken> {
-        self.endpoint.take_complaints()
+    delegate! {
+        to self.endpoint {
+            fn name(&self) -> String;
+            fn abilities(&self) -> Abilities;
+            fn line(&self) -> LineFormat;
+            fn now(&self) -> Duration;
+            fn rest(&mut self, time: Duration) -> Result<(), Broken>;
+            fn take_driver_edges(&mut self) -> Result<Vec<(Duration, bool)>, Broken>;
+            fn take_complaints(&mut self) -> Result<Vec<String>, Broken>;
+        }
     }
 }

@@ -7,7 +7,7 @@ use register_map::board::MODIO_02;
 use register_map::configuration::{BAUD, COMMAND, FORMAT, KEY};
 use register_map::{Module, counters, points, state};
 
-use crate::endpoint::{Abilities, Broken, Endpoint, Heard, Piece};
+use crate::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::frame::Mode;
 use crate::line::{LineFormat, Parity};
 
@@ -104,7 +104,7 @@ impl Unit {
 /// What becomes of a request and its reply.
 pub(super) enum Fate {
     Good,
-    /// The unit does not hear it.
+    /// The unit does not receive it.
     Lost,
     /// The reply is that to another request.
     Stale,
@@ -127,7 +127,7 @@ pub(super) struct Line {
     pub watch: Watch,
     /// A rate that the endpoint lacks.
     pub lacks: Option<u32>,
-    reply: Vec<Heard>,
+    reply: Vec<Received>,
 }
 
 /// From the end of a request to the reply.
@@ -173,7 +173,7 @@ impl Line {
         }
     }
 
-    fn hear_request(&mut self, frame: &[u8]) {
+    fn receive_request(&mut self, frame: &[u8]) {
         let fate = (self.watch)(frame, &self.line);
         let Ok((address, pdu)) = Mode::Rtu.decode(frame) else {
             return;
@@ -195,7 +195,7 @@ impl Line {
         for byte in Mode::Rtu.frame(address, &reply) {
             let end = start + line.characters(1);
             let good = true;
-            self.reply.push(Heard {
+            self.reply.push(Received {
                 byte,
                 start,
                 end,
@@ -248,17 +248,17 @@ impl Endpoint for Line {
                 continue;
             };
             self.now += self.line.characters(frame.len());
-            self.hear_request(frame);
+            self.receive_request(frame);
         }
         Ok(self.now)
     }
 
-    fn hear(
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         _: usize,
-    ) -> Result<Vec<Heard>, Broken> {
+    ) -> Result<Vec<Received>, Broken> {
         self.now = self
             .reply
             .last()

@@ -1,5 +1,5 @@
-//! A board on a bench: the whole suite, then how soon and how surely it answers at each rate, then the
-//! wires that lead from outputs to inputs. Behind the command `modio-hil`, which `cargo xtask hil` runs.
+//! Tests a board on a bench: the whole suite, then the turnaround and the lost frames at each rate, then the wires that
+//! connect outputs to inputs. The command `modio-hil`, which `cargo xtask hil` runs, uses this module.
 //!
 //! ```text
 //! cli, setup  the command                 timing   requests at one rate: turnaround, lost frames
@@ -9,16 +9,17 @@
 //! analog      analog wires                remote   asks any unit on the line
 //! ```
 //!
-//! The unit is left as it was found: rate, outputs, configuration; also when a step fails and when the run
+//! The rate, the outputs and the configuration of the unit are restored at the end, also when a step fails or the run
 //! is interrupted.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use anyhow::{Context as _, Error, Result, bail};
 use register_map::{Module, state};
 
 use crate::bench::{Bench, Patience};
-use crate::case::{Case, Check, Failure, Stop};
+use crate::case::{Case, Check, Stop, skip};
 use crate::endpoint::Endpoint;
 use crate::frame::Mode;
 use crate::line::LineFormat;
@@ -47,10 +48,10 @@ use report::{Finding, Report};
 /// The unit address of loader mode, in which the line has its own rate, whatever is stored.
 const LOADER: u8 = 255;
 
-/// The bits of the unit's status that say that its settings are not those stored, or not in force.
+/// Bits of the unit's status: settings are not saved, or not in force.
 const UNSETTLED: u16 = 1 << 3 | 1 << 4;
 
-/// What to do on the bench.
+/// The tests to run on the bench.
 #[derive(Clone)]
 pub struct Plan {
     /// The unit's address.
@@ -61,13 +62,13 @@ pub struct Plan {
     pub patience: Patience,
     /// Whether cases may write the unit's configuration.
     pub allow_config: bool,
-    /// The cases to run; none: no suite.
+    /// The cases to run. If empty, the suite is left out.
     pub cases: Vec<Case>,
     /// Requests at each rate; 0: no timing.
     pub requests: u32,
     /// The rates to measure at, in bit/s; none: the present one.
     pub rates: Vec<u32>,
-    /// The longest turnaround that 99 of 100 requests may have; `None`: it is only told.
+    /// The longest turnaround that 99 of 100 requests may have; `None`: the turnaround is only reported.
     pub limit: Option<Duration>,
     /// Digital outputs wired to digital inputs.
     pub wires: Vec<Wire>,
@@ -75,20 +76,19 @@ pub struct Plan {
     pub analog: Vec<Analog>,
 }
 
-/// Does it; `tell` hears each line for people as it comes. What has been found up to an error stands in
-/// the report.
+/// Carries out the plan. Calls `print` with each line for people. The report has all results up to an error.
 ///
 /// # Errors
 ///
-/// Why it cannot go on, in one line: no answer, another device or module, an endpoint that is gone, a unit that
-/// could not be brought back.
+/// Why the run cannot continue: no answer, another device or module, an endpoint that no longer works, a unit whose
+/// rate could not be restored.
 pub fn run(
     endpoint: &mut dyn Endpoint,
     plan: &Plan,
     stop: &AtomicBool,
     report: &mut Report,
-    tell: &mut dyn FnMut(&str),
-) -> Result<(), String> {
+    print: &mut dyn FnMut(&str),
+) -> Result<()> {
     let given = Given {
         unit: plan.unit,
         mode: Mode::Rtu,
@@ -98,26 +98,24 @@ pub fn run(
     };
     let (target, patience) = probe(endpoint, &given)?;
     report.endpoint = endpoint.name();
+    let unit = plan.unit;
     let modio = target
         .modio
-        .ok_or_else(|| format!("unit {} is no modio", plan.unit))?;
+        .with_context(|| format!("unit {unit} is not a modio"))?;
     let module = modio.module();
     if let Some(wanted) = plan.module.filter(|wanted| *wanted != module) {
-        return Err(format!(
-            "unit {} has the module {module} in force, but the bench has {wanted}",
-            plan.unit
-        ));
+        bail!("unit {unit} has the module {module} in force, but the bench has {wanted}");
     }
     let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);
-    report.about.unit = Some(about::Unit::ask(&mut bench, modio).map_err(told)?);
-    tell(&report.endpoint);
+    report.about.unit = Some(about::Unit::ask(&mut bench, modio)?);
+    print(&report.endpoint);
     for (name, value) in report.about.properties() {
-        tell(&format!("{name}: {value}"));
+        print(&format!("{name}: {value}"));
     }
     let go_on = || !stop.load(Ordering::Relaxed);
 
     if !plan.cases.is_empty() {
-        tell(&format!("\nconformance: {} cases", plan.cases.len()));
+        print(&format!("\nconformance: {} cases", plan.cases.len()));
         let options = Options {
             patience,
             allow_config: plan.allow_config,
@@ -128,29 +126,28 @@ pub fn run(
             options,
             &plan.cases,
             go_on,
-            |outcome| tell(&table::row(outcome)),
+            |outcome| print(&table::row(outcome)),
             &mut report.outcomes,
-        )
-        .map_err(|broken| broken.to_string())?;
-        tell(&table::summary(&report.outcomes));
+        )?;
+        print(&table::summary(&report.outcomes));
     }
     let mut bench = Bench::new(endpoint, &target, patience, plan.allow_config);
     if plan.requests > 0 && go_on() {
-        timing_at_each_rate(&mut bench, plan, stop, report, tell)?;
+        timing_at_each_rate(&mut bench, plan, stop, report, print)?;
     }
     let wires = plan.wires.len() + plan.analog.len();
     if wires > 0 && go_on() {
-        tell(&format!("\nwires: {wires}"));
+        print(&format!("\nwires: {wires}"));
     }
     let mut finding = |finding: Finding| {
-        tell(&finding.to_string());
+        print(&finding.to_string());
         report.findings.push(finding);
     };
     if !plan.wires.is_empty() && go_on() {
-        wires::run(&mut bench, &plan.wires, stop, &mut finding).map_err(told)?;
+        wires::run(&mut bench, &plan.wires, stop, &mut finding)?;
     }
     if !plan.analog.is_empty() && go_on() {
-        analog::run(&mut bench, &plan.analog, stop, &mut finding).map_err(told)?;
+        analog::run(&mut bench, &plan.analog, stop, &mut finding)?;
     }
     report.interrupted = !go_on();
     Ok(())
@@ -161,8 +158,8 @@ fn timing_at_each_rate(
     plan: &Plan,
     stop: &AtomicBool,
     report: &mut Report,
-    tell: &mut dyn FnMut(&str),
-) -> Result<(), String> {
+    print: &mut dyn FnMut(&str),
+) -> Result<()> {
     let home = bench.endpoint.line();
     let at = |baud: &u32| LineFormat {
         baud: *baud,
@@ -179,20 +176,20 @@ fn timing_at_each_rate(
     let toured = tour(bench, stops, |bench| {
         if stop.load(Ordering::Relaxed) {
             interrupted = true;
-            return Err(Stop::Skip("interrupted".to_owned()));
+            return skip("interrupted");
         }
         let line = bench.endpoint.line();
         let least = timing::least(bench, plan.requests).as_secs();
-        tell(&format!(
+        print(&format!(
             "\ntiming at {line}: {} requests, {least} s or more",
             plan.requests
         ));
         let begin = bench.endpoint.now();
         let tally = timing::measure(bench, plan.requests, stop)?;
-        tell(&tally.to_string());
+        print(&tally.to_string());
         report.findings.push(Finding {
             name: format!("timing/{line}"),
-            about: "every request is answered, once and rightly".to_owned(),
+            about: "every request gets one reply, and the right one".to_owned(),
             note: String::new(),
             verdict: tally.verdict(plan.limit),
             time: bench.endpoint.now().saturating_sub(begin),
@@ -204,50 +201,33 @@ fn timing_at_each_rate(
     match toured {
         Err(Stop::Skip(_)) if interrupted && here == home => Ok(()),
         Ok(()) => Ok(()),
-        Err(stop) if here == home => Err(told(stop)),
-        Err(stop) => Err(format!(
-            "the unit could not be brought back to {home}, it was heard last at {here}: {}",
-            told(stop)
-        )),
+        Err(stop) if here == home => Err(stop.into()),
+        Err(stop) => Err(Error::new(stop).context(format!(
+            "the unit could not be set back to {home}; it last answered at {here}"
+        ))),
     }
 }
 
-/// Whether this unit's rate can be changed and put back without harm.
-fn may_change_rate(bench: &mut Bench<'_>, home: LineFormat) -> Result<(), String> {
+/// Checks that this unit's rate can be changed and restored without side effects.
+fn may_change_rate(bench: &mut Bench<'_>, home: LineFormat) -> Result<()> {
     if !bench.endpoint.abilities().set_line {
-        return Err("--rates needs a serial port: a socket has no rate".to_owned());
+        bail!("--rates needs a serial port: a socket has no rate");
     }
     if bench.unit() == LOADER {
-        return Err("--rates: in loader mode the unit stays at 9600 8N2".to_owned());
+        bail!("--rates: in loader mode the unit stays at 9600 8N2");
     }
-    let status = bench.read_word(state::STATUS).map_err(told)?;
+    let status = bench.read_word(state::STATUS)?;
     if status & UNSETTLED != 0 {
-        return Err(format!(
-            "--rates: the unit has settings that are not saved, or wait for a restart (status {status:#06x}): \
-             save or drop them, or restart it, so that it can be brought back to {home} as it is"
-        ));
+        bail!(
+            "--rates: the unit has settings that are not saved, or that wait for a restart (status {status:#06x}): \
+             save or drop them, or restart the unit, so that it can be set back to {home}"
+        );
     }
     Ok(())
 }
 
-/// What stopped a step, in one line.
-fn told(stop: Stop) -> String {
-    match stop {
-        Stop::Broken(broken) => broken.to_string(),
-        Stop::Skip(why) => why,
-        Stop::Fail(failure) => failed(&failure),
-    }
-}
-
-fn failed(failure: &Failure) -> String {
-    format!(
-        "to {} came {}; wanted: {}",
-        failure.sent, failure.came, failure.wanted
-    )
-}
-
-/// A failure of a step becomes a verdict; an endpoint that is gone does not.
-fn verdict(result: Check) -> Result<Verdict, Stop> {
+/// Returns the verdict about a step. An endpoint that no longer works is an error instead.
+fn verdict(result: Check) -> Check<Verdict> {
     match result {
         Ok(()) => Ok(Verdict::Passed),
         Err(Stop::Fail(failure)) => Ok(Verdict::Failed(failure)),

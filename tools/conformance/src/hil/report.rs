@@ -1,21 +1,22 @@
-//! What was found: lines for people, JUnit XML and JSON for machines.
+//! The results: lines for people, JUnit XML and JSON for machines.
 
 use std::fmt;
 use std::time::Duration;
 
+use quick_junit::Property;
 use serde_json::{Value, json};
 
 use crate::case::Kind;
 use crate::hil::about::About;
 use crate::hil::timing::Tally;
-use crate::report::junit::{self, Test};
+use crate::report::junit;
 use crate::report::{Totals, json as suite_json};
 use crate::run::{Outcome, Verdict};
 
-/// Something that was tried beside the suite.
+/// The result of a test outside the suite.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// What it is about, a slash, what was tried.
+    /// What was tested: a group, a slash, a name.
     pub name: String,
     /// What must be so.
     pub about: String,
@@ -27,7 +28,7 @@ pub struct Finding {
     pub time: Duration,
 }
 
-/// All that was found.
+/// All results.
 #[derive(Clone, Default)]
 pub struct Report {
     /// What was tested, with what, where and when.
@@ -40,7 +41,7 @@ pub struct Report {
     pub timing: Vec<Tally>,
     /// Rates, wires and pulses.
     pub findings: Vec<Finding>,
-    /// Whether it ended early because somebody wanted so.
+    /// Whether the user ended the run early.
     pub interrupted: bool,
 }
 
@@ -59,7 +60,7 @@ impl fmt::Display for Finding {
 }
 
 impl Report {
-    /// How many ended how, of everything.
+    /// Counts the results of the cases and of the other tests.
     #[must_use]
     pub fn totals(&self) -> Totals {
         let mut totals = Totals::of(&self.outcomes);
@@ -69,7 +70,7 @@ impl Report {
         totals
     }
 
-    /// The names of what failed.
+    /// The names of the cases and tests that failed.
     pub fn failed(&self) -> impl Iterator<Item = &str> {
         let cases = self.outcomes.iter().map(|o| (o.case.name, &o.verdict));
         let findings = self.findings.iter().map(|f| (f.name.as_str(), &f.verdict));
@@ -79,33 +80,29 @@ impl Report {
             .map(|(name, _)| name)
     }
 
-    /// A JUnit document: a suite for the cases and one for the rest.
+    /// Returns a JUnit report: a suite for the cases and one for the other tests.
     #[must_use]
-    pub fn junit(&self) -> String {
-        let rest: Vec<Test<'_>> = self
-            .findings
-            .iter()
-            .map(|finding| Test {
-                name: &finding.name,
-                section: "hil",
-                kind: Kind::Modio,
-                verdict: &finding.verdict,
-                time: finding.time,
-                asked_again: 0,
-            })
-            .collect();
+    pub fn junit(&self) -> quick_junit::Report {
+        let tests = self.findings.iter().map(|finding| {
+            let demand = (finding.name.as_str(), "hil", Kind::Modio);
+            junit::test(demand, &finding.verdict, finding.time)
+        });
         let suites = [
             (self.endpoint.as_str(), junit::tests(&self.outcomes)),
-            ("hil", rest),
+            ("hil", tests.collect()),
         ];
-        let mut xml = format!("{}<testsuites>\n", junit::HEADER);
-        for (name, tests) in suites.iter().filter(|(_, tests)| !tests.is_empty()) {
-            xml += &junit::element(name, &self.about.properties(), tests);
+        let mut report = quick_junit::Report::new("modio-hil");
+        for (name, tests) in suites.into_iter().filter(|(_, tests)| !tests.is_empty()) {
+            let mut suite = junit::suite(name, tests);
+            for (name, value) in self.about.properties() {
+                suite.add_property(Property::new(name, value));
+            }
+            report.add_test_suite(suite);
         }
-        xml + "</testsuites>\n"
+        report
     }
 
-    /// The same and the times in JSON.
+    /// Returns the results, and the times of the requests at each rate, in JSON.
     #[must_use]
     pub fn json(&self) -> Value {
         let totals = self.totals();

@@ -1,7 +1,9 @@
-//! The command line and the bench file, merged: which line, what is done to the board, what is tested.
+//! The command line and the bench file, merged: the line, the commands for the board, and the tests.
 
 use std::path::Path;
 use std::time::Duration;
+
+use anyhow::{Context as _, Result, anyhow, bail};
 
 use crate::case::Case;
 use crate::cli::{chosen, waits};
@@ -25,15 +27,15 @@ impl Cli {
     ///
     /// # Errors
     ///
-    /// What is wrong with the file, or with both together, in one line.
-    pub fn setup(&self) -> Result<Setup, String> {
+    /// When the file is wrong, or does not fit the command line.
+    pub fn setup(&self) -> Result<Setup> {
         let file = match &self.bench {
             None => BenchFile::default(),
             Some(path) => {
                 let shown = path.display();
                 let text =
-                    std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
-                BenchFile::parse(&text, self.unit).map_err(|wrong| format!("{shown}:{wrong}"))?
+                    std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+                BenchFile::parse(&text, self.unit).map_err(|wrong| anyhow!("{shown}:{wrong}"))?
             }
         };
         let setup = Setup {
@@ -41,18 +43,15 @@ impl Cli {
             file,
         };
         if setup.port().is_none() && self.tcp.is_none() {
-            return Err("which serial port? Name it with --port, or in the bench file".to_owned());
+            bail!("no serial port: name it with --port, or in the bench file");
         }
         let format = setup.line().format().to_string();
         if !["8N2", "8E1", "8O1", "8N1"].contains(&format.as_str()) {
-            return Err(format!(
-                "a modio has no format {format}: 8N2, 8E1, 8O1, 8N1"
-            ));
+            bail!("a modio has no format {format}: use 8N2, 8E1, 8O1 or 8N1");
         }
         let wires = setup.file.wires.len() + setup.file.analog.len();
         if self.no_suite && self.requests == 0 && wires == 0 {
-            let what = "nothing is left to do: no suite, no requests, and no wires in a bench file";
-            return Err(what.to_owned());
+            bail!("nothing to test: no suite, no requests, and no wires in a bench file");
         }
         Ok(setup)
     }
@@ -62,11 +61,8 @@ impl Setup {
     /// The serial port, if the line is on one.
     #[must_use]
     pub fn port(&self) -> Option<&Path> {
-        let told = self.cli.port.as_deref();
-        match self.cli.tcp {
-            Some(_) => None,
-            None => told.or(self.file.port.as_deref()),
-        }
+        let port = self.cli.port.as_deref().or(self.file.port.as_deref());
+        port.filter(|_| self.cli.tcp.is_none())
     }
 
     fn line(&self) -> LineFormat {
@@ -82,7 +78,7 @@ impl Setup {
     ///
     /// # Errors
     ///
-    /// When it cannot be opened, in one line.
+    /// When the line cannot be opened.
     pub fn open(&self) -> Result<Box<dyn Endpoint>, Broken> {
         let line: Box<dyn Endpoint> = match (self.port(), &self.cli.tcp) {
             (Some(port), _) => Box::new(Stream::serial(port, self.line())?),
@@ -96,7 +92,7 @@ impl Setup {
         })
     }
 
-    /// How the image is to be written, if it is.
+    /// How to write the image, if the image is written.
     #[must_use]
     pub fn flash(&self) -> Option<Flash> {
         let probe = self.cli.probe.as_ref().or(self.file.probe.as_ref());
@@ -109,16 +105,16 @@ impl Setup {
     /// The command that resets the board, if there is one.
     #[must_use]
     pub fn reset(&self) -> Option<&str> {
-        let told = self.cli.reset_cmd.as_deref();
-        told.or(self.file.reset_cmd.as_deref())
+        let command = self.cli.reset_cmd.as_deref();
+        command.or(self.file.reset_cmd.as_deref())
     }
 
-    /// What to do, on this line.
+    /// The tests to run on this line.
     ///
     /// # Errors
     ///
-    /// When no case has a name as wanted, in one line.
-    pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan, String> {
+    /// When no case has a name that was asked for.
+    pub fn plan(&self, endpoint: &dyn Endpoint) -> Result<Plan> {
         let (cli, file) = (&self.cli, &self.file);
         Ok(Plan {
             unit: cli.unit.or(file.unit).unwrap_or(1),
@@ -134,7 +130,7 @@ impl Setup {
         })
     }
 
-    fn cases(&self) -> Result<Vec<Case>, String> {
+    fn cases(&self) -> Result<Vec<Case>> {
         if self.cli.no_suite {
             return Ok(Vec::new());
         }
@@ -162,6 +158,7 @@ mod tests {
         parse(&[&["--bench", &path], arguments].concat())
             .unwrap()
             .setup()
+            .map_err(|error| format!("{error:#}"))
     }
 
     const FILE: &str = "port = \"/dev/a\"\nprobe = \"1:2\"\nunit = 7\nbaud = 19200\nformat = \"8E1\"\n\
@@ -197,12 +194,12 @@ mod tests {
             "--reset-cmd",
             "s",
         ];
-        let told = setup(FILE, &arguments).unwrap();
-        assert_eq!(told.port(), Some(Path::new("/dev/b")));
-        assert_eq!(told.line().to_string(), "9600 8N1");
-        assert_eq!(told.flash().unwrap().probe.as_deref(), Some("3:4"));
-        assert_eq!(told.reset(), Some("s"));
-        let plan = told.plan(&Line::new(&[1])).unwrap();
+        let merged = setup(FILE, &arguments).unwrap();
+        assert_eq!(merged.port(), Some(Path::new("/dev/b")));
+        assert_eq!(merged.line().to_string(), "9600 8N1");
+        assert_eq!(merged.flash().unwrap().probe.as_deref(), Some("3:4"));
+        assert_eq!(merged.reset(), Some("s"));
+        let plan = merged.plan(&Line::new(&[1])).unwrap();
         assert_eq!((plan.unit, plan.module), (9, Some(Module::Di4)));
         assert_eq!(setup(FILE, &["--tcp", "b:1"]).unwrap().port(), None);
         assert_eq!(setup(FILE, &[]).unwrap().flash(), None);
@@ -210,19 +207,20 @@ mod tests {
 
     #[test]
     fn mistake_is_one_line_that_names_the_file_and_the_line() {
-        let told = setup("unit = 1\nprot = \"x\"", &[]).unwrap_err();
+        let error = setup("unit = 1\nprot = \"x\"", &[]).unwrap_err();
         assert!(
-            told.contains("bench.toml:2: unknown field `prot`"),
-            "{told}"
+            error.contains("bench.toml:2: unknown field `prot`"),
+            "{error}"
         );
-        assert!(!told.contains('\n'), "{told}");
-        let told = setup("unit = 1", &[]).unwrap_err();
-        assert!(told.contains("--port"), "{told}");
-        let told = setup(FILE, &["--no-suite", "--requests", "0"]).unwrap_err();
-        assert!(told.starts_with("nothing is left to do"), "{told}");
-        let told = setup(FILE, &["--format", "7E1"]).unwrap_err();
-        assert!(told.starts_with("a modio has no format 7E1"), "{told}");
+        assert!(!error.contains('\n'), "{error}");
+        let error = setup("unit = 1", &[]).unwrap_err();
+        assert!(error.contains("--port"), "{error}");
+        let error = setup(FILE, &["--no-suite", "--requests", "0"]).unwrap_err();
+        assert!(error.starts_with("nothing to test"), "{error}");
+        let error = setup(FILE, &["--format", "7E1"]).unwrap_err();
+        assert!(error.starts_with("a modio has no format 7E1"), "{error}");
         let cli = parse(&["--bench", "/nowhere/b.toml"]).unwrap();
-        assert!(cli.setup().unwrap_err().starts_with("/nowhere/b.toml: "));
+        let error = format!("{:#}", cli.setup().unwrap_err());
+        assert!(error.starts_with("/nowhere/b.toml: "), "{error}");
     }
 }

@@ -1,10 +1,13 @@
-//! What is done to the board by other programs: its image is written, it is reset, its power is switched.
+//! Other programs that write the image of the board, reset the board and switch its power.
 
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
 
-use crate::endpoint::{Abilities, Broken, Endpoint, Heard, Piece};
+use anyhow::{Context as _, Result, ensure};
+use delegate::delegate;
+
+use crate::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::line::LineFormat;
 
 /// How the image is written.
@@ -12,7 +15,7 @@ use crate::line::LineFormat;
 pub struct Flash {
     /// The debug probe, when there are several.
     pub probe: Option<String>,
-    /// This image instead of one that is built.
+    /// The image to write. If `None`, the image is built first.
     pub elf: Option<PathBuf>,
 }
 
@@ -21,8 +24,8 @@ impl Flash {
     ///
     /// # Errors
     ///
-    /// When that fails; it has reported why.
-    pub fn write(&self) -> Result<(), String> {
+    /// When the command fails. The command has printed the reason.
+    pub fn write(&self) -> Result<()> {
         // The cargo that runs xtask, so that both use the same toolchain.
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
@@ -42,7 +45,7 @@ impl Flash {
 /// # Errors
 ///
 /// When it ends with a status other than 0.
-pub fn run(script: &str) -> Result<(), String> {
+pub fn run(script: &str) -> Result<()> {
     let (shell, option) = if cfg!(windows) {
         ("cmd", "/C")
     } else {
@@ -51,15 +54,15 @@ pub fn run(script: &str) -> Result<(), String> {
     status(Command::new(shell).args([option, script]), script)
 }
 
-fn status(command: &mut Command, name: &str) -> Result<(), String> {
-    match command.status() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(format!("`{name}` failed ({status})")),
-        Err(error) => Err(format!("`{name}` cannot be run: {error}")),
-    }
+fn status(command: &mut Command, name: &str) -> Result<()> {
+    let status = command
+        .status()
+        .with_context(|| format!("`{name}` cannot be run"))?;
+    ensure!(status.success(), "`{name}` failed ({status})");
+    Ok(())
 }
 
-/// An endpoint whose unit has its power switched by a command.
+/// An endpoint with a command that switches the power of the unit.
 pub struct Powered {
     line: Box<dyn Endpoint>,
     command: String,
@@ -67,7 +70,7 @@ pub struct Powered {
 }
 
 impl Powered {
-    /// The unit on `line` is on; `command`, followed by `off` or `on`, switches its power.
+    /// The unit on `line` is on. `command`, followed by `off` or `on`, switches its power.
     #[must_use]
     pub const fn new(line: Box<dyn Endpoint>, command: String) -> Self {
         Self {
@@ -90,10 +93,10 @@ impl Drop for Powered {
 
 impl Endpoint for Powered {
     fn set_power(&mut self, on: bool) -> Result<(), Broken> {
-        // A command that fails may have cut the power all the same.
+        // A command that fails may have switched the power off before it failed.
         self.on &= on;
         let script = format!("{} {}", self.command, if on { "on" } else { "off" });
-        run(&script).map_err(Broken)?;
+        run(&script).map_err(|error| Broken(format!("{error:#}")))?;
         self.on = on;
         Ok(())
     }
@@ -105,41 +108,17 @@ impl Endpoint for Powered {
         }
     }
 
-    fn name(&self) -> String {
-        self.line.name()
-    }
-
-    fn line(&self) -> LineFormat {
-        self.line.line()
-    }
-
-    fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
-        self.line.set_line(line)
-    }
-
-    fn now(&self) -> Duration {
-        self.line.now()
-    }
-
-    fn rest(&mut self, time: Duration) -> Result<(), Broken> {
-        self.line.rest(time)
-    }
-
-    fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken> {
-        self.line.send(pieces)
-    }
-
-    fn hear(
-        &mut self,
-        patience: Duration,
-        quiet: Duration,
-        enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        self.line.hear(patience, quiet, enough)
-    }
-
-    fn flush(&mut self) -> Result<Vec<Heard>, Broken> {
-        self.line.flush()
+    delegate! {
+        to self.line {
+            fn name(&self) -> String;
+            fn line(&self) -> LineFormat;
+            fn set_line(&mut self, line: LineFormat) -> Result<(), Broken>;
+            fn now(&self) -> Duration;
+            fn rest(&mut self, time: Duration) -> Result<(), Broken>;
+            fn send(&mut self, pieces: &[Piece]) -> Result<Duration, Broken>;
+            fn receive(&mut self, patience: Duration, quiet: Duration, enough: usize) -> Result<Vec<Received>, Broken>;
+            fn flush(&mut self) -> Result<Vec<Received>, Broken>;
+        }
     }
 }
 

@@ -92,7 +92,7 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
             0
         };
         if reply == Reply::Pdu(request) {
-            if let (Some(first), Some(last)) = (bench.heard.first(), bench.heard.last()) {
+            if let (Some(first), Some(last)) = (bench.received.first(), bench.received.last()) {
                 times.push(if exact {
                     first.start.saturating_sub(bench.sent_end)
                 } else {

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::report::Totals;
 use crate::run::{Outcome, Verdict};
 
-/// The outcomes as a JSON value; `endpoint` is what was tested through.
+/// Returns the outcomes as a JSON value; `endpoint` is the name of the endpoint.
 #[must_use]
 pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
     let totals = Totals::of(outcomes);
@@ -33,7 +33,7 @@ pub fn value(endpoint: &str, outcomes: &[Outcome]) -> Value {
     })
 }
 
-/// How something ended, and why.
+/// Returns a verdict and its reason as a JSON value.
 #[must_use]
 pub fn result(verdict: &Verdict) -> Value {
     match verdict {
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_outcome_is_there() {
+    fn json_has_every_outcome() {
         let value = value("somewhere", &crate::report::some_outcomes());
         assert_eq!(value["failed"], 1);
         let results: Vec<&str> = value["cases"]

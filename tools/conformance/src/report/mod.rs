@@ -1,4 +1,4 @@
-//! What a run tells: a table for people, JUnit XML and JSON for machines.
+//! Reports of a run: a table for people, JUnit XML and JSON for machines.
 
 pub mod json;
 pub mod junit;
@@ -7,18 +7,18 @@ pub mod table;
 use crate::case::Kind;
 use crate::run::{Outcome, Verdict};
 
-/// How many cases ended how.
+/// Number of cases by their result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Totals {
     /// Cases that passed.
     pub passed: usize,
     /// Cases that failed.
     pub failed: usize,
-    /// Cases among them whose demand is a reading of the standards.
+    /// Failed cases of the kind interpretation.
     pub failed_interpretations: usize,
     /// Cases that did not apply.
     pub skipped: usize,
-    /// Due replies that did not come and were asked for once more.
+    /// Due replies that were missing, so that the request was repeated.
     pub asked_again: u32,
 }
 
@@ -38,7 +38,7 @@ impl Totals {
         totals
     }
 
-    /// Counts one more.
+    /// Adds one verdict.
     pub fn count(&mut self, verdict: &Verdict) {
         match verdict {
             Verdict::Passed => self.passed += 1,
@@ -46,10 +46,8 @@ impl Totals {
             Verdict::Skipped(_) => self.skipped += 1,
         }
     }
-}
 
-impl Totals {
-    /// Number of failed cases that make the run fail: interpretations count when `strict` only.
+    /// Number of failed cases that make the run fail. Interpretations count only when `strict` is set.
     #[must_use]
     pub const fn counted(&self, strict: bool) -> usize {
         if strict {
@@ -60,7 +58,7 @@ impl Totals {
     }
 }
 
-/// Says how many due replies did not come and were asked for once more; nothing when there was none.
+/// Returns a text with the number of repeated requests; empty when there was none.
 fn asked_again(times: u32) -> String {
     match times {
         0 => String::new(),
@@ -69,7 +67,7 @@ fn asked_again(times: u32) -> String {
     }
 }
 
-/// Outcomes to try the reports on.
+/// Outcomes for the tests of the reports.
 #[cfg(test)]
 fn some_outcomes() -> Vec<Outcome> {
     use crate::case::Failure;

@@ -4,7 +4,7 @@ use crate::case::Case;
 use crate::report::{Totals, asked_again};
 use crate::run::{Outcome, Verdict};
 
-/// One row, and below it what went wrong.
+/// Returns the row of a case, and for a failed case the failure below it.
 #[must_use]
 pub fn row(outcome: &Outcome) -> String {
     let (result, reason) = match &outcome.verdict {
@@ -32,7 +32,7 @@ pub fn row(outcome: &Outcome) -> String {
     }
 }
 
-/// The line below the table.
+/// Returns the line below the table.
 #[must_use]
 pub fn summary(outcomes: &[Outcome]) -> String {
     let totals = Totals::of(outcomes);
@@ -53,7 +53,7 @@ pub fn summary(outcomes: &[Outcome]) -> String {
     )
 }
 
-/// Every case as a table in Markdown: the output of `--list`.
+/// Returns the cases as a table in Markdown, which is the output of `--list`.
 #[must_use]
 pub fn list(cases: &[Case]) -> String {
     let mut text = "| case | section | kind | what must be so |\n|---|---|---|---|\n".to_owned();
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_tells_all_there_is() {
+    fn row_of_a_failed_case_has_the_whole_failure() {
         let outcomes = crate::report::some_outcomes();
         let rows: Vec<String> = outcomes.iter().map(row).collect();
         assert!(rows[0].contains(" ok ") && !rows[0].contains('\n'));

@@ -4,21 +4,17 @@
 //! every case.
 
 use std::env;
-use std::sync::Mutex;
-use std::thread;
 
 use conformance::case::Case;
 use conformance::cases::all;
-use conformance::endpoint::sim::{Fitting, start};
+use conformance::endpoint::sim::Fitting;
 use conformance::frame::Mode;
 use conformance::line::LineFormat;
-use conformance::report::table;
-use conformance::run::Verdict;
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use register_map::Module;
-use register_map::board::MODIO_02;
 use register_map::codes::{self, Baud, Format};
 
-use super::{elf, outcomes};
+use super::{failed, in_process, line, modio_02, passed};
 
 /// Set when every case is wanted.
 const VARIABLE: &str = "MODIO_MATRIX";
@@ -29,12 +25,13 @@ const CHOSEN: [&str; 7] = [
     "gaps/",
     "damage/",
     "ascii/",
-    "fc03/",
+    "fc03/quantity-most",
     "bus/own-echo",
     "framing/no-byte",
 ];
 
-/// Those that take the longest: they go through a frame character by character, or wait for a second each time.
+/// Parts of the names of the cases that take longest: they damage each character of a frame in turn, or wait for a
+/// second each time.
 const LONG: [&str; 3] = ["ascii/truncated", "ascii/damaged", "ascii/gap"];
 
 /// A rate, a format and a mode that can be used together.
@@ -44,10 +41,7 @@ fn cells() -> Vec<Cell> {
     let mut cells = Vec::new();
     for baud in Baud::ALL {
         for (format, (_, name)) in Format::ALL.iter().zip(Format::NAMES) {
-            let line = LineFormat::new(
-                baud.bits_per_second(),
-                name.parse().expect("a name of a format"),
-            );
+            let line = line(baud.bits_per_second(), name);
             for (mode, of_map) in [
                 (Mode::Rtu, codes::Mode::Rtu),
                 (Mode::Ascii, codes::Mode::Ascii),
@@ -73,28 +67,21 @@ fn cases(every: bool, (line, _): Cell) -> Vec<Case> {
     cases
 }
 
-/// The failures of a cell, and the number of cases that passed.
-fn failures(cell: Cell, every: bool) -> (Vec<String>, usize) {
+/// Tries a cell; returns a row for each case that failed.
+fn failures(cell: Cell, every: bool) -> Vec<String> {
     let (line, mode) = cell;
-    let mut endpoint = start(&Fitting {
-        elf: elf(&MODIO_02),
-        board: &MODIO_02,
-        module: Module::Do4,
-        slots: Vec::new(),
-        dip: 1,
+    let fitting = Fitting {
         line,
         mode,
-        settings: Vec::new(),
-    })
-    .expect("the image can be read");
-    let outcomes = outcomes(&mut endpoint, 1, mode, &cases(every, cell));
-    let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
-    let failed = outcomes
-        .iter()
-        .filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
-        .map(|outcome| format!("{line} {mode:?}: {}", table::row(outcome)))
-        .collect();
-    (failed, passed.count())
+        ..modio_02(Module::Do4)
+    };
+    let outcomes = in_process(&fitting, &cases(every, cell));
+    let passed = passed(&outcomes);
+    println!("{line} {mode:?}: {passed} passed");
+    let least = if every { 150 } else { 12 };
+    assert!(passed > least, "{cell:?}: only {passed} cases passed");
+    let rows = failed(&outcomes).into_iter();
+    rows.map(|row| format!("{line} {mode:?}: {row}")).collect()
 }
 
 #[test]
@@ -103,23 +90,9 @@ fn every_rate_and_format_conforms() {
     let every = env::var_os(VARIABLE).is_some();
     let cells = cells();
     assert_eq!(cells.len(), Baud::ALL.len() * (4 + 7));
-    let left = Mutex::new(cells.into_iter());
-    let failed = Mutex::new(Vec::new());
-    let next = || left.lock().expect("no thread has panicked").next();
-    let threads = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some(cell) = next() {
-                    let (failures, passed) = failures(cell, every);
-                    println!("{} {:?}: {passed} passed", cell.0, cell.1);
-                    let least = if every { 150 } else { 15 };
-                    assert!(passed > least, "{cell:?}: only {passed} cases apply");
-                    failed.lock().expect("no panic").extend(failures);
-                }
-            });
-        }
-    });
-    let failed = failed.into_inner().expect("no thread has panicked");
+    let failed: Vec<String> = cells
+        .into_par_iter()
+        .flat_map_iter(|cell| failures(cell, every))
+        .collect();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use conformance::endpoint::{Abilities, Broken, Endpoint, Heard, Piece};
+use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
 use conformance::frame::Mode;
 use conformance::line::LineFormat;
 
 use super::fault::Fault;
 use super::modio_fault::ModioFault;
-use super::unit::{Sign, Unit};
+use super::unit::{Character, Unit};
 
 /// For the unit to start in.
 const START: Duration = Duration::from_millis(100);
@@ -62,12 +62,12 @@ impl Reference {
         self.now = self.now.max(to);
     }
 
-    fn character(&mut self, sign: Sign) {
-        self.advance(sign.start);
+    fn character(&mut self, character: Character) {
+        self.advance(character.start);
         if self.powered && self.starts.is_none() {
-            self.unit.hear(sign);
+            self.unit.receive(character);
         }
-        self.now = sign.end;
+        self.now = character.end;
     }
 }
 
@@ -114,7 +114,7 @@ impl Endpoint for Reference {
         let bit = self.unit.master.bits(1);
         for piece in pieces {
             let start = self.now;
-            let sign = |byte| Sign {
+            let character = |byte| Character {
                 byte,
                 start,
                 end: start + length,
@@ -125,27 +125,27 @@ impl Endpoint for Reference {
                 Piece::Bytes(bytes) => {
                     for byte in bytes {
                         let start = self.now;
-                        let sign = Sign {
+                        let character = Character {
                             start,
                             end: start + length,
-                            ..sign(*byte)
+                            ..character(*byte)
                         };
-                        self.character(sign);
+                        self.character(character);
                     }
                 }
                 Piece::Gap(gap) => self.advance(start + *gap),
-                Piece::BadParity(byte) => self.character(Sign {
+                Piece::BadParity(byte) => self.character(Character {
                     parity_error: true,
-                    ..sign(*byte)
+                    ..character(*byte)
                 }),
-                Piece::BadStop(byte) => self.character(Sign {
+                Piece::BadStop(byte) => self.character(Character {
                     stop_error: true,
-                    ..sign(*byte)
+                    ..character(*byte)
                 }),
-                Piece::Break(bits) => self.character(Sign {
+                Piece::Break(bits) => self.character(Character {
                     stop_error: true,
                     end: start + bit * u32::from(*bits + 1),
-                    ..sign(0)
+                    ..character(0)
                 }),
                 Piece::Glitch(width) => {
                     self.advance(start + *width);
@@ -156,26 +156,26 @@ impl Endpoint for Reference {
         Ok(self.now)
     }
 
-    fn hear(
+    fn receive(
         &mut self,
         patience: Duration,
         quiet: Duration,
         enough: usize,
-    ) -> Result<Vec<Heard>, Broken> {
-        let mut heard: Vec<Heard> = Vec::new();
+    ) -> Result<Vec<Received>, Broken> {
+        let mut received: Vec<Received> = Vec::new();
         let mut until = self.now + patience;
-        while heard.len() < enough {
+        while received.len() < enough {
             if let Some(next) = self
                 .unit
-                .said
+                .sent
                 .front()
                 .copied()
                 .filter(|next| next.end <= until)
             {
-                self.unit.said.pop_front();
+                self.unit.sent.pop_front();
                 self.now = self.now.max(next.end);
                 until = next.end + quiet;
-                heard.push(next);
+                received.push(next);
                 continue;
             }
             match self.unit.closes().filter(|at| *at <= until) {
@@ -190,14 +190,14 @@ impl Endpoint for Reference {
                 }
             }
         }
-        Ok(heard)
+        Ok(received)
     }
 
     fn set_power(&mut self, on: bool) -> Result<(), Broken> {
         self.powered = on;
         self.starts = on.then_some(self.now + START);
         if !on {
-            self.unit.said.clear();
+            self.unit.sent.clear();
         }
         Ok(())
     }

@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use conformance::endpoint::Heard;
-use conformance::frame::{Mode, crc, lrc};
+use conformance::endpoint::Received;
+use conformance::frame::Mode;
 use conformance::line::LineFormat;
 
-use modbus_reference::Server as Reference;
 use modbus_reference::server::{BUS, ERRORS};
+use modbus_reference::{Server as Reference, crc, framed, lrc};
 
 use super::fault::Fault;
 use super::modio::{self, Modio};
@@ -23,7 +23,7 @@ const THINKING: Duration = Duration::from_micros(40);
 
 /// A character as it stands on the line.
 #[derive(Clone, Copy, Debug)]
-pub struct Sign {
+pub struct Character {
     pub byte: u8,
     pub start: Duration,
     pub end: Duration,
@@ -45,7 +45,7 @@ pub struct Unit {
     /// It waits for the data that a write announces, or drops the write.
     pub silent_to_incomplete_writes: bool,
     /// What it says, and its driver's edges.
-    pub said: VecDeque<Heard>,
+    pub sent: VecDeque<Received>,
     pub edges: Vec<(Duration, bool)>,
     pub echo: bool,
     open: Vec<u8>,
@@ -74,7 +74,7 @@ impl Unit {
             master: line,
             own_characters: false,
             silent_to_incomplete_writes: false,
-            said: VecDeque::new(),
+            sent: VecDeque::new(),
             edges: Vec::new(),
             echo: false,
             open: Vec::new(),
@@ -115,7 +115,7 @@ impl Unit {
         self.waiting = true;
         self.dead = self.server.has(Fault::DeadAfterPowerOff);
         if self.server.has(Fault::ZeroAtStart) {
-            self.said.push_back(Heard {
+            self.sent.push_back(Received {
                 byte: 0,
                 start: at,
                 end: at + self.line.characters(1),
@@ -166,16 +166,16 @@ impl Unit {
     }
 
     /// A character comes.
-    pub fn hear(&mut self, sign: Sign) {
+    pub fn receive(&mut self, character: Character) {
         if self.line != self.master {
             return;
         }
-        let fast = sign.start < self.reply_end + self.line.t15();
+        let fast = character.start < self.reply_end + self.line.t15();
         if fast && self.server.modio_has(ModioFault::LosesFastRequests) {
             return;
         }
         if let Some(last) = self.last {
-            let gap = sign.start.saturating_sub(last);
+            let gap = character.start.saturating_sub(last);
             let near_the_end = self.open.len() > 5;
             let longest = if self.server.has(Fault::DropsShortGaps) {
                 self.t15() / 3
@@ -186,43 +186,45 @@ impl Unit {
             self.late |=
                 gap > self.t15() && (!self.server.has(Fault::StrictSometimes) || near_the_end);
         }
-        self.last = Some(sign.end);
-        let parity = sign.parity_error && !self.server.has(Fault::IgnoresParity);
-        let stop = sign.stop_error && !self.server.has(Fault::IgnoresStop);
+        self.last = Some(character.end);
+        let parity = character.parity_error && !self.server.has(Fault::IgnoresParity);
+        let stop = character.stop_error && !self.server.has(Fault::IgnoresStop);
         let slow = self.server.has(Fault::SlowToListen) && self.open.is_empty();
-        let missed = slow && sign.start < self.reply_end + self.t35() * 2;
+        let missed = slow && character.start < self.reply_end + self.t35() * 2;
         let damaged = parity || stop || missed;
-        if sign.stop_error && sign.byte == 0 && self.server.has(Fault::DeafAfterBreak) {
+        if character.stop_error && character.byte == 0 && self.server.has(Fault::DeafAfterBreak) {
             self.deaf = true;
         }
         self.damaged |= damaged;
         if self.mode == Mode::Ascii {
-            self.hear_ascii(sign, damaged);
+            self.receive_ascii(character, damaged);
         } else {
-            self.open.push(sign.byte);
+            self.open.push(character.byte);
         }
     }
 
-    fn hear_ascii(&mut self, sign: Sign, damaged: bool) {
-        let in_rtu = self.open.first().is_none_or(|first| *first != b':') && sign.byte != b':';
+    fn receive_ascii(&mut self, character: Character, damaged: bool) {
+        let in_rtu = self.open.first().is_none_or(|first| *first != b':') && character.byte != b':';
         if in_rtu && self.server.has(Fault::TakesRtuInAscii) {
-            self.open.push(sign.byte);
+            self.open.push(character.byte);
             if self.open.len() == 8 && crc(&self.open[..6]) == self.open[6..] {
                 let frame = std::mem::take(&mut self.open);
-                self.message(frame[..6].to_vec(), true, sign.end);
+                self.message(frame[..6].to_vec(), true, character.end);
             }
             return;
         }
         let spoilt = std::mem::replace(&mut self.colon_spoilt, false);
-        if self.open.is_empty() && sign.byte != b':' && self.server.has(Fault::NeedsColonFirst) {
+        if self.open.is_empty() && character.byte != b':' && self.server.has(Fault::NeedsColonFirst)
+        {
             self.colon_spoilt = true;
         }
-        if self.server.has(Fault::KeepsTruncated) && sign.byte == b':' && !self.open.is_empty() {
+        if self.server.has(Fault::KeepsTruncated) && character.byte == b':' && !self.open.is_empty()
+        {
             self.damaged = true;
             return;
         }
         let restarts = !self.server.has(Fault::FindsRequests) || self.open.is_empty();
-        if sign.byte == b':' && restarts {
+        if character.byte == b':' && restarts {
             self.open.clear();
             self.damaged = false;
             if damaged || spoilt {
@@ -232,7 +234,7 @@ impl Unit {
         } else if self.open.is_empty() {
             return;
         }
-        self.open.push(sign.byte);
+        self.open.push(character.byte);
         let longest = if self.server.has(Fault::ShortBuffer) {
             511
         } else {
@@ -260,7 +262,7 @@ impl Unit {
                 .collect();
             if let Some((check, body)) = bytes.split_last().filter(|_| whole) {
                 let good = *check == lrc(body) || self.server.has(Fault::IgnoresCrc);
-                self.message(body.to_vec(), good && !self.damaged, sign.end);
+                self.message(body.to_vec(), good && !self.damaged, character.end);
             } else {
                 self.spoilt();
             }
@@ -327,7 +329,7 @@ impl Unit {
             self.spoilt();
             self.deaf |= self.server.has(Fault::DeafAfterBadFrames);
             if self.server.has(Fault::AnswersNoise) && body.first() == Some(&self.address) {
-                self.say(&[self.address, 0x80, 1], at);
+                self.send(&[self.address, 0x80, 1], at);
             }
             return;
         }
@@ -348,10 +350,10 @@ impl Unit {
                 self.reference.log.push(0x80);
             }
             if self.server.has(Fault::RefusesForOthers) && pdu[0] > 0x2B {
-                self.say(&[unit, pdu[0] | 0x80, 1], at);
+                self.send(&[unit, pdu[0] | 0x80, 1], at);
             }
             if self.server.has(Fault::RefusesForUnit1) && unit == 1 {
-                self.say(&[unit, pdu[0] | 0x80, 1], at);
+                self.send(&[unit, pdu[0] | 0x80, 1], at);
             }
             self.deaf = self.server.has(Fault::DeafAfterOthers) && pdu.len() == 3;
             self.deaf |= self.server.has(Fault::DeafAfterLongReplies) && pdu.len() > 200;
@@ -383,7 +385,7 @@ impl Unit {
             }
             let delay = self.server.modio.as_ref().map(Modio::response_delay);
             let body = [vec![self.address], reply].concat();
-            self.say(&body, at + delay.unwrap_or_default());
+            self.send(&body, at + delay.unwrap_or_default());
             self.restart(at);
         }
     }
@@ -395,11 +397,9 @@ impl Unit {
         }
     }
 
-    fn say(&mut self, body: &[u8], at: Duration) {
-        let mut frame = match self.mode {
-            Mode::Rtu => [body, &crc(body)].concat(),
-            Mode::Ascii => conformance::frame::ascii(body, lrc(body)),
-        };
+    fn send(&mut self, body: &[u8], at: Duration) {
+        let delimiter = (self.mode == Mode::Ascii).then_some(b'\n');
+        let mut frame = framed(delimiter, body[0], &body[1..]);
         if self.server.has(Fault::TrailingZero) {
             frame.push(0);
         }
@@ -414,7 +414,7 @@ impl Unit {
                 start += self.line.t15() * 2;
             }
             let end = start + character;
-            self.said.push_back(Heard {
+            self.sent.push_back(Received {
                 byte: *byte,
                 start,
                 end,

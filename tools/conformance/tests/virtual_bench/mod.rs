@@ -16,7 +16,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 /// Interval at which inputs are set to what their outputs are.
-const CARRY: Duration = Duration::from_millis(5);
+const CARRY: Duration = Duration::from_millis(20);
 
 /// Length of each level of a contact that bounces, in ms of the board's time. The factory's debounce is 5 ms.
 const BOUNCE: f64 = 8.0;
