@@ -10,7 +10,6 @@ use register_map::Board;
 use serde_json::{Value, json};
 
 use crate::steps::Bench;
-use crate::toolchain::Need;
 use crate::workspace::{self, MESSAGES, Workspace};
 use crate::{build, command, image, size};
 
@@ -104,7 +103,7 @@ fn measure(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<Value
 /// Builds the rivals and returns where they are.
 fn rivals(workspace: &mut Workspace) -> Result<Vec<PathBuf>> {
     let target = workspace.target().join("rivals");
-    let mut cargo = workspace.target_cargo(Need::Build, "build")?;
+    let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--quiet", "--release", "--manifest-path", RIVALS, MESSAGES]);
     let artifacts = workspace::artifacts(cargo.arg("--target-dir").arg(&target))?;
     let programs = RIVAL_NAMES

@@ -10,7 +10,7 @@ use register_map::Board;
 use register_map::board::MODIO_02;
 
 use crate::board::Hardware;
-use crate::toolchain::{Need, TARGET};
+use crate::toolchain::TARGET;
 use crate::workspace::{self, MESSAGES, Workspace};
 use crate::{command, image};
 
@@ -58,7 +58,7 @@ fn linked(workspace: &mut Workspace, board: &Board, map: Option<&Path>) -> Resul
     let target = target(workspace.target(), board);
     // Only `cargo rustc` has options for the linker with which dependencies are not compiled again.
     let subcommand = if map.is_some() { "rustc" } else { "build" };
-    let mut cargo = workspace.target_cargo(Need::Build, subcommand)?;
+    let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--profile", PROFILE, "--package", "firmware"]);
     cargo.args(["--bin", "modio", "--features", board.name, MESSAGES]);
     cargo.arg("--target-dir").arg(&target);

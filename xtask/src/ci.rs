@@ -8,7 +8,6 @@ use register_map::Board;
 
 use crate::steps::{Bench, In, Step, short};
 use crate::test::{self, Chosen};
-use crate::toolchain::Need;
 use crate::workspace::Workspace;
 use crate::{bench, build, command, fuzz, peers, renode};
 
@@ -56,7 +55,7 @@ pub fn steps() -> Vec<Step> {
         deny_warnings(cargo)
     }));
     all.extend(for_board("lint", "lints, target", |bench, board| {
-        let mut cargo = bench.workspace.target_cargo(Need::Lint, "clippy")?;
+        let mut cargo = bench.workspace.target_cargo("clippy")?;
         for_target(&mut cargo, board);
         for package in TARGET_PACKAGES {
             cargo.args(["--package", package]);
@@ -69,7 +68,7 @@ pub fn steps() -> Vec<Step> {
         }),
         step("lint-rivals", "lints, rivals of the bench", |bench| {
             let rivals = bench.workspace.target().join("rivals");
-            let mut cargo = bench.workspace.target_cargo(Need::Lint, "clippy")?;
+            let mut cargo = bench.workspace.target_cargo("clippy")?;
             cargo.args(["--release", "--manifest-path", bench::RIVALS]);
             cargo.arg("--target-dir").arg(rivals);
             deny_warnings(cargo)
@@ -86,7 +85,7 @@ pub fn steps() -> Vec<Step> {
         }),
     ]);
     all.extend(for_board("doc", "documentation, target", |bench, board| {
-        let mut cargo = bench.workspace.target_cargo(Need::Lint, "doc")?;
+        let mut cargo = bench.workspace.target_cargo("doc")?;
         for_target(&mut cargo, board);
         cargo.args(["--package", "board-support", "--package", "firmware"]);
         documentation(cargo)

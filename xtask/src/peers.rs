@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use fs_err as fs;
@@ -31,9 +30,6 @@ const END: &str = "<!-- to here -->\n";
 
 /// The case that `cargo xtask ci` runs on every server. It reads 125 registers.
 const SMOKE: &str = "fc03/quantity-most";
-
-/// Time for a program to start. Python takes seconds on a busy machine.
-const START: Duration = Duration::from_secs(60);
 
 /// The options of `cargo xtask peers`.
 #[derive(clap::Args, Debug)]
@@ -123,11 +119,11 @@ impl Programs {
     /// Starts a server on a new line, runs these cases against it, and returns the suite's report.
     fn test(&self, server: &Prepared, cases: &[&str], traces: Option<&Path>) -> Result<Value> {
         let name = server.name;
-        let mut line = Started::new(Command::new(&self.line), START)?;
+        let mut line = Started::new(Command::new(&self.line))?;
         let [port, other] = [line.line()?, line.line()?];
         let mut program = Command::new(&server.program);
         program.args(&server.arguments).arg(port);
-        let mut running = Started::new(program, START)?;
+        let mut running = Started::new(program)?;
         let ready = running.line()?;
         ensure!(ready == "ready", "{name} does not start: {ready}");
         let json = self.scratch.join(format!("{name}.json"));

@@ -31,31 +31,15 @@ const RUSTUP_LIMIT: Duration = Duration::from_secs(300);
 /// that lld.
 const LINKER: &str = "/usr/bin/rust-lld";
 
-/// What the toolchain is needed for. The later can do what the earlier can.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Need {
-    /// Compile the image.
-    Build,
-    /// Lint it as well.
-    Lint,
-}
-
-impl Need {
-    /// The Debian packages for it: rustc and cargo, which Debian keeps new enough for Firefox, the sources of `core`,
-    /// which has no package for the target, and lld.
-    fn packages(self) -> &'static [&'static str] {
-        match self {
-            Self::Build => &["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"],
-            Self::Lint => &[
-                "rustc-web",
-                "cargo-web",
-                "rust-web-src",
-                "rust-web-llvm",
-                "rust-web-clippy",
-            ],
-        }
-    }
-}
+/// Debian's rustc and cargo, which are kept new enough for Firefox, the sources of `core`, which has no package for the
+/// target, lld, and clippy.
+const PACKAGES: [&str; 5] = [
+    "rustc-web",
+    "cargo-web",
+    "rust-web-src",
+    "rust-web-llvm",
+    "rust-web-clippy",
+];
 
 /// A way to compile for the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,8 +84,8 @@ impl Way {
 }
 
 /// Finds a way to compile for the target, and prints it in one line. Debian packages are only installed with `install`.
-pub fn find(root: &Path, need: Need, install: bool) -> Result<Way> {
-    Machine::default().find(root, need, install)
+pub fn find(root: &Path, install: bool) -> Result<Way> {
+    Machine::default().find(root, install)
 }
 
 /// Has rustup fetch a target for the active toolchain, unless it is installed.
@@ -131,18 +115,17 @@ impl Default for Machine {
 }
 
 impl Machine {
-    fn find(&self, root: &Path, need: Need, install: bool) -> Result<Way> {
+    fn find(&self, root: &Path, install: bool) -> Result<Way> {
         let Err(rustup) = self.add(root, TARGET) else {
             eprintln!("{TARGET}: installed in the active toolchain");
             return Ok(Way::Rustup);
         };
-        let packages = need.packages();
-        self.debian(packages, install).map_err(|debian| {
+        self.debian(install).map_err(|debian| {
             anyhow!(
                 "no way to compile for {TARGET}: install rustup (https://rustup.rs) and run `rustup target add \
                  {TARGET}`, or on Debian run as root `apt-get install --no-install-recommends {}` (rustup: \
                  {rustup:#}; Debian: {debian:#})",
-                packages.join(" ")
+                PACKAGES.join(" ")
             )
         })?;
         eprintln!("{TARGET}: core built with Debian's rustc-web (rustup: {rustup:#})");
@@ -171,17 +154,17 @@ impl Machine {
         }
     }
 
-    fn debian(&self, packages: &[&str], install: bool) -> Result<()> {
-        if !self.has(packages) {
+    fn debian(&self, install: bool) -> Result<()> {
+        if !self.has_packages() {
             if !install {
                 bail!(
                     "the packages are not installed; `cargo xtask ci --install-packages` installs them as root"
                 );
             }
-            eprintln!("{TARGET}: apt-get installs {}", packages.join(" "));
+            eprintln!("{TARGET}: apt-get installs {}", PACKAGES.join(" "));
             let mut update = Command::new(&self.apt_get);
             command::run(update.args(["-q", "update"]))?;
-            self.install(packages)?;
+            self.install(&PACKAGES)?;
             if let Some(package) = missing_linker(Path::new(LINKER)) {
                 self.install(&[&package])?;
             }
@@ -190,14 +173,12 @@ impl Machine {
         new_enough(&version, env!("CARGO_PKG_RUST_VERSION"))
     }
 
-    fn has(&self, packages: &[&str]) -> bool {
+    fn has_packages(&self) -> bool {
         let mut query = Command::new(&self.dpkg_query);
         query.args(["--show", "--showformat", "${db:Status-Status}\\n"]);
-        let states = command::output(query.args(packages));
-        let installed = |states: &str| states.lines().filter(|state| *state == "installed").count();
-        states.is_ok_and(|output| {
-            installed(&String::from_utf8_lossy(&output.stdout)) == packages.len()
-        }) && missing_linker(Path::new(LINKER)).is_none()
+        let states = command::read(query.args(PACKAGES)).unwrap_or_default();
+        let installed = states.lines().filter(|state| *state == "installed");
+        installed.count() == PACKAGES.len() && missing_linker(Path::new(LINKER)).is_none()
     }
 
     fn install(&self, packages: &[&str]) -> Result<()> {
@@ -258,55 +239,38 @@ mod tests {
     fn rustup_is_preferred_to_debian() {
         let directory = tempfile::tempdir().unwrap();
         let machine = machine(directory.path(), "exit 0", "exit 1");
-        let way = machine.find(directory.path(), Need::Build, true);
+        let way = machine.find(directory.path(), true);
         assert_eq!(way.unwrap(), Way::Rustup);
         assert_eq!(installed(directory.path()), "");
     }
 
     #[test]
-    fn installed_debian_packages_are_used() {
+    fn debian_packages_are_used_and_installed_only_on_request() {
         let directory = tempfile::tempdir().unwrap();
-        let four = "printf 'installed\\ninstalled\\ninstalled\\ninstalled\\n'";
-        let machine = machine(directory.path(), "exit 1", four);
-        let way = machine.find(directory.path(), Need::Build, false);
+        let five = "for n in 1 2 3 4 5; do echo installed; done";
+        let machine = |dpkg_query| machine(directory.path(), "exit 1", dpkg_query);
+        let way = machine(five).find(directory.path(), false);
         assert_eq!(way.unwrap(), Way::Debian);
-        let error = machine.find(directory.path(), Need::Lint, false);
-        assert!(error.is_err(), "to lint takes another package");
-    }
-
-    #[test]
-    fn debian_packages_are_installed_only_on_request() {
-        let directory = tempfile::tempdir().unwrap();
-        let machine = machine(directory.path(), "exit 1", "exit 1");
-        let error = machine
-            .find(directory.path(), Need::Build, false)
-            .unwrap_err();
+        let error = machine("exit 1").find(directory.path(), false).unwrap_err();
         let text = format!("{error:#}");
-        for part in [
-            "rustup target add thumbv7m-none-eabi",
-            "apt-get install --no-install-recommends rustc-web",
-            "--install-packages",
-        ] {
-            assert!(
-                text.contains(part) && !text.contains('\n'),
-                "{part}: {text}"
-            );
-        }
+        assert!(
+            text.contains("rustup target add thumbv7m-none-eabi"),
+            "{text}"
+        );
+        assert!(
+            text.contains("apt-get install --no-install-recommends rustc-web"),
+            "{text}"
+        );
+        assert!(!text.contains('\n'), "{text}");
         assert_eq!(installed(directory.path()), "");
-        let way = machine.find(directory.path(), Need::Lint, true);
+        let way = machine("exit 1").find(directory.path(), true);
         assert_eq!(way.unwrap(), Way::Debian);
         assert!(installed(directory.path()).ends_with("rust-web-clippy"));
     }
 
     #[test]
-    fn versions_are_compared_as_numbers() {
-        for new in [
-            "rustc 1.96.0 (ac68faa20 2026-05-25)",
-            "rustc 1.100.0",
-            "rustc 2.0.0",
-        ] {
-            assert!(new_enough(new, "1.95").is_ok(), "{new}");
-        }
+    fn old_rustc_is_refused() {
+        assert!(new_enough("rustc 1.100.0 (ac68faa20 2026-05-25)", "1.95").is_ok());
         let old = new_enough("rustc 1.85.1 (Debian)", "1.95").unwrap_err();
         assert_eq!(old.to_string(), "its rustc is 1.85.1, 1.95 is needed");
         assert!(new_enough("", "1.95").is_err());

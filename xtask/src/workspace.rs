@@ -9,14 +9,14 @@ use anyhow::{Context as _, Result, bail};
 use cargo_metadata::{Artifact, Message, MetadataCommand};
 
 use crate::command;
-use crate::toolchain::{self, Need, Way};
+use crate::toolchain::{self, Way};
 
 /// The project on this machine.
 #[derive(Debug)]
 pub struct Workspace {
     root: PathBuf,
     target: PathBuf,
-    way: Option<(Need, Way)>,
+    way: Option<Way>,
     /// Whether Debian packages that are missing may be installed.
     pub install: bool,
 }
@@ -55,12 +55,11 @@ impl Workspace {
     }
 
     /// Returns cargo for the microcontroller, run at the root. The way to compile for it is searched once.
-    pub fn target_cargo(&mut self, need: Need, subcommand: &str) -> Result<Command> {
+    pub fn target_cargo(&mut self, subcommand: &str) -> Result<Command> {
         let way = match self.way {
-            Some((found, way)) if found >= need => way,
-            _ => toolchain::find(&self.root, need, self.install)?,
+            Some(way) => way,
+            None => *self.way.insert(toolchain::find(&self.root, self.install)?),
         };
-        self.way = Some((need, way));
         let mut cargo = way.cargo(subcommand);
         cargo.current_dir(&self.root);
         Ok(cargo)

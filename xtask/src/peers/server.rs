@@ -1,13 +1,10 @@
 //! The servers: what each needs, and how it is started.
 
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Lines};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::thread;
-use std::time::Duration;
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 
-use anyhow::{Context as _, Result, anyhow};
+use anyhow::{Context as _, Result};
 use clap::ValueEnum;
 
 use crate::workspace::{Workspace, locked};
@@ -119,42 +116,26 @@ pub fn locked_version(lock: &Path, name: &str) -> Result<String> {
 pub struct Started {
     name: String,
     child: Child,
-    lines: Receiver<String>,
-    limit: Duration,
+    lines: Lines<BufReader<ChildStdout>>,
 }
 
 impl Started {
-    /// Starts a program that prints lines, each within `limit`.
-    pub fn new(mut command: Command, limit: Duration) -> Result<Self> {
+    /// Starts a program that prints a few lines when it is ready.
+    pub fn new(mut command: Command) -> Result<Self> {
         let name = command.get_program().to_string_lossy().into_owned();
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         // The suite reports the bad frames that a server logs, so its log is not shown.
         let child = command.stderr(Stdio::null()).spawn();
         let mut child = child.map_err(|error| command::no_start(&command, error))?;
-        let (send, lines) = channel();
         let stdout = child.stdout.take().context("no output")?;
-        thread::spawn(move || {
-            let lines = BufReader::new(stdout).lines().map_while(|line| line.ok());
-            // Continues when no line is received any more: a full pipe would stop the program.
-            lines.for_each(|line| drop(send.send(line)));
-        });
-        Ok(Self {
-            name,
-            child,
-            lines,
-            limit,
-        })
+        let lines = BufReader::new(stdout).lines();
+        Ok(Self { name, child, lines })
     }
 
     /// Returns the next line that it prints.
     pub fn line(&mut self) -> Result<String> {
-        self.lines.recv_timeout(self.limit).map_err(|error| {
-            let why = match error {
-                RecvTimeoutError::Timeout => "does not report that it is ready",
-                RecvTimeoutError::Disconnected => "has ended at its start",
-            };
-            anyhow!("{} {why}", self.name)
-        })
+        let line = self.lines.next().transpose()?;
+        line.with_context(|| format!("{} has ended at its start", self.name))
     }
 
     /// Returns its exit status, if it has ended.
