@@ -2,13 +2,11 @@
 //! probe, `run` and `gdb` use the simulator.
 
 use std::ffi::OsString;
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::thread;
-use std::time::{Duration, Instant};
 
-use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use anyhow::{Context as _, Result, anyhow, bail};
 
 use crate::board::{Hardware, Memory};
 use crate::error::{Missing, usage};
@@ -18,9 +16,6 @@ use crate::{build, command, image, sim};
 
 /// GDBs that may know Arm, the likely ones first.
 const GDBS: [&str; 3] = ["arm-none-eabi-gdb", "gdb-multiarch", "gdb"];
-
-/// Time for a GDB server to start.
-const START: Duration = Duration::from_secs(30);
 
 /// The image and the board.
 #[derive(clap::Args, Clone, Debug)]
@@ -47,7 +42,7 @@ pub struct Options {
 #[group(skip)]
 pub struct GdbOptions {
     #[command(flatten)]
-    options: Options,
+    board: Options,
 
     /// The GDB [default: the first installed of arm-none-eabi-gdb, gdb-multiarch and gdb]
     #[arg(long, value_name = "PROGRAM")]
@@ -72,11 +67,7 @@ pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// `cargo xtask run`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let probe_rs = ProbeRs::new(options);
-    if let Err(error) = probe_rs.check() {
-        if options.asks_for_probe() || !error.is::<Missing>() {
-            return Err(error);
-        }
-        eprintln!("xtask: running in the simulator: {error:#}");
+    if !probe_rs.has_probe(options)? {
         return sim::run_image(workspace, options.build.board, options.elf.as_deref());
     }
     let elf = elf(workspace, options)?;
@@ -93,54 +84,39 @@ pub fn attach(workspace: &mut Workspace, options: &Options) -> Result<()> {
 
 /// `cargo xtask gdb`.
 pub fn gdb(workspace: &mut Workspace, options: &GdbOptions) -> Result<()> {
-    let gdb = match &options.gdb {
-        Some(gdb) => gdb.into(),
-        None => GDBS
-            .iter()
-            .find_map(|name| which::which(name).ok())
-            .context("no GDB is installed (on Debian: apt-get install gdb-multiarch)")?,
-    };
-    let probe_rs = ProbeRs::new(&options.options);
-    let probe = probe_rs.check();
-    let elf = elf(workspace, &options.options)?;
+    let installed = GDBS.into_iter().find(|gdb| knows_arm(gdb));
+    let gdb = options.gdb.as_deref().or(installed).context(
+        "no GDB for Arm is installed (on Debian: apt-get install gdb-multiarch); --gdb names another one",
+    )?;
+    let board = &options.board;
+    let probe_rs = ProbeRs::new(board);
+    let has_probe = probe_rs.has_probe(board)?;
+    let elf = elf(workspace, board)?;
     let address = format!("127.0.0.1:{}", free_port()?);
-    let server = match probe {
-        Ok(()) => {
-            probe_rs.write(&elf)?;
-            let mut server = probe_rs.command("gdb");
-            server.args(["--gdb-connection-string", &address]);
-            server
-        }
-        Err(error) if options.options.asks_for_probe() || !error.is::<Missing>() => {
-            return Err(error);
-        }
-        Err(error) => {
-            eprintln!("xtask: debugging in the simulator: {error:#}");
-            let mut server = Command::new(sim::simulator(workspace)?);
-            let board = options.options.build.board;
-            server.args(["--board", board.name, "--gdb", &address]);
-            server
-                .args(["--http", "127.0.0.1:0"])
-                .arg("--elf")
-                .arg(&elf);
-            server
-        }
-    };
+    let mut server;
+    if has_probe {
+        probe_rs.write(&elf)?;
+        server = probe_rs.command("gdb");
+        server.args(["--gdb-connection-string", &address]);
+    } else {
+        server = Command::new(sim::simulator(workspace)?);
+        server.args(["--board", board.build.board.name, "--gdb", &address]);
+        server.args(["--http", "127.0.0.1:0", "--elf"]).arg(&elf);
+    }
     // GDB handles Ctrl-C, by which it halts the core.
     command::ignore_interrupt()?;
-    let mut server = Group::start(server)?;
-    await_server(&mut server, &address)?;
+    let _server = Group::start(server)?;
     let mut gdb = Command::new(gdb);
-    gdb.arg(elf);
+    // GDB tries to connect until the server is ready.
+    gdb.arg(elf).args(["-ex", "set tcp connect-timeout 30"]);
     gdb.args(["-ex", &format!("target extended-remote {address}")]);
     command::run(gdb.args(&options.arguments))
 }
 
-impl Options {
-    /// Whether an option only makes sense with a probe.
-    fn asks_for_probe(&self) -> bool {
-        self.probe.is_some() || self.chip.is_some()
-    }
+/// Returns whether a GDB is installed and can debug Arm.
+fn knows_arm(gdb: &str) -> bool {
+    let try_it = ["-nx", "-batch", "-ex", "set architecture arm"];
+    command::read(Command::new(gdb).args(try_it)).is_ok()
 }
 
 /// Returns the image that the options name, or builds it.
@@ -162,19 +138,6 @@ fn elf(workspace: &mut Workspace, options: &Options) -> Result<PathBuf> {
 pub fn free_port() -> Result<u16> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).context("no free TCP port")?;
     Ok(listener.local_addr()?.port())
-}
-
-fn await_server(server: &mut Group, address: &str) -> Result<()> {
-    let end = Instant::now() + START;
-    while TcpStream::connect(address).is_err() {
-        ensure!(!server.has_ended()?, "the GDB server has ended");
-        ensure!(
-            Instant::now() < end,
-            "the GDB server does not answer at {address}"
-        );
-        thread::sleep(Duration::from_millis(100));
-    }
-    Ok(())
 }
 
 /// The program probe-rs with the options that each of its commands gets.
@@ -228,6 +191,21 @@ impl ProbeRs {
             ));
         }
         Ok(())
+    }
+
+    /// Returns whether there is a probe, or the simulator is to be used instead. A probe that the options need is an
+    /// error when it is missing.
+    fn has_probe(&self, options: &Options) -> Result<bool> {
+        match self.check() {
+            Ok(()) => Ok(true),
+            Err(error)
+                if error.is::<Missing>() && options.probe.is_none() && options.chip.is_none() =>
+            {
+                eprintln!("xtask: using the simulator: {error:#}");
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
     }
 
     fn write(&self, elf: &Path) -> Result<()> {

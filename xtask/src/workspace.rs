@@ -98,8 +98,11 @@ pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
 
 /// Returns the file of a program that was built.
 pub fn executable(artifacts: &[Artifact], program: &str) -> Result<PathBuf> {
-    let built = artifacts.iter().find(|built| built.target.name == program);
-    let file = built.and_then(|built| built.executable.clone());
+    // A library may have the same name.
+    let mut built = artifacts
+        .iter()
+        .filter(|built| built.target.name == program);
+    let file = built.find_map(|built| built.executable.clone());
     let file = file.with_context(|| format!("cargo has built no program {program}"))?;
     Ok(file.into())
 }

@@ -127,66 +127,62 @@ mod tests {
     use super::*;
 
     fn unpacked(archive: &[u8]) -> BTreeMap<String, Vec<u8>> {
-        let mut files = BTreeMap::new();
-        for file in tar::Archive::new(archive).entries().unwrap() {
+        let mut archive = tar::Archive::new(archive);
+        let entries = archive.entries().unwrap().map(|file| {
             let mut file = file.unwrap();
-            let header = file.header();
-            assert_eq!((header.mtime().unwrap(), header.uid().unwrap()), (0, 0));
+            assert_eq!(
+                (file.header().mtime().unwrap(), file.header().uid().unwrap()),
+                (0, 0)
+            );
             let name = file.path().unwrap().to_string_lossy().into_owned();
             let mut content = Vec::new();
             file.read_to_end(&mut content).unwrap();
-            files.insert(name, content);
-        }
-        files
-    }
-
-    /// Returns the blob that a descriptor names, after a check of its size and sum.
-    fn blob<'a>(files: &'a BTreeMap<String, Vec<u8>>, descriptor: &Value) -> &'a [u8] {
-        let sum = descriptor["digest"].as_str().unwrap();
-        let sum = sum.strip_prefix("sha256:").unwrap();
-        let content = &files[&format!("blobs/sha256/{sum}")];
-        assert_eq!(sha256(content), sum);
-        assert_eq!(descriptor["size"], content.len());
-        content
+            (name, content)
+        });
+        entries.collect()
     }
 
     #[test]
     fn index_leads_to_the_program_which_starts_without_rights() {
         let files = unpacked(&archive(b"program", "x86_64").unwrap());
-        let read = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).unwrap();
-        let index = read(&files["index.json"]);
-        let entry = &index["manifests"][0];
+        let json = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).unwrap();
+        // Returns the blob that a descriptor names, after a check of its size and sum.
+        let blob = |descriptor: &Value| {
+            let sum = descriptor["digest"]
+                .as_str()
+                .unwrap()
+                .strip_prefix("sha256:");
+            let content = &files[&format!("blobs/sha256/{}", sum.unwrap())];
+            assert_eq!(Some(sha256(content).as_str()), sum);
+            assert_eq!(descriptor["size"], content.len());
+            content
+        };
+        let entry = &json(&files["index.json"])["manifests"][0];
         assert_eq!(entry["platform"]["architecture"], "amd64");
-        let manifest = read(blob(&files, entry));
-        let config = read(blob(&files, &manifest["config"]));
-        let layer = blob(&files, &manifest["layers"][0]);
-        assert_eq!(
-            config["rootfs"]["diff_ids"][0],
-            manifest["layers"][0]["digest"]
-        );
-        assert_eq!(unpacked(layer)["modio-sim"], b"program");
+        let manifest = json(blob(entry));
+        let config = json(blob(&manifest["config"]));
+        let layer = &manifest["layers"][0];
+        assert_eq!(config["rootfs"]["diff_ids"][0], layer["digest"]);
+        assert_eq!(unpacked(blob(layer))["modio-sim"], b"program");
         assert_eq!(config["config"]["User"], "65532:65532");
-        let entrypoint = config["config"]["Entrypoint"].as_array().unwrap();
-        assert_eq!(entrypoint[0], "/modio-sim");
-        for port in ["8502", "5020"] {
-            let address = format!("0.0.0.0:{port}");
-            assert!(entrypoint.contains(&address.into()), "{entrypoint:?}");
-            assert!(config["config"]["ExposedPorts"][format!("{port}/tcp")].is_object());
-        }
-        let old = read(&files["manifest.json"]);
+        let entrypoint = [
+            "/modio-sim",
+            "--http",
+            "0.0.0.0:8502",
+            "--tcp",
+            "0.0.0.0:5020",
+        ];
+        assert_eq!(config["config"]["Entrypoint"], json!(entrypoint));
+        let ports = json!({ "8502/tcp": {}, "5020/tcp": {} });
+        assert_eq!(config["config"]["ExposedPorts"], ports);
+        let old = json(&files["manifest.json"]);
         assert!(files.contains_key(old[0]["Config"].as_str().unwrap()));
-        assert_eq!(
-            files.len(),
-            6,
-            "the layout, the index, the old manifest, three blobs"
-        );
     }
 
     #[test]
     fn same_program_gives_the_same_archive() {
         let archive = |processor| archive(b"program", processor).unwrap();
         assert_eq!(archive("x86_64"), archive("x86_64"));
-        assert_ne!(archive("x86_64"), archive("aarch64"));
         assert!(super::archive(b"program", "sparc64").is_err());
     }
 }
