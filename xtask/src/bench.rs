@@ -1,29 +1,23 @@
-//! `cargo xtask bench`: what the release image costs, in instructions and bytes, which repeat: every
-//! request, the processor under load, flash and RAM by crate; beside it servers on other crates.
+//! `cargo xtask bench`: the costs of the release image in instructions and bytes, which are the same in every run: every
+//! request, the processor's load, flash and RAM by crate, and servers on other crates for comparison.
 //!
-//! `tools/bench` measures, this builds what it needs, shows it and holds it against the baseline.
+//! `tools/bench` measures. This command builds what that needs, shows the figures and compares them with the baseline.
 
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::toolchain::{Need, TARGET};
-use crate::workspace::Workspace;
-use crate::{Failure, Result, build, command, size};
+use crate::steps::Bench;
+use crate::workspace::{self, MESSAGES, Workspace};
+use crate::{build, command, image, size};
 
 mod baseline;
-mod footprint;
-mod share;
+mod server;
 mod table;
 
-/// The file with the figures of a board's last release.
-fn baseline(workspace: &Workspace, board: &Board) -> PathBuf {
-    let name = format!("baseline-{board}.json");
-    workspace.root().join("tools/bench").join(name)
-}
-
-/// The servers on other crates: a workspace of its own.
+/// The servers on other crates, a separate workspace.
 pub const RIVALS: &str = "tools/bench/rivals/Cargo.toml";
 const RIVAL_NAMES: [&str; 2] = ["rmodbus", "modbus-core"];
 
@@ -43,12 +37,7 @@ pub struct Options {
     bless: bool,
 }
 
-/// `cargo xtask bench`.
-///
-/// # Errors
-///
-/// When something does not build, the image does not serve a request, or a figure is over its budget, or worse
-/// than the baseline by more than its tolerance.
+/// `cargo xtask bench`. A figure over its budget or worse than the baseline is an error.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let board = options.build.board;
     let elf = build::image(workspace, board)?.elf;
@@ -56,35 +45,32 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     if options.json {
         say!("{report:#}");
     } else {
-        say!("{}", table::of(&report).trim_end());
+        say!("{}", table::of(&report));
     }
-    let file = baseline(workspace, board);
     if options.bless {
-        return baseline::write(&file, &report);
+        return baseline::write(&file(workspace, board), &report);
     }
-    within_budgets(&report)?;
-    baseline::hold(&file, &report)
+    within_limits(workspace, board, &report)
 }
 
-/// Fails when a figure is over its budget, and names all that are.
-fn within_budgets(report: &Value) -> Result<()> {
+/// The step of `cargo xtask ci`.
+pub fn check(bench: &mut Bench, board: &'static Board) -> Result<()> {
+    let elf = bench.image(board)?;
+    let report = measure(bench.workspace, &elf, board)?;
+    say!("{}", table::of(&report));
+    within_limits(bench.workspace, board, &report)
+}
+
+/// The file with the baseline of a board.
+fn file(workspace: &Workspace, board: &Board) -> PathBuf {
+    let name = format!("baseline-{board}.json");
+    workspace.root().join("tools/bench").join(name)
+}
+
+fn within_limits(workspace: &Workspace, board: &Board, report: &Value) -> Result<()> {
     let over = table::over_budget(report);
-    if over.is_empty() {
-        return Ok(());
-    }
-    Err(Failure::new(format!("over budget: {}", over.join("; "))))
-}
-
-/// The step of `cargo xtask ci`: the tables, and the baseline held.
-///
-/// # Errors
-///
-/// As [`run`].
-pub fn check(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<()> {
-    let report = measure(workspace, elf, board)?;
-    say!("{}", table::of(&report).trim_end());
-    within_budgets(&report)?;
-    baseline::hold(&baseline(workspace, board), &report)
+    ensure!(over.is_empty(), "over budget: {}", over.join("; "));
+    baseline::compare_with(&file(workspace, board), report)
 }
 
 fn measure(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<Value> {
@@ -99,28 +85,29 @@ fn measure(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<Value
         "--",
     ]);
     cargo.arg(elf).args(["--board", board.name, "--rivals"]);
-    cargo.args(rivals);
-    let text = command::read(&mut cargo)?;
-    let mut report: Value = serde_json::from_str(&text)
-        .map_err(|error| Failure::new(format!("the bench's report is broken: {error}")))?;
-    share::add(&mut report, elf)?;
+    let text = command::read(cargo.args(rivals))?;
+    let mut report: Value =
+        serde_json::from_str(&text).context("the report of tools/bench is broken")?;
+    let bytes = image::read(elf)?;
+    let parsed = image::parse(&bytes)?;
+    server::add_instructions(&mut report, &parsed)?;
     report["image"] = size::report(elf, board)?;
-    footprint::add(&mut report, elf)?;
+    let structures = size::structures(&parsed, server::CRATE)?;
+    report["server"] = json!({
+        "flash": server::flash(&report["image"])?,
+        "ram": server::ram(&structures)?,
+    });
     Ok(report)
 }
 
-/// Builds the rivals and tells where they are.
+/// Builds the rivals and returns where they are.
 fn rivals(workspace: &mut Workspace) -> Result<Vec<PathBuf>> {
     let target = workspace.target().join("rivals");
-    let mut cargo = workspace.target_cargo(Need::Build, "build")?;
-    cargo.args([
-        "--quiet",
-        "--release",
-        "--manifest-path",
-        RIVALS,
-        "--target-dir",
-    ]);
-    command::run(cargo.arg(&target))?;
-    let directory = target.join(TARGET).join("release");
-    Ok(RIVAL_NAMES.map(|name| directory.join(name)).to_vec())
+    let mut cargo = workspace.target_cargo("build")?;
+    cargo.args(["--quiet", "--release", "--manifest-path", RIVALS, MESSAGES]);
+    let artifacts = workspace::artifacts(cargo.arg("--target-dir").arg(&target))?;
+    let programs = RIVAL_NAMES
+        .iter()
+        .map(|name| workspace::executable(&artifacts, name));
+    programs.collect()
 }

@@ -1,5 +1,4 @@
-//! What xtask needs to know of a board beyond the register map: the parts that its image runs on, and how much of
-//! them the application may take.
+//! What xtask knows of a board beyond the register map: its parts, and how much of them the application may use.
 
 use register_map::Board;
 
@@ -8,7 +7,7 @@ const KIB: u32 = 1024;
 /// An amount of memory, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
-    /// Whose it is: the name of a part as probe-rs has it, or `budget`.
+    /// The name of a part, as probe-rs has it, or `budget`.
     pub name: &'static str,
     /// Bytes of flash.
     pub flash: u32,
@@ -34,7 +33,7 @@ pub struct Hardware {
     pub part: Memory,
     /// Another part that the image must fit as well.
     pub smaller: Option<Memory>,
-    /// What the application may take at most. The rest is for the stack, the configuration store and a loader.
+    /// What the application may use at most. The rest is for the stack, the configuration store and a loader.
     pub budget: Memory,
 }
 
@@ -64,15 +63,14 @@ const _: () = {
 };
 
 impl Hardware {
-    /// The hardware of a board.
-    #[must_use]
+    /// Returns the hardware of a board.
     pub fn of(board: &Board) -> &'static Self {
         let row = HARDWARE.iter().find(|row| row.board == board);
         // Checked above: every board has a row.
         row.unwrap_or(&HARDWARE[0])
     }
 
-    /// What the image must fit: the parts, the smaller one first, and the budget.
+    /// Returns what the image must fit: the parts, the smaller one first, and the budget.
     pub fn limits(&self) -> impl Iterator<Item = Memory> {
         let parts = self.smaller.into_iter().chain([self.part]);
         parts.chain([self.budget])
@@ -84,13 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hardware_of_every_board_is_its_own() {
-        let parts = Board::ALL.map(|board| Hardware::of(board).part.name);
-        assert_eq!(parts, ["STM32F103CB", "STM32F103RC"]);
-    }
-
-    #[test]
-    fn the_configuration_is_stored_in_flash_that_every_part_has() {
+    fn configuration_is_stored_in_flash_that_every_part_has() {
         for board in Board::ALL {
             let hardware = Hardware::of(board);
             let least = hardware.smaller.unwrap_or(hardware.part).flash;

@@ -1,23 +1,186 @@
-//! `cargo xtask`: the commands this project is built, tested and tried with.
+//! `cargo xtask`: the commands that build, test and try this project. One module for each command.
+//!
+//! An error says in one line what is wrong and what to do about it. Exit status: 1 for a failure, 2 for a wrong
+//! question.
+
+#![forbid(unsafe_code)]
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+use error::Usage;
+use workspace::Workspace;
+
+/// As `println!`, but a reader that has ended, such as `head`, is no error.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
+mod bench;
+mod board;
+mod build;
+mod ci;
+mod command;
+mod debug;
+mod dist;
+mod docs;
+mod error;
+mod fuzz;
+mod group;
+mod hil;
+mod image;
+mod page;
+mod peers;
+mod pymodbus;
+mod python;
+mod renode;
+mod sim;
+mod size;
+mod soak;
+mod steps;
+mod table;
+mod test;
+mod toolchain;
+mod workspace;
+
+/// The command line of `cargo xtask`.
+#[derive(Parser, Debug)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", about, long_about = None)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Build the release image: ELF and .bin
+    Build(build::Options),
+    /// Write the image into a board with probe-rs, verify and start it
+    Flash(debug::Options),
+    /// Build the image, run it on the board at the debug probe, or without one in the simulator, and show its log
+    Run(debug::Options),
+    /// Show the log of the image that runs on the board at the debug probe
+    Attach(debug::Options),
+    /// Debug the image with GDB, on the board at the debug probe, or without one in the simulator
+    Gdb(debug::GdbOptions),
+    /// Build the image and run it on the virtual board
+    Sim(Box<sim_options::Options>),
+    /// Run the steps that a change must pass, or those named
+    Test(test::Options),
+    /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
+    Ci(ci::Options),
+    /// Show flash and RAM by crate and section, and what is left of the parts and the budget
+    Size(size::Options),
+    /// Count the instructions of every request, the processor's load, flash and RAM
+    Bench(bench::Options),
+    /// Build all files of a release: ELF, .bin, .hex, map, bill of materials, check sums
+    Dist(dist::Options),
+    /// Test the image on Renode: its suites and the conformance suite
+    Renode(renode::Options),
+    /// Test a real board on its serial line: conformance, timing, wires
+    #[command(disable_help_flag = true)]
+    Hil(hil::Options),
+    /// Test well-known Modbus servers with the conformance suite, and renew the table in docs/conformance.md
+    Peers(peers::Options),
+    /// Run the fuzz targets: framers, server and configuration store
+    Fuzz(fuzz::Options),
+    /// Send a million frames, good and damaged, to the image in simulation
+    Soak(soak::Options),
+    /// Run the conformance suite at every rate and format of the register map, in simulation
+    Matrix,
+    /// Renew docs/register-map.md
+    Docs,
+    /// Take the pictures of the simulator's page in docs/images
+    Screenshots,
+}
 
 fn main() -> ExitCode {
-    let cli = match xtask::Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) if error.use_stderr() && !xtask::Cli::wants_usage(&error) => {
-            eprintln!("xtask: {}", sim_options::one_line(&error));
-            return ExitCode::from(2);
+    use clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand as NoCommand;
+    let done = match Cli::try_parse() {
+        Ok(cli) => run(cli),
+        Err(error) if error.use_stderr() && error.kind() != NoCommand => {
+            Err(error::usage(sim_options::one_line(&error)))
         }
-        Err(usage) => usage.exit(),
+        Err(help) => help.exit(),
     };
-    match xtask::run(cli) {
+    match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("xtask: {failure}");
-            ExitCode::from(failure.code)
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
+    }
+}
+
+fn run(cli: Cli) -> Result<()> {
+    let mut workspace = Workspace::open()?;
+    let workspace = &mut workspace;
+    match cli.command {
+        Command::Build(options) => build::run(workspace, &options),
+        Command::Flash(options) => debug::flash(workspace, &options),
+        Command::Run(options) => debug::run(workspace, &options),
+        Command::Attach(options) => debug::attach(workspace, &options),
+        Command::Gdb(options) => debug::gdb(workspace, &options),
+        Command::Sim(options) => sim::run(workspace, &options, std::env::args_os().skip(2)),
+        Command::Test(options) => test::run(workspace, &options),
+        Command::Ci(options) => ci::run(workspace, &options),
+        Command::Size(options) => size::run(workspace, &options),
+        Command::Bench(options) => bench::run(workspace, &options),
+        Command::Dist(options) => dist::run(workspace, &options),
+        Command::Renode(options) => renode::run(workspace, &options),
+        Command::Hil(options) => hil::run(workspace, &options),
+        Command::Peers(options) => peers::run(workspace, &options),
+        Command::Fuzz(options) => fuzz::run(workspace, &options),
+        Command::Soak(options) => soak::run(workspace, &options),
+        Command::Matrix => soak::matrix(workspace),
+        Command::Docs => docs::run(workspace),
+        Command::Screenshots => page::screenshots(workspace),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_line_is_well_formed() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn unknown_board_is_refused_with_the_list_of_boards() {
+        for command in ["build", "flash", "run", "size", "bench", "sim", "renode"] {
+            let error = Cli::try_parse_from(["xtask", command, "--board", "nucleo"]).unwrap_err();
+            let text = sim_options::one_line(&error);
+            assert!(
+                text.contains("'nucleo'") && text.contains("one of modio-02, modio-08"),
+                "{command}: {text}"
+            );
+        }
+    }
+}
+
+/// Programs made of a shell script, which tests call in place of the real ones.
+#[cfg(all(test, unix))]
+mod script {
+    use std::path::{Path, PathBuf};
+
+    /// Makes a program of that name.
+    ///
+    /// A shell writes the file. If this process had it open for writing while another test starts a program, that
+    /// program would inherit the open file, and the file could not be executed ("text file busy").
+    pub fn program(directory: &Path, name: &str, script: &str) -> PathBuf {
+        let program = directory.join(name);
+        let write = r#"printf '#!/bin/sh\n%s\n' "$2" > "$1" && chmod +x "$1""#;
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", write, "sh"]).arg(&program).arg(script);
+        crate::command::run(&mut shell).unwrap();
+        program
     }
 }

@@ -1,158 +1,131 @@
-//! `cargo xtask peers`: well-known Modbus servers under the standard cases of the conformance suite, as a table in
+//! `cargo xtask peers`: well-known Modbus servers with the standard cases of the conformance suite, as a table in
 //! docs/conformance.md. tools/peers has a small host program for each; the line is a pair of pseudo-terminals.
 
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use fs_err as fs;
+use serde_json::Value;
+
+use crate::command;
+use crate::workspace::{self, MESSAGES, Workspace};
+
 mod server;
-mod table;
 #[cfg(all(test, unix))]
 mod tests;
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::time::Duration;
+use server::{Peer, Prepared, Started};
 
-use serde_json::Value;
-
-use crate::steps::Outcome;
-use crate::workspace::Workspace;
-use crate::{Failure, Result, command};
-use server::{Peer, Started};
-use table::Row;
-
-/// The servers' package, a workspace of its own.
+/// The servers' package, a separate workspace.
 pub const MANIFEST: &str = "tools/peers/Cargo.toml";
 
-/// What every server is configured to have.
+/// The configuration of every server.
 const PROFILE: &str = "tools/peers/profile.toml";
 
-/// The document with the table.
+/// The document with the table, and the lines before and after the table.
 const DOCUMENT: &str = "docs/conformance.md";
+const BEGIN: &str = "<!-- `cargo xtask peers` writes from here -->\n";
+const END: &str = "<!-- to here -->\n";
 
-/// The case that `cargo xtask ci` tries on every server: 125 registers are read.
+/// The case that `cargo xtask ci` runs on every server. It reads 125 registers.
 const SMOKE: &str = "fc03/quantity-most";
-
-/// Time in which a program has to be ready. Python takes seconds on a busy machine.
-const START: Duration = Duration::from_secs(60);
 
 /// The options of `cargo xtask peers`.
 #[derive(clap::Args, Debug)]
 pub struct Options {
-    /// Test only this server, print its row, and leave the document alone; may be repeated
-    #[arg(long, value_name = "NAME", value_parser = ["libmodbus", "modbus-core", "pymodbus", "rmodbus"])]
-    only: Vec<String>,
+    /// Test only this server, print its row, and do not write the document; may be repeated
+    #[arg(long, value_name = "NAME")]
+    only: Vec<Peer>,
 
     /// Write what every server sent and received, and every failed case, to files in this directory
     #[arg(long, value_name = "DIR")]
     traces: Option<PathBuf>,
 }
 
-/// `cargo xtask peers`.
-///
-/// # Errors
-///
-/// When the suite or the servers do not build, a server does not start, or the document cannot be written. A
-/// server whose library is missing is left out of the table, with the reason below it.
+/// `cargo xtask peers`. A server whose library is missing is left out of the table, with the reason after it.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     let programs = Programs::build(workspace)?;
-    let mut rows = Vec::new();
-    let mut missing = Vec::new();
-    for peer in Peer::ALL {
-        let name = peer.name();
-        if !options.only.is_empty() && !options.only.iter().any(|only| only == name) {
+    let mut table =
+        "| server | version | passed | failed | could not be asked | failed cases by group |\n\
+                     |---|---|---|---|---|---|\n"
+            .to_owned();
+    let mut missing = String::new();
+    for &peer in Peer::ALL {
+        if !options.only.is_empty() && !options.only.contains(&peer) {
             continue;
         }
+        let name = peer.name();
         eprintln!("testing {name}, which takes minutes");
         match peer.prepare(workspace) {
-            Ok(prepared) => {
+            Ok(server) => {
                 let cases = ["--standard-only", "--trace"];
-                let report = programs.test(&prepared.command, &cases, name, options)?;
-                rows.push(Row::new(name, &prepared.version, &report)?);
+                let report = programs.test(&server, &cases, options.traces.as_deref())?;
+                table += &row(&server, &report)?;
             }
-            Err(why) => {
-                eprintln!("{name} is left out: {why}");
-                missing.push(format!("{name}: {why}"));
-            }
+            Err(why) => missing += &format!("\nLeft out: {name}: {why:#}.\n"),
         }
     }
-    let text = table::text(&rows, &missing);
-    say!("{}", text.trim_end());
+    let table = table + &missing;
+    say!("{}", table.trim_end());
     if options.only.is_empty() {
-        table::replace_in(&workspace.root().join(DOCUMENT), &text)?;
+        let path = workspace.root().join(DOCUMENT);
+        let document = replaced(&fs::read_to_string(&path)?, &table);
+        fs::write(
+            &path,
+            document.with_context(|| format!("{DOCUMENT} has no {BEGIN:?} with {END:?}"))?,
+        )?;
     }
     Ok(())
 }
 
-/// Builds every server, and reads registers of each; part of `cargo xtask ci`.
-pub fn step(workspace: &Workspace) -> Outcome {
-    let options = Options {
-        only: Vec::new(),
-        traces: None,
-    };
-    let tried = Programs::build(workspace).and_then(|programs| {
-        for peer in Peer::ALL {
-            let prepared = peer.prepare(workspace)?;
-            let cases = ["--only", SMOKE];
-            let report = programs.test(&prepared.command, &cases, peer.name(), &options)?;
-            let row = Row::new(peer.name(), &prepared.version, &report)?;
-            if row.passed == 0 {
-                let what = format!("{} does not pass {SMOKE}", peer.name());
-                return Err(Failure::new(what));
-            }
-        }
-        Ok(())
-    });
-    tried.into()
+/// Builds every server, and reads registers of each.
+pub fn check(workspace: &Workspace) -> Result<()> {
+    let programs = Programs::build(workspace)?;
+    for peer in Peer::ALL {
+        let server = peer.prepare(workspace)?;
+        let report = programs.test(&server, &["--only", SMOKE], None)?;
+        let cases = report["cases"].as_array().into_iter().flatten();
+        let passed = cases.filter(|case| case["result"] == "passed").count();
+        ensure!(passed > 0, "{} does not pass {SMOKE}", peer.name());
+    }
+    Ok(())
 }
 
-/// The programs that a test takes.
+/// The programs of a test.
 struct Programs {
     /// Joins two pseudo-terminals.
     line: PathBuf,
     suite: PathBuf,
     profile: PathBuf,
-    /// Where reports are kept for the time of a run.
+    /// Directory of the reports.
     scratch: PathBuf,
 }
 
 impl Programs {
     fn build(workspace: &Workspace) -> Result<Self> {
-        command::run(workspace.cargo("build").args([
-            "--quiet",
-            "--package",
-            "conformance",
-            "--bin",
-            "modio-conformance",
-        ]))?;
-        let peers = server::directory(workspace);
+        let scratch = server::directory(workspace);
         let mut cargo = workspace.cargo("build");
-        cargo.args(["--quiet", "--locked", "--manifest-path", MANIFEST]);
-        command::run(cargo.arg("--target-dir").arg(&peers))?;
+        cargo.args(["--quiet", "--locked", "--manifest-path", MANIFEST, MESSAGES]);
+        let artifacts = workspace::artifacts(cargo.arg("--target-dir").arg(&scratch))?;
         Ok(Self {
-            line: peers.join("debug/peer-line"),
-            suite: workspace.target().join("debug/modio-conformance"),
+            line: workspace::executable(&artifacts, "peer-line")?,
+            suite: workspace.program("conformance", "modio-conformance")?,
             profile: workspace.root().join(PROFILE),
-            scratch: peers,
+            scratch,
         })
     }
 
-    /// Starts a server on a line of its own and runs these cases against it; returns the suite's report.
-    fn test(
-        &self,
-        server: &[PathBuf],
-        cases: &[&str],
-        name: &str,
-        options: &Options,
-    ) -> Result<Value> {
-        let mut line = Started::new(&mut Command::new(&self.line), START)?;
+    /// Starts a server on a new line, runs these cases against it, and returns the suite's report.
+    fn test(&self, server: &Prepared, cases: &[&str], traces: Option<&Path>) -> Result<Value> {
+        let name = server.name;
+        let mut line = Started::new(Command::new(&self.line))?;
         let [port, other] = [line.line()?, line.line()?];
-        let [program, arguments @ ..] = server else {
-            return Err(Failure::new(format!("{name} has no program")));
-        };
-        let mut server = Started::new(Command::new(program).args(arguments).arg(port), START)?;
-        let ready = server.line()?;
-        if ready != "ready" {
-            return Err(Failure::new(format!("{name} does not start: {ready}")));
-        }
+        let mut program = Command::new(&server.program);
+        program.args(&server.arguments).arg(port);
+        let mut running = Started::new(program)?;
+        let ready = running.line()?;
+        ensure!(ready == "ready", "{name} does not start: {ready}");
         let json = self.scratch.join(format!("{name}.json"));
         let mut suite = Command::new(&self.suite);
         suite.arg("--serial").arg(other);
@@ -162,35 +135,62 @@ impl Programs {
             .args(cases)
             .arg("--json")
             .arg(&json);
-        let output = suite
-            .output()
-            .map_err(|error| Failure::new(format!("modio-conformance cannot be run: {error}")))?;
-        if let Some(directory) = &options.traces {
-            for (kind, bytes) in [("cases", &output.stdout), ("trace", &output.stderr)] {
-                write(&directory.join(format!("{name}.{kind}")), bytes)?;
-            }
+        let output = command::output(&mut suite)?;
+        if let Some(directory) = traces {
+            fs::create_dir_all(directory)?;
+            fs::write(directory.join(format!("{name}.cases")), &output.stdout)?;
+            fs::write(directory.join(format!("{name}.trace")), &output.stderr)?;
         }
-        // 0 and 1 are verdicts.
+        // 0: all cases passed, 1: cases failed.
         if !matches!(output.status.code(), Some(0 | 1)) {
-            let why = command::complaint(&output);
-            return Err(Failure::new(format!("{name} cannot be tested: {why}")));
+            bail!("{name} cannot be tested: {}", command::complaint(&output));
         }
-        if let Some(status) = server.ended() {
-            let what = format!("{name} has ended while it was tested ({status})");
-            return Err(Failure::new(what));
+        if let Some(status) = running.ended() {
+            bail!("{name} has ended during the test ({status})");
         }
-        read_report(&json)
+        let report = serde_json::from_str(&fs::read_to_string(&json)?);
+        report.with_context(|| json.display().to_string())
     }
 }
 
-fn read_report(path: &Path) -> Result<Value> {
-    let told = |why: String| Failure::new(format!("{}: {why}", path.display()));
-    let text = fs::read_to_string(path).map_err(|error| told(error.to_string()))?;
-    serde_json::from_str(&text).map_err(|error| told(error.to_string()))
+/// Returns the row of a server in the table, from the suite's report.
+fn row(server: &Prepared, report: &Value) -> Result<String> {
+    let (mut passed, mut failed, mut skipped) = (0, 0, 0);
+    // Groups of cases with the number of those that failed, in the order of the suite.
+    let mut groups: Vec<(&str, usize)> = Vec::new();
+    for case in report["cases"]
+        .as_array()
+        .context("modio-conformance reports no cases")?
+    {
+        match case["result"].as_str() {
+            Some("passed") => passed += 1,
+            Some("skipped") => skipped += 1,
+            _ => {
+                failed += 1;
+                let group = case["name"]
+                    .as_str()
+                    .and_then(|name| name.split('/').next());
+                let group = group.unwrap_or_default();
+                match groups.iter_mut().find(|(name, _)| *name == group) {
+                    Some((_, count)) => *count += 1,
+                    None => groups.push((group, 1)),
+                }
+            }
+        }
+    }
+    let groups = groups
+        .iter()
+        .map(|(name, count)| format!("`{name}` {count}"));
+    let groups = groups.collect::<Vec<_>>().join(", ");
+    let Prepared { name, version, .. } = server;
+    Ok(format!(
+        "| {name} | {version} | {passed} | {failed} | {skipped} | {groups} |\n"
+    ))
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let made = path.parent().map_or(Ok(()), fs::create_dir_all);
-    made.and_then(|()| fs::write(path, bytes))
-        .map_err(|error| Failure::new(format!("cannot write {}: {error}", path.display())))
+/// Returns the document with another table.
+fn replaced(document: &str, table: &str) -> Option<String> {
+    let (before, rest) = document.split_once(BEGIN)?;
+    let (_, after) = rest.split_once(END)?;
+    Some(format!("{before}{BEGIN}{table}{END}{after}"))
 }

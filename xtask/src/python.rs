@@ -1,12 +1,15 @@
-//! Virtual environments of Python under target/, for the tests that drive programs written in it.
+//! Virtual environments of Python under target/, for the tests that run programs written in Python.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::{Failure, Result, command};
+use anyhow::{Context as _, Result};
+use fs_err as fs;
 
-/// What a virtual environment has to offer.
+use crate::command;
+use crate::error::Missing;
+
+/// What a virtual environment must have.
 #[derive(Clone, Copy, Debug)]
 pub struct Environment<'a> {
     /// What needs it, for messages.
@@ -22,31 +25,23 @@ pub struct Environment<'a> {
 }
 
 impl Environment<'_> {
-    /// Makes the environment, or takes the one made earlier from the same requirements, and returns its interpreter.
-    ///
-    /// # Errors
-    ///
-    /// When Python or its module venv is missing, or PyPI cannot be reached, with what to install.
+    /// Makes the environment, or uses the one made earlier from the same requirements, and returns its interpreter.
+    /// The error is [`Missing`].
     pub fn prepare(&self) -> Result<PathBuf> {
-        self.prepare_with("python3")
+        let made = self.prepare_with("python3");
+        made.map_err(|error| Missing(format!("{error:#}")).into())
     }
 
     fn prepare_with(&self, python: &str) -> Result<PathBuf> {
-        let wanted = self
-            .requirements
-            .iter()
-            .map(|file| {
-                fs::read_to_string(file).map_err(|error| {
-                    Failure::new(format!("cannot read {}: {error}", file.display()))
-                })
-            })
-            .collect::<Result<String>>()?;
-        let interpreter = self.directory.join(if cfg!(windows) {
+        let wanted = self.requirements.iter().map(fs::read_to_string);
+        let wanted: String = wanted.collect::<Result<_, _>>()?;
+        let name = if cfg!(windows) {
             "Scripts/python.exe"
         } else {
             "bin/python"
-        });
-        // Written last, so that an installation cut short is not mistaken for a whole one.
+        };
+        let interpreter = self.directory.join(name);
+        // Written last, so that an interrupted installation is not mistaken for a complete one.
         let stamp = self.directory.join("installed.txt");
         let import = format!("import {}", self.imports);
         let works = || command::read(Command::new(&interpreter).args(["-c", &import]));
@@ -56,32 +51,26 @@ impl Environment<'_> {
         }
         let Self { what, oldest, .. } = self;
         let version = format!("import sys; sys.exit(sys.version_info < (3, {oldest}))");
-        command::read(Command::new(python).args(["-c", &version])).map_err(|_| {
-            Failure::new(format!(
-                "{what} needs Python 3.{oldest} or newer as python3 on the PATH"
-            ))
+        command::read(Command::new(python).args(["-c", &version])).with_context(|| {
+            format!("{what} needs Python 3.{oldest} or newer as python3 on the PATH")
         })?;
         eprintln!("making {}", self.directory.display());
-        command::read(
-            Command::new(python)
-                .args(["-m", "venv", "--clear"])
-                .arg(self.directory),
-        )
-        .map_err(|why| {
-            Failure::new(format!(
-                "no virtual environment (on Debian: python3-venv): {why}"
-            ))
-        })?;
+        let mut venv = Command::new(python);
+        command::read(venv.args(["-m", "venv", "--clear"]).arg(self.directory))
+            .context("no virtual environment (on Debian: apt-get install python3-venv)")?;
         let mut pip = Command::new(&interpreter);
-        pip.args(["-m", "pip", "install", "--quiet"]);
-        pip.arg("--disable-pip-version-check");
+        pip.args([
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+        ]);
         for file in self.requirements {
             pip.arg("--requirement").arg(file);
         }
-        command::read(&mut pip)
-            .map_err(|why| Failure::new(format!("{what} cannot be installed from PyPI: {why}")))?;
-        fs::write(&stamp, wanted)
-            .map_err(|error| Failure::new(format!("cannot write {}: {error}", stamp.display())))?;
+        command::read(&mut pip).with_context(|| format!("{what} cannot be installed from PyPI"))?;
+        fs::write(&stamp, wanted)?;
         Ok(interpreter)
     }
 }
@@ -91,82 +80,57 @@ mod tests {
     use super::*;
     use crate::script::program;
 
-    /// A python3 whose `-m venv` makes an interpreter that writes down how it is called.
+    /// A python3 whose `-m venv` makes an interpreter that writes down its arguments.
     const MAKES_VENV: &str = r#"
         [ "$2" = venv ] || exit 0
         mkdir -p "$4/bin"
         printf '#!/bin/sh\necho "$@" >> "%s/calls"\n' "$4" > "$4/bin/python"
         chmod +x "$4/bin/python""#;
 
-    struct Case {
-        directory: tempfile::TempDir,
-        python: PathBuf,
+    /// Prepares an environment with two files of requirements in this directory.
+    fn prepare(directory: &Path, script: &str) -> Result<PathBuf> {
+        let at = |name| directory.join(name);
+        Environment {
+            what: "pymodbus",
+            directory: &at("venv"),
+            requirements: &[at("one.txt"), at("two.txt")],
+            imports: "pymodbus, serial",
+            oldest: 10,
+        }
+        .prepare_with(&program(directory, "python3", script).to_string_lossy())
     }
 
-    impl Case {
-        fn new(script: &str) -> Self {
-            let directory = tempfile::tempdir().unwrap();
-            let python = program(directory.path(), "python3", script);
-            fs::write(directory.path().join("one.txt"), "pymodbus==3.0\n").unwrap();
-            fs::write(directory.path().join("two.txt"), "pillow==1.0\n").unwrap();
-            Self { directory, python }
-        }
-
-        fn prepare(&self) -> Result<PathBuf> {
-            self.prepare_with(&self.python.to_string_lossy())
-        }
-
-        fn prepare_with(&self, python: &str) -> Result<PathBuf> {
-            let at = |name| self.directory.path().join(name);
-            Environment {
-                what: "pymodbus",
-                directory: &at("venv"),
-                requirements: &[at("one.txt"), at("two.txt")],
-                imports: "pymodbus, serial",
-                oldest: 10,
-            }
-            .prepare_with(python)
-        }
-
-        fn calls(&self) -> String {
-            fs::read_to_string(self.directory.path().join("venv/calls")).unwrap_or_default()
-        }
-
-        fn installations(&self) -> usize {
-            self.calls().matches("pip install").count()
-        }
+    fn directory() -> tempfile::TempDir {
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(directory.path().join("one.txt"), "pymodbus==3.0\n").unwrap();
+        fs::write(directory.path().join("two.txt"), "pillow==1.0\n").unwrap();
+        directory
     }
 
     #[test]
     fn environment_is_made_once_and_again_for_other_versions() {
-        let case = Case::new(MAKES_VENV);
-        assert!(case.prepare().unwrap().ends_with("venv/bin/python"));
-        assert_eq!(case.installations(), 1);
-        let calls = case.calls();
-        assert!(calls.contains("one.txt") && calls.contains("two.txt"));
-        case.prepare().unwrap();
-        assert_eq!(case.installations(), 1, "the environment exists already");
-        fs::write(case.directory.path().join("two.txt"), "pillow==1.1\n").unwrap();
-        case.prepare().unwrap();
-        assert_eq!(case.installations(), 2, "other versions are wanted");
+        let directory = directory();
+        let calls = || fs::read_to_string(directory.path().join("venv/calls")).unwrap();
+        let installations = || {
+            prepare(directory.path(), MAKES_VENV).unwrap();
+            calls().matches("pip install").count()
+        };
+        assert_eq!(installations(), 1);
+        assert!(calls().contains("one.txt") && calls().contains("two.txt"));
+        assert_eq!(installations(), 1, "the environment exists already");
+        fs::write(directory.path().join("two.txt"), "pillow==1.1\n").unwrap();
+        assert_eq!(installations(), 2, "the versions have changed");
     }
 
     #[test]
-    fn missing_or_old_python_is_reported_with_the_version_needed() {
-        let case = Case::new("exit 1");
-        for python in [case.python.to_str().unwrap(), "no-python-here"] {
-            let text = case.prepare_with(python).unwrap_err().to_string();
-            assert!(text.contains("pymodbus needs Python 3.10"), "{text}");
-        }
-    }
-
-    #[test]
-    fn missing_venv_module_is_reported_with_its_package() {
-        let case = Case::new("[ \"$2\" = venv ] && { echo no ensurepip >&2; exit 1; }; exit 0");
-        let text = case.prepare().unwrap_err().to_string();
+    fn missing_python_or_venv_is_reported_with_what_to_install() {
+        let directory = directory();
+        let text = |script| format!("{:#}", prepare(directory.path(), script).unwrap_err());
+        assert!(text("exit 1").contains("pymodbus needs Python 3.10"));
+        let venv = text("[ \"$2\" = venv ] && { echo no ensurepip >&2; exit 1; }; exit 0");
         assert!(
-            text.contains("python3-venv") && text.contains("no ensurepip"),
-            "{text}"
+            venv.contains("python3-venv") && venv.contains("no ensurepip"),
+            "{venv}"
         );
     }
 }

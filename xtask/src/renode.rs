@@ -1,37 +1,33 @@
-//! `cargo xtask renode`: the image on Renode, an emulator that nobody here wrote: its own suites, then the
-//! conformance suite with every module, in virtual time. With `--interactive`, for a person to try.
+//! `cargo xtask renode`: the image on Renode, an emulator of other authors: its own suites, then the conformance suite
+//! with every module, in virtual time. `--interactive` starts the board for a person.
 //!
-//! Renode is not needed for anything else: what can be checked of its files without it is a step of
-//! `cargo xtask test` ([`checks`]), and the simulator of `cargo xtask sim` needs none.
+//! Nothing else needs Renode. [`checks`], a step of `cargo xtask test`, checks Renode's files without it, and the
+//! simulator of `cargo xtask sim` is the project's own.
 
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
+use anyhow::Result;
+use fs_err as fs;
 use register_map::{Board, Module};
+use serde_json::{Value, json};
 
-use crate::steps::{Outcome, Steps};
+use crate::error::usage;
 use crate::workspace::Workspace;
-use crate::{Failure, Result, build};
+use crate::{build, group, steps};
 
 pub mod checks;
 mod find;
 mod live;
 #[cfg(test)]
 mod platform;
-mod processes;
-mod report;
 mod suites;
 #[cfg(all(test, unix))]
 mod tests;
 
-pub use find::Renode;
+use find::Renode;
 
 /// The platform, the scripts and the suites, relative to the root.
-pub const DIRECTORY: &str = "renode";
-
-/// Where the line is when nothing else is asked for.
-const PORT: u16 = 3456;
+const DIRECTORY: &str = "renode";
 
 /// What to run, and where.
 #[derive(clap::Args, Clone, Debug)]
@@ -40,7 +36,7 @@ pub struct Options {
     #[command(flatten)]
     build: build::Options,
 
-    /// The program renode, or the directory it is in [default: $RENODE, the PATH, the usual places]
+    /// The program renode, or its directory [default: $RENODE, the PATH, the usual places]
     #[arg(long, value_name = "PATH")]
     renode: Option<PathBuf>,
 
@@ -48,11 +44,11 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
 
-    /// Start the board in Renode, its line on a TCP socket, and leave it to you
+    /// Start the board in Renode, its line on a TCP socket, with Renode's monitor on the terminal
     #[arg(long)]
     interactive: bool,
 
-    /// What is in the first slot of --interactive: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// The module in the first slot of --interactive: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[arg(
         long,
         value_name = "NAME",
@@ -66,49 +62,43 @@ pub struct Options {
     dip: u8,
 
     /// The line's TCP port of --interactive
-    #[arg(long, value_name = "N", default_value_t = PORT, requires = "interactive", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3456, requires = "interactive", value_parser = clap::value_parser!(u16).range(1..))]
     port: u16,
 }
 
 /// `cargo xtask renode`.
-///
-/// # Errors
-///
-/// When there is no Renode, or none new enough; when the image does not build; when a test failed.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    // Before the build: without Renode there is nothing to build for.
-    let renode = Renode::find(options.renode.as_deref(), &find::Surroundings::of_process())?;
+    // Before the build, which is of no use without Renode.
+    let renode = Renode::find(options.renode.as_deref(), &find::Places::of_process()?)?;
     eprintln!("{renode}");
+    let board = options.build.board;
     let elf = match &options.elf {
         Some(elf) if !elf.is_file() => {
-            let what = format!("there is no image {}", elf.display());
-            return Err(Failure::asked(what));
+            return Err(usage(format!("there is no image {}", elf.display())));
         }
-        Some(elf) => absolute(elf)?,
-        None => build::image(workspace, options.build.board)?.elf,
+        Some(elf) => std::path::absolute(elf)?,
+        None => build::image(workspace, board)?.elf,
     };
     let bench = Bench {
         directory: workspace.root().join(DIRECTORY),
-        output: workspace
-            .target()
-            .join("renode")
-            .join(options.build.board.name),
-        board: options.build.board,
+        output: workspace.target().join("renode").join(board.name),
+        board,
         renode,
         elf,
     };
     if options.interactive {
         return live::interact(&bench, options.module, options.dip, options.port);
     }
-    let conformance = live::suite(workspace)?;
-    bench.run(&conformance)
+    let conformance = workspace.program("conformance", "modio-conformance")?;
+    let rebot = checks::python(workspace)?;
+    bench.run(&conformance, &rebot)
 }
 
 /// Everything that a run in Renode needs.
 struct Bench {
     /// The project's files for Renode.
     directory: PathBuf,
-    /// Where results go.
+    /// Directory of the results.
     output: PathBuf,
     board: &'static Board,
     renode: Renode,
@@ -116,40 +106,34 @@ struct Bench {
 }
 
 impl Bench {
-    /// Runs the suites in Renode and then `conformance`, the program, and sums both up.
-    fn run(&self, conformance: &Path) -> Result<()> {
-        processes::end_on_signal()?;
-        // Results of another run would be taken for this one's.
+    /// Runs the suites in Renode and then the program `conformance`, and writes a summary of both.
+    fn run(&self, conformance: &Path, python: &Path) -> Result<()> {
+        group::end_on_signal()?;
+        // Results of another run would be mistaken for those of this one.
         let _ = fs::remove_dir_all(&self.output);
-        fs::create_dir_all(&self.output).map_err(|error| {
-            Failure::new(format!("cannot make {}: {error}", self.output.display()))
-        })?;
-        let begin = Instant::now();
-        let mut steps = Steps::default();
-        let mut ended = Vec::new();
-        let mut step = |name: String, run: &dyn Fn() -> Result<()>| {
-            steps.run(&name, || {
-                let begin = Instant::now();
-                let outcome = Outcome::from(run());
-                say!("{name}: {} s", begin.elapsed().as_secs());
-                ended.push((name.clone(), outcome.clone(), begin.elapsed()));
-                outcome
-            });
-        };
-        step("suites in Renode".to_owned(), &|| suites::run(self));
+        fs::create_dir_all(&self.output)?;
+        let mut done = vec![steps::timed("suites", "suites in Renode", true, || {
+            suites::run(self, python)
+        })];
         for module in Module::ALL {
-            step(format!("conformance in Renode, {module}"), &|| {
+            let name = format!("conformance-{module}");
+            let what = format!("conformance in Renode, {module}");
+            done.push(steps::timed(&name, &what, true, || {
                 live::conformance(self, module, conformance)
-            });
+            }));
         }
-        report::summary(&self.output, &self.renode, &ended)?;
+        let summary = self.summary(&done);
+        fs::write(self.output.join("summary.json"), format!("{summary:#}\n"))?;
         say!("\nresults: {}", self.output.display());
-        say!("the whole run took {} s", begin.elapsed().as_secs());
-        steps.finish()
+        steps::finish(&done)
     }
-}
 
-fn absolute(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path)
-        .map_err(|error| Failure::asked(format!("{}: {error}", path.display())))
+    /// Returns the version of Renode, and the outcome and duration of every step.
+    fn summary(&self, done: &[steps::Done]) -> Value {
+        let steps = done.iter().map(|(name, outcome, took)| {
+            let (word, why) = outcome.words();
+            json!({ "step": name, "outcome": word.to_lowercase(), "why": why, "seconds": took.as_secs_f64() })
+        });
+        json!({ "renode": self.renode.version.to_string(), "steps": steps.collect::<Vec<_>>() })
+    }
 }

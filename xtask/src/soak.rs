@@ -1,46 +1,31 @@
-//! `cargo xtask soak`: a million frames, good and damaged, to the release image in simulation, or hours of virtual time.
-//!
-//! The tests are `noise` and `long_run` of `tools/sim/tests/image`, which `cargo xtask test` runs with fewer frames and
-//! for seconds.
+//! `cargo xtask soak` and `cargo xtask matrix`: longer runs of tests that `cargo xtask test` runs too, with fewer frames,
+//! for seconds, and with chosen cases.
 
+use anyhow::Result;
 use register_map::board::MODIO_02;
 
 use crate::workspace::Workspace;
-use crate::{Result, build, command, test};
+use crate::{build, command, test};
 
-/// How many frames the test sends: read by it.
-const FRAMES: &str = "MODIO_SOAK_FRAMES";
-/// How many hours pass: read by the test.
-const HOURS: &str = "MODIO_SOAK_HOURS";
-
-/// How long to go on.
+/// How long to run.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    /// So many frames
+    /// Number of frames to send
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     frames: u64,
 
-    /// Instead of frames without pause: one request every second for so many hours of virtual time, such as 24
+    /// Instead of frames without pause: hours of virtual time, such as 24, with a request every second
     #[arg(long, conflicts_with = "frames", value_parser = hours)]
     hours: Option<f64>,
 
     /// Corner of the part: nominal, slow or fast
-    #[arg(long, default_value = test::NOMINAL, value_parser = corner)]
+    #[arg(long, default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
     corner: String,
 }
 
-/// A corner by its name.
-fn corner(name: &str) -> std::result::Result<String, String> {
-    if name == test::NOMINAL || test::CORNERS.contains(&name) {
-        Ok(name.to_owned())
-    } else {
-        Err("nominal, slow or fast".to_owned())
-    }
-}
-
-/// A number of hours.
-fn hours(text: &str) -> std::result::Result<f64, String> {
+/// Parses a number of hours.
+fn hours(text: &str) -> Result<f64, String> {
     let hours: f64 = text.parse().map_err(|_| "not a number of hours")?;
     // Virtual time ends after 213 days.
     if (0.01..=2400.0).contains(&hours) {
@@ -50,27 +35,51 @@ fn hours(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
-/// `cargo xtask soak`.
-///
-/// # Errors
-///
-/// When image or simulator cannot be built, the image loses a good frame or takes a bad one, or memory grows.
+/// `cargo xtask soak`: tests `noise` and `long_run` of `tools/sim/tests/image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    let frames = options.frames.to_string();
+    let hours = options.hours.map(|hours| hours.to_string());
+    let (name, variable, value) = match &hours {
+        Some(hours) => (
+            "long_run::an_input_changes_and_is_read_every_second_for_hours",
+            "MODIO_SOAK_HOURS",
+            hours,
+        ),
+        None => ("noise::soak", "MODIO_SOAK_FRAMES", &frames),
+    };
+    one_test(
+        workspace,
+        &["sim"],
+        name,
+        &[(variable, value), (test::CORNER, &options.corner)],
+    )
+}
+
+/// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, the test
+/// `matrix` of `tools/conformance/tests/image`.
+pub fn matrix(workspace: &mut Workspace) -> Result<()> {
+    let name = "matrix::every_rate_and_format_conforms";
+    let every_case = [("MODIO_MATRIX", "every case")];
+    one_test(
+        workspace,
+        &["conformance", "--features", "sim"],
+        name,
+        &every_case,
+    )
+}
+
+fn one_test(
+    workspace: &mut Workspace,
+    package: &[&str],
+    name: &str,
+    variables: &[(&str, &str)],
+) -> Result<()> {
     let elf = build::image(workspace, &MODIO_02)?.elf;
     let mut cargo = workspace.cargo("test");
     // The simulator's core, crate rigless, declares a newer rustc than it needs.
-    cargo.args(["--quiet", "--ignore-rust-version", "--package", "sim"]);
-    cargo.args(["--test", "image", "--", "--include-ignored", "--nocapture"]);
-    cargo.env("MODIO_ELF", elf);
-    cargo.env(test::CORNER, &options.corner);
-    cargo.arg("--exact");
-    match options.hours {
-        Some(hours) => cargo
-            .arg("long_run::an_input_changes_and_is_read_every_second_for_hours")
-            .env(HOURS, hours.to_string()),
-        None => cargo
-            .arg("noise::soak")
-            .env(FRAMES, options.frames.to_string()),
-    };
+    cargo.args(["--quiet", "--ignore-rust-version", "--package"]);
+    cargo.args(package).args(["--test", "image", "--"]);
+    cargo.args(["--include-ignored", "--nocapture", "--exact", name]);
+    cargo.env("MODIO_ELF", elf).envs(variables.iter().copied());
     command::run(&mut cargo)
 }

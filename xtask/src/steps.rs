@@ -1,144 +1,259 @@
-//! Runs the steps of a check to the last, whatever fails on the way, and sums them up.
+//! The steps of `cargo xtask test` and `cargo xtask ci`: run to the last, whatever fails, and summed up.
 
-use std::fmt::Write as _;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
-use crate::{Failure, Result};
+use anyhow::{Result, anyhow, bail};
+use register_map::Board;
+
+use crate::error::{Missing, usage};
+use crate::table;
+use crate::workspace::Workspace;
+use crate::{build, steps};
 
 /// How a step ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// All it checks holds.
+    /// Everything was right.
     Passed,
-    /// Something does not hold: what.
+    /// What was wrong.
     Failed(String),
-    /// It could not be tried here: why.
+    /// Why the step could not be run on this machine.
     Skipped(String),
 }
 
-impl From<Result<()>> for Outcome {
-    fn from(result: Result<()>) -> Self {
+impl Outcome {
+    fn new(result: Result<()>, strict: bool) -> Self {
         match result {
             Ok(()) => Self::Passed,
-            Err(failure) => Self::Failed(failure.to_string()),
+            Err(error) if error.is::<Missing>() && !strict => Self::Skipped(format!("{error:#}")),
+            Err(error) => Self::Failed(format!("{error:#}")),
+        }
+    }
+
+    /// The word for it and the reason.
+    pub fn words(&self) -> (&'static str, &str) {
+        match self {
+            Self::Passed => ("passed", ""),
+            Self::Failed(why) => ("FAILED", why),
+            Self::Skipped(why) => ("skipped", why),
         }
     }
 }
 
-impl Outcome {
-    /// The outcome of a step whose tool is missing: failed when `strict`, as in CI.
-    #[must_use]
-    pub fn missing(what: &Failure, strict: bool) -> Self {
-        if strict {
-            Self::Failed(what.to_string())
-        } else {
-            Self::Skipped(what.to_string())
+/// What the steps of a run share.
+pub struct Bench<'a> {
+    /// The project on this machine.
+    pub workspace: &'a mut Workspace,
+    /// Whether host tests leave out the simulator.
+    pub host: bool,
+    images: BTreeMap<&'static str, Result<PathBuf, String>>,
+}
+
+impl<'a> Bench<'a> {
+    /// Nothing is built yet.
+    pub fn new(workspace: &'a mut Workspace, host: bool) -> Self {
+        Self {
+            workspace,
+            host,
+            images: BTreeMap::new(),
+        }
+    }
+
+    /// Returns the image of a board, which the first step that needs it builds.
+    pub fn image(&mut self, board: &'static Board) -> Result<PathBuf> {
+        let image = self.images.entry(board.name).or_insert_with(|| {
+            let built = build::image(self.workspace, board);
+            built
+                .map(|image| image.elf)
+                .map_err(|error| format!("{error:#}"))
+        });
+        let image = image.clone();
+        image.map_err(|why| anyhow!("no image of the {board}: {why}"))
+    }
+}
+
+type Run = Box<dyn Fn(&mut Bench) -> Result<()>>;
+
+/// Which command runs a step when no step is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum In {
+    /// `cargo xtask test --host`, and the other two.
+    Host,
+    /// `cargo xtask test` and `cargo xtask ci`.
+    Test,
+    /// `cargo xtask ci` only.
+    Ci,
+}
+
+/// A step.
+pub struct Step {
+    /// Its short name, which does not change.
+    pub name: String,
+    /// Which command runs it.
+    pub part_of: In,
+    what: String,
+    run: Run,
+}
+
+impl Step {
+    /// A step by its name, what it does, and how.
+    pub fn new(
+        part_of: In,
+        name: impl Into<String>,
+        what: impl Into<String>,
+        run: impl Fn(&mut Bench) -> Result<()> + 'static,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            part_of,
+            what: what.into(),
+            run: Box::new(run),
         }
     }
 }
 
-/// The steps run so far.
-#[derive(Debug, Default)]
-pub struct Steps {
-    done: Vec<(String, Outcome)>,
+/// Returns the short name of a board in names of steps: `02` for modio-02.
+pub fn short(board: &Board) -> &'static str {
+    board.name.rsplit('-').next().unwrap_or(board.name)
 }
 
-impl Steps {
-    /// Runs a step under its name.
-    pub fn run(&mut self, name: &str, step: impl FnOnce() -> Outcome) {
-        eprintln!("==> {name}");
-        let outcome = step();
-        match &outcome {
-            Outcome::Passed => {}
-            Outcome::Failed(why) => eprintln!("==> {name} failed: {why}"),
-            Outcome::Skipped(why) => eprintln!("==> {name} skipped: {why}"),
-        }
-        self.done.push((name.to_owned(), outcome));
+/// Returns the steps of these names, in the order of `all`, or without names those of the command.
+pub fn chosen(all: Vec<Step>, names: &[String], command: In) -> Result<Vec<Step>> {
+    if let Some(name) = names
+        .iter()
+        .find(|name| !all.iter().any(|step| step.name == **name))
+    {
+        return Err(usage(format!("no step {name:?}; --list shows the steps")));
     }
+    let wanted = |step: &Step| match names {
+        [] => step.part_of <= command,
+        names => names.contains(&step.name),
+    };
+    Ok(all.into_iter().filter(wanted).collect())
+}
 
-    fn count(&self, is: fn(&Outcome) -> bool) -> usize {
-        self.done.iter().filter(|(_, outcome)| is(outcome)).count()
+/// Prints the names of the steps.
+pub fn list(all: &[Step]) {
+    let mut table = table::new(["step", "runs in", "what"]);
+    for step in all {
+        let part_of = match step.part_of {
+            In::Host => "test --host, test, ci",
+            In::Test => "test, ci",
+            In::Ci => "ci",
+        };
+        table.add_row([&step.name, part_of, &step.what]);
     }
+    say!("{}", table::text(&table));
+}
 
-    /// The table of all steps, and the line `N passed, N failed, N skipped` below it.
-    #[must_use]
-    pub fn summary(&self) -> String {
-        let width = self
-            .done
-            .iter()
-            .map(|(name, _)| name.len())
-            .max()
-            .unwrap_or(0);
-        let mut text = String::new();
-        for (name, outcome) in &self.done {
-            let (state, why) = match outcome {
-                Outcome::Passed => ("passed", ""),
-                Outcome::Failed(why) => ("FAILED", why.as_str()),
-                Outcome::Skipped(why) => ("skipped", why.as_str()),
-            };
-            let line = format!("{name:<width$}  {state:<7}  {why}");
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}", line.trim_end());
-        }
-        let passed = self.count(|outcome| matches!(outcome, Outcome::Passed));
-        let failed = self.count(|outcome| matches!(outcome, Outcome::Failed(_)));
-        let skipped = self.count(|outcome| matches!(outcome, Outcome::Skipped(_)));
-        let _ = write!(text, "{passed} passed, {failed} failed, {skipped} skipped");
-        text
+/// Runs steps, those that lack a tool too when not `strict`, and prints a summary.
+pub fn run(all: &[Step], bench: &mut Bench, strict: bool) -> Result<()> {
+    let mut done = Vec::new();
+    for step in all {
+        done.push(timed(&step.name, &step.what, strict, || (step.run)(bench)));
     }
+    steps::finish(&done)
+}
 
-    /// Prints the summary.
-    ///
-    /// # Errors
-    ///
-    /// When a step failed: the names of those that did.
-    pub fn finish(&self) -> Result<()> {
-        say!("\n{}", self.summary());
-        let failed: Vec<&str> = self
-            .done
-            .iter()
-            .filter(|(_, outcome)| matches!(outcome, Outcome::Failed(_)))
-            .map(|(name, _)| name.as_str())
-            .collect();
-        if failed.is_empty() {
-            Ok(())
-        } else {
-            Err(Failure::new(format!("failed: {}", failed.join(", "))))
-        }
+/// A step that has been run: name, outcome, and duration.
+pub type Done = (String, Outcome, Duration);
+
+/// Runs one step and says how it ended.
+pub fn timed(name: &str, what: &str, strict: bool, run: impl FnOnce() -> Result<()>) -> Done {
+    eprintln!("==> {name}: {what}");
+    let begin = Instant::now();
+    let outcome = Outcome::new(run(), strict);
+    let took = begin.elapsed();
+    match outcome.words() {
+        ("passed", _) => {}
+        (word, why) => eprintln!("==> {name} {word}: {why}"),
     }
+    (name.to_owned(), outcome, took)
+}
+
+/// Prints the table of steps, and the line `N passed, N failed, N skipped` after it.
+pub fn finish(done: &[Done]) -> Result<()> {
+    say!("\n{}", summary(done));
+    let failed = |done: &&Done| matches!(done.1, Outcome::Failed(_));
+    let failed: Vec<_> = done
+        .iter()
+        .filter(failed)
+        .map(|done| done.0.as_str())
+        .collect();
+    if !failed.is_empty() {
+        bail!("failed: {}", failed.join(", "));
+    }
+    Ok(())
+}
+
+fn summary(done: &[Done]) -> String {
+    let mut table = table::new(["step", "outcome", "time", "why"]);
+    for (name, outcome, took) in done {
+        let (word, why) = outcome.words();
+        table.add_row([name, word, &format!("{} s", took.as_secs()), why]);
+    }
+    let count = |word| done.iter().filter(|done| done.1.words().0 == word).count();
+    let [passed, failed, skipped] = ["passed", "FAILED", "skipped"].map(count);
+    let table = table::text(&table);
+    format!("{table}\n{passed} passed, {failed} failed, {skipped} skipped")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn every_step_runs_and_is_summed_up() {
-        let mut steps = Steps::default();
-        let mut ran = 0;
-        steps.run("one", || {
-            ran += 1;
-            Outcome::Passed
-        });
-        steps.run("two", || Outcome::from(Err(Failure::new("broken"))));
-        steps.run("three", || Outcome::Skipped("no Python".to_owned()));
-        steps.run("four", || {
-            ran += 1;
-            Outcome::Passed
-        });
-        assert_eq!(ran, 2, "a failure stops nothing");
-        let expected = "one    passed\n\
-                        two    FAILED   broken\n\
-                        three  skipped  no Python\n\
-                        four   passed\n\
-                        2 passed, 1 failed, 1 skipped";
-        assert_eq!(steps.summary(), expected);
-        assert_eq!(steps.finish().unwrap_err().to_string(), "failed: two");
+    fn done(name: &str, result: Result<()>) -> Done {
+        (
+            name.to_owned(),
+            Outcome::new(result, false),
+            Duration::from_secs(2),
+        )
     }
 
     #[test]
-    fn skipped_steps_are_no_failure() {
-        let mut steps = Steps::default();
-        steps.run("one", || Outcome::Skipped("no Python".to_owned()));
-        assert_eq!(steps.finish(), Ok(()));
+    fn summary_counts_and_failed_steps_are_an_error() {
+        let skipped = done("two", Err(Missing("no Python".to_owned()).into()));
+        finish(&[done("one", Ok(())), skipped.clone()]).unwrap();
+        let all = [
+            done("one", Ok(())),
+            skipped,
+            done("three", Err(anyhow!("broken"))),
+        ];
+        let text = summary(&all);
+        assert!(text.ends_with("\n1 passed, 1 failed, 1 skipped"), "{text}");
+        assert!(text.contains("FAILED") && text.contains("broken"), "{text}");
+        let error = finish(&all).unwrap_err().to_string();
+        assert_eq!(error, "failed: three");
+    }
+
+    #[test]
+    fn missing_tool_fails_when_strict() {
+        let missing = || Err(Missing("no Python".to_owned()).into());
+        assert!(matches!(Outcome::new(missing(), true), Outcome::Failed(_)));
+        assert!(matches!(
+            Outcome::new(missing(), false),
+            Outcome::Skipped(_)
+        ));
+    }
+
+    #[test]
+    fn steps_are_chosen_by_command_or_name() {
+        let all = || {
+            let step = |part_of, name: &str| Step::new(part_of, name, "", |_| Ok(()));
+            vec![step(In::Ci, "a"), step(In::Host, "b"), step(In::Test, "c")]
+        };
+        let names = |names: &[&str], command| {
+            let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+            let chosen = chosen(all(), &names, command);
+            chosen.map(|steps| steps.into_iter().map(|step| step.name).collect::<String>())
+        };
+        assert_eq!(names(&[], In::Host).unwrap(), "b");
+        assert_eq!(names(&[], In::Test).unwrap(), "bc");
+        assert_eq!(names(&[], In::Ci).unwrap(), "abc");
+        assert_eq!(names(&["c", "a"], In::Test).unwrap(), "ac");
+        let error = names(&["d"], In::Test).unwrap_err();
+        assert!(error.is::<crate::error::Usage>(), "{error}");
     }
 }

@@ -1,113 +1,119 @@
-//! Where the project and its build products are, and which toolchain was found for the target.
+//! The project on this machine: where it and its build products are, and how cargo is called.
 
+use std::collections::BTreeMap;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
-use crate::toolchain::{self, Need, Way};
-use crate::{Failure, Result, command};
+use anyhow::{Context as _, Result, bail};
+use cargo_metadata::{Artifact, Message, MetadataCommand};
+
+use crate::command;
+use crate::toolchain::{self, Way};
 
 /// The project on this machine.
 #[derive(Debug)]
 pub struct Workspace {
     root: PathBuf,
     target: PathBuf,
-    way: Option<(Need, Way)>,
+    way: Option<Way>,
+    /// Whether Debian packages that are missing may be installed.
+    pub install: bool,
 }
 
 impl Workspace {
     /// Finds the project that xtask was built from, and cargo's target directory.
-    ///
-    /// # Errors
-    ///
-    /// When cargo cannot be asked.
     pub fn open() -> Result<Self> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let root = root.parent().unwrap_or(root).to_owned();
-        let text = command::read(cargo_in(&root, "metadata").args([
-            "--no-deps",
-            "--offline",
-            "--format-version",
-            "1",
-        ]))?;
-        let target = target_directory(&text)
-            .ok_or_else(|| Failure::new("`cargo metadata` names no target directory"))?;
+        let offline = ["--offline".to_owned()];
+        let mut metadata = MetadataCommand::new();
+        metadata.current_dir(&root).no_deps().other_options(offline);
         Ok(Self {
+            target: metadata.exec()?.target_directory.into(),
             root,
-            target,
             way: None,
+            install: false,
         })
     }
 
     /// The directory of the root Cargo.toml.
-    #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
     /// Cargo's target directory.
-    #[must_use]
     pub fn target(&self) -> &Path {
         &self.target
     }
 
-    /// Cargo for the host, run at the root.
-    #[must_use]
+    /// Returns cargo for the host, run at the root.
     pub fn cargo(&self, subcommand: &str) -> Command {
-        cargo_in(&self.root, subcommand)
+        let mut cargo = Command::new(toolchain::cargo());
+        cargo.current_dir(&self.root).arg(subcommand);
+        cargo
     }
 
-    /// Cargo for the microcontroller, run at the root. The way to compile for it is looked for once
-    /// and told in one line on stderr.
-    ///
-    /// # Errors
-    ///
-    /// When this machine has no way, with what to install.
-    pub fn target_cargo(&mut self, need: Need, subcommand: &str) -> Result<Command> {
+    /// Returns cargo for the microcontroller, run at the root. The way to compile for it is searched once.
+    pub fn target_cargo(&mut self, subcommand: &str) -> Result<Command> {
         let way = match self.way {
-            Some((found, way)) if found >= need => way,
-            _ => {
-                let mut machine = toolchain::ThisMachine::new(&self.root);
-                let way = toolchain::find(&mut machine, need, &mut |line| eprintln!("{line}"))?;
-                self.way = Some((need, way));
-                way
-            }
+            Some(way) => way,
+            None => *self.way.insert(toolchain::find(&self.root, self.install)?),
         };
-        let mut command = way.cargo(subcommand);
-        command.current_dir(&self.root);
-        Ok(command)
+        let mut cargo = way.cargo(subcommand);
+        cargo.current_dir(&self.root);
+        Ok(cargo)
+    }
+
+    /// Builds a program of this workspace for the host, and returns where it is.
+    pub fn program(&self, package: &str, program: &str) -> Result<PathBuf> {
+        let mut cargo = self.cargo("build");
+        // The simulator's core, crate rigless, declares a newer rustc than it needs.
+        cargo.args(["--ignore-rust-version", "--package", package]);
+        cargo.args(["--bin", program, MESSAGES]);
+        executable(&artifacts(&mut cargo)?, program)
     }
 }
 
-fn cargo_in(root: &Path, subcommand: &str) -> Command {
-    // The cargo that runs xtask, so that both use the same toolchain.
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(root).arg(subcommand);
-    command
+/// The option with which cargo reports what it builds.
+pub const MESSAGES: &str = "--message-format=json-render-diagnostics";
+
+/// Runs a build of cargo with the option [`MESSAGES`], and returns what it has made.
+pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
+    let child = cargo.stdout(Stdio::piped()).spawn();
+    let mut child = child.map_err(|error| command::no_start(cargo, error))?;
+    let stdout = child.stdout.take().context("cargo has no output")?;
+    let mut artifacts = Vec::new();
+    for message in Message::parse_stream(BufReader::new(stdout)) {
+        if let Message::CompilerArtifact(artifact) = message? {
+            artifacts.push(artifact);
+        }
+    }
+    let status = child.wait()?;
+    if !status.success() {
+        bail!("`{}` failed ({status})", command::shown(cargo));
+    }
+    Ok(artifacts)
 }
 
-fn target_directory(metadata: &str) -> Option<PathBuf> {
-    let metadata: serde_json::Value = serde_json::from_str(metadata).ok()?;
-    Some(metadata.get("target_directory")?.as_str()?.into())
+/// Returns the file of a program that was built.
+pub fn executable(artifacts: &[Artifact], program: &str) -> Result<PathBuf> {
+    // A library may have the same name.
+    let mut built = artifacts
+        .iter()
+        .filter(|built| built.target.name == program);
+    let file = built.find_map(|built| built.executable.clone());
+    let file = file.with_context(|| format!("cargo has built no program {program}"))?;
+    Ok(file.into())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_target_directory_is_where_cargo_says() {
-        assert_eq!(
-            target_directory(r#"{"packages":[],"target_directory":"/x/target"}"#),
-            Some("/x/target".into())
-        );
-        assert_eq!(target_directory("{}"), None);
-        assert_eq!(target_directory("cargo: not found"), None);
-    }
-
-    #[test]
-    fn the_project_is_found() {
-        let workspace = Workspace::open().unwrap();
-        assert!(workspace.root().join("xtask/src/workspace.rs").is_file());
-        assert!(workspace.target().is_absolute());
-    }
+/// Returns a field of the packages in a Cargo.lock, by name and version. Packages without the field are left out.
+pub fn locked(lock: &Path, field: &str) -> Result<BTreeMap<(String, String), String>> {
+    let table: toml::Table = fs_err::read_to_string(lock)?.parse()?;
+    let packages = table.get("package").and_then(toml::Value::as_array);
+    let fields = packages.into_iter().flatten().filter_map(|package| {
+        let text = |name| Some(package.get(name)?.as_str()?.to_owned());
+        Some(((text("name")?, text("version")?), text(field)?))
+    });
+    Ok(fields.collect())
 }

@@ -1,38 +1,71 @@
-//! The figures as tables for a terminal.
+//! The figures as tables for a terminal, and their budgets.
 
 use std::fmt::Write as _;
 
 use serde_json::Value;
 
-/// What the design allows: instructions from t3.5 to the first byte, and for a byte's interrupt in RTU
-/// mode, the CRC in it. In ASCII mode, where a byte is two characters, it allows nothing in particular.
+use crate::table;
+
+/// The columns of a request: key, heading.
+pub const COLUMNS: [(&str, &str); 7] = [
+    ("to_first_byte", "first byte"),
+    ("to_second_byte", "second byte"),
+    ("byte_in", "byte in"),
+    ("byte_out", "byte out"),
+    ("reply_end", "end"),
+    ("transaction", "in all"),
+    ("server", "server"),
+];
+
+/// Instructions that the design allows from t3.5 to the first byte, and for a byte's interrupt in RTU mode, with the
+/// CRC. For ASCII mode, where a byte is two characters, the design has no budget of a byte.
 const TO_FIRST_BYTE: u64 = 400;
 const BYTE: u64 = 80;
-const ASCII: &str = "ASCII";
 
-/// What it allows the server with every function and two buffers, in bytes of flash and RAM.
+/// Bytes of flash and RAM that the design allows the server with every function and two buffers.
 const SERVER: [(&str, u64); 2] = [("flash", 9216), ("ram", 900)];
 
-/// How long locks and other handlers may hold off an interrupt of the line, in microseconds, at the nominal and at
-/// the slow corner, and the tasks that it is about. A character at 921600 bit/s takes 10.8 us.
+/// Longest time that locks and other handlers may delay an interrupt of the line, in microseconds, at the nominal and at
+/// the slow corner, and the tasks of these interrupts. A character at 921600 bit/s takes 10.8 us.
 const LINE_WAIT_US: f64 = 5.0;
 const SLOW_LINE_WAIT_US: f64 = 8.5;
-const SLOW: &str = "slow";
 const LINE_TASKS: [&str; 2] = ["byte", "frame gap"];
 
-/// The tables of a report.
+/// Instructions of FreeMODBUS for a whole transaction without a UART driver, from what was measured on a Cortex-M3 when
+/// modio was designed: 41 for a byte in; from t3.5 to the first byte 415 (one register), 3400 (125) and 3000 (120
+/// written); and 37 for each byte out after that.
+const FREEMODBUS: [(&str, u64); 5] = [
+    ("03 read holding registers, 1", 8 * 41 + 415 + 6 * 37),
+    ("03 read holding registers, 125", 8 * 41 + 3400 + 254 * 37),
+    ("04 read input registers, 1", 8 * 41 + 415 + 6 * 37),
+    ("04 read input registers, 125", 8 * 41 + 3400 + 254 * 37),
+    ("10 write multiple registers, 123", 255 * 41 + 3000 + 7 * 37),
+];
+
+const LEGEND: &str = "\
+first and second byte: from the expiry of t3.5 until it is in the data register. end: the interrupt that switches the
+driver off. in all: the line's interrupts, from the request's first byte to the end; server: of these, without RTIC and
+the drivers of UART and timer. Rivals: from complete frame to complete response in memory; -: no answer, or no such
+function.";
+
+/// Returns the tables of a report.
 pub fn of(report: &Value) -> String {
-    let mut text = String::new();
-    requests(report, &mut text);
-    load(report, &mut text);
-    image(report, &mut text);
-    for over in over_budget(report) {
-        line(&mut text, &format!("over budget: {over}"));
-    }
-    text
+    let over = over_budget(report).into_iter();
+    let over = over.map(|over| format!("over budget: {over}\n"));
+    format!(
+        "{}\n{LEGEND}\nbudgets: {TO_FIRST_BYTE} to the first byte, {BYTE} for a byte's interrupt in RTU mode. The \
+         server's column for FreeMODBUS:\n{}\n\n{}\n\n{}\n{}",
+        requests(report),
+        freemodbus(),
+        load(report),
+        image(report),
+        over.collect::<String>()
+    )
+    .trim_end()
+    .to_owned()
 }
 
-/// Every figure that is over its budget.
+/// Returns every figure that is over its budget.
 pub fn over_budget(report: &Value) -> Vec<String> {
     let mut over = Vec::new();
     for row in rows(report, "requests") {
@@ -45,17 +78,17 @@ pub fn over_budget(report: &Value) -> Vec<String> {
         }
     }
     for row in rows(report, "load") {
-        for wait in rows(row, "longest_waits_us") {
-            let task = wait[0].as_str().unwrap_or_default();
-            let us = wait[1].as_f64().unwrap_or_default();
-            let most = if row["corner"] == SLOW {
-                SLOW_LINE_WAIT_US
-            } else {
-                LINE_WAIT_US
-            };
+        let most = if is_slow(row) {
+            SLOW_LINE_WAIT_US
+        } else {
+            LINE_WAIT_US
+        };
+        for (task, us) in waits(row) {
             if LINE_TASKS.iter().any(|name| task.starts_with(name)) && us > most {
-                let name = load_name(row);
-                over.push(format!("{name}: {task} waits {us:.1} us of {most}"));
+                over.push(format!(
+                    "{}: {task} waits {us:.1} us of {most}",
+                    load_name(row)
+                ));
             }
         }
     }
@@ -68,149 +101,105 @@ pub fn over_budget(report: &Value) -> Vec<String> {
     over
 }
 
-fn rows<'a>(report: &'a Value, name: &str) -> impl Iterator<Item = &'a Value> {
-    report[name].as_array().into_iter().flatten()
-}
-
-fn line(text: &mut String, cells: &str) {
-    // A String takes everything.
-    let _ = writeln!(text, "{}", cells.trim_end());
-}
-
-/// What FreeMODBUS takes for a whole transaction, without a UART driver, made up of what was measured of it on
-/// a Cortex-M3 when modio was designed: 41 for a byte in; from t3.5 to the first byte 415 (one register), 3400
-/// (125) and 3000 (120 written); and 37 for each byte out after that.
-const FREEMODBUS: [(&str, u64); 5] = [
-    ("03 read holding registers, 1", 8 * 41 + 415 + 6 * 37),
-    ("03 read holding registers, 125", 8 * 41 + 3400 + 254 * 37),
-    ("04 read input registers, 1", 8 * 41 + 415 + 6 * 37),
-    ("04 read input registers, 125", 8 * 41 + 3400 + 254 * 37),
-    ("10 write multiple registers, 123", 255 * 41 + 3000 + 7 * 37),
-];
-
-/// The columns of a request: key, heading.
-const COLUMNS: [(&str, &str); 7] = [
-    ("to_first_byte", "first byte"),
-    ("to_second_byte", "second byte"),
-    ("byte_in", "byte in"),
-    ("byte_out", "byte out"),
-    ("reply_end", "end"),
-    ("transaction", "in all"),
-    ("server", "server"),
-];
-
-/// What a request may take in a column, where there is a budget.
+/// Returns the budget of a request in a column, where there is one.
 fn budget(key: &str, request: &str) -> Option<u64> {
     match key {
         "to_first_byte" => Some(TO_FIRST_BYTE),
-        "byte_in" | "byte_out" if request.starts_with(ASCII) => None,
+        "byte_in" | "byte_out" if request.starts_with("ASCII") => None,
         "byte_in" | "byte_out" | "reply_end" => Some(BYTE),
         _ => None,
     }
 }
 
-fn requests(report: &Value, text: &mut String) {
-    let rivals: Vec<&String> = rows(report, "requests")
-        .next()
-        .and_then(|row| row["rivals"].as_object())
-        .map(|rivals| rivals.keys().collect())
-        .unwrap_or_default();
-    let mut head = format!("{:<42}", "instructions");
-    let headings = COLUMNS.iter().map(|(_, heading)| *heading);
-    for heading in headings.chain(rivals.iter().map(|rival| rival.as_str())) {
-        let _ = write!(head, " {heading:>11}");
-    }
-    line(text, &head);
-    for row in rows(report, "requests") {
-        let name = row["request"].as_str().unwrap_or_default();
-        let mut cells = format!("{name:<42}");
-        for (key, _) in COLUMNS {
-            let _ = write!(cells, " {:>11}", number(row[key].as_u64()));
-        }
-        for rival in &rivals {
-            let taken = row["rivals"][rival.as_str()].as_u64();
-            let _ = write!(cells, " {:>11}", number(taken));
-        }
-        line(text, &cells);
-    }
-    line(
-        text,
-        "first and second byte: from t3.5's expiry until it is in the data register. end: the driver's switching off.\n\
-         in all: the line's interrupts, from the request's first byte to the end; server: of these, without\n\
-         RTIC and the drivers of UART and timer. Rivals: from complete frame to complete response in memory;\n\
-         -: no answer, or no such function.",
-    );
-    line(
-        text,
-        &format!(
-            "budgets: {TO_FIRST_BYTE} to the first byte, {BYTE} for a byte's interrupt in RTU mode. The server's column \
-             for FreeMODBUS:"
-        ),
-    );
-    for (request, taken) in FREEMODBUS {
-        line(text, &format!("  {request:<40} {taken}"));
-    }
-    line(text, "");
+/// Returns the rows of a part of a report.
+pub fn rows<'a>(report: &'a Value, name: &str) -> impl Iterator<Item = &'a Value> {
+    report[name].as_array().into_iter().flatten()
 }
 
-fn number(value: Option<u64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+/// Returns the tasks of a load with their longest waits, in microseconds.
+fn waits(row: &Value) -> impl Iterator<Item = (&str, f64)> {
+    rows(row, "longest_waits_us").filter_map(|wait| Some((wait[0].as_str()?, wait[1].as_f64()?)))
 }
 
-/// The rate, the request, and the corner unless it is the nominal one.
+fn is_slow(row: &Value) -> bool {
+    row["corner"] == "slow"
+}
+
+/// Returns the name of a load: the rate, the request, and the corner unless it is the nominal one.
 pub fn load_name(row: &Value) -> String {
     let request = row["request"].as_str().unwrap_or_default();
-    let corner = if row["corner"] == SLOW {
-        ", slow corner"
-    } else {
-        ""
-    };
+    let corner = if is_slow(row) { ", slow corner" } else { "" };
     format!("{} bit/s, {request}{corner}", row["baud"])
 }
 
-fn load(report: &Value, text: &mut String) {
-    line(
-        text,
-        "requests back to back for a second      answered  awake   longest wait of an interrupt, us",
+fn number(value: &Value) -> String {
+    let value = value.as_u64();
+    value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+}
+
+fn requests(report: &Value) -> String {
+    let first = rows(report, "requests").next();
+    let rivals = first.and_then(|row| row["rivals"].as_object());
+    let rivals: Vec<&str> = rivals
+        .into_iter()
+        .flat_map(|rivals| rivals.keys().map(String::as_str))
+        .collect();
+    let headings = COLUMNS.map(|(_, heading)| heading);
+    let mut table = table::new(
+        ["instructions"]
+            .into_iter()
+            .chain(headings)
+            .chain(rivals.clone()),
     );
+    table::figures(&mut table);
+    for row in rows(report, "requests") {
+        let mut cells = vec![row["request"].as_str().unwrap_or_default().to_owned()];
+        cells.extend(COLUMNS.map(|(key, _)| number(&row[key])));
+        cells.extend(rivals.iter().map(|rival| number(&row["rivals"][rival])));
+        table.add_row(cells);
+    }
+    table::text(&table)
+}
+
+fn freemodbus() -> String {
+    let mut table = table::new(["FreeMODBUS", "server"]);
+    table::figures(&mut table);
+    table.add_rows(FREEMODBUS.map(|(request, taken)| [request.to_owned(), taken.to_string()]));
+    table::text(&table)
+}
+
+fn load(report: &Value) -> String {
+    let mut table = table::new([
+        "requests back to back for a second",
+        "answered",
+        "awake",
+        "longest wait of an interrupt, us",
+    ]);
     for row in rows(report, "load") {
-        let name = load_name(row);
-        let awake = row["awake_percent"].as_f64().unwrap_or_default();
-        let answered = number(row["answered"].as_u64());
-        let mut cells = format!("{name:<40} {answered:>7} {awake:>5.1} %  ");
-        for wait in rows(row, "longest_waits_us") {
-            let task = wait[0].as_str().unwrap_or_default();
-            let _ = write!(cells, " {task} {:.1}", wait[1].as_f64().unwrap_or_default());
+        let mut longest = String::new();
+        for (task, us) in waits(row) {
+            // Writing to a string cannot fail.
+            let _ = write!(longest, "{task} {us:.1} ");
         }
-        line(text, &cells);
+        let awake = row["awake_percent"].as_f64().unwrap_or_default();
+        let awake = format!("{awake:.1} %");
+        table.add_row([load_name(row), number(&row["answered"]), awake, longest]);
     }
-    line(text, "");
+    table::text(&table)
 }
 
-fn image(report: &Value, text: &mut String) {
-    let image = &report["image"];
-    line(
-        text,
-        "crate                                      flash     RAM",
-    );
-    for row in rows(image, "crates") {
-        let name = row["name"].as_str().unwrap_or_default();
-        line(text, &memory(name, row));
+fn image(report: &Value) -> String {
+    let mut table = table::new(["crate", "flash", "RAM"]);
+    table::figures(&mut table);
+    let mut add = |name: &str, row: &Value| {
+        table.add_row([name.to_owned(), number(&row["flash"]), number(&row["ram"])]);
+    };
+    for row in rows(&report["image"], "crates") {
+        add(row["name"].as_str().unwrap_or_default(), row);
     }
-    line(text, &memory("image", image));
-    let server = &report["server"];
-    line(
-        text,
-        &format!(
-            "{}    the server alone, with two buffers",
-            memory("modbus_server", server)
-        ),
-    );
-}
-
-fn memory(name: &str, row: &Value) -> String {
-    let (flash, ram) = (number(row["flash"].as_u64()), number(row["ram"].as_u64()));
-    format!("{name:<40} {flash:>7} {ram:>7}")
+    add("image", &report["image"]);
+    add("the server alone, with two buffers", &report["server"]);
+    table::text(&table)
 }
 
 #[cfg(test)]
@@ -219,48 +208,36 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn figures_budgets_and_rivals_are_shown() {
+    fn figures_rivals_and_exceeded_budgets_are_shown() {
         let report = json!({
             "requests": [
-                { "request": "03 one", "to_first_byte": 326, "to_second_byte": 700, "transaction": 2000, "byte_in": 80, "byte_out": 81, "reply_end": 70,
-                  "server": 965, "rivals": { "rmodbus": 664, "modbus-core": null } },
-                { "request": "03 read holding registers, 1", "server": 965 },
+                { "request": "03-one", "to_first_byte": 326, "to_second_byte": 700, "transaction": 2000,
+                  "byte_in": 80, "byte_out": 81, "reply_end": 70, "server": 965,
+                  "rivals": { "rmodbus": 664, "modbus-core": null } },
                 { "request": "ASCII: 03 one", "to_first_byte": 401, "byte_in": 81 },
-                { "request": "03 read holding registers, 125", "server": 13_127 },
             ],
             "load": [{ "baud": 9600, "request": "03 one", "answered": 40, "awake_percent": 2.04,
                        "longest_waits_us": [["byte", 0.04], ["frame gap", 5.6], ["scan", 50.0]] }],
             "image": { "flash": 30_000, "ram": 3_000, "crates": [{ "name": "core", "flash": 500, "ram": 0 }] },
             "server": { "flash": 9216, "ram": 901 },
         });
+        assert_eq!(
+            over_budget(&report),
+            [
+                "03-one: byte out 81 of 80",
+                "ASCII: 03 one: first byte 401 of 400",
+                "9600 bit/s, 03 one: frame gap waits 5.6 us of 5",
+                "ram of the server 901 of 900",
+            ]
+        );
         let text = of(&report);
-        assert!(
-            text.contains("over budget: ram of the server 901 of 900"),
-            "{text}"
-        );
-        assert!(
-            text.contains("over budget: 9600 bit/s, 03 one: frame gap waits 5.6 us of 5"),
-            "{text}"
-        );
-        assert!(!text.contains("byte waits") && !text.contains("scan waits"));
-        assert!(!text.contains("flash of the server"), "{text}");
-        assert!(
-            text.contains("over budget: 03 one: byte out 81 of 80"),
-            "{text}"
-        );
-        assert!(!text.contains("byte in 80 of"), "{text}");
-        assert!(!text.contains("byte in 81 of"), "{text}");
-        assert!(
-            text.contains("over budget: ASCII: 03 one: first byte 401 of 400"),
-            "{text}"
-        );
         let row = text
             .lines()
-            .find(|line| line.starts_with("03 one"))
+            .find(|line| line.trim().starts_with("03-one"))
             .unwrap();
         let cells: Vec<_> = row.split_whitespace().collect();
         assert_eq!(
-            cells[2..],
+            cells[1..],
             ["326", "700", "80", "81", "70", "2000", "965", "-", "664"]
         );
         assert!(text.contains("2.0 %") && text.contains("30000"), "{text}");

@@ -1,19 +1,15 @@
 //! Flash as an Intel HEX file.
 
+use anyhow::{Context as _, Result};
 use ihex::Record;
 
 use crate::image::FLASH_BASE;
-use crate::{Failure, Result};
 
-/// Bytes in a data record: what every programmer takes.
+/// Bytes in a data record: a length that every programmer accepts.
 const BYTES: usize = 16;
 
-/// The file for these bytes from the beginning of flash on, and for where the program starts.
-///
-/// # Errors
-///
-/// When there is more than fits the addresses that flash can have.
-pub(super) fn file(flash: &[u8], entry: u32) -> Result<String> {
+/// Returns the file for these bytes from the first address of flash on, and for the address at which the program starts.
+pub fn file(flash: &[u8], entry: u32) -> Result<String> {
     let mut records = Vec::new();
     let mut upper = None;
     for (address, value) in (FLASH_BASE..).step_by(BYTES).zip(flash.chunks(BYTES)) {
@@ -29,8 +25,7 @@ pub(super) fn file(flash: &[u8], entry: u32) -> Result<String> {
     }
     records.push(Record::StartLinearAddress(entry));
     records.push(Record::EndOfFile);
-    ihex::create_object_file_representation(&records)
-        .map_err(|error| Failure::new(format!("no Intel HEX of the image: {error}")))
+    ihex::create_object_file_representation(&records).context("no Intel HEX of the image")
 }
 
 #[cfg(test)]
@@ -38,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again_at_its_addresses() {
+    fn written_bytes_are_read_back_at_their_addresses() {
         let flash: Vec<u8> = (0..0x1_0013_u32).map(|n| ((n * 7) >> 3) as u8).collect();
         let text = file(&flash, 0x0800_0131).unwrap();
         let mut back = Vec::new();

@@ -1,147 +1,99 @@
-//! Small images for tests, made with the writing half of crate `object`.
+//! Small images for tests.
 
-use object::write::elf::{FileHeader, ProgramHeader, SectionHeader, Sym, Writer};
+use object::build::elf::{Builder, SectionData};
 use object::{Endianness, elf};
 
-/// A load segment, which is a section at the same time.
-pub(crate) struct Segment<'a> {
-    pub(crate) load: u32,
-    pub(crate) run: u32,
-    pub(crate) data: &'a [u8],
-    /// Bytes in memory, at least as many as there are data.
-    pub(crate) size: u32,
+/// A load segment, which is a section at the same time: load address, run address, data, size in memory.
+pub type Segment<'a> = (u32, u32, &'a [u8], u32);
+
+/// A function or variable: name, address, size. The address of a function has the Thumb bit.
+pub type Symbol<'a> = (&'a str, u32, u32);
+
+/// Returns code or constants, used where they are loaded.
+pub fn code(address: u32, data: &[u8]) -> Segment<'_> {
+    (address, address, data, data.len() as u32)
 }
 
-impl<'a> Segment<'a> {
-    /// Code or constants, used where they are loaded.
-    pub(crate) fn at(address: u32, data: &'a [u8]) -> Self {
-        let size = u32::try_from(data.len()).unwrap();
-        Self {
-            load: address,
-            run: address,
-            data,
-            size,
-        }
-    }
-
-    fn name(&self) -> &'static [u8] {
-        match (self.data.is_empty(), self.load == self.run) {
-            (true, _) => b".bss",
-            (false, true) => b".text",
-            (false, false) => b".data",
-        }
-    }
-}
-
-/// A function or variable: name, address, size.
-pub(crate) type Symbol<'a> = (&'a str, u32, u32);
-
-/// An ELF file for an Arm core with these contents.
-pub(crate) fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let mut writer = Writer::new(Endianness::Little, false, &mut bytes);
-
-    writer.reserve_file_header();
-    writer.reserve_program_headers(u32::try_from(segments.len()).unwrap());
-    let offsets: Vec<usize> = segments
-        .iter()
-        .map(|segment| writer.reserve(segment.data.len(), 4))
-        .collect();
-    writer.reserve_null_section_index();
-    let sections: Vec<_> = segments
-        .iter()
-        .map(|segment| {
-            (
-                writer.add_section_name(segment.name()),
-                writer.reserve_section_index(),
-            )
-        })
-        .collect();
-    let names: Vec<_> = symbols
-        .iter()
-        .map(|symbol| writer.add_string(symbol.0.as_bytes()))
-        .collect();
-    writer.reserve_null_symbol_index();
-    symbols.iter().for_each(|_| {
-        writer.reserve_symbol_index(None);
-    });
-    writer.reserve_symtab_section_index();
-    writer.reserve_strtab_section_index();
-    writer.reserve_shstrtab_section_index();
-    writer.reserve_symtab();
-    writer.reserve_strtab();
-    writer.reserve_shstrtab();
-    writer.reserve_section_headers();
-
-    let header = FileHeader {
-        os_abi: elf::ELFOSABI_NONE,
-        abi_version: 0,
-        e_type: elf::ET_EXEC,
-        e_machine: elf::EM_ARM,
-        e_entry: 0,
-        e_flags: 0,
-    };
-    writer.write_file_header(&header).unwrap();
-    for (segment, offset) in segments.iter().zip(&offsets) {
-        writer.write_program_header(&ProgramHeader {
-            p_type: elf::PT_LOAD,
-            p_flags: elf::PF_R,
-            p_offset: *offset as u64,
-            p_vaddr: segment.run.into(),
-            p_paddr: segment.load.into(),
-            p_filesz: segment.data.len() as u64,
-            p_memsz: segment.size.into(),
-            p_align: 4,
-        });
-    }
-    for segment in segments {
-        writer.write_align(4);
-        writer.write(segment.data);
-    }
-    writer.write_null_symbol();
-    for (&(_, address, size), name) in symbols.iter().zip(names) {
-        let home = segments
-            .iter()
-            .position(|segment| (segment.run..segment.run + segment.size).contains(&address));
-        // A function's address has the Thumb bit.
-        let kind = if address & 1 == 1 {
-            elf::STT_FUNC
-        } else {
-            elf::STT_OBJECT
+/// Returns an ELF file for an Arm core with these contents.
+pub fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
+    let mut builder = Builder::new(Endianness::Little, false);
+    builder.header.e_type = elf::ET_EXEC;
+    builder.header.e_machine = elf::EM_ARM;
+    builder.header.e_phoff = 0x34;
+    let mut sections = Vec::new();
+    for &(load, run, data, size) in segments {
+        let section = builder.sections.add();
+        section.name = match (data.is_empty(), load == run) {
+            (true, _) => b".bss"[..].into(),
+            (false, true) => b".text"[..].into(),
+            (false, false) => b".data"[..].into(),
         };
-        writer.write_symbol(&Sym {
-            name: Some(name),
-            section: Some(sections[home.expect("a symbol in a segment")].1),
-            st_info: elf::STB_GLOBAL << 4 | kind,
-            st_other: 0,
-            st_shndx: 0,
-            st_value: address.into(),
-            st_size: size.into(),
-        });
+        section.sh_flags = elf::SHF_ALLOC.into();
+        section.sh_addr = run.into();
+        section.sh_addralign = 1;
+        section.sh_size = size.into();
+        if data.is_empty() {
+            section.sh_type = elf::SHT_NOBITS;
+            section.data = SectionData::UninitializedData(size.into());
+        } else {
+            section.sh_type = elf::SHT_PROGBITS;
+            section.data = SectionData::Data(data.into());
+        }
+        sections.push((section.id(), run..run.saturating_add(size)));
     }
-    writer.write_strtab();
-    writer.write_shstrtab();
-    writer.write_null_section_header();
-    for ((segment, offset), (name, _)) in segments.iter().zip(offsets).zip(sections) {
-        writer.write_section_header(&SectionHeader {
-            name: Some(name),
-            sh_type: if segment.data.is_empty() {
-                elf::SHT_NOBITS
+    for &(name, address, size) in symbols {
+        let home = sections.iter().find(|(_, range)| range.contains(&address));
+        let symbol = builder.symbols.add();
+        symbol.name = name.as_bytes().into();
+        symbol.section = Some(home.expect("a symbol in a segment").0);
+        symbol.set_st_info(
+            elf::STB_GLOBAL,
+            if address & 1 == 1 {
+                elf::STT_FUNC
             } else {
-                elf::SHT_PROGBITS
+                elf::STT_OBJECT
             },
-            sh_flags: elf::SHF_ALLOC.into(),
-            sh_addr: segment.run.into(),
-            sh_offset: offset as u64,
-            sh_size: segment.size.into(),
-            sh_link: 0,
-            sh_info: 0,
-            sh_addralign: 4,
-            sh_entsize: 0,
-        });
+        );
+        symbol.st_value = address.into();
+        symbol.st_size = size.into();
     }
-    writer.write_symtab_section_header(1);
-    writer.write_strtab_section_header();
-    writer.write_shstrtab_section_header();
+    for (name, kind) in [
+        (".symtab", SectionData::Symbol),
+        (".strtab", SectionData::String),
+        (".shstrtab", SectionData::SectionString),
+    ] {
+        let section = builder.sections.add();
+        section.name = name.as_bytes().into();
+        section.sh_type = if name == ".symtab" {
+            elf::SHT_SYMTAB
+        } else {
+            elf::SHT_STRTAB
+        };
+        section.sh_addralign = 1;
+        section.data = kind;
+    }
+    for _ in segments {
+        builder.segments.add().p_type = elf::PT_LOAD;
+    }
+    builder.set_section_sizes();
+    // Behind the file header and the program headers.
+    let mut offset = 0x34 + 0x20 * segments.len() as u64;
+    for ((section, _), &(_, _, data, _)) in sections.iter().zip(segments) {
+        builder.sections.get_mut(*section).sh_offset = offset;
+        offset += data.len() as u64;
+    }
+    for (segment, &(load, run, data, size)) in builder.segments.iter_mut().zip(segments) {
+        segment.p_paddr = load.into();
+        segment.p_vaddr = run.into();
+        segment.p_filesz = data.len() as u64;
+        segment.p_memsz = size.into();
+        segment.p_align = 1;
+    }
+    for ((section, _), segment) in sections.iter().zip(&mut builder.segments) {
+        segment.p_offset = builder.sections.get(*section).sh_offset;
+        segment.sections.push(*section);
+    }
+    let mut bytes = Vec::new();
+    builder.write(&mut bytes).unwrap();
     bytes
 }

@@ -1,24 +1,23 @@
-//! The servers: what each takes, and how it is started.
+//! The servers: what each needs, and how it is started.
 
-use std::fs;
-use std::io::{BufRead as _, BufReader};
-use std::path::PathBuf;
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::thread;
-use std::time::Duration;
+use std::io::{BufRead as _, BufReader, Lines};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 
-use crate::workspace::Workspace;
-use crate::{Failure, Result, command, pymodbus};
+use anyhow::{Context as _, Result};
+use clap::ValueEnum;
 
-/// Where the servers are built.
-pub(super) fn directory(workspace: &Workspace) -> PathBuf {
+use crate::workspace::{Workspace, locked};
+use crate::{command, pymodbus};
+
+/// The directory in which the servers are built.
+pub fn directory(workspace: &Workspace) -> PathBuf {
     workspace.target().join("peers")
 }
 
 /// A server.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Peer {
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Peer {
     Libmodbus,
     ModbusCore,
     Pymodbus,
@@ -27,16 +26,20 @@ pub(super) enum Peer {
 
 /// A server that can be started.
 #[derive(Debug)]
-pub(super) struct Prepared {
+pub struct Prepared {
+    /// Its name in the table.
+    pub name: &'static str,
     /// Version of the library.
     pub version: String,
-    /// The program and its first arguments; the port follows.
-    pub command: Vec<PathBuf>,
+    /// The program.
+    pub program: PathBuf,
+    /// Its first arguments; the port follows.
+    pub arguments: Vec<PathBuf>,
 }
 
 impl Peer {
     /// All servers, in the order of the table.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: &[Self] = &[
         Self::Libmodbus,
         Self::ModbusCore,
         Self::Pymodbus,
@@ -53,119 +56,89 @@ impl Peer {
         }
     }
 
-    /// Gets the server ready; the Rust ones have been built.
-    ///
-    /// # Errors
-    ///
-    /// What is missing, and how to install it.
+    /// Prepares the server. Those in Rust are built already.
     pub fn prepare(self, workspace: &Workspace) -> Result<Prepared> {
+        let name = self.name();
+        let prepared = |version: &str, program, arguments| Prepared {
+            name,
+            version: version.trim().to_owned(),
+            program,
+            arguments,
+        };
+        let peers = workspace.root().join("tools/peers");
         match self {
-            Self::Libmodbus => libmodbus(workspace, "pkg-config"),
+            Self::Libmodbus => {
+                let mut pkg_config = Command::new("pkg-config");
+                pkg_config.args(["--cflags", "--libs", "libmodbus"]);
+                let flags = command::read(&mut pkg_config).context(
+                    "libmodbus is not installed (on Debian: apt-get install gcc pkg-config libmodbus-dev)",
+                )?;
+                let program = directory(workspace).join("peer-libmodbus");
+                let mut cc = Command::new("cc");
+                cc.args(["-Wall", "-Wextra", "-Werror", "-o"]).arg(&program);
+                cc.arg(peers.join("libmodbus.c"));
+                command::run(cc.args(flags.split_whitespace()))?;
+                let version = command::read(Command::new(&program).arg("--version"))?;
+                Ok(prepared(&version, program, Vec::new()))
+            }
             Self::Pymodbus => {
                 let python = pymodbus::environment(workspace)?;
                 let version = "import pymodbus; print(pymodbus.__version__)";
                 let version = command::read(Command::new(&python).args(["-c", version]))?;
-                let script = workspace.root().join("tools/peers/pymodbus_server.py");
-                Ok(Prepared {
-                    version: version.trim().to_owned(),
-                    // -B: leaves no __pycache__ in the tree.
-                    command: vec![python, "-B".into(), script],
-                })
+                // -B: leaves no __pycache__ in the tree.
+                let arguments = vec!["-B".into(), peers.join("pymodbus_server.py")];
+                Ok(prepared(&version, python, arguments))
             }
             Self::ModbusCore | Self::Rmodbus => {
-                let lock = workspace.root().join("tools/peers/Cargo.lock");
-                let text = fs::read_to_string(&lock).map_err(|error| {
-                    Failure::new(format!("cannot read {}: {error}", lock.display()))
-                })?;
-                let version = locked_version(&text, self.name()).ok_or_else(|| {
-                    Failure::new(format!("{} is not in {}", self.name(), lock.display()))
-                })?;
-                let program = format!("debug/peer-{}", self.name());
-                Ok(Prepared {
-                    version,
-                    command: vec![directory(workspace).join(program)],
-                })
+                let version = locked_version(&peers.join("Cargo.lock"), name)?;
+                let program = format!("debug/peer-{name}");
+                Ok(prepared(
+                    &version,
+                    directory(workspace).join(program),
+                    Vec::new(),
+                ))
             }
         }
     }
 }
 
-/// Compiles the server on libmodbus.
-pub(super) fn libmodbus(workspace: &Workspace, pkg_config: &str) -> Result<Prepared> {
-    let flags = command::read(Command::new(pkg_config).args(["--cflags", "--libs", "libmodbus"]))
-        .map_err(|_| {
-        Failure::new(
-            "libmodbus is not installed (on Debian: apt-get install gcc pkg-config libmodbus-dev)",
-        )
-    })?;
-    let program = directory(workspace).join("peer-libmodbus");
-    command::run(
-        Command::new("cc")
-            .args(["-Wall", "-Wextra", "-Werror", "-o"])
-            .arg(&program)
-            .arg(workspace.root().join("tools/peers/libmodbus.c"))
-            .args(flags.split_whitespace()),
-    )?;
-    let version = command::read(Command::new(&program).arg("--version"))?;
-    Ok(Prepared {
-        version: version.trim().to_owned(),
-        command: vec![program],
-    })
+/// Returns the version of a package in a Cargo.lock.
+pub fn locked_version(lock: &Path, name: &str) -> Result<String> {
+    let packages = locked(lock, "version")?;
+    let version = packages
+        .into_iter()
+        .find(|((package, _), _)| package == name);
+    let version = version.with_context(|| format!("{} has no {name}", lock.display()))?;
+    Ok(version.1)
 }
 
-/// The version of a package in a Cargo.lock.
-pub(super) fn locked_version(lock: &str, name: &str) -> Option<String> {
-    let (_, package) = lock.split_once(&format!("name = \"{name}\"\nversion = \""))?;
-    Some(package.split_once('"')?.0.to_owned())
-}
-
-/// A program that runs beside this one, and ends with this value.
-pub(super) struct Started {
+/// A program that runs beside this one, and is killed when this value is dropped.
+pub struct Started {
     name: String,
     child: Child,
-    lines: Receiver<String>,
-    patience: Duration,
+    lines: Lines<BufReader<ChildStdout>>,
 }
 
 impl Started {
-    /// Starts a program that prints lines, each within `patience`.
-    pub fn new(command: &mut Command, patience: Duration) -> Result<Self> {
+    /// Starts a program that prints a few lines when it is ready.
+    pub fn new(mut command: Command) -> Result<Self> {
         let name = command.get_program().to_string_lossy().into_owned();
-        let mut child = command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            // What a server logs about each bad frame says nothing that the suite does not.
-            .stderr(Stdio::null())
-            .spawn()
-            .map_err(|error| Failure::new(format!("{name} cannot be run: {error}")))?;
-        let (send, lines) = channel();
-        if let Some(stdout) = child.stdout.take() {
-            thread::spawn(move || {
-                let lines = BufReader::new(stdout).lines().map_while(|line| line.ok());
-                // Reads on when nobody wants the lines any more: a full pipe would stop the program.
-                lines.for_each(|line| drop(send.send(line)));
-            });
-        }
-        Ok(Self {
-            name,
-            child,
-            lines,
-            patience,
-        })
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        // The suite reports the bad frames that a server logs, so its log is not shown.
+        let child = command.stderr(Stdio::null()).spawn();
+        let mut child = child.map_err(|error| command::no_start(&command, error))?;
+        let stdout = child.stdout.take().context("no output")?;
+        let lines = BufReader::new(stdout).lines();
+        Ok(Self { name, child, lines })
     }
 
-    /// The next line that it prints.
+    /// Returns the next line that it prints.
     pub fn line(&mut self) -> Result<String> {
-        self.lines.recv_timeout(self.patience).map_err(|error| {
-            let why = match error {
-                RecvTimeoutError::Timeout => "does not say that it is ready",
-                RecvTimeoutError::Disconnected => "has ended at its start",
-            };
-            Failure::new(format!("{} {why}", self.name))
-        })
+        let line = self.lines.next().transpose()?;
+        line.with_context(|| format!("{} has ended at its start", self.name))
     }
 
-    /// How it ended, if it has.
+    /// Returns its exit status, if it has ended.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         self.child.try_wait().ok().flatten()
     }
@@ -173,7 +146,7 @@ impl Started {
 
 impl Drop for Started {
     fn drop(&mut self) {
-        // It has ended already when this fails.
+        // An error means that it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,8 +1,7 @@
-//! The command with scripts in the place of line, server and suite.
+//! The command with scripts in place of line, server and suite.
 
 use serde_json::json;
 
-use super::server::{libmodbus, locked_version};
 use super::*;
 use crate::script::program;
 
@@ -15,55 +14,47 @@ const SUITE: &str = r#"
     echo '{"cases": [{"name": "fc01/data", "result": "passed"}]}' > "$2"
     exit 1"#;
 
-struct Fake {
-    directory: tempfile::TempDir,
-    programs: Programs,
+fn prepared(program: PathBuf) -> Prepared {
+    Prepared {
+        name: "fake",
+        version: "1.2".to_owned(),
+        program,
+        arguments: Vec::new(),
+    }
 }
 
-impl Fake {
-    fn new(line: &str, server: &str, suite: &str) -> Self {
-        let directory = tempfile::tempdir().unwrap();
-        let at = directory.path();
-        program(at, "server", server);
-        let programs = Programs {
-            line: program(at, "line", line),
-            suite: program(at, "suite", suite),
-            profile: "profile.toml".into(),
-            scratch: at.to_owned(),
-        };
-        Self {
-            directory,
-            programs,
-        }
-    }
-
-    fn test(&self) -> Result<Value> {
-        let options = Options {
-            only: Vec::new(),
-            traces: Some(self.directory.path().join("traces")),
-        };
-        let server = [self.directory.path().join("server")];
-        self.programs
-            .test(&server, &["--standard-only"], "fake", &options)
-    }
+/// Runs a test of these scripts, with traces in `traces` of the directory.
+fn test(directory: &Path, line: &str, server: &str, suite: &str) -> Result<Value> {
+    let programs = Programs {
+        line: program(directory, "line", line),
+        suite: program(directory, "suite", suite),
+        profile: "profile.toml".into(),
+        scratch: directory.to_owned(),
+    };
+    let server = prepared(program(directory, "server", server));
+    programs.test(
+        &server,
+        &["--standard-only"],
+        Some(&directory.join("traces")),
+    )
 }
 
 #[test]
-fn suite_is_run_on_the_other_end_of_the_servers_line_and_its_report_is_returned() {
-    let fake = Fake::new(LINE, SERVER, SUITE);
-    let report = fake.test().unwrap();
-    assert_eq!(Row::new("fake", "1", &report).unwrap().passed, 1);
-    let traces = fake.directory.path().join("traces");
-    let arguments = fs::read_to_string(traces.join("fake.cases")).unwrap();
+fn suite_runs_on_the_other_end_of_the_servers_line() {
+    let directory = tempfile::tempdir().unwrap();
+    let report = test(directory.path(), LINE, SERVER, SUITE).unwrap();
+    assert_eq!(report["cases"][0]["name"], "fc01/data");
+    let trace = |name| fs::read_to_string(directory.path().join("traces").join(name)).unwrap();
     let wanted =
         "--serial /dev/b --baud 19200 --format 8N2 --profile profile.toml --standard-only --json ";
-    assert!(arguments.starts_with(wanted), "{arguments}");
-    let trace = fs::read_to_string(traces.join("fake.trace")).unwrap();
-    assert_eq!(trace, "traced\n");
+    assert!(trace("fake.cases").starts_with(wanted));
+    assert_eq!(trace("fake.trace"), "traced\n");
 }
 
 #[test]
 fn server_that_does_not_start_or_ends_or_cannot_be_tested_is_an_error() {
+    let dies = format!("sleep 1\n{SUITE}");
+    let silent = "echo 'modio-conformance: silent' >&2; exit 2";
     for (line, server, suite, wrong) in [
         (
             LINE,
@@ -73,24 +64,12 @@ fn server_that_does_not_start_or_ends_or_cannot_be_tested_is_an_error() {
         ),
         (LINE, "exit 0", SUITE, "has ended at its start"),
         ("exit 0", SERVER, SUITE, "has ended at its start"),
-        (
-            LINE,
-            "echo ready",
-            &format!("sleep 1\n{SUITE}"),
-            "fake has ended while",
-        ),
-        (
-            LINE,
-            SERVER,
-            "echo 'modio-conformance: silent' >&2; exit 2",
-            "silent",
-        ),
+        (LINE, "echo ready", &dies, "fake has ended during the test"),
+        (LINE, SERVER, silent, "silent"),
     ] {
-        let told = Fake::new(line, server, suite)
-            .test()
-            .unwrap_err()
-            .to_string();
-        assert!(told.contains(wrong), "{told}");
+        let directory = tempfile::tempdir().unwrap();
+        let error = test(directory.path(), line, server, suite).unwrap_err();
+        assert!(error.to_string().contains(wrong), "{error}");
     }
 }
 
@@ -104,51 +83,33 @@ fn failures_are_counted_by_group() {
         case("fc05/address", "failed"),
         case("power/answers", "skipped"),
     ] });
-    let row = Row::new("libother", "1.2", &report).unwrap();
-    let text = table::text(&[row], &["libmodbus: not here".to_owned()]);
-    let lines: Vec<&str> = text.lines().skip(2).collect();
-    assert_eq!(
-        lines[0],
-        "| libother | 1.2 | 1 | 3 | 1 | `fc01` 1, `fc05` 2 |"
-    );
-    assert_eq!(lines[2], "Left out: libmodbus: not here.");
-    assert!(Row::new("x", "1", &json!({})).is_err());
+    let server = prepared("server".into());
+    let row = row(&server, &report).unwrap();
+    assert_eq!(row, "| fake | 1.2 | 1 | 3 | 1 | `fc01` 1, `fc05` 2 |\n");
+    assert!(super::row(&server, &json!({})).is_err());
 }
 
 #[test]
-fn table_is_replaced_between_its_marks_in_the_document() {
-    let workspace = Workspace::open().unwrap();
-    let document = fs::read_to_string(workspace.root().join(DOCUMENT)).unwrap();
-    let new = table::replaced(&document, "a table\n").expect("the document has a place for it");
-    assert!(new.contains("-->\na table\n<!--"));
-    assert_eq!(table::replaced(&new, "a table\n"), Some(new));
-    assert_eq!(table::replaced("no marks", "a table\n"), None);
-}
-
-#[test]
-fn document_has_the_versions_that_are_locked() {
+fn document_has_a_place_for_the_table_and_the_locked_versions() {
     let workspace = Workspace::open().unwrap();
     let root = workspace.root();
     let document = fs::read_to_string(root.join(DOCUMENT)).unwrap();
-    let lock = fs::read_to_string(root.join("tools/peers/Cargo.lock")).unwrap();
-    let python = root.join("tools/sim/tests/pymodbus/requirements.txt");
-    let python = fs::read_to_string(python).unwrap();
-    let pinned = python
+    let new = replaced(&document, "a table\n").unwrap();
+    assert!(new.contains("-->\na table\n<!--"));
+    let lock = root.join("tools/peers/Cargo.lock");
+    let python = fs::read_to_string(crate::pymodbus::requirements(&workspace)).unwrap();
+    let mut pinned = python
         .lines()
-        .find_map(|line| line.strip_prefix("pymodbus=="));
+        .filter_map(|line| line.strip_prefix("pymodbus=="));
     for (name, version) in [
-        ("modbus-core", locked_version(&lock, "modbus-core").unwrap()),
-        ("rmodbus", locked_version(&lock, "rmodbus").unwrap()),
-        ("pymodbus", pinned.unwrap().to_owned()),
+        (
+            "modbus-core",
+            server::locked_version(&lock, "modbus-core").unwrap(),
+        ),
+        ("rmodbus", server::locked_version(&lock, "rmodbus").unwrap()),
+        ("pymodbus", pinned.next().unwrap().to_owned()),
     ] {
         let row = format!("| {name} | {version} |");
         assert!(document.contains(&row), "{row}: run `cargo xtask peers`");
     }
-}
-
-#[test]
-fn missing_libmodbus_is_reported_with_what_to_install() {
-    let workspace = Workspace::open().unwrap();
-    let told = libmodbus(&workspace, "no-pkg-config-here").unwrap_err();
-    assert!(told.to_string().contains("apt-get install"), "{told}");
 }

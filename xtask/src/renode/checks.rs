@@ -1,71 +1,57 @@
-//! What can be checked of Renode's files without Renode: the Python models do what the firmware needs,
-//! the image starts on them, every suite names keywords that Renode has and calls them right, and, played on the project's own
-//! simulator, the suites expect of the unit what it does.
+//! Checks of Renode's files without Renode: the Python models do what the firmware needs, the image starts on them, every
+//! suite calls keywords that Renode has with the right arguments, and the suites pass on the project's own simulator.
 //!
-//! The platform and the scripts are checked by tests of this package (`platform`).
+//! Tests of this package (`platform`) check the platform and the scripts.
 
 use std::ffi::OsStr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use anyhow::{Context as _, Result};
 use register_map::{Board, Module, configuration, record};
 use serde_json::{Value, json};
 
 use super::DIRECTORY;
 use crate::python::Environment;
-use crate::steps::Outcome;
 use crate::workspace::Workspace;
-use crate::{Failure, Result, command, sim};
+use crate::{command, sim};
 
-/// The step of `cargo xtask test` for a board: the models, the image on them, and a dry run of the suites. Skipped with
-/// the reason where there is no Python or nothing from PyPI, but failed when `strict`, as in CI.
-pub fn step(workspace: &Workspace, board: &Board, elf: &Path, strict: bool) -> Outcome {
-    with_robot(workspace, strict, |python, checks, output| {
-        models(python, checks, board, elf)?;
-        robot(python, checks, board, output, &["--dryrun"])
-    })
+/// Checks the models, the image on them, and in a dry run the suites.
+pub fn files(workspace: &Workspace, board: &Board, elf: &Path) -> Result<()> {
+    let python = python(workspace)?;
+    models(workspace, &python, board, elf)?;
+    robot(workspace, &python, board, &["--dryrun"])
 }
 
-/// The step of `cargo xtask ci`: the suites against the image in the simulator, which takes minutes.
-pub fn on_simulator(workspace: &Workspace, board: &Board, elf: &Path, strict: bool) -> Outcome {
-    with_robot(workspace, strict, |python, checks, output| {
-        let simulator = sim::simulator(workspace)?;
-        let options = [
-            "--exclude",
-            "renode-only",
-            "--exclude",
-            "exact-time",
-            "--variable",
-            &format!("SIMULATOR:{}", simulator.display()),
-            "--variable",
-            &format!("ELF:{}", elf.display()),
-        ];
-        robot(python, checks, board, output, &options)
-    })
+/// Runs the suites against the image in the simulator, which takes minutes.
+pub fn on_simulator(workspace: &Workspace, board: &Board, elf: &Path) -> Result<()> {
+    let python = python(workspace)?;
+    let simulator = format!("SIMULATOR:{}", sim::simulator(workspace)?.display());
+    let elf = format!("ELF:{}", elf.display());
+    let excluded = ["--exclude", "renode-only", "--exclude", "exact-time"];
+    let variables = ["--variable", &simulator, "--variable", &elf];
+    robot(workspace, &python, board, &[excluded, variables].concat())
 }
 
-fn with_robot(
-    workspace: &Workspace,
-    strict: bool,
-    check: impl FnOnce(&Path, &Path, &Path) -> Result<()>,
-) -> Outcome {
-    let checks = workspace.root().join(DIRECTORY).join("checks");
-    let environment = Environment {
+/// Returns the interpreter of an environment with Robot Framework and Unicorn.
+pub fn python(workspace: &Workspace) -> Result<PathBuf> {
+    Environment {
         what: "Robot Framework with Unicorn",
         directory: &workspace.target().join("renode-venv"),
-        requirements: &[checks.join("requirements.txt")],
+        requirements: &[checks(workspace).join("requirements.txt")],
         imports: "robot, unicorn",
         oldest: 8,
-    };
-    match environment.prepare() {
-        Ok(python) => check(&python, &checks, &workspace.target().join("renode-checks")).into(),
-        Err(missing) => Outcome::missing(&missing, strict),
     }
+    .prepare()
 }
 
-/// Runs the unit tests of the models, of the monitor's commands and of the stand-ins for Renode, and starts
-/// the image on the models.
-fn models(python: &Path, checks: &Path, board: &Board, elf: &Path) -> Result<()> {
+fn checks(workspace: &Workspace) -> PathBuf {
+    workspace.root().join(DIRECTORY).join("checks")
+}
+
+/// Runs the unit tests of the models, of the monitor's commands and of the replacements for Renode, and starts the image
+/// on the models.
+fn models(workspace: &Workspace, python: &Path, board: &Board, elf: &Path) -> Result<()> {
     let presets = presets();
     let tests: [(&str, &[&OsStr]); 6] = [
         ("test_syntax.py", &[]),
@@ -77,15 +63,16 @@ fn models(python: &Path, checks: &Path, board: &Board, elf: &Path) -> Result<()>
     ];
     for (test, arguments) in tests {
         let mut python = Command::new(python);
-        // Leaves no __pycache__ in the tree.
-        python.arg("-B").arg(checks.join(test)).args(arguments);
+        // -B: leaves no __pycache__ in the tree.
+        python.arg("-B").arg(checks(workspace).join(test));
+        python.args(arguments);
         command::run(&mut python)?;
     }
     Ok(())
 }
 
-/// What the register map has a new device store, in JSON: board, modules by port, address and bytes; for every module in
-/// every slot alone, and for different modules in all slots.
+/// Returns what a new device stores, as JSON rows of board, modules by port, address and bytes: for every module in every
+/// slot alone, and for different modules in all slots.
 fn presets() -> String {
     let mut presets = Vec::new();
     for board in Board::ALL {
@@ -114,14 +101,9 @@ fn presets() -> String {
     Value::Array(presets).to_string()
 }
 
-/// Runs Robot Framework on the suites as renode-test does, with our keywords in place of Renode's.
-fn robot(
-    python: &Path,
-    checks: &Path,
-    board: &Board,
-    output: &Path,
-    options: &[&str],
-) -> Result<()> {
+/// Runs Robot Framework on the suites as renode-test does, with the project's keywords in place of Renode's.
+fn robot(workspace: &Workspace, python: &Path, board: &Board, options: &[&str]) -> Result<()> {
+    let output = workspace.target().join("renode-checks");
     let mut robot = Command::new(python);
     robot.args([
         "-B",
@@ -131,17 +113,14 @@ fn robot(
         "quiet",
         "--prerunmodifier",
     ]);
-    robot.arg(checks.join("AsRenodeTest.py"));
-    robot.arg("--outputdir").arg(output).args(options);
-    robot.arg("--variable").arg(format!("BOARD_NAME:{board}"));
+    robot.arg(checks(workspace).join("AsRenodeTest.py"));
+    robot.arg("--outputdir").arg(&output).args(options);
+    robot.args(["--variable", &format!("BOARD_NAME:{board}")]);
     robot.args(super::suites::all(
-        checks.parent().unwrap_or(checks),
+        &workspace.root().join(DIRECTORY),
         board,
     )?);
-    command::run(&mut robot).map_err(|failure| {
-        let log = output.join("log.html");
-        Failure::new(format!("{failure}, see {}", log.display()))
-    })
+    command::run(&mut robot).with_context(|| format!("see {}", output.join("log.html").display()))
 }
 
 #[cfg(test)]

@@ -1,51 +1,34 @@
 //! Where Renode is on this machine, and whether it is new enough.
 
 use std::env;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
-use crate::{Failure, Result, command};
+use anyhow::{Context as _, Result, bail, ensure};
+use semver::Version;
 
-/// The oldest version whose Python models see accesses under the names that ours use.
-const OLDEST: Version = Version(1, 16, 1);
+use crate::command;
+use crate::error::usage;
 
-/// Renode takes seconds to start, on a slow disk many.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// The oldest version in which Python models receive accesses under the names that the project's models use.
+const OLDEST: Version = Version::new(1, 16, 1);
 
 /// What to do about a Renode that is missing or too old.
-const GET_IT: &str = "get Renode 1.16.1 or newer from https://github.com/renode/renode/releases, or tell where it is \
-    with --renode PATH or $RENODE; the simulator of `cargo xtask sim` needs none";
+const GET_IT: &str = "get Renode 1.16.1 or newer from https://github.com/renode/renode/releases, or give its place with \
+    --renode PATH or $RENODE; the simulator of `cargo xtask sim` needs none";
 
-/// A version: major, minor, patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Version(u32, u32, u32);
-
-impl fmt::Display for Version {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(major, minor, patch) = self;
-        write!(f, "{major}.{minor}.{patch}")
-    }
-}
-
-impl Version {
-    /// The first version number in what `renode --version` prints.
-    fn parse(text: &str) -> Option<Self> {
-        text.split(|c: char| !(c.is_ascii_digit() || c == '.'))
-            .find_map(|word| {
-                let mut numbers = word.split('.').map_while(|part| part.parse().ok());
-                Some(Self(numbers.next()?, numbers.next()?, numbers.next()?))
-            })
-    }
-}
+/// Names of the program: everywhere, and in the application directory of macOS.
+const NAMES: [&str; 2] = ["renode", "macos_run.command"];
 
 /// A Renode that can be used.
 #[derive(Clone, Debug)]
 pub struct Renode {
-    program: PathBuf,
-    version: Version,
+    /// The program.
+    pub program: PathBuf,
+    /// Its version.
+    pub version: Version,
 }
 
 impl fmt::Display for Renode {
@@ -54,167 +37,121 @@ impl fmt::Display for Renode {
     }
 }
 
-/// What of the machine says where programs are.
+/// Where this machine may have programs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Surroundings {
+pub struct Places {
     /// `$RENODE`
-    pub(super) variable: Option<OsString>,
-    /// The directories of the PATH.
-    pub(super) path: Vec<PathBuf>,
-    /// The directories that installers and people put Renode into.
-    pub(super) usual: Vec<PathBuf>,
+    pub variable: Option<PathBuf>,
+    /// The directories of the PATH, and then those into which installers and people put Renode.
+    pub path: OsString,
 }
 
-impl Surroundings {
+impl Places {
     /// Those of this process.
-    pub(super) fn of_process() -> Self {
+    pub fn of_process() -> Result<Self> {
         let path = env::var_os("PATH").unwrap_or_default();
-        let mut usual: Vec<PathBuf> = if cfg!(windows) {
-            ["ProgramFiles", "ProgramFiles(x86)", "LOCALAPPDATA"]
-                .iter()
-                .filter_map(env::var_os)
-                .flat_map(|base| {
-                    let base = PathBuf::from(base).join("Renode");
-                    [base.join("bin"), base]
-                })
-                .collect()
-        } else if cfg!(target_os = "macos") {
-            vec![
-                "/Applications/Renode.app/Contents/MacOS".into(),
-                "/opt/homebrew/bin".into(),
-                "/usr/local/bin".into(),
-            ]
+        let mut path: Vec<PathBuf> = env::split_paths(&path).collect();
+        if cfg!(windows) {
+            for base in ["ProgramFiles", "ProgramFiles(x86)", "LOCALAPPDATA"] {
+                let base = env::var_os(base).map(|base| PathBuf::from(base).join("Renode"));
+                path.extend(base.into_iter().flat_map(|base| [base.join("bin"), base]));
+            }
         } else {
-            vec![
-                "/opt/renode".into(),
-                "/usr/bin".into(),
-                "/usr/local/bin".into(),
-            ]
-        };
-        // Where the portable archive is unpacked as its manual has it.
-        if let Some(home) = env::home_dir() {
-            usual.extend([home.join("renode_portable"), home.join("renode")]);
+            path.extend(
+                [
+                    "/Applications/Renode.app/Contents/MacOS",
+                    "/opt/homebrew/bin",
+                    "/opt/renode",
+                    "/usr/local/bin",
+                ]
+                .map(PathBuf::from),
+            );
         }
-        Self {
-            variable: env::var_os("RENODE").filter(|value| !value.is_empty()),
-            path: env::split_paths(&path).collect(),
-            usual,
-        }
+        // The directories that Renode's manual suggests for the portable archive.
+        let home = env::home_dir().into_iter();
+        path.extend(home.flat_map(|home| [home.join("renode_portable"), home.join("renode")]));
+        Ok(Self {
+            variable: env::var_os("RENODE")
+                .filter(|value| !value.is_empty())
+                .map(PathBuf::from),
+            path: env::join_paths(path)?,
+        })
     }
+}
+
+/// Searches directories for a program of one of these names.
+fn search(names: &[&str], path: &OsStr) -> Option<PathBuf> {
+    let found = |name| which::which_in(name, Some(path), ".").ok();
+    names.iter().find_map(found)
 }
 
 impl Renode {
-    /// Finds Renode where it was `asked` for, else by `$RENODE`, the PATH, and the usual places.
-    ///
-    /// # Errors
-    ///
-    /// When it is not there, cannot be run, or is too old.
-    pub(super) fn find(asked: Option<&Path>, machine: &Surroundings) -> Result<Self> {
-        let named = [
-            ("--renode", asked.map(Path::to_owned)),
-            ("$RENODE", machine.variable.as_ref().map(PathBuf::from)),
-        ];
+    /// Finds Renode at the place that the user `asked` for, else by `$RENODE`, the PATH, and the usual places.
+    pub fn find(asked: Option<&Path>, places: &Places) -> Result<Self> {
+        let named = [("--renode", asked), ("$RENODE", places.variable.as_deref())];
         for (by, place) in named {
             if let Some(place) = place {
-                let program = program_at(&place).ok_or_else(|| {
-                    Failure::asked(format!("{by}: there is no Renode at {}", place.display()))
-                })?;
-                return Self::at(program);
+                let path = env::join_paths([place.to_owned(), place.join("Contents/MacOS")])?;
+                let file = place.is_file().then(|| place.to_owned());
+                let program = file.or_else(|| search(&NAMES, &path)).ok_or_else(|| {
+                    usage(format!("{by}: there is no Renode at {}", place.display()))
+                });
+                return Self::at(program?);
             }
         }
-        let program = machine
-            .path
-            .iter()
-            .chain(&machine.usual)
-            .find_map(|directory| program_in(directory))
-            .ok_or_else(|| Failure::new(format!("Renode is not installed: {GET_IT}")))?;
-        Self::at(program)
+        let program = search(&NAMES, &places.path);
+        Self::at(program.with_context(|| format!("Renode is not installed: {GET_IT}"))?)
     }
 
     fn at(program: PathBuf) -> Result<Self> {
-        let program = std::path::absolute(&program).unwrap_or(program);
-        let output = command::within(PATIENCE, Command::new(&program).arg("--version"))?;
-        let text = String::from_utf8_lossy(&output.stdout).into_owned()
-            + &String::from_utf8_lossy(&output.stderr);
+        let program = std::path::absolute(program)?;
+        let output = command::output(Command::new(&program).arg("--version"))?;
+        let text = [output.stdout.as_slice(), &output.stderr].concat();
         let shown = program.display();
-        let Some(version) = Version::parse(&text) else {
-            let why = command::complaint(&output);
-            return Err(Failure::new(format!(
-                "{shown} does not tell its version: {why}"
-            )));
+        let Some(version) = version(&String::from_utf8_lossy(&text)) else {
+            bail!(
+                "{shown} does not report its version: {}",
+                command::complaint(&output)
+            );
         };
-        if version < OLDEST {
-            return Err(Failure::new(format!(
-                "Renode {version} at {shown} is too old: {GET_IT}"
-            )));
-        }
+        ensure!(
+            version >= OLDEST,
+            "Renode {version} at {shown} is too old: {GET_IT}"
+        );
         Ok(Self { program, version })
     }
 
-    /// The command that starts it.
-    pub(super) fn command(&self) -> Command {
-        Command::new(&self.program)
-    }
-
-    /// The version, for reports.
-    pub(super) fn version(&self) -> String {
-        self.version.to_string()
-    }
-
-    /// The program that runs suites in it: beside it, or on the PATH.
-    ///
-    /// # Errors
-    ///
-    /// When it is in neither place, with what to do.
-    pub(super) fn tester(&self, machine: &Surroundings) -> Result<PathBuf> {
-        // A link in a directory of the PATH leads to where both are.
-        let linked = self.program.canonicalize().ok();
-        let beside = [Some(&self.program), linked.as_ref()];
-        beside
-            .into_iter()
+    /// Returns the program that runs suites: from the directory of Renode, or from the PATH.
+    pub fn tester(&self, places: &Places) -> Result<PathBuf> {
+        // A link in a directory of the PATH leads to the directory that has both.
+        let linked = self.program.canonicalize();
+        let programs = [Some(self.program.clone()), linked.ok()];
+        // On Windows the program may be in a subdirectory of the scripts' directory.
+        let beside = programs
+            .iter()
             .flatten()
-            .filter_map(|program| program.parent())
-            // On Windows the program may be in a subdirectory of where the scripts are.
-            .flat_map(|directory| [Some(directory), directory.parent()])
-            .flatten()
-            .chain(machine.path.iter().map(PathBuf::as_path))
-            .find_map(|directory| file_in(directory, &["renode-test", "renode-test.bat"]))
-            .ok_or_else(|| {
-                let program = self.program.display();
-                Failure::new(format!(
-                    "there is no renode-test beside {program}: install Renode from its package or archive, whole"
-                ))
-            })
+            .flat_map(|program| program.ancestors().skip(1).take(2));
+        let path = beside
+            .map(Path::to_owned)
+            .chain(env::split_paths(&places.path));
+        search(&["renode-test"], &env::join_paths(path)?).with_context(|| {
+            let program = self.program.display();
+            format!("there is no renode-test beside {program}: install the whole package or archive of Renode")
+        })
     }
 }
 
-/// Renode in a directory, under the names it has on the three systems.
-fn program_in(directory: &Path) -> Option<PathBuf> {
-    file_in(
-        directory,
-        if cfg!(windows) {
-            &["renode.exe", "Renode.exe", "renode.bat"]
-        } else {
-            &["renode", "macos_run.command"]
-        },
-    )
-}
-
-/// Renode at a path that may be the program or its directory.
-fn program_at(place: &Path) -> Option<PathBuf> {
-    if place.is_file() {
-        return Some(place.to_owned());
-    }
-    program_in(place).or_else(|| program_in(&place.join("Contents/MacOS")))
-}
-
-fn file_in(directory: &Path, names: &[&str]) -> Option<PathBuf> {
-    names
-        .iter()
-        // On Windows the first is a script for another shell.
-        .filter(|name| !cfg!(windows) || name.contains('.'))
-        .map(|name| directory.join(name))
-        .find(|file| file.is_file())
+/// Returns the first version number in a text: `Renode v1.16.1.32541` is 1.16.1.
+fn version(text: &str) -> Option<Version> {
+    text.split(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .find_map(|word| {
+            let mut numbers = word.split('.').map_while(|part| part.parse().ok());
+            Some(Version::new(
+                numbers.next()?,
+                numbers.next()?,
+                numbers.next()?,
+            ))
+        })
 }
 
 #[cfg(test)]
@@ -222,23 +159,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn versions_are_found_in_what_renode_prints() {
-        for (text, version) in [
+    fn version_is_found_in_the_output_of_renode() {
+        for (text, expected) in [
             (
                 "Renode v1.16.1.32541\n  build: 1a2b3c4-202602161200",
-                Some(Version(1, 16, 1)),
+                Some((1, 16, 1)),
             ),
             (
                 "Renode, version 1.17.0.1234 (abcdef0-202610011234)",
-                Some(Version(1, 17, 0)),
+                Some((1, 17, 0)),
             ),
-            ("10:20:30.1 [INFO] x\nRenode v2.0.0", Some(Version(2, 0, 0))),
+            ("10:20:30.1 [INFO] x\nRenode v2.0.0", Some((2, 0, 0))),
             ("Renode", None),
-            ("", None),
         ] {
-            assert_eq!(Version::parse(text), version, "{text}");
+            let expected = expected.map(|(major, minor, patch)| Version::new(major, minor, patch));
+            assert_eq!(version(text), expected, "{text}");
         }
-        assert!(Version(1, 16, 0) < OLDEST && Version(1, 15, 3) < OLDEST);
-        assert!(Version(1, 16, 1) >= OLDEST && Version(2, 0, 0) >= OLDEST);
     }
 }

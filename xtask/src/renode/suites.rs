@@ -1,80 +1,83 @@
 //! The suites of renode/tests, run by Renode's own renode-test.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use anyhow::{Result, bail, ensure};
+use fs_err as fs;
 use register_map::Board;
 
-use super::find::Surroundings;
-use super::processes::Group;
-use super::{Bench, report};
-use crate::{Failure, Result};
+use super::Bench;
+use super::find::Places;
+use crate::command;
+use crate::group::Group;
 
-/// What a suite's variable must not hold where Robot Framework splits or expands it.
-const SPECIAL: [char; 2] = ['$', '%'];
-
-/// Runs all suites; their results go to `robot` in the output directory.
-///
-/// # Errors
-///
-/// When renode-test is missing or a test failed, with how many.
-pub(super) fn run(bench: &Bench) -> Result<()> {
-    let tester = bench.renode.tester(&Surroundings::of_process())?;
+/// Runs all suites. The results are in `robot` in the output directory, and as JUnit XML in `robot.xml`.
+pub fn run(bench: &Bench, python: &Path) -> Result<()> {
+    let tester = bench.renode.tester(&Places::of_process()?)?;
     let output = bench.output.join("robot");
-    fs::create_dir_all(&output)
-        .map_err(|error| Failure::new(format!("cannot make {}: {error}", output.display())))?;
+    fs::create_dir_all(&output)?;
     let elf = bench.elf.to_string_lossy();
-    if elf.contains(SPECIAL) {
-        let what = format!("{elf}: Robot Framework takes no $ or % in a path");
-        return Err(Failure::new(what));
-    }
-    let mut command = Command::new(tester);
-    command.arg("-r").arg(&output);
-    command.arg("--variable").arg(format!("ELF:{elf}"));
-    command
-        .arg("--variable")
-        .arg(format!("BOARD_NAME:{}", bench.board));
-    command.args(all(&bench.directory, bench.board)?);
-    let status = Group::start(&mut command)?.wait()?;
-    // Also when tests failed: what is there is to be read by whatever shows results.
-    let told = report::robot_to_junit(
+    ensure!(
+        !elf.contains(['$', '%']),
+        "{elf}: Robot Framework accepts no $ or % in a path; move the image"
+    );
+    let mut tester = Command::new(tester);
+    tester.arg("-r").arg(&output);
+    tester.args(["--variable", &format!("ELF:{elf}")]);
+    tester.args(["--variable", &format!("BOARD_NAME:{}", bench.board)]);
+    let status = Group::start({
+        tester.args(all(&bench.directory, bench.board)?);
+        tester
+    })?
+    .wait()?;
+    // Also when tests failed, so that whatever shows results has them.
+    let failed = to_junit(
+        python,
         &output.join("robot_output.xml"),
         &bench.output.join("robot.xml"),
     );
-    match (status.code(), told) {
-        (Some(0), Ok(counts)) if counts.failed == 0 && counts.passed > 0 => Ok(()),
-        (Some(0), Ok(_)) => Err(Failure::new("renode-test ran no test, or hid a failure")),
-        (Some(0), Err(failure)) => Err(failure),
-        (Some(1), Err(failure)) => Err(failure),
-        (Some(1), Ok(counts)) => Err(Failure::new(format!(
-            "{} of {} tests failed, see {}",
-            counts.failed,
-            counts.passed + counts.failed + counts.skipped,
+    match (status.code(), failed) {
+        (Some(0), Ok(0)) => Ok(()),
+        (Some(0), Ok(_)) => bail!("renode-test has hidden a failure"),
+        (Some(1), Ok(failed)) => bail!(
+            "{failed} tests failed, see {}",
             output.join("log.html").display()
-        ))),
-        (Some(2), _) => Err(Failure::new(format!(
-            "Renode crashed, see {}",
-            output.join("logs").display()
-        ))),
-        (Some(code), _) => Err(Failure::new(format!(
-            "renode-test ended with status {code}; it needs Python 3 with Renode's tests/requirements.txt"
-        ))),
-        (None, _) => Err(Failure::new(format!("renode-test was ended ({status})"))),
+        ),
+        (Some(2), _) => bail!("Renode crashed, see {}", output.join("logs").display()),
+        (Some(0 | 1), Err(error)) => Err(error),
+        (Some(code), _) => {
+            bail!(
+                "renode-test ended with status {code}; it needs Python 3 with Renode's tests/requirements.txt"
+            )
+        }
+        (None, _) => bail!("renode-test was ended ({status})"),
     }
 }
 
-/// The suites for a board, in the order of their names: those in tests are about any board, those in a directory of a
-/// board's name there about that board.
-///
-/// # Errors
-///
-/// When there are none.
-pub(super) fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
+/// Has Robot Framework convert its results to JUnit XML, and returns how many tests have failed. Results without a test
+/// are an error.
+fn to_junit(python: &Path, from: &Path, to: &Path) -> Result<i32> {
+    ensure!(from.is_file(), "renode-test has left no {}", from.display());
+    let mut rebot = Command::new(python);
+    rebot.args(["-B", "-m", "robot.rebot"]);
+    rebot.args([
+        "--output", "NONE", "--log", "NONE", "--report", "NONE", "--xunit",
+    ]);
+    let output = command::output(rebot.arg(to).arg(from))?;
+    // The exit status of rebot is the number of failed tests, or above 250 an error.
+    match output.status.code() {
+        Some(failed @ 0..=250) => Ok(failed),
+        _ => bail!("{}: {}", from.display(), command::complaint(&output)),
+    }
+}
+
+/// Returns the suites for a board, in the order of their names: those in tests, which are for any board, and those in the
+/// directory there with the name of the board.
+pub fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
     let tests = directory.join("tests");
-    let of_any = fs::read_dir(&tests)
-        .map_err(|error| Failure::new(format!("{}: {error}", tests.display())))?;
-    // A board need not have suites that are about it alone.
+    let of_any = fs::read_dir(&tests)?;
+    // A board need not have separate suites.
     let of_board = fs::read_dir(tests.join(board.name)).into_iter().flatten();
     let mut suites: Vec<PathBuf> = of_any
         .chain(of_board)
@@ -85,8 +88,6 @@ pub(super) fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
         })
         .collect();
     suites.sort();
-    if suites.is_empty() {
-        return Err(Failure::new(format!("no suites in {}", tests.display())));
-    }
+    ensure!(!suites.is_empty(), "no suites in {}", tests.display());
     Ok(suites)
 }

@@ -1,13 +1,12 @@
-//! Renode played by scripts: what is found and run, in which order, and what becomes of it.
+//! Renode replaced by scripts: what is found and run, in which order, and how its end is reported.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use anyhow::Error;
 
-use super::find::Surroundings;
+use super::find::Places;
 use super::*;
 use crate::script::program;
 
-/// Prints a version, or opens the port of the script it is given and waits for `quit`.
+/// Prints a version, or opens the port of the script in its arguments and waits for `quit`.
 const RENODE: &str = r#"
 if [ "$1" = --version ]; then echo 'Renode v1.16.1.32541'; exit 0; fi
 echo "renode $*" >> "$CALLS"
@@ -33,8 +32,11 @@ wait $!
 /// Leaves results as the real one does.
 const RENODE_TEST: &str = r#"
 echo "renode-test $*" >> "$CALLS"
-echo '<suite name="S"><test name="T"><status status="PASS"/></test></suite>' > "$2/robot_output.xml"
+echo results > "$2/robot_output.xml"
 "#;
+
+/// A Python whose rebot reports no failed test.
+const REBOT: &str = r#"[ "$3" = robot.rebot ] || exit 252; echo "rebot $*" >> "$CALLS""#;
 
 /// Writes down its options.
 const CONFORMANCE: &str = r#"
@@ -47,11 +49,11 @@ struct Fake {
 
 impl Fake {
     fn new() -> Self {
-        let fake = Self {
-            directory: tempfile::tempdir().unwrap(),
-        };
+        let directory = tempfile::tempdir().unwrap();
+        let fake = Self { directory };
         fake.program("renode", RENODE);
         fake.program("renode-test", RENODE_TEST);
+        fake.program("python", REBOT);
         fake.program("conformance", CONFORMANCE);
         fake
     }
@@ -60,38 +62,33 @@ impl Fake {
         self.directory.path().join(name)
     }
 
-    fn program(&self, name: &str, script: &str) -> PathBuf {
-        let calls = self.at("calls");
-        let text = format!("CALLS='{}'\n{script}", calls.display());
-        program(self.directory.path(), name, &text)
-    }
-
-    fn version(&self, version: &str) -> PathBuf {
-        self.program("renode", &format!("echo '{version}'"))
+    fn program(&self, name: &str, script: &str) {
+        let text = format!("CALLS='{}'\n{script}", self.at("calls").display());
+        program(self.directory.path(), name, &text);
     }
 
     fn find(&self) -> Result<Renode> {
-        Renode::find(Some(&self.at("renode")), &Surroundings::default())
+        Renode::find(Some(&self.at("renode")), &Places::default())
     }
 
     fn bench(&self) -> Bench {
-        Bench {
+        let bench = Bench {
             directory: Workspace::open().unwrap().root().join(DIRECTORY),
             output: self.at("output with a space"),
             board: &register_map::board::MODIO_02,
             renode: self.find().unwrap(),
             elf: self.at("modio"),
-        }
+        };
+        fs::create_dir_all(&bench.output).unwrap();
+        bench
     }
 
-    /// Both steps, one after the other, as `Bench::run` has them.
-    fn run(&self) -> (Result<()>, Result<()>) {
-        let bench = self.bench();
-        fs::create_dir_all(&bench.output).unwrap();
-        let suites = suites::run(&bench);
-        let conformance = self.at("conformance");
-        let conformance = live::conformance(&bench, Module::Do4, &conformance);
-        (suites, conformance)
+    fn suites(&self, bench: &Bench) -> Result<()> {
+        suites::run(bench, &self.at("python"))
+    }
+
+    fn conformance(&self, bench: &Bench) -> Result<()> {
+        live::conformance(bench, Module::Do4, &self.at("conformance"))
     }
 
     fn calls(&self) -> Vec<String> {
@@ -105,174 +102,162 @@ fn message<T: std::fmt::Debug>(result: Result<T>) -> String {
 }
 
 #[test]
-fn it_is_found_by_option_then_variable_then_path_then_usual_places() {
-    let [option, variable, path, usual] = [(); 4].map(|()| Fake::new());
-    let directory = |fake: &Fake| fake.directory.path().to_owned();
-    let mut machine = Surroundings {
-        variable: Some(directory(&variable).into()),
-        path: vec!["/nowhere".into(), directory(&path)],
-        usual: vec![directory(&usual)],
+fn renode_is_found_by_option_then_variable_then_path() {
+    let [option, variable, path] = [(); 3].map(|()| Fake::new());
+    let mut places = Places {
+        variable: Some(variable.directory.path().to_owned()),
+        path: path.directory.path().into(),
     };
-    let found = |asked: Option<&Path>, machine: &Surroundings| {
-        let text = Renode::find(asked, machine).unwrap().to_string();
-        let place = text.strip_prefix("Renode 1.16.1 at ").unwrap().to_owned();
-        PathBuf::from(place)
-    };
+    let found =
+        |asked: Option<&Path>, places: &Places| Renode::find(asked, places).unwrap().program;
     assert_eq!(
-        found(Some(&option.at("renode")), &machine),
+        found(Some(&option.at("renode")), &places),
         option.at("renode")
     );
     assert_eq!(
-        found(Some(option.directory.path()), &machine),
+        found(Some(option.directory.path()), &places),
         option.at("renode")
     );
-    assert_eq!(found(None, &machine), variable.at("renode"));
-    machine.variable = None;
-    assert_eq!(found(None, &machine), path.at("renode"));
-    machine.path.pop();
-    assert_eq!(found(None, &machine), usual.at("renode"));
-    machine.usual.clear();
-    let failure = Renode::find(None, &machine).unwrap_err();
-    let text = failure.to_string();
+    assert_eq!(found(None, &places), variable.at("renode"));
+    places.variable = None;
+    assert_eq!(found(None, &places), path.at("renode"));
+    let text = message(Renode::find(None, &Places::default()));
+    for part in ["not installed", "github.com/renode", "cargo xtask sim"] {
+        assert!(text.contains(part) && !text.contains('\n'), "{text}");
+    }
+}
+
+#[test]
+fn place_without_renode_is_a_wrong_question() {
+    let is_usage = |error: &Error| error.is::<crate::error::Usage>();
+    let places = Places {
+        variable: Some("/nowhere/renode".into()),
+        ..Places::default()
+    };
+    for (asked, text) in [
+        (None, "$RENODE: there is no Renode at /nowhere/renode"),
+        (
+            Some(Path::new("/none")),
+            "--renode: there is no Renode at /none",
+        ),
+    ] {
+        let error = Renode::find(asked, &places).unwrap_err();
+        assert!(is_usage(&error) && error.to_string() == text, "{error}");
+    }
+}
+
+#[test]
+fn old_or_broken_renode_is_refused() {
+    let fake = Fake::new();
+    let prints = |version: &str| fake.program("renode", &format!("echo '{version}'"));
+    prints("Renode v1.16.0.1525");
+    let text = message(fake.find());
     assert!(
-        text.contains("not installed") && text.contains("github.com/renode"),
+        text.contains("too old") && text.contains("1.16.1"),
         "{text}"
     );
-    assert!(text.contains("cargo xtask sim"), "{text}");
-    assert!(!text.contains('\n'));
-    assert_eq!(failure.code, 1);
-}
-
-#[test]
-fn a_place_that_was_named_and_has_none_is_a_mistake() {
-    let machine = Surroundings {
-        variable: Some("/nowhere/renode".into()),
-        ..Surroundings::default()
-    };
-    let failure = Renode::find(None, &machine).unwrap_err();
-    assert_eq!(
-        failure.to_string(),
-        "$RENODE: there is no Renode at /nowhere/renode"
-    );
-    assert_eq!(failure.code, 2);
-    let failure = Renode::find(Some(Path::new("/none")), &machine).unwrap_err();
-    assert_eq!(failure.to_string(), "--renode: there is no Renode at /none");
-}
-
-#[test]
-fn one_that_is_too_old_or_none_is_told() {
-    let fake = Fake::new();
-    for old in ["Renode v1.16.0.1525", "Renode, version 1.15.3.2"] {
-        fake.version(old);
-        let text = message(fake.find());
-        assert!(
-            text.contains("too old") && text.contains("1.16.1"),
-            "{text}"
-        );
-    }
-    for new in ["Renode v1.16.1.1", "Renode v1.17.0.1 (x)", "Renode v2.0.0"] {
-        fake.version(new);
-        assert!(fake.find().is_ok(), "{new}");
-    }
+    prints("Renode v1.17.0.1 (x)");
+    assert!(fake.find().is_ok());
     fake.program("renode", "echo 'error: no .NET' >&2; exit 131");
     let text = message(fake.find());
     assert!(
-        text.contains("does not tell its version: error: no .NET"),
+        text.contains("does not report its version: error: no .NET"),
         "{text}"
     );
 }
 
 #[test]
-fn suites_run_first_and_then_conformance_against_the_board() {
+fn suites_run_with_image_and_board() {
+    for (board, wanted) in [
+        (&register_map::board::MODIO_02, "tests/boot.robot"),
+        (&register_map::board::MODIO_08, "modio-08/slots.robot"),
+    ] {
+        let fake = Fake::new();
+        let bench = Bench {
+            board,
+            ..fake.bench()
+        };
+        fake.suites(&bench).unwrap();
+        let calls = fake.calls();
+        let elf = format!("--variable ELF:{}", fake.at("modio").display());
+        let name = format!("--variable BOARD_NAME:{board}");
+        for part in [
+            "renode-test -r ",
+            &elf,
+            &name,
+            wanted,
+            "tests/watchdog.robot",
+        ] {
+            assert!(calls[0].contains(part), "{part}: {}", calls[0]);
+        }
+        assert!(
+            calls[1].contains("--xunit") && calls[1].contains("robot.xml"),
+            "{}",
+            calls[1]
+        );
+    }
+}
+
+#[test]
+fn conformance_suite_runs_against_the_board_in_renode() {
     let fake = Fake::new();
-    assert_eq!(fake.run(), (Ok(()), Ok(())));
+    fake.conformance(&fake.bench()).unwrap();
     let calls = fake.calls();
-    let [suites, renode, conformance, told] = calls.as_slice() else {
+    let [renode, conformance, told] = calls.as_slice() else {
         panic!("{calls:?}");
     };
-    assert!(suites.starts_with("renode-test -r "), "{suites}");
-    assert!(suites.contains(&format!("--variable ELF:{}", fake.at("modio").display())));
-    assert!(
-        suites.contains("boot.robot") && suites.contains("watchdog.robot"),
-        "{suites}"
-    );
     assert!(
         renode.starts_with("renode --disable-gui --plain --port "),
         "{renode}"
     );
-    assert!(
-        conformance.starts_with("conformance --exact-line 127.0.0.1:"),
-        "{conformance}"
-    );
-    for option in [
+    let parts = [
+        "conformance --exact-line 127.0.0.1:",
         "--allow-config",
         "--unit 1",
-        "conformance-4do.xml",
-        "conformance-4do.json",
-    ] {
-        assert!(conformance.contains(option), "{option}");
+    ];
+    for part in parts
+        .into_iter()
+        .chain(["conformance-4do.xml", "conformance-4do.json"])
+    {
+        assert!(conformance.contains(part), "{conformance}");
     }
     assert_eq!(told, "told quit", "Renode was ended by its own command");
-
     let script = fs::read_to_string(fake.at("calls.resc")).unwrap();
-    let port = conformance.split(['=', ':', ' ']).nth(3).unwrap();
-    assert!(script.contains(&format!("$port={port}\n")), "{script}");
-    assert!(script.contains("$module=\"4do\"\n$"), "{script}");
-    assert!(script.contains(&format!("$elf={}\n", live::token(&fake.at("modio")))));
+    let port = conformance.split([':', ' ']).nth(3).unwrap();
+    let elf = live::token(&fake.at("modio"));
+    let expected = format!("$elf={elf}\n$dip=1\n$module=\"4do\"\n$port={port}\ninclude @");
+    assert!(script.starts_with(&expected), "{script}");
     assert!(
         script.trim_end().ends_with("renode/modio-02-exact.resc"),
         "{script}"
     );
-    assert!(fake.at("output with a space/robot.xml").is_file());
 }
 
 #[test]
-fn another_board_has_scripts_and_suites_of_its_own() {
+fn end_of_the_suites_is_reported() {
     let fake = Fake::new();
-    let bench = Bench {
-        board: &register_map::board::MODIO_08,
-        ..fake.bench()
-    };
-    fs::create_dir_all(&bench.output).unwrap();
-    assert_eq!(suites::run(&bench), Ok(()));
-    let conformance = fake.at("conformance");
-    let ran = live::conformance(&bench, Module::Do4, &conformance);
-    assert_eq!(ran, Ok(()));
-    let suites = &fake.calls()[0];
-    assert!(suites.contains("modio-08/slots.robot"), "{suites}");
-    assert!(suites.contains("tests/watchdog.robot"), "{suites}");
-    assert!(suites.contains("BOARD_NAME:modio-08"), "{suites}");
-    let script = fs::read_to_string(fake.at("calls.resc")).unwrap();
-    let script = script.trim_end();
-    assert!(script.ends_with("renode/modio-08-exact.resc"), "{script}");
-}
-
-#[test]
-fn how_the_suites_end_is_told() {
-    let fake = Fake::new();
-    let failing = RENODE_TEST.replace("PASS", "FAIL");
-    for (script, expected) in [
-        (format!("{failing}exit 1"), "1 of 1 tests failed"),
-        (format!("{failing}exit 0"), "hid a failure"),
-        (format!("{RENODE_TEST}exit 2"), "Renode crashed"),
-        ("exit 0".to_owned(), "left no"),
-        ("exit 5".to_owned(), "status 5"),
-        ("kill -KILL $$".to_owned(), "was ended"),
+    for (script, failed, expected) in [
+        (format!("{RENODE_TEST}exit 1"), 3, "3 tests failed"),
+        (RENODE_TEST.to_owned(), 3, "hidden a failure"),
+        (RENODE_TEST.to_owned(), 252, "robot_output.xml"),
+        (format!("{RENODE_TEST}exit 2"), 0, "Renode crashed"),
+        ("exit 0".to_owned(), 0, "left no"),
+        ("exit 5".to_owned(), 0, "status 5"),
+        ("kill -KILL $$".to_owned(), 0, "was ended"),
     ] {
         let _ = fs::remove_dir_all(fake.at("output with a space"));
         fake.program("renode-test", &script);
-        let (suites, conformance) = fake.run();
-        let text = message(suites);
+        fake.program("python", &format!("exit {failed}"));
+        let text = message(fake.suites(&fake.bench()));
         assert!(text.contains(expected), "{text}");
-        assert_eq!(conformance, Ok(()), "it runs whatever the suites do");
     }
     fs::remove_file(fake.at("renode-test")).unwrap();
-    let text = message(fake.bench().renode.tester(&Surroundings::default()));
+    let text = message(fake.bench().renode.tester(&Places::default()));
     assert!(text.contains("no renode-test beside"), "{text}");
 }
 
 #[test]
-fn how_conformance_ends_is_told() {
+fn end_of_the_conformance_suite_is_reported() {
     let fake = Fake::new();
     for (script, expected) in [
         ("exit 1", "cases failed"),
@@ -280,46 +265,35 @@ fn how_conformance_ends_is_told() {
         ("exit 3", "was ended"),
     ] {
         fake.program("conformance", script);
-        assert!(message(fake.run().1).contains(expected), "{script}");
+        let text = message(fake.conformance(&fake.bench()));
+        assert!(text.contains(expected), "{script}: {text}");
     }
 }
 
 #[test]
-fn a_renode_that_does_not_come_up_is_told_with_what_it_said() {
+fn renode_that_does_not_start_is_reported_with_its_error() {
     let fake = Fake::new();
     let bench = fake.bench();
-    fs::create_dir_all(&bench.output).unwrap();
     fake.program("renode", "echo 'Error E25: no such type'; echo bye; exit 0");
-    let text = message(live::conformance(
-        &bench,
-        Module::Do4,
-        &fake.at("conformance"),
-    ));
+    let text = message(fake.conformance(&bench));
     assert_eq!(
         text,
         "Renode does not start the board: Error E25: no such type"
     );
-    assert_eq!(
-        fake.calls(),
-        Vec::<String>::new(),
-        "conformance was not tried"
-    );
+    assert!(fake.calls().is_empty(), "conformance was not tried");
 }
 
 #[test]
 fn renode_that_dies_during_the_run_is_a_failure_even_if_all_cases_passed() {
     let fake = Fake::new();
-    let calls = fake.at("calls");
-    let killer = format!(
-        "sleep 0.2; kill -KILL $(cat '{}.pid'); sleep 0.5; exit 0",
-        calls.display()
-    );
+    let pid = format!("{}.pid", fake.at("calls").display());
     fake.program(
         "renode",
         &format!("[ \"$1\" = --version ] || echo $$ > \"$CALLS.pid\"\n{RENODE}"),
     );
+    let killer = format!("sleep 0.2; kill -KILL $(cat '{pid}'); sleep 0.5; exit 0");
     fake.program("conformance", &killer);
-    let text = message(fake.run().1);
+    let text = message(fake.conformance(&fake.bench()));
     assert!(
         text.starts_with("Renode ended before the conformance suite did"),
         "{text}"
@@ -327,7 +301,7 @@ fn renode_that_dies_during_the_run_is_a_failure_even_if_all_cases_passed() {
 }
 
 #[test]
-fn paths_are_written_as_the_monitor_takes_them() {
+fn spaces_in_paths_are_escaped_for_the_monitor() {
     let written = live::token(Path::new("/home/a b/modio"));
     assert_eq!(written, "@/home/a\\ b/modio");
 }

@@ -1,14 +1,13 @@
-//! Whose a symbol is: the crate that its name says.
+//! The crate of a symbol, from its name.
 
-/// Names that crate `compiler_builtins` gives to what the compiler calls by itself.
+/// Names that crate `compiler_builtins` gives to what the compiler calls.
 const BUILTINS: [&str; 4] = ["__aeabi_", "mem", "__rust_", "bcmp"];
 
-/// Startup code, exception vectors and interrupt handlers bear the names that the linker script or
-/// the hardware knows them by.
+/// Startup code, exception vectors and interrupt handlers have the names that the linker script or the hardware knows
+/// them by.
 pub const NAMED: &str = "(vectors, handlers, start-up)";
 
-/// The crate of a symbol.
-#[must_use]
+/// Returns the crate of a symbol.
 pub fn of(symbol: &str) -> String {
     let Ok(name) = rustc_demangle::try_demangle(symbol) else {
         let builtin = BUILTINS.iter().any(|prefix| symbol.starts_with(prefix));
@@ -19,26 +18,21 @@ pub fn of(symbol: &str) -> String {
     crate_of(&name).unwrap_or(NAMED).to_owned()
 }
 
-/// The crate at the head of a path; of `<type as trait>` the type's, or where that is of no crate
-/// (`&str`, `u32`, `[T]`) the trait's.
+/// Returns the crate at the start of a path. For `<type as trait>` it is that of the type, or where the type has no crate
+/// (`&str`, `u32`, `[T]`) that of the trait.
 fn crate_of(path: &str) -> Option<&str> {
-    let path = match path.strip_prefix('<') {
-        Some(inner) => inner,
-        None => return head(path),
+    let Some(inner) = path.strip_prefix('<') else {
+        return head(path);
     };
-    let implementor = path.split(" as ").next().unwrap_or(path);
-    let bare = implementor.trim_start_matches(|c: char| !c.is_alphanumeric() && c != '_');
-    let bare = ["mut ", "dyn ", "const "]
-        .iter()
-        .fold(bare, |bare, word| bare.strip_prefix(word).unwrap_or(bare));
-    let bare = bare.trim_start_matches(|c: char| !c.is_alphanumeric() && c != '_');
-    head(bare).or_else(|| {
-        path.split_once(" as ")
-            .and_then(|(_, of_trait)| head(of_trait))
-    })
+    let (implementor, of_trait) = inner.split_once(" as ").unwrap_or((inner, ""));
+    let sigils = |c: char| !c.is_alphanumeric() && c != '_';
+    let bare = implementor.trim_start_matches(sigils);
+    let words = ["mut ", "dyn ", "const "].into_iter();
+    let bare = words.fold(bare, |bare, word| bare.strip_prefix(word).unwrap_or(bare));
+    head(bare.trim_start_matches(sigils)).or_else(|| head(of_trait))
 }
 
-/// `a` of `a::b`, when `a` is a plain name.
+/// Returns `a` of `a::b`, when `a` is a plain name.
 fn head(path: &str) -> Option<&str> {
     let (first, _) = path.split_once("::")?;
     let plain = !first.is_empty() && first.chars().all(|c| c.is_alphanumeric() || c == '_');
@@ -50,48 +44,49 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_manglings_are_understood() {
-        // Legacy, and v0.
-        assert_eq!(
-            of("_ZN13modbus_server3crc5crc1617h0123456789abcdefE"),
-            "modbus_server"
-        );
-        assert_eq!(of("_RNvCskwGfYPst2Cb_3foo16example_function"), "foo");
-        assert_eq!(
-            of("_ZN50_$LT$firmware..App$u20$as$u20$core..fmt..Debug$GT$3fmt17h0123456789abcdefE"),
-            "firmware"
-        );
-    }
-
-    #[test]
-    fn names_that_are_no_rust_paths_have_their_places() {
-        assert_eq!(of("__aeabi_memcpy4"), "compiler_builtins");
-        assert_eq!(of("memcpy"), "compiler_builtins");
-        assert_eq!(of("USART1"), NAMED);
-        assert_eq!(of("Reset"), NAMED);
-    }
-
-    #[test]
-    fn an_implementation_is_its_types_or_else_its_traits() {
-        for (path, name) in [
-            ("core::ptr::drop_in_place<firmware::App>", "core"),
-            ("<firmware::App>::run", "firmware"),
+    fn crate_is_found_in_both_manglings_and_in_names_of_the_compiler() {
+        for (symbol, name) in [
             (
-                "<modio_drivers::Di<P> as modio_drivers::IoModule>::scan",
-                "modio_drivers",
+                "_ZN13modbus_server3crc5crc1617h0123456789abcdefE",
+                "modbus_server",
+            ),
+            ("_RNvCskwGfYPst2Cb_3foo16example_function", "foo"),
+            (
+                "_ZN50_$LT$firmware..App$u20$as$u20$core..fmt..Debug$GT$3fmt17h0123456789abcdefE",
+                "firmware",
+            ),
+            ("__aeabi_memcpy4", "compiler_builtins"),
+            ("memcpy", "compiler_builtins"),
+            ("USART1", NAMED),
+        ] {
+            assert_eq!(of(symbol), name);
+        }
+    }
+
+    #[test]
+    fn implementation_belongs_to_its_type_or_else_to_its_trait() {
+        for (path, name) in [
+            ("core::ptr::drop_in_place<firmware::App>", Some("core")),
+            ("<firmware::App>::run", Some("firmware")),
+            (
+                "<modio_drivers::Di<P> as rtic::IoModule>::scan",
+                Some("modio_drivers"),
             ),
             (
                 "<&mut modbus_server::Frame as core::fmt::Debug>::fmt",
-                "modbus_server",
+                Some("modbus_server"),
             ),
-            ("<[fugit::Duration; 3] as core::fmt::Debug>::fmt", "fugit"),
-            ("<&u32 as core::fmt::Debug>::fmt", "core"),
-            ("<str as heapless::Sealed>::x", "heapless"),
-            ("<*const u8 as rtic::Monotonic>::now", "rtic"),
-            ("<dyn core::fmt::Write as nb::block::Yes>::x", "core"),
+            (
+                "<[fugit::Duration; 3] as core::fmt::Debug>::fmt",
+                Some("fugit"),
+            ),
+            ("<&u32 as core::fmt::Debug>::fmt", Some("core")),
+            ("<str as heapless::Sealed>::x", Some("heapless")),
+            ("<*const u8 as rtic::Monotonic>::now", Some("rtic")),
+            ("<dyn core::fmt::Write as nb::block::Yes>::x", Some("core")),
+            ("main", None),
         ] {
-            assert_eq!(crate_of(path), Some(name), "{path}");
+            assert_eq!(crate_of(path), name, "{path}");
         }
-        assert_eq!(crate_of("main"), None);
     }
 }

@@ -1,56 +1,47 @@
-//! Whose an instruction is: the crate whose source the debug information says it comes from.
+//! What the debug information says of an image: the crate of an instruction, and the sizes of structures.
 //!
-//! Symbols alone do not tell, for much of an optimised image is inlined into a few interrupt handlers.
-//! Code of `core` that is inlined counts for the crate that uses it.
+//! Symbols do not say which crate code comes from, because much of an optimised image is inlined into a few interrupt
+//! handlers. Code of `core` that is inlined counts for the crate that uses it.
 
-use addr2line::gimli::{self, Dwarf, EndianSlice, LittleEndian};
-use object::read::elf::SectionHeader;
+use std::collections::BTreeMap;
+
+use addr2line::gimli::{self, Dwarf, EndianSlice, LittleEndian, constants};
+use anyhow::{Context as _, Result};
+use object::{Object as _, ObjectSection as _};
 
 use crate::image::Elf;
 
-/// The library that everything uses: what it is used for says more.
+/// The library that every crate uses.
 const CORE: &str = "core";
 
-/// What debug information is read with.
-pub type Reader<'data> = EndianSlice<'data, LittleEndian>;
+type Reader<'data> = EndianSlice<'data, LittleEndian>;
 
-/// The debug information of an image; none has none.
-///
-/// # Errors
-///
-/// When it is broken.
-pub fn dwarf<'data>(elf: &Elf<'data>, bytes: &'data [u8]) -> gimli::Result<Dwarf<Reader<'data>>> {
-    let endian = elf.endian();
-    let table = elf.elf_section_table();
+/// Loads the debug information of an image, which may have none.
+fn dwarf<'data>(elf: &Elf<'data>) -> gimli::Result<Dwarf<Reader<'data>>> {
     Dwarf::load(|id| {
-        let section = table.section_by_name(endian, id.name().as_bytes());
-        let data = section.and_then(|(_, section)| section.data(endian, bytes).ok());
+        let section = elf.section_by_name(id.name());
+        let data = section.and_then(|section| section.data().ok());
         Ok(EndianSlice::new(data.unwrap_or_default(), LittleEndian))
     })
 }
 
-/// Whose an image's code is.
+/// The sources of an image's code.
 pub struct Source<'data> {
     context: addr2line::Context<Reader<'data>>,
 }
 
 impl<'data> Source<'data> {
-    /// Takes the debug information of an image; one without has no lines.
-    ///
-    /// # Errors
-    ///
-    /// When it is broken.
-    pub fn new(elf: &Elf<'data>, bytes: &'data [u8]) -> Result<Self, String> {
-        let context = dwarf(elf, bytes).and_then(addr2line::Context::from_dwarf);
-        let context = context.map_err(|error| format!("broken debug information: {error}"))?;
+    /// Reads the debug information of an image. Without any, no address has a source.
+    pub fn new(elf: &Elf<'data>) -> Result<Self> {
+        let context = dwarf(elf).and_then(addr2line::Context::from_dwarf);
+        let context = context.context("broken debug information")?;
         Ok(Self { context })
     }
 
-    /// The stretches of code from `start` up to `end` that come from a known crate: address, bytes, crate.
+    /// Returns the ranges of code from `start` up to `end` that come from a known crate: address, bytes, crate.
     pub fn owners(&self, start: u32, end: u32) -> Vec<(u32, u32, String)> {
-        let Ok(lines) = self.context.find_location_range(start.into(), end.into()) else {
-            return Vec::new();
-        };
+        let lines = self.context.find_location_range(start.into(), end.into());
+        let lines = lines.into_iter().flatten();
         lines
             .filter_map(|(address, length, _)| {
                 let address = u32::try_from(address).ok()?;
@@ -60,7 +51,7 @@ impl<'data> Source<'data> {
             .collect()
     }
 
-    /// What `of` makes of the innermost source file it knows of the instruction at `address`.
+    /// Returns the result of `of` for the innermost source file of the instruction at `address` for which it has one.
     pub fn innermost<T>(&self, address: u32, of: impl Fn(&str) -> Option<T>) -> Option<T> {
         let frames = self.context.find_frames(address.into()).skip_all_loads();
         let mut frames = frames.ok()?;
@@ -73,28 +64,66 @@ impl<'data> Source<'data> {
         None
     }
 
-    /// The innermost crate but `core` that the instruction at `address` is of.
+    /// Returns the innermost crate but `core` of the instruction at `address`.
     fn owner(&self, address: u32) -> Option<String> {
         self.innermost(address, |file| crate_of(file).filter(|name| name != CORE))
             .or_else(|| self.innermost(address, crate_of))
     }
 }
 
-/// The crate that a source file is of, by its path: the directory above `src`, without a version; or for
-/// generated code the package whose build script made it.
+/// Returns the crate of a source file, from its path: the directory above `src`, without a version. For generated code
+/// it is the package of the build script.
 fn crate_of(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split(['/', '\\']).collect();
     let above = |name: &str| {
         let at = parts.iter().rposition(|part| *part == name)?;
         parts.get(at.checked_sub(1)?).copied()
     };
-    // `serde-1.0.2`, or `serde-0a1b...` of target/.../build: a name, `-`, and something with a digit.
-    let bare = |name: &str| match name.rsplit_once('-') {
-        Some((bare, tail)) if tail.contains(|c: char| c.is_ascii_digit()) => bare.to_owned(),
-        _ => name.to_owned(),
-    };
     let name = above("src").or_else(|| above("out"))?;
-    Some(bare(name).replace('-', "_"))
+    // `serde-1.0.2`, or `serde-0a1b...` of target/.../build: a name, `-`, and something with a digit.
+    let bare = match name.rsplit_once('-') {
+        Some((bare, tail)) if tail.contains(|c: char| c.is_ascii_digit()) => bare,
+        _ => name,
+    };
+    Some(bare.replace('-', "_"))
+}
+
+/// Returns the structures of a crate by name, in bytes. Of several with one name, the largest.
+pub fn structures(elf: &Elf<'_>, krate: &str) -> Result<BTreeMap<String, u64>> {
+    find(elf, krate).context("broken debug information")
+}
+
+fn find(elf: &Elf<'_>, krate: &str) -> gimli::Result<BTreeMap<String, u64>> {
+    let dwarf = dwarf(elf)?;
+    let mut found = BTreeMap::new();
+    let mut headers = dwarf.units();
+    while let Some(header) = headers.next()? {
+        let unit = dwarf.unit(header)?;
+        let unit = unit.unit_ref(&dwarf);
+        // The depth of the crate's namespace while the cursor is in it.
+        let mut within = None;
+        let mut entries = unit.entries();
+        while let Some(entry) = entries.next_dfs()? {
+            within = within.filter(|depth| entry.depth() > *depth);
+            let Some(name) = entry.attr_value(constants::DW_AT_name) else {
+                continue;
+            };
+            let name: Reader<'_> = unit.attr_string(name)?;
+            let namespace = within.is_none() && name.slice() == krate.as_bytes();
+            match entry.tag() {
+                constants::DW_TAG_namespace if namespace => within = Some(entry.depth()),
+                constants::DW_TAG_structure_type if within.is_some() => {
+                    let size = entry.attr_value(constants::DW_AT_byte_size);
+                    let size = size.and_then(|size| size.udata_value()).unwrap_or_default();
+                    let name = name.to_string_lossy().into_owned();
+                    let largest: &mut u64 = found.entry(name).or_default();
+                    *largest = size.max(*largest);
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(found)
 }
 
 #[cfg(test)]
@@ -102,34 +131,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn crates_are_known_by_where_their_sources_are() {
+    fn crate_is_found_in_the_path_of_a_source() {
         for (path, name) in [
             (
                 "/home/me/modio/modbus-server/src/rtu/crc.rs",
-                "modbus_server",
+                Some("modbus_server"),
             ),
             (
                 "/r/.cargo/registry/src/index.crates.io-1949cf8c/stm32f1xx-hal-0.11.0/src/rcc.rs",
-                "stm32f1xx_hal",
+                Some("stm32f1xx_hal"),
             ),
-            (
-                "/r/.cargo/registry/src/index.crates.io-1949cf8c/vcell-0.1.3/src/lib.rs",
-                "vcell",
-            ),
-            (
-                "/usr/src/rustc-1.96.0/library/core/src/slice/mod.rs",
-                "core",
-            ),
-            ("/rustc/5980761/library/core/src/num/mod.rs", "core"),
-            ("C:\\modio\\firmware\\src\\app\\main.rs", "firmware"),
+            ("/rustc/5980761/library/core/src/ptr/mod.rs", Some("core")),
+            ("C:\\modio\\firmware\\src\\app\\main.rs", Some("firmware")),
             (
                 "/m/target/thumbv7m-none-eabi/firmware/build/stm32f1-2ab4c6/out/x.rs",
-                "stm32f1",
+                Some("stm32f1"),
             ),
+            ("<unknown>", None),
+            ("src/main.rs", None),
         ] {
-            assert_eq!(crate_of(path).as_deref(), Some(name), "{path}");
+            assert_eq!(crate_of(path).as_deref(), name, "{path}");
         }
-        assert_eq!(crate_of("<unknown>"), None);
-        assert_eq!(crate_of("src/main.rs"), None);
     }
 }
