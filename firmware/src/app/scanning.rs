@@ -143,7 +143,7 @@ impl Scanning {
             enqueue(events, Event::LineRepaired);
         }
         if self.proof_beat.is_due() {
-            // On a silent line nothing triggers these two tasks. Without a cause they do nothing but set their
+            // On a silent line nothing triggers these two tasks. Without a cause they only set their
             // marks.
             rtic::pend(Interrupt::USART1);
             rtic::pend(Interrupt::EXTI3);

@@ -54,7 +54,7 @@ impl Unit {
     }
 
     fn of(receiver: Receiver<'static>, framing: Framing, points: Points) -> Self {
-        Self::on(port(receiver), framing, points).without_what_it_lacks()
+        Self::on(port(receiver), framing, points).without_unsupported_modes()
     }
 
     /// Sends a request that must be rejected and returns the exception code.
@@ -70,7 +70,7 @@ impl Unit {
 
 impl UnitOn<'_> {
     /// Disables listen-only mode if the model does not have function 08.
-    pub fn without_what_it_lacks(mut self) -> Self {
+    pub fn without_unsupported_modes(mut self) -> Self {
         if self.points.lacks.contains(&0x08) {
             self.server = self.server.without_listen_only();
         }

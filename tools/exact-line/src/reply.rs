@@ -373,8 +373,8 @@ mod tests {
             (Request::Run(NOW), "ok 0 01@1", "01@1"),
             (Request::Run(NOW), "ok 0 nonsense", "nonsense"),
         ] {
-            let told = Reply::read(&request, line).unwrap_err();
-            assert!(told.contains(reason), "{line}: {told}");
+            let error = Reply::read(&request, line).unwrap_err();
+            assert!(error.contains(reason), "{line}: {error}");
         }
     }
 }

@@ -263,9 +263,9 @@ mod tests {
             ("reset now", "no arguments"),
             (&long, "longer than"),
         ] {
-            let told = line.parse::<Request>().unwrap_err();
-            assert!(told.contains(reason), "{line:.20}: {told}");
-            assert!(!told.contains('\n') && told.len() < 200, "{told}");
+            let error = line.parse::<Request>().unwrap_err();
+            assert!(error.contains(reason), "{line:.20}: {error}");
+            assert!(!error.contains('\n') && error.len() < 200, "{error}");
         }
     }
 }

@@ -17,11 +17,11 @@ Exit status: 0 done; 1 the unit refused; 2 wrong usage; 3 no answer; 4 garbled a
 Options of the endpoint may also stand in the environment (MODIO_PORT, MODIO_BAUD, ...), or under a name in a file:
 `--at office` takes those of [office] in endpoints.toml, where the system keeps settings (Linux: ~/.config/modio/).")]
 pub struct Cli {
-    /// Where the unit is.
+    /// Address and settings of the unit.
     #[command(flatten)]
     pub endpoint: Options,
 
-    /// A named endpoint of the file of endpoints [env: MODIO_AT]
+    /// Endpoint with this name in the file of endpoints [env: MODIO_AT]
     #[arg(long, global = true, value_name = "NAME", help_heading = "Endpoint")]
     pub at: Option<String>,
 
@@ -33,35 +33,35 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
-    /// Show every frame, in words and with times, on standard error
+    /// Print every frame on standard error, in words and with times
     #[arg(long, global = true)]
     pub trace: bool,
 
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// A command.
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// List the serial ports of this computer
     Ports,
     /// Look for units on the line
     Scan(Scan),
-    /// Show what the unit is and how it fares
+    /// Show identity, state and counters of the unit
     Info,
     /// Read points and registers
     Read(Read),
     /// Write points and registers
     Write(Write),
-    /// Set which module is in a slot
+    /// Set the module of a slot
     #[command(subcommand)]
     Module(Module),
     /// Read and change the unit's settings
     #[command(subcommand)]
     Config(Config),
-    /// Print values again and again, until Ctrl-C
+    /// Print values repeatedly, until Ctrl-C
     Watch(Watch),
     /// Show the unit on the whole screen: live values, outputs to switch, chart, counters, frames
     Monitor(Monitor),
@@ -69,15 +69,15 @@ pub enum Command {
     Raw(Raw),
     /// Show the frames of other devices on the line, until Ctrl-C, without sending anything
     Sniff(Sniff),
-    /// List the unit's points and registers, with what they mean
+    /// List the unit's points and registers with their meaning
     Describe(Describe),
     /// Write a configuration of another system for the unit
     Export(Export),
     /// Restart the unit
     Reboot,
-    /// Have the unit blink all its LEDs for 10 s
+    /// Blink all LEDs of the unit for 10 s
     Identify,
-    /// Print a script that completes commands in a shell
+    /// Print a completion script for a shell
     Completions {
         /// The shell
         shell: clap_complete::Shell,
@@ -111,7 +111,7 @@ pub struct Rates(pub Vec<u32>);
 pub struct Formats(pub Vec<crate::bus::format::Format>);
 
 fn units(text: &str) -> Result<Units, String> {
-    let wrong = || format!("{text:?} is no list of unit addresses 1 to 247, such as 1-20,40");
+    let wrong = || format!("{text:?} is not a list of unit addresses 1 to 247, such as 1-20,40");
     let mut units = Vec::new();
     for part in text.split(',') {
         let (first, last) = part.split_once('-').unwrap_or((part, part));
@@ -139,7 +139,7 @@ fn rates(text: &str) -> Result<Rates, String> {
     match rates {
         Ok(rates) if rates.iter().all(|rate| (50..=4_000_000).contains(rate)) => Ok(Rates(rates)),
         _ => Err(format!(
-            "{text:?} is no list of rates such as 9600,19200, nor `all`"
+            "{text:?} is not a list of rates such as 9600,19200, nor `all`"
         )),
     }
 }
@@ -160,7 +160,7 @@ pub struct Read {
     /// Names such as p5.1, p5.1.filter, BAUD, or addresses such as 0x0010
     #[arg(required = true, value_name = "NAME|ADDR")]
     pub names: Vec<String>,
-    /// Numbers as they stand in the registers, without units and names
+    /// Print raw numbers as in the registers, without units and names
     #[arg(long)]
     pub raw: bool,
 }
@@ -168,10 +168,11 @@ pub struct Read {
 /// Write points and registers.
 #[derive(Args, Debug)]
 pub struct Write {
-    /// What to write, such as p5.1=on, p5.3=12000, BAUD=19200. Settings count as their register says, and last if they are saved
+    /// Values to write, such as p5.1=on, p5.3=12000, BAUD=19200. A setting takes effect immediately or after a
+    /// restart, as its register says; it is kept only if it is saved
     #[arg(required = true, value_name = "NAME|ADDR=VALUE", value_parser = assignment)]
     pub values: Vec<(String, String)>,
-    /// Numbers as they stand in the registers
+    /// Write raw numbers as in the registers
     #[arg(long)]
     pub raw: bool,
 }
@@ -185,10 +186,10 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// Which module is in a slot.
+/// Set the module of a slot.
 #[derive(Subcommand, Debug)]
 pub enum Module {
-    /// Set it, save, restart and check: all a slot needs
+    /// Set the module, save, restart and check the result
     Set {
         /// The port of the slot, 1 to 8
         #[arg(id = "slot", value_name = "PORT", value_parser = clap::value_parser!(u8).range(1..=8))]
@@ -201,30 +202,30 @@ pub enum Module {
 /// The unit's settings.
 #[derive(Subcommand, Debug)]
 pub enum Config {
-    /// Show settings, all without names
+    /// Show these settings, or all settings without a name
     Get {
         /// Names such as BAUD, p5.1.filter
         names: Vec<String>,
     },
-    /// Change settings; `config save` makes them last
+    /// Change settings; `config save` stores them
     Set {
         /// Such as BAUD=19200
         #[arg(required = true, value_name = "NAME=VALUE", value_parser = assignment)]
         values: Vec<(String, String)>,
     },
-    /// Make the settings last over a restart
+    /// Store the settings, so that a restart keeps them
     Save,
-    /// Show where the settings differ from a file, or from the factory's
+    /// Show differences between the settings and a file, or the factory settings
     Diff {
         /// A file that `config export` wrote
         file: Option<PathBuf>,
     },
     /// Write all settings as TOML
     Export {
-        /// The file; without, standard output
+        /// The file; without it, print on standard output
         file: Option<PathBuf>,
     },
-    /// Take the settings of a file: all are checked first, then written and saved
+    /// Check all settings of a file, then write and save them
     Import {
         /// A file that `config export` wrote
         file: PathBuf,
@@ -232,7 +233,7 @@ pub enum Config {
         #[arg(long)]
         restart: bool,
     },
-    /// Set all to the factory's values, and save
+    /// Set all settings to the factory defaults, and save
     Reset {
         /// Restart the unit afterwards
         #[arg(long)]
@@ -240,24 +241,24 @@ pub enum Config {
     },
 }
 
-/// Print values again and again.
+/// Print values repeatedly.
 #[derive(Args, Debug)]
 pub struct Watch {
-    /// Names; without, all points
+    /// Names; without them, all points
     pub names: Vec<String>,
-    /// How often
+    /// Interval between values
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration)]
     pub every: Duration,
-    /// As a table for spreadsheets
+    /// Print CSV, for spreadsheets
     #[arg(long, conflicts_with = "json_lines")]
     pub csv: bool,
-    /// As one JSON object a line
+    /// Print one JSON object per line
     #[arg(long)]
     pub json_lines: bool,
-    /// Numbers as they stand in the registers
+    /// Print raw numbers as in the registers
     #[arg(long)]
     pub raw: bool,
-    /// Stop after so many
+    /// Number of times to print the values
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
 }
@@ -288,7 +289,7 @@ fn poll_interval(text: &str) -> Result<Duration, String> {
 /// Send a PDU.
 #[derive(Args, Debug)]
 pub struct Raw {
-    /// Function code and data in hexadecimal, such as 03 0000 0001; the check is added
+    /// Function code and data in hexadecimal, such as 03 0000 0001; the CRC or LRC is added
     #[arg(required = true, value_name = "PDU-HEX")]
     pub pdu: Vec<String>,
 }
@@ -304,7 +305,7 @@ pub struct Sniff {
 /// List points and registers.
 #[derive(Args, Debug)]
 pub struct Describe {
-    /// Ask the unit even if its description is known from before
+    /// Read the description from the unit even if it is already stored here
     #[arg(long)]
     pub refresh: bool,
 }
@@ -312,7 +313,7 @@ pub struct Describe {
 /// Write a configuration of another system for the unit.
 #[derive(Args, Debug)]
 pub struct Export {
-    // The id `format` belongs to the global option --format.
+    // The ID `format` belongs to the global option --format.
     /// The system
     #[arg(id = "system", value_name = "SYSTEM", value_enum)]
     pub format: ExportFormat,
@@ -321,7 +322,7 @@ pub struct Export {
     pub output: Option<PathBuf>,
 }
 
-/// A system that a configuration is written for.
+/// A system for which a configuration can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum ExportFormat {
     /// A table of all points and registers
@@ -359,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_of_units_are_read() {
+    fn lists_of_units_are_parsed() {
         assert_eq!(units("3,1-2,2"), Ok(Units(vec![1, 2, 3])));
         for wrong in ["", "0", "248", "5-3", "1-", "x"] {
             assert!(units(wrong).is_err(), "{wrong}");

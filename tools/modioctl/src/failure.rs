@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Why a command did not do what was asked.
+/// Reason why a command failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
     /// The unit answered with an exception.
@@ -11,10 +11,10 @@ pub enum Failure {
     /// The command line, a name, a value or a file is wrong.
     #[error("{0}")]
     Usage(String),
-    /// Nothing came back.
+    /// Nothing was received.
     #[error("{0}")]
     NoAnswer(String),
-    /// Something came back that is no answer.
+    /// Bytes were received that are not an answer.
     #[error("{0}")]
     Garbled(String),
     /// The serial port or the connection cannot be opened, or was lost.
@@ -23,12 +23,12 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// What is wrong with the command line, a name, a value or a file.
+    /// Returns a failure for a wrong command line, name, value or file.
     pub fn usage(what: impl fmt::Display) -> Self {
         Self::Usage(what.to_string())
     }
 
-    /// The exit status.
+    /// Returns the exit status.
     #[must_use]
     pub const fn status(&self) -> u8 {
         match self {
@@ -40,13 +40,13 @@ impl Failure {
         }
     }
 
-    /// Whether asking again later can help: the line or the unit was in trouble, not the question.
+    /// Returns whether asking again later can help: the line or the unit failed, not the request.
     #[must_use]
     pub const fn may_pass(&self) -> bool {
         matches!(self, Self::NoAnswer(_) | Self::Garbled(_) | Self::Port(_))
     }
 
-    /// The same failure, with what was being done in front.
+    /// Returns the failure with the present action in front.
     #[must_use]
     pub fn while_doing(self, what: impl fmt::Display) -> Self {
         let said = |text: String| format!("{what}: {text}");

@@ -1,8 +1,8 @@
 //! `modioctl`: finds, sets up and watches modio units over Modbus, on a serial port, over TCP and over Modbus TCP.
 //!
-//! The program is [`run`]. Other programs can use the modules below it: [`bus::Master`] asks units,
-//! [`device::Device`] reads and writes one of them with errors in words, [`names::Book`] knows its points and registers
-//! by name.
+//! The program is [`run`]. Other programs can use the modules below it: [`bus::Master`] sends requests to units,
+//! [`device::Device`] reads and writes one unit with errors as texts, [`names::Book`] knows its points and
+//! registers by name.
 
 #![forbid(unsafe_code)]
 

@@ -7,11 +7,11 @@ use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
 use crate::value::{table_name, takes, unit_name};
 
-/// Returns the description of a unit for programs. `source` says where the description is from.
+/// Returns the description of a unit for programs. `source` is the source of the description.
 ///
 /// # Errors
 ///
-/// Error when the unit is not a modio.
+/// When the unit is not a modio.
 pub fn as_json(book: &Book, source: &str) -> Result<Json, Failure> {
     let about = book.of_modio()?;
     Ok(json!({
@@ -34,7 +34,7 @@ fn unit(item: &Item) -> Unit {
     }
 }
 
-/// The values of an item, for people.
+/// Returns the allowed values of an item, for people.
 #[must_use]
 pub fn values(item: &Item) -> String {
     let unit = unit(item);
@@ -54,7 +54,7 @@ pub fn values(item: &Item) -> String {
     }
 }
 
-/// An item for programs.
+/// Returns an item for programs.
 fn item_json(item: &Item) -> Json {
     json!({
         "name": item.name,

@@ -13,7 +13,7 @@ fn main() -> ExitCode {
     let result = match runtime {
         Ok(runtime) => runtime.block_on(modioctl::run(cli)),
         Err(error) => {
-            eprintln!("modioctl: the system gives no timers: {error}");
+            eprintln!("modioctl: the system provides no timers: {error}");
             return ExitCode::FAILURE;
         }
     };

@@ -4,50 +4,50 @@ use modio_description::{Description, PointKind, Reading, Register, Scope, Table,
 
 use crate::failure::Failure;
 
-/// Points of a port.
+/// Number of points of a port.
 const CHANNELS: u16 = 4;
 
-/// Something that can be read: a point, a register, or an address of which nothing is known.
+/// An item that can be read: a point, a register, or an address without known meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// Its name.
+    /// Name of the item.
     pub name: String,
-    /// Bit or word.
+    /// Table of the item: bits or words.
     pub table: Table,
-    /// Its address, counted from 0.
+    /// Address, counted from 0.
     pub address: u16,
-    /// How many registers it takes; 1 for a bit.
+    /// Number of registers; 1 for a bit.
     pub words: u16,
-    /// What its number means.
+    /// Meaning of its number.
     pub meaning: Meaning,
     /// Whether it can be written.
     pub writable: bool,
-    /// Whether it is a setting behind the lock.
+    /// Whether it is a setting, which the lock protects.
     pub setting: bool,
-    /// Whether what is written counts after a restart only.
+    /// Whether a written value takes effect only after a restart.
     pub restart: bool,
-    /// Which values it takes; `None` when nothing is known.
+    /// Allowed values; `None` when they are not known.
     pub values: Option<Values>,
-    /// The factory's value, of a setting.
+    /// Factory default of a setting.
     pub default: u16,
-    /// What it is, in one line.
+    /// Description in one line.
     pub about: String,
 }
 
-/// What an item's number means.
+/// Meaning of an item's number.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Meaning {
     /// On or off.
     Bit,
-    /// What the description says of the register.
+    /// As the description says for the register.
     Value(Value),
-    /// An analog point, as its RANGE and SCALE make it be read.
+    /// An analog point, with the meaning that its RANGE and SCALE select.
     Analog(Reading),
-    /// Nothing is known.
+    /// The meaning is not known.
     Unknown,
 }
 
-/// A port with a slot, and the points that its module has.
+/// A port with a slot, and the points of its module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PortItems {
     /// Number of the port, 1 to 8.
@@ -68,7 +68,7 @@ pub struct Book {
 }
 
 impl Book {
-    /// The names of a unit; `readings` has RANGE and SCALE of every point.
+    /// Creates the names of a unit. `readings` contains RANGE and SCALE of every point.
     #[must_use]
     pub fn new(description: Description, readings: Vec<(u16, u16)>) -> Self {
         let mut items = points(&description, &readings);
@@ -81,38 +81,39 @@ impl Book {
         }
     }
 
-    /// The unit's description; `None` for one that is no modio.
+    /// Returns the unit's description; `None` for a unit that is not a modio.
     #[must_use]
     pub const fn description(&self) -> Option<&Description> {
         self.description.as_ref()
     }
 
-    /// All items: the points, then the registers in the order of their addresses.
+    /// Returns all items: the points, then the registers in the order of their addresses.
     #[must_use]
     pub fn items(&self) -> &[Item] {
         &self.items
     }
 
-    /// The description of a unit that must be a modio.
+    /// Returns the description of a unit that must be a modio.
     ///
     /// # Errors
     ///
-    /// Error when the unit is another device.
+    /// When the unit is another device.
     pub fn of_modio(&self) -> Result<&Description, Failure> {
         self.description().ok_or_else(|| {
             Failure::Refused(
-                "the unit is no modio: of others `read` and `write` work with addresses".to_owned(),
+                "the unit is not a modio; for other units use `read` and `write` with addresses"
+                    .to_owned(),
             )
         })
     }
 
-    /// The points.
+    /// Iterates over the points.
     pub fn points(&self) -> impl Iterator<Item = &Item> {
         let known = |item: &&Item| matches!(item.meaning, Meaning::Bit | Meaning::Analog(_));
         self.items.iter().filter(known)
     }
 
-    /// Returns the ports that have a slot with their points, those included whose values have no known meaning.
+    /// Returns the ports with a slot and their points, including points whose values have no known meaning.
     #[must_use]
     pub fn ports(&self) -> Vec<PortItems> {
         let Some(description) = &self.description else {
@@ -135,16 +136,16 @@ impl Book {
         description.ports.iter().map(port).collect()
     }
 
-    /// The settings: what a configuration file holds.
+    /// Iterates over the settings, which are the content of a configuration file.
     pub fn settings(&self) -> impl Iterator<Item = &Item> {
         self.items.iter().filter(|item| item.setting)
     }
 
-    /// The item with this name or address.
+    /// Returns the item with this name or address.
     ///
     /// # Errors
     ///
-    /// That there is none, with names that are close.
+    /// When there is no such item; the error contains similar names.
     pub fn find(&self, name: &str) -> Result<Item, Failure> {
         let wanted = slug(name);
         if let Some(item) = self.items.iter().find(|item| slug(&item.name) == wanted) {
@@ -165,7 +166,7 @@ impl Book {
     fn no_such(&self, name: &str, wanted: &str) -> String {
         if self.items.is_empty() {
             return format!(
-                "{name}: this unit has no names that are known; give an address such as 0x0010"
+                "{name}: the names of this unit are not known; give an address such as 0x0010"
             );
         }
         let mut near: Vec<_> = self
@@ -181,18 +182,18 @@ impl Book {
         near.sort_by_key(|(distance, _)| *distance);
         let near: Vec<_> = near.iter().take(4).map(|(_, name)| name.as_str()).collect();
         format!(
-            "{name}: no such point or register; close to it: {}. `modioctl describe` lists all",
+            "{name}: no such point or register; similar names: {}; `modioctl describe` lists all",
             near.join(", ")
         )
     }
 }
 
-/// A name in the form in which names are compared.
+/// Returns a name in the form in which names are compared.
 fn slug(name: &str) -> String {
     name.trim().to_lowercase().replace([' ', '-'], "_")
 }
 
-/// An address: `0x0010`, or 16.
+/// Parses an address: `0x0010`, or 16.
 fn address(text: &str) -> Option<u16> {
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => u16::from_str_radix(digits, 16).ok(),
@@ -216,7 +217,7 @@ fn unknown(address: u16) -> Item {
     }
 }
 
-/// The ports that have a slot, each with what a point of it is, in order.
+/// Iterates over the points of all ports with a slot: port, channel and kind of point, in order.
 fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKind)> {
     description.ports.iter().flat_map(move |port| {
         let module = description
@@ -231,7 +232,7 @@ fn kinds(description: &Description) -> impl Iterator<Item = (u16, u16, &PointKin
     })
 }
 
-/// The address of a point.
+/// Returns the address of a point.
 fn point(port: u16, channel: u16) -> u16 {
     (port.max(1) - 1) * CHANNELS + channel - 1
 }
@@ -268,7 +269,7 @@ fn points(description: &Description, readings: &[(u16, u16)]) -> Vec<Item> {
     items
 }
 
-/// The items of a register or a run of them.
+/// Returns the items of a register or a run of registers.
 fn registers(description: &Description, register: &Register) -> Vec<Item> {
     let each = match (&register.value, register.scope) {
         (Value::Opaque, Scope::Unit) => register.count,
@@ -319,7 +320,7 @@ fn registers(description: &Description, register: &Register) -> Vec<Item> {
     }
 }
 
-/// Whether a register that can be written is a setting: not the lock, an order or a counter.
+/// Returns whether a writable register is a setting, and not the lock, a command or a counter.
 fn is_setting(register: &Register) -> bool {
     !matches!(register.name.as_str(), "KEY" | "COMMAND")
         && !matches!(register.value, Value::Long(_))
@@ -340,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lead_to_addresses() {
+    fn names_are_resolved_to_addresses() {
         let book = book(Module::Ai2Ao2);
         let address = |name| book.find(name).map(|item| (item.address, item.words));
         assert_eq!(address("p5.1"), Ok((0x10, 1)));
@@ -357,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_name_lists_the_closest_ones() {
+    fn an_unknown_name_is_reported_with_similar_ones() {
         let unknown = book(Module::Di4).find("BUAD").unwrap_err();
         assert!(unknown.to_string().contains("BAUD"), "{unknown}");
         assert!(
@@ -369,10 +370,10 @@ mod tests {
     }
 
     #[test]
-    fn a_point_reads_as_its_settings_say_and_a_setting_takes_what_suits_it() {
+    fn a_point_has_the_meaning_of_its_settings_and_a_setting_the_values_of_its_kind() {
         let book = book(Module::Ai2Ao2);
         let Meaning::Analog(reading) = book.find("p5.1").unwrap().meaning else {
-            panic!("no analog point");
+            panic!("not an analog point");
         };
         assert_eq!((reading.unit.code.as_str(), reading.max), ("uA", 20_000));
         assert_eq!(

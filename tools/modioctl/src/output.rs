@@ -1,4 +1,4 @@
-//! Standard output: a reader that goes away, as `head` does, ends the program quietly.
+//! Standard output. When the reader closes it, as `head` does, the program ends without an error message.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stdout};
@@ -9,7 +9,7 @@ use crate::failure::Failure;
 ///
 /// # Errors
 ///
-/// That it cannot be written, to a full disk for instance.
+/// When the line cannot be written, for example to a full disk.
 pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -23,7 +23,7 @@ pub fn line(text: Arguments<'_>) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// That it cannot be written.
+/// When the output cannot be written.
 pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value).map_err(Failure::usage)?;
     line(format_args!("{text}"))
@@ -33,7 +33,7 @@ pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// That it cannot be written.
+/// When the output cannot be written.
 pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Failure> {
     let mut table = comfy_table::Table::new();
     table.load_preset(comfy_table::presets::NOTHING);

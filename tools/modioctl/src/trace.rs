@@ -1,11 +1,11 @@
-//! `--trace`: every frame on standard error, with times and in words.
+//! `--trace`: prints every frame on standard error, with times and in words.
 
 use tokio::time::Instant;
 
 use crate::bus::adu::Framing;
 use crate::bus::{Direction, Observer, Seen, decode};
 
-/// An observer that prints.
+/// Returns an observer that prints.
 #[must_use]
 pub fn to_stderr() -> Observer {
     let start = Instant::now();
@@ -18,7 +18,7 @@ pub fn to_stderr() -> Observer {
     })
 }
 
-/// A frame in a line: seconds since `start`, direction, bytes, words.
+/// Returns a frame as a line: seconds since `start`, direction, bytes, words.
 #[must_use]
 pub fn line(seen: &Seen, start: Instant, request: Option<&[u8]>) -> String {
     let seconds = seen.at.saturating_duration_since(start).as_secs_f64();
@@ -26,7 +26,7 @@ pub fn line(seen: &Seen, start: Instant, request: Option<&[u8]>) -> String {
     format!("{seconds:9.3} {frame}")
 }
 
-/// Returns a frame in a line: direction, bytes, words. `request` is the PDU of the request in front of a response.
+/// Returns a frame as a line: direction, bytes, words. `request` is the PDU of the request before a response.
 #[must_use]
 pub fn frame(
     direction: Direction,

@@ -1,4 +1,4 @@
-//! Values of points and registers, for people and for programs, and what people write back.
+//! Values of points and registers, formatted for people and programs, and parsed from the user's input.
 
 use modio_description::{Table, Unit, Value, Values};
 use serde_json::{Value as Json, json};
@@ -6,14 +6,14 @@ use serde_json::{Value as Json, json};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 
-/// A value as it was read: one register or more, or a bit.
+/// A value as read: one or more registers, or a bit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
     /// For people, without the unit.
     pub text: String,
     /// The unit for people; empty when there is none.
     pub unit: String,
-    /// For programs: a number, a bool, or a text.
+    /// For programs: a number, a bool or a text.
     pub json: Json,
 }
 
@@ -26,7 +26,7 @@ impl std::fmt::Display for Shown {
     }
 }
 
-/// What registers say; `raw`: as numbers, whatever they mean.
+/// Formats the words of an item. With `raw` they are shown as numbers without meaning.
 #[must_use]
 pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
     let first = words.first().copied().unwrap_or_default();
@@ -43,7 +43,7 @@ pub fn show(item: &Item, words: &[u16], raw: bool) -> Shown {
     }
 }
 
-/// A word, in two's complement where values below 0 are possible.
+/// Returns a word as a number, in two's complement when values below 0 are possible.
 fn signed(word: u16, min: i32) -> i64 {
     if min < 0 {
         i64::from(word.cast_signed())
@@ -105,7 +105,7 @@ fn number(number: i64, unit: &Unit) -> Shown {
     }
 }
 
-/// `number * 10^exponent` in decimal digits.
+/// Returns `number * 10^exponent` in decimal digits.
 fn decimal(number: i64, exponent: i8) -> String {
     let places = usize::from(exponent.min(0).unsigned_abs());
     if places == 0 {
@@ -122,7 +122,7 @@ fn decimal(number: i64, exponent: i8) -> String {
     format!("{sign}{whole}.{fraction}")
 }
 
-/// A UCUM code as people write the unit.
+/// Returns the name of a UCUM unit for people.
 #[must_use]
 pub fn unit_name(code: &str) -> &str {
     match code {
@@ -133,17 +133,17 @@ pub fn unit_name(code: &str) -> &str {
     }
 }
 
-/// The registers that make an item what `text` says; `raw`: a number as it stands in the register.
+/// Returns the words for the value in `text`. With `raw` it is a register's number.
 ///
 /// # Errors
 ///
-/// That the item cannot be written, or which values it takes.
+/// When the item cannot be written, or the value is not allowed; the error contains the allowed values.
 pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
     let name = &item.name;
     if !item.writable {
         return Err(Failure::usage(format!("{name} can only be read")));
     }
-    let wrong = |takes: String| Failure::usage(format!("{name} does not take {text:?}: {takes}"));
+    let wrong = |takes: String| Failure::usage(format!("{name} does not allow {text:?}: {takes}"));
     let word = number_of(text);
     let word = if raw && item.words == 1 {
         let word = word.ok_or_else(|| wrong("--raw needs a number from 0 to 65535".to_owned()))?;
@@ -190,7 +190,7 @@ pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
                     |values| takes(values, unit),
                 )
             };
-            // A value outside the unit's range, such as 0xFFFF for hold, is written as it is.
+            // A value outside the unit's range, such as 0xFFFF for hold, is written unchanged.
             let word = match text.get(..2) {
                 Some("0x" | "0X") => word.map(i64::from),
                 _ => steps(text, unit),
@@ -206,7 +206,7 @@ pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
                 .ok_or_else(|| wrong(takes()))
         }
         Meaning::Value(Value::Long(_)) => match text {
-            // The one long value that can be written is a counter that is cleared.
+            // The only long value that can be written is 0, which clears a counter.
             "0" => Ok(vec![0; usize::from(item.words)]),
             _ => Err(wrong("it can only be cleared, by 0".to_owned())),
         },
@@ -230,7 +230,7 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
     }
 }
 
-/// A number from 0 to 65535, decimal or hexadecimal.
+/// Parses a number from 0 to 65535, decimal or hexadecimal.
 fn number_of(text: &str) -> Option<u16> {
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => u16::from_str_radix(digits, 16).ok(),
@@ -238,7 +238,8 @@ fn number_of(text: &str) -> Option<u16> {
     }
 }
 
-/// How many steps of the unit a quantity is; `None` when it is no number, has another unit, or lies between two steps.
+/// Returns a quantity in steps of the unit; `None` when it is not a number, has another unit, or lies between two
+/// steps.
 fn steps(text: &str, unit: &Unit) -> Option<i64> {
     let shown = unit_name(&unit.code);
     let number = text
@@ -252,7 +253,7 @@ fn steps(text: &str, unit: &Unit) -> Option<i64> {
     near.then_some(whole as i64 - i64::from(unit.offset))
 }
 
-/// Whether a value is among those a register takes.
+/// Returns whether a register allows a value.
 #[must_use]
 pub fn allow(values: &Values, word: u16) -> bool {
     match values {
@@ -262,12 +263,12 @@ pub fn allow(values: &Values, word: u16) -> bool {
     }
 }
 
-/// Which values a register takes, in its unit.
+/// Describes the values that a register allows, in its unit.
 #[must_use]
 pub fn takes(values: &Values, unit: &Unit) -> String {
     match values {
         Values::Range(min, max) => range((*min).into(), (*max).into(), unit),
-        // The value beside the range stands for something else than a quantity, unless it is 0.
+        // The value outside the range has a special meaning, unless it is 0.
         Values::RangeOr(0, min, max) => {
             format!("{}, or 0", range((*min).into(), (*max).into(), unit))
         }
@@ -291,7 +292,7 @@ pub fn takes(values: &Values, unit: &Unit) -> String {
 
 fn range(min: i64, max: i64, unit: &Unit) -> String {
     if min == max {
-        // One value alone is no quantity but a key, or a 0 that clears something.
+        // A single allowed value is a key, or a 0 that clears something, and not a quantity.
         return match min {
             0..10 => format!("it takes only {min}"),
             _ => format!("it takes only {min:#06X}"),
@@ -304,7 +305,7 @@ fn range(min: i64, max: i64, unit: &Unit) -> String {
     )
 }
 
-/// What an item is read and written by, for people.
+/// Returns the name of a table, for people.
 #[must_use]
 pub const fn table_name(table: Table) -> &'static str {
     match table {
@@ -360,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn what_people_write_becomes_registers() {
+    fn values_are_parsed_into_registers() {
         let book = book(1, 1);
         assert_eq!(parsed(&book, "BAUD", "115200"), Ok(1152));
         assert_eq!(parsed(&book, "BAUD", "19200 bit/s"), Ok(192));
@@ -373,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_out_of_range_is_refused_with_the_range() {
+    fn a_value_out_of_range_is_rejected_with_the_range() {
         let book = book(1, 1);
         let wrong = |name, text| parsed(&book, name, text).unwrap_err();
         assert!(wrong("p5.3", "3000").contains("4000 to 20000 µA"));

@@ -1,6 +1,7 @@
-//! Exports, compared with files in `tests/export/` as a whole, and read back.
+//! Compares exports with the files in `tests/export/`, and parses them.
 //!
-//! After an intended change: `MODIOCTL_WRITE_EXPORTS=1 cargo test -p modioctl --test export`, then read the changes.
+//! After an intended change run `MODIOCTL_WRITE_EXPORTS=1 cargo test -p modioctl --test export`, then check the
+//! differences.
 
 use std::path::Path;
 use std::time::Duration;
@@ -115,7 +116,7 @@ fn digital_points_are_switches_and_binary_sensors() {
 }
 
 #[test]
-fn endpoint_that_a_system_cannot_use_is_refused() {
+fn endpoint_that_a_system_cannot_use_is_rejected() {
     let ascii = endpoint(Place::Tcp("gateway:4196".to_owned()), Framing::Ascii);
     for format in [ExportFormat::HomeAssistant, ExportFormat::NodeRed] {
         let error = export(format, &analog(), &ascii).unwrap_err();

@@ -1,4 +1,4 @@
-//! `modioctl monitor` in a pseudo-terminal, against a unit that this test serves over TCP.
+//! Tests of `modioctl monitor` in a pseudo-terminal, with a unit that this test serves over TCP.
 
 #![cfg(unix)]
 
@@ -19,7 +19,7 @@ use register_map::{Module, configuration::MODULE};
 
 use crate::terminal::{Terminal, wait};
 
-/// Length of every request that the monitor sends but function 10: unit, function, two words, CRC.
+/// Length of every request of the monitor except function 10: unit, function, two words, CRC.
 const REQUEST: usize = 8;
 
 /// The registers and bits of a modio-02 with a 4do.
@@ -44,9 +44,9 @@ impl Tables {
         tables
     }
 
-    /// Has a module in the slot, set and in force.
+    /// Sets a module in the slot, which is also in force.
     fn plug(&mut self, module: Module) {
-        // The program knows this unit's description, and does not read it.
+        // The program knows this unit's description and does not read it.
         let description = describe(&MODIO_02, "0.1.0", |_| module);
         let crc = checksum(&description.encode());
         let words = [
@@ -93,12 +93,12 @@ struct Unit {
     faults: Arc<Faults>,
 }
 
-/// What the unit does wrong.
+/// Faults of the unit.
 #[derive(Default)]
 struct Faults {
-    /// It answers no request.
+    /// It answers no requests.
     silent: AtomicBool,
-    /// It answers no request of function 05, and does not carry it out.
+    /// It neither answers nor executes requests of function 05.
     ignores_writes: AtomicBool,
     /// It closes every connection at the next request.
     hangs_up: AtomicBool,
@@ -134,7 +134,7 @@ fn connection(mut stream: TcpStream, tables: &Mutex<Tables>, faults: &Faults) {
         if is(&faults.hangs_up) {
             return;
         }
-        let (unit, pdu) = Framing::Rtu.open(&request).expect("a whole request");
+        let (unit, pdu) = Framing::Rtu.open(&request).expect("a complete request");
         if is(&faults.silent) || (pdu[0] == 5 && is(&faults.ignores_writes)) {
             continue;
         }
@@ -150,7 +150,7 @@ fn connection(mut stream: TcpStream, tables: &Mutex<Tables>, faults: &Faults) {
 
 fn monitor(unit: &Unit) -> Terminal {
     let terminal = Terminal::run(&["--tcp", &unit.address, "--baud", "115200", "monitor"]);
-    // A machine that stalls shows an old value for a moment; the test goes on when it is fresh.
+    // On a machine that stalls, the value may be old for a moment; the test continues when it is fresh.
     terminal.wait_for("p5.1 digital output      [□ off] good");
     terminal
 }
@@ -178,7 +178,7 @@ fn output_is_switched_by_key_and_by_click_and_a_silent_unit_is_shown() {
     terminal.wait_for("p5.3 is not switched: its present value is not known");
     assert!(unit.bit(0x12));
 
-    // The unit comes back with another module.
+    // The unit returns with another module.
     unit.tables.lock().unwrap().plug(Module::Di4);
     unit.faults.silent.store(false, Ordering::SeqCst);
     terminal.wait_for("● answers");
@@ -199,10 +199,13 @@ fn write_without_an_answer_is_repeated_only_when_asked() {
     unit.faults.ignores_writes.store(true, Ordering::SeqCst);
     let before = "p5.1 digital output      [□ off] good";
     terminal.switch(" ", before, "[r: try again]");
-    assert!(terminal.text().contains("may have carried it out"));
+    assert!(terminal.text().contains("may have executed it"));
     unit.faults.ignores_writes.store(false, Ordering::SeqCst);
     terminal.wait_for(before);
-    assert!(!unit.bit(0x10), "the program wrote without being asked");
+    assert!(
+        !unit.bit(0x10),
+        "the program repeated the write without an order"
+    );
     terminal.press("r");
     terminal.wait_for("p5.1 digital output       [■ on] good");
     assert!(unit.bit(0x10));
@@ -232,16 +235,16 @@ fn ctrl_c_restores_the_terminal_with_status_0() {
 }
 
 #[test]
-fn unit_that_is_no_modio_is_refused_with_status_1() {
+fn unit_that_is_not_a_modio_ends_with_status_1() {
     let unit = Unit::serve();
     unit.tables.lock().unwrap().words[usize::from(PRODUCT_CODE)] = 0;
     let mut terminal = Terminal::run(&["--tcp", &unit.address, "monitor"]);
     assert_eq!(terminal.wait_for_end().exit_code(), 1);
-    terminal.wait_for("no modio");
+    terminal.wait_for("not a modio");
 }
 
 #[test]
-fn without_a_terminal_the_monitor_is_refused_with_status_2() {
+fn monitor_without_a_terminal_ends_with_status_2() {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_modioctl"));
     let output = command
         .args(["--port", "none", "monitor"])

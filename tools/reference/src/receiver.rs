@@ -78,7 +78,7 @@ pub enum Mode {
 pub struct Receiver {
     /// Mode of the line.
     pub mode: Mode,
-    /// What has been counted.
+    /// Counters of the line.
     pub counters: LineCounters,
     /// Number of free buffers.
     pub free: usize,

@@ -1,4 +1,4 @@
-//! Where the unit is and how to talk to it: from the command line, a file of named endpoints, and the environment.
+//! Address and settings of the unit: from the command line, a file of named endpoints, and the environment.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -10,7 +10,7 @@ use super::adu::Framing;
 use super::format::Format;
 use crate::failure::Failure;
 
-/// Where the bytes go.
+/// Connection to the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A serial port by its path or name.
@@ -22,37 +22,37 @@ pub enum Place {
 }
 
 impl Place {
-    /// Whether a unit's line settings are this computer's as well.
+    /// Returns whether a change of the unit's line settings also concerns this computer's port.
     #[must_use]
     pub const fn is_serial(&self) -> bool {
         matches!(self, Self::Serial(_))
     }
 }
 
-/// Where the unit is, and how to talk to it.
+/// Address and settings of the unit.
 #[derive(Clone, Debug)]
 pub struct Endpoint {
-    /// Where the bytes go.
+    /// Connection to the line.
     pub place: Place,
-    /// In bit/s.
+    /// Baud rate in bit/s.
     pub baud: u32,
     /// Data bits, parity and stop bits.
     pub format: Format,
-    /// How frames are marked off.
+    /// Framing of the line.
     pub framing: Framing,
-    /// The unit's address, 1 to 247, or 255.
+    /// Unit address, 1 to 247, or 255.
     pub unit: u8,
-    /// How long to wait for the beginning of an answer.
+    /// Time to wait for the beginning of an answer.
     pub timeout: Duration,
-    /// How often to ask again.
+    /// Number of times that a request is repeated.
     pub retries: u8,
-    /// Whether the time-out was given, and is not the default.
+    /// Whether the time-out was given by the user.
     pub timeout_given: bool,
 }
 
 impl Endpoint {
-    /// How long `bytes` bytes take on the line, behind a gateway too; no time for Modbus TCP, whose server keeps the
-    /// times of its line itself.
+    /// Returns the duration of `bytes` bytes on the line, also for a gateway in transparent mode. Returns zero for
+    /// Modbus TCP, whose server handles the timing of its line itself.
     #[must_use]
     pub fn time_of(&self, bytes: usize) -> Duration {
         if self.framing == Framing::Mbap {
@@ -62,7 +62,7 @@ impl Endpoint {
         Duration::from_secs_f64(bits / f64::from(self.baud))
     }
 
-    /// The silence between frames on a serial line: t3.5, and 1.75 ms above 19200 bit/s (V1.02, 2.5.1.1).
+    /// Returns the silence between frames on a serial line: t3.5, and 1.75 ms above 19200 bit/s (V1.02, 2.5.1.1).
     #[must_use]
     pub fn frame_gap(&self) -> Duration {
         if self.framing == Framing::Mbap {
@@ -75,7 +75,7 @@ impl Endpoint {
     }
 }
 
-/// The endpoint's options: of the command line, of a named endpoint, or of the environment.
+/// Options of the endpoint: from the command line, a named endpoint, or the environment.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Endpoint")]
 pub struct Options {
@@ -83,7 +83,7 @@ pub struct Options {
     #[arg(long, global = true, value_name = "PORT", group = "where")]
     pub port: Option<String>,
 
-    /// RTU or ASCII frames over TCP, as gateways in transparent mode have them [env: MODIO_TCP]
+    /// RTU or ASCII frames over TCP, for gateways in transparent mode [env: MODIO_TCP]
     #[arg(long, global = true, value_name = "HOST:PORT", group = "where")]
     pub tcp: Option<String>,
 
@@ -91,7 +91,7 @@ pub struct Options {
     #[arg(long, global = true, value_name = "HOST:PORT", group = "where")]
     pub modbus_tcp: Option<String>,
 
-    /// Speed of the serial port in bit/s [default: 9600] [env: MODIO_BAUD]
+    /// Baud rate of the serial port in bit/s [default: 9600] [env: MODIO_BAUD]
     #[arg(long, global = true, value_name = "RATE", value_parser = clap::value_parser!(u32).range(50..=4_000_000))]
     pub baud: Option<u32>,
 
@@ -99,7 +99,7 @@ pub struct Options {
     #[arg(long, global = true)]
     pub format: Option<Format>,
 
-    /// How frames are marked off on a serial line: rtu or ascii [default: rtu] [env: MODIO_MODE]
+    /// Framing on a serial line: rtu or ascii [default: rtu] [env: MODIO_MODE]
     #[arg(long, global = true, value_enum)]
     pub mode: Option<Mode>,
 
@@ -107,11 +107,11 @@ pub struct Options {
     #[arg(long, global = true, value_name = "N", value_parser = unit)]
     pub unit: Option<u8>,
 
-    /// How long to wait for an answer, such as 200ms or 1s [default: 1s] [env: MODIO_TIMEOUT]
+    /// Time to wait for an answer, such as 200ms or 1s [default: 1s] [env: MODIO_TIMEOUT]
     #[arg(long, global = true, value_name = "TIME", value_parser = duration)]
     pub timeout: Option<Duration>,
 
-    /// How often to ask again [default: 2] [env: MODIO_RETRIES]
+    /// Number of times to repeat a request [default: 2] [env: MODIO_RETRIES]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=20))]
     pub retries: Option<u8>,
 }
@@ -132,11 +132,11 @@ fn unit(text: &str) -> Result<u8, String> {
     }
 }
 
-/// A duration with its unit, or a number of seconds.
+/// Parses a duration with its unit, or a number of seconds.
 ///
 /// # Errors
 ///
-/// What is wrong with it.
+/// A description of what is wrong with the text.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let seconds = text.parse::<f64>().ok();
     let duration = match seconds.map(Duration::try_from_secs_f64) {
@@ -149,7 +149,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// The names of the options in files; in the environment they are in capitals behind `MODIO_`.
+/// Names of the options in files. In the environment they are in capitals after `MODIO_`.
 const NAMES: [&str; 9] = [
     "port",
     "tcp",
@@ -162,7 +162,7 @@ const NAMES: [&str; 9] = [
     "retries",
 ];
 
-/// To have options that stand elsewhere read as those of the command line are.
+/// Parses options from a file or the environment in the same way as those of the command line.
 #[derive(Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct Elsewhere {
@@ -171,11 +171,12 @@ struct Elsewhere {
 }
 
 impl Options {
-    /// The endpoint: each option from the command line, else from the named endpoint, else from the environment.
+    /// Returns the endpoint. Each option is from the command line, or else from the named endpoint, or else from
+    /// the environment.
     ///
     /// # Errors
     ///
-    /// What is wrong with a value, a name or the file; or that nobody says where the unit is.
+    /// When a value, a name or the file is wrong, or when no source gives the address of the unit.
     pub fn endpoint(self, at: Option<&str>, file: Option<&Path>) -> Result<Endpoint, Failure> {
         let environment = Self::from_environment()?;
         let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
@@ -186,7 +187,7 @@ impl Options {
         };
         let merged = self.or(named).or(environment);
         let place = merged.place().ok_or_else(|| {
-            Failure::usage("where is the unit? Give --port, --tcp, --modbus-tcp or --at; `modioctl ports` lists the serial ports")
+            Failure::usage("no endpoint is given: use --port, --tcp, --modbus-tcp or --at; `modioctl ports` lists the serial ports")
         })?;
         let framing = match (&place, merged.mode) {
             (Place::ModbusTcp(_), _) => Framing::Mbap,
@@ -218,7 +219,7 @@ impl Options {
         serial.or_else(tcp).or_else(modbus_tcp)
     }
 
-    /// These, and what they leave open from `rest`. The place is one option in three forms.
+    /// Returns these options, with missing ones from `rest`. The place is a single option in three forms.
     fn or(self, rest: Self) -> Self {
         let (port, tcp, modbus_tcp) = if self.place().is_some() {
             (self.port, self.tcp, self.modbus_tcp)
@@ -299,17 +300,17 @@ impl Options {
     }
 }
 
-/// The first line of what clap says, without its heading.
+/// Returns the first line of clap's message, without its heading.
 fn first_line(text: &str) -> String {
     let line = text.lines().next().unwrap_or_default();
     line.trim_start_matches("error: ").to_owned()
 }
 
-/// The file of named endpoints when none is given: `modio/endpoints.toml` where the system keeps settings.
+/// Returns the default file of named endpoints: `modio/endpoints.toml` in the system's directory for settings.
 ///
 /// # Errors
 ///
-/// That there is no home directory.
+/// When there is no home directory.
 pub fn usual_file() -> Result<PathBuf, Failure> {
     let strategy = etcetera::choose_base_strategy()
         .map_err(|_| Failure::usage("there is no home directory: give --endpoints FILE"))?;
@@ -326,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn an_option_counts_before_that_of_a_file() {
+    fn an_option_has_priority_over_that_of_a_file() {
         let given = parse(&[("tcp", "a:1"), ("baud", "19200")]).unwrap();
         let file = parse(&[("port", "COM3"), ("baud", "1200"), ("unit", "9")]).unwrap();
         let endpoint = given.or(file).endpoint(None, None).unwrap();
@@ -336,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_value_is_named() {
+    fn a_wrong_value_is_reported_with_its_option() {
         let wrong = parse(&[("unit", "300")]).unwrap_err();
         assert!(
             wrong.contains("--unit") && wrong.contains("1 to 247"),

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// How a character is sent: `8N2`.
+/// Format of a character, such as `8N2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     /// 7 or 8.
@@ -15,7 +15,7 @@ pub struct Format {
 }
 
 impl Format {
-    /// Bits of a character on the line, start, parity and stop bits included.
+    /// Returns the bits of a character on the line, including start, parity and stop bits.
     #[must_use]
     pub fn bits(self) -> u32 {
         1 + u32::from(self.data_bits) + u32::from(self.parity != 'N') + u32::from(self.stop_bits)
@@ -43,7 +43,7 @@ impl FromStr for Format {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("{text:?} is no format: 8N2, 8E1, 8O1, 8N1, 7E1, 7O1 or 7N2");
+        let wrong = || format!("{text:?} is not a format: use 8N2, 8E1, 8O1, 8N1, 7E1, 7O1 or 7N2");
         let characters: Vec<char> = text.to_ascii_uppercase().chars().collect();
         let [data, parity @ ('N' | 'E' | 'O'), stop] = characters[..] else {
             return Err(wrong());
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_are_read_as_they_are_written() {
+    fn formats_are_parsed_as_they_are_written() {
         for text in ["8N2", "8E1", "7O1", "8N1"] {
             assert_eq!(text.parse::<Format>().unwrap().to_string(), text);
         }

@@ -1,4 +1,4 @@
-//! Asks units, one request at a time.
+//! Sends requests to units, one at a time.
 
 use std::io;
 use std::time::Duration;
@@ -11,51 +11,51 @@ use super::stream::Stream;
 use super::{Direction, Waiting};
 use crate::failure::Failure;
 
-/// The pause after a broadcast, in which every unit carries it out (V1.02, 2.4.1: 100 to 200 ms).
+/// Pause after a broadcast, in which every unit executes it (V1.02, 2.4.1: 100 to 200 ms).
 const TURNAROUND: Duration = Duration::from_millis(100);
 
-/// A silence that ends what arrives, beyond the time of some characters: adapters hand on bytes in batches, 16 ms apart
-/// and more.
+/// Silence that ends an answer, in addition to the time of some characters. USB adapters deliver bytes in batches,
+/// 16 ms apart and more.
 const BATCH: Duration = Duration::from_millis(60);
 
-/// Why a request had no answer.
+/// Reason why a request had no answer.
 #[derive(Debug)]
 pub enum Lost {
-    /// Nothing came back.
+    /// Nothing was received.
     Silent,
-    /// These bytes came back, and they are no answer.
+    /// These bytes were received, and they are not an answer.
     Garbled(Vec<u8>),
-    /// The port or the connection is gone.
+    /// The port or the connection is lost.
     Broken(io::Error),
 }
 
-/// A frame, or what arrived in place of one.
+/// A frame, or bytes that were received instead of one.
 #[derive(Clone, Debug)]
 pub struct Seen {
-    /// When it was sent, or was complete.
+    /// Time when it was sent, or was complete.
     pub at: Instant,
-    /// Which way it went.
+    /// Direction of the frame.
     pub direction: Direction,
-    /// How frames are marked off.
+    /// Framing of the line.
     pub framing: Framing,
-    /// Its bytes.
+    /// Bytes of the frame.
     pub bytes: Vec<u8>,
 }
 
 /// Receives every frame, for the trace and the frame log.
 pub type Observer = Box<dyn FnMut(&Seen) + Send>;
 
-/// An open line, and how to talk to units on it.
+/// An open line with its settings.
 pub struct Master {
     endpoint: Endpoint,
     stream: Stream,
     observer: Option<Observer>,
     transaction: u16,
-    /// From when on the next frame may be sent.
+    /// Time from which the next frame may be sent.
     free: Instant,
     /// Whether the adapter returns what it sends.
     echo: bool,
-    /// The unit and the function of a request whose answer may still come.
+    /// Unit and PDU of a request whose answer may still be received.
     owed: Option<(u8, Vec<u8>)>,
 }
 
@@ -64,7 +64,7 @@ impl Master {
     ///
     /// # Errors
     ///
-    /// Why it cannot be opened.
+    /// When the line cannot be opened; the error says why.
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         Ok(Self {
             stream: Stream::open(&endpoint).await?,
@@ -77,34 +77,35 @@ impl Master {
         })
     }
 
-    /// How the line is set.
+    /// Returns the settings of the line.
     #[must_use]
     pub const fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// Opens the line anew with other settings.
+    /// Closes the line and opens it with other settings.
     ///
     /// # Errors
     ///
-    /// Why it cannot be opened.
+    /// When the line cannot be opened; the error says why.
     pub async fn reopen(self, endpoint: Endpoint) -> Result<Self, Failure> {
         let observer = self.observer;
         drop(self.stream);
         Self::open(endpoint, observer).await
     }
 
-    /// Closes the line without sending what the system still holds. A request that got no answer is then not delivered
-    /// late, when a cable is plugged in again for instance.
+    /// Closes the line and discards bytes that the system has not sent yet. Otherwise a request without an answer
+    /// could be delivered late, for example when a cable is plugged in again.
     pub fn close_unsent(self) {
         self.stream.discard_unsent();
     }
 
-    /// Asks a unit, and asks again as often as the endpoint says. The response's PDU, which may be an exception's.
+    /// Sends a request to a unit, and repeats it as often as the endpoint says. Returns the PDU of the response,
+    /// which may be an exception.
     ///
     /// # Errors
     ///
-    /// What happened to the last attempt, unless an earlier one was garbled.
+    /// The failure of the last attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
         let mut garbled = None;
         for _ in 0..=self.endpoint.retries {
@@ -121,55 +122,55 @@ impl Master {
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Errors of the port.
     pub async fn tell_all(&mut self, pdu: &[u8]) -> io::Result<()> {
         self.send(0, pdu).await?;
         self.free = self.free.max(Instant::now() + TURNAROUND);
         Ok(())
     }
 
-    /// Sends a request when the line is free, and returns before it is out.
+    /// Sends a request when the line is free. Returns before the request has been sent completely.
     async fn send(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
         self.settle(unit, pdu).await?;
         self.put(unit, pdu).await?;
         Ok(())
     }
 
-    /// Sends a request at once. Its frame.
+    /// Sends a request immediately. Returns its frame.
     pub(super) async fn put(&mut self, unit: u8, pdu: &[u8]) -> io::Result<Vec<u8>> {
         self.transaction = self.transaction.wrapping_add(1);
         let frame = self.endpoint.framing.frame(self.transaction, unit, pdu);
         self.see(Direction::Request, &frame);
         self.stream.write(&frame).await?;
-        // The system takes all bytes at once, and sends them one by one.
+        // The system takes all bytes together and sends them one by one.
         let sent = Instant::now() + self.endpoint.time_of(frame.len());
         self.free = sent + self.endpoint.frame_gap();
         Ok(frame)
     }
 
-    /// Sets time-out and retries. Those before.
+    /// Sets time-out and retries. Returns the previous values.
     pub(super) fn be_patient(&mut self, timeout: Duration, retries: u8) -> (Duration, u8) {
         let before = (self.endpoint.timeout, self.endpoint.retries);
         (self.endpoint.timeout, self.endpoint.retries) = (timeout, retries);
         before
     }
 
-    /// From when on the next frame may be sent.
+    /// Returns the time from which the next frame may be sent.
     pub(super) const fn free(&self) -> Instant {
         self.free
     }
 
-    /// Waits until the line is free, and forgets what arrived: it answers nothing that is still waited for.
+    /// Waits until the line is free, and discards received bytes: they answer no pending request.
     async fn settle(&mut self, unit: u8, pdu: &[u8]) -> io::Result<()> {
         if let Some((asked, request)) = self.owed.take()
             && self.endpoint.framing != Framing::Mbap
             && asked == unit
             && request != pdu
         {
-            // A late answer could be taken for the answer to this.
+            // A late answer could be mistaken for the answer to this request.
             self.free = self.free.max(Instant::now() + self.endpoint.timeout);
         }
-        // On a line that is never quiet the request goes out nevertheless.
+        // On a line that is never silent, the request is sent nevertheless.
         let most = self.free + self.endpoint.timeout;
         loop {
             let mut stale = Vec::new();
@@ -182,11 +183,11 @@ impl Master {
         }
     }
 
-    /// Reads once, until then at most; 0 when nothing came.
+    /// Reads once, until `until` at most. Returns 0 when nothing was received.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Errors of the port.
     pub async fn read_until(&mut self, until: Instant, into: &mut Vec<u8>) -> io::Result<usize> {
         let mut chunk = [0; 512];
         match timeout_at(until, self.stream.read(&mut chunk)).await {
@@ -223,7 +224,7 @@ impl Master {
                 > 0
             {
                 self.drop_echo(&own, pdu, &mut got);
-                // A busy computer hands on an answer in pieces, with a pause between them.
+                // A busy computer delivers an answer in pieces, with a pause between them.
                 let all = [junk.as_slice(), &got].concat();
                 for bytes in [&got, &all] {
                     if let Some((answer, range)) = waiting.find(bytes) {
@@ -234,7 +235,7 @@ impl Master {
                 until = Instant::now() + idle;
                 continue;
             }
-            // A silence: nothing more belongs to what came before it.
+            // A silence ends the answer: later bytes do not belong to it.
             if let Some(answer) = waiting.whole(&got) {
                 self.received(&got);
                 return Ok(answer);
@@ -253,8 +254,8 @@ impl Master {
         Err(Lost::Garbled(junk))
     }
 
-    /// Takes the request out of what arrived, where the adapter returns it. That it does is seen at a function whose
-    /// response is not the request.
+    /// Removes the request from the received bytes if the adapter returns it. Whether it does is detected with a
+    /// function whose response differs from the request.
     fn drop_echo(&mut self, own: &[u8], pdu: &[u8], got: &mut Vec<u8>) {
         let differs = !matches!(pdu.first(), Some(0x05 | 0x06 | 0x08 | 0x16));
         if (self.echo || differs) && got.starts_with(own) && self.endpoint.framing != Framing::Mbap
@@ -264,7 +265,7 @@ impl Master {
         }
     }
 
-    /// Passes a frame, or bytes that came in place of one, to the observer.
+    /// Passes a frame, or bytes received instead of one, to the observer.
     pub(super) fn received(&mut self, bytes: &[u8]) {
         self.see(Direction::Response, bytes);
         self.free = Instant::now() + self.endpoint.frame_gap();

@@ -1,4 +1,4 @@
-//! A Modbus master: frames, the line they go over, and the unit's answers.
+//! A Modbus master: frames, the line, and the answers of units.
 
 pub mod endpoint;
 pub mod format;

@@ -1,4 +1,4 @@
-//! What the bytes go through: a serial port, or a TCP connection.
+//! The connection for the bytes: a serial port, or a TCP connection.
 
 use std::io;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use super::endpoint::{Endpoint, Place};
 use super::format::Format;
 use crate::failure::Failure;
 
-/// Longest time for a connection to be made.
+/// Time limit for opening a connection.
 const CONNECTING: Duration = Duration::from_secs(5);
 
 /// An open serial port or connection.
@@ -33,11 +33,11 @@ pub struct Serial {
 }
 
 impl Stream {
-    /// Opens it.
+    /// Opens the connection.
     ///
     /// # Errors
     ///
-    /// Why it cannot be opened, with what to do.
+    /// When it cannot be opened; the error says why and what to do.
     pub async fn open(endpoint: &Endpoint) -> Result<Self, Failure> {
         match &endpoint.place {
             Place::Serial(path) => {
@@ -55,7 +55,7 @@ impl Stream {
                 let port = SerialPort::open(path, settings).map_err(not_opened)?;
                 #[cfg(unix)]
                 exclude(&lock);
-                // What arrived before belongs to nobody.
+                // Bytes received before are not part of any answer.
                 let _ = port.discard_buffers();
                 Ok(Self::Serial(Serial {
                     port,
@@ -69,7 +69,7 @@ impl Stream {
                     .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
                     .map_err(|error| {
                         Failure::Port(format!(
-                            "no connection to {address} ({error}): is the address right, and does the gateway or simulator run?"
+                            "no connection to {address} ({error}): check the address, and whether the gateway or simulator runs"
                         ))
                     })?;
                 let _ = stream.set_nodelay(true);
@@ -78,11 +78,11 @@ impl Stream {
         }
     }
 
-    /// Reads what is there, at least a byte; 0 bytes: the other end is gone.
+    /// Reads the available bytes, at least one. 0 bytes means that the other end has closed the connection.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Errors of the port.
     pub async fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         match self {
             Self::Serial(serial) => serial.port.read(bytes).await,
@@ -90,21 +90,21 @@ impl Stream {
         }
     }
 
-    /// Discards bytes that the system holds and has not sent yet; a connection cannot be used afterwards.
+    /// Discards bytes that the system has not sent yet. A connection cannot be used afterwards.
     pub fn discard_unsent(&self) {
-        // Dropping the stream follows, so a stream that cannot discard its bytes is treated no differently.
+        // The stream is dropped next, so a failure to discard is ignored.
         let _ = match self {
             Self::Serial(serial) => serial.port.discard_output_buffer(),
-            // Closing such a connection resets it. The system would otherwise send the bytes again for minutes.
+            // Closing such a connection resets it. Otherwise the system would repeat the bytes for minutes.
             Self::Tcp(stream) => stream.set_zero_linger(),
         };
     }
 
-    /// Writes all of it.
+    /// Writes all bytes.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Errors of the port.
     pub async fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Serial(serial) => serial.port.write_all(bytes).await,
@@ -113,7 +113,7 @@ impl Stream {
     }
 }
 
-/// What keeps other programs from opening the port: two masters on one line would garble each other's answers.
+/// Locks the port against other programs: two masters on one line would garble each other's answers.
 #[cfg(unix)]
 fn lock(path: &str) -> io::Result<std::fs::File> {
     use rustix::fs::OFlags;
@@ -130,14 +130,14 @@ fn lock(path: &str) -> io::Result<std::fs::File> {
     }
 }
 
-/// Keeps out programs that do not lock, too, but for those of root.
+/// Also prevents programs without such a lock from opening the port, except those of root.
 #[cfg(unix)]
 fn exclude(file: &std::fs::File) {
-    // A port that cannot is used all the same.
+    // A port that does not support this is used nevertheless.
     let _ = rustix::termios::ioctl_tiocexcl(file);
 }
 
-/// Whether a port is a pseudo-terminal: it carries bytes, which have neither parity nor stop bits.
+/// Returns whether a port is a pseudo-terminal, which transfers bytes without parity and stop bits.
 pub fn is_pseudo_terminal(path: &str) -> bool {
     std::fs::canonicalize(path).is_ok_and(|path| path.starts_with("/dev/pts"))
 }
@@ -160,7 +160,7 @@ fn set_format(settings: &mut Settings, format: Format) {
     });
 }
 
-/// What to say of a serial port that cannot be opened.
+/// Returns the failure for a serial port that cannot be opened.
 fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
     Failure::Port(match error.kind() {
         io::ErrorKind::NotFound => {
@@ -175,9 +175,9 @@ fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
         io::ErrorKind::PermissionDenied => {
             let group = owning_group(path).unwrap_or_else(|| "dialout".to_owned());
             if group == "root" {
-                // Nobody should join that group.
+                // No user should join that group.
                 format!(
-                    "no permission for {path}, which is root's alone: take it with `sudo chown $USER {path}`"
+                    "no permission for {path}, which belongs to root: change its owner with `sudo chown $USER {path}`"
                 )
             } else {
                 format!(
@@ -189,14 +189,14 @@ fn not_opened(path: &str, endpoint: &Endpoint, error: &io::Error) -> Failure {
             format!("{path} is in use: close the program that has it open")
         }
         io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported => format!(
-            "{path} does not take {} bit/s, {} ({error}); another adapter may",
+            "{path} does not support {} bit/s, {} ({error}); try another adapter",
             endpoint.baud, endpoint.format
         ),
         _ => format!("{path} cannot be opened: {error}"),
     })
 }
 
-/// The names of this computer's serial ports, for people.
+/// Returns the names of this computer's serial ports, for people.
 fn port_names() -> String {
     let ports = serialport::available_ports().unwrap_or_default();
     let names: Vec<_> = ports.into_iter().map(|port| port.port_name).collect();
@@ -207,7 +207,7 @@ fn port_names() -> String {
     }
 }
 
-/// The name of the group that may use a port.
+/// Returns the name of the group that may use a port.
 #[cfg(unix)]
 fn owning_group(path: &str) -> Option<String> {
     use std::os::unix::fs::MetadataExt;

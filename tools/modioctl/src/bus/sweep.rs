@@ -1,9 +1,9 @@
-//! Looks for units: asks every address for its identity, function 11, without waiting long for any.
+//! Looks for units: asks every address for its identity with function 11, with a short time-out.
 //!
-//! A unit answers function 11 from its protocol stack, in a few milliseconds, and one without the function refuses as
-//! fast. Answers carry their unit's address, so one that an adapter hands on late still counts for the right unit. Where
-//! an answer came late, or something that is no answer, the addresses whose requests it can have met are asked again,
-//! with more time.
+//! A unit answers function 11 from its protocol stack in a few milliseconds, and a unit without the function
+//! rejects it as fast. Answers contain the address of their unit, so a late answer is still assigned to the right
+//! unit. When an answer was late, or the received bytes were no answer, the addresses whose requests may have been
+//! disturbed are asked again with a longer time-out.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -14,45 +14,45 @@ use tokio::time::Instant;
 use super::adu::{Framing, MBAP, response_length};
 use super::master::{Lost, Master};
 
-/// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns what it sends is
-/// not taken for a unit.
+/// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns the request
+/// is not mistaken for a unit.
 const REPORT: u8 = 0x11;
 
-/// How long an address has for the first byte of its answer: t3.5 at 9600 bit/s and the 16 ms for which adapters hold
-/// bytes back, with some room.
+/// Time that an address has for the first byte of its answer: t3.5 at 9600 bit/s and the 16 ms for which adapters
+/// hold bytes back, with a margin.
 pub const SHORT: Duration = Duration::from_millis(25);
 
-/// Bytes of a response that is being received arrive at least this often.
+/// Largest pause between bytes of a response.
 const IDLE: Duration = Duration::from_millis(40);
 
-/// How long an address that is asked again has, and how often.
+/// Time-out and number of retries for an address that is asked again.
 const AGAIN: (Duration, u8) = (Duration::from_millis(300), 1);
 
-/// What a sweep has found.
+/// Result of a sweep.
 #[derive(Debug, Default)]
 pub struct Found {
     /// Units that answered.
     pub units: BTreeSet<u8>,
-    /// Addresses at which something answered that could not be read.
+    /// Addresses whose answer was garbled.
     pub garbled: BTreeSet<u8>,
 }
 
-/// What came while it was an address's turn.
+/// What was received after the request to an address.
 enum Turn {
-    /// Nothing, or its answer.
+    /// Nothing, or the answer of this address.
     Quiet,
-    /// The answer of a unit that was asked before.
+    /// The answer of a unit that was asked earlier.
     Late(u8),
-    /// Something that is no answer.
+    /// Bytes that are not an answer.
     Garbled,
 }
 
 impl Master {
-    /// Asks these addresses. Each has the time `wait` for the beginning of its answer. `asked` is called with each address.
+    /// Asks these addresses. Each has the time `wait` to begin its answer. Calls `asked` with each address.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Errors of the port.
     pub async fn sweep(
         &mut self,
         units: &[u8],
@@ -68,7 +68,7 @@ impl Master {
             match self.offer(*unit, wait, &mut got, &mut found).await? {
                 Turn::Quiet => {}
                 Turn::Late(late) => {
-                    // Its answer met the requests that were sent since.
+                    // The late answer disturbed the requests that were sent after its own request.
                     let since = before.iter().rev().take_while(|unit| **unit != late);
                     suspects.extend(since);
                     suspects.insert(*unit);
@@ -79,7 +79,7 @@ impl Master {
                 }
             }
         }
-        // Answers that the adapter or a gateway still holds.
+        // The adapter or a gateway may still hold answers.
         let until = Instant::now() + self.endpoint().timeout.min(Duration::from_millis(300));
         while self.read_until(until, &mut got).await? > 0 {}
         if let Some(late) = self.take(&mut got, &mut found) {
@@ -130,7 +130,7 @@ impl Master {
         }
     }
 
-    /// Takes whole answers out of what arrived. The unit of the last.
+    /// Removes complete answers from the received bytes. Returns the unit of the last one.
     fn take(&mut self, got: &mut Vec<u8>, found: &mut Found) -> Option<u8> {
         let mut last = None;
         while let Some(length) = length(self.endpoint().framing, got)
@@ -140,9 +140,9 @@ impl Master {
             self.received(&got[..length]);
             got.drain(..length);
             last = Some(unit);
-            // A gateway that answers for a unit that is not there.
+            // A gateway answers for a missing unit.
             let absent = matches!(pdu[..], [code, 0x0A | 0x0B] if code == REPORT | 0x80);
-            // One that answers twice is two.
+            // Two answers from one address mean two units.
             if !absent && !found.units.insert(unit) {
                 found.garbled.insert(unit);
             }
@@ -151,7 +151,7 @@ impl Master {
     }
 }
 
-/// The length of the frame at the beginning, if it is known.
+/// Returns the length of the frame at the beginning, if it is known.
 fn length(framing: Framing, bytes: &[u8]) -> Option<usize> {
     match framing {
         Framing::Rtu => response_length(&[REPORT], bytes),

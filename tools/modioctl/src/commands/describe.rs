@@ -11,7 +11,7 @@ use crate::value::table_name;
 ///
 /// # Errors
 ///
-/// What went wrong with the unit.
+/// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Describe, json: bool) -> Result<(), Failure> {
     let learned = fetch(device, options.refresh).await?;
     let about = learned.book.of_modio()?;

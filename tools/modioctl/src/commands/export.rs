@@ -12,7 +12,7 @@ use crate::output;
 ///
 /// # Errors
 ///
-/// Error when the unit does not answer, when the system cannot use the endpoint, or when the file cannot be written.
+/// When the unit does not answer, when the system cannot use the endpoint, or when the file cannot be written.
 pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
     let learned = fetch(device, false).await?;
     let text = text(

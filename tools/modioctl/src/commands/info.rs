@@ -10,7 +10,7 @@ use crate::names::{Item, Meaning};
 use crate::output;
 use crate::value::show;
 
-/// The first objects of the device identification (V1.1b3, 6.21).
+/// Names of the first objects of the device identification (V1.1b3, 6.21).
 const OBJECTS: [&str; 7] = [
     "vendor",
     "product code",
@@ -21,16 +21,16 @@ const OBJECTS: [&str; 7] = [
     "application",
 ];
 
-/// Shows what the unit is and how it fares.
+/// Shows identity, state and counters of the unit.
 ///
 /// # Errors
 ///
-/// What went wrong with the unit.
+/// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let mut identity = identity(device).await?;
     let book = learn(device).await?.book;
     if book.description().is_some() {
-        // The objects beyond the standard's are registers as well.
+        // The objects that the standard does not define are also registers.
         identity.retain(|(name, text)| OBJECTS.contains(&name.as_str()) && !text.is_empty());
     }
     let told = |item: &Item| identity.iter().any(|(name, _)| *name == item.name);
@@ -63,20 +63,20 @@ pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     output::table(&rows)
 }
 
-/// Whether this is state of the unit: a register that can only be read, and what is in a slot.
+/// Returns whether an item is state of the unit: a read-only register, or the module of a slot.
 fn is_state(item: &Item) -> bool {
     !item.writable && matches!(item.meaning, Meaning::Value(_))
 }
 
-/// The objects of the device identification; none for a unit without it.
+/// Returns the objects of the device identification, or none for a unit without it.
 ///
 /// # Errors
 ///
-/// That the unit does not answer.
+/// When the unit does not answer.
 pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Failure> {
     let mut found = Vec::new();
     let mut object = 0;
-    // Extended, from an object on; a unit with few objects says so in one answer.
+    // Extended stream from an object on. A unit with few objects needs only one answer.
     for _ in 0..16 {
         let answer = device
             .ask(

@@ -24,14 +24,14 @@ use crate::device::{Device, Learned, fetch};
 use crate::failure::Failure;
 use crate::{monitor, output, trace};
 
-/// What a shell says of a program that Ctrl-C ended.
+/// Exit status of a program that Ctrl-C has ended, as shells define it.
 const INTERRUPTED: u8 = 130;
 
-/// Does what the command line says, until it is done or Ctrl-C is pressed.
+/// Runs the command of the command line, until it is done or Ctrl-C is pressed.
 ///
 /// # Errors
 ///
-/// Why it could not be done.
+/// The reason why the command failed.
 pub async fn run(cli: Cli) -> Result<ExitCode, Failure> {
     let until_stopped = matches!(
         cli.command,
@@ -50,7 +50,7 @@ pub async fn run(cli: Cli) -> Result<ExitCode, Failure> {
 
 async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
     let json = cli.json;
-    // These need no unit.
+    // These commands need no unit.
     match cli.command {
         Command::Ports => return ports::run(json),
         Command::Completions { shell } => {
@@ -105,7 +105,7 @@ fn endpoint(cli: &mut Cli) -> Result<Endpoint, Failure> {
     options.endpoint(cli.at.as_deref(), cli.endpoints.as_deref().map(Path::new))
 }
 
-/// What the unit is.
+/// Learns the names of the unit.
 async fn learn(device: &mut Device) -> Result<Learned, Failure> {
     fetch(device, false).await
 }

@@ -1,4 +1,4 @@
-//! `modioctl module`, `reboot` and `identify`: orders.
+//! `modioctl module`, `reboot` and `identify`: commands that the unit executes.
 
 use register_map::{points, state};
 
@@ -12,11 +12,11 @@ use crate::value::{parse, show};
 /// COMMAND 6: all LEDs blink.
 const IDENTIFY: u16 = 6;
 
-/// Commissions a slot.
+/// Sets up a slot for a module.
 ///
 /// # Errors
 ///
-/// That the port or the module is none of the unit's, or what went wrong with the unit.
+/// When the unit does not have the port or the module, does not answer or refuses.
 pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let Module::Set { port, module } = options;
     let book = learn(&mut device).await?.book;
@@ -43,11 +43,11 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let in_force = device.read_words(state::MODULE_IN_FORCE + index, 1).await?;
     if in_force != words {
         return Err(Failure::Refused(format!(
-            "port {port} has module {} in force, not {module}: look at `modioctl info`",
+            "port {port} has module {} in force, not {module}: see `modioctl info`",
             show(&item, &in_force, false)
         )));
     }
-    // A module needs some scans before it can be judged.
+    // The state of a module is known only after some scans.
     tokio::time::sleep(std::time::Duration::from_millis(300)).await;
     let fares = book.find(&format!("p{port}.module_state"))?;
     let state = device.read_items(std::slice::from_ref(&fares)).await?;
@@ -65,7 +65,7 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// What went wrong with the unit.
+/// When the unit does not answer or refuses.
 pub async fn reboot(mut device: Device) -> Result<(), Failure> {
     device.unlock().await?;
     let mut device = device.restart().await?;
@@ -76,22 +76,22 @@ pub async fn reboot(mut device: Device) -> Result<(), Failure> {
     output::line(format_args!(
         "restarted{}",
         if bad {
-            "; a module is not well, see `modioctl info`"
+            "; a module has a fault, see `modioctl info`"
         } else {
             ""
         }
     ))
 }
 
-/// Has the unit blink.
+/// Makes the unit blink its LEDs.
 ///
 /// # Errors
 ///
-/// What went wrong with the unit.
+/// When the unit does not answer or refuses.
 pub async fn identify(device: &mut Device) -> Result<(), Failure> {
     device.unlock().await?;
     device
-        .order(IDENTIFY, "blinking (firmware that is older cannot)")
+        .order(IDENTIFY, "blinking (older firmware does not support it)")
         .await?;
     output::line(format_args!(
         "all LEDs of unit {} blink for 10 s",

@@ -6,11 +6,11 @@ use serialport::{SerialPortInfo, SerialPortType, available_ports};
 use crate::failure::Failure;
 use crate::output;
 
-/// Lists the serial ports with what is known of their adapters.
+/// Lists the serial ports with the known data of their adapters.
 ///
 /// # Errors
 ///
-/// Error when the system does not list its ports.
+/// When the system does not list its ports.
 pub fn run(json: bool) -> Result<(), Failure> {
     let ports = available_ports().map_err(|error| {
         Failure::Port(format!(

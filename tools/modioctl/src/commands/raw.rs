@@ -10,7 +10,7 @@ use crate::output;
 ///
 /// # Errors
 ///
-/// That the digits are none, what went wrong, or the exception.
+/// When the digits are wrong, the unit does not answer, or the answer is an exception.
 pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
     let pdu = hex(&options.pdu.concat())?;
     let framing = device.master.endpoint().framing;
@@ -36,7 +36,7 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
         }
         Err(Lost::Garbled(bytes)) => {
             output::line(format_args!(
-                "<- {}  no answer to this",
+                "<- {}  not an answer to this request",
                 decode::bytes(framing, &bytes)
             ))?;
             Err(device.lost(&Lost::Garbled(bytes)))
@@ -49,7 +49,7 @@ fn hex(digits: &str) -> Result<Vec<u8>, Failure> {
     let digits: String = digits.chars().filter(|c| !c.is_whitespace()).collect();
     let wrong = || {
         Failure::usage(format!(
-            "{digits:?} is no PDU in hexadecimal, 1 to 253 bytes: 03 0000 0001"
+            "{digits:?} is not a PDU in hexadecimal; give 1 to 253 bytes, such as 03 0000 0001"
         ))
     };
     let bytes = digits.as_bytes();

@@ -14,7 +14,7 @@ use crate::value::show;
 ///
 /// # Errors
 ///
-/// That a name is unknown, or what went wrong with the unit.
+/// When a name is unknown, or the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), Failure> {
     let book = learn(device).await?.book;
     let items: Vec<Item> = options
@@ -39,7 +39,7 @@ pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), 
     output::table(&rows)
 }
 
-/// An item with its value, for programs.
+/// Returns an item with its value, for programs.
 pub fn as_json(item: &Item, words: &[u16], raw: bool) -> Json {
     let shown = show(item, words, raw);
     json!({

@@ -22,11 +22,11 @@ struct Unit {
     modules: String,
 }
 
-/// Looks for units at the rates and formats that were asked for.
+/// Looks for units at the requested rates and formats.
 ///
 /// # Errors
 ///
-/// That none was found, or that something answered, but garbled.
+/// When no unit was found, or when only garbled answers were received.
 pub async fn run(
     endpoint: Endpoint,
     observer: Option<Observer>,
@@ -103,7 +103,7 @@ pub async fn run(
 
 async fn sweep(master: &mut Master, units: &[u8], bar: &ProgressBar) -> Result<Found, Failure> {
     let endpoint = master.endpoint();
-    // A gateway waits for its units itself, and says when there is none.
+    // A gateway waits for its units itself, and reports when a unit is missing.
     let wait = match endpoint.framing {
         Framing::Mbap => endpoint.timeout,
         _ if endpoint.timeout_given => endpoint.timeout,
@@ -116,13 +116,13 @@ async fn sweep(master: &mut Master, units: &[u8], bar: &ProgressBar) -> Result<F
         .map_err(|error| Failure::Port(format!("{place} is lost ({error})")))
 }
 
-/// Says who a unit is.
+/// Reads the identity of a unit.
 ///
 /// # Errors
 ///
-/// That its answers are garbled, as those of two units with one address are, or that the port is lost.
+/// When its answers are garbled, as those of two units with one address are, or when the port is lost.
 async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
-    // Of a unit that does not answer everything what it does answer counts.
+    // Use what the unit does answer, even if it does not answer every request.
     fn answered<T: Default>(result: Result<T, Failure>) -> Result<T, Failure> {
         match result {
             Err(Failure::Refused(_) | Failure::NoAnswer(_)) => Ok(T::default()),
@@ -207,7 +207,7 @@ fn print(all: &[Unit], garbled: &[String], serial: bool, json: bool) -> Result<(
     Ok(())
 }
 
-/// A bar on standard error; none where that is no terminal.
+/// Returns a progress bar on standard error, hidden when that is not a terminal.
 fn progress(steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta}") {

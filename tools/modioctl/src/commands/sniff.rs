@@ -18,8 +18,8 @@ use crate::failure::Failure;
 use crate::sniff::{Kind, Piece, Splitter};
 use crate::{output, trace};
 
-/// Silence after which an incomplete RTU frame counts as garbled, beyond the time of some characters. USB adapters
-/// deliver bytes in batches, 16 ms apart and more.
+/// Silence after which an incomplete RTU frame counts as garbled, in addition to the time of some characters. USB
+/// adapters deliver bytes in batches, 16 ms apart and more.
 const BATCH: Duration = Duration::from_millis(60);
 /// Longest time between two characters of an ASCII frame (V1.02, 2.5.2.1).
 const ASCII_IDLE: Duration = Duration::from_secs(1);
@@ -28,7 +28,7 @@ const ASCII_IDLE: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 ///
-/// Error when the line cannot be opened or is lost, or when the capture file cannot be written.
+/// When the line cannot be opened or is lost, or when the capture file cannot be written.
 pub async fn run(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<(), Failure> {
     if matches!(endpoint.place, Place::ModbusTcp(_)) {
         return Err(Failure::usage(
@@ -68,7 +68,7 @@ pub async fn run(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<(),
         };
         printer.print(&splitter.flush())?;
         return Err(Failure::Port(format!(
-            "{} is lost ({lost}): is the adapter still plugged in, or the gateway running?",
+            "{} is lost ({lost}): check that the adapter is plugged in, or that the gateway runs",
             place(endpoint)
         )));
     }
@@ -166,7 +166,7 @@ fn words(framing: Framing, piece: &Piece) -> String {
     }
 }
 
-/// Returns a piece in a line: time in s, gap in ms, direction, bytes, words, turnaround in ms.
+/// Returns a piece as a line: time in s, gap in ms, direction, bytes, words, turnaround in ms.
 fn line(framing: Framing, piece: &Piece, gap: Option<Duration>) -> String {
     let gap = gap.map_or_else(
         || "-".to_owned(),

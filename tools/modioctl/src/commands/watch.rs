@@ -12,11 +12,11 @@ use crate::names::{Book, Item};
 use crate::output;
 use crate::value::{Shown, show};
 
-/// Prints values until it is stopped. A unit that is lost is waited for.
+/// Prints values until it is stopped. Waits for a unit that is lost.
 ///
 /// # Errors
 ///
-/// That a name is unknown, or that the unit refuses.
+/// When a name is unknown, or when the unit refuses.
 pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
     let items = chosen(&learn(&mut device).await?.book, &options.names)?;
     if options.csv {
@@ -58,7 +58,7 @@ pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Opens the port or connection again, as often as it takes.
+/// Opens the port or connection again, as often as needed.
 async fn reconnect(device: Device, endpoint: crate::bus::Endpoint) -> Device {
     drop(device);
     loop {
@@ -69,11 +69,11 @@ async fn reconnect(device: Device, endpoint: crate::bus::Endpoint) -> Device {
     }
 }
 
-/// The items with these names; all points without names.
+/// Returns the items with these names, or all points without names.
 ///
 /// # Errors
 ///
-/// That a name is unknown, or that there are no points.
+/// When a name is unknown, or when there are no points.
 pub fn chosen(book: &Book, names: &[String]) -> Result<Vec<Item>, Failure> {
     if !names.is_empty() {
         return names.iter().map(|name| book.find(name)).collect();
@@ -81,7 +81,7 @@ pub fn chosen(book: &Book, names: &[String]) -> Result<Vec<Item>, Failure> {
     let points: Vec<_> = book.points().cloned().collect();
     if points.is_empty() {
         return Err(Failure::usage(
-            "the unit has no points: set a module with `modioctl module set PORT MODULE`, or name what to watch",
+            "the unit has no points: set a module with `modioctl module set PORT MODULE`, or give the names of registers",
         ));
     }
     Ok(points)
@@ -116,7 +116,7 @@ fn print(
     ))
 }
 
-/// A field of a CSV file (RFC 4180).
+/// Returns a field of a CSV file (RFC 4180).
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))

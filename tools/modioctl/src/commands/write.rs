@@ -14,7 +14,7 @@ use crate::value::{parse, show};
 ///
 /// # Errors
 ///
-/// That a name or a value is wrong; nothing is written then. Or what went wrong with the unit.
+/// When a name or a value is wrong; nothing is written then. When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
     let book = learn(device).await?.book;
     let mut checked = Vec::new();
@@ -47,9 +47,7 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
         ))?;
     }
     if unsaved {
-        output::line(format_args!(
-            "not saved: `modioctl config save` makes it last"
-        ))?;
+        output::line(format_args!("not saved: save with `modioctl config save`"))?;
     }
     Ok(())
 }
@@ -59,7 +57,7 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn write_item(&mut self, item: &Item, words: &[u16]) -> Result<(), Failure> {
         let about = format!("writing {}", item.name);
         match (item.table, words) {

@@ -1,4 +1,4 @@
-//! What a unit is: its own description of its registers, which this program may know already.
+//! Learns the names of a unit: from the unit's own description of its registers, or from a stored copy.
 
 use std::path::PathBuf;
 
@@ -11,32 +11,34 @@ use super::Device;
 use crate::failure::Failure;
 use crate::names::Book;
 
-/// Records that one request reads: 124 go into a response, less a margin for gateways with small buffers.
+/// Number of records that one request reads. A response can contain 124; the margin is for gateways with small
+/// buffers.
 const RECORDS: u16 = 100;
 
-/// How often a description with a wrong CRC is read again: the modules of the unit may have changed during the read.
+/// Number of times that a description with a wrong CRC is read again: the modules of the unit may have changed
+/// during the read.
 const TIMES: u8 = 2;
 
-/// What is known of a unit.
+/// Knowledge about a unit.
 #[derive(Clone, Debug)]
 pub struct Learned {
-    /// Its names.
+    /// Names of the unit.
     pub book: Book,
-    /// Where the description is from, for people.
+    /// Source of the description, for people.
     pub source: String,
 }
 
-/// Learns what the unit is. A unit that is no modio has no names, only addresses. `refresh`: its description is read
-/// from the unit, even if it is known.
+/// Learns the names of a unit. A unit that is not a modio has no names, only addresses. With `refresh` the
+/// description is read from the unit even if it is stored here.
 ///
 /// # Errors
 ///
-/// That it does not answer, or that its description cannot be read.
+/// When the unit does not answer, or when its description cannot be read.
 pub async fn fetch(device: &mut Device, refresh: bool) -> Result<Learned, Failure> {
     let Some((description, source)) = description(device, refresh).await? else {
         return Ok(Learned {
             book: Book::default(),
-            source: "nothing: the unit is no modio".to_owned(),
+            source: "nothing: the unit is not a modio".to_owned(),
         });
     };
     let readings = readings(device, &description).await?;
@@ -46,7 +48,7 @@ pub async fn fetch(device: &mut Device, refresh: bool) -> Result<Learned, Failur
     })
 }
 
-/// The unit's description and where it is from; `None` for a unit that is no modio.
+/// Returns the unit's description and its source; `None` for a unit that is not a modio.
 async fn description(
     device: &mut Device,
     refresh: bool,
@@ -57,7 +59,7 @@ async fn description(
     let known = known(device).await?;
     let own = match device.read_words(state::DESCRIPTION_CRC, 1).await {
         Ok(words) => words.first().copied(),
-        // Firmware from before it described itself.
+        // The firmware is too old to describe itself.
         Err(Failure::Refused(_)) => None,
         Err(failure) => return Err(failure),
     };
@@ -86,12 +88,12 @@ async fn description(
     Ok(Some((read, "the unit".to_owned())))
 }
 
-/// What this program knows of the unit by its register map, without asking for its description; `None` for a unit that
-/// is no modio, or has a board that is newer than this program.
+/// Returns what this program knows about the unit from its own register map, without asking for the unit's
+/// description; `None` for a unit that is not a modio, or whose board is newer than this program.
 ///
 /// # Errors
 ///
-/// That it does not answer.
+/// When the unit does not answer.
 pub async fn known(device: &mut Device) -> Result<Option<Description>, Failure> {
     let head = match device.read_words(state::PRODUCT_CODE, 6).await {
         Ok(head) => head,
@@ -124,9 +126,9 @@ async fn is_modio(device: &mut Device) -> Result<bool, Failure> {
     }
 }
 
-/// File 1 of the unit, as bytes, with a check that is right.
+/// Returns file 1 of the unit, as bytes with a valid CRC.
 async fn read_file(device: &mut Device) -> Result<Vec<u8>, Failure> {
-    eprintln!("modioctl: reading the unit's description of itself; it is kept for the next time");
+    eprintln!("modioctl: reading the unit's description; it is stored for the next time");
     let mut last = None;
     for _ in 0..TIMES {
         let mut file = device.read_records(FILE, 0, HEAD).await?;
@@ -151,11 +153,11 @@ async fn read_file(device: &mut Device) -> Result<Vec<u8>, Failure> {
     }
     let why = last.map_or_else(String::new, |error| error.to_string());
     Err(Failure::Garbled(format!(
-        "the unit's description does not arrive whole ({why})"
+        "the unit's description cannot be read completely ({why})"
     )))
 }
 
-/// RANGE and SCALE of every point.
+/// Returns RANGE and SCALE of every point.
 async fn readings(
     device: &mut Device,
     description: &Description,
@@ -173,7 +175,7 @@ async fn readings(
     Ok(ranges.into_iter().zip(scales).collect())
 }
 
-/// The file in which a description with this CRC is kept; `None` without a home directory.
+/// Returns the file that stores a description with this CRC; `None` without a home directory.
 fn path(crc: u16) -> Option<PathBuf> {
     let strategy = etcetera::choose_base_strategy().ok()?;
     let directory = strategy.cache_dir().join("modio");
@@ -184,10 +186,10 @@ fn kept(crc: u16) -> Option<Description> {
     Description::open(&std::fs::read(path(crc)?).ok()?).ok()
 }
 
-/// Keeps a description. One that cannot be kept is read again next time.
+/// Stores a description. If that fails, it is read again next time.
 fn keep(crc: u16, file: &[u8]) {
     let Some(path) = path(crc) else { return };
-    // Written beside it and then renamed, so that the file is never half written.
+    // Write another file and rename it, so that the file is never incomplete.
     let new = path.with_extension(format!("{}.new", std::process::id()));
     let written = path
         .parent()

@@ -1,4 +1,4 @@
-//! A unit on the line: its registers and points, with errors in words.
+//! A unit on the line: its registers and points. Errors are texts for the user.
 
 mod learn;
 mod orders;
@@ -15,14 +15,14 @@ use crate::bus::endpoint::{Endpoint, Place};
 use crate::bus::{Lost, Master, Observer, decode};
 use crate::failure::Failure;
 
-/// Registers that one request can read (V1.1b3, 6.3).
+/// Largest number of registers that one request can read (V1.1b3, 6.3).
 const MOST_WORDS: u16 = 125;
-/// Registers that one request can write (V1.1b3, 6.12).
+/// Largest number of registers that one request can write (V1.1b3, 6.12).
 const MOST_WRITTEN: usize = 123;
-/// Bits that one request can read here: far fewer than the standard's 2000, and more than there are.
+/// Largest number of bits that one request reads here: less than the standard's 2000, and more than any unit has.
 const MOST_BITS: u16 = 256;
 
-/// A unit, and the line to it.
+/// A unit and the line to it.
 pub struct Device {
     /// The line.
     pub master: Master,
@@ -35,18 +35,18 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// Why it cannot be opened.
+    /// When the line cannot be opened; the error says why.
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         let unit = endpoint.unit;
         let master = Master::open(endpoint, observer).await?;
         Ok(Self { master, unit })
     }
 
-    /// Sends a request. An exception is a failure; `about` says what was asked, for its text.
+    /// Sends a request. An exception is a failure; `about` describes the request in its text.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn ask(&mut self, pdu: &[u8], about: &str) -> Result<Vec<u8>, Failure> {
         match self.master.ask(self.unit, pdu).await {
             Ok(response) => match response[..] {
@@ -57,11 +57,11 @@ impl Device {
         }
     }
 
-    /// Registers from `first` on, by function 03.
+    /// Reads registers from `first` on, by function 03.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>, Failure> {
         let mut words = Vec::new();
         let mut done = 0;
@@ -78,11 +78,11 @@ impl Device {
         Ok(words)
     }
 
-    /// Bits from `first` on, by function 01.
+    /// Reads bits from `first` on, by function 01.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn read_bits(&mut self, first: u16, count: u16) -> Result<Vec<bool>, Failure> {
         let count = count.min(MOST_BITS);
         let request = head(1, first, count);
@@ -95,11 +95,11 @@ impl Device {
         Ok(bits.take(count.into()).collect())
     }
 
-    /// Writes registers: one by function 06, more by function 10.
+    /// Writes registers: a single one by function 06, several by function 10.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words; `about` is what is being written.
+    /// When the unit does not answer or refuses; `about` describes the write.
     pub async fn write_words(
         &mut self,
         first: u16,
@@ -124,18 +124,18 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// What went wrong, in words; `about` is what is being written.
+    /// When the unit does not answer or refuses; `about` describes the write.
     pub async fn write_bit(&mut self, address: u16, on: bool, about: &str) -> Result<(), Failure> {
         let word = if on { 0xFF00 } else { 0 };
         self.ask(&head(5, address, word), about).await?;
         Ok(())
     }
 
-    /// Records of a file, by function 14, as bytes.
+    /// Reads records of a file, by function 14, as bytes.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn read_records(
         &mut self,
         file: u16,
@@ -150,7 +150,7 @@ impl Device {
         );
         let about = format!("reading file {file}");
         let response = self.ask(&request, &about).await?;
-        // Behind function, length of all, length of the group and reference type.
+        // After function, total length, length of the group and reference type.
         Ok(response.get(4..).unwrap_or_default().to_vec())
     }
 
@@ -158,10 +158,10 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// That it did not within `most`.
+    /// When the unit did not answer within `most`.
     pub async fn wait_until_back(&mut self, most: Duration) -> Result<(), Failure> {
         let until = tokio::time::Instant::now() + most;
-        // A unit that is still there, but not yet restarted, would answer as well.
+        // A unit that has not restarted yet would also answer.
         tokio::time::sleep(Duration::from_millis(100)).await;
         loop {
             match self.read_words(register_map::state::STATUS, 1).await {
@@ -175,26 +175,26 @@ impl Device {
         }
     }
 
-    /// Says whether the unit's line settings are those of this computer's port.
+    /// Returns whether a change of the unit's line settings also concerns this computer's port.
     #[must_use]
     pub const fn is_serial(&self) -> bool {
         self.master.endpoint().place.is_serial()
     }
 
-    /// What an exception means.
+    /// Returns the failure for an exception, with its meaning.
     #[must_use]
     pub fn exception(&self, code: u8, about: &str) -> Failure {
         let name = names::exception(code).unwrap_or("unknown exception");
         let meaning = match code {
             1 => "the unit does not have this function",
             2 => "there is no such point or register, or it cannot be written",
-            3 => "the unit does not take this value",
+            3 => "the unit does not allow this value",
             4 => {
-                "the module in the slot does not answer: is it plugged in, and is it the kind that MODULE names?"
+                "the module in the slot does not answer: check that it is plugged in and that MODULE names it"
             }
             6 => "the configuration is locked, or a save is still under way: try again",
             0x0A | 0x0B => "the gateway says that the unit does not answer",
-            _ => "the unit's manual says more",
+            _ => "see the manual of the unit",
         };
         let unit = self.unit;
         Failure::Refused(format!(
@@ -202,7 +202,7 @@ impl Device {
         ))
     }
 
-    /// Why there is no answer.
+    /// Returns the failure for a request without an answer.
     #[must_use]
     pub fn lost(&self, lost: &Lost) -> Failure {
         let endpoint = self.master.endpoint();
@@ -226,13 +226,13 @@ impl Device {
                 ))
             }
             Lost::Broken(error) => Failure::Port(format!(
-                "{place} is lost ({error}): is the adapter still plugged in, or the gateway running?"
+                "{place} is lost ({error}): check that the adapter is plugged in, or that the gateway runs"
             )),
         }
     }
 }
 
-/// An endpoint for people.
+/// Describes an endpoint for people.
 #[must_use]
 pub fn place(endpoint: &Endpoint) -> String {
     match &endpoint.place {

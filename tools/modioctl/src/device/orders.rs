@@ -1,4 +1,4 @@
-//! The lock, and what COMMAND orders.
+//! The lock, and the commands of register COMMAND.
 
 use std::time::Duration;
 
@@ -13,9 +13,9 @@ use crate::bus::adu::Framing;
 use crate::bus::endpoint::Endpoint;
 use crate::failure::Failure;
 
-/// Longest time that a save takes: two pages are erased, and a change is written.
+/// Time limit for a save, which erases two pages and writes a change.
 const SAVING: Duration = Duration::from_secs(3);
-/// Longest time from a restart to the first answer.
+/// Time limit from a restart to the first answer.
 const STARTING: Duration = Duration::from_secs(8);
 
 impl Device {
@@ -23,17 +23,17 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn unlock(&mut self) -> Result<(), Failure> {
         self.write_words(KEY, &[OPENING_KEY], "opening the lock")
             .await
     }
 
-    /// Orders something. The lock must be open.
+    /// Writes a command. The lock must be open.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn order(&mut self, command: u16, about: &str) -> Result<(), Failure> {
         self.write_words(COMMAND, &[command], about).await
     }
@@ -42,7 +42,7 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn save(&mut self) -> Result<(), Failure> {
         self.order(Command::Save.code(), "saving").await?;
         let until = Instant::now() + SAVING;
@@ -53,18 +53,19 @@ impl Device {
             }
             if Instant::now() > until {
                 return Err(Failure::Refused(
-                    "the unit says that the settings are not saved: try `modioctl config save`, and look at `modioctl info`".to_owned(),
+                    "the unit reports that the settings are not saved: try `modioctl config save`, and see `modioctl info`".to_owned(),
                 ));
             }
             sleep(Duration::from_millis(50)).await;
         }
     }
 
-    /// Restarts the unit, and waits until it is back; with the line settings that it has then. The lock must be open.
+    /// Restarts the unit and waits until it answers, with the line settings that it then has. The lock must be
+    /// open.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn restart(mut self) -> Result<Self, Failure> {
         let line = self.read_words(BAUD, 3).await?;
         let before = self.uptime().await?;
@@ -91,7 +92,7 @@ impl Device {
     }
 }
 
-/// The endpoint for a unit with these BAUD, FORMAT and MODE, if it is another than now.
+/// Returns the endpoint for a unit with these values of BAUD, FORMAT and MODE, if it differs from the present one.
 fn settings(now: &Endpoint, line: &[u16]) -> Option<Endpoint> {
     let [baud, format, mode] = line else {
         return None;
@@ -112,12 +113,12 @@ fn settings(now: &Endpoint, line: &[u16]) -> Option<Endpoint> {
         },
         ..now.clone()
     };
-    // The loader's address keeps the factory's line settings, whatever is stored.
+    // With the loader's address the unit always uses the factory's line settings.
     let same = (then.baud, then.format, then.framing) == (now.baud, now.format, now.framing);
     (!same && now.unit != 255).then_some(then)
 }
 
-/// The description with these modules in its slots: what the settings by point are for.
+/// Returns the description with these modules in its slots, to which the settings by point belong.
 #[must_use]
 pub fn with_modules(
     mut description: Description,

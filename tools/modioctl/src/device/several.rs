@@ -1,4 +1,4 @@
-//! Many items in few requests.
+//! Reads of many items in few requests.
 
 use std::collections::BTreeMap;
 
@@ -8,15 +8,15 @@ use super::Device;
 use crate::failure::Failure;
 use crate::names::Item;
 
-/// Registers that one request asks for at most.
+/// Largest number of registers that one request reads.
 const MOST: u16 = 120;
 
 impl Device {
-    /// Reads items, neighbours in one request each. The words of each item, in the order of the items.
+    /// Reads items, consecutive ones in one request. Returns the words of each item, in the order of the items.
     ///
     /// # Errors
     ///
-    /// What went wrong, in words.
+    /// When the unit does not answer or refuses.
     pub async fn read_items(&mut self, items: &[Item]) -> Result<Vec<Vec<u16>>, Failure> {
         let mut spans: Vec<(Table, u16, u16)> = items
             .iter()
@@ -51,7 +51,7 @@ impl Device {
     }
 }
 
-/// Spans that follow one another, as one.
+/// Joins consecutive spans.
 fn joined(spans: &[(Table, u16, u16)]) -> Vec<(Table, u16, u16)> {
     let mut joined: Vec<(Table, u16, u16)> = Vec::new();
     for (table, address, count) in spans {
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbours_are_read_together_and_gaps_are_not_read() {
+    fn consecutive_items_are_read_together_and_gaps_are_not_read() {
         use Table::{Bit, Word};
         let spans = [
             (Bit, 16, 1),

@@ -1,7 +1,8 @@
 //! YAML for the integrations `modbus` and `template` of Home Assistant.
 //!
-//! The integration `modbus` has no numbers that a user can set. An analog output is therefore a sensor, and a number of
-//! the integration `template` that shows the sensor and writes by the action `modbus.write_register`.
+//! The integration `modbus` has no numbers that a user can set. An analog output is therefore exported as a sensor,
+//! together with a number of the integration `template` that shows the sensor and writes with the action
+//! `modbus.write_register`.
 
 use modio_description::Table;
 use serde::Serialize;
@@ -290,7 +291,7 @@ fn number(item: &Item, unit: &str, hub: &str, endpoint: &Endpoint) -> Number {
     }
 }
 
-/// How Home Assistant shows a quantity.
+/// A quantity as Home Assistant shows it.
 struct Shown {
     exponent: i8,
     factor: f64,
@@ -300,7 +301,7 @@ struct Shown {
 
 fn shown(scaling: &Scaling) -> Shown {
     let (exponent, unit, device_class) = match scaling.unit.code.as_str() {
-        // Home Assistant has no µA among the units of a current.
+        // Home Assistant does not support µA as a unit of current.
         "uA" => (
             scaling.unit.exponent.saturating_sub(3),
             "mA",

@@ -1,4 +1,4 @@
-//! The description as `describe --json` prints it, with the endpoint.
+//! The description as printed by `describe --json`, with the endpoint.
 
 use serde_json::json;
 

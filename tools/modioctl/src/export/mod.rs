@@ -1,4 +1,4 @@
-//! Configurations of other systems for a unit as the unit is set up.
+//! Configurations of other systems for a unit with its present settings.
 
 mod csv;
 mod home_assistant;
@@ -13,14 +13,14 @@ use crate::cli::ExportFormat;
 use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
 
-/// What an export is made of.
+/// Data of an export.
 #[derive(Clone, Copy)]
 pub struct Source<'a> {
     /// The names of the unit.
     pub book: &'a Book,
-    /// Where the unit is.
+    /// Connection to the unit.
     pub endpoint: &'a Endpoint,
-    /// Where the description of the unit is from.
+    /// Source of the unit's description.
     pub source: &'a str,
 }
 
@@ -28,7 +28,7 @@ pub struct Source<'a> {
 ///
 /// # Errors
 ///
-/// Error when the unit is not a modio, or when the system cannot use the endpoint.
+/// When the unit is not a modio, or when the system cannot use the endpoint.
 pub fn text(format: ExportFormat, source: Source<'_>) -> Result<String, Failure> {
     match format {
         ExportFormat::Csv => csv::text(source),
@@ -63,13 +63,13 @@ impl Source<'_> {
     }
 }
 
-/// How the number in a register becomes a quantity: `(number + offset) * 10^exponent`.
+/// Conversion of a register's number to a quantity: `(number + offset) * 10^exponent`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Scaling {
     unit: Unit,
     /// Whether the word is in two's complement.
     signed: bool,
-    /// The least and the greatest number, where both are known.
+    /// The smallest and the largest number, if both are known.
     range: Option<(i32, i32)>,
 }
 
@@ -99,7 +99,7 @@ impl Scaling {
         power(self.unit.exponent)
     }
 
-    /// Returns the data type in capitals, as INT16, UINT16 or UINT32.
+    /// Returns the data type in capitals: INT16, UINT16 or UINT32.
     fn data_type(&self, item: &Item) -> &'static str {
         match (item.words, self.signed) {
             (2, _) => "UINT32",
@@ -109,7 +109,7 @@ impl Scaling {
     }
 }
 
-/// Returns a power of ten, exactly as its decimal form reads.
+/// Returns a power of ten, exactly equal to its decimal form.
 fn power(exponent: i8) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(1.0)
 }
@@ -130,7 +130,7 @@ fn identifier(name: &str) -> String {
 ///
 /// # Errors
 ///
-/// Error when the address has no port.
+/// When the address has no port.
 fn host_and_port(address: &str) -> Result<(String, u16), Failure> {
     let parts = address.rsplit_once(':');
     let parsed = parts.and_then(|(host, port)| Some((host, port.parse().ok()?)));
@@ -143,7 +143,7 @@ fn host_and_port(address: &str) -> Result<(String, u16), Failure> {
     Ok((host.to_owned(), port))
 }
 
-/// Error for ASCII frames over TCP, which a system cannot use.
+/// Returns an error for ASCII frames over TCP, which a system cannot use.
 fn no_ascii_over_tcp(system: &str, endpoint: &Endpoint) -> Result<(), Failure> {
     let ascii = endpoint.framing == crate::bus::adu::Framing::Ascii;
     if ascii && matches!(endpoint.place, Place::Tcp(_)) {

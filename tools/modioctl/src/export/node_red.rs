@@ -1,7 +1,7 @@
 //! A flow for Node-RED with the nodes of node-red-contrib-modbus.
 //!
-//! Neighbouring points of one kind share one request. A function node makes an object of names and values from each
-//! response. Each output has a write node that takes the value in `msg.payload`.
+//! Consecutive points of one kind share one request. A function node creates an object of names and values from
+//! each response. Each output has a write node that takes the value in `msg.payload`.
 
 use modio_description::Table;
 use serde_json::{Value as Json, json};
@@ -114,7 +114,7 @@ fn client(endpoint: &Endpoint, ids: &Ids, name: &str) -> Result<Json, Failure> {
     Ok(client)
 }
 
-/// Returns runs of items with neighbouring addresses in one table, all writable or none.
+/// Returns runs of items with consecutive addresses in one table, all writable or none.
 fn runs<'a>(items: impl Iterator<Item = &'a Item>) -> Vec<Vec<&'a Item>> {
     let mut runs: Vec<Vec<&Item>> = Vec::new();
     for item in items {
@@ -183,7 +183,7 @@ fn expression(item: &Item, at: u16) -> String {
     let number = match (item.table, item.words, scaling.signed) {
         (Table::Bit, ..) => return format!("Boolean(w[{at}])"),
         (Table::Word, 2, _) => format!("(w[{at}] * 65536 + w[{}])", at + 1),
-        // A shift by 16 bits to and fro extends the sign.
+        // Shifting left and right by 16 bits extends the sign.
         (Table::Word, _, true) => format!("(w[{at}] << 16 >> 16)"),
         (Table::Word, _, false) => format!("w[{at}]"),
     };
@@ -199,7 +199,8 @@ fn expression(item: &Item, at: u16) -> String {
     }
 }
 
-/// Returns a write node for an output. A function node in front of it turns the quantity into the register's number.
+/// Returns a write node for an output. A function node in front of it converts the quantity to the register's
+/// number.
 fn write(item: &Item, ids: &Ids, endpoint: &Endpoint, row: usize) -> Vec<Json> {
     let scaling = Scaling::of(item);
     let id = format!("{}_{}", ids.prefix, identifier(&item.name));

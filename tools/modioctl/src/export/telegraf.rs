@@ -111,7 +111,7 @@ pub fn text(source: Source<'_>) -> Result<String, Failure> {
     ))
 }
 
-/// Returns the form of a serial port that Telegraf takes: a URL for a path, the name for a port of Windows.
+/// Returns a serial port in Telegraf's form: a URL for a path, the name for a port of Windows.
 fn serial_port(port: &str) -> String {
     if port.starts_with('/') {
         format!("file://{port}")
@@ -120,8 +120,8 @@ fn serial_port(port: &str) -> String {
     }
 }
 
-/// Returns a field. Its name carries the unit of the quantity. Telegraf has no offset, so a register with an offset is
-/// exported as it is, without a unit.
+/// Returns a field. Its name contains the unit of the quantity. Telegraf has no offset, so a register with an
+/// offset is exported as a plain number, without a unit.
 fn field(item: &Item) -> Field {
     let scaling = Scaling::of(item);
     let name = item.name.replace(['.', ' '], "_");

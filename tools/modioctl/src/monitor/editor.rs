@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::value::{Shown, parse, show};
 
-/// Characters that can be typed at most.
+/// Largest number of characters that can be typed.
 const MOST: usize = 12;
 
 /// The slider, while it is open.
@@ -14,17 +14,17 @@ const MOST: usize = 12;
 pub struct Editor {
     /// The output.
     pub item: Item,
-    /// What its number means.
+    /// Meaning of its number.
     pub reading: Reading,
     /// The new value in steps of the register.
     position: i32,
     /// Characters of an exact value; empty while the slider is used.
     pub typed: String,
-    /// Why the typed value cannot be sent.
+    /// Reason why the typed value cannot be sent.
     pub wrong: Option<String>,
 }
 
-/// How far the slider moves.
+/// Distance that the slider moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// One step of the register.
@@ -36,8 +36,8 @@ pub enum Step {
 }
 
 impl Editor {
-    /// Opens the slider at the present value, at the lowest value when that is not known. `None` when the point is no
-    /// analog output.
+    /// Opens the slider at the present value, or at the lowest value when the present one is not known. Returns
+    /// `None` when the point is not an analog output.
     #[must_use]
     pub fn new(item: &Item, words: Option<&[u16]>) -> Option<Self> {
         let Meaning::Analog(reading) = &item.meaning else {
@@ -62,7 +62,7 @@ impl Editor {
         })
     }
 
-    /// Moves the slider, by a negative number to the left.
+    /// Moves the slider; a negative number moves it to the left.
     pub fn slide(&mut self, steps: i32, step: Step) {
         let span = self.reading.max.saturating_sub(self.reading.min);
         let one = match step {
@@ -73,7 +73,7 @@ impl Editor {
         self.place(self.position.saturating_add(steps.saturating_mul(one)));
     }
 
-    /// Moves the slider to a place between 0 at the left and 1 at the right.
+    /// Moves the slider to a position from 0 (left) to 1 (right).
     pub fn place_at(&mut self, part: f64) {
         let span = f64::from(self.reading.max) - f64::from(self.reading.min);
         let steps = (span * part.clamp(0.0, 1.0)).round();
@@ -86,14 +86,14 @@ impl Editor {
         self.wrong = None;
     }
 
-    /// Returns the place of the slider, from 0 at the left to 1 at the right.
+    /// Returns the position of the slider, from 0 (left) to 1 (right).
     #[must_use]
     pub fn part(&self) -> f64 {
         let span = f64::from(self.reading.max) - f64::from(self.reading.min);
         (f64::from(self.position) - f64::from(self.reading.min)) / span
     }
 
-    /// Adds a character of an exact value. Returns whether it can be part of one.
+    /// Adds a character of an exact value. Returns whether it can be part of a value.
     pub fn type_in(&mut self, character: char) -> bool {
         let fits = character.is_ascii_digit() || matches!(character, '.' | '-');
         if fits && self.typed.len() < MOST {
@@ -121,8 +121,8 @@ impl Editor {
         [self.reading.min, self.reading.max].map(|end| show(&self.item, &[end as u16], false))
     }
 
-    /// Returns the words to write: what was typed, or the slider's value. When the typed value does not fit, `wrong`
-    /// has the reason.
+    /// Returns the words to write: the typed value, or the slider's value. When the typed value is not allowed,
+    /// `wrong` contains the reason.
     pub fn words(&mut self) -> Option<Vec<u16>> {
         if self.typed.is_empty() {
             return Some(vec![self.position as u16]);

@@ -15,13 +15,13 @@ use crate::names::Book;
 /// Interval of polling in tests.
 pub const EVERY: Duration = Duration::from_millis(250);
 
-/// The book of a unit with this module in every slot; RANGE and SCALE of every point are the same.
+/// Returns the names of a unit with this module in every slot. RANGE and SCALE of every point are the same.
 pub fn book(board: &Board, module: Module, range: u16, scale: u16) -> Book {
     let readings = vec![(range, scale); 32];
     Book::new(describe(board, "0.1.0", |_| module), readings)
 }
 
-/// A display of a modio-02 with this module, in mA or V, of which nothing has been read yet.
+/// Returns a display of a modio-02 with this module, in mA or V, before the first reading.
 pub fn model(module: Module, now: Instant) -> Model {
     let mut model = Model::new("/dev/ttyUSB0, 9600 bit/s 8N2".to_owned(), 1, EVERY, now);
     let book = Box::new(book(&MODIO_02, module, 1, 1));
@@ -29,7 +29,7 @@ pub fn model(module: Module, now: Instant) -> Model {
     model
 }
 
-/// A round of polling with these values of p5.1 and so on; all channels and the module are well.
+/// Returns a round of polling with these values of p5.1 and so on, without any fault.
 pub fn polled(at: Instant, values: &[u16]) -> Polled {
     let mut words = Words::new();
     for (channel, value) in (1..).zip(values) {

@@ -1,4 +1,4 @@
-//! The log of frames, and what the frames say of the line.
+//! The log of frames, and the counters derived from the frames.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -8,19 +8,19 @@ use tokio::time::Instant;
 
 use crate::bus::{Direction, Seen, decode};
 
-/// Frames that are kept.
+/// Largest number of stored frames.
 const MOST: usize = 10_000;
 
 /// A frame of the log.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// When it was sent, or was complete.
+    /// Time when the frame was sent, or was complete.
     pub at: DateTime<Local>,
-    /// Which way it went.
+    /// Direction of the frame.
     pub direction: Direction,
-    /// What it says.
+    /// The frame in words.
     pub text: String,
-    /// Its bytes, for people.
+    /// The bytes, for people.
     pub bytes: String,
 }
 
@@ -30,32 +30,32 @@ pub struct Frames {
     entries: VecDeque<Entry>,
     /// Number of frames that have been removed.
     removed: usize,
-    /// Number of frames in front of the first that is not shown; `None`: the newest frame is shown.
+    /// Number of frames in front of the first one that is not shown; `None` when the newest frame is shown.
     end: Option<usize>,
     /// Whether the user has paused the log.
     pub paused: bool,
-    /// Whether bytes are shown in place of words.
+    /// Whether bytes are shown instead of words.
     pub hex: bool,
     /// The request that waits for its response.
     request: Option<(Instant, Vec<u8>)>,
-    /// What was counted.
+    /// Counters of this program.
     pub counts: Counts,
 }
 
-/// What this program has counted.
+/// Counters of this program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Requests that were sent.
+    /// Number of requests sent.
     pub requests: u64,
-    /// Exceptions that were received.
+    /// Number of exceptions received.
     pub exceptions: u64,
-    /// Requests without an answer.
+    /// Number of requests without an answer.
     pub no_answer: u64,
-    /// Answers that could not be read.
+    /// Number of answers that could not be decoded.
     pub garbled: u64,
-    /// Times that the port or the connection was lost.
+    /// Number of times that the port or the connection was lost.
     pub lost: u64,
-    /// The latest time from a request to the end of its response.
+    /// Latest time from a request to the end of its response.
     pub trip: Option<Duration>,
     /// The longest of these times.
     pub longest: Duration,
@@ -113,18 +113,18 @@ impl Frames {
         }
     }
 
-    /// Forgets the request that waits: its answer has been given up.
+    /// Drops the waiting request, whose answer is no longer expected.
     pub fn give_up(&mut self) {
         self.request = None;
     }
 
-    /// Number of frames since the start.
+    /// Returns the number of frames since the start.
     #[must_use]
     pub fn total(&self) -> usize {
         self.removed + self.entries.len()
     }
 
-    /// Number of frames after the last one that is shown.
+    /// Returns the number of frames after the last one that is shown.
     #[must_use]
     pub fn below(&self) -> usize {
         self.end.map_or(0, |end| self.total().saturating_sub(end))
@@ -146,7 +146,8 @@ impl Frames {
             .then(|| self.end.unwrap_or_else(|| self.total()));
     }
 
-    /// Scrolls towards older frames, by a negative number, or newer ones. The log stands still until it is at its end.
+    /// Scrolls towards older frames with a negative number, otherwise towards newer ones. The log does not move
+    /// until it is scrolled to its end again.
     pub fn scroll(&mut self, by: isize, height: usize) {
         let least = (self.removed + height).min(self.total());
         let end = self.end.unwrap_or_else(|| self.total());
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn paused_log_stands_still_while_frames_are_added() {
+    fn paused_log_does_not_move_while_frames_are_added() {
         let mut frames = filled(10);
         frames.pause();
         let shown = last(&frames);
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn scrolled_log_stands_still_until_it_is_at_its_end() {
+    fn scrolled_log_does_not_move_until_it_is_at_its_end() {
         let mut frames = filled(10);
         frames.scroll(-3, 5);
         assert_eq!(last(&frames), "unit 1: read holding registers 0x0006 x 1");

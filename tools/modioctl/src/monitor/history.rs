@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// How far back the chart goes.
+/// Time span of the chart.
 pub const SPAN: Duration = Duration::from_secs(300);
-/// Values that are kept at most. More of them than a chart has columns show nothing new.
+/// Largest number of stored values, more than a chart has columns.
 const MOST: usize = 8192;
 
 /// Values of an analog point.
@@ -27,7 +27,7 @@ impl History {
     }
 
     /// Returns lines of the chart: seconds before `now`, as negative numbers, with the values. A pause longer than
-    /// `gap` ends a line, so that the chart has a gap where nothing was read.
+    /// `gap` ends a line, so that the chart shows a gap.
     #[must_use]
     pub fn lines(&self, now: Instant, gap: Duration) -> Vec<Vec<(f64, f64)>> {
         let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();

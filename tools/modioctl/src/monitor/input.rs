@@ -1,4 +1,4 @@
-//! What keys and the mouse do.
+//! Handles keys and the mouse.
 
 use ratatui::crossterm::event::{
     Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
@@ -12,10 +12,10 @@ use super::messages::Write;
 use super::model::{Focus, Model, Page};
 use super::tree::Row;
 
-/// Rows that the wheel of the mouse scrolls.
+/// Rows per step of the mouse wheel.
 const WHEEL: isize = 3;
 
-/// What the program has to do after an event, besides drawing.
+/// Action of the program after an event, besides drawing.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Nothing.
@@ -24,7 +24,7 @@ pub enum Action {
     Quit,
     /// Write a value.
     Write(Write),
-    /// Take clicks of the mouse, or leave them to the terminal.
+    /// Handle clicks of the mouse, or leave them to the terminal.
     Mouse(bool),
 }
 
@@ -37,7 +37,7 @@ impl From<Option<Write>> for Action {
 /// Handles a key or the mouse. `screen` is the whole display as it was drawn last.
 pub fn event(model: &mut Model, event: &Event, screen: Rect, now: Instant) -> Action {
     match event {
-        // Windows reports keys that are released, too.
+        // Windows also reports released keys.
         Event::Key(key) if key.kind != KeyEventKind::Release => self::key(model, *key, screen, now),
         Event::Mouse(mouse) if model.mouse => self::mouse(model, *mouse, screen, now),
         _ => Action::None,
@@ -89,7 +89,7 @@ fn key(model: &mut Model, key: KeyEvent, screen: Rect, now: Instant) -> Action {
     Action::None
 }
 
-/// Returns which part takes the keys that move. The page of the line has only its log.
+/// Returns the part that receives movement keys. The page of the line contains only its log.
 #[must_use]
 pub fn focus(model: &Model) -> Focus {
     match model.page {

@@ -126,7 +126,7 @@ fn click_on_a_value_operates_and_elsewhere_only_selects() {
     );
     model.mouse = false;
     assert_eq!(click(&mut model, (30, 3), now), Action::None);
-    assert!(!model.tree.is_open(5), "the mouse is off");
+    assert!(!model.tree.is_open(5), "the mouse is disabled");
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn failed_write_has_keys_and_buttons() {
 }
 
 #[test]
-fn help_closes_with_any_key_and_hides_what_is_below() {
+fn help_closes_with_any_key_and_blocks_other_actions() {
     let now = Instant::now();
     let mut model = outputs(Module::Do4, now);
     key(&mut model, KeyCode::Char('?'), now);
@@ -207,7 +207,7 @@ fn pages_focus_and_log_follow_their_keys() {
 }
 
 #[test]
-fn any_event_on_any_screen_is_taken() {
+fn any_event_on_any_screen_is_handled() {
     let now = Instant::now();
     let mut model = outputs(Module::Ao4, now);
     let eight = Box::new(book(&MODIO_08, Module::Do4, 0, 0));

@@ -1,4 +1,4 @@
-//! Where the parts of the display are: for drawing, and for clicks of the mouse.
+//! Positions of the parts of the display, for drawing and for clicks of the mouse.
 
 use ratatui::layout::{Constraint, Layout, Rect};
 
@@ -8,7 +8,7 @@ use super::model::Page;
 pub const LEAST: (u16, u16) = (60, 16);
 /// Width of the tree.
 const TREE: u16 = 50;
-/// Smallest height of the chart, where counters share its column.
+/// Smallest height of the chart when counters share its column.
 const CHART: u16 = 12;
 /// Height of the counters, with their title.
 pub const COUNTERS: u16 = 12;
@@ -16,7 +16,7 @@ pub const COUNTERS: u16 = 12;
 /// The parts of the display. A part that is not shown is empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Parts {
-    /// Which unit this is, and how it answers.
+    /// Name of the unit and state of the connection.
     pub head: Rect,
     /// The names of the pages.
     pub tabs: Rect,
@@ -106,7 +106,7 @@ impl Parts {
         }
     }
 
-    /// Returns where the names of the pages are.
+    /// Returns the positions of the page names.
     #[must_use]
     pub fn pages(&self) -> [(Page, &'static str, Rect); 2] {
         let at = |x: u16, width| {
@@ -123,7 +123,7 @@ impl Parts {
         ]
     }
 
-    /// Returns where values stand in the tree: there a click operates an output.
+    /// Returns the area of the values in the tree. A click there operates an output.
     #[must_use]
     pub fn values(&self) -> Rect {
         let inside = Self::inside(self.tree);
@@ -135,7 +135,7 @@ impl Parts {
         .intersection(inside)
     }
 
-    /// Returns where the buttons of a failed write are: to try again, and to drop it.
+    /// Returns the buttons of a failed write: to repeat it, and to drop it.
     #[must_use]
     pub fn buttons(&self) -> [Rect; 2] {
         let line = Rect {
@@ -157,9 +157,9 @@ impl Parts {
 
 /// Column of the tree in which values begin.
 pub const VALUE_AT: u16 = 22;
-/// Width of a value, brackets included.
+/// Width of a value, including brackets.
 pub const VALUE: u16 = 12;
-/// The button that orders a failed write again.
+/// The button that repeats a failed write.
 pub const AGAIN: &str = "[r: try again]";
 /// The button that drops a failed write.
 pub const DROP: &str = "[Esc: leave it]";
@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_inside_the_screen_whatever_its_size() {
+    fn parts_are_inside_a_screen_of_any_size() {
         for (width, height) in [
             (0, 0),
             (1, 1),

@@ -1,4 +1,4 @@
-//! Whether the unit answers, and which values are fresh.
+//! State of the connection, and freshness of values.
 
 use std::time::Duration;
 
@@ -6,38 +6,38 @@ use tokio::time::Instant;
 
 use crate::failure::Failure;
 
-/// Time by which a value may be older than two rounds of polling.
+/// Margin by which a value may be older than two rounds of polling.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// How the unit has answered.
+/// State of the connection to the unit.
 #[derive(Clone, Debug)]
 pub struct Link {
-    /// When the last round of polling was complete.
+    /// Time when the last round of polling was complete.
     answered: Instant,
-    /// Why the last round failed; `None` when it did not.
+    /// Failure of the last round; `None` when it succeeded.
     trouble: Option<Failure>,
-    /// Longest time for which a value counts as fresh.
+    /// Age up to which a value counts as fresh.
     limit: Duration,
     every: Duration,
 }
 
-/// How the unit answers.
+/// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
-    /// It does.
+    /// The unit answers.
     Answers,
     /// Nothing is received.
     NoAnswer(Duration),
-    /// What is received cannot be read.
+    /// The received bytes cannot be decoded.
     Garbled(Duration),
     /// The port or the connection is lost.
     PortLost(Duration),
-    /// Something else than a modio answers, or the unit refuses to say what it is.
+    /// The device is not a modio, or the unit refuses to identify itself.
     Refuses(Duration),
 }
 
 impl Link {
-    /// A link to a unit that has answered just now.
+    /// Returns a link to a unit that has just answered.
     #[must_use]
     pub fn new(now: Instant, every: Duration) -> Self {
         Self {
@@ -48,25 +48,25 @@ impl Link {
         }
     }
 
-    /// Notes that a round of polling is complete.
+    /// Stores that a round of polling is complete.
     pub fn answered(&mut self, now: Instant, took: Duration) {
         self.answered = now;
         self.trouble = None;
         self.limit = self.every.max(took) * 2 + GRACE;
     }
 
-    /// Notes that a round failed.
+    /// Stores that a round failed.
     pub fn failed(&mut self, failure: Failure) {
         self.trouble = Some(failure);
     }
 
-    /// Returns why the last round failed.
+    /// Returns the failure of the last round.
     #[must_use]
     pub const fn trouble(&self) -> Option<&Failure> {
         self.trouble.as_ref()
     }
 
-    /// Returns how the unit answers.
+    /// Returns the state of the connection.
     #[must_use]
     pub fn state(&self, now: Instant) -> State {
         let since = now.saturating_duration_since(self.answered);
@@ -79,7 +79,8 @@ impl Link {
         }
     }
 
-    /// Returns whether a value that was read at this time is fresh. `extra` is for values that are read seldom.
+    /// Returns whether a value that was read at this time is fresh. `extra` is an additional time for values that
+    /// are read less often.
     #[must_use]
     pub fn is_fresh(&self, at: Instant, now: Instant, extra: Duration) -> bool {
         let age = now.saturating_duration_since(at);
@@ -108,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn value_is_stale_after_a_failure_and_without_news() {
+    fn value_is_old_after_a_failure_and_without_new_values() {
         let start = Instant::now();
         let at = |millis| start + Duration::from_millis(millis);
         let mut link = Link::new(start, Duration::from_millis(250));

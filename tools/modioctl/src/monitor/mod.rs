@@ -1,7 +1,8 @@
 //! `modioctl monitor`: a unit on the whole screen.
 //!
-//! Three parts run side by side, and none waits for another. The [polling task](poll) alone uses the line. A thread reads
-//! keys and the mouse. The loop in [`run`] takes news of both into the [model](model::Model) and draws it.
+//! Three parts run concurrently, and none waits for another. Only the [polling task](poll) uses the line. A thread
+//! reads keys and the mouse. The loop in [`run`] applies the messages of both to the [model](model::Model) and
+//! draws it.
 
 pub mod draw;
 pub mod editor;
@@ -44,14 +45,14 @@ use crate::device::{Device, fetch, place};
 use crate::failure::Failure;
 use crate::trace;
 
-/// Interval at which the display is drawn: ages of values go on without news.
+/// Interval at which the display is drawn. The ages of values increase without messages.
 const FRAME: Duration = Duration::from_millis(100);
 
 /// Shows the unit until the user quits.
 ///
 /// # Errors
 ///
-/// That there is no terminal, or no modio at the beginning. A unit that is lost later is shown as lost.
+/// When there is no terminal, or no modio at the start. A unit that is lost later is shown as lost.
 pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<(), Failure> {
     if !stdout().is_terminal() {
         return Err(Failure::usage(
@@ -63,7 +64,7 @@ pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<
             "--trace would write over the monitor: add `2>FILE`, or look at its own log of frames",
         ));
     }
-    // Polling asks again anyway. A write must not be repeated after the user has seen no effect.
+    // Polling repeats its requests anyway. A write must not be repeated after the user has seen no effect.
     let endpoint = Endpoint {
         retries: 0,
         ..endpoint
@@ -103,7 +104,7 @@ pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<
     let mut dirty = true;
     loop {
         tokio::select! {
-            // News of a fast line must not keep keys waiting.
+            // Messages of a fast line must not delay keys.
             biased;
             () = &mut ended => return Ok(()),
             event = events.recv() => {
@@ -138,7 +139,7 @@ pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<
                 "a part of the monitor has panicked, as shown above",
             ));
         }
-        // Events that wait are handled before the next drawing.
+        // Handle waiting events before the next drawing.
         if dirty && events.is_empty() {
             let drawn = screen.terminal.draw(|frame| {
                 area = frame.area();
@@ -150,7 +151,7 @@ pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<
     }
 }
 
-/// Makes sure that the unit is a modio before the display begins. One frame that is lost does not end the program: the
+/// Checks that the unit is a modio before the display begins. A single lost frame does not end the program: the
 /// failure is returned.
 async fn first(device: &mut Device) -> Result<Option<Failure>, Failure> {
     let (learned, failure) = match fetch(device, false).await {
@@ -161,7 +162,7 @@ async fn first(device: &mut Device) -> Result<Option<Failure>, Failure> {
     Ok(failure)
 }
 
-/// Returns when the system asks the program to end, or the terminal has been closed.
+/// Returns when the system asks the program to end, or when the terminal has been closed.
 #[cfg(unix)]
 async fn ended() {
     use tokio::signal::unix::{SignalKind, signal};

@@ -1,4 +1,4 @@
-//! What the monitor knows and shows, apart from how it is drawn.
+//! The state of the monitor, apart from how it is drawn.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -16,9 +16,9 @@ use crate::failure::Failure;
 use crate::names::{Book, Item};
 use crate::value::show;
 
-/// Time for which a message stays that needs no answer.
+/// Time for which a message without an answer is shown.
 const NOTICE: Duration = Duration::from_secs(6);
-/// Interval at which counters are read: they may be that much older than other values.
+/// Interval at which counters are read. They may be older than other values by this time.
 pub const SELDOM: Duration = Duration::from_secs(1);
 
 /// A page of the display.
@@ -31,7 +31,7 @@ pub enum Page {
     Line,
 }
 
-/// Which part of a page takes the keys that move.
+/// Part of a page that receives movement keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Focus {
     /// The tree.
@@ -41,36 +41,36 @@ pub enum Focus {
     Frames,
 }
 
-/// Words that were read, and when.
+/// Words with the time when they were read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stamped {
     /// The words.
     pub words: Vec<u16>,
-    /// When they were read.
+    /// Time when they were read.
     pub at: Instant,
 }
 
-/// A write on its way.
+/// A write that is not complete.
 #[derive(Clone, Debug)]
 pub struct Pending {
     /// The words.
     pub words: Vec<u16>,
-    /// When the unit confirmed the write. The write is pending until a later round shows the value.
+    /// Time when the unit confirmed the write. The write is pending until a later round shows the value.
     pub confirmed: Option<Instant>,
 }
 
-/// A write that failed, and that the user may order again.
+/// A write that failed. The user may order it again.
 #[derive(Clone, Debug)]
 pub struct Failed {
     /// The write.
     pub write: Write,
-    /// What went wrong.
+    /// Description of the failure.
     pub text: String,
 }
 
 /// The state of the display.
 pub struct Model {
-    /// Where the unit is.
+    /// Connection to the unit.
     pub place: String,
     /// The unit's address.
     pub unit: u8,
@@ -80,13 +80,13 @@ pub struct Model {
     pub book: Book,
     /// Ports and points.
     pub tree: Tree,
-    /// How the unit answers.
+    /// State of the connection.
     pub link: Link,
     /// Duration of the last round of polling.
     pub took: Duration,
-    /// The log, and what it counts.
+    /// The log and its counters.
     pub frames: Frames,
-    /// Writes on their way, by the name of the output.
+    /// Pending writes, by the name of the output.
     pub pending: BTreeMap<String, Pending>,
     /// Writes that failed, the latest one last.
     pub failed: Vec<Failed>,
@@ -94,11 +94,11 @@ pub struct Model {
     pub editor: Option<Editor>,
     /// The page that is shown.
     pub page: Page,
-    /// Which part takes the keys that move.
+    /// Part that receives movement keys.
     pub focus: Focus,
     /// Whether the help is shown.
     pub help: bool,
-    /// Whether the program takes clicks of the mouse.
+    /// Whether the program handles clicks of the mouse.
     pub mouse: bool,
     notice: Option<(String, Instant)>,
     values: BTreeMap<String, Stamped>,
@@ -108,7 +108,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// A display of a unit of which the polling task will soon have news.
+    /// Returns a display of a unit before the first message of the polling task.
     #[must_use]
     pub fn new(place: String, unit: u8, every: Duration, now: Instant) -> Self {
         Self {
@@ -135,7 +135,7 @@ impl Model {
         }
     }
 
-    /// Takes news from the polling task.
+    /// Applies a message of the polling task.
     pub fn update(&mut self, update: Update, now: Instant) {
         match update {
             Update::Learned(book) => self.learned(*book, now),
@@ -236,7 +236,7 @@ impl Model {
                 self.pending.remove(&name);
                 let unsure = if failure.may_pass() {
                     self.count(&failure);
-                    " (the unit may have carried it out)"
+                    " (the unit may have executed it)"
                 } else {
                     ""
                 };
@@ -261,7 +261,7 @@ impl Model {
         (now.saturating_duration_since(*at) < NOTICE).then_some(text.as_str())
     }
 
-    /// Returns the conditions that the unit reports; `None` while there are none, or while they are not known.
+    /// Returns the conditions that the unit reports; `None` when there are none, or when they are not known.
     #[must_use]
     pub fn status(&self, now: Instant) -> Option<String> {
         let (value, _) = self.value("status", now).filter(|(_, fresh)| *fresh)?;
@@ -294,7 +294,7 @@ impl Model {
         self.histories.get(name)
     }
 
-    /// Returns why the unit refuses the points of a port.
+    /// Returns the reason why the unit refuses the points of a port.
     #[must_use]
     pub fn refusal(&self, port: u8) -> Option<&str> {
         self.refused.get(&port).map(String::as_str)

@@ -47,7 +47,7 @@ fn operate_orders_the_state_that_is_not_shown() {
 }
 
 #[test]
-fn operate_on_a_stale_value_orders_nothing() {
+fn operate_on_an_old_value_orders_nothing() {
     let now = Instant::now();
     let mut model = outputs(now);
     assert!(model.operate(after(now, 5000)).is_none());
@@ -74,19 +74,22 @@ fn confirmed_write_is_pending_until_a_later_round() {
     model.update(Update::Wrote(write, Ok(())), after(now, 50));
     let before = polled(after(now, 20), &[0, 1, 0, 0]);
     model.update(Update::Polled(before), after(now, 60));
-    assert!(model.pending.contains_key("p5.2"), "read before the write");
+    assert!(
+        model.pending.contains_key("p5.2"),
+        "the value was read before the write"
+    );
     show(&mut model, after(now, 70), &[0, 0, 0, 0]);
     assert!(model.pending.is_empty());
 }
 
 #[test]
-fn failed_write_is_offered_again_and_ordered_only_when_asked() {
+fn failed_write_is_offered_again_and_repeated_only_when_ordered() {
     let now = Instant::now();
     let mut model = outputs(now);
     let write = model.operate(now).unwrap();
     model.update(Update::Wrote(write, Err(silent())), now);
     assert!(model.pending.is_empty() && model.failed.len() == 1);
-    assert!(model.failed[0].text.contains("may have carried it out"));
+    assert!(model.failed[0].text.contains("may have executed it"));
     assert_eq!(is_fresh(&model, "p5.2", now), Some(false));
     let later = after(now, 60_000);
     let back = Box::new(book(&MODIO_02, Module::Do4, 1, 1));
@@ -123,7 +126,7 @@ fn unit_with_other_modules_loses_values_writes_and_slider() {
         ordered: now,
     };
     model.update(Update::Wrote(write, Err(silent())), now);
-    // The same module, but in volts: 4000 would now be shown as 4000 mV.
+    // The same module, but with voltages: 4000 would now be shown as 4000 mV.
     let volts = Box::new(book(&MODIO_02, Module::Ao4, 0, 1));
     model.update(Update::Learned(volts), now);
     assert!(model.editor.is_none() && model.failed.is_empty());
@@ -132,7 +135,7 @@ fn unit_with_other_modules_loses_values_writes_and_slider() {
 }
 
 #[test]
-fn same_unit_that_comes_back_keeps_values_as_old_ones() {
+fn same_unit_that_returns_keeps_its_values_as_old() {
     let now = Instant::now();
     let mut model = outputs(now);
     model.update(Update::Lost(silent()), after(now, 1000));
@@ -150,7 +153,7 @@ fn same_unit_that_comes_back_keeps_values_as_old_ones() {
 }
 
 #[test]
-fn refused_port_has_stale_values_and_the_reason() {
+fn refused_port_has_old_values_and_the_reason() {
     let now = Instant::now();
     let mut model = outputs(now);
     let later = after(now, 2000);

@@ -1,4 +1,4 @@
-//! What the user orders: which output is written, and with which value.
+//! Writes that the user orders.
 
 use tokio::time::Instant;
 
@@ -59,7 +59,7 @@ impl Model {
         }
     }
 
-    /// Returns the write that failed last, to order it again.
+    /// Returns the write that failed last, to repeat it.
     pub fn retry(&mut self, now: Instant) -> Option<Write> {
         let Failed { write, .. } = self.failed.pop()?;
         Some(self.order(write.item, write.words, now))

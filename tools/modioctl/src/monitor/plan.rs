@@ -1,4 +1,4 @@
-//! What the monitor reads of a unit, and whether the values that it read mean what it knows of the unit.
+//! The items that the monitor reads of a unit, and the check that their meaning has not changed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::names::{Book, Item, Meaning, PortItems};
 /// Values by the name of their item.
 pub type Words = BTreeMap<String, Vec<u16>>;
 
-/// Counters of the line, by the names that the description gives them.
+/// Counters of the line, by their names in the description.
 const COUNTERS: [&str; 9] = [
     "bus messages",
     "bus communication errors",
@@ -22,21 +22,22 @@ const COUNTERS: [&str; 9] = [
     "inter-character gaps",
 ];
 
-/// What is read of a unit.
+/// The items to read of a unit.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     /// Ports with their points.
     pub ports: Vec<PortItems>,
     /// State of the unit, of its modules and of its channels: read after the points.
     pub state: Vec<Item>,
-    /// Settings that say what the points mean: read after the points. Without analog points there are none.
+    /// Settings that determine the meaning of the points, read after the points. There are none without analog
+    /// points.
     pub settings: Vec<Item>,
-    /// Counters of the line: read seldom.
+    /// Counters of the line, read less often.
     pub counters: Vec<Item>,
 }
 
 impl Plan {
-    /// Returns what to read of the unit with this book.
+    /// Returns the items to read of the unit with these names.
     #[must_use]
     pub fn new(book: &Book) -> Self {
         let ports = book.ports();
@@ -67,8 +68,8 @@ impl Plan {
         }
     }
 
-    /// Returns whether the unit still has the modules, ranges and scales that the plan was made for. These words were
-    /// read after the points, so a change between the two reads is noticed.
+    /// Returns whether the unit still has the modules, ranges and scales for which the plan was made. These words
+    /// were read after the points, so a change between the two reads is detected.
     #[must_use]
     pub fn holds(&self, words: &Words) -> bool {
         self.ports.iter().all(|port| {
@@ -83,7 +84,7 @@ impl Plan {
         })
     }
 
-    /// Returns the settings that say what a point means.
+    /// Returns the settings that determine the meaning of a point.
     #[must_use]
     pub fn settings_of(&self, point: &Item) -> Vec<Item> {
         let names = ["range", "scale"].map(|setting| format!("{}.{setting}", point.name));
@@ -92,8 +93,8 @@ impl Plan {
         own.cloned().collect()
     }
 
-    /// Returns whether RANGE and SCALE of an analog point are those for which its meaning is known. Other points have
-    /// the same meaning always.
+    /// Returns whether RANGE and SCALE of an analog point are those for which its meaning is known. The meaning of
+    /// other points never changes.
     #[must_use]
     pub fn reads_alike(point: &Item, words: &Words) -> bool {
         let setting = |setting: &str| {
@@ -108,8 +109,8 @@ impl Plan {
         }
     }
 
-    /// Returns the ports whose MODULE differs from the module in force. RANGE and SCALE of such a port belong to the
-    /// module after the next restart, and do not say how the present one is read.
+    /// Returns the ports whose MODULE differs from the module in force. RANGE and SCALE of such a port belong to
+    /// the module after the next restart, and do not apply to the present one.
     #[must_use]
     pub fn waiting_for_restart(&self, words: &Words) -> BTreeSet<u8> {
         let waiting = self.ports.iter().filter(|port| self.unsettled(port, words));

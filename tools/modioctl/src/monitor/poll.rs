@@ -1,4 +1,4 @@
-//! The polling task: it alone uses the line. The display never waits for it.
+//! The polling task. Only this task uses the line, and the display never waits for it.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -13,19 +13,20 @@ use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, PortItems};
 
-/// Longest time from the order of a write to its request. An older order is not sent: an output must not switch when
-/// the user no longer expects it.
+/// Longest time from the order of a write to its request. An older order is not sent, because an output must not
+/// switch when the user no longer expects it.
 const LATEST: Duration = Duration::from_millis(1500);
 /// Pause before a port or a connection is opened again, and after a failure.
 const AGAIN: Duration = Duration::from_secs(1);
-/// Time without an answer after which a connection is opened anew. A gateway that lost its supply never closes it.
+/// Time without an answer after which a connection is opened again. A gateway that has lost its supply never closes
+/// it.
 const STUCK: Duration = Duration::from_secs(5);
 /// Interval at which counters are read.
 const COUNTERS: Duration = Duration::from_secs(1);
 /// Shortest pause between two rounds.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Makes an observer for each time that the line is opened.
+/// Creates an observer each time that the line is opened.
 pub type Observers = Box<dyn FnMut() -> Observer + Send>;
 
 /// The polling task.
@@ -37,26 +38,26 @@ pub struct Poller {
     writes: UnboundedReceiver<Write>,
     device: Option<Device>,
     plan: Option<Plan>,
-    /// Ports that wait for a restart, since the last restart that was seen.
+    /// Ports that wait for a restart, since the last restart that was detected.
     waiting: BTreeSet<u8>,
-    /// The unit's uptime in seconds, and when it was read.
+    /// Uptime of the unit in seconds, and the time when it was read.
     uptime: Option<(u64, Instant)>,
     counted: Option<Instant>,
     answered: Instant,
 }
 
-/// How a round ended.
+/// Result of a round.
 enum Round {
     /// Its values are valid.
     Complete(Box<Polled>),
-    /// A write waits, which may change values that were read before it.
+    /// A write is waiting, which may change values that were read before it.
     Interrupted,
-    /// The unit is no longer what it was.
+    /// The modules or settings of the unit have changed.
     Changed,
 }
 
 impl Poller {
-    /// Makes the task for a device that is open, and of which nothing is known yet.
+    /// Creates the task for an open device without knowledge about the unit.
     #[must_use]
     pub fn new(
         device: Device,
@@ -80,7 +81,7 @@ impl Poller {
         }
     }
 
-    /// Polls until the display is gone.
+    /// Polls until the display has ended.
     pub async fn run(mut self) {
         let mut next = Instant::now();
         loop {
@@ -106,11 +107,11 @@ impl Poller {
     }
 
     fn tell(&self, update: Update) {
-        // Without a display the task ends at its next look at the channel of writes.
+        // Without a display the task ends when it next reads the channel of writes.
         let _ = self.updates.send(update);
     }
 
-    /// Opens the line, learns what the unit is, or polls. Returns the time to the next step.
+    /// Opens the line, learns the names of the unit, or polls. Returns the time to the next step.
     async fn step(&mut self) -> Result<Duration, Failure> {
         let Some(device) = &mut self.device else {
             let observer = (self.observers)();
@@ -186,7 +187,7 @@ impl Poller {
         })))
     }
 
-    /// Notices a restart by the uptime. A port that waited for a restart has had it then.
+    /// Detects a restart from the uptime. A port that waited for a restart no longer waits then.
     fn note_restart(&mut self, words: &Words) {
         let Some(uptime) = words.get("uptime") else {
             return;
@@ -195,7 +196,7 @@ impl Poller {
             .iter()
             .fold(0, |long: u64, word| long << 16 | u64::from(*word));
         if let Some((before, at)) = self.uptime {
-            // A unit on its internal oscillator counts up to some per cent slower.
+            // A unit on its internal oscillator may count a few per cent slower.
             let least = before + at.elapsed().as_secs() * 9 / 10;
             if now + 2 < least || now < before {
                 self.waiting.clear();
@@ -205,9 +206,9 @@ impl Poller {
         self.uptime = Some((now, Instant::now()));
     }
 
-    /// Takes note of a failed step. Returns the time to the next one.
+    /// Handles a failed step. Returns the time to the next one.
     fn lost(&mut self, failure: Failure) -> Duration {
-        // A unit that comes back may have other modules.
+        // A unit that returns may have other modules.
         self.plan = None;
         let serial = self.endpoint.place.is_serial();
         let stuck = !serial && self.answered.elapsed() > STUCK;
@@ -228,7 +229,7 @@ impl Poller {
             && failure.may_pass()
         {
             self.plan = None;
-            // The order must not reach the unit later, from a buffer of this computer.
+            // The order must not reach the unit later from a buffer of this computer.
             if let Some(device) = self.device.take() {
                 device.master.close_unsent();
             }
@@ -250,7 +251,7 @@ impl Poller {
         };
         let has = |port: &&PortItems| port.points.iter().any(|point| point == item);
         let Some(port) = plan.ports.iter().find(has) else {
-            return Err(not_sent("the unit no longer has this output as it was"));
+            return Err(not_sent("the unit has other modules or settings now"));
         };
         if is_analog(item) {
             if self.waiting.contains(&port.number) {
@@ -278,8 +279,8 @@ async fn read(device: &mut Device, items: &[Item], words: &mut Words) -> Result<
     Ok(())
 }
 
-/// Reads all points together. If the unit refuses, reads each port alone, so that one port does not hide the others.
-/// Returns the ports that were refused.
+/// Reads all points together. If the unit refuses, reads each port separately, so that one port does not hide the
+/// others. Returns the refused ports.
 async fn points(
     device: &mut Device,
     plan: &Plan,

@@ -16,7 +16,8 @@ use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
 use crate::device::Device;
 
-/// Orders a write that was asked for this long ago, of a silent unit. Returns the failure and what the unit received.
+/// Orders a write that was requested this long ago from a unit that does not answer. Returns the failure and the
+/// bytes that the unit received.
 fn order(age: Duration) -> (String, Vec<u8>) {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()

@@ -1,4 +1,4 @@
-//! The terminal: prepared for the display, and restored whatever happens.
+//! The terminal: prepared for the display, and restored at every kind of end.
 
 use std::io::{self, stdout};
 use std::sync::Arc;
@@ -13,14 +13,14 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 use crate::failure::Failure;
 
-/// Interval at which the thread that reads keys looks whether the display has ended.
+/// Interval at which the thread that reads keys checks whether the display has ended.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// The terminal while the display is shown. Dropping it restores the terminal.
 pub struct Screen {
-    /// Draws.
+    /// Draws on the terminal.
     pub terminal: DefaultTerminal,
-    /// Whether a task or a thread has panicked. The terminal has been restored then, and shows the reason.
+    /// Whether a task or a thread has panicked. In that case the terminal has been restored and shows the reason.
     panicked: Arc<AtomicBool>,
     ended: Arc<AtomicBool>,
     reader: JoinHandle<()>,
@@ -31,7 +31,7 @@ impl Screen {
     ///
     /// # Errors
     ///
-    /// Why the terminal cannot be used.
+    /// When the terminal cannot be used; the error says why.
     pub fn open() -> Result<(Self, UnboundedReceiver<io::Result<Event>>), Failure> {
         let terminal = ratatui::try_init().map_err(|error| {
             ratatui::restore();
@@ -44,7 +44,7 @@ impl Screen {
             move |info| {
                 panicked.store(true, Ordering::Relaxed);
                 let _ = execute!(stdout(), DisableMouseCapture);
-                // This hook of ratatui restores the terminal, and calls the usual one.
+                // This hook of ratatui restores the terminal and calls the previous hook.
                 hook(info);
             }
         }));
@@ -74,9 +74,9 @@ impl Screen {
         self.panicked.load(Ordering::Relaxed)
     }
 
-    /// Takes clicks of the mouse, or leaves them to the terminal.
+    /// Handles clicks of the mouse, or leaves them to the terminal.
     pub fn take_mouse(&mut self, take: bool) {
-        // A terminal without a mouse is used by its keys.
+        // A terminal without a mouse is operated by keys.
         let _ = if take {
             execute!(stdout(), EnableMouseCapture)
         } else {
@@ -88,13 +88,13 @@ impl Screen {
 impl Drop for Screen {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
-        // A second restoring would move the cursor into the text of the panic.
+        // Restoring it a second time would move the cursor into the text of the panic.
         if self.has_panicked() {
             return;
         }
         self.take_mouse(false);
-        // Reports of the mouse that are still on their way must not reach the shell. On a terminal that has been closed
-        // the thread never returns from crossterm, so it is left behind after a moment.
+        // Pending reports of the mouse must not reach the shell. On a closed terminal the thread never returns from
+        // crossterm, so the program stops waiting for it after a moment.
         let until = Instant::now() + LOOK * 4;
         while !self.reader.is_finished() && Instant::now() < until {
             std::thread::sleep(LOOK / 10);

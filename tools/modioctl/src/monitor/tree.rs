@@ -1,4 +1,4 @@
-//! The tree of ports and points: what is selected, open and in the window.
+//! The tree of ports and points: its selection, open ports and window.
 
 use std::collections::BTreeSet;
 
@@ -34,7 +34,7 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Takes the ports of a unit. The selection stays at the row with the same name.
+    /// Sets the ports of a unit. The selection stays at the row with the same name.
     pub fn set(&mut self, ports: Vec<PortItems>) {
         let name = self.selected().map(|row| row.name());
         self.ports = ports;
@@ -88,12 +88,12 @@ impl Tree {
         self.selected
     }
 
-    /// Selects a row; the last one when there are fewer.
+    /// Selects a row, or the last one when there are fewer.
     pub fn select(&mut self, index: usize) {
         self.selected = index.min(self.rows().len().saturating_sub(1));
     }
 
-    /// Moves the selection, by a negative number upwards.
+    /// Moves the selection; a negative number moves it upwards.
     pub fn move_by(&mut self, by: isize) {
         self.select(self.selected.saturating_add_signed(by));
     }

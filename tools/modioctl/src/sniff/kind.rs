@@ -1,4 +1,4 @@
-//! Which lengths a frame can have, and whether a frame is a request or a response.
+//! Possible lengths of a frame, and the decision whether a frame is a request or a response.
 
 use std::time::Duration;
 

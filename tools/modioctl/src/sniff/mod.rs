@@ -1,4 +1,4 @@
-//! Finds the frames in what a listener receives from a Modbus line.
+//! Finds the frames in the bytes that a listener receives from a Modbus line.
 //!
 //! A listener receives requests and responses in one stream of bytes. On an RTU line, silence marks the end of a frame,
 //! but USB adapters deliver bytes in batches, 16 ms apart and more: the silences are lost. [`Splitter`] therefore finds
@@ -26,7 +26,7 @@ pub struct Piece {
     pub until: Duration,
 }
 
-/// What a piece is.
+/// Kind of a piece.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A frame with a correct check.
@@ -40,7 +40,7 @@ pub enum Kind {
         /// For a response: the request that it answers, if the listener received that request.
         request: Option<Request>,
     },
-    /// Bytes that are no frame: noise, a collision, a wrong rate or a wrong format.
+    /// Bytes that are not a frame: noise, a collision, a wrong rate or a wrong format.
     Garbled,
 }
 

@@ -8,7 +8,7 @@ use super::{Kind, Piece, Request};
 use crate::bus::Direction;
 use crate::bus::adu::{ASCII_MOST, Framing, RTU_MOST};
 
-/// What the bytes at the front of the buffer are.
+/// Content at the front of the buffer.
 #[derive(Debug, PartialEq, Eq)]
 enum Front {
     /// A frame of this many bytes.
@@ -23,14 +23,14 @@ enum Front {
 #[derive(Debug)]
 pub struct Splitter {
     framing: Framing,
-    /// Time that one character takes on the line.
+    /// Duration of one character on the line.
     character: Duration,
     /// Longest time from a request to its response.
     patience: Duration,
     bytes: Vec<u8>,
     /// The end of each byte of `bytes`.
     times: VecDeque<Duration>,
-    /// When the last chunk was received.
+    /// Time when the last chunk was received.
     received: Duration,
     garbled: Option<Piece>,
     open: Option<Request>,
@@ -53,7 +53,7 @@ impl Splitter {
         }
     }
 
-    /// Whether bytes wait for the rest of their frame.
+    /// Returns whether no bytes wait for the rest of their frame.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty() && self.garbled.is_none()
@@ -64,7 +64,7 @@ impl Splitter {
         for after in (0..bytes.len()).rev() {
             let after = u32::try_from(after).unwrap_or(u32::MAX);
             let end = at.saturating_sub(self.character.saturating_mul(after));
-            // A byte of this chunk was not received before the last byte of the chunk in front of it.
+            // A byte of this chunk was not received before the last byte of the previous chunk.
             self.times.push_back(end.max(self.received));
         }
         self.received = at.max(self.received);
@@ -72,7 +72,7 @@ impl Splitter {
         self.split(false)
     }
 
-    /// Returns the bytes that are left after a silence. Nothing that is received later belongs to them.
+    /// Returns the remaining bytes after a silence. Later bytes do not belong to them.
     pub fn flush(&mut self) -> Vec<Piece> {
         self.split(true)
     }
@@ -89,7 +89,8 @@ impl Splitter {
                 }
             }
         }
-        // Garbled bytes wait for more of them, up to the longest frame: one piece is easier to read than many.
+        // Garbled bytes are collected up to the length of the longest frame, because one piece is easier to read
+        // than many.
         let long = |piece: &Piece| piece.bytes.len() >= RTU_MOST;
         if silence || self.garbled.as_ref().is_some_and(long) {
             pieces.extend(self.garbled.take());
@@ -128,8 +129,9 @@ impl Splitter {
         self.unknown_function(silence).unwrap_or(Front::Garbled(1))
     }
 
-    /// Looks for a frame with a function whose lengths are unknown: at the beginning of the received bytes or directly
-    /// after a frame, the shortest run of bytes with a correct CRC counts. Elsewhere noise would often have one.
+    /// Looks for a frame with a function of unknown length: at the beginning of the received bytes or directly
+    /// after a frame, the shortest run of bytes with a correct CRC is used. Elsewhere noise would often contain
+    /// one.
     fn unknown_function(&self, silence: bool) -> Option<Front> {
         let [unit, function, ..] = self.bytes[..] else {
             return None;
@@ -165,7 +167,7 @@ impl Splitter {
                     Front::Garbled(end)
                 }
             }
-            // A colon starts a new frame, so the frame in front of it is incomplete.
+            // A colon starts a new frame, so the previous frame is incomplete.
             (_, Some(again)) => Front::Garbled(again),
             (_, None) if silence || self.bytes.len() > ASCII_MOST => {
                 Front::Garbled(self.bytes.len())
@@ -184,7 +186,7 @@ impl Splitter {
         asked(self.open.as_ref(), unit, function, from, self.patience)
     }
 
-    /// Returns when the first byte of the buffer began.
+    /// Returns the time when the first byte of the buffer began.
     fn start(&self) -> Duration {
         let end = self.times.front().copied().unwrap_or(self.received);
         end.saturating_sub(self.character)

@@ -151,7 +151,7 @@ fn times_within_a_chunk_are_those_of_the_characters() {
 }
 
 fn settings() -> ProptestConfig {
-    // A fixed seed: noise has a correct CRC once in 65536 times, and such noise is a frame.
+    // A fixed seed: noise has a correct CRC once in 65536 times, and then counts as a frame.
     ProptestConfig {
         rng_seed: RngSeed::Fixed(1),
         failure_persistence: None,
@@ -175,7 +175,7 @@ fn push_in_chunks(splitter: &mut Splitter, bytes: &[u8], cuts: &[usize]) -> Vec<
     pieces
 }
 
-/// Part of what a line carries: an exchange by its number, or noise.
+/// Part of the traffic on a line: an exchange by its number, or noise.
 #[derive(Clone, Debug)]
 enum Part {
     Exchange(u8, usize),
@@ -193,7 +193,7 @@ proptest! {
     #![proptest_config(settings())]
 
     #[test]
-    fn valid_frames_are_found_however_the_bytes_are_cut(
+    fn valid_frames_are_found_for_any_split_into_chunks(
         picks in prop::collection::vec((1_u8..=247, 0..exchanges().len()), 1..12),
         cuts in prop::collection::vec(1_usize..40, 1..20),
         ascii in any::<bool>(),

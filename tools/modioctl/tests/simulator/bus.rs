@@ -1,13 +1,13 @@
-//! A line with several units on it, over TCP: every unit receives the requests, and the master every reply. It can
-//! invert bits.
+//! A line with several units over TCP: every unit receives the requests, and the master every reply. It can invert
+//! bits.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::thread;
 
-/// Joins these lines to one, and gives its address. One bit in `per_error` is turned round on the way, in both
-/// directions; 0: none.
+/// Joins these lines to one and returns its address. One bit in `per_error` is inverted on the way, in both
+/// directions; 0 means none.
 pub fn of(lines: &[SocketAddr], per_error: u64) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -51,7 +51,7 @@ fn forward(mut from: TcpStream, mut to: Vec<TcpStream>, noise: &Arc<Mutex<Noise>
     });
 }
 
-/// Turns one bit in so many round, the same ones in every run.
+/// Inverts one bit in `per_error`, the same bits in every run.
 struct Noise {
     per_error: u64,
     random: fastrand::Rng,

@@ -1,4 +1,4 @@
-//! Every command, on each kind of line, but for `monitor` and `sniff`, which have files of their own.
+//! Tests of every command on each kind of line, except `monitor` and `sniff`, which have their own files.
 
 use std::process::Stdio;
 use std::thread;
@@ -8,7 +8,7 @@ use crate::program::{At, modioctl};
 use crate::unit::Unit;
 use crate::{bus, gateway};
 
-/// A unit on each kind of line.
+/// Returns a unit on each kind of line.
 fn lines(unit: &Unit) -> [At; 3] {
     [
         At::port(unit.pty.display()),
@@ -64,7 +64,7 @@ fn outputs_are_written_and_read_back_on_every_line() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn info_and_describe_say_what_the_unit_is() {
+fn info_and_describe_show_identity_and_registers() {
     let unit = Unit::with(7, &["--module", "2relay"]);
     for at in lines(&unit) {
         let text = at.run("--unit 7 info").fine();
@@ -84,7 +84,7 @@ fn info_and_describe_say_what_the_unit_is() {
         for part in ["p5.3 ", "digital output", "BAUD", "COMM_TIMEOUT", "0x0010"] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        // The same from the unit itself, but for where it is from.
+        // The description read from the unit is the same, except for the source.
         let read = at.run("--unit 7 describe --refresh").fine();
         assert!(
             read.lines().next().unwrap().ends_with("from the unit"),
@@ -99,7 +99,7 @@ fn info_and_describe_say_what_the_unit_is() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn settings_go_to_a_file_and_back_and_a_wrong_file_changes_nothing() {
+fn settings_are_exported_and_imported_and_a_wrong_file_changes_nothing() {
     let unit = Unit::with(1, &["--module", "2ai2ao"]);
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("unit.toml");
@@ -161,7 +161,7 @@ fn an_import_with_another_rate_follows_the_unit() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn watch_prints_values_and_waits_for_a_unit_that_is_gone() {
+fn watch_prints_values_and_waits_for_a_lost_unit() {
     let unit = Unit::with(1, &["--module", "4di"]);
     for at in lines(&unit) {
         let text = at.run("watch --count 3 --every 50ms").fine();
@@ -200,7 +200,7 @@ fn watch_prints_values_and_waits_for_a_unit_that_is_gone() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn a_pdu_is_sent_as_it_is_and_both_frames_are_shown() {
+fn a_raw_pdu_is_sent_and_both_frames_are_shown() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let [pty, tcp, modbus_tcp] = lines(&unit);
     for at in [pty, tcp] {
@@ -274,7 +274,7 @@ fn each_of_three_boards_on_a_line_answers_for_itself() {
 }
 
 #[test]
-fn what_needs_no_unit_works_without_one() {
+fn commands_without_a_unit_need_no_endpoint() {
     let run = |words: &[&str]| String::from_utf8(modioctl(words).output().unwrap().stdout).unwrap();
     assert!(run(&["completions", "bash"]).contains("_modioctl"));
     assert!(run(&["man"]).contains(".TH modioctl"));

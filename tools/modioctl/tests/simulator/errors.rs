@@ -1,4 +1,4 @@
-//! Each exit status, provoked.
+//! Tests of each exit status.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
@@ -11,7 +11,7 @@ use crate::unit::Unit;
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn what_the_unit_refuses_is_status_1() {
+fn a_refused_request_is_status_1() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::tcp(unit.tcp);
     let text = at.run("read 0x0090").failed(1);
@@ -41,7 +41,7 @@ fn a_module_that_is_not_plugged_in_is_status_1() {
 }
 
 #[test]
-fn wrong_usage_is_status_2_and_says_what_is_right() {
+fn wrong_usage_is_status_2_and_reports_what_is_allowed() {
     let nowhere = At::tcp("127.0.0.1:1");
     for (words, part) in [
         ("read", "NAME"),
@@ -106,7 +106,7 @@ fn a_wrong_rate_is_status_3_or_4() {
     assert!(ran.status == 4 || ran.status == 3, "{ran:?}");
 }
 
-/// Two units with address 1: their answers meet on the line, where a 0 wins over a 1.
+/// Two units with address 1: their answers collide on the line, where a 0 overrides a 1.
 fn two_units_with_one_address() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -117,7 +117,7 @@ fn two_units_with_one_address() -> SocketAddr {
                 let Some((1, pdu)) = Framing::Rtu.open(&bytes[..count]) else {
                     continue;
                 };
-                // They are of one kind, and say so alike; all else differs.
+                // Their replies to function 11 are equal, because they are of one kind; all others differ.
                 let differs = pdu[0] != 0x11;
                 let answer = |unit: u8| [pdu[0], 2, 0x55, if differs { unit } else { 0xFF }];
                 let [one, other] = [1, 2].map(|unit| Framing::Rtu.frame(0, 1, &answer(unit)));
@@ -155,7 +155,7 @@ fn a_port_that_cannot_be_opened_is_status_5() {
         text.contains("there is no port /dev/nowhere; this computer has"),
         "{text}"
     );
-    // Bound and not listening any more: nobody is there.
+    // A free port that nobody listens on.
     let free = TcpListener::bind("127.0.0.1:0")
         .unwrap()
         .local_addr()
@@ -178,7 +178,7 @@ fn a_port_that_cannot_be_opened_is_status_5() {
     at.run("info").fine();
 }
 
-/// Root may open every port, so there the program runs as a user who may not.
+/// Root may open every port, so in that case the program runs as a user without permission.
 #[cfg(unix)]
 #[test]
 fn a_port_without_permission_is_status_5_and_names_the_group() {
@@ -194,7 +194,7 @@ fn a_port_without_permission_is_status_5_and_names_the_group() {
     let port = pseudo_terminal.master.tty_name().unwrap();
     let permissions = |bits| std::fs::Permissions::from_mode(bits);
     std::fs::set_permissions(&port, permissions(0)).unwrap();
-    // Where anybody may run it.
+    // Every user may run the program from here.
     let folder = tempfile::tempdir().unwrap();
     std::fs::set_permissions(folder.path(), permissions(0o755)).unwrap();
     let is_root = folder.path().metadata().unwrap().uid() == ROOT;

@@ -1,4 +1,4 @@
-//! A gateway: Modbus TCP on one side, RTU frames over TCP on the other.
+//! A gateway with Modbus TCP on one side and RTU frames over TCP on the other.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use modioctl::bus::adu::Framing;
 
-/// How long it waits for a unit.
+/// Time that the gateway waits for a unit.
 const WAIT: Duration = Duration::from_millis(400);
 
-/// Serves the line at `line` from now on, at the address that it gives.
+/// Starts a gateway to the line at `line` and returns the gateway's address.
 pub fn before(line: SocketAddr) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -18,7 +18,7 @@ pub fn before(line: SocketAddr) -> SocketAddr {
             let line = TcpStream::connect(line).unwrap();
             line.set_read_timeout(Some(WAIT)).unwrap();
             line.set_nodelay(true).unwrap();
-            // Ends with the master's connection.
+            // Ends when the master closes the connection.
             let _ = serve(master, line);
         }
     });
@@ -38,7 +38,7 @@ fn serve(mut master: TcpStream, mut line: TcpStream) -> std::io::Result<()> {
         // 0B: the unit does not answer.
         let answer = answer.unwrap_or_else(|| vec![pdu[0] | 0x80, 0x0B]);
         master.write_all(&Framing::Mbap.frame(transaction, *unit, &answer))?;
-        // The line's silence between frames.
+        // Silence between frames on the line.
         std::thread::sleep(Duration::from_millis(5));
     }
 }

@@ -1,4 +1,4 @@
-//! `modioctl sniff` beside a master.
+//! Tests of `modioctl sniff` next to a master.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -11,7 +11,7 @@ use portable_pty::{PtySize, native_pty_system};
 use crate::program::At;
 use crate::unit::Unit;
 
-/// A line that a master can connect to, and all bytes on it in both directions.
+/// Returns a line that a master can connect to, and all bytes on it in both directions.
 fn tapped(line: SocketAddr) -> (SocketAddr, Receiver<Vec<u8>>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -50,7 +50,7 @@ impl Listener {
         Self(command.stdout(Stdio::piped()).spawn().unwrap())
     }
 
-    /// The first lines that it prints.
+    /// Returns the first lines that it prints.
     fn lines(&mut self, count: usize) -> Vec<String> {
         use std::io::{BufRead, BufReader};
         let lines = BufReader::new(self.0.stdout.take().unwrap()).lines();
@@ -65,13 +65,13 @@ impl Drop for Listener {
     }
 }
 
-/// A master writes and reads an output twice, and what the line carries goes to the ear.
-fn both_directions_are_shown(ear: &At, mut carry: impl FnMut(&[u8])) {
+/// A master writes and reads an output twice, and the bytes on the line are passed to the listener.
+fn both_directions_are_shown(listener: &At, mut carry: impl FnMut(&[u8])) {
     let unit = Unit::with(1, &["--module", "4do"]);
     let (line, hear) = tapped(unit.tcp);
     let folder = tempfile::tempdir().unwrap();
     let capture = folder.path().join("line.pcapng");
-    let mut listener = Listener::at(ear, &capture);
+    let mut listener = Listener::at(listener, &capture);
     std::thread::sleep(Duration::from_millis(500));
     let master = At::tcp(line);
     let text = master.run("raw 05 0010 FF00").fine();
@@ -92,7 +92,7 @@ fn both_directions_are_shown(ear: &At, mut carry: impl FnMut(&[u8])) {
     let capture = std::fs::read(capture).unwrap();
     let section_header = [0x0A, 0x0D, 0x0D, 0x0A];
     assert!(capture.starts_with(&section_header));
-    // Each frame stands in the file as it was on the line.
+    // Each frame is in the file as it was on the line.
     let write = [1, 5, 0, 0x10, 0xFF, 0];
     let times = capture.windows(6).filter(|bytes| *bytes == write).count();
     assert_eq!(times, 2);
@@ -102,9 +102,9 @@ fn both_directions_are_shown(ear: &At, mut carry: impl FnMut(&[u8])) {
 #[ignore = "needs the simulator: cargo xtask test"]
 fn sniff_over_tcp_shows_and_records_both_directions() {
     let socket = TcpListener::bind("127.0.0.1:0").unwrap();
-    let ear = At::tcp(socket.local_addr().unwrap());
+    let listener = At::tcp(socket.local_addr().unwrap());
     let mut stream = None;
-    both_directions_are_shown(&ear, |bytes| {
+    both_directions_are_shown(&listener, |bytes| {
         let stream = stream.get_or_insert_with(|| socket.accept().unwrap().0);
         stream.write_all(bytes).unwrap();
     });
@@ -114,9 +114,9 @@ fn sniff_over_tcp_shows_and_records_both_directions() {
 #[ignore = "needs the simulator: cargo xtask test"]
 fn sniff_on_a_pseudo_terminal_shows_and_records_both_directions() {
     let pty = native_pty_system().openpty(PtySize::default()).unwrap();
-    let ear = At::port(pty.master.tty_name().unwrap().display());
+    let listener = At::port(pty.master.tty_name().unwrap().display());
     let mut wire = pty.master.take_writer().unwrap();
-    both_directions_are_shown(&ear, |bytes| {
+    both_directions_are_shown(&listener, |bytes| {
         wire.write_all(bytes).unwrap();
         wire.flush().unwrap();
     });

@@ -1,5 +1,5 @@
-//! `modioctl` against the release image in the simulator: over a pseudo-terminal, over TCP and over Modbus TCP. They need
-//! the simulator and the image, whose paths `cargo xtask test` gives in MODIO_SIM and MODIO_ELF.
+//! Tests of `modioctl` with the release image in the simulator: over a pseudo-terminal, over TCP and over Modbus
+//! TCP. They need the simulator and the image, whose paths `cargo xtask test` passes in MODIO_SIM and MODIO_ELF.
 
 #![cfg(unix)]
 

@@ -1,4 +1,4 @@
-//! A unit that is newer than this program: another board, firmware and registers that only its own description has.
+//! A unit that is newer than this program: only its own description contains its board, firmware and registers.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -12,7 +12,7 @@ use register_map::board::MODIO_02;
 
 use crate::program::At;
 
-/// The description: that of a modio-02, with what is new.
+/// Returns the description: that of a modio-02 with new parts.
 fn description() -> Description {
     let mut description = describe(&MODIO_02, "9.9.9", |_| Module::Ai4);
     description.board = "modio-99".to_owned();
@@ -36,7 +36,7 @@ fn description() -> Description {
     description
 }
 
-/// Serves its registers and its file over TCP.
+/// Serves the unit's registers and its file over TCP.
 fn unit() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -108,7 +108,7 @@ fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
 }
 
 #[test]
-fn its_own_description_names_what_this_program_does_not_know() {
+fn a_newer_unit_is_read_by_its_own_description() {
     let at = At::tcp(unit());
     let first = at.run("read PRESSURE_LIMIT p5.1");
     assert!(
@@ -120,7 +120,7 @@ fn its_own_description_names_what_this_program_does_not_know() {
         "PRESSURE_LIMIT  123.4 kPa\np5.1            7\n"
     );
     let again = at.run("describe");
-    assert!(again.err.is_empty(), "kept from before: {again:?}");
+    assert!(again.err.is_empty(), "stored before: {again:?}");
     let text = again.fine();
     assert!(
         text.contains("modio-99") && text.contains("Where the valve opens"),

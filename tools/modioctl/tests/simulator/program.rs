@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::process::{Command, Output};
 
-/// What a run of the program gave.
+/// Result of a run of the program.
 #[derive(Debug)]
 pub struct Ran {
     pub status: i32,
@@ -21,14 +21,14 @@ impl Ran {
         }
     }
 
-    /// Standard output of a run that went well.
+    /// Returns the standard output of a run that succeeded.
     #[track_caller]
     pub fn fine(self) -> String {
         assert_eq!(self.status, 0, "{self:#?}");
         self.out
     }
 
-    /// Standard error of a run that ended with this status, and said why in one line.
+    /// Returns the standard error of a run that ended with this status and one line of text.
     #[track_caller]
     pub fn failed(self, status: i32) -> String {
         assert_eq!(self.status, status, "{self:#?}");
@@ -37,7 +37,7 @@ impl Ran {
     }
 }
 
-/// The program, without what this machine's user has set.
+/// Returns the program, without the settings of this machine's user.
 pub fn modioctl(endpoint: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_modioctl"));
     for name in [
@@ -81,7 +81,7 @@ impl At {
         )
     }
 
-    /// The program with the words of this command.
+    /// Returns the program with the words of this command.
     pub fn command(&self, words: &str) -> Command {
         let endpoint: Vec<_> = self.0.iter().map(String::as_str).collect();
         let mut command = modioctl(&endpoint);

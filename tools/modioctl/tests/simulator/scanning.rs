@@ -1,4 +1,4 @@
-//! `modioctl scan` on large buses.
+//! Tests of `modioctl scan` on large buses.
 
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
@@ -11,8 +11,8 @@ use modioctl::bus::adu::Framing;
 
 use crate::program::At;
 
-/// The shortest time-out with which a master finds every unit when it waits for each in turn: V1.02, 2.4.1, has 100 ms
-/// as the least that a master should wait.
+/// The shortest time-out with which a master finds every unit when it waits for each in turn: V1.02, 2.4.1, gives
+/// 100 ms as the least time that a master should wait.
 const SENSIBLE: Duration = Duration::from_millis(100);
 
 /// A bus of units that answer after `delay`, one line for all.
@@ -50,13 +50,14 @@ fn found(at: &At, words: &str) -> BTreeSet<u8> {
 }
 
 #[test]
-fn thirty_units_are_found_in_a_third_of_the_time_that_waiting_for_each_takes() {
+fn thirty_units_are_found_in_a_third_of_the_time_of_sequential_waiting() {
     let addresses: BTreeSet<u8> = (0..30).map(|n| n * 8 + 3).collect();
     let at = At::tcp(bus(addresses.clone(), Duration::from_millis(12)));
     let start = Instant::now();
     assert_eq!(found(&at, "scan --units 1-247"), addresses);
     let took = start.elapsed();
-    // Each request of 4 bytes takes 4.6 ms at 9600 bit/s. The answers: the identities of those that were found.
+    // Each request of 4 bytes takes 4.6 ms at 9600 bit/s. The answers are the identities of the units that were
+    // found.
     let request = Duration::from_micros(4_583);
     let third = (SENSIBLE + request) * 247 / 3;
     let answers = Duration::from_millis(30 * 350);
@@ -67,7 +68,7 @@ fn thirty_units_are_found_in_a_third_of_the_time_that_waiting_for_each_takes() {
 }
 
 #[test]
-fn a_unit_that_is_slower_than_its_turn_is_found_all_the_same() {
+fn a_unit_that_answers_late_is_found() {
     for delay in [40, 70] {
         let addresses = BTreeSet::from([3, 9, 10, 200]);
         let at = At::tcp(bus(addresses.clone(), Duration::from_millis(delay)));

@@ -1,4 +1,4 @@
-//! `modioctl monitor` with the release image.
+//! Tests of `modioctl monitor` with the release image.
 
 use crate::gateway;
 use crate::terminal::{Terminal, wait};
@@ -6,7 +6,7 @@ use crate::unit::Unit;
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn the_monitor_switches_an_output_and_sees_the_unit_come_back_on_every_line() {
+fn the_monitor_switches_an_output_and_shows_a_returning_unit_on_every_line() {
     let unit = Unit::with(1, &["--module", "4do"]);
     let [pty, tcp, modbus_tcp] = [
         unit.pty.display().to_string(),
@@ -27,7 +27,7 @@ fn the_monitor_switches_an_output_and_sees_the_unit_come_back_on_every_line() {
         unit.post("/api/power", r#"{"on":false}"#);
         terminal.wait_for("old:");
         unit.post("/api/power", r#"{"on":true}"#);
-        // It starts with its outputs off.
+        // The unit starts with its outputs off.
         terminal.wait_for(off);
         terminal.press("q");
         assert!(terminal.wait_for_end().success(), "{option}");

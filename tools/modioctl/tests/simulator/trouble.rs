@@ -1,4 +1,4 @@
-//! Lines with bit errors, and units that die.
+//! Tests with bit errors on the line, and with units that lose their power.
 
 use std::process::Stdio;
 use std::thread;
@@ -31,7 +31,7 @@ fn a_thousand_polls_over_a_line_with_bit_errors_show_no_wrong_value() {
         let (_, values) = line.split_once(',').unwrap();
         assert_eq!(values, "on,off,on,off,115200,0,23835860");
     }
-    // The line was as bad as it should be.
+    // The line did have bit errors.
     let info = At::tcp(unit.tcp)
         .run("read bus_communication_errors")
         .fine();
@@ -40,7 +40,7 @@ fn a_thousand_polls_over_a_line_with_bit_errors_show_no_wrong_value() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn a_unit_that_dies_in_the_middle_makes_one_line_and_status_3() {
+fn a_unit_that_stops_during_a_command_gives_one_line_and_status_3() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::tcp(unit.tcp);
     let dying = at
@@ -62,7 +62,7 @@ fn a_unit_that_dies_in_the_middle_makes_one_line_and_status_3() {
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
-fn a_line_that_is_cut_is_status_5_at_once() {
+fn a_lost_connection_is_status_5_immediately() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::tcp(unit.tcp);
     let cut = at

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-/// A unit in the simulator, which ends with it.
+/// A unit in the simulator, which ends when this value is dropped.
 pub struct Unit {
     simulator: Child,
     /// The line's pseudo-terminal.
@@ -50,7 +50,7 @@ impl Unit {
         let tcp = after("tcp: ").parse().unwrap();
         let http = after("http: http://");
         let http = http.trim_end_matches('/').parse().unwrap();
-        // The simulator prints the firmware's log, which somebody must read.
+        // The simulator prints the firmware's log, which must be read so that the pipe does not fill up.
         std::thread::spawn(move || lines.for_each(drop));
         let unit = Self {
             simulator,
@@ -58,12 +58,12 @@ impl Unit {
             tcp,
             http,
         };
-        // It answers from some milliseconds after its start on; a test that asks once must not be too early.
+        // The unit answers some milliseconds after its start; a test with a single request must not be too early.
         std::thread::sleep(std::time::Duration::from_millis(300));
         unit
     }
 
-    /// Asks the simulator's HTTP interface for something.
+    /// Sends a request to the simulator's HTTP interface.
     pub fn post(&self, path: &str, body: &str) {
         let mut stream = TcpStream::connect(self.http).unwrap();
         let length = body.len();

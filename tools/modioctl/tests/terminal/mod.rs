@@ -1,4 +1,4 @@
-//! The monitor in a terminal, for the tests of both kinds.
+//! The monitor in a terminal, for the tests with and without the simulator.
 
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use portable_pty::{Child, CommandBuilder, ExitStatus, MasterPty, PtySize, native_pty_system};
 
-/// Longest time to wait for something on the screen. Only a test that fails takes it.
+/// Time limit for an expected text on the screen. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The monitor in a terminal of 80 by 24.
@@ -65,8 +65,8 @@ impl Terminal {
         );
     }
 
-    /// Presses keys that change the screen from one text to another. The monitor refuses them while a value is old,
-    /// which a machine that stalls can cause: they are then pressed again.
+    /// Presses keys that change the screen from one text to another. The monitor ignores them while a value is old,
+    /// which can happen on a machine that stalls: then they are pressed again.
     pub fn switch(&mut self, keys: &str, before: &str, after: &str) {
         const REFUSED: &str = "is not switched";
         loop {
@@ -80,7 +80,7 @@ impl Terminal {
             if self.text().contains(after) {
                 return;
             }
-            wait(|| !refused(), || "the notice does not go".to_owned());
+            wait(|| !refused(), || "the notice does not disappear".to_owned());
         }
     }
 
@@ -117,7 +117,7 @@ fn parser() -> vt100::Parser {
     vt100::Parser::new(rows, columns, 0)
 }
 
-/// Waits until it is done, and fails with these words when it never is.
+/// Waits until `done` returns true, and fails with this text when it never does.
 pub fn wait(mut done: impl FnMut() -> bool, what: impl Fn() -> String) {
     let until = Instant::now() + PATIENCE;
     while !done() {

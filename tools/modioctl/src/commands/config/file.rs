@@ -1,4 +1,4 @@
-//! The file of settings: TOML, by register name.
+//! The file of settings: TOML with register names.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -12,15 +12,15 @@ use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
 use crate::value::{parse, show, takes};
 
-/// The text of a file.
+/// Returns the text of a file.
 ///
 /// # Errors
 ///
-/// That the unit is no modio.
+/// When the unit is not a modio.
 pub fn text(book: &Book, items: &[Item], values: &[Vec<u16>]) -> Result<String, Failure> {
     let about = book.of_modio()?;
     let mut text = format!(
-        "# Settings of a {} with firmware {}, as `modioctl config export` wrote them.\n",
+        "# Settings of a {} with firmware {}, written by `modioctl config export`.\n",
         about.board, about.firmware
     );
     for (item, words) in items.iter().zip(values) {
@@ -64,11 +64,11 @@ fn comment(item: &Item, unit: &str) -> String {
     }
 }
 
-/// Reads a file: names and values.
+/// Reads names and values from a file.
 ///
 /// # Errors
 ///
-/// That it cannot be read, or is no TOML.
+/// When the file cannot be read, or is not valid TOML.
 pub fn read(path: &Path) -> Result<Vec<(String, String)>, Failure> {
     let shown = path.display();
     let text = std::fs::read_to_string(path)
@@ -88,7 +88,7 @@ pub fn read(path: &Path) -> Result<Vec<(String, String)>, Failure> {
     Ok(values)
 }
 
-/// `p5.1.filter = 4` stands for tables within tables.
+/// `p5.1.filter = 4` is a table within tables.
 fn flatten(prefix: String, table: toml::Table, values: &mut Vec<(String, String)>) {
     for (key, value) in table {
         let name = if prefix.is_empty() {
@@ -104,11 +104,11 @@ fn flatten(prefix: String, table: toml::Table, values: &mut Vec<(String, String)
     }
 }
 
-/// The names of the unit with the modules that the file asks for.
+/// Returns the names of the unit with the modules in the file.
 ///
 /// # Errors
 ///
-/// That the file cannot be read, or asks for a module that there is not.
+/// When the file cannot be read, or contains an unknown module.
 pub fn book(book: &Book, path: &Path) -> Result<Book, Failure> {
     let mut modules = Vec::new();
     for (name, text) in read(path)? {
@@ -129,13 +129,13 @@ pub fn book(book: &Book, path: &Path) -> Result<Book, Failure> {
 ///
 /// # Errors
 ///
-/// The first that is wrong.
+/// The first name or value that is wrong.
 pub fn check(book: &Book, values: Vec<(String, String)>) -> Result<Vec<(Item, Vec<u16>)>, Failure> {
     let mut changes = Vec::new();
     for (name, text) in values {
         let item = book.find(&name)?;
         if !item.setting {
-            return Err(Failure::usage(format!("{name} is no setting")));
+            return Err(Failure::usage(format!("{name} is not a setting")));
         }
         let words = parse(&item, &text, false)?;
         changes.push((item, words));
@@ -143,11 +143,11 @@ pub fn check(book: &Book, values: Vec<(String, String)>) -> Result<Vec<(Item, Ve
     Ok(changes)
 }
 
-/// Checks that FORMAT suits MODE, as the unit would.
+/// Checks that FORMAT and MODE are compatible, as the unit does.
 ///
 /// # Errors
 ///
-/// That it does not.
+/// When they are not.
 pub fn check_line(wanted: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
     let word = |address: u16| {
         let found = wanted.iter().find(|(item, _)| item.address == address);

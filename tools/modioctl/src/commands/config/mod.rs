@@ -16,21 +16,21 @@ use crate::names::{Book, Item};
 use crate::output;
 use crate::value::show;
 
-/// Registers that one request writes at most.
+/// Largest number of registers that one request writes.
 const MOST: usize = 100;
 
 /// Reads and changes settings.
 ///
 /// # Errors
 ///
-/// That a name, a value or a file is wrong; nothing is written then. Or what went wrong with the unit.
+/// When a name, a value or a file is wrong; nothing is written then. When the unit does not answer or refuses.
 pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), Failure> {
     let book = learn(&mut device).await?.book;
     let modules = device
         .read_words(configuration::MODULE, points::PORTS)
         .await?;
     let set = |port: u8| modules.get(usize::from(port.max(1)) - 1).copied();
-    // Settings by point are for the module that is set, which may not be in force yet.
+    // Settings by point belong to the module that is set, which may not be in force yet.
     let book = of_modules(&book, set)?;
     match options {
         Config::Get { names } => get(&mut device, &book, &names, json).await,
@@ -39,7 +39,7 @@ pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), 
             device.unlock().await?;
             write(&mut device, &changes).await?;
             output::line(format_args!(
-                "written, not saved: `modioctl config save` makes it last"
+                "written, but not saved: save with `modioctl config save`"
             ))
         }
         Config::Save => {
@@ -63,25 +63,22 @@ pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), 
         Config::Reset { restart } => {
             device.unlock().await?;
             device
-                .order(
-                    Command::LoadDefaults.code(),
-                    "loading the factory's settings",
-                )
+                .order(Command::LoadDefaults.code(), "loading the factory settings")
                 .await?;
             device.save().await?;
-            output::line(format_args!("the factory's settings are saved"))?;
+            output::line(format_args!("the factory settings are saved"))?;
             finish(device, restart).await
         }
     }
 }
 
-/// The names of the unit as it will be with these modules.
+/// Returns the names of the unit as they will be with these modules.
 fn of_modules(book: &Book, module: impl Fn(u8) -> Option<u16>) -> Result<Book, Failure> {
     let description = with_modules(book.of_modio()?.clone(), module);
     Ok(Book::new(description, Vec::new()))
 }
 
-/// All settings with their values.
+/// Returns all settings with their values.
 async fn settings(device: &mut Device, book: &Book) -> Result<(Vec<Item>, Vec<Vec<u16>>), Failure> {
     let items: Vec<_> = book.settings().cloned().collect();
     let values = device.read_items(&items).await?;
@@ -114,7 +111,7 @@ async fn get(
     output::table(&rows)
 }
 
-/// Writes settings that are checked. The lock must be open.
+/// Writes settings that have been checked. The lock must be open.
 async fn write(device: &mut Device, changes: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
     // Modules first: a change of module resets the settings of its points. Registers with consecutive addresses go in one
     // request, so that the unit checks FORMAT and MODE together.
@@ -164,7 +161,7 @@ async fn diff(device: &mut Device, book: &Book, path: Option<&Path>) -> Result<(
         let now = now.map(|(_, words)| words);
         if now != Some(words) {
             let now = now.map_or_else(
-                || "not there".to_owned(),
+                || "missing".to_owned(),
                 |words| show(item, words, false).to_string(),
             );
             rows.push([item.name.clone(), now, show(item, words, false).to_string()]);
@@ -195,7 +192,7 @@ async fn import(
     path: &Path,
     restart: bool,
 ) -> Result<(), Failure> {
-    // All of the file is checked before anything is written, with the modules that it asks for.
+    // Check the whole file before anything is written, with the modules that it contains.
     let values = file::read(path)?;
     let book = file::book(book, path)?;
     let wanted = file::check(&book, values)?;
@@ -209,7 +206,7 @@ async fn import(
     let modules = differing(&mut device, &modules).await?;
     write(&mut device, &modules).await?;
     let mut changes = differing(&mut device, &wanted).await?;
-    // Both or none of the two that must suit each other.
+    // FORMAT and MODE must be compatible, so write both or none.
     let line = configuration::FORMAT..=configuration::MODE;
     if changes.iter().any(|(item, _)| line.contains(&item.address)) {
         changes.retain(|(item, _)| !line.contains(&item.address));
@@ -224,7 +221,7 @@ async fn import(
     let left = differing(&mut device, &wanted).await?;
     if let Some((item, _)) = left.first() {
         return Err(Failure::Refused(format!(
-            "{} does not hold what was written; nothing is saved: `modioctl config diff {}` shows it",
+            "{} does not have the written value; nothing is saved: see `modioctl config diff {}`",
             item.name,
             path.display()
         )));
@@ -240,7 +237,7 @@ async fn import(
     finish(device, restart).await
 }
 
-/// Those that the unit does not have yet.
+/// Returns the settings whose values differ from those of the unit.
 async fn differing(
     device: &mut Device,
     wanted: &[(Item, Vec<u16>)],
@@ -254,7 +251,7 @@ async fn differing(
         .collect())
 }
 
-/// Restarts the unit if that is wanted and needed; says so if it is needed only.
+/// Restarts the unit if that is wanted and needed. Prints a note if it is needed but not wanted.
 async fn finish(mut device: Device, restart: bool) -> Result<(), Failure> {
     if !restart {
         return tell_restart(&mut device).await;
@@ -275,7 +272,7 @@ async fn waits(device: &mut Device) -> Result<bool, Failure> {
 async fn tell_restart(device: &mut Device) -> Result<(), Failure> {
     if waits(device).await? {
         output::line(format_args!(
-            "some settings count after a restart: `modioctl reboot`"
+            "some settings take effect after a restart: use `modioctl reboot`"
         ))?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Draws what is known of the selected point: the chart of an analog point, the state of others.
+//! Draws the details of the selected point: the chart of an analog point, the state of other points.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -96,14 +96,14 @@ fn chart(frame: &mut Frame, model: &Model, item: &Item, area: Rect, now: Instant
     };
     let step = 10_f64.powi(reading.unit.exponent.into());
     let margin = ((high - low) * 0.1).max(step * 5.0);
-    // The axis ends where the point's range ends, unless a value lies outside.
+    // The axis has the range of the point, extended when a value lies outside.
     let [least, most] = [reading.min, reading.max].map(|end| f64::from(end) * step);
     let bounds = [
         (low - margin).max(least.min(low)),
         (high + margin).min(most.max(high)),
     ];
     let datasets = lines.iter().map(|line| {
-        // One value alone makes no line.
+        // A single value gives no line.
         let graph = if line.len() > 1 {
             GraphType::Line
         } else {

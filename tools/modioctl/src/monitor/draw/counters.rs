@@ -1,4 +1,4 @@
-//! Draws the counters of the line: those of the unit, and those of this program.
+//! Draws the counters of the line: those of the unit and those of this program.
 
 use std::time::Duration;
 

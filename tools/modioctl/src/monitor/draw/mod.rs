@@ -1,4 +1,4 @@
-//! Draws the display. Colours are the terminal's own 16, and no meaning rests on a colour alone.
+//! Draws the display. It uses the terminal's own 16 colours, and no information is shown by colour only.
 
 mod chart;
 mod counters;
@@ -49,14 +49,14 @@ pub fn draw(frame: &mut Frame, model: &mut Model, now: Instant) {
 const GOOD: Style = Style::new().fg(Color::Green);
 /// Colour of faults.
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
-/// How values that are not fresh are drawn.
+/// Style of values that are not fresh.
 const OLD: Style = Style::new().add_modifier(Modifier::DIM);
-/// How text that stands out is drawn.
+/// Style of emphasised text.
 const STRONG: Style = Style::new().add_modifier(Modifier::BOLD);
-/// How selected text is drawn.
+/// Style of selected text.
 const SELECTED: Style = Style::new().add_modifier(Modifier::REVERSED);
 
-/// A part with a title; the title of the part that takes the keys stands out.
+/// Returns a part with a title. The title of the part that receives the keys is emphasised.
 fn titled(title: String, focused: bool) -> Block<'static> {
     let style = if focused { STRONG } else { Style::new() };
     let mark = if focused { "» " } else { "" };
@@ -86,11 +86,11 @@ fn head(frame: &mut Frame, model: &Model, area: Rect, now: Instant) {
     frame.render_widget(right, area);
 }
 
-/// Returns how the unit answers, for people.
+/// Returns the state of the connection, for people.
 fn state(model: &Model, now: Instant) -> (String, Style) {
     let since = |what: &str, duration| format!("× {what}no answer since {}", ago(duration));
     match model.link.state(now) {
-        State::Answers if model.title.is_empty() => ("· being looked at".to_owned(), OLD),
+        State::Answers if model.title.is_empty() => ("· connecting".to_owned(), OLD),
         State::Answers => ("● answers".to_owned(), GOOD),
         State::NoAnswer(duration) => (since("", duration), BAD),
         State::Garbled(duration) => (since("garbled, ", duration), BAD),

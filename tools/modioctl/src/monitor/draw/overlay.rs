@@ -1,4 +1,4 @@
-//! Draws what lies over the display: the slider and the help.
+//! Draws the slider and the help above the display.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -79,7 +79,7 @@ const HELP: [(&str, &str); 14] = [
     ("[→ on]", "this value is being written"),
     ("old: 12 s", "value read 12 s ago: it may have changed"),
     ("?", "the value is not known"),
-    ("×", "something is wrong"),
+    ("×", "there is a fault"),
 ];
 
 /// Draws the help.

@@ -59,7 +59,7 @@ fn page_of_points_fits_80_by_24() {
 }
 
 #[test]
-fn unit_without_answers_shows_old_values_as_old() {
+fn unit_without_answers_has_its_values_marked_as_old() {
     let now = Instant::now();
     let mut model = model(Module::Ai2Ao2, now);
     show(&mut model, now, &[12_000, 0, 4000, 20_000]);
@@ -71,7 +71,7 @@ fn unit_without_answers_shows_old_values_as_old() {
     assert!(rows[6].contains("[4000 µA] old: 12 s"));
     assert!(rows[3].contains("old: good"));
     assert!(rows[21].contains("does not answer at"));
-    // Without news the age alone makes a value an old one.
+    // Without new values the age alone marks a value as old.
     show(&mut model, seconds(now, 13), &[12_000, 0, 4000, 20_000]);
     assert!(screen(&mut model, 80, 24, seconds(now, 13))[0].ends_with("● answers"));
     let rows = screen(&mut model, 80, 24, seconds(now, 15));
@@ -79,7 +79,7 @@ fn unit_without_answers_shows_old_values_as_old() {
 }
 
 #[test]
-fn channel_in_trouble_and_unknown_values_are_marked() {
+fn channel_with_a_fault_and_unknown_values_are_marked() {
     let now = Instant::now();
     let mut model = model(Module::Ai4, now);
     let mut round = polled(now, &[0, 12_000]);
@@ -124,7 +124,7 @@ fn analog_point_has_a_chart_with_its_unit() {
 }
 
 #[test]
-fn slider_and_help_lie_over_the_display() {
+fn slider_and_help_are_drawn_above_the_display() {
     let now = Instant::now();
     let mut model = model(Module::Ao4, now);
     show(&mut model, now, &[12_000; 4]);

@@ -101,8 +101,8 @@ fn point(model: &Model, item: &Item, now: Instant) -> Line<'static> {
     ])
 }
 
-/// Returns the value of a point for people, and whether it is fresh. Outputs stand in brackets. A value that is being
-/// written follows an arrow.
+/// Returns the value of a point for people, and whether it is fresh. Outputs are in brackets. An arrow marks a
+/// value that is being written.
 fn value(model: &Model, item: &Item, now: Instant) -> (String, bool) {
     let read = model.value(&item.name, now);
     let fresh = read.is_some_and(|(_, fresh)| fresh);
@@ -118,7 +118,7 @@ fn value(model: &Model, item: &Item, now: Instant) -> (String, bool) {
     }
 }
 
-/// A digital value has a mark that is seen from afar.
+/// Returns a digital value with a mark that is easy to see.
 fn with_mark(shown: &Shown) -> String {
     match shown.text.as_str() {
         "on" => "■ on".to_owned(),
@@ -127,7 +127,7 @@ fn with_mark(shown: &Shown) -> String {
     }
 }
 
-/// Returns the text of a code, and its colour: 0 and 1 are well.
+/// Returns the text of a code, and its colour: 0 and 1 mean no fault.
 fn judged(model: &Model, name: &str, now: Instant) -> (String, Style) {
     let Some((value, fresh)) = model.value(name, now) else {
         return (String::new(), OLD);
