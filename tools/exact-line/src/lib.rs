@@ -1,8 +1,8 @@
 //! The exact-line protocol: a serial line in virtual time, as requests and replies in lines of text.
 //!
 //! A server is an emulator or simulator in which time passes on request only; a client is a master on that
-//! line. This crate holds what both have in common: the types, and how they are written and read. The
-//! protocol itself is described in `docs/conformance.md`.
+//! line. This crate has what both share: the types, and how they are written and read.
+//! `docs/conformance.md` describes the protocol.
 
 #![forbid(unsafe_code)]
 
@@ -15,11 +15,11 @@ pub use request::{Piece, Request};
 
 use std::time::Duration;
 
-/// The version of the protocol that this crate speaks.
+/// The version of the protocol in this crate.
 pub const VERSION: u32 = 1;
 
 /// Longest request line in characters, without the line end. A server refuses a longer one.
 pub const LONGEST_LINE: usize = 1 << 20;
 
-/// The most virtual time that one request may take.
+/// The longest virtual time of one request.
 pub const LONGEST_RUN: Duration = Duration::from_secs(600);

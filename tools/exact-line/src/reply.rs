@@ -1,4 +1,4 @@
-//! What a server replies.
+//! The replies of a server.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -8,7 +8,7 @@ use crate::VERSION;
 use crate::request::Request;
 use crate::time::{Micros, parse};
 
-/// Something a server can do, or that its line has.
+/// An ability of a server, or a property of its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Ability {
     /// It changes rate and format of the master's end.
@@ -19,15 +19,15 @@ pub enum Ability {
     Power,
     /// It resets the unit.
     Reset,
-    /// It lets the unit receive what it sends.
+    /// It can let the unit receive its own frames.
     Echo,
     /// It reports when the unit's driver is switched.
     Driver,
-    /// Characters that the unit sends take their time on the line.
+    /// Characters that the unit sends have their duration on the line.
     CharacterTime,
-    /// The unit notices a start bit when it begins.
+    /// The unit detects a character at its start bit.
     StartBit,
-    /// It reports what the unit did that a real part would not take well.
+    /// It reports what the unit did that a real part would not accept.
     Findings,
 }
 
@@ -62,16 +62,16 @@ impl Ability {
     }
 }
 
-/// What the server is.
+/// The reply to `hello`: the line, the abilities and the name of the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// Rate of the master's end in bit/s.
     pub baud: u32,
     /// Format of the master's end, such as `8N2`.
     pub format: String,
-    /// What it can do. A client ignores abilities that it does not know.
+    /// Its abilities. A client ignores abilities that it does not know.
     pub abilities: BTreeSet<Ability>,
-    /// What it is, for people.
+    /// Its name for people.
     pub name: String,
 }
 
@@ -91,7 +91,7 @@ pub enum Event {
     },
     /// The unit switched its driver.
     Driver {
-        /// When.
+        /// Time of the switch.
         at: Duration,
         /// Whether it was on afterwards.
         on: bool,
@@ -99,7 +99,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// When it was over.
+    /// End of the event.
     #[must_use]
     pub const fn at(&self) -> Duration {
         match self {
@@ -109,7 +109,7 @@ impl Event {
     }
 }
 
-/// What a server replies to a request that it has carried out.
+/// The reply to a request that the server has carried out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// To `hello`.
@@ -373,8 +373,8 @@ mod tests {
             (Request::Run(NOW), "ok 0 01@1", "01@1"),
             (Request::Run(NOW), "ok 0 nonsense", "nonsense"),
         ] {
-            let told = Reply::read(&request, line).unwrap_err();
-            assert!(told.contains(reason), "{line}: {told}");
+            let error = Reply::read(&request, line).unwrap_err();
+            assert!(error.contains(reason), "{line}: {error}");
         }
     }
 }

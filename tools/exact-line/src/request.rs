@@ -1,4 +1,4 @@
-//! What a client asks for.
+//! The requests of a client.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::time::{Micros, parse};
 use crate::{LONGEST_LINE, LONGEST_RUN};
 
-/// Something to put on the line.
+/// Something to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Piece {
     /// Characters without a gap between them.
@@ -27,9 +27,10 @@ pub enum Piece {
 /// A request line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Asks what the server is; the number is the newest version of the protocol that the client knows.
+    /// Asks for the name and abilities of the server. The number is the newest version of the protocol that the client
+    /// knows.
     Hello(u32),
-    /// Puts pieces on the line, one after another, and lets time pass until the last has ended.
+    /// Sends pieces one after another, and lets time pass until the last one has ended.
     Send(Vec<Piece>),
     /// Lets time pass.
     Run(Duration),
@@ -39,9 +40,9 @@ pub enum Request {
     Power(bool),
     /// Resets the unit by its reset pin.
     Reset,
-    /// Lets the unit receive what it sends, or not.
+    /// Switches whether the unit receives its own frames.
     Echo(bool),
-    /// Asks what the unit did that a real part would not take well.
+    /// Asks what the unit did that a real part would not accept.
     Findings,
 }
 
@@ -67,7 +68,7 @@ impl fmt::Display for Request {
                 f.write_str("send")?;
                 pieces
                     .iter()
-                    // No bytes have no text.
+                    // An empty run of bytes has no text.
                     .filter(|piece| !matches!(piece, Piece::Bytes(bytes) if bytes.is_empty()))
                     .try_for_each(|piece| write!(f, " {piece}"))
             }
@@ -219,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_typed_by_hand_are_understood() {
+    fn line_typed_by_hand_is_parsed() {
         let typed: Request = "  send  01ab   gap:10  FF ".parse().unwrap();
         let pieces = vec![
             Piece::Bytes(vec![1, 0xAB]),
@@ -262,9 +263,9 @@ mod tests {
             ("reset now", "nothing"),
             (&long, "longer than"),
         ] {
-            let told = line.parse::<Request>().unwrap_err();
-            assert!(told.contains(reason), "{line:.20}: {told}");
-            assert!(!told.contains('\n') && told.len() < 200, "{told}");
+            let error = line.parse::<Request>().unwrap_err();
+            assert!(error.contains(reason), "{line:.20}: {error}");
+            assert!(!error.contains('\n') && error.len() < 200, "{error}");
         }
     }
 }

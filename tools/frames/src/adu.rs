@@ -1,4 +1,4 @@
-//! Frames: a unit address and a PDU as they go over the line (Modbus over Serial Line V1.02, 2.5; Modbus Messaging on
+//! Frames: a unit address and a PDU in the form of the line (Modbus over Serial Line V1.02, 2.5; Modbus Messaging on
 //! TCP/IP V1.0b, 3.1).
 
 use crc::{CRC_16_MODBUS, Crc};
@@ -37,7 +37,7 @@ impl Framing {
             .find(|framing| framing.open(frame).is_some())
     }
 
-    /// The frame with this address and PDU. `transaction` counts for Modbus TCP only.
+    /// Returns the frame with this address and PDU. Only Modbus TCP uses `transaction`.
     #[must_use]
     pub fn frame(self, transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
         let mut frame = vec![unit];
@@ -157,7 +157,7 @@ pub fn response_length(request: &[u8], frame: &[u8]) -> Option<usize> {
         0x01..=0x04 | 0x0C | 0x11 | 0x14 | 0x17 => counted(2),
         0x05 | 0x06 | 0x0B | 0x0F | 0x10 => Some(8),
         0x07 => Some(5),
-        // They send the request's own bytes back, or as many others.
+        // The response repeats the request, or has as many other bytes.
         0x08 | 0x15 => Some(request.len() + 3),
         0x16 => Some(10),
         0x18 => fifo_length(frame),

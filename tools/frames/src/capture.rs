@@ -48,9 +48,9 @@ const CRC_ERROR: u32 = 1 << 24;
 pub struct Packet<'a> {
     /// Time of the first byte, since 1970.
     pub time: Duration,
-    /// Which way the bytes went, if that is known. Only a frame with a known direction becomes a Modbus packet.
+    /// Direction of the bytes, if it is known. Only a frame with a known direction becomes a Modbus packet.
     pub direction: Option<Direction>,
-    /// How frames are marked off. Bytes that are no such frame become a packet of protocol "data".
+    /// The form of the frames. Bytes that are not such a frame become a packet of protocol "data".
     pub framing: Framing,
     /// The bytes as received.
     pub bytes: &'a [u8],
@@ -58,7 +58,7 @@ pub struct Packet<'a> {
     pub comment: &'a str,
 }
 
-/// A capture file. Each packet is written at once and in full, so the file is valid whenever the program ends.
+/// A capture file. Each packet is written immediately and completely, so the file is valid whenever the program ends.
 pub struct Recorder<W: Write> {
     writer: PcapNgWriter<BufWriter<W>>,
 }
@@ -160,7 +160,7 @@ fn frame(direction: Direction, unit: u8, pdu: &[u8]) -> Vec<u8> {
     packet
 }
 
-/// Returns the packet for bytes that are no frame.
+/// Returns the packet for bytes that are not a frame.
 fn garbled(bytes: &[u8]) -> Vec<u8> {
     let mut packet = Vec::new();
     tag(&mut packet, 12, b"data");

@@ -1,4 +1,4 @@
-//! What requests and responses say, in words: for people who read along.
+//! Requests and responses in words, for people who read the traffic.
 
 use crate::adu::Framing;
 use crate::{Direction, names};
@@ -52,7 +52,7 @@ pub fn request(pdu: &[u8]) -> String {
         return "nothing".to_owned();
     };
     let name = named(*code);
-    told(*code, pdu).map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
+    fields(*code, pdu).map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
 }
 
 fn with_rest(name: &str, pdu: &[u8]) -> String {
@@ -62,8 +62,8 @@ fn with_rest(name: &str, pdu: &[u8]) -> String {
     }
 }
 
-/// What a request asks for; `None` when its form is not the function's.
-fn told(code: u8, pdu: &[u8]) -> Option<String> {
+/// Describes the fields of a request; `None` when the form of the request is wrong for its function.
+fn fields(code: u8, pdu: &[u8]) -> Option<String> {
     let (first, second) = (word(pdu, 1), word(pdu, 3));
     Some(match code {
         0x01..=0x04 => format!("{:#06X} x {}", first?, second?),
@@ -133,7 +133,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
             format!("{from}= {}", bits(data, count.unwrap_or(data.len() * 8)))
         }
         0x03 | 0x04 | 0x17 => format!("{from}= {}", words(pdu.get(2..)?)),
-        0x05 | 0x06 | 0x08 | 0x16 => told(code, pdu)?,
+        0x05 | 0x06 | 0x08 | 0x16 => fields(code, pdu)?,
         0x0F | 0x10 => format!("{:#06X} x {}", word(pdu, 1)?, word(pdu, 3)?),
         0x07 => format!("= {:08b}", pdu.get(1)?),
         0x0B => format!("status {:04X}, count {}", word(pdu, 1)?, word(pdu, 3)?),
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_and_responses_say_what_they_are_about() {
+    fn request_and_response_are_described_with_their_fields() {
         let asked = [3, 1, 1, 0, 2];
         assert_eq!(request(&asked), "read holding registers 0x0101 x 2");
         let answer = response(&[3, 4, 0, 96, 0, 0], Some(&asked));
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn responses_with_a_byte_count_are_taken_apart() {
+    fn response_with_a_byte_count_is_split_into_its_fields() {
         for (pdu, text) in [
             // The example of V1.1b3, 6.10.
             (

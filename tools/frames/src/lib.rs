@@ -1,15 +1,15 @@
-//! Modbus frames for people: what a frame on a serial line or a TCP connection says, in words, and capture files.
+//! Modbus frames on serial lines and TCP connections: built, checked, described in words, and written to capture files.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`adu`] | frames in RTU, ASCII and TCP form: made, checked and measured |
+//! | [`adu`] | frames in RTU, ASCII and TCP form: built, checked and measured |
 //! | [`names`] | names of functions and exceptions |
 //! | [`decode`] | requests and responses in words, as `modioctl sniff` shows them |
 //! | [`sentence`] | a frame as a sentence, as the simulator's log shows it |
 //! | [`capture`] | capture files that Wireshark reads |
 //!
-//! The crate knows the standard only: no device, no line and no clock. The host tool and the simulator both use it, and
-//! it depends on neither.
+//! The crate contains only what the standard defines: no device, no line and no clock. The host tool, the simulator and the
+//! conformance suite use it.
 //!
 //! ```
 //! use modbus_frames::{Direction, adu::Framing, decode, sentence};
@@ -33,7 +33,7 @@ mod waiting;
 
 pub use waiting::Waiting;
 
-/// Which way a frame went.
+/// Direction of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// To the unit.

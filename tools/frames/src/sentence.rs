@@ -1,7 +1,7 @@
 //! A frame as a sentence: the form of the simulator's log.
 //!
-//! What the points are read and written with (functions 01 to 06, 0F and 10) has a sentence of its own; the other
-//! functions are told in the words of [`decode`].
+//! The functions that read and write points (01 to 06, 0F and 10) have their own sentences. For the other functions the
+//! sentence is that of [`decode`].
 
 use crate::adu::{Framing, RTU_MOST};
 use crate::{Direction, decode, names};
@@ -25,7 +25,7 @@ pub fn frame(direction: Direction, bytes: &[u8]) -> String {
     format!("{to}: {what}")
 }
 
-/// What is wrong with bytes that are no frame.
+/// Returns what is wrong with bytes that are not a frame.
 fn damaged(bytes: &[u8]) -> String {
     let length = bytes.len();
     match bytes {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn requests_are_told() {
+    fn request_is_described_in_a_sentence() {
         for (unit, pdu, text) in [
             (
                 1,
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn responses_are_told() {
+    fn response_is_described_in_a_sentence() {
         for (pdu, text) in [
             (&[1, 1, 0x05][..], "unit 1: coils: 05"),
             (
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_no_frame_are_told_as_such() {
+    fn bytes_that_are_not_a_frame_are_described_as_such() {
         for (bytes, text) in [
             (&[1, 2, 3][..], "3 bytes, too short for a frame"),
             (&[], "0 bytes, too short for a frame"),

@@ -2,13 +2,13 @@
 
 use crate::adu::{Framing, MBAP, response_length};
 
-/// Bytes in front of an answer that are forgiven: what a driver that is switched on makes of the line.
+/// Number of bytes in front of an answer that are ignored. A driver that is switched on can cause such bytes.
 const NOISE: usize = 3;
 
 /// A request that waits for its answer.
 #[derive(Debug)]
 pub struct Waiting<'a> {
-    /// How frames are marked off.
+    /// The form of the frames.
     pub framing: Framing,
     /// The number of the request, on Modbus TCP.
     pub transaction: u16,
@@ -19,7 +19,7 @@ pub struct Waiting<'a> {
 }
 
 impl Waiting<'_> {
-    /// The answer in `bytes`, and where it stands there; `None` while there is none.
+    /// Returns the answer in `bytes` and its place; `None` while there is no answer.
     #[must_use]
     pub fn find(&self, bytes: &[u8]) -> Option<(Vec<u8>, std::ops::Range<usize>)> {
         match self.framing {
@@ -59,7 +59,7 @@ impl Waiting<'_> {
         }
     }
 
-    /// The answer, if all bytes before a silence are one frame. For functions whose length only the silence shows.
+    /// Returns the answer, if all bytes before a silence are one frame. For functions whose end only the silence shows.
     #[must_use]
     pub fn whole(&self, bytes: &[u8]) -> Option<Vec<u8>> {
         (self.framing == Framing::Rtu).then(|| self.answer(bytes))?
@@ -77,7 +77,7 @@ impl Waiting<'_> {
         (unit == self.unit && self.fits(&pdu)).then_some(pdu)
     }
 
-    /// Whether a response can be that to this request, and not a late one to another.
+    /// Whether a response can belong to this request. A late response to another request cannot.
     #[must_use]
     pub fn fits(&self, response: &[u8]) -> bool {
         let (Some(asked), Some(answered)) = (self.pdu.first(), response.first()) else {
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_found_behind_noise_and_before_it_is_whole_nothing_is() {
+    fn answer_is_found_after_noise_and_only_when_it_is_complete() {
         for framing in [Framing::Rtu, Framing::Ascii, Framing::Mbap] {
             let waiting = waiting(framing, READ);
             let answer = framing.frame(9, 1, &[3, 2, 0, 5]);
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_the_answer_is_none() {
+    fn response_to_another_request_is_not_the_answer() {
         for framing in [Framing::Rtu, Framing::Ascii, Framing::Mbap] {
             let find = |unit, pdu: &[u8]| waiting(framing, READ).find(&framing.frame(9, unit, pdu));
             assert_eq!(find(2, &[3, 2, 0, 5]), None, "another unit's");

@@ -1,4 +1,4 @@
-//! What a server serves.
+//! The device that a server serves.
 
 /// Four tables from address 0 on.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Device {
     pub read_only_from: u32,
     /// Larger words are refused.
     pub max_word: u16,
-    /// If set, everything that has a right address and value is refused with this exception.
+    /// If set, requests with right addresses and values are refused with this exception.
     pub state: Option<u8>,
     /// Exception status, and the low byte of the diagnostic register.
     pub status: u8,
@@ -29,8 +29,8 @@ pub struct Device {
     pub running: bool,
     /// Of function 11, after the run indicator.
     pub additional_data: Vec<u8>,
-    /// A function that the server does not know: it keeps its data, and answers with them backwards,
-    /// three times. Without data it is refused.
+    /// A function that the server does not know. The device keeps the data and answers with them backwards, three times.
+    /// A request without data is refused.
     pub custom: Option<u8>,
     /// The data of the last request of that function.
     pub kept: Vec<u8>,

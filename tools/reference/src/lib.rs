@@ -1,10 +1,10 @@
-//! A second Modbus serial-line server, as plain as can be, written from the standard alone: V1.02 is *Modbus over Serial
-//! Line*, V1.1b3 the *Modbus Application Protocol Specification*. What other servers do is compared with what it does.
+//! A second Modbus serial-line server, in the plainest form, written only from the standard: V1.02 is *Modbus over Serial
+//! Line*, V1.1b3 the *Modbus Application Protocol Specification*. Tests compare other servers with this one.
 //!
 //! - [`framed`] and [`unframed`] are a master's side of the line; [`pdu`] and the functions after it make requests.
-//! - [`Receiver`] says what a unit must have received, from the whole text of a frame at its end.
+//! - [`Receiver`] judges a frame by its whole text, at the end of the frame.
 //! - [`Server`] serves requests for a [`Device`], and counts and logs them.
-//! - [`Unit`] is both together.
+//! - [`Unit`] is a receiver with a server.
 
 mod device;
 mod frame;

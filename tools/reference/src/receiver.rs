@@ -1,8 +1,8 @@
-//! What a unit must have received, from the whole text of a frame at its end: plain where real receivers are quick.
+//! A receiver that judges a frame by its whole text at its end. It is plain where real receivers are quick.
 
 use crate::{UNIT, judge_ascii, judge_rtu};
 
-/// What a line has counted (V1.02 appendix A, and what a receiver drops).
+/// Counters of a line (V1.02 appendix A, and the frames that a receiver drops).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounters {
     /// Frames with a good check.
@@ -13,11 +13,11 @@ pub struct LineCounters {
     pub overruns: u16,
     /// Silences above t1.5 within frames.
     pub gaps: u16,
-    /// Good frames for this unit that it could not take.
+    /// Good frames for this unit that it dropped.
     pub dropped: u16,
 }
 
-/// What was at the end of a frame.
+/// The result at the end of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Closed {
     /// No frame.
@@ -31,7 +31,7 @@ pub enum Closed {
     Good {
         /// Unit address and PDU.
         body: Vec<u8>,
-        /// It must not be served: it has a gap, or there was no buffer.
+        /// The frame must not be served: it has a gap, or there was no buffer.
         dropped: bool,
     },
 }
@@ -53,12 +53,12 @@ fn is_for_us(body: &[u8]) -> bool {
     [0, UNIT].contains(&body[0])
 }
 
-/// The line a unit listens to.
+/// The mode of the line.
 #[derive(Clone, Copy, Debug)]
 pub enum Mode {
     /// RTU.
     Rtu {
-        /// A gap above t1.5 costs the frame.
+        /// A frame with a gap above t1.5 is dropped.
         strict: bool,
     },
     /// ASCII.
@@ -77,15 +77,15 @@ pub enum Mode {
 pub struct Receiver {
     /// How the line is used.
     pub mode: Mode,
-    /// What has been counted.
+    /// The counters.
     pub counters: LineCounters,
-    /// Buffers that are not away.
+    /// Number of free buffers.
     pub free: usize,
     deaf: bool,
     frame: Option<Frame>,
 }
 
-/// A frame under way.
+/// A frame that has begun.
 #[derive(Debug, Default)]
 struct Frame {
     text: Vec<u8>,
@@ -93,12 +93,12 @@ struct Frame {
     overrun: bool,
     torn: bool,
     paused: bool,
-    /// There was a buffer when it began.
+    /// Whether there was a free buffer when the frame began.
     kept: bool,
 }
 
 impl Receiver {
-    /// A receiver of a line where a frame may be under way.
+    /// A receiver of a line on which a frame may have begun.
     #[must_use]
     pub fn new(mode: Mode) -> Self {
         Self {
@@ -135,7 +135,7 @@ impl Receiver {
                 let byte = if seven_bits { byte % 128 } else { byte };
                 if byte == b':' && (self.frame.is_none() || faults == 0) {
                     let closed = self.close();
-                    // A complete frame that nobody took in time is dropped; its buffer is free again.
+                    // Drop a complete frame that was not taken in time. Its buffer is free again.
                     if closed.clone().request().is_some() {
                         self.counters.dropped = self.counters.dropped.wrapping_add(1);
                         self.free += 1;

@@ -1,30 +1,30 @@
-//! What a server does with good and bad frames (V1.1b3 6, V1.02 appendix A).
+//! The handling of good and bad frames (V1.1b3 6, V1.02 appendix A).
 
 use crate::{Device, UNIT, framed};
 
 /// A server and its counters.
 pub struct Server {
-    /// What it serves.
+    /// The device that it serves.
     pub device: Device,
     /// The end mark of frames in ASCII mode; `None` in RTU mode.
     pub delimiter: Option<u8>,
-    /// It is in listen-only mode.
+    /// Whether it is in listen-only mode.
     pub listening: bool,
-    /// Listen-only mode can be entered.
+    /// Whether listen-only mode can be entered.
     pub can_listen_only: bool,
-    /// In the order of their sub-functions, from 0B on; the gaps last.
+    /// Counters in the order of their sub-functions from 0B on; the last one counts gaps.
     pub counters: [u16; 9],
     /// The event counter of function 11.
     pub events: u16,
-    /// The newest last.
+    /// The event log, with the newest event last.
     pub log: Vec<u8>,
-    /// Bad frames, and overruns, that the log does not know of yet.
+    /// Bad frames, and overruns, that are not yet in the log.
     pub unlogged: (u16, u16),
-    /// Bits of the diagnostic register that have not gone since they were cleared.
+    /// Bits of the diagnostic register that were cleared while their cause lasts.
     cleared: [u8; 2],
 }
 
-// The places of the counters.
+// Indices of the counters.
 /// Good frames on the bus.
 pub const BUS: usize = 0;
 /// Bad frames.
@@ -60,7 +60,7 @@ impl Server {
         }
     }
 
-    /// A bad frame was heard.
+    /// Counts a bad frame.
     pub fn bad(&mut self, overrun: bool) {
         self.counters[ERRORS] += 1;
         self.counters[OVERRUNS] += u16::from(overrun);
@@ -68,7 +68,7 @@ impl Server {
         self.unlogged.1 += u16::from(overrun);
     }
 
-    /// A good frame was heard; `torn`: it must not be obeyed. The frame of the reply.
+    /// Handles a good frame; `torn`: the frame must not be served. Returns the frame of the reply.
     pub fn good(&mut self, unit: u8, pdu: &[u8], torn: bool) -> Option<Vec<u8>> {
         self.counters[BUS] += 1;
         if unit != UNIT && unit != 0 {
@@ -88,13 +88,13 @@ impl Server {
         Some(framed(delimiter, UNIT, &reply))
     }
 
-    /// A good frame for this unit is not served.
+    /// Counts a good frame for this unit that is not served.
     fn drop_good(&mut self) {
         self.counters[UNIT_MESSAGES] += 1;
         self.counters[NO_RESPONSE] += 1;
     }
 
-    /// A request to this unit or to all, which `answer` serves: the PDU of the reply.
+    /// Handles a request to this unit or to all units by `answer`. Returns the PDU of the reply.
     pub fn request(
         &mut self,
         broadcast: bool,
@@ -103,7 +103,7 @@ impl Server {
     ) -> Option<Vec<u8>> {
         let listening = |me: &Self| if me.listening { 0x20 } else { 0 };
         let (bad, overruns) = std::mem::take(&mut self.unlogged);
-        // Of more than the log holds nobody knows which were the last: overruns are told first.
+        // If there are more bad frames than the log can hold, their order is unknown. Overruns are logged first.
         for n in 0..bad.min(64) {
             let overrun = if n < overruns { 0x10 } else { 0 };
             self.log.push(0x82 + overrun + listening(self));
@@ -127,7 +127,7 @@ impl Server {
         let mut reply = None;
         if obeyed {
             let before = self.device.clone();
-            // What is asked for is read after the request has been counted.
+            // Count the request before the counters are read.
             self.events += u16::from(!matches!(pdu[0], 11 | 12));
             match answer(self, pdu) {
                 Ok(pdu) => reply = Some(pdu),
@@ -165,7 +165,7 @@ impl Server {
         reply.filter(|_| !silent)
     }
 
-    /// What function 08 does once its reply is out.
+    /// Carries out the effect of function 08 after its reply.
     fn afterwards(&mut self, pdu: &[u8]) {
         let gone = |me: &mut Self| {
             me.counters = [0; 9];
@@ -238,7 +238,7 @@ impl Server {
         }
     }
 
-    /// The diagnostic register of the device, all of it.
+    /// The whole diagnostic register of the device.
     fn register(&self) -> [u8; 2] {
         [0xAB, self.device.status]
     }
@@ -276,10 +276,10 @@ impl Server {
     }
 }
 
-/// The longest value that fits a reply by itself.
+/// The longest value that fits into a reply with no other value.
 const LONGEST: usize = 253 - 7 - 2;
 
-/// Function 2B/0E: whole objects, as many as fit.
+/// Serves function 2B/0E with as many whole objects as fit into a reply.
 pub(crate) fn identify(device: &Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     match pdu {
         [_] => return Err(3),

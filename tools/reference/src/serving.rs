@@ -1,4 +1,4 @@
-//! The reference's reading and writing of device.
+//! Reads and writes of the device.
 
 use crate::Device;
 use crate::server::identify;
@@ -24,7 +24,7 @@ pub fn answer(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
             if at >= there {
                 return Err(2);
             }
-            // What cannot be read cannot be masked.
+            // A register that cannot be read cannot be masked.
             device.state.map_or(Ok(()), Err)?;
             let now = usize::from(device.words[at]);
             let [and, or] = [3, 5].map(|from| field(pdu, from));
@@ -117,7 +117,7 @@ fn write_one(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     Ok(pdu.to_vec())
 }
 
-/// Start and count of a multiple write that can be done.
+/// Start and count of a multiple write that is valid.
 fn check_many(device: &Device, pdu: &[u8], bits: bool, limit: usize) -> Result<(), u8> {
     let (start, count) = (field(pdu, 1), field(pdu, 3));
     let bytes = if bits { count.div_ceil(8) } else { count * 2 };
@@ -156,7 +156,7 @@ fn write_many(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     Ok(pdu[..5].to_vec())
 }
 
-/// Form of both halves, then the addresses of both, then values, then the write and the read.
+/// Checks the form of both halves, then the addresses of both, then the values. Then writes and reads.
 fn read_and_write(device: &mut Device, pdu: &[u8]) -> Result<Vec<u8>, u8> {
     if pdu.len() < 10 {
         return Err(3);
@@ -202,7 +202,7 @@ fn groups(pdu: &[u8]) -> Result<Vec<[usize; 5]>, u8> {
     Ok(groups)
 }
 
-/// All groups are there; `writing`: and can be written.
+/// Checks that all groups exist; `writing`: and that they can be written.
 fn check_groups(device: &Device, groups: &[[usize; 5]], writing: bool) -> Result<(), u8> {
     for [reference, file, record, count, _] in groups {
         if *reference != 6 || *file == 0 || record + count > 10_000 {

@@ -5,14 +5,14 @@ use crate::{Closed, Device, Mode, Receiver, Server};
 
 /// Receives, serves and replies.
 pub struct Unit {
-    /// What it does with frames.
+    /// Handles frames.
     pub server: Server,
     receiver: Receiver,
 }
 
 impl Unit {
-    /// A unit after the first silence; `delimiter`: in ASCII mode with this end mark, else in RTU mode. `strict`: a gap
-    /// above t1.5 costs an RTU frame.
+    /// A unit after the first silence; `delimiter`: in ASCII mode with this end mark, else in RTU mode. `strict`: an RTU
+    /// frame with a gap above t1.5 is dropped.
     pub fn new(delimiter: Option<u8>, device: Device, strict: bool) -> Self {
         let server = Server::new(delimiter, device);
         let mut receiver = Receiver::new(mode(delimiter, strict));
@@ -20,7 +20,8 @@ impl Unit {
         Self { server, receiver }
     }
 
-    /// A character, with faults as for [`Receiver::character`]. The reply to an ASCII frame that it ended.
+    /// Receives a character, with faults as for [`Receiver::character`]. Returns the reply to an ASCII frame that ends with
+    /// the character.
     pub fn character(&mut self, byte: u8, faults: u8) -> Option<Vec<u8>> {
         let gaps = self.receiver.counters.gaps;
         let cut_off = self.receiver.character(byte, faults);
@@ -38,7 +39,7 @@ impl Unit {
         self.receiver.pause();
     }
 
-    /// The reply to what was received before this silence.
+    /// Ends the frame. Returns the reply to it.
     pub fn silence(&mut self) -> Option<Vec<u8>> {
         let closed = self.receiver.close();
         self.serve(closed)

@@ -179,7 +179,7 @@ fn own_echo(bench: &mut Bench<'_>) -> Check {
     let result = echoed(bench);
     bench.endpoint.set_echo(false)?;
     result?;
-    bench.alive("the echo of its own replies")
+    bench.alive("replies that the unit received itself")
 }
 
 fn echoed(bench: &mut Bench<'_>) -> Check {
