@@ -24,7 +24,8 @@ pub struct Patience {
 /// # Errors
 ///
 /// The steps that return a [`Check`] fail with [`Stop::Broken`] when the endpoint no longer works, with [`Stop::Fail`]
-/// when the unit does something else than the step demands, and with [`Stop::Skip`] when the unit lacks what it needs.
+/// when the unit does not do what the step demands, and with [`Stop::Skip`] when the unit does not have what the step
+/// needs.
 pub struct Bench<'a> {
     /// The line.
     pub endpoint: &'a mut dyn Endpoint,

@@ -1,14 +1,13 @@
-//! The command itself: its exit status, its lines, its files, over a socket with the reference server
-//! behind it.
+//! The command: its exit status, its output and its files. It tests the reference server over a socket.
 
 #[path = "reference/fault.rs"]
 #[allow(dead_code, reason = "the list of faults is for the test of the cases")]
 mod fault;
 #[path = "reference/modio.rs"]
-#[allow(dead_code, reason = "the unit behind the socket is no modio")]
+#[allow(dead_code, reason = "the unit behind the socket is not a modio")]
 mod modio;
 #[path = "reference/modio_fault.rs"]
-#[allow(dead_code, reason = "the unit behind the socket is no modio")]
+#[allow(dead_code, reason = "the unit behind the socket is not a modio")]
 mod modio_fault;
 #[path = "reference/server.rs"]
 mod server;
@@ -56,7 +55,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Serves one master on a socket until it goes: a silence of some milliseconds ends a frame.
+/// Serves one master on a socket until it disconnects. A silence of 8 ms ends a frame.
 fn serve(mut stream: TcpStream, fault: Option<Fault>) {
     let line = LineFormat::default();
     let mut unit = Unit::new(fault, Mode::Rtu, line);
@@ -92,7 +91,7 @@ fn serve(mut stream: TcpStream, fault: Option<Fault>) {
     }
 }
 
-/// A server with this fault; its address.
+/// Starts a server with this fault. Returns its address.
 fn server(fault: Option<Fault>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = listener.local_addr().expect("bound").to_string();
@@ -105,7 +104,7 @@ fn server(fault: Option<Fault>) -> String {
 }
 
 #[test]
-fn a_good_server_passes_and_the_reports_are_written() {
+fn good_server_passes_and_the_reports_are_written() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = |name: &str| directory.path().join(name).display().to_string();
     std::fs::write(path("profile.toml"), PROFILE).expect("written");
@@ -150,7 +149,7 @@ fn a_good_server_passes_and_the_reports_are_written() {
 }
 
 #[test]
-fn a_faulty_server_gives_status_1_and_the_failure_is_shown() {
+fn faulty_server_gives_status_1_and_its_failure_is_printed() {
     let directory = tempfile::tempdir().expect("a directory");
     let profile = directory.path().join("profile.toml");
     std::fs::write(&profile, PROFILE).expect("written");
@@ -177,7 +176,7 @@ fn a_faulty_server_gives_status_1_and_the_failure_is_shown() {
 }
 
 #[test]
-fn what_cannot_be_tested_is_status_2_and_one_line() {
+fn run_that_cannot_test_gives_status_2_and_one_line() {
     let nobody = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let nowhere = nobody.local_addr().expect("bound").to_string();
     drop(nobody);
@@ -219,7 +218,7 @@ fn what_cannot_be_tested_is_status_2_and_one_line() {
 }
 
 #[test]
-fn a_failed_interpretation_gives_status_1_with_strict_only() {
+fn failed_interpretation_gives_status_1_only_with_strict() {
     let directory = tempfile::tempdir().expect("a directory");
     let profile = directory.path().join("profile.toml");
     std::fs::write(&profile, PROFILE).expect("written");
@@ -245,7 +244,7 @@ fn a_failed_interpretation_gives_status_1_with_strict_only() {
 }
 
 #[test]
-fn the_list_names_every_case() {
+fn list_names_every_case() {
     let output = command(&["--list"]);
     assert_eq!(output.status.code(), Some(0));
     let list = text(&output.stdout);

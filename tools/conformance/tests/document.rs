@@ -1,4 +1,4 @@
-//! `docs/conformance.md` tells the truth: its table of cases and its errata are those of the suite.
+//! Checks that the table of cases and the errata in `docs/conformance.md` are those of the suite.
 
 use conformance::cases::all;
 use conformance::report::table;
@@ -7,7 +7,7 @@ use conformance::vectors;
 const DOCUMENT: &str = include_str!("../../../docs/conformance.md");
 
 #[test]
-fn the_table_of_cases_is_the_list() {
+fn table_of_cases_is_the_list() {
     let list = table::list(&all());
     assert!(
         DOCUMENT.contains(&list),
@@ -18,7 +18,7 @@ fn the_table_of_cases_is_the_list() {
 }
 
 #[test]
-fn the_errata_are_those_of_the_worked_frames() {
+fn errata_are_those_of_the_worked_frames() {
     let errata = vectors::errata();
     assert!(
         DOCUMENT.contains(&errata),

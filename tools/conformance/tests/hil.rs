@@ -18,7 +18,7 @@ use register_map::board::MODIO_02;
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_image_loses_nothing_at_any_rate_and_is_back_at_its_own() {
+fn image_loses_no_frame_at_any_rate_and_its_rate_is_restored() {
     let elf = env::var_os("MODIO_ELF").expect("MODIO_ELF names the image: cargo xtask test");
     let home = LineFormat::default();
     let mut endpoint = start(&Fitting {
@@ -63,7 +63,7 @@ fn the_image_loses_nothing_at_any_rate_and_is_back_at_its_own() {
     }
     assert_eq!(endpoint.line(), home);
 
-    // A power cycle shows what is stored.
+    // After a power cycle the stored settings are in force.
     endpoint.set_power(false).expect("a simulator switches");
     endpoint.set_power(true).expect("a simulator switches");
     endpoint

@@ -1,4 +1,4 @@
-//! `modio-hil`, the command: what it does to the board in which order, with scripts in the place of other programs.
+//! The command `modio-hil`: the order of its actions on the board. Scripts replace the other programs.
 
 #![cfg(unix)]
 
@@ -11,7 +11,7 @@ use std::process::{Command, Output};
 /// A directory with a log of what was done, and a `cargo` that writes its arguments to the log.
 struct Fake {
     directory: tempfile::TempDir,
-    /// A line on which nobody answers.
+    /// A line without a unit.
     line: TcpListener,
 }
 
@@ -74,8 +74,8 @@ fn image_is_written_then_the_board_is_reset_then_tested() {
     ];
     let output = fake.run(&arguments);
     assert_eq!(fake.log(), ["xtask flash --probe 1:2 --elf x", "reset"]);
-    let told = complaint(&output);
-    assert!(told.contains("unit 1 does not answer"), "{told}");
+    let error = complaint(&output);
+    assert!(error.contains("unit 1 does not answer"), "{error}");
     assert_eq!(output.status.code(), Some(2));
 }
 
@@ -93,7 +93,7 @@ fn bench_file_gives_probe_and_reset_command_and_nothing_is_written_without_flash
 }
 
 #[test]
-fn mistake_is_reported_before_anything_is_done_to_the_board() {
+fn wrong_argument_is_reported_before_anything_is_done_to_the_board() {
     let fake = Fake::new("");
     let file = fake.at("bench.toml");
     fs::write(&file, "unit = 1\nwires = 3\n").unwrap();
@@ -105,8 +105,11 @@ fn mistake_is_reported_before_anything_is_done_to_the_board() {
         (&["--format", "7E1"], "no format 7E1"),
     ] {
         let output = fake.run(&[&["--flash", "--reset-cmd", "false"], arguments].concat());
-        let told = complaint(&output);
-        assert!(told.contains(wrong) && told.lines().count() == 1, "{told}");
+        let error = complaint(&output);
+        assert!(
+            error.contains(wrong) && error.lines().count() == 1,
+            "{error}"
+        );
         assert_eq!((output.status.code(), fake.log().len()), (Some(2), 0));
     }
 }
@@ -121,7 +124,7 @@ fn board_that_cannot_be_written_or_reset_is_not_tested() {
 
     let fake = Fake::new("");
     let output = fake.run(&["--reset-cmd", "exit 3"]);
-    let told = complaint(&output);
-    assert!(told.contains("`exit 3` failed"), "{told}");
-    assert!(!told.contains("does not answer"), "{told}");
+    let error = complaint(&output);
+    assert!(error.contains("`exit 3` failed"), "{error}");
+    assert!(!error.contains("does not answer"), "{error}");
 }

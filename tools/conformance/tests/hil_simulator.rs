@@ -1,6 +1,6 @@
 //! `modio-hil` against the image in the simulator: each board a `modio-sim` with its line on a pseudo-terminal, the
 //! lines joined to one, and wires from outputs to inputs through the simulators' HTTP interface. Every check of
-//! wires, pulses, analog values and power passes on a bench that is right, and fails on one that is not.
+//! wires, pulses, analog values and power passes on a right bench, and fails on a wrong one.
 
 #![cfg(target_os = "linux")]
 
@@ -38,10 +38,10 @@ tolerance = 20
 within_ms = 400
 "#;
 
-/// The options that leave out everything but the wires.
+/// The options to test only the wires.
 const ONLY_WIRES: [&str; 3] = ["--no-suite", "--requests", "0"];
 
-/// What was tried beside the suite: its kind, and how it ended.
+/// The tests outside the suite: their kind and their verdict.
 fn verdicts(run: &Run) -> Vec<(&str, &str)> {
     let findings = run.report["hil"].as_array().map_or(&[][..], Vec::as_slice);
     findings
@@ -54,7 +54,7 @@ fn verdicts(run: &Run) -> Vec<(&str, &str)> {
         .collect()
 }
 
-/// Runs modio-hil on the wires of the bench file, which must end like this.
+/// Runs modio-hil on the wires of the bench file, which must give these verdicts.
 fn assert_wires(bench: &Bench, file: &str, wanted: &[(&str, &str)]) -> Run {
     let run = bench.hil_until(file, &ONLY_WIRES, |run| verdicts(run) == wanted);
     assert_eq!(verdicts(&run), wanted, "{}", run.text);
@@ -65,7 +65,7 @@ fn assert_wires(bench: &Bench, file: &str, wanted: &[(&str, &str)]) -> Run {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn wires_and_pulses_between_two_boards_pass_and_a_wire_that_is_missing_or_crossed_fails() {
+fn wires_and_pulses_between_two_boards_pass_and_a_missing_or_crossed_wire_fails() {
     let bench = Bench::new(&[(1, "4do"), (2, "4di")]);
     bench.wire([Loop::digital(1, 1, 2, 1), Loop::digital(1, 2, 2, 2)]);
     let [wire, pulses] = [("wires", "passed"), ("pulses", "passed")];
@@ -74,7 +74,7 @@ fn wires_and_pulses_between_two_boards_pass_and_a_wire_that_is_missing_or_crosse
     bench.wire([Loop::digital(1, 1, 2, 1)]);
     assert_wires(&bench, WIRES, &[wire, pulses, ("wires", "failed")]);
 
-    // The second input follows the first output, too.
+    // The second input follows the first output as well.
     bench.wire([Loop::digital(1, 1, 2, 1), Loop::digital(1, 1, 2, 2)]);
     let failed = ("wires", "failed");
     assert_wires(&bench, WIRES, &[failed, pulses, failed]);
@@ -91,7 +91,7 @@ fn pulses_of_a_contact_that_bounces_longer_than_the_debounce_fail() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn analog_wires_of_one_board_pass_and_a_gain_that_is_off_fails() {
+fn analog_wires_of_one_board_pass_and_a_wrong_gain_fails() {
     let bench = Bench::new(&[(1, "2ai2ao")]);
     bench.wire([Loop::analog(3, 1, 1.0), Loop::analog(4, 2, 1.0)]);
     let run = assert_wires(&bench, ANALOG, &[("analog", "passed"); 2]);

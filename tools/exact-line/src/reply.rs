@@ -19,7 +19,7 @@ pub enum Ability {
     Power,
     /// It resets the unit.
     Reset,
-    /// It lets the unit receive what it sends.
+    /// It can let the unit receive its own frames.
     Echo,
     /// It reports when the unit's driver is switched.
     Driver,

@@ -52,7 +52,7 @@ pub fn request(pdu: &[u8]) -> String {
         return "nothing".to_owned();
     };
     let name = named(*code);
-    told(*code, pdu).map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
+    fields(*code, pdu).map_or_else(|| with_rest(&name, pdu), |text| format!("{name} {text}"))
 }
 
 fn with_rest(name: &str, pdu: &[u8]) -> String {
@@ -133,7 +133,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
             format!("{from}= {}", bits(data, count.unwrap_or(data.len() * 8)))
         }
         0x03 | 0x04 | 0x17 => format!("{from}= {}", words(pdu.get(2..)?)),
-        0x05 | 0x06 | 0x08 | 0x16 => told(code, pdu)?,
+        0x05 | 0x06 | 0x08 | 0x16 => fields(code, pdu)?,
         0x0F | 0x10 => format!("{:#06X} x {}", word(pdu, 1)?, word(pdu, 3)?),
         0x07 => format!("= {:08b}", pdu.get(1)?),
         0x0B => format!("status {:04X}, count {}", word(pdu, 1)?, word(pdu, 3)?),

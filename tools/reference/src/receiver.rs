@@ -32,7 +32,7 @@ pub enum Closed {
     Good {
         /// Unit address and PDU.
         body: Vec<u8>,
-        /// It must not be served: it has a gap, or there was no buffer.
+        /// The frame must not be served: it has a gap, or there was no buffer.
         dropped: bool,
     },
 }

@@ -1,4 +1,4 @@
-//! Whom a frame is for: other units, reserved addresses, broadcasts.
+//! Addresses of frames: other units, reserved addresses, broadcasts.
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
@@ -88,8 +88,8 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// Addresses that are not this unit's: all of them where that is quick, else those that one wrong bit or
-/// digit would confuse with it.
+/// Addresses of other units: all of them where time is exact, elsewhere those that differ from this unit's address in
+/// one bit, and 1, 2 and 247.
 fn others(bench: &Bench<'_>) -> Vec<u8> {
     let unit = bench.unit();
     let all = bench.endpoint.abilities().exact;
@@ -109,7 +109,7 @@ fn silent_to(bench: &mut Bench<'_>, unit: u8, pdu: &[u8]) -> Check {
     let frame = bench.target.mode.frame(unit, pdu);
     bench.silence_to(
         &frame,
-        format!("it is for {unit}, not for {}", bench.unit()),
+        format!("the frame is for address {unit}, not for {}", bench.unit()),
     )
 }
 
@@ -259,7 +259,7 @@ fn nonsense(bench: &mut Bench<'_>) -> Check {
 }
 
 fn broadcast_restart(bench: &mut Bench<'_>) -> Check {
-    bench.alive("nothing")?;
+    bench.alive("the start of the case")?;
     for data in [[0, 0], [0xFF, 0]] {
         let before = count(bench, 0x0B)?;
         silent_to(bench, 0, &diagnose(1, &data))?;

@@ -118,7 +118,7 @@ fn bad_lrc(bench: &mut Bench<'_>) -> Check {
     let body = body(bench);
     for bit in 0..8 {
         let bad = ascii(&body, lrc(&body) ^ 1 << bit);
-        bench.silence_to(&bad, "its LRC is wrong")?;
+        bench.silence_to(&bad, "the LRC is wrong")?;
     }
     bench.alive("frames with a wrong LRC")
 }
@@ -147,24 +147,24 @@ fn not_digits(bench: &mut Bench<'_>) -> Check {
     for wrong in [b'G', b' ', b'/', b'@', 0x00] {
         let mut bad = good.clone();
         bad[3] = wrong;
-        bench.silence_to(&bad, "something in it is no digit")?;
+        bench.silence_to(&bad, "a character is not a digit")?;
     }
     let mut odd = good.clone();
     odd.remove(3);
     bench.silence_to(&odd, "an odd number of digits")?;
-    bench.silence_to(b":\r\n", "nothing in it")?;
+    bench.silence_to(b":\r\n", "the frame is empty")?;
     bench.silence_to(b":01FF\r\n", "an address alone")?;
-    bench.alive("frames that are none")
+    bench.alive("invalid frames")
 }
 
 fn lower_case(bench: &mut Bench<'_>) -> Check {
-    // Its digits contain letters, whatever the unit's address.
+    // These data have letters among their digits, whatever the unit's address is.
     let function = super::dispatch::unknown_function(bench)?;
     let pdu = [function, 0xAB, 0xCD, 0xEF];
     bench.exception(&pdu, 1)?;
     bench.silence_to(
         &bench.frame(&pdu).to_ascii_lowercase(),
-        "its digits are in lower case",
+        "the digits are in lower case",
     )?;
     bench.alive("a frame in lower case")
 }
@@ -180,7 +180,7 @@ fn damaged(bench: &mut Bench<'_>) -> Check {
 fn truncated(bench: &mut Bench<'_>) -> Check {
     let good = bench.ping();
     for cut in 1..good.len() {
-        bench.silence_to(&good[..cut], "it has no end")?;
+        bench.silence_to(&good[..cut], "the frame has no end")?;
         bench.alive("a truncated frame")?;
     }
     Ok(())
@@ -224,14 +224,14 @@ fn longest(bench: &mut Bench<'_>) -> Check {
     let reply = bench.raw_due(&frame)?;
     bench.ensure(
         frame.len() == 513 && reply.exception(function) == Some(1),
-        "exception 01: a frame of 513 characters is one",
+        "exception 01: a frame of 513 characters is valid",
     )
 }
 
 fn too_long(bench: &mut Bench<'_>) -> Check {
     for data in [253, 254, 300, 600] {
         let (_, frame) = of_length(bench, data);
-        bench.silence_to(&frame, "it is too long")?;
+        bench.silence_to(&frame, "the frame is too long")?;
         bench.alive("a frame that is too long")?;
     }
     Ok(())
@@ -240,7 +240,7 @@ fn too_long(bench: &mut Bench<'_>) -> Check {
 fn rtu_frame(bench: &mut Bench<'_>) -> Check {
     let frame = rtu(&body(bench));
     for _ in 0..3 {
-        bench.silence_to(&frame, "it is an RTU frame")?;
+        bench.silence_to(&frame, "the frame is an RTU frame")?;
     }
     bench.alive("RTU frames")
 }
@@ -256,7 +256,7 @@ fn delimiter(bench: &mut Bench<'_>) -> Check {
     };
     let ping = bench.target.ping.clone();
     let new = with(bench, &ping, b'!');
-    // The reply may end in either: what counts is that there is one.
+    // The reply may end in either character.
     let answered = bench.raw_due(&new)? != Reply::Silence;
     let back = with(bench, &change(b'\n'), b'!');
     bench.raw(&back)?;

@@ -1,4 +1,4 @@
-//! Life on a line with other units on it.
+//! A line with other units on it.
 
 use std::time::Duration;
 
@@ -63,7 +63,7 @@ pub(super) const CASES: &[Case] = &[
     .interpretation(),
 ];
 
-/// What other units and their master say to each other.
+/// Requests to other units, and their replies.
 fn traffic(bench: &Bench<'_>) -> Vec<Vec<u8>> {
     let other = bench.other();
     [
@@ -86,11 +86,11 @@ fn traffic(bench: &Bench<'_>) -> Vec<Vec<u8>> {
 
 fn others_traffic(bench: &mut Bench<'_>) -> Check {
     for frame in traffic(bench) {
-        bench.silence_to(&frame, "it is another unit's")?;
+        bench.silence_to(&frame, "the frame is another unit's")?;
         bench.alive("other units' traffic")?;
     }
     for frame in traffic(bench) {
-        bench.silence_to(&frame, "it is another unit's")?;
+        bench.silence_to(&frame, "the frame is another unit's")?;
     }
     bench.alive("a lot of other units' traffic")
 }
@@ -99,12 +99,12 @@ fn others_truncated(bench: &mut Bench<'_>) -> Check {
     for frame in traffic(bench) {
         let cuts = [1, 2, 3, frame.len() - 1];
         for cut in cuts.into_iter().filter(|cut| *cut < frame.len()) {
-            bench.silence_to(&frame[..cut], "it is another unit's, and cut")?;
+            bench.silence_to(&frame[..cut], "the frame of another unit is cut")?;
         }
         bench.alive("other units' truncated traffic")?;
         let mut bad = frame.clone();
         bad[1] ^= 4;
-        bench.silence_to(&bad, "it is another unit's, and damaged")?;
+        bench.silence_to(&bad, "the frame of another unit is damaged")?;
         bench.alive("other units' damaged traffic")?;
     }
     Ok(())
@@ -118,7 +118,7 @@ fn others_long(bench: &mut Bench<'_>) -> Check {
             vec![0x5A; usize::from(words) * 2],
         ]
         .concat();
-        bench.silence_to(&rtu(&body), "it is another unit's reply")?;
+        bench.silence_to(&rtu(&body), "the frame is another unit's reply")?;
         bench.alive(format!("another unit's reply of {words} registers"))?;
     }
     Ok(())
@@ -146,13 +146,13 @@ fn reply_is_no_request(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?.up_to(1);
     bench.set_bits(span.first, &[false])?;
     let other = bench.other();
-    // The echo of a write by another unit, twice: as request and as reply.
+    // A write to another unit and its echo, which are the same frame.
     let frame = rtu(&[&[other], &pdu(5, span.first, 0xFF00)[..]].concat());
-    // And a read reply whose data is a good request for this unit, CRC and all.
+    // A reply to a read whose data is a good request for this unit, including its CRC.
     let inner = bench.frame(&pdu(5, span.first, 0xFF00));
     let body = [&[other, 3, inner.len() as u8], &inner[..]].concat();
     for frame in [frame.clone(), frame, rtu(&body)] {
-        bench.silence_to(&frame, "it is another unit's")?;
+        bench.silence_to(&frame, "the frame is another unit's")?;
     }
     bench.is_off(span)
 }
@@ -166,7 +166,10 @@ fn stray_zero(bench: &mut Bench<'_>) -> Check {
         bench.alive("a stray byte in front of a request")?;
         let silence = bench.endpoint.line().t35_limits().most * 2;
         let apart = apart(stray, silence, &bench.ping());
-        bench.answers(&apart, "a reply: the stray byte was a frame of its own")?;
+        bench.answers(
+            &apart,
+            "a reply: a silence separates the stray byte from the request",
+        )?;
     }
     Ok(())
 }
@@ -176,7 +179,7 @@ fn own_echo(bench: &mut Bench<'_>) -> Check {
     let result = echoed(bench);
     bench.endpoint.set_echo(false)?;
     result?;
-    bench.alive("its own echo")
+    bench.alive("replies that the unit received itself")
 }
 
 fn echoed(bench: &mut Bench<'_>) -> Check {
@@ -184,7 +187,7 @@ fn echoed(bench: &mut Bench<'_>) -> Check {
     for _ in 0..10 {
         bench.reply(&ping)?;
     }
-    // Replies that are the requests themselves: taken for one, each would be answered for ever.
+    // Replies that are equal to their requests. A unit that treats its own reply as a request never stops answering.
     let mut echoes = Vec::new();
     if bench.target.has(8) {
         echoes.push(vec![8, 0, 0, 1, 2]);

@@ -1,4 +1,4 @@
-//! A modio's configuration: its lock, its checks, what is in force.
+//! The configuration of a modio: its lock, its checks, and when a setting is in force.
 
 use std::time::Duration;
 
@@ -78,7 +78,7 @@ fn wrong_key(bench: &mut Bench<'_>) -> Check {
         bench.exception(&pdu(6, configuration::KEY, key), 3)?;
     }
     let now = bench.read_word(configuration::KEY)?;
-    bench.ensure(now == before, "the lock as it was")
+    bench.ensure(now == before, "the lock is unchanged")
 }
 
 fn value_first(bench: &mut Bench<'_>) -> Check {
@@ -118,7 +118,7 @@ fn read_only(bench: &mut Bench<'_>) -> Check {
 
 fn command(bench: &mut Bench<'_>) -> Check {
     let now = bench.read_word(configuration::COMMAND)?;
-    bench.ensure(now == 0, "0")?;
+    bench.ensure(now == 0, "COMMAND reads 0")?;
     for value in [0, 7, 0xB006, 0xFFFF] {
         bench.exception(&pdu(6, configuration::COMMAND, value), 3)?;
     }
@@ -129,7 +129,7 @@ fn command(bench: &mut Bench<'_>) -> Check {
         bench.reply_is(&request, &request)?;
     }
     let now = bench.read_word(configuration::COMMAND)?;
-    bench.ensure(now == 0, "0 after commands, too")
+    bench.ensure(now == 0, "COMMAND reads 0 after a command")
 }
 
 fn all_or_nothing(bench: &mut Bench<'_>) -> Check {
@@ -139,7 +139,7 @@ fn all_or_nothing(bench: &mut Bench<'_>) -> Check {
     bench.exception(&write_words(at, &[700, 1, 4, 0]), 3)?;
     bench.exception(&write_words(at, &[700, 1, 0, 2]), 3)?;
     let now = bench.reply(&pdu(3, at, 4))?;
-    bench.ensure(now == before, "the four registers as they were")
+    bench.ensure(now == before, "the four registers are unchanged")
 }
 
 fn response_delay(bench: &mut Bench<'_>) -> Check {

@@ -100,7 +100,7 @@ fn line_break(bench: &mut Bench<'_>) -> Check {
     }
     bench.silence(
         &[Piece::Break(15), Piece::Break(15), Piece::Break(15)],
-        "breaks",
+        "breaks are no request",
     )?;
     bench.alive("breaks")
 }
@@ -120,7 +120,7 @@ fn glitch(bench: &mut Bench<'_>) -> Check {
 }
 
 /// Sends a request and pulses after it. Returns the reply, and the time from the end of the request to the moment
-/// when the unit switches its driver on. Pulses on top of the reply would hide its first start bit.
+/// when the unit switches its driver on. Pulses during the reply would hide its first start bit.
 fn turnaround(bench: &mut Bench<'_>, pulses: &[Piece]) -> Check<(Reply, Duration)> {
     let frame = bench.ping();
     let end = bench.endpoint.now() + bench.endpoint.line().characters(frame.len());
@@ -145,8 +145,8 @@ fn train(width: Duration, first: Duration, spacing: Duration, last: Duration) ->
     pulses
 }
 
-/// How long the unit's processor may be busy with something else when its reply is due. The reply then begins up to a
-/// bit later, with the UART's clock.
+/// Time that the unit's processor may be busy with other work when its reply is due. The reply then begins up to one
+/// bit later, at the next clock of the UART.
 const BUSY: Duration = Duration::from_micros(5);
 
 fn noise_behind(bench: &mut Bench<'_>) -> Check {
@@ -170,7 +170,7 @@ fn noise_behind(bench: &mut Bench<'_>) -> Check {
             silence,
         ] {
             for first in [bit, bit * 4, bit * 8] {
-                // Trains that end before the reply may start, and trains that go on while it is due.
+                // Pulses that end before the reply may start, and pulses that continue while it is due.
                 for last in [silence - bit * 3, most + line.characters(2)] {
                     let pulses = train(width, first, spacing, last);
                     let (reply, took) = turnaround(bench, &pulses)?;
@@ -180,7 +180,7 @@ fn noise_behind(bench: &mut Bench<'_>) -> Check {
                             "a reply {most:?} after the request or earlier, not {took:?}: without pulses it takes {undisturbed:?}"
                         ),
                     )?;
-                    // Pulses on top of the reply damage it for the master.
+                    // Pulses during the reply damage the reply at the master.
                     let right = bench.is_pong(&reply) || last > silence;
                     bench.ensure(right, "a good reply")?;
                 }

@@ -1,4 +1,4 @@
-//! Diagnostics, function 08: echo, restart, listen-only and the rest.
+//! Diagnostics, function 08: echo, restart, listen-only mode and counters.
 
 use super::dispatch::unknown_function;
 use super::line_counters;
@@ -117,7 +117,7 @@ fn unknown(bench: &mut Bench<'_>) -> Check {
 
 fn data(bench: &mut Bench<'_>) -> Check {
     let refused = data_refused(bench);
-    // One that took a bad 04 for a good one listens only, which is for no case after this.
+    // A faulty unit may have entered listen-only mode by a bad 04. End that mode, so that later cases are not affected.
     bench.ask(&diagnose(1, &[0, 0]))?;
     refused?;
     bench.alive("diagnostics with bad data")
@@ -174,7 +174,7 @@ fn restart(bench: &mut Bench<'_>) -> Check {
         bench.reply_is(&request, &request)?;
         bench.alive("a restart of the communication")?;
         if counts {
-            // Its reply without exceptions is the request itself.
+            // When the counter is 0, the reply is equal to the request.
             bench.reply_is(&exceptions, &exceptions)?;
         }
     }
@@ -218,7 +218,7 @@ pub(super) fn enter(bench: &mut Bench<'_>) -> Check {
     bench.silence_to(&enter, "08/04 is not answered")
 }
 
-/// Gets it out again, whatever has gone wrong, and passes on what has.
+/// Ends the listen-only mode, also after a failure. Returns that failure, or the failure to end the mode.
 fn leave(bench: &mut Bench<'_>, so_far: Check) -> Check {
     let reply = bench.ask(&diagnose(1, &[0, 0]))?;
     let out = match so_far {
@@ -228,7 +228,7 @@ fn leave(bench: &mut Bench<'_>, so_far: Check) -> Check {
         ),
         failed => failed,
     };
-    // A second one is a restart of a unit that listens and talks, and cannot hurt.
+    // A second restart has no effect on a unit that has left the mode.
     bench.ask(&diagnose(1, &[0, 0]))?;
     out.and(bench.alive("08/01 has ended the listen-only mode"))
 }
@@ -276,7 +276,7 @@ fn clear(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&request, "08/0A")?;
     bench.ensure(reply == request, "the request echoed")?;
     let function = unknown_function(bench)?;
-    // Those that this request and its kind move themselves may have moved again.
+    // Number of messages by which the requests after the clearing move each counter.
     for (sub, moved) in [
         (0x0B, 1),
         (0x0C, 0),
@@ -288,9 +288,9 @@ fn clear(bench: &mut Bench<'_>) -> Check {
         (0x12, 0),
         (0x02, 0),
     ] {
-        // Everything that a line can move has moved.
+        // Move every counter that traffic on the line can move.
         for _ in 0..2 {
-            bench.alive("a clearing")?;
+            bench.alive("a request that clears the counters")?;
             let bad = line_counters::bad(bench);
             bench.silence_to(&bad, "its check is wrong")?;
             bench.exception(&[function], 1)?;
@@ -322,5 +322,8 @@ fn clear_overruns(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply_unless_lacking(&request, "08/14")?;
     bench.ensure(reply == request, "the request echoed")?;
     let overruns = bench.reply_unless_lacking(&diagnose(0x12, &[0, 0]), "08/12")?;
-    bench.ensure(overruns == diagnose(0x12, &[0, 0]), "no overruns any more")
+    bench.ensure(
+        overruns == diagnose(0x12, &[0, 0]),
+        "the overrun counter is 0",
+    )
 }

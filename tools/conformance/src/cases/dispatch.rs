@@ -36,8 +36,8 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// Functions that the unit does not have. Those that some maker may use are left alone on any device but
-/// a modio: nobody knows what they would do.
+/// Functions that the unit does not have. On other devices than a modio only codes that no maker is known to use, because
+/// the effect of a maker's own function is unknown.
 pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
     let lacking = |function: &u8| !bench.target.has(*function);
     if bench.target.modio.is_some() {
@@ -48,7 +48,7 @@ pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
     }
 }
 
-/// One of them, or the case is skipped.
+/// A function that the unit does not have. Without one the case is skipped.
 pub(super) fn unknown_function(bench: &Bench<'_>) -> Check<u8> {
     let one = unknown_functions(bench).pop();
     one.ok_or_else(|| Stop::Skip("every function exists".to_owned()))
@@ -83,14 +83,17 @@ fn not_functions(bench: &mut Bench<'_>) -> Check {
             )?;
         }
     }
-    bench.alive("functions that are none")
+    bench.alive("invalid function codes")
 }
 
 fn elsewhere(bench: &mut Bench<'_>) -> Check {
     let other = bench.other();
     for function in [0x41, 0x65, 0x00, 0x80] {
         let reply = bench.ask_unit(other, &[function, 1, 2, 3])?;
-        bench.ensure(reply == Reply::Silence, "silence: it is another unit's")?;
+        bench.ensure(
+            reply == Reply::Silence,
+            "silence: the request is for another unit",
+        )?;
     }
     Ok(())
 }

@@ -170,13 +170,13 @@ fn exception_status(bench: &mut Bench<'_>) -> Check {
     bench.ensure(reply.len() == 2, "07 and one byte")
 }
 
-/// The standard does not say what becomes of a request that is longer than its function's.
+/// Sends requests with data that the function does not have. The standard does not define the reply.
 fn with_data(bench: &mut Bench<'_>, function: u8) -> Check {
     bench.exception_03_or_silence(&[function, 0])?;
     bench.exception_03_or_silence(&[function, 0, 0])
 }
 
-/// The event count.
+/// Reads the event count.
 fn events(bench: &mut Bench<'_>) -> Check<u16> {
     let reply = bench.reply(&[0x0B])?;
     let [0x0B, status_high, status_low, high, low] = reply[..] else {
@@ -196,7 +196,7 @@ fn counter_counts(bench: &mut Bench<'_>) -> Check {
     let again = events(bench)?;
     bench.ensure(again == before, "0B does not count itself")?;
     for _ in 0..3 {
-        bench.alive("nothing")?;
+        bench.alive("the first reading of the count")?;
     }
     let after = events(bench)?;
     bench.ensure(
@@ -215,7 +215,7 @@ fn counter_counts(bench: &mut Bench<'_>) -> Check {
     bench.ensure(same == after, "another unit's message does not count")
 }
 
-/// Event count, message count, events.
+/// Reads the event log: event count, message count and events.
 fn log(bench: &mut Bench<'_>) -> Check<(u16, u16, Vec<u8>)> {
     let reply = bench.reply(&[0x0C])?;
     let [0x0C, count, s1, s0, e1, e0, m1, m0, ref events @ ..] = reply[..] else {
@@ -237,9 +237,9 @@ fn log(bench: &mut Bench<'_>) -> Check<(u16, u16, Vec<u8>)> {
 
 fn log_shape(bench: &mut Bench<'_>) -> Check {
     log(bench)?;
-    // More events than the log holds.
+    // Cause more events than the log can hold.
     for _ in 0..40 {
-        bench.alive("nothing")?;
+        bench.alive("the first reading of the count")?;
     }
     let (_, _, events) = log(bench)?;
     bench.ensure(events.len() == 64, "a full log of 64 events")
@@ -249,9 +249,9 @@ fn log_counts(bench: &mut Bench<'_>) -> Check {
     let count = events(bench)?;
     let (logged, messages, _) = log(bench)?;
     bench.ensure(logged == count, format!("the event count of 0B, {count}"))?;
-    bench.alive("nothing")?;
+    bench.alive("the first reading of the count")?;
     let (logged, later, _) = log(bench)?;
-    // 6.9 does not say whether 0C itself counts once its reply is out.
+    // 6.9 does not define whether 0C counts itself after its reply.
     let more = logged.wrapping_sub(count);
     bench.ensure(
         more == 1 || more == 2,
@@ -264,10 +264,10 @@ fn log_counts(bench: &mut Bench<'_>) -> Check {
 }
 
 fn log_order(bench: &mut Bench<'_>) -> Check {
-    bench.alive("nothing")?;
+    bench.alive("the first reading of the count")?;
     let (_, _, events) = log(bench)?;
-    // Receive events have bit 7, send events bits 7 and 6 as 01; the request that reads the log may
-    // stand in it already.
+    // Receive events have bit 7 set. Send events have bit 7 clear and bit 6 set. The log may already contain the request
+    // that reads it.
     let receive = |event: &u8| event & 0x80 != 0;
     let sent = |event: &u8| event & 0xC0 == 0x40;
     let skip = usize::from(events.first().is_some_and(receive));
@@ -291,7 +291,7 @@ fn log_order(bench: &mut Bench<'_>) -> Check {
 
 fn log_cleared(bench: &mut Bench<'_>) -> Check {
     for _ in 0..6 {
-        bench.alive("nothing")?;
+        bench.alive("the first reading of the count")?;
     }
     let (_, _, before) = log(bench)?;
     bench.ensure(before.len() > 6, "a log of the messages before")?;
@@ -304,8 +304,8 @@ fn log_cleared(bench: &mut Bench<'_>) -> Check {
     bench.ensure(events.contains(&0), "event 00, the restart")
 }
 
-/// Does something and checks the events that the log has for it, the newest first. Where the standard leaves
-/// the order of two events open, there are several right answers.
+/// Calls `done` and checks the events that the log has for it, the newest first. Several sequences are right where the
+/// standard does not define the order of two events.
 fn logs(
     bench: &mut Bench<'_>,
     what: &str,
@@ -318,7 +318,7 @@ fn logs(
     // The request that reads the log may already be in the log.
     let events = events.strip_prefix(&[0x80]).unwrap_or(&events);
     let found = right.iter().any(|right| {
-        // The older events are those of the first reading.
+        // The older events must be the events of the first reading.
         let all = [right, &[0x40, 0x80][..]].concat();
         events.starts_with(&all)
     });
@@ -388,8 +388,8 @@ fn log_bad_check(bench: &mut Bench<'_>) -> Check {
         "two frames with a bad check",
         &[&[0x82, 0x82]],
         |bench| {
-            bench.silence_to(&frame, "its check is wrong")?;
-            bench.silence_to(&frame, "its check is wrong")
+            bench.silence_to(&frame, "the check is wrong")?;
+            bench.silence_to(&frame, "the check is wrong")
         },
     )
 }
@@ -405,8 +405,8 @@ fn log_bad_character(bench: &mut Bench<'_>) -> Check {
 fn log_others(bench: &mut Bench<'_>) -> Check {
     let frame = bench.target.mode.frame(bench.other(), &bench.target.ping);
     logs(bench, "requests for another unit", &[&[]], |bench| {
-        bench.silence_to(&frame, "it is another unit's")?;
-        bench.silence_to(&frame, "it is another unit's")
+        bench.silence_to(&frame, "the request is for another unit")?;
+        bench.silence_to(&frame, "the request is for another unit")
     })
 }
 
@@ -429,10 +429,10 @@ fn log_listen_only(bench: &mut Bench<'_>) -> Check {
             "in listen-only mode nothing is answered",
         ),
         (bench.target.mode.frame(0, &ping), "a broadcast"),
-        (line_counters::bad(bench), "its check is wrong"),
+        (line_counters::bad(bench), "the check is wrong"),
     ];
     let mut right = Vec::new();
-    // The unit enters and leaves the mode before or after it has finished the request for that.
+    // The unit may enter and leave the mode before or after it finishes the request to do so.
     for restart in [&[0x00, 0x60, 0xA0][..], &[0x40, 0x00, 0xA0]] {
         for entry in [&[0x04, 0x40, 0x80][..], &[0x60, 0x04, 0x80]] {
             let frames = [0xA2, 0x60, 0xE0, 0x60, 0xA0];
@@ -462,7 +462,7 @@ fn server_id(bench: &mut Bench<'_>) -> Check {
         usize::from(count) == data.len() && data.len() >= 2,
         "a byte count of all that follows, at least id and run indicator",
     )?;
-    // How long the identification is each device decides.
+    // The length of the identification differs between devices.
     let indicator = data[1..].iter().any(|byte| matches!(byte, 0 | 0xFF));
     bench.ensure(indicator, "a run indicator of 00 or FF after the id")
 }

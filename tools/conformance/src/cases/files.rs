@@ -1,4 +1,4 @@
-//! File records, functions 14 and 15; and the file that describes a modio.
+//! File records, functions 14 and 15, and the file that describes a modio.
 
 use modio_description::{Description, FILE, records};
 use register_map::{points, state};
@@ -93,7 +93,7 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// A group of records: file, first record and how many.
+/// A group of records: file, first record and number of records.
 type Group = (u16, u16, u16);
 
 /// A group of a request, with this reference type.
@@ -108,7 +108,7 @@ fn request(groups: &[Group]) -> Vec<u8> {
     [&[0x14, groups.len() as u8], &groups[..]].concat()
 }
 
-/// Reads groups; the bytes of each.
+/// Reads groups. Returns the bytes of each group.
 fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
     let reply = bench.reply(&request(groups))?;
     let [0x14, count, ref rest @ ..] = reply[..] else {
@@ -116,7 +116,7 @@ fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
     };
     bench.ensure(
         rest.len() == usize::from(count),
-        "a byte count that is true",
+        "a byte count equal to the number of bytes",
     )?;
     let (mut rest, mut read) = (rest, Vec::new());
     for (_, _, records) in groups {
@@ -137,7 +137,7 @@ fn read(bench: &mut Bench<'_>, groups: &[Group]) -> Check<Vec<Vec<u8>>> {
 fn byte_count(bench: &mut Bench<'_>) -> Check {
     bench.exception(&[0x14, 0], 3)?;
     bench.exception(&[0x14, 6, 6, 0, 1, 0, 0, 0], 3)?;
-    // 35 groups are the most; this is one byte more.
+    // A request has 35 groups at most. This one has one byte more.
     let most = group(6, (1, 0, 1)).repeat(35);
     let pdu = [&[0x14, 0xF6], &most[..], &[6]].concat();
     bench.exception(&pdu, 3)
@@ -188,11 +188,11 @@ fn longest_reply(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-/// The head of file 1, and how many records the file has.
+/// Reads the first two records of file 1. Returns them and the number of records of the file.
 fn head(bench: &mut Bench<'_>) -> Check<(Vec<u8>, u16)> {
     let head = read(bench, &[(FILE, 0, 2)])?.concat();
     let records = records(u16::from_be_bytes([head[0], head[1]]));
-    bench.ensure(records <= 10_000, "a length that a file can have")?;
+    bench.ensure(records <= 10_000, "a length of at most 10000 records")?;
     Ok((head, records))
 }
 
@@ -210,7 +210,7 @@ fn self_description(bench: &mut Bench<'_>) -> Check {
     let crc = bench.read_word(state::DESCRIPTION_CRC)?;
     bench.ensure(
         crc.to_be_bytes() == head[2..],
-        "the CRC of the second record",
+        "the CRC in the second record",
     )?;
     let in_force = bench.read_words(Span {
         first: state::MODULE_IN_FORCE,

@@ -1,4 +1,4 @@
-//! What is a frame in RTU and what is not, as far as any endpoint can try it.
+//! RTU framing, as far as every endpoint can test it.
 
 use std::time::Duration;
 
@@ -95,7 +95,7 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// Bits to turn over, one at a time: all of them where that is quick, else one of each byte.
+/// Bits to invert, one at a time: all bits where time is exact, elsewhere every ninth.
 fn bits(bench: &Bench<'_>, frame: &[u8]) -> Vec<usize> {
     let step = if bench.endpoint.abilities().exact {
         1
@@ -120,16 +120,16 @@ fn swapped_crc(bench: &mut Bench<'_>) -> Check {
     let length = bad.len();
     bad.swap(length - 1, length - 2);
     bench.silence_to(&bad, "the CRC's bytes are exchanged")?;
-    bench.alive("it")
+    bench.alive("a frame with a wrong CRC")
 }
 
 fn unknown_bad_crc(bench: &mut Bench<'_>) -> Check {
     for function in [0x66, 0x41, 0x00, 0x80] {
         let mut bad = bench.frame(&[function, 0, 0, 0, 1]);
         bad[6] ^= 0x10;
-        bench.silence_to(&bad, "its CRC is wrong")?;
+        bench.silence_to(&bad, "the CRC is wrong")?;
     }
-    bench.alive("it")
+    bench.alive("a frame with a wrong CRC")
 }
 
 fn bad_crc_write(bench: &mut Bench<'_>) -> Check {
@@ -140,7 +140,7 @@ fn bad_crc_write(bench: &mut Bench<'_>) -> Check {
         for bit in 0..16 {
             let mut bad = rtu(&[unit, 5, high, low, 0xFF, 0]);
             bad[6 + bit / 8] ^= 1 << (bit % 8);
-            bench.silence_to(&bad, "its CRC is wrong")?;
+            bench.silence_to(&bad, "the CRC is wrong")?;
         }
     }
     bench.is_off(span)
@@ -180,7 +180,7 @@ fn longest(bench: &mut Bench<'_>) -> Check {
         let reply = bench.raw_due(&frame)?;
         bench.ensure(
             reply.exception(function) == Some(1),
-            format!("exception 01: a frame of {length} bytes is one"),
+            format!("exception 01: a frame of {length} bytes is valid"),
         )?;
     }
     Ok(())
@@ -189,7 +189,7 @@ fn longest(bench: &mut Bench<'_>) -> Check {
 fn too_long(bench: &mut Bench<'_>) -> Check {
     for length in [257, 258, 259, 300, 512, 513, 1000] {
         let (_, frame) = of_length(bench, length);
-        bench.silence_to(&frame, format!("{length} bytes are no frame"))?;
+        bench.silence_to(&frame, format!("{length} bytes are too long for a frame"))?;
         bench.alive(format!("{length} bytes"))?;
     }
     Ok(())
@@ -201,7 +201,7 @@ fn joined(bench: &mut Bench<'_>) -> Check {
         let bytes = [vec![0x33; length], ping.clone()].concat();
         bench.silence_to(
             &bytes,
-            format!("it follows {length} bytes without a silence"),
+            format!("the request follows {length} bytes without a silence"),
         )?;
         bench.alive(format!("{length} bytes and a request"))?;
     }
@@ -211,17 +211,20 @@ fn joined(bench: &mut Bench<'_>) -> Check {
 fn truncated(bench: &mut Bench<'_>) -> Check {
     let ping = bench.ping();
     for length in 1..ping.len() {
-        bench.silence_to(&ping[..length], "it is cut short")?;
+        bench.silence_to(&ping[..length], "the request is cut")?;
         bench.alive("a truncated request")?;
     }
-    // The other half does not complete it.
+    // The second half of a request must not complete the first half.
     let half = ping.len() / 2;
     let pieces = apart(
         &ping[..half],
         bench.endpoint.line().t35_limits().most * 2 + Duration::from_millis(20),
         &ping[half..],
     );
-    bench.silence(&pieces, "a silence in the middle makes two frames of it")?;
+    bench.silence(
+        &pieces,
+        "a silence in the middle makes two frames of the request",
+    )?;
     bench.alive("two halves")
 }
 
@@ -242,11 +245,11 @@ fn nothing_else(bench: &mut Bench<'_>) -> Check {
         _ => ping.len(),
     };
     for _ in 0..10 {
-        // Another byte would show in the check, but a 00 behind the CRC leaves that right.
+        // A wrong CRC shows any other additional byte, but a 00 after the CRC keeps the CRC right.
         let reply = bench.reply(&ping)?;
         bench.ensure(
             reply.len() == length,
-            format!("a PDU of {length} bytes and nothing behind its CRC"),
+            format!("a PDU of {length} bytes and no byte after its CRC"),
         )?;
         let late = bench.listen_until(usize::MAX)?;
         bench.ensure(late == Reply::Silence, "silence after the reply")?;
@@ -260,7 +263,7 @@ fn trailing(bench: &mut Bench<'_>) -> Check {
         bench.silence_to(&frame, "a byte too many")?;
         bench.alive("a byte too many")?;
     }
-    // The CRC of a frame and its CRC is 0, and stays 0 with a 00 behind it: the frame is good, its PDU a
+    // The CRC over a frame and its CRC is 0, and remains 0 with a 00 after it. So the frame is good, but its PDU is one
     // byte too long.
     let frame = [bench.ping(), vec![0]].concat();
     let function = bench.target.ping[0];

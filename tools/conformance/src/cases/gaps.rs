@@ -74,11 +74,10 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// How far from its limit a gap is tried: a fifth of a character, but what the bits of a character
-/// itself leave open at least.
+/// Distance of a gap from its limit: 3 bits, but at least 20 us.
 fn margin(bench: &Bench<'_>) -> Duration {
     let line = bench.endpoint.line();
-    // A receiver may take the stop bits for silence already, and needs one bit to see a start bit.
+    // A receiver may count the stop bits as silence, and needs one bit to detect a start bit.
     line.bits(3).max(Duration::from_micros(20))
 }
 
@@ -105,7 +104,7 @@ fn below_t15(bench: &mut Bench<'_>) -> Check {
             )?;
         }
     }
-    // Every byte on its own.
+    // A gap after every byte.
     let mut pieces = Vec::new();
     for byte in bench.ping() {
         pieces.extend([Piece::Bytes(vec![byte]), Piece::Gap(t15 / 2)]);
@@ -131,7 +130,7 @@ fn just_below_t35(bench: &mut Bench<'_>) -> Check {
     kept_or_dropped(bench, &[middle(bench), high])
 }
 
-/// Frames with these gaps between t1.5 and t3.5 are all kept, or all dropped.
+/// Sends frames with these gaps between t1.5 and t3.5. The unit must keep all of them or drop all of them.
 fn kept_or_dropped(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
     let mut dropped = bench.target.strict_t15;
     for index in places(bench) {
@@ -176,7 +175,7 @@ fn a_bit_too_soon(bench: &mut Bench<'_>) -> Check {
     joined_after(bench, &[gap])
 }
 
-/// A request these gaps after another one joins it.
+/// Sends requests after these gaps. Each request must be joined with the one before it.
 fn joined_after(bench: &mut Bench<'_>, gaps: &[Duration]) -> Check {
     let mine = bench.ping();
     let others = bench.target.mode.frame(bench.other(), &bench.target.ping);

@@ -1,4 +1,4 @@
-//! What hurts the users of such devices, where it can be seen from the line.
+//! Faults that users of such devices report, as far as they show on the line.
 
 use std::time::Duration;
 
@@ -90,7 +90,7 @@ enum Use {
     Restarts,
 }
 
-/// A PDU that changes nothing on any device: reads of every kind, good and bad; writes that are cut short.
+/// Returns a PDU that changes nothing on any device: a good or bad read, or a write that is cut.
 fn harmless(rng: &mut Rng, unknown: &[u8]) -> Vec<u8> {
     let function = match rng.u8(0..12) {
         0..6 => rng.u8(1..=4),
@@ -156,7 +156,7 @@ fn noise(bench: &mut Bench<'_>) -> Check {
         if bytes.len() >= 4 && rtu(&bytes[..split]) == bytes {
             continue;
         }
-        bench.silence_to(&bytes, format!("it is noise, burst {n}"))?;
+        bench.silence_to(&bytes, format!("the bytes are noise, burst {n}"))?;
         if n % 20 == 19 {
             bench.alive("noise")?;
         }
@@ -164,7 +164,7 @@ fn noise(bench: &mut Bench<'_>) -> Check {
     bench.alive("noise")
 }
 
-/// Uptime in seconds, and the reset cause.
+/// Reads the uptime in seconds and the reset cause.
 fn age(bench: &mut Bench<'_>) -> Check<(u32, u16)> {
     let reply = bench.reply(&pdu(3, state::RESET_CAUSE, 3))?;
     let [cause, high, low] = words_of(&reply)[..] else {
@@ -182,11 +182,14 @@ fn restarts(bench: &mut Bench<'_>) -> Check {
     let after = age(bench)?;
     let passed = (bench.endpoint.now() - begin).as_secs_f64();
     let counted = f64::from(after.0.saturating_sub(before.0));
-    bench.ensure(after.1 == before.1, "the reset cause as before")?;
-    // What is not exact may be a simulator that does not keep up with the clock.
+    bench.ensure(after.1 == before.1, "the reset cause is unchanged")?;
+    // Where time is not exact, the unit may be a simulator that is slower than its clock.
     let right = after.0 >= before.0
         && (!bench.endpoint.abilities().exact || (counted - passed).abs() <= 1.5);
-    bench.ensure(right, format!("an uptime {passed:.1} s further"))
+    bench.ensure(
+        right,
+        format!("an uptime that has increased by {passed:.1} s"),
+    )
 }
 
 fn no_gaps(bench: &mut Bench<'_>) -> Check {
@@ -233,5 +236,5 @@ fn half_written(bench: &mut Bench<'_>) -> Check {
         bench.exception(&request, 3)?;
     }
     let now = bench.reply(&pdu(3, at, 2))?;
-    bench.ensure(now == before, "the counter as it was")
+    bench.ensure(now == before, "the counter is unchanged")
 }

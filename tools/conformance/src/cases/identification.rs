@@ -83,7 +83,7 @@ pub(super) const CASES: &[Case] = &[
 /// One reply.
 struct Page {
     conformity: u8,
-    /// The object to go on with.
+    /// The next object, if more follow.
     next: Option<u8>,
     objects: Vec<(u8, Vec<u8>)>,
 }
@@ -92,7 +92,7 @@ fn request(code: u8, object: u8) -> Vec<u8> {
     vec![0x2B, 0x0E, code, object]
 }
 
-/// Asks, and takes the reply apart; what is not as 6.21 has it fails the case.
+/// Sends a request and splits the reply into its objects. The case fails when the reply does not have the form of 6.21.
 fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
     let reply = bench.reply(&request(code, object))?;
     let [
@@ -131,8 +131,7 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
         (0, 0) => None,
         (0xFF, next) if code != 4 => Some(next),
         _ => {
-            return bench
-                .fail("more follows 00 and next object 00, or FF and the object to go on with");
+            return bench.fail("more follows 00 and next object 00, or FF and the next object");
         }
     };
     Ok(Page {
@@ -142,7 +141,7 @@ fn page(bench: &mut Bench<'_>, code: u8, object: u8) -> Check<Page> {
     })
 }
 
-/// The whole stream from an object on, over as many replies as it takes.
+/// Reads a whole stream from an object on, with as many requests as needed.
 fn stream(bench: &mut Bench<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)>> {
     let (mut all, mut from) = (Vec::new(), first);
     loop {
@@ -158,7 +157,7 @@ fn stream(bench: &mut Bench<'_>, code: u8, first: u8) -> Check<Vec<(u8, Vec<u8>)
             return Ok(all);
         };
         let ahead = all.last().is_some_and(|last| next > last.0);
-        bench.ensure(ahead, "a next object beyond those that have come")?;
+        bench.ensure(ahead, "a next object after those received")?;
         from = next;
     }
 }
@@ -180,7 +179,7 @@ fn regular(bench: &mut Bench<'_>) -> Check {
     let level = page(bench, 1, 0)?.conformity & 0x7F;
     let objects = ids(&stream(bench, 2, 0)?);
     if level == 1 {
-        // A device of the basic level answers with what it has.
+        // A device of the basic level answers with its basic objects.
         return bench.ensure(objects == [0, 1, 2], "the objects 00, 01 and 02");
     }
     if bench.target.modio.is_some() {
@@ -189,7 +188,7 @@ fn regular(bench: &mut Bench<'_>) -> Check {
     // Each of 03 to 06 is optional.
     bench.ensure(
         objects.starts_with(&[0, 1, 2]) && objects.iter().all(|id| *id <= 6),
-        "the objects 00, 01 and 02, and of 03 to 06 what there is",
+        "the objects 00, 01 and 02, and none after 06",
     )
 }
 
@@ -217,7 +216,7 @@ fn individual(bench: &mut Bench<'_>) -> Check {
         let one = page(bench, 4, id)?;
         bench.ensure(
             one.objects == [(id, value)],
-            format!("object {id:02X} alone, as the stream has it"),
+            format!("only object {id:02X}, with the same value as in the stream"),
         )?;
     }
     Ok(())
@@ -254,7 +253,9 @@ fn from_the_middle(bench: &mut Bench<'_>) -> Check {
             let rest = stream(bench, code, *id)?;
             bench.ensure(
                 rest == known[place..],
-                format!("the objects from {id:02X} on, as the whole stream has them"),
+                format!(
+                    "the objects from {id:02X} on, with the same values as in the whole stream"
+                ),
             )?;
         }
     }

@@ -1,4 +1,4 @@
-//! The counters of the serial line: sub-functions 0B to 12 of 08, and on a modio its registers for them.
+//! The counters of the serial line: sub-functions 0B to 12 of function 08, and the registers of a modio for them.
 
 use register_map::state;
 
@@ -93,7 +93,8 @@ pub(super) fn count(bench: &mut Bench<'_>, sub: u16) -> Check<u16> {
     skip("the unit has no line counters")
 }
 
-/// By how much a counter moves while something is done; reading it once is in it where that counts.
+/// Checks by how much a counter moves while `done` runs. `wanted` includes the request that reads the counter, if the
+/// counter counts such a request.
 fn moves(
     bench: &mut Bench<'_>,
     sub: u16,
@@ -117,7 +118,7 @@ fn ping_other(bench: &mut Bench<'_>) -> Check {
     bench.silence_to(&frame, "another unit's request")
 }
 
-/// A broadcast that is refused, in silence: nothing is written by it.
+/// Sends a broadcast that the unit refuses in silence, and that writes nothing.
 fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
     let function = [6, 5, 0x10].into_iter().find(|f| bench.target.has(*f));
     let Some(function) = function else {
@@ -138,7 +139,7 @@ fn refused_broadcast(bench: &mut Bench<'_>) -> Check {
 pub(super) fn bad(bench: &Bench<'_>) -> Vec<u8> {
     let mut frame = bench.ping();
     let digit = frame.len() - 3;
-    // In ASCII the LRC's last digit, in RTU the last data byte.
+    // In ASCII this is the last digit of the LRC, in RTU the last data byte.
     frame[digit] = if frame[digit] == b'0' { b'1' } else { b'0' };
     frame
 }
@@ -155,7 +156,7 @@ fn bus_messages(bench: &mut Bench<'_>) -> Check {
             }
             bench.alive("others' requests")?;
             let frame = bad(bench);
-            bench.silence_to(&frame, "its check is wrong")?;
+            bench.silence_to(&frame, "the check is wrong")?;
             bench.alive("a frame with a wrong check")
         },
     )
@@ -165,7 +166,7 @@ fn bus_errors(bench: &mut Bench<'_>) -> Check {
     moves(bench, 0x0C, 3, "3 frames with a bad check", |bench| {
         let frame = bad(bench);
         for _ in 0..3 {
-            bench.silence_to(&frame, "its check is wrong")?;
+            bench.silence_to(&frame, "the check is wrong")?;
         }
         ping_other(bench)?;
         bench.alive("frames with a wrong check")
@@ -216,7 +217,7 @@ fn unit_messages(bench: &mut Bench<'_>) -> Check {
         bench.alive("another's request")?;
         bench.alive("a request")?;
         let frame = bad(bench);
-        bench.silence_to(&frame, "its check is wrong")
+        bench.silence_to(&frame, "the check is wrong")
     })?;
     moves(
         bench,
@@ -263,7 +264,7 @@ fn registers(bench: &mut Bench<'_>) -> Check {
         let by_function = count(bench, sub)?;
         let register = state::BUS_MESSAGES + (sub - 0x0B);
         let by_register = bench.read_word(register)?;
-        // Reading moves two of them by one message.
+        // A request to read moves the counters 0B and 0E by one.
         let moved = u16::from(matches!(sub, 0x0B | 0x0E));
         bench.ensure(
             by_register == by_function.wrapping_add(moved),

@@ -105,7 +105,7 @@ fn formula(bench: &mut Bench<'_>) -> Check {
     let words = bench.words()?;
     let at = words.span.first;
     for (from, to) in [(words.low, words.high), (words.high, words.low)] {
-        // Three ways from one value that is taken to another.
+        // Three pairs of masks that change one accepted value to another.
         let masks = [(0, to), (from & to, to), (!(from ^ to), to)];
         for (and, or) in masks {
             bench.set_words(at, &[from])?;
@@ -153,7 +153,7 @@ fn mask_length(bench: &mut Bench<'_>) -> Check {
     bench.word_is(at, words.low)
 }
 
-/// Read a span, write values.
+/// Returns a request of function 17 that reads a span and writes values.
 fn both(read: Span, write: u16, values: &[u16]) -> Vec<u8> {
     let mut request = pdu(0x17, read.first, read.len() as u16);
     request.extend(write.to_be_bytes());
@@ -173,7 +173,7 @@ fn write_first(bench: &mut Bench<'_>) -> Check {
             let reply = bench.reply(&both(span, span.first, &values))?;
             bench.ensure(
                 usize::from(reply[1]) == values.len() * 2 && words_of(&reply) == values,
-                format!("reads back what it has written: {values:04X?}"),
+                format!("the values that were written: {values:04X?}"),
             )?;
         }
     }
@@ -191,12 +191,12 @@ fn two_places(bench: &mut Bench<'_>) -> Check {
     let reply = bench.reply(&both(at(first), second, &[words.high]))?;
     bench.ensure(
         words_of(&reply) == [words.low],
-        "the first register as it was",
+        "the value of the first register from before",
     )?;
     let now = bench.read_words(words.span.up_to(2))?;
     bench.ensure(
         now == [words.low, words.high],
-        "only the second has been written",
+        "only the second register is written",
     )
 }
 
@@ -211,7 +211,7 @@ fn quantities(bench: &mut Bench<'_>) -> Check {
         (0xFFFF, 1, 2),
         (1, 0, 0),
         (1, 122, 242),
-        // The frame of 122 registers would have 257 bytes: data are left out.
+        // The frame of 122 registers would have 257 bytes, so the last data bytes are left out.
         (1, 122, 244),
         (1, 0x8001, 2),
     ] {
@@ -235,7 +235,7 @@ fn quantities_most(bench: &mut Bench<'_>) -> Check {
         };
         return bench.exception(&both(read, read.first, &[0; 121]), 2);
     };
-    // The values go back to where they came from.
+    // Write the values that the registers already have.
     let values = bench.read_words(wide.up_to(121))?;
     let reply = bench.reply(&both(run.up_to(125), wide.first, &values))?;
     bench.ensure(

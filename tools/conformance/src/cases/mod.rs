@@ -1,4 +1,4 @@
-//! The cases, by what they are about.
+//! The cases, in groups.
 
 mod addressing;
 mod ascii;
@@ -26,8 +26,8 @@ mod write_words;
 
 use crate::case::Case;
 
-/// Every case, in the order in which they run: those that reset counters and the like come late, those
-/// that restart the unit last.
+/// Every case, in the order in which they run. Cases that reset counters are late, and cases that restart the unit are
+/// last.
 #[must_use]
 pub fn all() -> Vec<Case> {
     [
@@ -69,7 +69,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn cases_about_the_modio_are_no_interpretations() {
+    fn case_about_the_modio_is_not_an_interpretation() {
         for case in all() {
             let about_modio = case.needs.contains(&Need::Modio) || case.section.starts_with("map");
             assert_eq!(case.kind == Kind::Modio, about_modio, "{}", case.name);
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_unique_and_everything_is_told() {
+    fn case_has_a_unique_name_a_source_and_a_demand() {
         let mut names = BTreeSet::new();
         for case in all() {
             assert!(names.insert(case.name), "{} twice", case.name);

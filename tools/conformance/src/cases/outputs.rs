@@ -1,4 +1,4 @@
-//! A modio's outputs when the line dies, and at power-on.
+//! The outputs of a modio when the master stops sending, and at power-on.
 
 use std::time::Duration;
 
@@ -44,7 +44,7 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// A module's first output: its function to read, its address, and values to tell two states by.
+/// The first output of a module: the function that reads it, its address, and a value other than 0.
 fn output(bench: &Bench<'_>) -> Check<(u8, u16, u16)> {
     if let Some(span) = bench.target.bits {
         return Ok((1, span.first, 1));
@@ -104,7 +104,7 @@ fn set(bench: &mut Bench<'_>, register: u16, value: u16) -> Check {
     bench.reply_is(&request, &request)
 }
 
-/// COMM_TIMEOUT in tenths of a second: where time is not exact, a busy host must not let it run out.
+/// COMM_TIMEOUT in tenths of a second. Where time is not exact it is longer, so that a busy host does not exceed it.
 fn tenths(bench: &Bench<'_>, exact: u16) -> u16 {
     if bench.endpoint.abilities().exact {
         exact
@@ -113,7 +113,7 @@ fn tenths(bench: &Bench<'_>, exact: u16) -> u16 {
     }
 }
 
-/// Does something with COMM_TIMEOUT set and SAFE of the output at 0; both go back to what they were.
+/// Calls `done` with COMM_TIMEOUT set and SAFE of the output at 0, and restores both.
 fn with_timeout(
     bench: &mut Bench<'_>,
     tenths: u16,
@@ -146,7 +146,7 @@ fn line_dies(bench: &mut Bench<'_>) -> Check {
         bench.ensure(now == 0, "the output at SAFE, 0")?;
         let tripped = bench.read_word(state::STATUS)? & state::status::COMM_WATCHDOG;
         bench.ensure(tripped != 0, "status bit 0 set: the watchdog has tripped")?;
-        // Requests bring the line back, not the outputs.
+        // Requests end the timeout, but do not restore the outputs.
         let now = read(bench, function, address)?;
         bench.ensure(now == 0, "the output at SAFE until it is written")?;
         write(bench, function, address, high)?;
@@ -172,7 +172,7 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
             let now = read(bench, function, address)?;
             bench.ensure(now == high, "the output as written")?;
         }
-        // Refused by all, but valid; that it is a read keeps the outputs out of it.
+        // Every unit ignores a broadcast read, but it is a valid message and restarts the timeout.
         let broadcast = bench.target.mode.frame(0, &bench.target.ping);
         for _ in 0..8 {
             bench.rest(timeout / 4)?;
@@ -187,7 +187,7 @@ fn line_lives(bench: &mut Bench<'_>) -> Check {
     result
 }
 
-/// The outputs of one kind, as `function` reads them.
+/// Reads the outputs of one kind by `function`.
 fn read_all(bench: &mut Bench<'_>, function: u8, span: Span) -> Check<Vec<u16>> {
     if function == 3 {
         return bench.read_words(span);
@@ -205,7 +205,7 @@ fn write_all(bench: &mut Bench<'_>, function: u8, first: u16, values: &[u16]) ->
     bench.set_bits(first, &bits)
 }
 
-/// How long before the end of COMM_TIMEOUT the first read is made, and how long after it the last.
+/// The first read is this long before the end of COMM_TIMEOUT, and the last read this long after it.
 const BEFORE: Duration = Duration::from_millis(2);
 const AFTER: Duration = Duration::from_millis(3);
 /// A unit whose replies are waited for no longer than this gets a COMM_TIMEOUT of 200 ms, others one of 500 ms.
@@ -213,7 +213,7 @@ const FAST: Duration = Duration::from_millis(30);
 /// Number of reads around the end of COMM_TIMEOUT.
 const READS: u32 = 40;
 
-/// A module's outputs of one kind.
+/// The outputs of a module, of one kind.
 fn outputs(bench: &Bench<'_>) -> Check<Span> {
     let words = bench.target.words.filter(|words| !words.locked);
     let span = bench.target.bits.or(words.map(|words| words.span));
@@ -238,7 +238,7 @@ pub(super) fn torn(bench: &mut Bench<'_>) -> Check {
     result
 }
 
-/// Writes all outputs and reads them around the instant at which the timeout ends, at another distance each time.
+/// Writes all outputs and reads them near the end of the timeout, with another offset each time.
 fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
     let (function, _, high) = output(bench)?;
     let span = outputs(bench)?;
@@ -264,7 +264,7 @@ fn reads_around_the_end(bench: &mut Bench<'_>, timeout: Duration) -> Check {
             "every output as written, or every output at SAFE",
         )?;
     }
-    // Where the watchdog never or always trips in this span of time, nothing has been tried.
+    // If the watchdog trips in none or in all of the reads, no read was near the end of the timeout.
     bench.ensure(
         held > 0 && safe > 0,
         format!("some reads before and some after the end of the timeout, not {held} and {safe}"),

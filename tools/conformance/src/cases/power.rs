@@ -1,4 +1,4 @@
-//! Switching on.
+//! Power-on.
 
 use std::time::Duration;
 
@@ -53,7 +53,7 @@ fn answers(bench: &mut Bench<'_>) -> Check {
 
 fn mid_traffic(bench: &mut Bench<'_>) -> Check {
     let line = bench.endpoint.line();
-    // From before the unit has started to well after it.
+    // Send from before the start of the unit until well after it.
     let length = (START.as_nanos() / line.characters(1).as_nanos()) as usize;
     for byte in [0x55, 0x00, 0xFF] {
         cycle(bench)?;

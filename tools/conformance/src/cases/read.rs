@@ -4,12 +4,12 @@ use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::points::pdu;
 
-/// The most that one request may ask for (V1.1b3, 6.1 to 6.4).
+/// The largest quantity of one request (V1.1b3, 6.1 to 6.4).
 const fn most(function: u8) -> u16 {
     if function <= 2 { 2000 } else { 125 }
 }
 
-/// Data bytes of a reply.
+/// Number of data bytes of a reply.
 fn data_bytes(function: u8, quantity: u16) -> usize {
     if function <= 2 {
         usize::from(quantity).div_ceil(8)
@@ -108,7 +108,7 @@ pub(super) const ALIKE: &[Case] = &[
     ),
 ];
 
-/// A place to ask at: a readable one, or 0.
+/// The first readable address, or 0.
 fn somewhere(bench: &Bench<'_>, function: u8) -> u16 {
     let first = bench.target.readable(function).first();
     first.map_or(0, |span| span.first)
@@ -143,7 +143,7 @@ fn quantity_most<const F: u8>(bench: &mut Bench<'_>) -> Check {
 fn byte_count<const F: u8>(bench: &mut Bench<'_>) -> Check {
     let span = bench.readable(F)?;
     let longest = span.len().min(u32::from(most(F))) as u16;
-    // The short ones, where padding differs, and the longest.
+    // The short quantities, whose padding differs, and the longest.
     for quantity in (1..=longest.min(17)).chain([longest]) {
         let reply = bench.reply(&pdu(F, span.first, quantity))?;
         let bytes = data_bytes(F, quantity);
@@ -204,7 +204,7 @@ fn alike<const A: u8, const B: u8>(bench: &mut Bench<'_>) -> Check {
             other.len() == before.len(),
             format!("as long as by function {A:02X}"),
         )?;
-        // Inputs and counters may move while they are read: what stands still must be the same.
+        // Inputs and counters may change between the reads. Compare only the bytes that did not change.
         let after = bench.reply(&pdu(A, span.first, quantity))?;
         for at in (1..before.len()).filter(|at| before[*at] == after[*at]) {
             bench.ensure(

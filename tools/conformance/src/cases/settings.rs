@@ -1,4 +1,4 @@
-//! Changing a modio's rate and format, and changing it back.
+//! Changes of the rate and format of a modio.
 
 use register_map::codes::{self, Baud, Format};
 
@@ -40,7 +40,7 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// Goes through rates and formats and back to the first.
+/// Changes to each of these rates and formats, and restores the first.
 fn tour(bench: &mut Bench<'_>, stops: impl IntoIterator<Item = LineFormat>) -> Check {
     rate::tour(bench, stops, |_| Ok(()))
 }

@@ -1,4 +1,4 @@
-//! When the unit speaks, and how it handles its driver.
+//! The time of a reply, and the unit's driver.
 
 use std::time::Duration;
 
@@ -68,13 +68,13 @@ pub fn silence(bench: &mut Bench<'_>) -> Check<Duration> {
     Ok(bench.endpoint.line().t35_limits().least)
 }
 
-/// From the end of the last request to the first start bit of the reply.
+/// The time from the end of the last request to the first start bit of the reply.
 fn turnaround(bench: &Bench<'_>) -> Duration {
     let first = bench.received.first().map_or(Duration::ZERO, |h| h.start);
     first.saturating_sub(bench.sent_end)
 }
 
-/// Times are cut to nanoseconds on their way here.
+/// Allowance for times that were rounded to nanoseconds.
 const ROUNDING: Duration = Duration::from_nanos(10);
 
 fn not_before(bench: &Bench<'_>, least: Duration) -> Check {
@@ -91,7 +91,7 @@ fn after_t35(bench: &mut Bench<'_>) -> Check {
     for n in 0..20 {
         bench.reply(&ping)?;
         not_before(bench, least)?;
-        // Another phase of whatever else the unit does.
+        // Change the phase between the requests and the unit's periodic work.
         bench.rest(Duration::from_micros(137 * n))?;
     }
     Ok(())
@@ -161,7 +161,7 @@ fn driver(bench: &mut Bench<'_>) -> Check {
                 last.end
             ),
         )?;
-        // Then the line is the master's: the next request may come after t3.5.
+        // The next request may follow t3.5 after the reply.
         bench.ensure(
             off <= last.end + line.t15_limits().most,
             "the driver off well before the next request may come",
@@ -183,7 +183,7 @@ fn driver_off(bench: &mut Bench<'_>) -> Check {
         mode.frame(0, &ping),
         vec![0x55; 5],
     ] {
-        bench.silence_to(&frame, "it is nothing for this unit")?;
+        bench.silence_to(&frame, "the frame is not for this unit")?;
     }
     let edges = bench.endpoint.take_driver_edges()?;
     bench.ensure(edges.is_empty(), format!("the driver stays off: {edges:?}"))

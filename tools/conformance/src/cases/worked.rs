@@ -1,4 +1,4 @@
-//! The worked frames of manuals, played against the unit.
+//! The worked frames of manuals, sent to the unit.
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
@@ -41,14 +41,17 @@ pub(super) const CASES: &[Case] = &[
 fn for_others(bench: &mut Bench<'_>) -> Check {
     let unit = bench.unit();
     for worked in frames().filter(|w| w.crc_ok() && w.bytes[0] != unit) {
-        bench.silence_to(&worked.bytes, format!("it is for unit {}", worked.bytes[0]))?;
+        bench.silence_to(
+            &worked.bytes,
+            format!("the frame is for unit {}", worked.bytes[0]),
+        )?;
         bench.alive(format!("{} {}", worked.source, worked.place))?;
     }
     Ok(())
 }
 
-/// Plays a request for this unit. What it would write there is not: on a modio no such address exists.
-fn play(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
+/// Sends a worked frame to this unit. A write to a register that exists is left out; on a modio there is none.
+fn send(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
     let function = frame[1];
     if let [_, 6 | 0x10, high, low, ..] = *frame {
         let address = u16::from_be_bytes([high, low]);
@@ -90,8 +93,8 @@ fn for_this(bench: &mut Bench<'_>) -> Check {
         return skip(format!("no worked frame is for unit {unit}"));
     }
     for worked in mine {
-        // An echo is request and reply at once.
-        play(bench, &worked, &worked.bytes)?;
+        // The file has a request and its echo as one frame.
+        send(bench, &worked, &worked.bytes)?;
     }
     bench.alive("the worked frames")
 }
@@ -100,7 +103,7 @@ fn readdressed(bench: &mut Bench<'_>) -> Check {
     for worked in frames().filter(|worked| worked.request) {
         let body = &worked.bytes[1..worked.bytes.len() - 2];
         let frame = rtu(&[&[bench.unit()], body].concat());
-        play(bench, &worked, &frame)?;
+        send(bench, &worked, &frame)?;
     }
     bench.alive("the worked requests")
 }
@@ -109,12 +112,12 @@ fn errata(bench: &mut Bench<'_>) -> Check {
     for worked in frames().filter(|worked| !worked.crc_ok()) {
         let mut mine = worked.bytes.clone();
         mine[0] = bench.unit();
-        // The misprint may be right for another address.
+        // The printed CRC may be right for this unit's address.
         let (body, check) = mine.split_at(mine.len() - 2);
         let right = crc(body) == check;
         let frames = [worked.bytes.clone(), mine];
         for frame in frames.iter().take(if right { 1 } else { 2 }) {
-            bench.silence_to(frame, "its CRC is wrong")?;
+            bench.silence_to(frame, "the CRC is wrong")?;
             bench.alive(format!("{} {}", worked.source, worked.place))?;
         }
     }

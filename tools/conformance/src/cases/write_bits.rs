@@ -174,7 +174,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
     let at = bench.target.bits.map_or(0, |span| span.first);
     bench.exception(&[pdu(0x0F, at, 0), vec![0]].concat(), 3)?;
     bench.exception(&[pdu(0x0F, at, 0), vec![1, 0]].concat(), 3)?;
-    // 1969 coils take 247 bytes, and their frame, at 256 bytes, still is one.
+    // 1969 coils need 247 bytes. Their frame has 256 bytes, which is still a valid length.
     for (quantity, bytes) in [(1969, 247_u8), (1976, 247), (2048, 0), (0xFFFF, 247)] {
         let data = vec![0; usize::from(bytes)];
         let request = [pdu(0x0F, at, quantity), vec![bytes], data].concat();
@@ -199,7 +199,7 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
         if !bench.target.has(1) {
             return skip("the coils cannot be read first");
         }
-        // What the coils hold is written back to them.
+        // Write the values that the coils already have.
         let values = bench.read_bits(span.up_to(1968))?;
         let request = write_bits(span.first, &values, false);
         return bench.reply_is(&request, &request[..5]);
@@ -246,7 +246,7 @@ fn padding(bench: &mut Bench<'_>) -> Check {
 fn past_the_end(bench: &mut Bench<'_>) -> Check {
     let span = bench.bits()?;
     let readable = bench.target.readable(1).to_vec();
-    // The run that the coils are in may go on beyond those to write to.
+    // The run with these coils may have more coils after them.
     let Some(run) = readable.iter().find(|run| run.has(span.last)).copied() else {
         return bench.fail("the coils to write to can be read");
     };

@@ -178,7 +178,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
     let at = bench.target.words.map_or(0, |words| words.span.first);
     bench.exception(&[pdu(0x10, at, 0), vec![0]].concat(), 3)?;
     bench.exception(&[pdu(0x10, at, 0), vec![2, 0, 1]].concat(), 3)?;
-    // 124 registers would make a frame of 257 bytes: data are left out.
+    // The frame of 124 registers would have 257 bytes, so the last data bytes are left out.
     for (quantity, count) in [
         (124, 246),
         (124, 248_u8),
@@ -193,7 +193,7 @@ fn quantity_out_of_range(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-/// The 123 registers that a test may write to, if the unit has so many. Their values must go back to them.
+/// The 123 registers that a case may write to, if the unit has that many. The case must restore their values.
 pub(super) fn wide(bench: &mut Bench<'_>) -> Check<Option<Span>> {
     let config = bench.target.modio.is_some() && bench.allow_config && bench.target.has(3);
     if config {
@@ -245,9 +245,12 @@ fn quantity_most(bench: &mut Bench<'_>) -> Check {
         let request = write_words(span.first, &values);
         bench.reply_is(&request, &request[..5])?;
         let now = bench.read_words(span)?;
-        return bench.ensure(now == values, "the registers hold what was written");
+        return bench.ensure(
+            now == values,
+            "the registers have the values that were written",
+        );
     }
-    // Off the end of what there is, wherever that is.
+    // A range that ends at an address that does not exist.
     let nowhere = bench.nowhere(3)?;
     let first = nowhere.saturating_sub(122);
     bench.exception(&write_words(first, &[0; 123]), 2)
@@ -298,7 +301,7 @@ fn partly_out(bench: &mut Bench<'_>) -> Check {
     let Some(run) = readable.iter().find(|run| run.has(words.span.last)) else {
         return bench.fail("the registers to write to can be read");
     };
-    // The last registers of the run, and the one after them that is not there.
+    // The last registers of the run, and the address after them, which does not exist.
     for count in 1..=run.len().min(8) as u16 {
         let tail = Span {
             first: run.last - (count - 1),

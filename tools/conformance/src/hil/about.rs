@@ -1,4 +1,4 @@
-//! What was tested, with what, where and when: for the reports.
+//! The unit, the adapter, the computer and the date of a run, for the reports.
 
 use std::fmt;
 use std::path::Path;
@@ -20,20 +20,20 @@ const MAP_WITH_COMMIT: u16 = 2;
 /// whose bit 0 is set when the tree had uncommitted changes.
 const COMMIT: u16 = 0x020C;
 
-/// Where and when a run took place, and with what.
+/// The circumstances of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct About {
-    /// Date and time of its begin, in UTC, as RFC 3339 has them.
+    /// Date and time of the begin in UTC, in the form of RFC 3339.
     pub date: String,
     /// Name, operating system and architecture of the computer.
     pub host: String,
     /// Version of this program.
     pub version: String,
-    /// Commit of the tree that this program was built in, if it is still there.
+    /// Commit of the tree that this program was built in, if the tree still exists.
     pub commit: Option<String>,
-    /// The USB adapter on whose port the line is, if it is one.
+    /// The USB adapter of the port, if the port has one.
     pub adapter: Option<Adapter>,
-    /// The unit, once it has answered.
+    /// The unit, after it has answered.
     pub unit: Option<Unit>,
 }
 
@@ -48,14 +48,14 @@ pub struct Adapter {
     pub serial_number: Option<String>,
 }
 
-/// The unit, by its own registers.
+/// The unit, read from its registers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unit {
     /// Its address.
     pub address: u8,
     /// Version of its firmware.
     pub firmware: String,
-    /// First 32 bits of the commit that its image was built from; `None` when its register map has none.
+    /// First 32 bits of the commit that its image was built from; `None` when its register map has no commit.
     pub commit: Option<String>,
     /// Its unique identity, in hexadecimal.
     pub identity: String,
@@ -64,7 +64,7 @@ pub struct Unit {
 }
 
 impl About {
-    /// Everything but the unit: now, on this computer, through this port.
+    /// Describes this computer, this port and this instant. The unit is added later.
     #[must_use]
     pub fn here(port: Option<&Path>) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl About {
             ),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: commit(Path::new(env!("CARGO_MANIFEST_DIR"))),
-            // Without a list of ports the run is as good: the report names no adapter.
+            // If the ports cannot be listed, the report names no adapter.
             adapter: port.and_then(|port| adapter(port, &serialport::available_ports().ok()?)),
             unit: None,
         }
@@ -105,7 +105,7 @@ impl About {
         all
     }
 
-    /// The same in JSON; what is not known is null.
+    /// Returns the description in JSON. Unknown values are null.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({
@@ -140,11 +140,11 @@ impl fmt::Display for Adapter {
 }
 
 impl Unit {
-    /// Asks the unit, a modio with these modules.
+    /// Reads the registers of the unit, a modio with these modules.
     ///
     /// # Errors
     ///
-    /// [`Stop::Fail`](crate::case::Stop::Fail) when it does not give its registers, `Stop::Broken`.
+    /// [`Stop::Fail`](crate::case::Stop::Fail) when the registers cannot be read, `Stop::Broken`.
     pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
         let mut read = |first, count: u16| {
             bench.read_words(Span {
@@ -174,7 +174,7 @@ impl Unit {
     }
 }
 
-/// The adapter that has this port, which may be a link to it.
+/// The adapter of this port. The path may be a link to the port.
 fn adapter(port: &Path, ports: &[SerialPortInfo]) -> Option<Adapter> {
     let name = port.canonicalize().unwrap_or_else(|_| port.to_owned());
     let found = ports.iter().find(|one| Path::new(&one.port_name) == name)?;

@@ -1,5 +1,5 @@
-//! Tries the analog wires of a bench: each output in turn takes five values over its range, its input must be
-//! within the tolerance of each after the time given, and no other input may move. All outputs are put back.
+//! Tests the analog wires of a bench. Each output in turn is set to five values over its range. Its input must be within
+//! the tolerance of each value after the time given, and no other input may change. All outputs are restored.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -14,19 +14,19 @@ use crate::hil::remote::{put_back, read_word, registers, write_word};
 use crate::hil::report::Finding;
 use crate::hil::verdict;
 
-/// Tries all wires, or those before `stop` is set; `tell` gets each finding.
+/// Tests the wires until `stop` is set. Calls `report` with each finding.
 ///
 /// # Errors
 ///
-/// [`Stop::Broken`] when the line is gone, [`Stop::Fail`] when an output could not be put back.
+/// [`Stop::Broken`] when the line no longer works, [`Stop::Fail`] when an output could not be restored.
 pub fn run(
     bench: &mut Bench<'_>,
     wires: &[Analog],
     stop: &AtomicBool,
-    mut tell: impl FnMut(Finding),
+    mut report: impl FnMut(Finding),
 ) -> Check {
     let mut before: Vec<(Place, u16)> = Vec::new();
-    let tried = try_all(bench, wires, stop, &mut before, &mut tell);
+    let tried = try_all(bench, wires, stop, &mut before, &mut report);
     let mut restored = Ok(());
     for (output, value) in before {
         restored = restored.and(put_back(|| write_word(bench, output, value)));
@@ -34,7 +34,7 @@ pub fn run(
     tried.and(restored)
 }
 
-/// A wire, the lowest and the highest value of its output, and what its input is at the lowest.
+/// A wire, the lowest and the highest value of its output, and the value of its input at the lowest.
 struct Known {
     wire: Analog,
     range: Check<(u16, u16)>,
@@ -46,7 +46,7 @@ fn try_all(
     wires: &[Analog],
     stop: &AtomicBool,
     before: &mut Vec<(Place, u16)>,
-    tell: &mut impl FnMut(Finding),
+    report: &mut impl FnMut(Finding),
 ) -> Check {
     let mut known = Vec::new();
     for wire in wires {
@@ -63,7 +63,7 @@ fn try_all(
     let slowest = wires.iter().map(|wire| wire.within).max();
     bench.rest(slowest.unwrap_or_default())?;
     for one in known.iter_mut().filter(|one| one.range.is_ok()) {
-        // An input that cannot be read fails its own wire.
+        // If an input cannot be read, the test of this wire fails later.
         one.at_lowest = read_word(bench, 4, one.wire.to).ok();
     }
     for Known { wire, range, .. } in &known {
@@ -74,12 +74,12 @@ fn try_all(
         let mut worst = 0;
         let followed = range.clone().and_then(|range| {
             let followed = follow(bench, wire, range, &known, &mut worst);
-            // At the lowest value again, whatever it was that failed: the next wire wants it so.
+            // Restore the lowest value also after a failure: the tests of the other wires need it.
             followed.and(write_word(bench, wire.from, range.0))
         });
-        tell(Finding {
+        report(Finding {
             name: format!("analog/{wire}"),
-            about: "the input follows the output within the tolerance, and no other does"
+            about: "the input follows the output within the tolerance, and no other input changes"
                 .to_owned(),
             note: format!("largest difference {worst}"),
             verdict: verdict(followed)?,
@@ -114,7 +114,7 @@ fn lowest(
         return Err(Stop::Fail(Failure {
             sent: format!("RANGE and SCALE of {}", wire.from),
             came: format!("{signal} and {scale}"),
-            wanted: "those of an analog output".to_owned(),
+            wanted: "RANGE and SCALE of an analog output".to_owned(),
         }));
     };
     write_word(bench, wire.from, min)?;
@@ -130,8 +130,8 @@ fn setting(bench: &mut Bench<'_>, place: Place) -> Check<(u16, u16)> {
     ))
 }
 
-/// Takes the output through its range, and watches the inputs; `worst` is the largest difference that was within
-/// the tolerance.
+/// Sets the output to values over its range, and reads the inputs. `worst` is the largest difference within the
+/// tolerance.
 fn follow(
     bench: &mut Bench<'_>,
     wire: &Analog,
@@ -152,15 +152,18 @@ fn follow(
         if input.abs_diff(at_lowest) > other.wire.tolerance {
             return Err(Stop::Fail(Failure {
                 sent: format!("{} at {max}", wire.from),
-                came: format!("{} went from {at_lowest} to {input} as well", other.wire.to),
-                wanted: format!("{} follows {} alone", other.wire.to, other.wire.from),
+                came: format!(
+                    "{} changed from {at_lowest} to {input} as well",
+                    other.wire.to
+                ),
+                wanted: format!("{} follows {} only", other.wire.to, other.wire.from),
             }));
         }
     }
     Ok(())
 }
 
-/// Waits as long as the input may take, and compares it with the output; returns the difference.
+/// Waits for the time that the input may need, and compares the input with the output. Returns the difference.
 fn compare(bench: &mut Bench<'_>, wire: &Analog, value: u16) -> Check<u16> {
     bench.rest(wire.within)?;
     let input = read_word(bench, 4, wire.to)?;

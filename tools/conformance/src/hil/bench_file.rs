@@ -7,7 +7,7 @@
 //! unit = 1
 //! baud = 9600
 //! format = "8N2"
-//! module = "4do"                       # the run ends if the first slot holds another
+//! module = "4do"                       # the run ends if the first slot has another module
 //! power_cmd = "uhubctl -l 1-1 -p 2 -a" # followed by off or on
 //! reset_cmd = "./press-reset"
 //!
@@ -16,7 +16,7 @@
 //! to = { unit = 2, point = 0x0010 }
 //! within_ms = 50                       # 100 when left out
 //! inverted = true                      # the input is off when the output is on; false when left out
-//! pulses = 100                         # the input's pulse counter counts so many; 0 when left out
+//! pulses = 100                         # number of pulses that the input must count; 0 when left out
 //!
 //! [[analog]]                           # an analog output to an analog input
 //! from = { unit = 3, point = 0x0012 }
@@ -40,7 +40,7 @@ use toml::Spanned;
 
 use crate::line::CharacterFormat;
 
-/// What a bench file says.
+/// The contents of a bench file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BenchFile {
     /// The serial port.
@@ -193,11 +193,11 @@ fn unit<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u8>, D::Error> {
 }
 
 fn point<'de, D: Deserializer<'de>>(from: D) -> Result<u16, D::Error> {
-    let told = i64::deserialize(from)?;
-    let point = u16::try_from(told).ok();
+    let number = i64::deserialize(from)?;
+    let point = u16::try_from(number).ok();
     point
         .filter(|point| *point < points::COUNT)
-        .ok_or_else(|| D::Error::custom(format!("point = {told:#06x} is not 0 to 0x001F")))
+        .ok_or_else(|| D::Error::custom(format!("point = {number:#06x} is not 0 to 0x001F")))
 }
 
 fn baud<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u32>, D::Error> {
@@ -218,7 +218,7 @@ fn within<'de, D: Deserializer<'de>>(from: D) -> Result<Duration, D::Error> {
     }
 }
 
-/// A value that is written as the command line has it.
+/// Parses a value that is written as on the command line.
 fn text<'de, D: Deserializer<'de>, T: FromStr<Err: fmt::Display>>(
     from: D,
 ) -> Result<Option<T>, D::Error> {
@@ -226,7 +226,7 @@ fn text<'de, D: Deserializer<'de>, T: FromStr<Err: fmt::Display>>(
     text.parse().map(Some).map_err(D::Error::custom)
 }
 
-/// What is wrong, and where in the file.
+/// An error and its place in the file.
 type Wrong = (Range<usize>, String);
 
 impl BenchFile {
@@ -234,7 +234,7 @@ impl BenchFile {
     ///
     /// # Errors
     ///
-    /// The first thing that is wrong with it, in one line: `LINE: what`.
+    /// The first error in the file, in one line: `LINE: what`.
     pub fn parse(content: &str, unit: Option<u8>) -> Result<Self, String> {
         let found = toml::from_str::<File>(content).map_err(|error| {
             let what = error.message().replace('\n', " ");

@@ -1,4 +1,4 @@
-//! The command line of `modio-hil`, and of `cargo xtask hil`, which passes everything on to it.
+//! The command line of `modio-hil`, and of `cargo xtask hil`, which passes its arguments on.
 
 use std::path::PathBuf;
 
@@ -9,11 +9,11 @@ use register_map::codes::Baud;
 use crate::line::CharacterFormat;
 use crate::program::Files;
 
-/// Tests a modio on a bench: the conformance suite, how soon and how surely it answers at each rate, and
-/// the wires from outputs to inputs.
+/// Tests a modio on a bench: the conformance suite, the turnaround and lost frames at each rate, and the wires from
+/// outputs to inputs.
 ///
-/// Leaves the unit as it was, also after Ctrl-C. Exit status: 0 all is well, 1 something failed, 2 it could
-/// not be tested, 130 interrupted.
+/// Leaves the unit as it was, also after Ctrl-C. Exit status: 0 all tests passed, 1 a test failed, 2 nothing could
+/// be tested, 130 interrupted.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "modio-hil", version)]
 pub struct Cli {
@@ -26,7 +26,7 @@ pub struct Cli {
     #[arg(long, value_name = "PORT")]
     pub port: Option<PathBuf>,
 
-    /// Raw bytes over TCP in its place: a serial device server
+    /// Raw bytes over TCP instead of a serial port: a serial device server
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "port")]
     pub tcp: Option<String>,
 
@@ -46,8 +46,8 @@ pub struct Cli {
     #[arg(long, value_name = "CMD")]
     pub reset_cmd: Option<String>,
 
-    /// Run this in a shell, followed by ` off` or ` on`, to switch the unit's power; without it the cases that need
-    /// that are skipped
+    /// Run this in a shell, followed by ` off` or ` on`, to switch the unit's power; without it the cases that
+    /// switch the power are skipped
     #[arg(long, value_name = "CMD")]
     pub power_cmd: Option<String>,
 
@@ -67,7 +67,7 @@ pub struct Cli {
     #[arg(long, value_name = "NAME")]
     pub module: Option<Module>,
 
-    /// Run the cases too that write the unit's configuration; they put it back
+    /// Run also the cases that write the unit's configuration; they restore it
     #[arg(long)]
     pub allow_config: bool,
 
@@ -83,20 +83,20 @@ pub struct Cli {
     #[arg(long, value_name = "N", default_value_t = 2000)]
     pub requests: u32,
 
-    /// Measure at these rates, such as 9600,115200, or `all`; the unit's configuration is saved on the
-    /// way and put back [default: the present one]
+    /// Measure at these rates, such as 9600,115200, or `all`; the unit's configuration is saved at each
+    /// rate and restored [default: the present rate]
     #[arg(long, value_name = "LIST", value_parser = rates)]
     pub rates: Option<Rates>,
 
-    /// Fail when more than one turnaround of a hundred is above this
+    /// Fail when more than one turnaround in a hundred is longer than this
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     pub limit: Option<u64>,
 
-    /// What stays silent for so long, in ms, is silent [default: 250]
+    /// Time to wait, in ms, before a unit that must not reply counts as silent [default: 250]
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     pub patience: Option<u64>,
 
-    /// Where the results go
+    /// Files for the results
     #[command(flatten)]
     pub reports: Files,
 }
@@ -115,7 +115,10 @@ fn rates(text: &str) -> Result<Rates, String> {
         rate.filter(|rate| known().any(|other| other == *rate))
             .ok_or_else(|| {
                 let all: Vec<String> = known().map(|rate| rate.to_string()).collect();
-                format!("{part:?} is none of {}", all.join(" "))
+                format!(
+                    "{part:?} is not a rate of the device; use one of {}",
+                    all.join(" ")
+                )
             })
     };
     text.split(',')
@@ -167,6 +170,9 @@ mod tests {
         assert_eq!(rates("9600, 115200"), Ok(Rates(vec![9600, 115_200])));
         assert_eq!(rates("all").unwrap().0.len(), Baud::ALL.len());
         let text = rates("9600,300").unwrap_err();
-        assert!(text.starts_with("\"300\" is none of 1200 "), "{text}");
+        assert!(
+            text.starts_with("\"300\" is not a rate of the device; use one of 1200 "),
+            "{text}"
+        );
     }
 }

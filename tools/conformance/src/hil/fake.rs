@@ -1,4 +1,4 @@
-//! Units on a line in a time of its own: as much of a modio as the bench asks for, with faults to order.
+//! Fake units on a line in virtual time: the part of a modio that the bench uses, with faults that a test can choose.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -101,12 +101,12 @@ impl Unit {
     }
 }
 
-/// What becomes of a request and its reply.
+/// What happens to a request and its reply.
 pub(super) enum Fate {
     Good,
     /// The unit does not receive it.
     Lost,
-    /// The reply is that to another request.
+    /// The unit sends the reply to another request.
     Stale,
 }
 
@@ -121,16 +121,16 @@ pub(super) struct Line {
     pub wires: Vec<[(u8, u16); 2]>,
     /// Analog inputs that follow analog outputs: unit and point of both, and the input's error.
     pub analog: Vec<([(u8, u16); 2], u16)>,
-    /// The pulse counters count so many for each rising edge.
+    /// Number that the pulse counters count for each rising edge.
     pub counts: u16,
-    /// Decides about every frame that is sent.
+    /// Decides what happens to each frame that is sent.
     pub watch: Watch,
-    /// A rate that the endpoint lacks.
+    /// A rate that the endpoint does not support.
     pub lacks: Option<u32>,
     reply: Vec<Received>,
 }
 
-/// From the end of a request to the reply.
+/// Time from the end of a request to the reply.
 pub(super) const TURNAROUND: Duration = Duration::from_micros(4100);
 
 impl Line {
@@ -154,7 +154,7 @@ impl Line {
         units.find(|unit| unit.address == address).unwrap()
     }
 
-    /// Lets inputs follow their outputs.
+    /// Sets inputs to the values of their outputs.
     fn carry(&mut self) {
         for [(unit, output), (other, input)] in self.wires.clone() {
             let level = self.unit(unit).bits[usize::from(output)];

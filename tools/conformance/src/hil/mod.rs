@@ -45,7 +45,7 @@ pub mod wires;
 use bench_file::{Analog, Wire};
 use report::{Finding, Report};
 
-/// The unit address of loader mode, in which the line has its own rate, whatever is stored.
+/// The unit address of loader mode, in which the line has a fixed rate.
 const LOADER: u8 = 255;
 
 /// Bits of the unit's status: settings are not saved, or not in force.

@@ -1,4 +1,4 @@
-//! Asks any unit on the line for one of its points, and puts outputs back.
+//! Reads and writes points of any unit on the line, and restores outputs.
 
 use crate::bench::Bench;
 use crate::case::Check;
@@ -7,7 +7,7 @@ use crate::hil::bench_file::Place;
 use crate::points::{pdu, words_of};
 use crate::target::Target;
 
-/// How often an output is written before it counts as not put back.
+/// Number of attempts to restore an output.
 const ATTEMPTS: u32 = 3;
 
 /// Reads a bit by function 01, as an output, or 02, as an input.
@@ -49,7 +49,7 @@ pub(super) fn registers(
     Ok(words_of(&ask(bench, place, &request, right)?))
 }
 
-/// Does something that puts an output back, again if it fails: a lost frame must not leave the output elsewhere.
+/// Restores an output by calling `write`, and repeats a failed attempt: one lost frame must not leave the output changed.
 pub(super) fn put_back(mut write: impl FnMut() -> Check) -> Check {
     let mut done = write();
     for _ in 1..ATTEMPTS {
@@ -60,7 +60,7 @@ pub(super) fn put_back(mut write: impl FnMut() -> Check) -> Check {
     done
 }
 
-/// Asks a unit on the line, and wants a reply that is right.
+/// Sends a request to a unit on the line. Returns the reply if it is right.
 fn ask(
     bench: &mut Bench<'_>,
     place: Place,

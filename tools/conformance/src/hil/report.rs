@@ -18,22 +18,22 @@ use crate::run::{Outcome, Verdict};
 pub struct Finding {
     /// What was tested: a group, a slash, a name.
     pub name: String,
-    /// What must be so.
+    /// The demand.
     pub about: String,
-    /// What was measured on the way, if anything.
+    /// A measurement, if there is one.
     pub note: String,
-    /// How it ended.
+    /// The verdict.
     pub verdict: Verdict,
-    /// How long it took.
+    /// The duration.
     pub time: Duration,
 }
 
 /// All results.
 #[derive(Clone, Default)]
 pub struct Report {
-    /// What was tested, with what, where and when.
+    /// The circumstances of the run.
     pub about: About,
-    /// What the unit was tested through.
+    /// The name of the endpoint.
     pub endpoint: String,
     /// The cases of the suite.
     pub outcomes: Vec<Outcome>,

@@ -1,9 +1,9 @@
-//! How times are spread: minimum, percentiles, maximum, and a histogram for people.
+//! The distribution of times: minimum, percentiles, maximum, and a histogram for people.
 
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// Lines of a histogram, the one for outliers not counted.
+/// Number of lines of a histogram, without the line for outliers.
 const LINES: u128 = 20;
 
 /// The longest bar, in characters.
@@ -16,7 +16,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Sorts them; `None` when there is none.
+    /// Sorts times; `None` when there are none.
     #[must_use]
     pub fn of(mut times: Vec<Duration>) -> Option<Self> {
         times.sort_unstable();
@@ -24,7 +24,7 @@ impl Spread {
     }
 
     /// The time that `percent` of a hundred times do not exceed, by the nearest rank: 0 is the minimum,
-    /// 50 the median, 100 the maximum. Every one is a time that was measured.
+    /// 50 the median, 100 the maximum. Each result is a time that was measured.
     #[must_use]
     pub fn percentile(&self, percent: u8) -> Duration {
         let count = self.times.len();
@@ -32,7 +32,7 @@ impl Spread {
         self.times[rank.max(1) - 1]
     }
 
-    /// A line for every step of time from the minimum to the 99th percentile, one for what is above.
+    /// Returns a line for each step from the minimum to the 99th percentile, and one line for longer times.
     #[must_use]
     pub fn histogram(&self) -> String {
         let (first, top) = (
@@ -55,7 +55,7 @@ impl Spread {
         let mut text = String::new();
         for (count, low) in counts.iter().zip((begin..).step_by(step as usize)) {
             let bar = "#".repeat((count * BAR).div_ceil(most));
-            // A String takes everything.
+            // Writing to a String cannot fail.
             let line = format!("  {:>9} ms  {count:>6}  {bar}", ms(low));
             let _ = writeln!(text, "{}", line.trim_end());
         }
@@ -71,7 +71,7 @@ fn ms(us: u128) -> String {
     format!("{}.{:03}", us / 1000, us % 1000)
 }
 
-/// The next of 1, 2, 5, 10, 20, 50 and so on.
+/// Rounds up to 1, 2, 5, 10, 20, 50 and so on.
 fn round_up(least: u128) -> u128 {
     let mut decade = 1;
     loop {
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_histogram_counts_every_time_once_and_outliers_apart() {
+    fn histogram_counts_each_time_once_and_outliers_separately() {
         let mut times: Vec<u64> = (0..999).map(|n| 4000 + n % 100).collect();
         times.push(900_000);
         let text = spread(times).histogram();
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_times_are_one_line() {
+    fn equal_times_give_one_line() {
         let text = spread([5; 3]).histogram();
         assert_eq!(text.lines().count(), 1, "{text}");
         assert!(text.contains("0.005 ms") && text.contains(" 3 "), "{text}");

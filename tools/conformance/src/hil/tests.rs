@@ -276,9 +276,9 @@ fn unit_with_another_module_than_the_bench_is_not_tested() {
         ..plan(&line)
     };
     let (report, ended) = run_plan(&mut line, &plan, &never());
-    let told = ended.unwrap_err();
+    let error = ended.unwrap_err();
     assert_eq!(
-        told,
+        error,
         "unit 1 has the module 4do in force, but the bench has 4ao"
     );
     assert!(report.timing.is_empty());

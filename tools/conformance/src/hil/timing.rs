@@ -1,10 +1,9 @@
-//! How soon and how surely the unit answers at one rate.
+//! Turnaround and lost frames at one rate.
 //!
-//! Each request is an echo (08/00) with a number of its own, so that a late or doubled reply is not taken
-//! for the next one's. The *turnaround* is the line's silence between request and reply: the unit may not
-//! answer before t3.5. Where the endpoint's time is exact it is seen; elsewhere it is what remains of the
-//! whole exchange without the time of its characters, so it has the delays of adapter and operating system
-//! in it.
+//! Each request is an echo (08/00) with a unique number, so that a late or repeated reply is not mistaken for the reply to
+//! the next request. The *turnaround* is the silence between request and reply; the unit must not answer before t3.5.
+//! Where the endpoint's time is exact, the turnaround is measured. Elsewhere it is the time of the whole exchange minus
+//! the time of its characters, so it includes the delays of the adapter and the operating system.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,10 +19,10 @@ use crate::line::LineFormat;
 use crate::points::pdu;
 use crate::run::Verdict;
 
-/// After so many requests in a row without a reply the rest is not tried.
+/// Number of requests in a row without a reply after which the measurement ends.
 const GIVE_UP: u32 = 20;
 
-/// What came of the requests at one rate.
+/// The result of the requests at one rate.
 #[derive(Clone, Debug)]
 pub struct Tally {
     /// Rate and format.
@@ -32,22 +31,22 @@ pub struct Tally {
     pub sent: u32,
     /// Requests without a reply.
     pub lost: u32,
-    /// Replies that are not the right one.
+    /// Wrong replies.
     pub wrong: u32,
-    /// Whether so many were lost in a row that it was given up.
+    /// Whether the measurement ended early because too many requests in a row were lost.
     pub given_up: bool,
-    /// The first exchange that went wrong.
+    /// The first exchange that failed.
     pub example: Option<Failure>,
-    /// The turnarounds of the others.
+    /// The turnarounds of the exchanges that succeeded.
     pub spread: Option<Spread>,
-    /// The shortest turnaround that the unit may have: t3.5, or its FRAME_GAP.
+    /// The shortest turnaround that is allowed: t3.5, or the unit's FRAME_GAP.
     pub least: Duration,
 }
 
-/// Turnarounds are measured to a microsecond at best.
+/// Resolution of the measured turnarounds.
 const TOLERANCE: Duration = Duration::from_micros(1);
 
-/// The least time that so many requests take at the line's rate.
+/// The shortest time that this number of requests takes at the line's rate.
 #[must_use]
 pub fn least(bench: &Bench<'_>, requests: u32) -> Duration {
     let line = bench.endpoint.line();
@@ -59,7 +58,7 @@ fn echo(number: u16) -> Vec<u8> {
     pdu(8, 0, number)
 }
 
-/// Sends so many requests, each as soon as the line allows; fewer when `stop` is set meanwhile.
+/// Sends this number of requests, each as soon as the line allows. Ends early when `stop` is set.
 ///
 /// # Errors
 ///
@@ -122,8 +121,8 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
 }
 
 impl Tally {
-    /// Whether every request got its reply, none before its time, and 99 of 100 replies came within the limit if
-    /// there is one.
+    /// Passes when every request got its reply, no reply was early, and 99 of 100 turnarounds are within the limit, if
+    /// there is a limit.
     #[must_use]
     pub fn verdict(&self, limit: Option<Duration>) -> Verdict {
         let bad = |came: String, wanted: String| {

@@ -1,4 +1,4 @@
-//! Wires, pulses and analog values on fake units: what passes, what fails, and that outputs are put back.
+//! Wires, pulses and analog values on fake units: the verdicts, and that outputs are restored.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ const WIRES: &str = "[[wire]]\nfrom = { point = 16 }\nto = { unit = 2, point = 1
                      [[wire]]\nfrom = { point = 17 }\nto = { unit = 2, point = 17 }\n";
 
 #[test]
-fn wires_as_described_pass_and_outputs_are_put_back() {
+fn wires_as_described_pass_and_outputs_are_restored() {
     let (mut line, plan) = wired(WIRES);
     let (report, ended) = run_plan(&mut line, &plan, &never());
     assert_eq!(ended, Ok(()));
@@ -34,7 +34,7 @@ fn wires_as_described_pass_and_outputs_are_put_back() {
 }
 
 #[test]
-fn wires_that_are_not_so_fail_each_with_its_reason() {
+fn wrong_wires_fail_each_with_its_reason() {
     let failing = |mut line: Line, plan: Plan| {
         let (report, ended) = run_plan(&mut line, &plan, &never());
         assert_eq!(ended, Ok(()));
@@ -56,7 +56,7 @@ fn wires_that_are_not_so_fail_each_with_its_reason() {
     line.wires.push([(1, 16), (2, 17)]);
     let crossed = failing(line, plan).concat();
     assert!(
-        crossed.contains("unit 2 point 0x0011 went on as well"),
+        crossed.contains("unit 2 point 0x0011 changed to on as well"),
         "{crossed}"
     );
 
@@ -115,7 +115,7 @@ fn analog() -> (Line, Plan) {
 }
 
 #[test]
-fn analog_wires_within_the_tolerance_pass_and_outputs_are_put_back() {
+fn analog_wires_within_the_tolerance_pass_and_outputs_are_restored() {
     let (mut line, plan) = analog();
     let (report, ended) = run_plan(&mut line, &plan, &never());
     assert_eq!(ended, Ok(()));
@@ -126,7 +126,7 @@ fn analog_wires_within_the_tolerance_pass_and_outputs_are_put_back() {
 }
 
 #[test]
-fn analog_wires_that_are_not_so_fail_each_with_its_reason() {
+fn wrong_analog_wires_fail_each_with_its_reason() {
     let failing = |mut line: Line, plan: Plan| {
         let (report, ended) = run_plan(&mut line, &plan, &never());
         assert_eq!(ended, Ok(()));
@@ -161,7 +161,7 @@ fn analog_wires_that_are_not_so_fail_each_with_its_reason() {
     line.analog[1].0[0] = (1, 18);
     let crossed = failing(line, plan).concat();
     assert!(
-        crossed.contains("unit 1 point 0x0011 went from 20 to 4115 as well"),
+        crossed.contains("unit 1 point 0x0011 changed from 20 to 4115 as well"),
         "{crossed}"
     );
 
@@ -175,7 +175,7 @@ fn analog_wires_that_are_not_so_fail_each_with_its_reason() {
 }
 
 #[test]
-fn an_interrupt_among_the_wires_puts_outputs_back() {
+fn interrupt_during_the_wires_restores_outputs() {
     let (mut line, plan) = wired(WIRES);
     let stop = Arc::new(never());
     let pressed = Arc::clone(&stop);

@@ -1,6 +1,6 @@
-//! Tries the digital wires of a bench: each output in turn goes on and off, its input must follow in time, and no
-//! other input may. Where pulses are wanted, the input's counter must count each of them once. All outputs are put
-//! back.
+//! Tests the digital wires of a bench. Each output in turn is switched on and off. Its input must follow in time, and no
+//! other input may change. If the bench file asks for pulses, the input's counter must count each pulse once. All outputs
+//! are restored.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -15,19 +15,19 @@ use crate::hil::report::Finding;
 use crate::hil::verdict;
 use crate::run::Verdict;
 
-/// Tries all wires, or those before `stop` is set; `tell` gets each finding.
+/// Tests the wires until `stop` is set. Calls `report` with each finding.
 ///
 /// # Errors
 ///
-/// [`Stop::Broken`] when the line is gone, [`Stop::Fail`] when an output could not be put back.
+/// [`Stop::Broken`] when the line no longer works, [`Stop::Fail`] when an output could not be restored.
 pub fn run(
     bench: &mut Bench<'_>,
     wires: &[Wire],
     stop: &AtomicBool,
-    mut tell: impl FnMut(Finding),
+    mut report: impl FnMut(Finding),
 ) -> Check {
     let mut before: Vec<(Place, bool)> = Vec::new();
-    let tried = try_all(bench, wires, stop, &mut before, &mut tell);
+    let tried = try_all(bench, wires, stop, &mut before, &mut report);
     let mut restored = Ok(());
     for (output, on) in before {
         restored = restored.and(put_back(|| write_bit(bench, output, on)));
@@ -40,7 +40,7 @@ fn try_all(
     wires: &[Wire],
     stop: &AtomicBool,
     before: &mut Vec<(Place, bool)>,
-    tell: &mut impl FnMut(Finding),
+    report: &mut impl FnMut(Finding),
 ) -> Check {
     let mut dead: Vec<(Place, Failure)> = Vec::new();
     for Wire { from, .. } in wires {
@@ -62,14 +62,14 @@ fn try_all(
             break;
         }
         let dead = dead.iter().find(|(place, _)| *place == wire.from);
-        tell(try_one(
+        report(try_one(
             bench,
             wire,
             wires,
             dead.map(|(_, failure)| failure),
         )?);
         if wire.pulses > 0 && dead.is_none() && !stop.load(Ordering::Relaxed) {
-            tell(count_pulses(bench, wire)?);
+            report(count_pulses(bench, wire)?);
         }
     }
     Ok(())
@@ -94,14 +94,14 @@ fn try_one(
                     off.as_millis()
                 );
             }
-            // Off again, whatever it was that failed: the next wire wants it so.
+            // Switch the output off also after a failure: the tests of the other wires need it off.
             let off = write_bit(bench, wire.from, false);
             verdict(followed.map(drop).and(off))?
         }
     };
     Ok(Finding {
         name: format!("wires/{wire}"),
-        about: "the input follows the output, both ways, and no other does".to_owned(),
+        about: "the input follows the output on and off, and no other input changes".to_owned(),
         note,
         verdict,
         time: bench.endpoint.now().saturating_sub(begin),
@@ -127,7 +127,7 @@ fn count_pulses(bench: &mut Bench<'_>, wire: &Wire) -> Check<Finding> {
         Err(Stop::Fail(Failure {
             sent: format!("{} pulses of {}", wire.pulses, wire.from),
             came: format!("the counter of {} counted {counted}", wire.to),
-            wanted: format!("{} counted", wire.pulses),
+            wanted: format!("{} pulses counted", wire.pulses),
         }))
     })();
     let off = write_bit(bench, wire.from, false);
@@ -147,7 +147,7 @@ fn counter(bench: &mut Bench<'_>, input: Place) -> Check<u32> {
     Ok(u32::from(words[0]) << 16 | u32::from(words[1]))
 }
 
-/// Switches an output on and off, and watches the inputs; returns how long its own took.
+/// Switches an output on and off, and reads the inputs. Returns the times in which its own input followed.
 fn follow(bench: &mut Bench<'_>, wire: &Wire, wires: &[Wire]) -> Check<[Duration; 2]> {
     await_level(bench, wire, false)?;
     write_bit(bench, wire.from, true)?;
@@ -157,8 +157,8 @@ fn follow(bench: &mut Bench<'_>, wire: &Wire, wires: &[Wire]) -> Check<[Duration
         if level != other.inverted {
             return Err(Stop::Fail(Failure {
                 sent: format!("{} on", wire.from),
-                came: format!("{} went {} as well", other.to, level_name(level)),
-                wanted: format!("{} follows {} alone", other.to, other.from),
+                came: format!("{} changed to {} as well", other.to, level_name(level)),
+                wanted: format!("{} follows {} only", other.to, other.from),
             }));
         }
     }

@@ -1,4 +1,4 @@
-//! The firmware's image in the simulator, with every module, against the whole suite.
+//! Runs the whole suite on the firmware's image in the simulator, with every module.
 
 #![cfg(feature = "sim")]
 
@@ -34,7 +34,7 @@ fn elf(board: &Board) -> PathBuf {
     PathBuf::from(elf.unwrap_or_else(|| panic!("{name}: cargo xtask test sets it")))
 }
 
-/// A modio-02 with this module, set as in the factory.
+/// A modio-02 with this module and the factory settings.
 fn modio_02(module: Module) -> Fitting {
     Fitting {
         module,
@@ -105,7 +105,7 @@ fn assert_conforms(outcomes: &[Outcome], unit: &str, least: usize) {
     assert!(passed > least, "{passed} cases passed on {unit}");
 }
 
-/// The command modio-sim with this module in its slot, its line served by the exact-line protocol.
+/// The program modio-sim with this module in its slot and its line on the exact-line protocol.
 struct Simulator {
     child: Child,
     address: String,
@@ -190,7 +190,7 @@ fn cases_about_the_module_pass_on_an_exact_line_with_every_module() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_same_run_on_an_exact_line_gives_the_same_report_to_the_byte() {
+fn two_runs_on_an_exact_line_give_the_same_report_to_the_byte() {
     let cases = named(&["fc03/", "gaps/", "timing/", "power/"]);
     let report = || -> Vec<String> {
         let outcomes = Simulator::start(Module::Ai4).outcomes(&cases);
@@ -211,7 +211,7 @@ macro_rules! boards_conform {
     };
 }
 
-// Each board, and the number of cases of which more have to pass.
+// Each board, and a number: more cases than that have to pass.
 boards_conform! {
     an_empty_slot_conforms: modio_02(Module::None), 180;
     a_4di_conforms: modio_02(Module::Di4), 180;

@@ -1,6 +1,6 @@
-//! Every rate and format of the register map, in RTU and in ASCII mode.
+//! Tests the image at every rate and format of the register map, in RTU and in ASCII mode.
 //!
-//! Every test run tries the cases that depend on rate or format. `cargo xtask matrix` sets `MODIO_MATRIX` and tries
+//! Every test run includes the cases that depend on rate or format. `cargo xtask matrix` sets `MODIO_MATRIX` and runs
 //! every case.
 
 use std::env;
@@ -16,7 +16,7 @@ use register_map::codes::{self, Baud, Format};
 
 use super::{failed, in_process, line, modio_02, passed};
 
-/// Set when every case is wanted.
+/// Set to run every case.
 const VARIABLE: &str = "MODIO_MATRIX";
 
 /// Parts of the names of cases that depend on rate or format.
@@ -55,7 +55,7 @@ fn cells() -> Vec<Cell> {
     cells
 }
 
-/// The cases to try; at one rate and format the tours of all rates and formats are enough.
+/// The cases to run. The tours of all rates and formats run only at one rate and format.
 fn cases(every: bool, (line, _): Cell) -> Vec<Case> {
     let mut cases = all();
     let named = |case: &Case, parts: &[&str]| parts.iter().any(|part| case.name.contains(part));
@@ -67,7 +67,7 @@ fn cases(every: bool, (line, _): Cell) -> Vec<Case> {
     cases
 }
 
-/// Tries a cell; returns a row for each case that failed.
+/// Runs the cases of a cell. Returns a row for each case that failed.
 fn failures(cell: Cell, every: bool) -> Vec<String> {
     let (line, mode) = cell;
     let fitting = Fitting {

@@ -10,7 +10,7 @@ use super::fault::Fault;
 use super::modio_fault::ModioFault;
 use super::unit::{Character, Unit};
 
-/// For the unit to start in.
+/// Time that the unit needs to start.
 const START: Duration = Duration::from_millis(100);
 
 pub struct Reference {
@@ -44,13 +44,13 @@ impl Reference {
         self
     }
 
-    /// A unit that is silent to a write whose data are not as many bytes as it announces.
+    /// A unit that is silent to a write whose byte count differs from the number of data bytes.
     pub fn silent_to_incomplete_writes(mut self) -> Self {
         self.unit.silent_to_incomplete_writes = true;
         self
     }
 
-    /// Everything due up to `to` happens.
+    /// Lets time pass up to `to`, with everything that is due until then.
     fn advance(&mut self, to: Duration) {
         if let Some(at) = self.starts.filter(|at| *at <= to) {
             self.unit.start(at);

@@ -1,15 +1,15 @@
-//! What a faulty server does wrong, one thing at a time, and the cases that must find it.
+//! The faults of a server, and the cases that must find each fault.
 
-/// Makes an enumeration of mistakes, and a table of the cases that must find each.
+/// Defines an enumeration of faults, and a table of the cases that must find each fault.
 macro_rules! faults {
     ($name:ident $table:ident; $($(#[doc = $about:literal])+ $fault:ident => [$($case:literal),+],)+) => {
-        /// A mistake.
+        /// A fault.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum $name {
             $($(#[doc = $about])+ $fault,)+
         }
 
-        /// Every mistake, and the names of the cases that must fail by it.
+        /// Every fault, and the names of the cases that must fail because of it.
         pub const $table: &[($name, &[&str])] = &[$(($name::$fault, &[$($case),+])),+];
     };
 }
@@ -20,13 +20,13 @@ faults! {
     Fault FAULTS;
     /// Replies to broadcasts.
     AnswersBroadcasts => ["broadcast/coils", "broadcast/registers", "broadcast/read", "broadcast/nonsense", "timing/driver-stays-off"],
-    /// Takes 255 for a broadcast.
+    /// Treats address 255 as a broadcast.
     Obeys255 => ["address/other-units-write", "address/other-units-write-words"],
-    /// Does not look at the CRC.
+    /// Does not check the CRC.
     IgnoresCrc => ["framing/bad-crc", "ascii/bad-lrc", "worked/errata", "framing/bad-crc-writes-nothing", "framing/unknown-function-bad-crc", "framing/truncated"],
-    /// Takes the CRC high byte first as well.
+    /// Accepts a CRC with its bytes exchanged as well.
     TakesSwappedCrc => ["framing/swapped-crc"],
-    /// Takes 1234 for "on".
+    /// Accepts 1234 as "on".
     TakesCoil1234 => ["fc05/value", "broadcast/refused-writes-nothing"],
     /// Answers 126 registers.
     Answers126 => ["fc03/quantity-above-most", "fc04/quantity-above-most"],
@@ -40,7 +40,7 @@ faults! {
     DirtyPadding => ["fc02/byte-count", "fc01/byte-count"],
     /// Ignores the length of a read request.
     IgnoresLength => ["fc03/length", "fc01/length", "fc02/length", "fc04/length"],
-    /// Writes what it can before it finds that the rest is out of range.
+    /// Writes the registers that exist before it refuses the others.
     WritesPartly => ["fc10/partly-out-of-range", "fc10/one-bad-value"],
     /// Does not compare the byte count of 10 with the quantity.
     IgnoresByteCount => ["fc10/byte-count"],
@@ -50,15 +50,15 @@ faults! {
     StoresRefused => ["fc06/refused-value"],
     /// Reads before it writes in 17.
     ReadsFirst => ["fc17/write-before-read"],
-    /// Does a truncated 17 with zeros.
+    /// Serves a truncated 17 as if the missing bytes were zeros.
     FillsTruncated => ["fc17/truncated"],
-    /// Forgets the complement in the formula of 16.
+    /// Leaves out the complement in the formula of 16.
     PlainOr => ["fc16/formula"],
     /// Echoes two bytes of 08/00 only.
     ShortEcho => ["fc08/echo"],
-    /// Goes on talking in listen-only mode.
+    /// Replies in listen-only mode.
     TalksInListenOnly => ["fc08/listen-only"],
-    /// Goes on writing in listen-only mode.
+    /// Writes in listen-only mode.
     WritesInListenOnly => ["fc08/listen-only-writes"],
     /// 08/0A clears nothing.
     NeverClears => ["fc08/clear-counters"],
@@ -66,7 +66,7 @@ faults! {
     ClearsOneAlone => ["fc08/clear-counters"],
     /// Counts exceptions as events.
     CountsExceptions => ["fc0b/counts"],
-    /// Keeps the log over a restart with FF00.
+    /// Keeps the log at a restart with FF00.
     KeepsLog => ["fc0c/cleared-by-restart"],
     /// Puts the newest event last.
     LogBackwards => ["fc0c/newest-first"],
@@ -94,19 +94,19 @@ faults! {
     ErrorsUncounted => ["counters/bus-errors", "counters/bus-errors-short"],
     /// Does not count broadcasts as messages without response.
     BroadcastsUncounted => ["counters/no-response"],
-    /// Sends identification in one piece, however long.
+    /// Sends the identification in one reply, whatever its length.
     NeverSplits => ["fc2b/extended-stream"],
-    /// Answers 03 for an object that is not there.
+    /// Answers 03 for an object that does not exist.
     Object03 => ["fc2b/individual-unknown"],
     /// Answers 03 for another MEI type.
     Mei03 => ["fc2b/mei-type"],
-    /// Silent to functions it does not have.
+    /// Is silent to functions that it does not have.
     SilentToUnknown => ["dispatch/unknown-function", "dispatch/unknown-function-longest"],
-    /// Refuses unknown functions for other units, too.
+    /// Refuses unknown functions for other units as well.
     RefusesForOthers => ["dispatch/unknown-function-elsewhere"],
-    /// Dies of a function 00.
+    /// Stops after a request with function 00.
     DiesOf00 => ["dispatch/function-00-and-80-up", "hurts/odd-frames"],
-    /// Takes frames of any length.
+    /// Accepts frames of any length.
     TakesLongFrames => ["framing/too-long", "ascii/too-long"],
     /// Finds a good request at the end of other bytes.
     FindsRequests => ["framing/good-request-at-the-end-of-noise", "ascii/colon-restarts", "framing/two-at-once"],
@@ -114,11 +114,11 @@ faults! {
     TrailingZero => ["framing/no-byte-around-the-reply"],
     /// Answers noise with an exception.
     AnswersNoise => ["hurts/noise", "framing/short-noise"],
-    /// Deaf after another unit's reply.
+    /// Ignores one request after another unit's reply.
     DeafAfterOthers => ["bus/others-traffic"],
-    /// Takes its own echo for a request.
+    /// Treats its own reply as a request.
     HearsItself => ["bus/own-echo"],
-    /// Replies at once, without waiting for t3.5.
+    /// Replies before t3.5 has passed.
     RepliesEarly => ["timing/reply-after-t3.5", "timing/exceptions-after-t3.5"],
     /// Pauses in the middle of a reply.
     Pauses => ["timing/no-gap-in-the-reply"],
@@ -126,7 +126,7 @@ faults! {
     ReleasesEarly => ["timing/driver-held"],
     /// Drops frames with a gap above t1.5 only near their end.
     StrictSometimes => ["gaps/t1.5-to-t3.5"],
-    /// Takes a frame in two parts for one.
+    /// Treats two parts of a frame as one frame.
     JoinsParts => ["gaps/above-t3.5", "ascii/gap-above-1-s", "gaps/t3.5-is-enough", "gaps/after-noise", "bus/request-right-after-others-reply"],
     /// Ends frames at three quarters of t3.5.
     ClosesEarly => ["gaps/a-bit-too-soon", "gaps/just-below-t3.5"],
@@ -136,7 +136,7 @@ faults! {
     IgnoresParity => ["damage/parity-error"],
     /// Ignores framing errors.
     IgnoresStop => ["damage/framing-error", "ascii/damaged-character", "damage/parity-error-broadcast", "counters/bus-errors-characters"],
-    /// Looks for a request in what it hears first, without a silence before it.
+    /// Accepts a request at power-on without a silence in front of it.
     HasteAtStart => ["power/in-the-middle-of-traffic"],
     /// Checks the address before quantity and byte count in requests that write several points.
     AddressFirstInWrites => ["fc0f/quantity-before-address", "fc10/quantity-before-address", "fc17/quantity-before-address"],
@@ -146,7 +146,7 @@ faults! {
     Reads124 => ["fc17/quantities-most"],
     /// Obeys broadcast diagnostics.
     ObeysBroadcastDiagnostics => ["broadcast/restart", "broadcast/listen-only"],
-    /// Silent to 08/03.
+    /// Is silent to 08/03.
     SilentToDelimiter => ["fc08/delimiter-in-rtu"],
     /// Starts every stream of objects at object 0.
     StreamsFromZero => ["fc2b/stream-from-the-middle"],
@@ -156,11 +156,11 @@ faults! {
     RefusesLongestReads => ["fc01/quantity-most", "fc02/quantity-most", "fc03/quantity-most", "fc04/quantity-most"],
     /// Reads one address past the end of each table.
     ReadsPastTheEnd => ["fc01/one-past-the-end", "fc02/one-past-the-end", "fc03/one-past-the-end", "fc04/one-past-the-end"],
-    /// Gives the number of registers in place of the byte count.
+    /// Sends the number of registers instead of the byte count.
     CountsRegisters => ["fc03/byte-count", "fc04/byte-count"],
     /// Never switches a coil off by 05.
     NeverSwitchesOff => ["fc05/on-and-off"],
-    /// Echoes single writes to addresses that are not there.
+    /// Echoes single writes to addresses that do not exist.
     EchoesNowhere => ["fc05/address", "fc06/address", "fc16/address"],
     /// Checks the address before the value in 05.
     CoilAddressFirst => ["fc05/value-before-address"],
@@ -170,53 +170,53 @@ faults! {
     AddsAByte => ["fc07/shape", "fc0b/shape", "fc0c/shape", "fc11/shape"],
     /// Echoes requests of 08 without a whole sub-function.
     EchoesShortDiagnostics => ["fc08/length"],
-    /// Ignores data after the number of bytes that 0F and 10 announce.
+    /// Ignores data after the byte count of 0F and 10.
     IgnoresSpareData => ["fc0f/data-length", "fc10/data-length"],
-    /// Echoes the data of 0F and 10, too.
+    /// Echoes the data of 0F and 10 as well.
     EchoesData => ["fc0f/every-quantity", "fc10/every-quantity"],
-    /// Takes quantity 0 in 0F, 10 and 17.
+    /// Accepts quantity 0 in 0F, 10 and 17.
     WritesQuantity0 => ["fc0f/quantity-0-and-1969", "fc10/quantity-0-and-124", "fc17/quantities"],
     /// Refuses the longest writes.
     RefusesLongestWrites => ["fc0f/quantity-1968", "fc10/quantity-123"],
     /// Does not compare the byte count of 0F and 17 with the quantity.
     IgnoresOtherByteCounts => ["fc0f/byte-count", "fc17/byte-count"],
-    /// Writes the coils that are there before it refuses those that are not.
+    /// Writes the coils that exist before it refuses the others.
     WritesCoilsPartly => ["fc0f/past-the-end"],
-    /// Writes the register after the one that 06 names, too.
+    /// Writes also the register after the register of 06.
     WritesNeighbour => ["fc06/echo"],
-    /// Does not check the value that 16 results in.
+    /// Does not check the result of 16.
     MasksBeyondRange => ["fc16/refused-value"],
-    /// Writes at the address to read in 17.
+    /// Writes to the address to read in 17.
     WritesWhereItReads => ["fc17/two-places"],
     /// Writes in 17 before it checks the address to read.
     WritesBeforeItChecks => ["fc17/address"],
     /// Answers requests of 14 with a wrong byte count, and those whose reply is too long, with no groups.
     TakesAnyFileRequest => ["fc14/byte-count", "fc14/length", "fc14/longest-reply"],
-    /// Takes any reference type.
+    /// Accepts any reference type.
     TakesAnyReference => ["fc14/reference-type"],
-    /// Takes file 0 for file 1.
+    /// Treats file 0 as file 1.
     TakesFile0 => ["fc14/file-0"],
-    /// Takes records above 9999 for record 0.
+    /// Treats records above 9999 as record 0.
     WrapsRecords => ["fc14/record-above-9999"],
     /// Counts one object too many in identification replies.
     CountsObjectsWrong => ["fc2b/basic-stream", "fc2b/regular-stream"],
-    /// Gives an object another value when it is asked for alone.
+    /// Sends another value of an object when only that object is read.
     IndividualDiffers => ["fc2b/individual"],
-    /// Refuses a stream from an object that is not there.
+    /// Refuses a stream from an object that does not exist.
     RefusesUnknownStart => ["fc2b/stream-restarts"],
-    /// Takes read code 0 for 1.
+    /// Treats read code 0 as 1.
     TakesReadCode0 => ["fc2b/read-code"],
-    /// Gives another event count in the log than in 0B.
+    /// Sends another event count in the log than in 0B.
     LogCountDiffers => ["fc0c/counts"],
     /// Answers sub-functions that it does not have.
     EchoesAnySubFunction => ["fc08/unknown-sub-function"],
     /// Ignores the data of sub-functions.
     IgnoresDiagnosticData => ["fc08/data"],
-    /// Gives a diagnostic register of one byte.
+    /// Sends a diagnostic register of one byte.
     ShortRegister => ["fc08/register"],
     /// Restarts on any data of 08/01.
     TakesAnyRestart => ["fc08/restart"],
-    /// Keeps its counters over a restart.
+    /// Keeps its counters at a restart.
     RestartKeepsCounters => ["fc08/restart"],
     /// Has overruns from the start, which 08/14 does not clear.
     OverrunsStay => ["fc08/clear-overruns"],
@@ -226,43 +226,43 @@ faults! {
     ExceptionsUncounted => ["counters/exceptions"],
     /// Does not count broadcasts as messages for the unit.
     BroadcastsAreNoMessages => ["counters/unit-messages"],
-    /// Answers a neighbour's requests.
+    /// Answers requests for the next address.
     AnswersNeighbour => ["address/other-units"],
     /// Answers requests for address 248 and above.
     AnswersReserved => ["address/reserved"],
     /// Drops frames with a gap above a third of t1.5.
     DropsShortGaps => ["gaps/below-t1.5"],
-    /// Deaf to one request after a break.
+    /// Ignores one request after a break.
     DeafAfterBreak => ["damage/break"],
-    /// Deaf to one request after a glitch.
+    /// Ignores one request after a glitch.
     DeafAfterGlitch => ["damage/glitch"],
-    /// Begins t3.5 again after a short pulse.
+    /// Restarts t3.5 after a short pulse.
     PulsesRestartSilence => ["damage/noise-behind-a-frame"],
-    /// Deaf to one request after a bad frame.
+    /// Ignores one request after a bad frame.
     DeafAfterBadFrames => ["bus/others-truncated-traffic", "bus/stray-zero"],
-    /// Deaf to one request after a long reply of another unit.
+    /// Ignores one request after a long reply of another unit.
     DeafAfterLongReplies => ["bus/others-long-replies"],
     /// Finds requests inside other units' frames.
     FindsInside => ["bus/others-reply-is-no-request"],
-    /// Ignores a last byte that is too many.
+    /// Ignores one byte after a frame.
     IgnoresTrailingByte => ["framing/trailing-byte"],
-    /// Loses a request that comes less than twice t3.5 after its own reply.
+    /// Loses a request that begins less than twice t3.5 after its own reply.
     SlowToListen => ["timing/back-to-back"],
     /// Holds frames of 254 bytes, or 508 digits, at most.
     ShortBuffer => ["framing/longest", "ascii/longest"],
     /// Refuses requests for unit 1.
     RefusesForUnit1 => ["worked/for-other-units"],
-    /// Dead after the power was off.
+    /// Does not answer after the power was off.
     DeadAfterPowerOff => ["power/answers"],
     /// Sends a 00 when it starts.
     ZeroAtStart => ["power/no-byte-by-itself"],
-    /// Takes any character as the one that ends an ASCII frame.
+    /// Accepts any new end character of ASCII frames.
     TakesAnyDelimiter => ["ascii/delimiter-refused"],
     /// Echoes 08/03 and keeps its delimiter.
     KeepsDelimiter => ["ascii/delimiter"],
-    /// Takes lower-case digits in ASCII.
+    /// Accepts lower-case digits in ASCII.
     TakesLowerCase => ["ascii/lower-case"],
-    /// Takes any character as a digit in ASCII.
+    /// Accepts any character as a digit in ASCII.
     TakesAnyDigit => ["ascii/not-a-digit"],
     /// Loses an ASCII frame after characters in front of its colon.
     NeedsColonFirst => ["ascii/before-the-colon"],
@@ -270,6 +270,6 @@ faults! {
     ImpatientInAscii => ["ascii/gap-below-1-s"],
     /// Answers RTU frames in ASCII mode.
     TakesRtuInAscii => ["ascii/rtu-frame"],
-    /// Does not forget a truncated ASCII frame when a colon comes.
+    /// Keeps a truncated ASCII frame when a colon is received.
     KeepsTruncated => ["ascii/truncated"],
 }

@@ -1,5 +1,5 @@
-//! The suite against a reference server, written for this test alone: a faultless one passes every case,
-//! and each of its faults makes the case fail that is there to find it.
+//! Runs the suite against a unit made of the reference server. Without a fault the unit passes every case. Each fault
+//! makes the cases fail that have to find it.
 
 mod endpoint;
 mod fault;
@@ -49,14 +49,14 @@ fn reference(fault: Option<Fault>, mode: Mode, format: &str) -> Reference {
     Reference::new(fault, mode, line)
 }
 
-/// Runs the cases whose names are `only`, or all. The unit has this fault.
+/// Runs the case with the name `only`, or all cases. The unit has this fault.
 fn outcomes(
     mut endpoint: Reference,
     fault: Option<Fault>,
     mode: Mode,
     only: Option<&str>,
 ) -> Vec<Outcome> {
-    // The probe would stumble over some faults: it is given what a faultless one has.
+    // Some faults would mislead the probe, so it gets the functions of a unit without a fault.
     let mut profile = Profile::parse(PROFILE).unwrap();
     if fault.is_some() {
         profile.functions = Some(conformance::probe::FUNCTIONS.to_vec());
@@ -78,7 +78,7 @@ fn outcomes(
     run(&mut endpoint, &target, options, &cases, |_| {}).unwrap()
 }
 
-fn assert_faultless(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
+fn assert_passes(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
     let outcomes = outcomes(endpoint, None, mode, None);
     let mut passed = Vec::new();
     for outcome in &outcomes {
@@ -92,10 +92,10 @@ fn assert_faultless(endpoint: Reference, mode: Mode) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_faultless_server_passes_and_only_what_is_about_others_is_skipped() {
+fn server_without_a_fault_passes_every_case_that_is_not_about_a_modio() {
     let passed: Vec<&str> = [
-        assert_faultless(reference(None, Mode::Rtu, "8E1"), Mode::Rtu),
-        assert_faultless(reference(None, Mode::Ascii, "7E1"), Mode::Ascii),
+        assert_passes(reference(None, Mode::Rtu, "8E1"), Mode::Rtu),
+        assert_passes(reference(None, Mode::Ascii, "7E1"), Mode::Ascii),
     ]
     .concat();
     for case in all() {
@@ -110,16 +110,16 @@ fn a_faultless_server_passes_and_only_what_is_about_others_is_skipped() {
 }
 
 #[test]
-fn with_8n1_a_unit_passes_that_counts_characters_of_11_bits_and_one_that_counts_10() {
+fn with_8n1_a_unit_passes_that_counts_characters_of_11_or_of_10_bits() {
     let unit = || reference(None, Mode::Rtu, "8N1");
-    assert_faultless(unit(), Mode::Rtu);
-    assert_faultless(unit().counting_own_characters(), Mode::Rtu);
+    assert_passes(unit(), Mode::Rtu);
+    assert_passes(unit().counting_own_characters(), Mode::Rtu);
 }
 
 #[test]
 fn unit_that_is_silent_to_incomplete_writes_passes() {
     let unit = reference(None, Mode::Rtu, "8E1").silent_to_incomplete_writes();
-    assert_faultless(unit, Mode::Rtu);
+    assert_passes(unit, Mode::Rtu);
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn outcomes_of_modio(fault: Option<ModioFault>, cases: &[Case]) -> Vec<Outcome> 
 }
 
 #[test]
-fn a_faultless_modio_passes_every_case_about_a_modio() {
+fn modio_without_a_fault_passes_every_case_about_a_modio() {
     let mut cases = all();
     cases.retain(|case| case.kind == Kind::Modio);
     for outcome in outcomes_of_modio(None, &cases) {
@@ -204,7 +204,7 @@ fn every_case_has_a_fault_that_makes_it_fail() {
 }
 
 #[test]
-fn what_a_case_writes_is_put_back() {
+fn points_that_cases_write_to_are_restored() {
     let line = LineFormat::default();
     let mut endpoint = Reference::new(None, Mode::Rtu, line);
     let profile = Profile::parse(PROFILE).unwrap();

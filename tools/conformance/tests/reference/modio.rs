@@ -1,5 +1,5 @@
-//! What makes the reference server a modio: its points and registers by the register map, its lock, its
-//! communication watchdog, its commands. The module in its slot is a 2Relay: two inputs, two outputs.
+//! The part of a modio that the reference server does not have: points and registers by the register map, the lock, the
+//! communication watchdog and the commands. The module in its slot is a 2Relay: two inputs, two outputs.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -31,13 +31,13 @@ const OUTPUTS: usize = 2;
 const POWER_ON: u16 = 0x30;
 const SOFTWARE: u16 = 0x28;
 
-/// How long the lock stays open.
+/// Time that the lock stays open.
 const OPEN: Duration = Duration::from_secs(60);
 
-/// From one output to the next on the way to SAFE, with [`ModioFault::SafeOneByOne`].
+/// Time between two outputs that are set to SAFE, with [`ModioFault::SafeOneByOne`].
 const ONE_BY_ONE: Duration = Duration::from_millis(1);
 
-/// A modio behind its line.
+/// The points, registers and state of a modio.
 pub struct Modio {
     fault: Option<ModioFault>,
     edited: BTreeMap<u16, u16>,
@@ -49,11 +49,11 @@ pub struct Modio {
     open_until: Duration,
     /// The last valid request.
     last: Duration,
-    /// The watchdog has tripped; the flag may outlive that it is in force.
+    /// When the watchdog tripped. The flag can remain set after the watchdog is no longer in force.
     tripped: Option<Duration>,
     flag: bool,
     last_command: u16,
-    /// The unit is to start again once the reply is out.
+    /// The unit has to restart after the reply.
     pub restart: bool,
 }
 
@@ -86,7 +86,7 @@ impl Modio {
         self.fault == Some(fault)
     }
 
-    /// The unit starts; returns the line as it is from now on.
+    /// Starts the unit. Returns the rate and format in force.
     pub fn start(&mut self, at: Duration, power_on: bool) -> LineFormat {
         self.edited.clone_from(&self.saved);
         (self.booted, self.last, self.now) = (at, at, at);
@@ -110,7 +110,7 @@ impl Modio {
         LineFormat::new(baud, name.parse().unwrap())
     }
 
-    /// Silence beyond t3.5 before a reply.
+    /// Silence before a reply, in addition to t3.5.
     pub fn response_delay(&self) -> Duration {
         if self.has(ModioFault::RepliesUndelayed) {
             return Duration::ZERO;
@@ -118,7 +118,7 @@ impl Modio {
         Duration::from_millis(self.edited[&at::RESPONSE_DELAY].into())
     }
 
-    /// A valid request for this unit, or a broadcast, at this instant.
+    /// Notes a valid request for this unit, or a broadcast, at this instant.
     pub fn request(&mut self, at: Duration, broadcast: bool) {
         self.now = at;
         let timeout = Duration::from_millis(100) * u32::from(self.edited[&at::COMM_TIMEOUT]);
@@ -145,14 +145,14 @@ impl Modio {
         }
     }
 
-    /// A request with a function that no request can have.
+    /// Handles a request with a function code of 80 or above.
     pub fn odd_request(&mut self) {
         if self.has(ModioFault::RestartsByOddFrames) {
             self.start(self.now, false);
         }
     }
 
-    /// Does what a PDU asks for; `None` when the function has nothing to do with points and registers.
+    /// Serves a PDU; `None` when the function is not about points, registers or files.
     pub fn answer(&mut self, pdu: &[u8], counters: &[u16; 9]) -> Option<Answer> {
         match pdu[0] {
             1..=6 | 0x0F | 0x10 | 0x16 | 0x17 => Some(self.points(pdu, counters)),
@@ -161,7 +161,7 @@ impl Modio {
         }
     }
 
-    /// The self-description is file 1, and the only one.
+    /// Serves file 1, the self-description, which is the only file.
     fn files(&self, pdu: &[u8]) -> Answer {
         let mut pdu = pdu.to_vec();
         if pdu[0] == 0x15 && self.has(ModioFault::EchoesFileWrites) {
@@ -412,7 +412,7 @@ impl Modio {
     }
 }
 
-/// What the unit says of itself.
+/// The self-description of the unit.
 fn description() -> Description {
     describe(&MODIO_02, "0.1.0", |_| MODULE)
 }

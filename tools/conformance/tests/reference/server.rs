@@ -7,18 +7,18 @@ use super::fault::Fault;
 use super::modio::Modio;
 use super::modio_fault::ModioFault;
 
-/// Coils and registers: the first address, and how many.
+/// Coils and registers: the first address and their number.
 const COILS: (u16, usize) = (100, 2100);
 const INPUTS: (u16, usize) = (0, 19);
 const HOLDING: (u16, usize) = (1000, 200);
 const INPUT_REGISTERS: (u16, usize) = (50, 10);
-/// Holding registers take values up to this.
+/// The largest value that holding registers accept.
 const MOST: u16 = 4095;
 
 /// A reply, or an exception code.
 type Answer = Result<Vec<u8>, u8>;
 
-/// The reference, as this unit has it.
+/// The reference server with the points of this unit.
 pub fn reference(delimiter: Option<u8>) -> Reference {
     let texts = [
         "reference",
@@ -30,7 +30,7 @@ pub fn reference(delimiter: Option<u8>) -> Reference {
         "application",
     ];
     let object = |id: usize| match id {
-        // Together they take three replies.
+        // Together these objects need three replies.
         0x80..=0x84 => Some(vec![b'x'; 120]),
         _ => texts.get(id).map(|text| text.as_bytes().to_vec()),
     };
@@ -47,10 +47,10 @@ pub fn reference(delimiter: Option<u8>) -> Reference {
     Reference::new(delimiter, device)
 }
 
-/// What is in front of the reference: a fault, and what makes it a modio.
+/// The fault and the modio that change the replies of the reference.
 pub struct Server {
     pub fault: Option<Fault>,
-    /// What a modio has in place of coils and registers.
+    /// The points and registers, if the unit is a modio.
     pub modio: Option<Modio>,
 }
 
@@ -64,7 +64,7 @@ impl Server {
         self.fault == Some(fault)
     }
 
-    /// Serves a request to this unit or to all: the PDU of the reply.
+    /// Serves a request to this unit or to all units. Returns the PDU of the reply.
     pub fn request(
         &mut self,
         reference: &mut Reference,
@@ -88,7 +88,7 @@ impl Server {
             | (Some(Fault::ObeysBroadcastDiagnostics), Some(_)) => obeys_broadcast = true,
             (Some(Fault::TalksInListenOnly), _) => reference.listening = false,
             (Some(Fault::WritesInListenOnly), _) if listening => {
-                // The write is carried out; its answer is thrown away.
+                // Carry out the write and discard the answer.
                 let _ = self.answer(reference, pdu);
             }
             (Some(Fault::IgnoresDiagnosticData), Some(2 | 4 | 0x0A..=0x14)) => {
@@ -164,7 +164,7 @@ impl Server {
             (Fault::TakesAnyDelimiter, Some(3)) => reply = Some(pdu.to_vec()),
             (Fault::ShortEcho, Some(0)) => reply.as_mut()?.truncate(5),
             (Fault::ShortRegister, Some(2)) => drop(reply.as_mut()?.pop()),
-            // The worked frame with a wrong CRC is a reply.
+            // The worked frame with a wrong CRC is an exception reply.
             (Fault::IgnoresCrc, _) if pdu[0] > 0x80 => reply = Some(vec![pdu[0], 1]),
             (Fault::AddsAByte, None) if short => reply.as_mut()?.push(0),
             (Fault::LogBackwards, _) if pdu[0] == 0x0C => reply.as_mut()?[8..].reverse(),
@@ -174,7 +174,7 @@ impl Server {
         reply
     }
 
-    /// Does what a PDU asks for: the PDU of the reply, or an exception code.
+    /// Serves a PDU. Returns the PDU of the reply, or an exception code.
     fn answer(&mut self, reference: &mut Reference, pdu: &[u8]) -> Answer {
         let of_modio = self.modio.as_mut();
         let answer = match of_modio.and_then(|modio| modio.answer(pdu, &reference.counters)) {
@@ -185,7 +185,7 @@ impl Server {
         answer.map(|data| [vec![pdu[0]], data].concat())
     }
 
-    /// A request for points or identification: what the fault makes of it, and of its reply.
+    /// Serves a request for points, files or identification. The fault changes the request or the reply.
     fn serve(&self, device: &mut Device, pdu: &[u8]) -> Answer {
         let mut request = pdu.to_vec();
         if let Some(answer) = self.spoil(device, &mut request) {
@@ -250,8 +250,8 @@ impl Server {
         }
     }
 
-    /// Changes a request so that its right reply is the fault's, or gives the answer of a fault that looks at nothing
-    /// else.
+    /// Changes a request, so that the right reply to the changed request is the reply of the fault. Returns the answer
+    /// itself where the fault does not depend on the reply.
     fn spoil(&self, device: &mut Device, request: &mut Vec<u8>) -> Option<Answer> {
         let (function, len) = (request[0], request.len());
         let (at, value) = (word(request, 1), word(request, 3));
@@ -381,7 +381,7 @@ impl Server {
     }
 }
 
-/// Where `quantity` points from address `at` on are in a table.
+/// The index in a table of `quantity` points from address `at` on.
 fn place((first, count): (u16, usize), at: u16, quantity: u16) -> Result<usize, u8> {
     let start = at.checked_sub(first).map(usize::from).ok_or(2)?;
     if start + usize::from(quantity) <= count {
@@ -401,7 +401,7 @@ fn table(function: u8) -> (u16, usize) {
     }
 }
 
-/// The word at a place of a request; 0 where it ends before that.
+/// The word at a place of a request; 0 if the request is shorter.
 fn word(pdu: &[u8], at: usize) -> u16 {
     pdu.get(at..at + 2)
         .map_or(0, |pair| u16::from_be_bytes([pair[0], pair[1]]))
@@ -414,7 +414,7 @@ fn set(request: &mut [u8], at: usize, value: u16) {
     }
 }
 
-/// Does what a request asks for, with its addresses.
+/// Serves a request without a fault. Its addresses are those of this unit.
 fn right(device: &mut Device, pdu: &[u8]) -> Answer {
     let mut request = pdu.to_vec();
     let fields: &[usize] = if pdu[0] == 0x17 { &[1, 5] } else { &[1] };
@@ -427,7 +427,7 @@ fn right(device: &mut Device, pdu: &[u8]) -> Answer {
     }
     let reply = modbus_reference::answer(device, &request)?;
     Ok(match pdu[0] {
-        // An echo, with the addresses as they came.
+        // Echo the request, with the addresses of the request.
         5 | 6 | 0x0F | 0x10 | 0x16 => pdu[1..reply.len()].to_vec(),
         _ => reply[1..].to_vec(),
     })

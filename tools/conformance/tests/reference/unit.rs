@@ -1,4 +1,4 @@
-//! The reference server on a line: what is a frame, whom it is for, and when it replies.
+//! The reference server on a line: framing, addresses and the times of replies.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -15,13 +15,13 @@ use super::modio::{self, Modio};
 use super::modio_fault::ModioFault;
 use super::server::{Server, reference};
 
-/// The unit's address when it is no modio.
+/// The unit's address when it is not a modio.
 const UNIT: u8 = 9;
 
-/// From the end of the silence to the reply.
+/// Time from the end of the silence to the reply.
 const THINKING: Duration = Duration::from_micros(40);
 
-/// A character as it stands on the line.
+/// A character on the line.
 #[derive(Clone, Copy, Debug)]
 pub struct Character {
     pub byte: u8,
@@ -38,27 +38,27 @@ pub struct Unit {
     pub address: u8,
     pub mode: Mode,
     pub line: LineFormat,
-    /// Rate and format of the master. The two understand each other when they have the same.
+    /// Rate and format of the master. The unit receives only when they are those of its line.
     pub master: LineFormat,
     /// Counts characters of the line's format for t1.5 and t3.5, not characters of 11 bits.
     pub own_characters: bool,
-    /// It waits for the data that a write announces, or drops the write.
+    /// Is silent to a write whose byte count differs from the number of data bytes.
     pub silent_to_incomplete_writes: bool,
-    /// What it says, and its driver's edges.
+    /// Characters of replies, and the edges of the driver.
     pub sent: VecDeque<Received>,
     pub edges: Vec<(Duration, bool)>,
     pub echo: bool,
     open: Vec<u8>,
     damaged: bool,
     late: bool,
-    /// There was a gap above t1.5 in the frame.
+    /// The frame had a gap above t1.5.
     sparse: bool,
     last: Option<Duration>,
-    /// No silence has come yet since power-on.
+    /// There has been no silence since power-on.
     waiting: bool,
     deaf: bool,
     reply_end: Duration,
-    /// Characters came in front of an ASCII frame.
+    /// There were characters in front of an ASCII frame.
     colon_spoilt: bool,
     dead: bool,
 }
@@ -100,7 +100,7 @@ impl Unit {
         unit
     }
 
-    /// Started again at this instant.
+    /// Restarts the unit at this instant.
     pub fn start(&mut self, at: Duration) {
         let old = std::mem::replace(self, Self::new(self.server.fault, self.mode, self.line));
         self.edges = old.edges;
@@ -124,7 +124,7 @@ impl Unit {
         }
     }
 
-    /// When the frame that is open will be over, if nothing else comes.
+    /// When the open frame ends, if no further character is received.
     pub fn closes(&self) -> Option<Duration> {
         self.last.map(|last| last + self.silence())
     }
@@ -157,7 +157,7 @@ impl Unit {
         }
     }
 
-    /// A pulse that is too short for a character comes.
+    /// Receives a pulse that is too short for a character.
     pub fn glitch(&mut self, at: Duration) {
         if self.server.has(Fault::PulsesRestartSilence) {
             self.last = self.last.map(|_| at);
@@ -165,7 +165,7 @@ impl Unit {
         self.deaf |= self.server.has(Fault::DeafAfterGlitch);
     }
 
-    /// A character comes.
+    /// Receives a character.
     pub fn receive(&mut self, character: Character) {
         if self.line != self.master {
             return;
@@ -270,7 +270,7 @@ impl Unit {
         }
     }
 
-    /// The silence that ends a frame has come.
+    /// Ends a frame after its silence.
     pub fn close(&mut self, at: Duration) {
         let frame = std::mem::take(&mut self.open);
         let (damaged, late) = (self.damaged, self.late);
@@ -313,7 +313,7 @@ impl Unit {
         self.message(body, good && !damaged && !long && frame.len() >= 4, at);
     }
 
-    /// A frame is lost to a bad check or a damaged character.
+    /// Counts and logs a frame with a bad check or a damaged character.
     fn spoilt(&mut self) {
         self.reference.bad(false);
         if self.server.has(Fault::ErrorsUncounted) {
@@ -390,7 +390,7 @@ impl Unit {
         }
     }
 
-    /// A modio starts again when it was told to.
+    /// Restarts a modio after the command to restart.
     fn restart(&mut self, at: Duration) {
         if let Some(modio) = self.server.modio.as_mut().filter(|modio| modio.restart) {
             self.line = modio.start(at, false);
@@ -427,7 +427,7 @@ impl Unit {
         self.edges
             .push((if early { start - character } else { start }, false));
         if self.echo && self.server.has(Fault::HearsItself) {
-            // One round is enough to be wrong, and it must end.
+            // One reply to its own reply is enough to be wrong; more would never end.
             self.echo = false;
             let body = body.to_vec();
             self.message(body, true, start + self.line.t35());
@@ -436,7 +436,7 @@ impl Unit {
     }
 }
 
-/// Whether a write of several points has as many bytes of data as it announces.
+/// Whether the byte count of a write of several points is the number of its data bytes.
 fn is_complete(pdu: &[u8]) -> bool {
     let at = match pdu[0] {
         0x0F | 0x10 => 5,

@@ -1,11 +1,11 @@
-//! As much of an HTTP client as the simulator's interface needs.
+//! The part of an HTTP client that the simulator's interface needs.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 
 use serde_json::Value;
 
-/// Asks the simulator at HOST:PORT; with a body it is a POST. Returns the reply's body.
+/// Sends a request to the simulator at HOST:PORT: a POST with a body, a GET without one. Returns the reply's body.
 pub fn request(address: &str, path: &str, body: Option<&Value>) -> Value {
     let method = if body.is_some() { "POST" } else { "GET" };
     let body = body.map(Value::to_string).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! One line out of several pseudo-terminals.
+//! One line made of several pseudo-terminals.
 
 use std::fs;
 use std::os::fd::AsRawFd as _;
@@ -8,8 +8,8 @@ use std::thread;
 
 use serial2::SerialPort;
 
-/// Joins the lines at these ports to one, on which everybody receives what another sends; returns the port of a
-/// further participant. The line lasts as long as the process.
+/// Joins the lines at these ports to one line. Bytes sent on one port are received on all others. Returns an additional
+/// port of the line. The line lasts as long as the process.
 pub fn join(ports: &[PathBuf]) -> PathBuf {
     let (master, far) = SerialPort::pair().expect("the system has pseudo-terminals");
     let path = fs::read_link(format!("/proc/self/fd/{}", far.as_raw_fd()))
@@ -23,12 +23,12 @@ pub fn join(ports: &[PathBuf]) -> PathBuf {
         let all = Arc::clone(&all);
         thread::spawn(move || copy(&all, from));
     }
-    // Keeps the terminal while no program has it open.
+    // Keep the terminal while no program has it open.
     std::mem::forget(far);
     path
 }
 
-/// Gives the others what one sends, until a line is gone.
+/// Copies bytes from one line to all others, until a line is closed.
 fn copy(all: &[SerialPort], from: usize) {
     let mut buffer = [0; 512];
     loop {

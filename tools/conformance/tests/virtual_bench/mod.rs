@@ -15,16 +15,16 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-/// Interval at which inputs are set to what their outputs are.
+/// Interval at which inputs are set to the values of their outputs.
 const CARRY: Duration = Duration::from_millis(20);
 
-/// Length of each level of a contact that bounces, in ms of the board's time. The factory's debounce is 5 ms.
+/// Duration of each level of a contact that bounces, in ms of the board's time. The factory's debounce is 5 ms.
 const BOUNCE: f64 = 8.0;
 
-/// Highest voltage at the pin of an analog input, in mV: that of code 4095.
+/// Highest voltage at the pin of an analog input, in mV, which gives code 4095.
 const FULL_SCALE: f64 = 3300.0;
 
-/// A wire. Units by their address, channels from 1 to 4.
+/// A wire between two channels. A channel is a unit address and a number from 1 to 4.
 #[derive(Clone, Debug)]
 pub struct Loop {
     from: (u8, u8),
@@ -35,9 +35,9 @@ pub struct Loop {
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Digital,
-    /// The input goes on twice when the output goes on.
+    /// The input switches on twice when the output switches on.
     Bouncing,
-    /// The input is the output by this factor.
+    /// The input is the output multiplied by this factor.
     Analog(f64),
 }
 
@@ -51,7 +51,7 @@ impl Loop {
         }
     }
 
-    /// The same, with a contact that bounces.
+    /// From a channel of a 4DO to one of a 4DI, with a contact that bounces.
     pub const fn bouncing(unit: u8, output: u8, other: u8, input: u8) -> Self {
         let mut wire = Self::digital(unit, output, other, input);
         wire.kind = Kind::Bouncing;
@@ -78,7 +78,7 @@ struct Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        // It has ended already when this fails.
+        // A failure means that the process has already ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -112,13 +112,13 @@ impl Board {
         }
     }
 
-    /// What a channel, 1 to 4, is outside.
+    /// Reads the outside state of a channel, 1 to 4.
     fn channel(&self, number: u8) -> Value {
         let state = http::request(&self.address, "/api/state", None);
         state["channels"][usize::from(number) - 1].clone()
     }
 
-    /// Sets a channel, 1 to 4, outside.
+    /// Sets the outside state of a channel, 1 to 4.
     fn set(&self, number: u8, level: &Value) {
         let path = format!("/api/channels/{number}");
         http::request(&self.address, &path, Some(level));
@@ -150,19 +150,19 @@ impl Drop for Bench {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(carrier) = self.carrier.take() {
-            // A panic of the thread has been reported.
+            // A panic of the thread has already been reported.
             let _ = carrier.join();
         }
     }
 }
 
-/// What a run of modio-hil has given.
+/// The result of a run of modio-hil.
 pub struct Run {
     /// Its exit status.
     pub status: Option<i32>,
-    /// What it printed.
+    /// Its output.
     pub text: String,
-    /// Its report, null when it wrote none.
+    /// Its report; null when it did not write one.
     pub report: Value,
 }
 
@@ -210,7 +210,8 @@ impl Bench {
         *self.wires.lock().expect("no test fails with the lock") = wires.into_iter().collect();
     }
 
-    /// A command that switches the power of the first board: it leaves a file, and waits until that is gone.
+    /// A command that switches the power of the first board: it writes a file, and waits until the file is
+    /// removed.
     pub fn power_command(&self) -> String {
         let script = self.directory.path().join("switch");
         let power = self.directory.path().join("power");
@@ -222,8 +223,8 @@ impl Bench {
         format!("sh {}", script.display())
     }
 
-    /// Runs modio-hil until the result is as wanted, three times at most: where the machine is busy, the simulator may
-    /// pause in the middle of a reply, which is then a lost one. Returns the last run.
+    /// Runs modio-hil until the result is as wanted, three times at most. On a busy machine the simulator may pause in
+    /// the middle of a reply, which then counts as lost. Returns the last run.
     pub fn hil_until(
         &self,
         file: &str,
@@ -240,14 +241,14 @@ impl Bench {
         run
     }
 
-    /// Runs modio-hil with this bench file, to which the port is added.
+    /// Runs modio-hil with this bench file and the port of the line.
     fn hil(&self, file: &str, arguments: &[&str]) -> Run {
         let (path, json) = ["bench.toml", "report.json"]
             .map(|name| self.directory.path().join(name))
             .into();
         let file = format!("port = {:?}\n{file}", self.port.display().to_string());
         fs::write(&path, file).expect("the bench file can be written");
-        // Of an earlier run; there may be none.
+        // Remove the report of an earlier run, if there is one.
         let _ = fs::remove_file(&json);
         let output = Command::new(env!("CARGO_BIN_EXE_modio-hil"))
             .arg("--bench")
@@ -268,7 +269,7 @@ impl Bench {
     }
 }
 
-/// Switches the power of a board as the power command's file says.
+/// Switches the power of a board when the power command has written its file.
 fn switch(board: &Board, file: &Path) {
     if let Ok(state) = fs::read_to_string(file) {
         let on = state.trim() == "on";
@@ -277,7 +278,7 @@ fn switch(board: &Board, file: &Path) {
     }
 }
 
-/// Sets inputs to what their outputs are.
+/// Sets inputs to the values of their outputs.
 fn carry(boards: &[Board], wires: &[Loop]) {
     let board = |unit| {
         let mut boards = boards.iter();

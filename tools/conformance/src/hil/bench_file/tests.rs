@@ -119,10 +119,10 @@ fn error_is_one_line_that_begins_with_the_number_of_the_line() {
             "1: missing field `tolerance`",
         ),
     ] {
-        let told = BenchFile::parse(&text, None).unwrap_err();
+        let error = BenchFile::parse(&text, None).unwrap_err();
         assert!(
-            told.starts_with(wrong) && !told.contains('\n'),
-            "{text}: {told}"
+            error.starts_with(wrong) && !error.contains('\n'),
+            "{text}: {error}"
         );
     }
 }
