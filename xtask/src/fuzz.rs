@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::ValueEnum;
 use fs_err as fs;
 
@@ -166,7 +166,14 @@ fn fuzz(workspace: &Workspace, name: &str, program: &Path, seconds: u32) -> Resu
         "-artifact_prefix=",
         found.join(format!("{name}-")),
     ));
-    command::run(fuzzer.current_dir(workspace.root())).context(name.to_owned())
+    let output = command::output(fuzzer.current_dir(workspace.root()))?;
+    let text = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{text}\n{name}: {}", output.status);
+    // Without the dictionary that libFuzzer recommends after every run.
+    for line in text.lines().filter(|line| line.starts_with("stat::")) {
+        say!("{line}");
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -57,7 +57,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
         }
         let name = peer.name();
         eprintln!("testing {name}, which takes minutes");
-        match peer.prepare(workspace) {
+        match peer.prepare(workspace, programs.built()) {
             Ok(server) => {
                 let cases = ["--standard-only", "--trace"];
                 let report = programs.test(&server, &cases, options.traces.as_deref())?;
@@ -83,7 +83,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
 pub fn check(workspace: &Workspace) -> Result<()> {
     let programs = Programs::build(workspace)?;
     for peer in Peer::ALL {
-        let server = peer.prepare(workspace)?;
+        let server = peer.prepare(workspace, programs.built())?;
         let report = programs.test(&server, &["--only", SMOKE], None)?;
         let cases = report["cases"].as_array().into_iter().flatten();
         let passed = cases.filter(|case| case["result"] == "passed").count();
@@ -114,6 +114,11 @@ impl Programs {
             profile: workspace.root().join(PROFILE),
             scratch,
         })
+    }
+
+    /// The directory of the servers in Rust.
+    fn built(&self) -> &Path {
+        self.line.parent().unwrap_or(&self.line)
     }
 
     /// Starts a server on a new line, runs these cases against it, and returns the suite's report.

@@ -63,7 +63,7 @@ fn with_rest(name: &str, pdu: &[u8]) -> String {
 }
 
 /// Describes the parameters of a request; `None` when its form does not match the function.
-fn told(code: u8, pdu: &[u8]) -> Option<String> {
+fn fields(code: u8, pdu: &[u8]) -> Option<String> {
     let (first, second) = (word(pdu, 1), word(pdu, 3));
     Some(match code {
         0x01..=0x04 => format!("{:#06X} x {}", first?, second?),

@@ -56,8 +56,8 @@ impl Peer {
         }
     }
 
-    /// Prepares the server. Those in Rust are built already.
-    pub fn prepare(self, workspace: &Workspace) -> Result<Prepared> {
+    /// Prepares the server. Those in Rust are built already, and are in the directory `built`.
+    pub fn prepare(self, workspace: &Workspace, built: &Path) -> Result<Prepared> {
         let name = self.name();
         let prepared = |version: &str, program, arguments| Prepared {
             name,
@@ -91,12 +91,8 @@ impl Peer {
             }
             Self::ModbusCore | Self::Rmodbus => {
                 let version = locked_version(&peers.join("Cargo.lock"), name)?;
-                let program = format!("debug/peer-{name}");
-                Ok(prepared(
-                    &version,
-                    directory(workspace).join(program),
-                    Vec::new(),
-                ))
+                let program = built.join(format!("peer-{name}"));
+                Ok(prepared(&version, program, Vec::new()))
             }
         }
     }

@@ -17,8 +17,8 @@ use crate::command;
 use crate::debug::free_port;
 use crate::group::Group;
 
-/// Ends of the names of a board's scripts: of the one that serves the line by the exact-line protocol, and of the one
-/// that offers it to a person.
+/// A script of a board has the board's name and one of these ends. `EXACT` serves the line by the exact-line protocol,
+/// `SOCKET` offers the line to a person.
 const EXACT: &str = "-exact.resc";
 const SOCKET: &str = ".resc";
 

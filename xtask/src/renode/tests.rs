@@ -23,8 +23,8 @@ def serve(server):
         for line in client.makefile():
             client.sendall(b'ok 0.000 version=1 line=9600,8N2 abilities= name=fake\\n')
 threading.Thread(target=serve, args=[socket.create_server(('127.0.0.1', line))], daemon=True).start()
-told = monitor.accept()[0].makefile().read().lstrip()
-open(os.environ['CALLS'], 'a').write('told ' + told)
+received = monitor.accept()[0].makefile().read().lstrip()
+open(os.environ['CALLS'], 'a').write('monitor ' + received)
 " "$@" &
 wait $!
 "#;
@@ -203,7 +203,7 @@ fn conformance_suite_runs_against_the_board_in_renode() {
     let fake = Fake::new();
     fake.conformance(&fake.bench()).unwrap();
     let calls = fake.calls();
-    let [renode, conformance, told] = calls.as_slice() else {
+    let [renode, conformance, monitor] = calls.as_slice() else {
         panic!("{calls:?}");
     };
     assert!(
@@ -221,7 +221,10 @@ fn conformance_suite_runs_against_the_board_in_renode() {
     {
         assert!(conformance.contains(part), "{conformance}");
     }
-    assert_eq!(told, "told quit", "Renode was ended by its own command");
+    assert_eq!(
+        monitor, "monitor quit",
+        "Renode was ended by its own command"
+    );
     let script = fs::read_to_string(fake.at("calls.resc")).unwrap();
     let port = conformance.split([':', ' ']).nth(3).unwrap();
     let elf = live::token(&fake.at("modio"));
