@@ -159,4 +159,13 @@ mod tests {
         let names: Vec<String> = steps().into_iter().map(|step| step.name).collect();
         assert_eq!(names.len(), names.iter().collect::<BTreeSet<_>>().len());
     }
+    #[test]
+    fn workflow_runs_every_step() {
+        let workflow = include_str!("../../.github/workflows/ci.yml");
+        let words: BTreeSet<&str> = workflow.split_whitespace().collect();
+        for step in steps() {
+            let name = step.name.as_str();
+            assert!(words.contains(name), "{name} is in no job of ci.yml");
+        }
+    }
 }
