@@ -3,8 +3,8 @@
 use crate::adu::Framing;
 use crate::{Direction, names};
 
-/// A frame in words: the unit, and the request or response. `request` is the PDU of the request before, if that is known:
-/// it has the addresses that a response does not repeat.
+/// A frame in words: the unit, and the request or response. `request` is the PDU of the request before, if that is
+/// known: it has the addresses that a response does not repeat.
 #[must_use]
 pub fn frame(
     framing: Framing,

@@ -8,8 +8,8 @@
 //! | [`sentence`] | a frame as a sentence, as the simulator's log shows it |
 //! | [`capture`] | capture files that Wireshark reads |
 //!
-//! The crate contains only what the standard defines: no device, no line and no clock. The host tool, the simulator and the
-//! conformance suite use it.
+//! The crate contains only what the standard defines: no device, no line and no clock. The host tool, the simulator
+//! and the conformance suite use it.
 //!
 //! ```
 //! use modbus_frames::{Direction, adu::Framing, decode, sentence};

@@ -29,8 +29,8 @@ pub struct Device {
     pub running: bool,
     /// Of function 11, after the run indicator.
     pub additional_data: Vec<u8>,
-    /// A function that the server does not know. The device keeps the data and answers with them backwards, three times.
-    /// A request without data is refused.
+    /// A function that the server does not know. The device keeps the data and answers with them backwards, three
+    /// times. A request without data is refused.
     pub custom: Option<u8>,
     /// The data of the last request of that function.
     pub kept: Vec<u8>,

@@ -1,5 +1,5 @@
-//! A second Modbus serial-line server, in the plainest form, written only from the standard: V1.02 is *Modbus over Serial
-//! Line*, V1.1b3 the *Modbus Application Protocol Specification*. Tests compare other servers with this one.
+//! A second Modbus serial-line server, in the plainest form, written only from the standard: V1.02 is *Modbus over
+//! Serial Line*, V1.1b3 the *Modbus Application Protocol Specification*. Tests compare other servers with this one.
 //!
 //! - [`framed`] and [`unframed`] are a master's side of the line; [`pdu`] and the functions after it make requests.
 //! - [`Receiver`] judges a frame by its whole text, at the end of the frame.

@@ -110,8 +110,8 @@ impl Receiver {
         }
     }
 
-    /// A character, with faults as the bits of `modbus_server::line::Faults`, of which noise (4) does not count. Returns
-    /// the ASCII frame that a colon cut off.
+    /// A character, with faults as the bits of `modbus_server::line::Faults`, of which noise (4) does not count.
+    /// Returns the ASCII frame that a colon cut off.
     pub fn character(&mut self, byte: u8, faults: u8) -> Closed {
         let faults = faults & 11;
         match self.mode {

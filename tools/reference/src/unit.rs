@@ -11,8 +11,8 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// A unit after the first silence; `delimiter`: in ASCII mode with this end mark, else in RTU mode. `strict`: an RTU
-    /// frame with a gap above t1.5 is dropped.
+    /// A unit after the first silence; `delimiter`: in ASCII mode with this end mark, else in RTU mode. `strict`: an
+    /// RTU frame with a gap above t1.5 is dropped.
     pub fn new(delimiter: Option<u8>, device: Device, strict: bool) -> Self {
         let server = Server::new(delimiter, device);
         let mut receiver = Receiver::new(mode(delimiter, strict));
@@ -20,8 +20,8 @@ impl Unit {
         Self { server, receiver }
     }
 
-    /// Receives a character, with faults as for [`Receiver::character`]. Returns the reply to an ASCII frame that ends with
-    /// the character.
+    /// Receives a character, with faults as for [`Receiver::character`]. Returns the reply to an ASCII frame that
+    /// ends with the character.
     pub fn character(&mut self, byte: u8, faults: u8) -> Option<Vec<u8>> {
         let gaps = self.receiver.counters.gaps;
         let cut_off = self.receiver.character(byte, faults);

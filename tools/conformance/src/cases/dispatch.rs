@@ -16,8 +16,8 @@ pub(super) const CASES: &[Case] = &[
         elsewhere),
 ];
 
-/// Functions that the unit does not have. On other devices than a modio only codes that no maker is known to use, because
-/// the effect of a maker's own function is unknown.
+/// Functions that the unit does not have. On other devices than a modio only codes that no maker is known to use,
+/// because the effect of a maker's own function is unknown.
 pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
     let lacking = |function: &u8| !bench.target.has(*function);
     if bench.target.modio.is_some() {

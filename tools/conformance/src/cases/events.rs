@@ -161,8 +161,8 @@ fn log_counts(bench: &mut Bench<'_>) -> Check {
 fn log_order(bench: &mut Bench<'_>) -> Check {
     bench.alive("the first reading of the count")?;
     let (_, _, events) = log(bench)?;
-    // Receive events have bit 7 set. Send events have bit 7 clear and bit 6 set. The log may already contain the request
-    // that reads it.
+    // Receive events have bit 7 set. Send events have bit 7 clear and bit 6 set. The log may already contain the
+    // request that reads it.
     let receive = |event: &u8| event & 0x80 != 0;
     let sent = |event: &u8| event & 0xC0 == 0x40;
     let skip = usize::from(events.first().is_some_and(receive));
