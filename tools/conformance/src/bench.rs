@@ -113,8 +113,8 @@ impl<'a> Bench<'a> {
         self.listen_until(enough)
     }
 
-    /// Sends pieces to which a reply is due. Where requests may get lost on the way, they are repeated once when there is
-    /// no reply.
+    /// Sends pieces to which a reply is due. Where requests may get lost on the way, they are repeated once when
+    /// there is no reply.
     pub fn exchange_due(&mut self, pieces: &[Piece]) -> Check<Reply> {
         let reply = self.exchange(pieces)?;
         if reply != Reply::Silence || !self.endpoint.abilities().asks_again {
@@ -210,8 +210,8 @@ impl<'a> Bench<'a> {
         self.ensure(reply.exception(pdu[0]) == Some(code), wanted)
     }
 
-    /// Sends a PDU whose last byte before the data is the byte count, and expects exception 03. If the byte count differs
-    /// from the number of data bytes, silence is right as well, because the frame is not complete.
+    /// Sends a PDU whose last byte before the data is the byte count, and expects exception 03. If the byte count
+    /// differs from the number of data bytes, silence is right as well, because the frame is not complete.
     pub fn exception_03_with(&mut self, head: &[u8], data: &[u8]) -> Check {
         let request = [head, data].concat();
         if head.last().copied().map(usize::from) == Some(data.len()) {

@@ -1,9 +1,9 @@
-//! A suite of cases that a Modbus serial-line server must pass. The suite tests the server from outside, by raw bytes on
-//! a serial line, a socket or a simulated line.
+//! A suite of cases that a Modbus serial-line server must pass. The suite tests the server from outside, by raw bytes
+//! on a serial line, a socket or a simulated line.
 //!
 //! Each case cites its source: *V1.02* is Modbus over Serial Line V1.02, *V1.1b3* the Modbus Application Protocol
-//! V1.1b3, *map* the register map of the modio. A case lists what it needs of the unit and of the endpoint. If something
-//! is missing, the case is skipped with the reason.
+//! V1.1b3, *map* the register map of the modio. A case lists what it needs of the unit and of the endpoint. If
+//! something is missing, the case is skipped with the reason.
 //!
 //! ```text
 //! main, cli,     the command                  case, cases/   the cases

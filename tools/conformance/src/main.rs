@@ -60,7 +60,7 @@ fn test(cli: &Cli) -> anyhow::Result<u8> {
     // The results up to an error are reported, too.
     program::say(table::summary(&outcomes));
     let json = json::value(&name, &outcomes);
-    let written = cli.reports.write(&junit::report(&name, &outcomes), &json);
+    let written = cli.reports.write(&junit::document(&name, &outcomes), &json);
     ended?;
     written?;
     if !go_on() {

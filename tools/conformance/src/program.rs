@@ -63,8 +63,8 @@ impl Files {
     /// # Errors
     ///
     /// The first file that cannot be written, and why.
-    pub fn write(&self, junit: &quick_junit::Report, json: &serde_json::Value) -> Result<()> {
-        let junit = write(self.junit.as_deref(), &junit.to_string()?);
+    pub fn write(&self, junit: &str, json: &serde_json::Value) -> Result<()> {
+        let junit = write(self.junit.as_deref(), junit);
         let json = write(self.json.as_deref(), &format!("{json:#}\n"));
         junit.and(json)
     }

@@ -20,14 +20,14 @@ const INTERVAL: Duration = Duration::from_millis(250);
 const ATTEMPTS: u32 = 3;
 
 /// Sets each of these rates and formats, calls `visit` there, and restores the first rate and format, also after a
-/// failure. If the unit does not answer after a change, the endpoint tries the rates where the unit may be. The tour ends
-/// when `visit` fails.
+/// failure. If the unit does not answer after a change, the endpoint tries the rates where the unit may be. The tour
+/// ends when `visit` fails.
 ///
 /// # Errors
 ///
 /// [`Stop::Skip`] when the endpoint does not support one of the rates and formats; then the unit is not changed.
-/// Otherwise the error of the first change or visit that failed, or of restoring the rate. In the last case the unit may
-/// be at another rate than before, and the endpoint is at the rate at which the unit last answered.
+/// Otherwise the error of the first change or visit that failed, or of restoring the rate. In the last case the unit
+/// may be at another rate than before, and the endpoint is at the rate at which the unit last answered.
 pub fn tour(
     bench: &mut Bench<'_>,
     stops: impl IntoIterator<Item = LineFormat>,

@@ -153,8 +153,8 @@ pub struct Target {
     pub mode: Mode,
     /// The functions that were probed.
     pub functions: BTreeMap<u8, Support>,
-    /// The readable addresses, for functions 1 to 4. The runs are in ascending order. Two runs follow each other without
-    /// an address between them only when one request cannot span both.
+    /// The readable addresses, for functions 1 to 4. The runs are in ascending order. Two runs follow each other
+    /// without an address between them only when one request cannot span both.
     pub readable: [Vec<Span>; 4],
     /// Coils to write to: at most 1968.
     pub bits: Option<Span>,

@@ -1,8 +1,8 @@
 //! Capture files: pcapng with link type `WIRESHARK_UPPER_PDU` (252).
 //!
-//! Packets of this link type carry the name of the dissector that decodes them. Wireshark therefore decodes Modbus RTU
-//! without any configuration. Other link types, such as `USER0` and `RTAC_SERIAL`, need an entry in the user's settings.
-//! Each packet starts with tags (type, length, value; big-endian; Wireshark `wsutil/exported_pdu_tlvs.h`):
+//! Packets of this link type carry the name of the dissector that decodes them. Wireshark therefore decodes Modbus
+//! RTU without any configuration. Other link types, such as `USER0` and `RTAC_SERIAL`, need an entry in the user's
+//! settings. Each packet starts with tags (type, length, value; big-endian; Wireshark `wsutil/exported_pdu_tlvs.h`):
 //!
 //! | tag | value |
 //! |---|---|

@@ -6,86 +6,29 @@ use crate::cases::diagnostics::diagnose;
 use crate::cases::line_counters::count;
 use crate::points::{pdu, write_bits, write_words};
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "address/other-units",
-        "V1.02 2.2",
-        "requests for other units get silence",
-        &[],
-        other_units,
-    ),
-    case(
-        "address/reserved",
-        "V1.02 2.2",
-        "addresses 248 to 255 get silence",
-        &[],
-        reserved,
-    ),
-    case(
-        "address/other-units-write",
-        "V1.02 2.2",
-        "writes to other units and reserved addresses do nothing here",
-        &[Need::Bits, Need::Function(1)],
-        other_units_write,
-    ),
-    case(
-        "address/other-units-write-words",
-        "V1.02 2.2",
-        "register writes to other units and reserved addresses do nothing here",
-        &[Need::Words, Need::Function(3)],
-        other_units_write_words,
-    ),
-    case(
-        "broadcast/coils",
-        "V1.02 2.1",
-        "a broadcast 05 or 0F is done, in silence",
-        &[Need::Bits, Need::Function(1)],
-        broadcast_bits,
-    ),
-    case(
-        "broadcast/registers",
-        "V1.02 2.1",
-        "a broadcast 06 or 10 is done, in silence",
-        &[Need::Words, Need::Function(3)],
-        broadcast_words,
-    ),
-    case(
-        "broadcast/read",
-        "V1.02 2.1",
-        "a broadcast read gets silence",
-        &[],
-        broadcast_read,
-    ),
-    case(
-        "broadcast/nonsense",
-        "V1.02 2.1",
-        "a broadcast that is refused gets silence and writes nothing",
-        &[],
-        nonsense,
-    ),
-    case(
-        "broadcast/restart",
-        "V1.1b3 6.8, 08/01",
-        "a broadcast 08/01 gets silence and restarts nothing: the counters go on",
-        &[Need::Function(8)],
-        broadcast_restart,
-    )
-    .interpretation(),
-    case(
-        "broadcast/listen-only",
-        "V1.1b3 6.8, 08/04",
-        "a broadcast 08/04 puts no unit into listen-only mode",
-        &[Need::Function(8)],
-        broadcast_listen_only,
-    )
-    .interpretation(),
-    case(
-        "broadcast/refused-writes-nothing",
-        "V1.02 2.1",
-        "a broadcast write that is partly wrong writes nothing",
-        &[Need::Bits, Need::Function(1)],
-        refused_writes,
-    ),
+    case("address/other-units", "V1.02 2.2", "requests for other units get silence", &[], other_units),
+    case("address/reserved", "V1.02 2.2", "addresses 248 to 255 get silence", &[], reserved),
+    case("address/other-units-write", "V1.02 2.2", "writes to other units and reserved addresses do nothing here",
+        &[Need::Bits, Need::Function(1)], other_units_write),
+    case("address/other-units-write-words", "V1.02 2.2",
+        "register writes to other units and reserved addresses do nothing here", &[Need::Words, Need::Function(3)],
+        other_units_write_words),
+    case("broadcast/coils", "V1.02 2.1", "a broadcast 05 or 0F is done, in silence", &[Need::Bits, Need::Function(1)],
+        broadcast_bits),
+    case("broadcast/registers", "V1.02 2.1", "a broadcast 06 or 10 is done, in silence",
+        &[Need::Words, Need::Function(3)], broadcast_words),
+    case("broadcast/read", "V1.02 2.1", "a broadcast read gets silence", &[], broadcast_read),
+    case("broadcast/nonsense", "V1.02 2.1", "a broadcast that is refused gets silence and writes nothing", &[],
+        nonsense),
+    case("broadcast/restart", "V1.1b3 6.8, 08/01",
+        "a broadcast 08/01 gets silence and restarts nothing: the counters go on", &[Need::Function(8)],
+        broadcast_restart).interpretation(),
+    case("broadcast/listen-only", "V1.1b3 6.8, 08/04", "a broadcast 08/04 puts no unit into listen-only mode",
+        &[Need::Function(8)], broadcast_listen_only).interpretation(),
+    case("broadcast/refused-writes-nothing", "V1.02 2.1", "a broadcast write that is partly wrong writes nothing",
+        &[Need::Bits, Need::Function(1)], refused_writes),
 ];
 
 /// Addresses of other units: all of them where time is exact, elsewhere those that differ from this unit's address in

@@ -13,101 +13,29 @@ use crate::line::Parity;
 const N: &[Need] = &[Need::Ascii];
 const S: &str = "V1.02 2.5.2.1";
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "ascii/bad-lrc",
-        "V1.02 2.5.2.2",
-        "a wrong LRC gets silence",
-        N,
-        bad_lrc,
-    ),
-    case(
-        "ascii/before-the-colon",
-        S,
-        "whatever stands before the colon is ignored",
-        N,
-        before_colon,
-    ),
-    case(
-        "ascii/colon-restarts",
-        S,
-        "a colon starts a new frame, whatever was open",
-        N,
-        colon_restarts,
-    ),
-    case(
-        "ascii/not-a-digit",
-        S,
-        "characters that are no digits, and odd numbers of digits, spoil the frame",
-        N,
-        not_digits,
-    ),
-    case(
-        "ascii/lower-case",
-        S,
-        "the digits are 0-9 and A-F: a frame with lower-case digits gets silence",
-        N,
-        lower_case,
-    )
-    .interpretation(),
-    case(
-        "ascii/damaged-character",
-        S,
+    case("ascii/bad-lrc", "V1.02 2.5.2.2", "a wrong LRC gets silence", N, bad_lrc),
+    case("ascii/before-the-colon", S, "whatever stands before the colon is ignored", N, before_colon),
+    case("ascii/colon-restarts", S, "a colon starts a new frame, whatever was open", N, colon_restarts),
+    case("ascii/not-a-digit", S, "characters that are no digits, and odd numbers of digits, spoil the frame", N,
+        not_digits),
+    case("ascii/lower-case", S, "the digits are 0-9 and A-F: a frame with lower-case digits gets silence", N,
+        lower_case).interpretation(),
+    case("ascii/damaged-character", S,
         "a character with a low stop bit or wrong parity spoils its frame, and that one only",
-        &[Need::Ascii, Need::Faults],
-        damaged,
-    ),
-    case(
-        "ascii/truncated",
-        S,
-        "a frame without its end gets silence, and the next one is answered",
-        N,
-        truncated,
-    ),
-    case(
-        "ascii/gap-below-1-s",
-        S,
-        "gaps of up to a second inside a frame are no harm",
-        N,
-        short_gap,
-    ),
-    case(
-        "ascii/gap-above-1-s",
-        S,
-        "a gap of more than a second ends the frame",
-        N,
-        long_gap,
-    ),
-    case(
-        "ascii/longest",
-        S,
-        "a frame of 513 characters is processed",
-        N,
-        longest,
-    ),
-    case(
-        "ascii/too-long",
-        S,
-        "longer frames are dropped",
-        N,
-        too_long,
-    ),
+        &[Need::Ascii, Need::Faults], damaged),
+    case("ascii/truncated", S, "a frame without its end gets silence, and the next one is answered", N, truncated),
+    case("ascii/gap-below-1-s", S, "gaps of up to a second inside a frame are no harm", N, short_gap),
+    case("ascii/gap-above-1-s", S, "a gap of more than a second ends the frame", N, long_gap),
+    case("ascii/longest", S, "a frame of 513 characters is processed", N, longest),
+    case("ascii/too-long", S, "longer frames are dropped", N, too_long),
     case("ascii/rtu-frame", S, "RTU frames get silence", N, rtu_frame),
-    case(
-        "ascii/delimiter",
-        "V1.1b3 6.8.1, 03",
-        "08/03 changes the character that ends a frame after CR",
-        &[Need::Ascii, Need::Function(8)],
-        delimiter,
-    ),
-    case(
-        "ascii/delimiter-refused",
-        "V1.1b3 6.8.1, 03",
+    case("ascii/delimiter", "V1.1b3 6.8.1, 03", "08/03 changes the character that ends a frame after CR",
+        &[Need::Ascii, Need::Function(8)], delimiter),
+    case("ascii/delimiter-refused", "V1.1b3 6.8.1, 03",
         "08/03 with a colon, CR or a digit, or without 00 after the character, is exception 03",
-        &[Need::Ascii, Need::Function(8)],
-        delimiter_refused,
-    )
-    .interpretation(),
+        &[Need::Ascii, Need::Function(8)], delimiter_refused).interpretation(),
 ];
 
 fn body(bench: &Bench<'_>) -> Vec<u8> {

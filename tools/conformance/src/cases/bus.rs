@@ -10,57 +10,21 @@ use crate::points::pdu;
 
 const N: &[Need] = &[Need::Rtu];
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "bus/others-traffic",
-        "V1.02 2.4.1",
-        "requests, replies and exceptions of other units make this one neither deaf nor talkative",
-        N,
-        others_traffic,
-    ),
-    case(
-        "bus/others-truncated-traffic",
-        "V1.02 2.4.1",
-        "nor do truncated and damaged ones",
-        N,
-        others_truncated,
-    ),
-    case(
-        "bus/others-long-replies",
-        "V1.02 2.4.1",
-        "nor do replies of every length, up to 255 bytes",
-        N,
-        others_long,
-    ),
-    case(
-        "bus/request-right-after-others-reply",
-        "V1.02 2.5.1.1",
-        "a request t3.5 after another unit's reply is answered",
-        &[Need::Rtu, Need::Exact],
-        right_after,
-    ),
-    case(
-        "bus/others-reply-is-no-request",
-        "V1.02 2.2",
+    case("bus/others-traffic", "V1.02 2.4.1",
+        "requests, replies and exceptions of other units make this one neither deaf nor talkative", N,
+        others_traffic),
+    case("bus/others-truncated-traffic", "V1.02 2.4.1", "nor do truncated and damaged ones", N, others_truncated),
+    case("bus/others-long-replies", "V1.02 2.4.1", "nor do replies of every length, up to 255 bytes", N, others_long),
+    case("bus/request-right-after-others-reply", "V1.02 2.5.1.1",
+        "a request t3.5 after another unit's reply is answered", &[Need::Rtu, Need::Exact], right_after),
+    case("bus/others-reply-is-no-request", "V1.02 2.2",
         "a reply that would be a write if it were for this unit is not taken for one",
-        &[Need::Rtu, Need::Bits, Need::Function(1)],
-        reply_is_no_request,
-    ),
-    case(
-        "bus/stray-zero",
-        "V1.02 2.5.1.1",
-        "a stray 00 before a request costs that request at most",
-        N,
-        stray_zero,
-    ),
-    case(
-        "bus/own-echo",
-        "V1.02 3.3",
-        "with DE and RE tied, the unit does not take its own reply for a request",
-        &[Need::Rtu, Need::Echo],
-        own_echo,
-    )
-    .interpretation(),
+        &[Need::Rtu, Need::Bits, Need::Function(1)], reply_is_no_request),
+    case("bus/stray-zero", "V1.02 2.5.1.1", "a stray 00 before a request costs that request at most", N, stray_zero),
+    case("bus/own-echo", "V1.02 3.3", "with DE and RE tied, the unit does not take its own reply for a request",
+        &[Need::Rtu, Need::Echo], own_echo).interpretation(),
 ];
 
 /// Requests to other units, and their replies.

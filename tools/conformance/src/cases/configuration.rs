@@ -8,56 +8,25 @@ use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::points::{pdu, write_words};
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "config/locked",
-        "map, 0x0100",
+    case("config/locked", "map, 0x0100",
         "while the lock is closed a configuration write is exception 06 and changes nothing",
-        &[Need::Modio, Need::Function(6)],
-        locked,
-    ),
-    case(
-        "config/wrong-key",
-        "map, 0x0100",
-        "KEY takes 5A17 only, anything else is exception 03",
-        &[Need::Modio, Need::Function(6)],
-        wrong_key,
-    ),
-    case(
-        "config/value-before-lock",
-        "map, access rules",
-        "a value out of range is exception 03 even while the lock is closed",
-        &[Need::Modio, Need::Function(6)],
-        value_first,
-    ),
-    case(
-        "config/read-only",
-        "map, access rules",
-        "writing identity and state is exception 02, by 06 and 10",
-        &[Need::Modio, Need::Function(6), Need::Function(0x10)],
-        read_only,
-    ),
-    case(
-        "config/command-reads-0",
-        "map, 0x0108",
-        "COMMAND reads 0, and takes no command that does not exist",
-        &[Need::Modio, Need::Function(6)],
-        command,
-    ),
-    case(
-        "config/all-or-nothing",
-        "map, access rules",
+        &[Need::Modio, Need::Function(6)], locked),
+    case("config/wrong-key", "map, 0x0100", "KEY takes 5A17 only, anything else is exception 03",
+        &[Need::Modio, Need::Function(6)], wrong_key),
+    case("config/value-before-lock", "map, access rules",
+        "a value out of range is exception 03 even while the lock is closed", &[Need::Modio, Need::Function(6)],
+        value_first),
+    case("config/read-only", "map, access rules", "writing identity and state is exception 02, by 06 and 10",
+        &[Need::Modio, Need::Function(6), Need::Function(0x10)], read_only),
+    case("config/command-reads-0", "map, 0x0108", "COMMAND reads 0, and takes no command that does not exist",
+        &[Need::Modio, Need::Function(6)], command),
+    case("config/all-or-nothing", "map, access rules",
         "a write of several registers with one bad value changes none of them",
-        &[Need::Modio, Need::Config, Need::Function(0x10)],
-        all_or_nothing,
-    ),
-    case(
-        "config/response-delay",
-        "map, 0x0105",
-        "RESPONSE_DELAY is in force at once: replies come that much later",
-        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)],
-        response_delay,
-    ),
+        &[Need::Modio, Need::Config, Need::Function(0x10)], all_or_nothing),
+    case("config/response-delay", "map, 0x0105", "RESPONSE_DELAY is in force at once: replies come that much later",
+        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)], response_delay),
 ];
 
 fn locked(bench: &mut Bench<'_>) -> Check {

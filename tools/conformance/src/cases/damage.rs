@@ -9,57 +9,20 @@ use crate::frame::Reply;
 
 const N: &[Need] = &[Need::Rtu, Need::Faults];
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "damage/framing-error",
-        "V1.02 2.5.1.1",
-        "a character with a low stop bit spoils its frame, and that one only",
-        N,
-        framing_error,
-    ),
-    case(
-        "damage/parity-error",
-        "V1.02 2.5.1",
-        "a character with wrong parity spoils its frame, and that one only",
-        &[Need::Rtu, Need::Faults, Need::Parity],
-        parity_error,
-    ),
-    case(
-        "damage/parity-error-broadcast",
-        "V1.02 2.5.1",
-        "a broadcast write with a damaged character is not done",
-        &[
-            Need::Rtu,
-            Need::Faults,
-            Need::Bits,
-            Need::Function(1),
-            Need::Function(5),
-        ],
-        damaged_write,
-    ),
-    case(
-        "damage/break",
-        "V1.02 2.5.1.1",
-        "a break costs no later request",
-        N,
-        line_break,
-    ),
-    case(
-        "damage/glitch",
-        "V1.02 2.5.1.1",
-        "short glitches on the idle line cost no later request",
-        N,
-        glitch,
-    )
-    .interpretation(),
-    case(
-        "damage/noise-behind-a-frame",
-        "V1.02 2.5.1.1",
+    case("damage/framing-error", "V1.02 2.5.1.1",
+        "a character with a low stop bit spoils its frame, and that one only", N, framing_error),
+    case("damage/parity-error", "V1.02 2.5.1", "a character with wrong parity spoils its frame, and that one only",
+        &[Need::Rtu, Need::Faults, Need::Parity], parity_error),
+    case("damage/parity-error-broadcast", "V1.02 2.5.1", "a broadcast write with a damaged character is not done",
+        &[Need::Rtu, Need::Faults, Need::Bits, Need::Function(1), Need::Function(5)], damaged_write),
+    case("damage/break", "V1.02 2.5.1.1", "a break costs no later request", N, line_break),
+    case("damage/glitch", "V1.02 2.5.1.1", "short glitches on the idle line cost no later request", N,
+        glitch).interpretation(),
+    case("damage/noise-behind-a-frame", "V1.02 2.5.1.1",
         "pulses below half a bit after a request delay its reply by one character at most",
-        &[Need::Rtu, Need::Exact, Need::Faults, Need::Driver],
-        noise_behind,
-    )
-    .interpretation(),
+        &[Need::Rtu, Need::Exact, Need::Faults, Need::Driver], noise_behind).interpretation(),
 ];
 
 /// Damages each character of a request in turn. The unit is silent to that request, and answers the next one.

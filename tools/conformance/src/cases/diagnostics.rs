@@ -8,86 +8,30 @@ use crate::frame::Reply;
 
 const N: &[Need] = &[Need::Function(8)];
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "fc08/echo",
-        "V1.1b3 6.8.1, 00",
-        "sub-function 00 returns its data, any number of words; a modio's any number of bytes",
-        N,
-        echo,
-    ),
-    case(
-        "fc08/unknown-sub-function",
-        "V1.1b3 6.8",
-        "a sub-function that the unit does not have is exception 01",
-        N,
-        unknown,
-    ),
-    case(
-        "fc08/data",
-        "V1.1b3 6.8.1",
-        "data other than 0000 where 0000 is required is exception 03",
-        N,
-        data,
-    ),
-    case(
-        "fc08/length",
-        "V1.1b3 6.8",
-        "a request without a whole sub-function is 03 or silence",
-        N,
-        length,
-    )
-    .interpretation(),
-    case(
-        "fc08/register",
-        "V1.1b3 6.8.1, 02",
-        "sub-function 02 gives the diagnostic register",
-        N,
-        register,
-    ),
-    case(
-        "fc08/restart",
-        "V1.1b3 6.8.1, 01",
-        "sub-function 01 echoes 0000 and FF00, clears the counters and goes on, anything else is 03",
-        N,
-        restart,
-    ),
-    case(
-        "fc08/delimiter-in-rtu",
-        "V1.1b3 6.8.1, 03",
+    case("fc08/echo", "V1.1b3 6.8.1, 00",
+        "sub-function 00 returns its data, any number of words; a modio's any number of bytes", N, echo),
+    case("fc08/unknown-sub-function", "V1.1b3 6.8", "a sub-function that the unit does not have is exception 01", N,
+        unknown),
+    case("fc08/data", "V1.1b3 6.8.1", "data other than 0000 where 0000 is required is exception 03", N, data),
+    case("fc08/length", "V1.1b3 6.8", "a request without a whole sub-function is 03 or silence", N,
+        length).interpretation(),
+    case("fc08/register", "V1.1b3 6.8.1, 02", "sub-function 02 gives the diagnostic register", N, register),
+    case("fc08/restart", "V1.1b3 6.8.1, 01",
+        "sub-function 01 echoes 0000 and FF00, clears the counters and goes on, anything else is 03", N, restart),
+    case("fc08/delimiter-in-rtu", "V1.1b3 6.8.1, 03",
         "in RTU sub-function 03 has no effect: it is exception 01 or echoed; on a modio 01",
-        &[Need::Function(8), Need::Rtu],
-        delimiter_in_rtu,
-    )
-    .interpretation(),
-    case(
-        "fc08/listen-only",
-        "V1.1b3 6.8.1, 04",
-        "04 is not answered; then nothing is, nor done, but 01, which ends it, itself without reply",
-        N,
-        listen_only,
-    ),
-    case(
-        "fc08/listen-only-writes",
-        "V1.1b3 6.8.1, 04",
+        &[Need::Function(8), Need::Rtu], delimiter_in_rtu).interpretation(),
+    case("fc08/listen-only", "V1.1b3 6.8.1, 04",
+        "04 is not answered; then nothing is, nor done, but 01, which ends it, itself without reply", N, listen_only),
+    case("fc08/listen-only-writes", "V1.1b3 6.8.1, 04",
         "in listen-only mode nothing is written, not by broadcast either",
-        &[Need::Function(8), Need::Function(1), Need::Bits],
-        listen_only_writes,
-    ),
-    case(
-        "fc08/clear-counters",
-        "V1.1b3 6.8.1, 0A",
-        "0A sets every counter and the diagnostic register to 0",
-        N,
-        clear,
-    ),
-    case(
-        "fc08/clear-overruns",
-        "V1.1b3 6.8.1, 14",
-        "14 is echoed, and the overrun counter is 0 after it",
-        N,
-        clear_overruns,
-    ),
+        &[Need::Function(8), Need::Function(1), Need::Bits], listen_only_writes),
+    case("fc08/clear-counters", "V1.1b3 6.8.1, 0A", "0A sets every counter and the diagnostic register to 0", N,
+        clear),
+    case("fc08/clear-overruns", "V1.1b3 6.8.1, 14", "14 is echoed, and the overrun counter is 0 after it", N,
+        clear_overruns),
 ];
 
 /// A request of function 08.

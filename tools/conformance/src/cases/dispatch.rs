@@ -4,40 +4,20 @@ use crate::bench::Bench;
 use crate::case::{Case, Check, Stop, case};
 use crate::frame::Reply;
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "dispatch/unknown-function",
-        "V1.1b3 7",
-        "a function that the unit does not have is exception 01",
-        &[],
-        unknown,
-    ),
-    case(
-        "dispatch/unknown-function-longest",
-        "V1.1b3 7",
-        "the same with the longest PDU, 253 bytes",
-        &[],
-        longest,
-    ),
-    case(
-        "dispatch/function-00-and-80-up",
-        "V1.1b3 4.1",
-        "function 00 and those from 80 on get silence or exception 01, never what looks like a reply",
-        &[],
-        not_functions,
-    )
-    .interpretation(),
-    case(
-        "dispatch/unknown-function-elsewhere",
-        "V1.02 2.2",
-        "an unknown function for another unit gets silence",
-        &[],
-        elsewhere,
-    ),
+    case("dispatch/unknown-function", "V1.1b3 7", "a function that the unit does not have is exception 01", &[],
+        unknown),
+    case("dispatch/unknown-function-longest", "V1.1b3 7", "the same with the longest PDU, 253 bytes", &[], longest),
+    case("dispatch/function-00-and-80-up", "V1.1b3 4.1",
+        "function 00 and those from 80 on get silence or exception 01, never what looks like a reply", &[],
+        not_functions).interpretation(),
+    case("dispatch/unknown-function-elsewhere", "V1.02 2.2", "an unknown function for another unit gets silence", &[],
+        elsewhere),
 ];
 
-/// Functions that the unit does not have. On other devices than a modio only codes that no maker is known to use, because
-/// the effect of a maker's own function is unknown.
+/// Functions that the unit does not have. On other devices than a modio only codes that no maker is known to use,
+/// because the effect of a maker's own function is unknown.
 pub(super) fn unknown_functions(bench: &Bench<'_>) -> Vec<u8> {
     let lacking = |function: &u8| !bench.target.has(*function);
     if bench.target.modio.is_some() {

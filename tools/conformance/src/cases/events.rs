@@ -10,159 +10,54 @@ use crate::endpoint::Piece;
 use crate::frame::hex;
 use crate::points::pdu;
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "fc07/shape",
-        "V1.1b3 6.7",
-        "the reply is one byte of status",
-        &[Need::Function(7)],
-        exception_status,
-    ),
-    case(
-        "fc07/length",
-        "V1.1b3 6.7",
-        "a request with data is 03 or silence",
-        &[Need::Function(7)],
-        |bench| with_data(bench, 7),
-    )
-    .interpretation(),
-    case(
-        "fc0b/shape",
-        "V1.1b3 6.9",
-        "the reply is a status of 0000 or FFFF and a count",
-        &[Need::Function(0x0B)],
-        counter_shape,
-    ),
-    case(
-        "fc0b/length",
-        "V1.1b3 6.9",
-        "a request with data is 03 or silence",
-        &[Need::Function(0x0B)],
-        |bench| with_data(bench, 0x0B),
-    )
-    .interpretation(),
-    case(
-        "fc0b/counts",
-        "V1.1b3 6.9",
-        "each message done counts one; exceptions and 0B itself do not count",
-        &[Need::Function(0x0B)],
-        counter_counts,
-    ),
-    case(
-        "fc0c/shape",
-        "V1.1b3 6.10",
-        "byte count, status, event count, message count and at most 64 events",
-        &[Need::Function(0x0C)],
-        log_shape,
-    ),
-    case(
-        "fc0c/length",
-        "V1.1b3 6.10",
-        "a request with data is 03 or silence",
-        &[Need::Function(0x0C)],
-        |bench| with_data(bench, 0x0C),
-    )
-    .interpretation(),
-    case(
-        "fc0c/counts",
-        "V1.1b3 6.10",
-        "the log's event count is what 0B gives, the log's own reading not in it",
-        &[Need::Function(0x0B), Need::Function(0x0C)],
-        log_counts,
-    ),
-    case(
-        "fc0c/newest-first",
-        "V1.1b3 6.10",
-        "the newest event is first: a request received, before it the reply sent",
-        &[Need::Function(0x0C)],
-        log_order,
-    ),
-    case(
-        "fc0c/cleared-by-restart",
-        "V1.1b3 6.8, 08/01",
-        "08/01 with FF00 empties the log; the restart itself is event 00",
-        &[Need::Function(8), Need::Function(0x0C)],
-        log_cleared,
-    ),
-    case(
-        "fc0c/reply-sent",
-        "V1.1b3 6.10",
-        "a request that is answered is 80, received, and then 40, sent",
-        &[Need::Function(0x0C)],
-        log_reply,
-    ),
-    case(
-        "fc0c/exception-sent",
-        "V1.1b3 6.10",
-        "a reply with exception 01 to 03 is 41, read exception sent",
-        &[Need::Function(0x0C)],
-        log_exceptions,
-    ),
-    case(
-        "fc0c/busy-exception-sent",
-        "V1.1b3 6.10",
-        "a reply with exception 06 is 44, server busy exception sent",
-        &[Need::Function(0x0C), Need::Function(6), Need::Modio],
-        log_busy,
-    ),
-    case(
-        "fc0c/broadcast",
-        "V1.1b3 6.10",
-        "a broadcast is C0, received, and then 40, done without a reply",
-        &[Need::Function(0x0C)],
-        log_broadcast,
-    ),
-    case(
-        "fc0c/communication-error",
-        "V1.1b3 6.10",
-        "a frame with a bad check is 82, received with a communication error",
-        &[Need::Function(0x0C)],
-        log_bad_check,
-    ),
-    case(
-        "fc0c/communication-error-characters",
-        "V1.1b3 6.10",
+    case("fc07/shape", "V1.1b3 6.7", "the reply is one byte of status", &[Need::Function(7)], exception_status),
+    case("fc07/length", "V1.1b3 6.7", "a request with data is 03 or silence", &[Need::Function(7)],
+        |bench| with_data(bench, 7)).interpretation(),
+    case("fc0b/shape", "V1.1b3 6.9", "the reply is a status of 0000 or FFFF and a count", &[Need::Function(0x0B)],
+        counter_shape),
+    case("fc0b/length", "V1.1b3 6.9", "a request with data is 03 or silence", &[Need::Function(0x0B)],
+        |bench| with_data(bench, 0x0B)).interpretation(),
+    case("fc0b/counts", "V1.1b3 6.9", "each message done counts one; exceptions and 0B itself do not count",
+        &[Need::Function(0x0B)], counter_counts),
+    case("fc0c/shape", "V1.1b3 6.10", "byte count, status, event count, message count and at most 64 events",
+        &[Need::Function(0x0C)], log_shape),
+    case("fc0c/length", "V1.1b3 6.10", "a request with data is 03 or silence", &[Need::Function(0x0C)],
+        |bench| with_data(bench, 0x0C)).interpretation(),
+    case("fc0c/counts", "V1.1b3 6.10", "the log's event count is what 0B gives, the log's own reading not in it",
+        &[Need::Function(0x0B), Need::Function(0x0C)], log_counts),
+    case("fc0c/newest-first", "V1.1b3 6.10",
+        "the newest event is first: a request received, before it the reply sent", &[Need::Function(0x0C)],
+        log_order),
+    case("fc0c/cleared-by-restart", "V1.1b3 6.8, 08/01",
+        "08/01 with FF00 empties the log; the restart itself is event 00", &[Need::Function(8), Need::Function(0x0C)],
+        log_cleared),
+    case("fc0c/reply-sent", "V1.1b3 6.10", "a request that is answered is 80, received, and then 40, sent",
+        &[Need::Function(0x0C)], log_reply),
+    case("fc0c/exception-sent", "V1.1b3 6.10", "a reply with exception 01 to 03 is 41, read exception sent",
+        &[Need::Function(0x0C)], log_exceptions),
+    case("fc0c/busy-exception-sent", "V1.1b3 6.10", "a reply with exception 06 is 44, server busy exception sent",
+        &[Need::Function(0x0C), Need::Function(6), Need::Modio], log_busy),
+    case("fc0c/broadcast", "V1.1b3 6.10", "a broadcast is C0, received, and then 40, done without a reply",
+        &[Need::Function(0x0C)], log_broadcast),
+    case("fc0c/communication-error", "V1.1b3 6.10",
+        "a frame with a bad check is 82, received with a communication error", &[Need::Function(0x0C)],
+        log_bad_check),
+    case("fc0c/communication-error-characters", "V1.1b3 6.10",
         "a frame with a damaged character is 82, received with a communication error",
-        &[Need::Function(0x0C), Need::Faults, Need::Rtu],
-        log_bad_character,
-    ),
-    case(
-        "fc0c/other-units",
-        "V1.1b3 6.10",
-        "requests for other units are no events",
-        &[Need::Function(0x0C)],
-        log_others,
-    ),
-    case(
-        "fc0c/restart",
-        "V1.1b3 6.8, 08/01",
-        "08/01 with 0000 keeps the log and adds event 00",
-        &[Need::Function(8), Need::Function(0x0C)],
-        log_restart,
-    ),
-    case(
-        "fc0c/listen-only",
-        "V1.1b3 6.10",
+        &[Need::Function(0x0C), Need::Faults, Need::Rtu], log_bad_character),
+    case("fc0c/other-units", "V1.1b3 6.10", "requests for other units are no events", &[Need::Function(0x0C)],
+        log_others),
+    case("fc0c/restart", "V1.1b3 6.8, 08/01", "08/01 with 0000 keeps the log and adds event 00",
+        &[Need::Function(8), Need::Function(0x0C)], log_restart),
+    case("fc0c/listen-only", "V1.1b3 6.10",
         "entering listen-only mode is event 04; from then on events have bit 5, up to the restart",
-        &[Need::Function(8), Need::Function(0x0C)],
-        log_listen_only,
-    )
-    .interpretation(),
-    case(
-        "fc11/shape",
-        "V1.1b3 6.13",
-        "byte count, identification and a run indicator of 00 or FF",
-        &[Need::Function(0x11)],
-        server_id,
-    ),
-    case(
-        "fc11/length",
-        "V1.1b3 6.13",
-        "a request with data is 03 or silence",
-        &[Need::Function(0x11)],
-        |bench| with_data(bench, 0x11),
-    )
-    .interpretation(),
+        &[Need::Function(8), Need::Function(0x0C)], log_listen_only).interpretation(),
+    case("fc11/shape", "V1.1b3 6.13", "byte count, identification and a run indicator of 00 or FF",
+        &[Need::Function(0x11)], server_id),
+    case("fc11/length", "V1.1b3 6.13", "a request with data is 03 or silence", &[Need::Function(0x11)],
+        |bench| with_data(bench, 0x11)).interpretation(),
 ];
 
 fn exception_status(bench: &mut Bench<'_>) -> Check {
@@ -266,8 +161,8 @@ fn log_counts(bench: &mut Bench<'_>) -> Check {
 fn log_order(bench: &mut Bench<'_>) -> Check {
     bench.alive("the first reading of the count")?;
     let (_, _, events) = log(bench)?;
-    // Receive events have bit 7 set. Send events have bit 7 clear and bit 6 set. The log may already contain the request
-    // that reads it.
+    // Receive events have bit 7 set. Send events have bit 7 clear and bit 6 set. The log may already contain the
+    // request that reads it.
     let receive = |event: &u8| event & 0x80 != 0;
     let sent = |event: &u8| event & 0xC0 == 0x40;
     let skip = usize::from(events.first().is_some_and(receive));

@@ -11,86 +11,26 @@ const N: &[Need] = &[Need::Function(0x14)];
 const M: &[Need] = &[Need::Function(0x14), Need::Modio];
 const S: &str = "V1.1b3 6.14";
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "fc14/byte-count",
-        S,
-        "a byte count below 07 or above F5 is exception 03",
-        N,
-        byte_count,
-    ),
-    case(
-        "fc14/length",
-        S,
-        "a request cut short or too long is 03 or silence",
-        N,
-        length,
-    )
-    .interpretation(),
-    case(
-        "fc14/reference-type",
-        S,
-        "a reference type other than 06 is exception 02",
-        N,
-        reference_type,
-    ),
-    case(
-        "fc14/file-0",
-        S,
-        "file number 0 is exception 02",
-        N,
-        file_0,
-    ),
-    case(
-        "fc14/record-above-9999",
-        S,
-        "a record number above 9999 is exception 02",
-        N,
-        record_above_9999,
-    ),
-    case(
-        "fc14/longest-reply",
-        S,
+    case("fc14/byte-count", S, "a byte count below 07 or above F5 is exception 03", N, byte_count),
+    case("fc14/length", S, "a request cut short or too long is 03 or silence", N, length).interpretation(),
+    case("fc14/reference-type", S, "a reference type other than 06 is exception 02", N, reference_type),
+    case("fc14/file-0", S, "file number 0 is exception 02", N, file_0),
+    case("fc14/record-above-9999", S, "a record number above 9999 is exception 02", N, record_above_9999),
+    case("fc14/longest-reply", S,
         "groups that do not fit a reply of 253 bytes are exception 03, or 02 where the file has not so many records",
-        N,
-        longest_reply,
-    )
-    .interpretation(),
-    case(
-        "files/self-description",
-        "map",
+        N, longest_reply).interpretation(),
+    case("files/self-description", "map",
         "file 1 is the self-description, with its length, its CRC, which is register 0x020F, and the modules in force",
-        M,
-        self_description,
-    ),
-    case(
-        "files/groups",
-        S,
-        "several groups in one request are read in their order",
-        M,
-        groups,
-    ),
-    case(
-        "files/longest-reply",
-        S,
-        "a group of 124 records is read and one of 125 is exception 03",
-        M,
-        longest_of_modio,
-    ),
-    case(
-        "files/beyond-the-end",
-        "map",
-        "records beyond the end of file 1, and every other file, are exception 02",
-        M,
-        beyond_the_end,
-    ),
-    case(
-        "files/read-only",
-        "map",
-        "a write to a file is exception 02 and writes nothing",
-        &[Need::Function(0x14), Need::Function(0x15), Need::Modio],
-        read_only,
-    ),
+        M, self_description),
+    case("files/groups", S, "several groups in one request are read in their order", M, groups),
+    case("files/longest-reply", S, "a group of 124 records is read and one of 125 is exception 03", M,
+        longest_of_modio),
+    case("files/beyond-the-end", "map", "records beyond the end of file 1, and every other file, are exception 02", M,
+        beyond_the_end),
+    case("files/read-only", "map", "a write to a file is exception 02 and writes nothing",
+        &[Need::Function(0x14), Need::Function(0x15), Need::Modio], read_only),
 ];
 
 /// A group of records: file, first record and number of records.

@@ -11,67 +11,22 @@ const N: &[Need] = &[Need::Rtu, Need::Exact];
 const B: &[Need] = &[Need::Rtu, Need::Exact, Need::StartBit];
 const S: &str = "V1.02 2.5.1.1";
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "gaps/below-t1.5",
-        S,
-        "gaps up to t1.5 inside a frame are no harm",
-        N,
-        below_t15,
-    ),
-    case(
-        "gaps/t1.5-to-t3.5",
-        S,
-        "a gap between t1.5 and t3.5 drops the frame, or not, as STRICT_T15 says: always alike",
-        N,
-        between,
-    )
-    .interpretation(),
-    case(
-        "gaps/just-below-t3.5",
-        S,
-        "a gap that is a few bits below t3.5 is treated as any other between t1.5 and t3.5",
-        B,
-        just_below_t35,
-    )
-    .interpretation(),
-    case(
-        "gaps/above-t3.5",
-        S,
-        "a gap above t3.5 ends the frame: neither half is one",
-        N,
-        above_t35,
-    ),
-    case(
-        "gaps/too-soon",
-        S,
-        "a request less than t3.5 after another joins it, and both are lost",
-        N,
-        too_soon,
-    )
-    .interpretation(),
-    case(
-        "gaps/a-bit-too-soon",
-        S,
-        "a request a few bits less than t3.5 after another joins it, and both are lost",
-        B,
-        a_bit_too_soon,
-    )
-    .interpretation(),
-    case(
-        "gaps/t3.5-is-enough",
-        S,
-        "a request t3.5 after another unit's is answered",
-        N,
-        soon_enough,
-    ),
-    case(
-        "gaps/after-noise",
-        S,
-        "noise, t3.5 of silence, and a request is answered",
-        N,
-        after_noise,
-    ),
+    case("gaps/below-t1.5", S, "gaps up to t1.5 inside a frame are no harm", N, below_t15),
+    case("gaps/t1.5-to-t3.5", S,
+        "a gap between t1.5 and t3.5 drops the frame, or not, as STRICT_T15 says: always alike", N,
+        between).interpretation(),
+    case("gaps/just-below-t3.5", S,
+        "a gap that is a few bits below t3.5 is treated as any other between t1.5 and t3.5", B,
+        just_below_t35).interpretation(),
+    case("gaps/above-t3.5", S, "a gap above t3.5 ends the frame: neither half is one", N, above_t35),
+    case("gaps/too-soon", S, "a request less than t3.5 after another joins it, and both are lost", N,
+        too_soon).interpretation(),
+    case("gaps/a-bit-too-soon", S, "a request a few bits less than t3.5 after another joins it, and both are lost", B,
+        a_bit_too_soon).interpretation(),
+    case("gaps/t3.5-is-enough", S, "a request t3.5 after another unit's is answered", N, soon_enough),
+    case("gaps/after-noise", S, "noise, t3.5 of silence, and a request is answered", N, after_noise),
 ];
 
 /// Distance of a gap from its limit: 3 bits, but at least 20 us.

@@ -11,56 +11,27 @@ use crate::cases::timing::hundred_requests;
 use crate::frame::{Mode, Reply, crc, rtu};
 use crate::points::{pdu, words_of};
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "hurts/odd-frames",
-        "V1.02 2.4.2",
-        "random frames, with good checks too, never upset the unit: the next good request is answered",
-        &[],
-        odd_frames,
-    ),
-    case(
-        "hurts/noise",
-        "V1.02 2.5.1.1",
-        "random bytes never get a reply, and the next good request is answered",
-        &[],
-        noise,
-    ),
-    case(
-        "hurts/restarts",
-        "map, 0x0208",
-        "nothing on the line restarts the unit: its uptime goes on, its reset cause stays",
-        &[Need::Modio],
-        restarts,
-    ),
-    case(
-        "hurts/masters-without-gaps",
-        "map, line",
+    case("hurts/odd-frames", "V1.02 2.4.2",
+        "random frames, with good checks too, never upset the unit: the next good request is answered", &[],
+        odd_frames),
+    case("hurts/noise", "V1.02 2.5.1.1", "random bytes never get a reply, and the next good request is answered", &[],
+        noise),
+    case("hurts/restarts", "map, 0x0208",
+        "nothing on the line restarts the unit: its uptime goes on, its reset cause stays", &[Need::Modio], restarts),
+    case("hurts/masters-without-gaps", "map, line",
         "a master that asks again at once after a reply is answered every time",
-        &[Need::Modio, Need::Rtu, Need::Exact],
-        no_gaps,
-    ),
-    case(
-        "hurts/wrong-baud-and-format",
-        "map, 0x0101",
-        "a rate or format that does not exist is exception 03 and changes nothing",
-        &[Need::Modio, Need::Function(6)],
-        wrong_settings,
-    ),
-    case(
-        "hurts/half-written",
-        "map, 0x0300",
+        &[Need::Modio, Need::Rtu, Need::Exact], no_gaps),
+    case("hurts/wrong-baud-and-format", "map, 0x0101",
+        "a rate or format that does not exist is exception 03 and changes nothing", &[Need::Modio, Need::Function(6)],
+        wrong_settings),
+    case("hurts/half-written", "map, 0x0300",
         "one half of a counter cannot be written: exception 03, and the counter stays",
-        &[Need::Modio, Need::Function(0x10)],
-        half_written,
-    ),
-    case(
-        "hurts/torn-values",
-        "map, communication watchdog",
+        &[Need::Modio, Need::Function(0x10)], half_written),
+    case("hurts/torn-values", "map, communication watchdog",
         "a read of several outputs while they go to SAFE gives all of them before or all of them after",
-        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)],
-        super::outputs::torn,
-    ),
+        &[Need::Modio, Need::Config, Need::Exact, Need::Function(6)], super::outputs::torn),
 ];
 
 /// Number of random frames, or bursts of noise: more where the host does not have to wait for them.

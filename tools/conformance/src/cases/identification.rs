@@ -6,78 +6,22 @@ use crate::case::{Case, Check, Need, case, skip};
 const N: &[Need] = &[Need::Function(0x2B)];
 const S: &str = "V1.1b3 6.21";
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "fc2b/basic-stream",
-        S,
-        "read code 01 from object 0 gives objects 00 to 02",
-        N,
-        basic,
-    ),
-    case(
-        "fc2b/regular-stream",
-        S,
-        "read code 02 from object 0 gives objects 00 to 06 and more follow in order",
-        N,
-        regular,
-    ),
-    case(
-        "fc2b/extended-stream",
-        S,
-        "read code 03 gives at least what its conformity level promises, split within 253 bytes",
-        N,
-        extended,
-    ),
-    case(
-        "fc2b/individual",
-        S,
-        "read code 04 gives the one object asked for, as the stream has it",
-        N,
-        individual,
-    ),
-    case(
-        "fc2b/individual-unknown",
-        S,
-        "read code 04 with an object that is not there is exception 02",
-        N,
-        individual_unknown,
-    ),
-    case(
-        "fc2b/stream-restarts",
-        S,
-        "a stream from an object that is not there starts at object 0",
-        N,
-        restarts,
-    ),
-    case(
-        "fc2b/stream-from-the-middle",
-        S,
-        "a stream from an object that is there starts at that object",
-        N,
-        from_the_middle,
-    ),
-    case(
-        "fc2b/read-code",
-        S,
-        "read code 00 and those above 04 are exception 03",
-        N,
-        read_code,
-    ),
-    case(
-        "fc2b/mei-type",
-        "V1.1b3 6.19",
-        "another MEI type is exception 01",
-        N,
-        mei_type,
-    ),
-    case(
-        "fc2b/length",
-        S,
-        "a request cut short or too long is 03 or silence",
-        N,
-        length,
-    )
-    .interpretation(),
+    case("fc2b/basic-stream", S, "read code 01 from object 0 gives objects 00 to 02", N, basic),
+    case("fc2b/regular-stream", S, "read code 02 from object 0 gives objects 00 to 06 and more follow in order", N,
+        regular),
+    case("fc2b/extended-stream", S,
+        "read code 03 gives at least what its conformity level promises, split within 253 bytes", N, extended),
+    case("fc2b/individual", S, "read code 04 gives the one object asked for, as the stream has it", N, individual),
+    case("fc2b/individual-unknown", S, "read code 04 with an object that is not there is exception 02", N,
+        individual_unknown),
+    case("fc2b/stream-restarts", S, "a stream from an object that is not there starts at object 0", N, restarts),
+    case("fc2b/stream-from-the-middle", S, "a stream from an object that is there starts at that object", N,
+        from_the_middle),
+    case("fc2b/read-code", S, "read code 00 and those above 04 are exception 03", N, read_code),
+    case("fc2b/mei-type", "V1.1b3 6.19", "another MEI type is exception 01", N, mei_type),
+    case("fc2b/length", S, "a request cut short or too long is 03 or silence", N, length).interpretation(),
 ];
 
 /// One reply.

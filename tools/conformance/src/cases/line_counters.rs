@@ -11,70 +11,19 @@ use crate::points::pdu;
 
 const S: &str = "V1.02 appendix A";
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "counters/bus-messages",
-        S,
-        "0B counts every good message on the bus, whoever it is for",
-        &[],
-        bus_messages,
-    ),
-    case(
-        "counters/bus-errors",
-        S,
-        "0C counts frames with a bad check, nothing else",
-        &[],
-        bus_errors,
-    ),
-    case(
-        "counters/bus-errors-short",
-        S,
-        "0C counts frames of fewer than 3 bytes",
-        &[Need::Rtu],
-        short_frames,
-    ),
-    case(
-        "counters/bus-errors-characters",
-        S,
-        "0C counts a frame with a damaged character once",
-        &[Need::Faults, Need::Rtu],
-        damaged_characters,
-    ),
-    case(
-        "counters/exceptions",
-        S,
-        "0D counts exceptions, those to broadcasts too",
-        &[],
-        exceptions,
-    ),
-    case(
-        "counters/unit-messages",
-        S,
-        "0E counts messages for this unit, and broadcasts",
-        &[],
-        unit_messages,
-    ),
-    case(
-        "counters/no-response",
-        S,
-        "0F counts messages without a response, broadcasts included",
-        &[],
-        no_response,
-    ),
-    case(
-        "counters/nak-busy-overrun",
-        S,
-        "10, 11 and 12 do not move by ordinary traffic",
-        &[],
-        others,
-    ),
-    case(
-        "counters/registers",
-        "map, 0x0230",
-        "a modio's registers are the counters of 08",
-        &[Need::Modio, Need::Function(8)],
-        registers,
-    ),
+    case("counters/bus-messages", S, "0B counts every good message on the bus, whoever it is for", &[], bus_messages),
+    case("counters/bus-errors", S, "0C counts frames with a bad check, nothing else", &[], bus_errors),
+    case("counters/bus-errors-short", S, "0C counts frames of fewer than 3 bytes", &[Need::Rtu], short_frames),
+    case("counters/bus-errors-characters", S, "0C counts a frame with a damaged character once",
+        &[Need::Faults, Need::Rtu], damaged_characters),
+    case("counters/exceptions", S, "0D counts exceptions, those to broadcasts too", &[], exceptions),
+    case("counters/unit-messages", S, "0E counts messages for this unit, and broadcasts", &[], unit_messages),
+    case("counters/no-response", S, "0F counts messages without a response, broadcasts included", &[], no_response),
+    case("counters/nak-busy-overrun", S, "10, 11 and 12 do not move by ordinary traffic", &[], others),
+    case("counters/registers", "map, 0x0230", "a modio's registers are the counters of 08",
+        &[Need::Modio, Need::Function(8)], registers),
 ];
 
 /// Reads a counter by function 08, or by a modio's register. The counter includes this request.

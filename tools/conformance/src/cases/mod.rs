@@ -1,4 +1,5 @@
-//! The cases, in groups.
+//! The cases, in groups. Each group begins with a table of its cases: name, section, demand, needs and function.
+//! rustfmt would give each of these a line.
 
 mod addressing;
 mod ascii;

@@ -13,35 +13,17 @@ use crate::target::{Modio, Span};
 
 const N: &[Need] = &[Need::Modio, Need::Config, Need::Function(6)];
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "outputs/safe-when-the-line-dies",
-        "map, communication watchdog",
-        "without requests for COMM_TIMEOUT every output goes to SAFE, the flag stays until it is cleared",
-        N,
-        line_dies,
-    ),
-    case(
-        "outputs/stay-while-the-line-lives",
-        "map, communication watchdog",
-        "requests and broadcasts within COMM_TIMEOUT keep outputs as they are",
-        N,
-        line_lives,
-    ),
-    case(
-        "outputs/inputs-take-no-writes",
-        "map, points",
-        "writing an input point is exception 02, by every function that writes",
-        &[Need::Modio],
-        inputs,
-    ),
-    case(
-        "outputs/start-value",
-        "map, 0x01E0",
-        "at power-on outputs are at START",
-        &[Need::Modio, Need::Power],
-        start_value,
-    ),
+    case("outputs/safe-when-the-line-dies", "map, communication watchdog",
+        "without requests for COMM_TIMEOUT every output goes to SAFE, the flag stays until it is cleared", N,
+        line_dies),
+    case("outputs/stay-while-the-line-lives", "map, communication watchdog",
+        "requests and broadcasts within COMM_TIMEOUT keep outputs as they are", N, line_lives),
+    case("outputs/inputs-take-no-writes", "map, points",
+        "writing an input point is exception 02, by every function that writes", &[Need::Modio], inputs),
+    case("outputs/start-value", "map, 0x01E0", "at power-on outputs are at START", &[Need::Modio, Need::Power],
+        start_value),
 ];
 
 /// The first output of a module: the function that reads it, its address, and a value other than 0.

@@ -6,30 +6,15 @@ use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "power/answers",
-        "V1.02 2.4.2",
-        "switched off and on, the unit answers within a second",
-        &[Need::Power],
-        answers,
-    )
-    .interpretation(),
-    case(
-        "power/in-the-middle-of-traffic",
-        "V1.02 2.4.2",
+    case("power/answers", "V1.02 2.4.2", "switched off and on, the unit answers within a second", &[Need::Power],
+        answers).interpretation(),
+    case("power/in-the-middle-of-traffic", "V1.02 2.4.2",
         "switched on in the middle of traffic, it ignores all of it up to the first silence",
-        &[Need::Power, Need::Exact, Need::Rtu],
-        mid_traffic,
-    ),
-    case(
-        "power/no-byte-by-itself",
-        "V1.02 3.3",
-        "nothing leaves a unit that starts",
-        &[Need::Power],
-        no_byte,
-    )
-    .interpretation(),
+        &[Need::Power, Need::Exact, Need::Rtu], mid_traffic),
+    case("power/no-byte-by-itself", "V1.02 3.3", "nothing leaves a unit that starts", &[Need::Power],
+        no_byte).interpretation(),
 ];
 
 const OFF: Duration = Duration::from_millis(200);

@@ -86,26 +86,12 @@ pub(super) const FC02: &[Case] = &reading!(2, "fc02", "V1.1b3 6.2");
 pub(super) const FC03: &[Case] = &reading!(3, "fc03", "V1.1b3 6.3");
 pub(super) const FC04: &[Case] = &reading!(4, "fc04", "V1.1b3 6.4");
 
+#[rustfmt::skip]
 pub(super) const ALIKE: &[Case] = &[
-    case(
-        "fc02/same-as-01",
-        "map, access rules",
-        "every bit point reads through 01 and 02 alike",
-        &[
-            Need::Modio,
-            Need::Function(1),
-            Need::Function(2),
-            Need::Readable(1),
-        ],
-        alike::<1, 2>,
-    ),
-    case(
-        "fc04/same-as-03",
-        "map, access rules",
-        "every word point reads through 03 and 04 alike",
-        &[Need::Modio, Need::Function(3), Need::Function(4)],
-        alike::<3, 4>,
-    ),
+    case("fc02/same-as-01", "map, access rules", "every bit point reads through 01 and 02 alike",
+        &[Need::Modio, Need::Function(1), Need::Function(2), Need::Readable(1)], alike::<1, 2>),
+    case("fc04/same-as-03", "map, access rules", "every word point reads through 03 and 04 alike",
+        &[Need::Modio, Need::Function(3), Need::Function(4)], alike::<3, 4>),
 ];
 
 /// The first readable address, or 0.

@@ -16,28 +16,14 @@ const N: &[Need] = &[
     Need::Function(0x10),
 ];
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "settings/reply-under-the-old-rate",
-        "map, 0x0108",
-        "the reply to the command that changes the rate goes out under the old one",
-        N,
-        one_change,
-    ),
-    case(
-        "settings/every-rate",
-        "map, 0x0101",
-        "every rate can be set, is in force after the restart, and can be left again",
-        N,
-        every_rate,
-    ),
-    case(
-        "settings/every-format",
-        "map, 0x0102",
-        "so can every format that the transmission mode can use",
-        N,
-        every_format,
-    ),
+    case("settings/reply-under-the-old-rate", "map, 0x0108",
+        "the reply to the command that changes the rate goes out under the old one", N, one_change),
+    case("settings/every-rate", "map, 0x0101",
+        "every rate can be set, is in force after the restart, and can be left again", N, every_rate),
+    case("settings/every-format", "map, 0x0102", "so can every format that the transmission mode can use", N,
+        every_format),
 ];
 
 /// Changes to each of these rates and formats, and restores the first.

@@ -7,50 +7,22 @@ use crate::case::{Case, Check, Need, case};
 use crate::endpoint::Piece;
 use crate::frame::Reply;
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "timing/reply-after-t3.5",
-        "V1.02 2.5.1.1",
-        "a reply starts t3.5 after its request or later",
-        &[Need::Rtu, Need::Exact],
-        after_t35,
-    ),
-    case(
-        "timing/exceptions-after-t3.5",
-        "V1.02 2.5.1.1",
-        "so do exceptions, and replies to the longest requests",
-        &[Need::Rtu, Need::Exact],
-        exceptions_after_t35,
-    ),
-    case(
-        "timing/no-gap-in-the-reply",
-        "V1.02 2.5.1.1",
-        "between a reply's characters there is less than t1.5",
-        &[Need::Rtu, Need::Exact, Need::CharacterTime],
-        no_gap,
-    ),
-    case(
-        "timing/driver-held",
-        "V1.02 3.3",
+    case("timing/reply-after-t3.5", "V1.02 2.5.1.1", "a reply starts t3.5 after its request or later",
+        &[Need::Rtu, Need::Exact], after_t35),
+    case("timing/exceptions-after-t3.5", "V1.02 2.5.1.1", "so do exceptions, and replies to the longest requests",
+        &[Need::Rtu, Need::Exact], exceptions_after_t35),
+    case("timing/no-gap-in-the-reply", "V1.02 2.5.1.1", "between a reply's characters there is less than t1.5",
+        &[Need::Rtu, Need::Exact, Need::CharacterTime], no_gap),
+    case("timing/driver-held", "V1.02 3.3",
         "the driver is on before the first start bit and up to the end of the last stop bit",
-        &[Need::Exact, Need::Driver],
-        driver,
-    ),
-    case(
-        "timing/driver-stays-off",
-        "V1.02 3.3",
-        "what gets silence does not touch the driver",
-        &[Need::Exact, Need::Driver],
-        driver_off,
-    )
-    .interpretation(),
-    case(
-        "timing/back-to-back",
-        "V1.02 2.5.1.1",
-        "a hundred requests, each t3.5 after the reply before it, are all answered",
-        &[Need::Rtu, Need::Exact],
-        back_to_back,
-    ),
+        &[Need::Exact, Need::Driver], driver),
+    case("timing/driver-stays-off", "V1.02 3.3", "what gets silence does not touch the driver",
+        &[Need::Exact, Need::Driver], driver_off).interpretation(),
+    case("timing/back-to-back", "V1.02 2.5.1.1",
+        "a hundred requests, each t3.5 after the reply before it, are all answered", &[Need::Rtu, Need::Exact],
+        back_to_back),
 ];
 
 /// The shortest t3.5 that a unit may use, or the silence that a modio is set to instead.

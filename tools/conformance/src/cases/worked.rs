@@ -7,35 +7,17 @@ use crate::vectors::{Worked, frames};
 
 const S: &str = "manuals, see docs/conformance.md";
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "worked/for-other-units",
-        S,
-        "worked frames for other units get silence",
-        &[Need::Rtu],
-        for_others,
-    ),
-    case(
-        "worked/for-this-unit",
-        S,
+    case("worked/for-other-units", S, "worked frames for other units get silence", &[Need::Rtu], for_others),
+    case("worked/for-this-unit", S,
         "worked requests for this unit get a reply or an exception, worked replies are no requests",
-        &[Need::Rtu, Need::Modio],
-        for_this,
-    ),
-    case(
-        "worked/requests-readdressed",
-        S,
+        &[Need::Rtu, Need::Modio], for_this),
+    case("worked/requests-readdressed", S,
         "worked requests with this unit's address get a reply or an exception in good form",
-        &[Need::Rtu, Need::Modio],
-        readdressed,
-    ),
-    case(
-        "worked/errata",
-        S,
-        "worked frames whose CRC is wrong get silence, with this unit's address too",
-        &[Need::Rtu],
-        errata,
-    ),
+        &[Need::Rtu, Need::Modio], readdressed),
+    case("worked/errata", S, "worked frames whose CRC is wrong get silence, with this unit's address too",
+        &[Need::Rtu], errata),
 ];
 
 fn for_others(bench: &mut Bench<'_>) -> Check {

@@ -8,110 +8,38 @@ use crate::target::Span;
 const W06: &[Need] = &[Need::Function(6), Need::Function(3), Need::Words];
 const W10: &[Need] = &[Need::Function(0x10), Need::Function(3), Need::Words];
 
+#[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case(
-        "fc06/echo",
-        "V1.1b3 6.6",
-        "a value is written and echoed, and no other register changes",
-        W06,
-        echo,
-    ),
-    case(
-        "fc06/refused-value",
-        "V1.1b3 6.6",
-        "a value out of range is exception 03 and the register stays",
-        W06,
-        refused,
-    ),
-    case(
-        "fc06/address",
-        "V1.1b3 6.6",
-        "a register that is not there is exception 02",
-        &[Need::Function(6)],
-        address,
-    ),
-    case(
-        "fc06/address-before-value",
-        "V1.1b3 6.6",
-        "a value out of range at a bad address is exception 02, not 03",
-        &[Need::Function(6), Need::Words],
-        address_first,
-    )
-    .interpretation(),
-    case(
-        "fc06/length",
-        "V1.1b3 6.6",
-        "a request a byte short or long is 03 or silence, and the register stays",
-        W06,
-        length,
-    )
-    .interpretation(),
-    case(
-        "fc10/every-quantity",
-        "V1.1b3 6.12",
-        "every quantity is written, and echoed with address and quantity",
-        W10,
-        every_quantity,
-    ),
-    case(
-        "fc10/quantity-0-and-124",
-        "V1.1b3 6.12",
-        "quantities of 0 and above 123 are exception 03",
-        &[Need::Function(0x10)],
-        quantity_out_of_range,
-    ),
-    case(
-        "fc10/quantity-123",
-        "V1.1b3 6.12",
-        "123 registers fit a frame: written, or 02 where there are not so many",
-        &[Need::Function(0x10)],
-        quantity_most,
-    ),
-    case(
-        "fc10/quantity-before-address",
-        "V1.1b3 6.12",
-        "a bad quantity or byte count at a bad address is exception 03, not 02",
-        &[Need::Function(0x10)],
-        quantity_first,
-    ),
-    case(
-        "fc10/address-before-value",
-        "V1.1b3 6.12",
+    case("fc06/echo", "V1.1b3 6.6", "a value is written and echoed, and no other register changes", W06, echo),
+    case("fc06/refused-value", "V1.1b3 6.6", "a value out of range is exception 03 and the register stays", W06,
+        refused),
+    case("fc06/address", "V1.1b3 6.6", "a register that is not there is exception 02", &[Need::Function(6)], address),
+    case("fc06/address-before-value", "V1.1b3 6.6", "a value out of range at a bad address is exception 02, not 03",
+        &[Need::Function(6), Need::Words], address_first).interpretation(),
+    case("fc06/length", "V1.1b3 6.6", "a request a byte short or long is 03 or silence, and the register stays", W06,
+        length).interpretation(),
+    case("fc10/every-quantity", "V1.1b3 6.12", "every quantity is written, and echoed with address and quantity", W10,
+        every_quantity),
+    case("fc10/quantity-0-and-124", "V1.1b3 6.12", "quantities of 0 and above 123 are exception 03",
+        &[Need::Function(0x10)], quantity_out_of_range),
+    case("fc10/quantity-123", "V1.1b3 6.12", "123 registers fit a frame: written, or 02 where there are not so many",
+        &[Need::Function(0x10)], quantity_most),
+    case("fc10/quantity-before-address", "V1.1b3 6.12",
+        "a bad quantity or byte count at a bad address is exception 03, not 02", &[Need::Function(0x10)],
+        quantity_first),
+    case("fc10/address-before-value", "V1.1b3 6.12",
         "a value out of range in a range that is not there, or partly, is exception 02, not 03",
-        &[Need::Function(0x10), Need::Function(3), Need::Words],
-        range_first,
-    )
-    .interpretation(),
-    case(
-        "fc10/byte-count",
-        "V1.1b3 6.12",
-        "a byte count that is not twice the quantity, odd or 255, is exception 03 and writes nothing",
-        W10,
-        byte_count,
-    ),
-    case(
-        "fc10/data-length",
-        "V1.1b3 6.12",
-        "data cut short or with bytes to spare is 03 or silence and writes nothing",
-        W10,
-        data_length,
-    )
-    .interpretation(),
-    case(
-        "fc10/partly-out-of-range",
-        "V1.1b3 6.12",
-        "a range that is partly not there is exception 02 and writes nothing",
-        W10,
-        partly_out,
-    ),
-    case(
-        "fc10/one-bad-value",
-        "V1.1b3 6.12",
-        "one value out of range refuses all of them",
-        W10,
-        one_bad_value,
-    )
-    .interpretation(),
+        &[Need::Function(0x10), Need::Function(3), Need::Words], range_first).interpretation(),
+    case("fc10/byte-count", "V1.1b3 6.12",
+        "a byte count that is not twice the quantity, odd or 255, is exception 03 and writes nothing", W10,
+        byte_count),
+    case("fc10/data-length", "V1.1b3 6.12",
+        "data cut short or with bytes to spare is 03 or silence and writes nothing", W10,
+        data_length).interpretation(),
+    case("fc10/partly-out-of-range", "V1.1b3 6.12",
+        "a range that is partly not there is exception 02 and writes nothing", W10, partly_out),
+    case("fc10/one-bad-value", "V1.1b3 6.12", "one value out of range refuses all of them", W10,
+        one_bad_value).interpretation(),
 ];
 
 fn echo(bench: &mut Bench<'_>) -> Check {

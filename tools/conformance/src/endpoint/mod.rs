@@ -60,8 +60,8 @@ pub struct Broken(pub String);
 ///
 /// # Errors
 ///
-/// Every method fails with [`Broken`] when the line no longer works, or when the endpoint does not have the ability that
-/// the method needs.
+/// Every method fails with [`Broken`] when the line no longer works, or when the endpoint does not have the ability
+/// that the method needs.
 pub trait Endpoint {
     /// Its name for people, such as `the simulator, 4do`.
     fn name(&self) -> String;

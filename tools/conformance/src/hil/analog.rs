@@ -1,5 +1,5 @@
-//! Tests the analog wires of a bench. Each output in turn is set to five values over its range. Its input must be within
-//! the tolerance of each value after the time given, and no other input may change. All outputs are restored.
+//! Tests the analog wires of a bench. Each output in turn is set to five values over its range. Its input must be
+//! within the tolerance of each value after the time given, and no other input may change. All outputs are restored.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -49,7 +49,8 @@ pub(super) fn registers(
     Ok(words_of(&ask(bench, place, &request, right)?))
 }
 
-/// Restores an output by calling `write`, and repeats a failed attempt: one lost frame must not leave the output changed.
+/// Restores an output by calling `write`, and repeats a failed attempt: one lost frame must not leave the output
+/// changed.
 pub(super) fn put_back(mut write: impl FnMut() -> Check) -> Check {
     let mut done = write();
     for _ in 1..ATTEMPTS {

@@ -127,9 +127,7 @@ fn lost_and_stale_replies_are_counted_apart_and_fail_the_run() {
     assert!(
         report
             .junit()
-            .to_string()
-            .unwrap()
-            .contains("name=\"hil\" tests=\"1\" skipped=\"0\" errors=\"0\" failures=\"1\"")
+            .contains("name=\"hil\" tests=\"1\" failures=\"1\"")
     );
 }
 
@@ -308,7 +306,7 @@ fn reports_say_which_unit_was_tested() {
         (&unit["module"], unit["commit"].is_null()),
         (&"4do".into(), true)
     );
-    let xml = report.junit().to_string().unwrap();
+    let xml = report.junit();
     assert!(
         xml.contains("<property name=\"firmware\" value=\"1.2.3\"/>"),
         "{xml}"

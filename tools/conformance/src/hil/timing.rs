@@ -1,9 +1,9 @@
 //! Turnaround and lost frames at one rate.
 //!
-//! Each request is an echo (08/00) with a unique number, so that a late or repeated reply is not mistaken for the reply to
-//! the next request. The *turnaround* is the silence between request and reply; the unit must not answer before t3.5.
-//! Where the endpoint's time is exact, the turnaround is measured. Elsewhere it is the time of the whole exchange minus
-//! the time of its characters, so it includes the delays of the adapter and the operating system.
+//! Each request is an echo (08/00) with a unique number, so that a late or repeated reply is not mistaken for the
+//! reply to the next request. The *turnaround* is the silence between request and reply; the unit must not answer
+//! before t3.5. Where the endpoint's time is exact, the turnaround is measured. Elsewhere it is the time of the whole
+//! exchange minus the time of its characters, so it includes the delays of the adapter and the operating system.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,6 +1,6 @@
-//! Tests the digital wires of a bench. Each output in turn is switched on and off. Its input must follow in time, and no
-//! other input may change. If the bench file asks for pulses, the input's counter must count each pulse once. All outputs
-//! are restored.
+//! Tests the digital wires of a bench. Each output in turn is switched on and off. Its input must follow in time, and
+//! no other input may change. If the bench file asks for pulses, the input's counter must count each pulse once. All
+//! outputs are restored.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -1,75 +1,126 @@
 //! JUnit XML, as CI services read it.
 
+use std::fmt::Write as _;
 use std::time::Duration;
-
-use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use crate::case::Kind;
 use crate::report::asked_again;
 use crate::run::{Outcome, Verdict};
 
-/// Returns the outcomes as a JUnit report; `name` is the name of the endpoint.
-#[must_use]
-pub fn report(name: &str, outcomes: &[Outcome]) -> Report {
-    let mut report = Report::new("modio-conformance");
-    report.add_test_suite(suite(name, tests(outcomes)));
-    report
+/// The first line of a document.
+pub const HEADER: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+
+/// A test of a JUnit document.
+#[derive(Clone, Copy, Debug)]
+pub struct Test<'a> {
+    /// The name: a group, a slash, and what is tried.
+    pub name: &'a str,
+    /// The section that the demand comes from.
+    pub section: &'a str,
+    /// The kind of source that the demand comes from.
+    pub kind: Kind,
+    /// The verdict.
+    pub verdict: &'a Verdict,
+    /// The duration.
+    pub time: Duration,
+    /// Number of due replies that were missing, so that the request was repeated.
+    pub asked_again: u32,
 }
 
-/// Returns a suite with its time, which is the sum of the times of the tests.
+/// Returns the outcomes as a JUnit document; `suite` is the name of the endpoint.
 #[must_use]
-pub fn suite(name: &str, tests: Vec<TestCase>) -> TestSuite {
-    let mut suite = TestSuite::new(name);
-    suite.set_time(tests.iter().filter_map(|test| test.time).sum());
-    suite.add_test_cases(tests);
-    suite
+pub fn document(suite: &str, outcomes: &[Outcome]) -> String {
+    format!("{HEADER}{}", element(suite, &[], &tests(outcomes)))
 }
 
-/// Returns a test for each outcome.
+/// Returns the outcomes as tests of a JUnit document.
 #[must_use]
-pub fn tests(outcomes: &[Outcome]) -> Vec<TestCase> {
-    let test = |outcome: &Outcome| {
-        let case = outcome.case;
-        let mut test = test(
-            (case.name, case.section, case.kind),
-            &outcome.verdict,
-            outcome.time,
+pub fn tests(outcomes: &[Outcome]) -> Vec<Test<'_>> {
+    outcomes
+        .iter()
+        .map(|outcome| Test {
+            name: outcome.case.name,
+            section: outcome.case.section,
+            kind: outcome.case.kind,
+            verdict: &outcome.verdict,
+            time: outcome.time,
+            asked_again: outcome.asked_again,
+        })
+        .collect()
+}
+
+/// Returns one `testsuite` of a document, with properties: names and values.
+#[must_use]
+pub fn element(suite: &str, properties: &[(&str, String)], tests: &[Test<'_>]) -> String {
+    let count = |is: fn(&Verdict) -> bool| tests.iter().filter(|test| is(test.verdict)).count();
+    let time: Duration = tests.iter().map(|test| test.time).sum();
+    let mut xml = String::new();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        xml,
+        "<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" skipped=\"{}\" errors=\"0\" time=\"{:.3}\">",
+        escaped(suite),
+        tests.len(),
+        count(|verdict| matches!(verdict, Verdict::Failed(_))),
+        count(|verdict| matches!(verdict, Verdict::Skipped(_))),
+        time.as_secs_f64()
+    );
+    if !properties.is_empty() {
+        xml.push_str("  <properties>\n");
+        for (name, value) in properties {
+            let (name, value) = (escaped(name), escaped(value));
+            let _ = writeln!(xml, "    <property name=\"{name}\" value=\"{value}\"/>");
+        }
+        xml.push_str("  </properties>\n");
+    }
+    for test in tests {
+        let (class, name) = test.name.split_once('/').unwrap_or(("", test.name));
+        let _ = write!(
+            xml,
+            "  <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\"",
+            escaped(class),
+            escaped(name),
+            test.time.as_secs_f64()
         );
-        if outcome.verdict == Verdict::Passed && outcome.asked_again > 0 {
-            test.set_system_out(asked_again(outcome.asked_again));
-        }
-        test
-    };
-    outcomes.iter().map(test).collect()
+        let _ = match test.verdict {
+            Verdict::Passed if test.asked_again > 0 => writeln!(
+                xml,
+                "><system-out>{}</system-out></testcase>",
+                asked_again(test.asked_again)
+            ),
+            Verdict::Passed => writeln!(xml, "/>"),
+            Verdict::Skipped(why) => {
+                writeln!(xml, "><skipped message=\"{}\"/></testcase>", escaped(why))
+            }
+            Verdict::Failed(failure) => writeln!(
+                xml,
+                "><failure type=\"{}\" message=\"{}\">{}: sent {}; came {}</failure></testcase>",
+                test.kind.name(),
+                escaped(&failure.wanted),
+                escaped(test.section),
+                escaped(&failure.sent),
+                escaped(&failure.came)
+            ),
+        };
+    }
+    xml.push_str("</testsuite>\n");
+    xml
 }
 
-/// Returns a test of this name, with the section and the kind of its demand.
-#[must_use]
-pub fn test(
-    (name, section, kind): (&str, &str, Kind),
-    verdict: &Verdict,
-    time: Duration,
-) -> TestCase {
-    let status = match verdict {
-        Verdict::Passed => TestCaseStatus::success(),
-        Verdict::Skipped(why) => {
-            let mut status = TestCaseStatus::skipped();
-            status.set_message(why);
-            status
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            // XML 1.0 has no other control characters.
+            control if control.is_control() => out.push(' '),
+            other => out.push(other),
         }
-        Verdict::Failed(failure) => {
-            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            status.set_type(kind.name());
-            status.set_message(&failure.wanted);
-            let (sent, came) = (&failure.sent, &failure.came);
-            status.set_description(format!("{section}: sent {sent}; came {came}"));
-            status
-        }
-    };
-    let (class, name) = name.split_once('/').unwrap_or(("", name));
-    let mut test = TestCase::new(name, status);
-    test.set_classname(class).set_time(time);
-    test
+    }
+    out
 }
 
 #[cfg(test)]
@@ -77,17 +128,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn report_counts_the_tests_and_shows_why_one_failed_or_was_skipped() {
-        let outcomes = crate::report::some_outcomes();
-        let xml = report("a \"unit\"", &outcomes).to_string().unwrap();
-        for part in [
-            "name=\"a &quot;unit&quot;\" tests=\"3\" skipped=\"1\" errors=\"0\" failures=\"1\" time=\"3.750\"",
-            "sent 01 03 &lt;&amp;&gt; &quot;x&quot;; came silence",
-            "<skipped message=\"the unit answers 01",
-            "<failure message=\"a reply\" type=\"standard\">",
-        ] {
-            assert!(xml.contains(part), "{part}: {xml}");
-        }
+    fn document_counts_the_tests_and_escapes_their_texts() {
+        let xml = document("a \"unit\"", &crate::report::some_outcomes());
+        assert!(
+            xml.contains("name=\"a &quot;unit&quot;\" tests=\"3\" failures=\"1\" skipped=\"1\"")
+        );
+        assert!(xml.contains("sent 01 03 &lt;&amp;&gt; &quot;x&quot;; came silence"));
+        assert!(xml.contains("<skipped message=\"the unit answers 01"));
+        assert!(xml.contains("<failure type=\"standard\" message=\"a reply\">"));
         assert_eq!(xml.matches("<testcase").count(), 3);
+        assert_eq!(escaped("a\u{7}b"), "a b");
     }
 }
