@@ -199,7 +199,14 @@ fn a_port_without_permission_is_status_5_and_names_the_group() {
     std::fs::set_permissions(folder.path(), permissions(0o755)).unwrap();
     let is_root = folder.path().metadata().unwrap().uid() == ROOT;
     let program = folder.path().join("modioctl");
-    std::fs::copy(env!("CARGO_BIN_EXE_modioctl"), &program).unwrap();
+    // By another process: a child that a thread starts while this process writes the file would keep it open, and a
+    // program that is open for writing cannot be started.
+    let source = env!("CARGO_BIN_EXE_modioctl");
+    let copied = std::process::Command::new("cp")
+        .arg(source)
+        .arg(&program)
+        .status();
+    assert!(copied.unwrap().success());
     let refused = |group: u32| {
         let mut command = std::process::Command::new(&program);
         command.arg("--port").arg(&port).arg("info");
