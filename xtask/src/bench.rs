@@ -4,6 +4,7 @@
 //! `tools/bench` measures. This command builds what that needs, shows the figures and compares them with the baseline.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
@@ -75,17 +76,9 @@ fn within_limits(workspace: &Workspace, board: &Board, report: &Value) -> Result
 
 fn measure(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<Value> {
     let rivals = rivals(workspace)?;
-    let mut cargo = workspace.cargo("run");
-    // The simulator's core, crate rigless, declares a newer rustc than it needs.
-    cargo.args([
-        "--quiet",
-        "--ignore-rust-version",
-        "--package",
-        "bench",
-        "--",
-    ]);
-    cargo.arg(elf).args(["--board", board.name, "--rivals"]);
-    let text = command::read(cargo.args(rivals))?;
+    let mut program = Command::new(workspace.program("modio-bench")?);
+    program.arg(elf).args(["--board", board.name, "--rivals"]);
+    let text = command::read(program.args(rivals))?;
     let mut report: Value =
         serde_json::from_str(&text).context("the report of tools/bench is broken")?;
     let bytes = image::read(elf)?;

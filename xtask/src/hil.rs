@@ -27,7 +27,7 @@ pub struct Options {
 
 /// `cargo xtask hil`.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
-    let program = workspace.program("conformance", "modio-hil")?;
+    let program = workspace.program("modio-hil")?;
     command::exec(Command::new(program).args(&options.arguments))
 }
 

@@ -110,7 +110,7 @@ impl Programs {
         let artifacts = workspace::artifacts(cargo.arg("--target-dir").arg(&scratch))?;
         Ok(Self {
             line: workspace::executable(&artifacts, "peer-line")?,
-            suite: workspace.program("conformance", "modio-conformance")?,
+            suite: workspace.program("modio-conformance")?,
             profile: workspace.root().join(PROFILE),
             scratch,
         })

@@ -89,7 +89,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     if options.interactive {
         return live::interact(&bench, options.module, options.dip, options.port);
     }
-    let conformance = workspace.program("conformance", "modio-conformance")?;
+    let conformance = workspace.program("modio-conformance")?;
     let rebot = checks::python(workspace)?;
     bench.run(&conformance, &rebot)
 }

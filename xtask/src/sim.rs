@@ -53,7 +53,7 @@ pub fn run_image(workspace: &mut Workspace, board: &Board, elf: Option<&Path>) -
 
 /// Builds the simulator and returns where it is.
 pub fn simulator(workspace: &Workspace) -> Result<PathBuf> {
-    workspace.program("sim", "modio-sim")
+    workspace.program("modio-sim")
 }
 
 fn no_image(elf: &Path) -> Error {

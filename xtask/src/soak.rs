@@ -4,7 +4,7 @@
 use anyhow::Result;
 use register_map::board::MODIO_02;
 
-use crate::workspace::Workspace;
+use crate::workspace::{ALL, Workspace};
 use crate::{build, command, test};
 
 /// How long to run.
@@ -49,36 +49,30 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     };
     one_test(
         workspace,
-        &["sim"],
+        "image",
         name,
         &[(variable, value), (test::CORNER, &options.corner)],
     )
 }
 
 /// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, the test
-/// `matrix` of `tools/conformance/tests/image`.
+/// `matrix` of `tools/conformance/tests/suite`.
 pub fn matrix(workspace: &mut Workspace) -> Result<()> {
     let name = "matrix::every_rate_and_format_conforms";
     let every_case = [("MODIO_MATRIX", "every case")];
-    one_test(
-        workspace,
-        &["conformance", "--features", "sim"],
-        name,
-        &every_case,
-    )
+    one_test(workspace, "suite", name, &every_case)
 }
 
 fn one_test(
     workspace: &mut Workspace,
-    package: &[&str],
+    test: &str,
     name: &str,
     variables: &[(&str, &str)],
 ) -> Result<()> {
     let elf = build::image(workspace, &MODIO_02)?.elf;
     let mut cargo = workspace.cargo("test");
-    // The simulator's core, crate rigless, declares a newer rustc than it needs.
-    cargo.args(["--quiet", "--ignore-rust-version", "--package"]);
-    cargo.args(package).args(["--test", "image", "--"]);
+    cargo.args(ALL).args(["--quiet", "--features", test::SUITE]);
+    cargo.args(["--test", test, "--"]);
     cargo.args(["--include-ignored", "--nocapture", "--exact", name]);
     cargo.env("MODIO_ELF", elf).envs(variables.iter().copied());
     command::run(&mut cargo)

@@ -7,11 +7,15 @@ use register_map::Board;
 use register_map::board::{MODIO_02, MODIO_08};
 
 use crate::steps::{self, Bench, In, Step, short};
-use crate::workspace::Workspace;
+use crate::workspace::{ALL, Workspace};
 use crate::{ci, command, page, pymodbus, renode, sim, size};
 
 /// The variable that names the corner of the part to the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
+
+/// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
+/// built twice.
+pub const SUITE: &str = "conformance/sim";
 
 /// The options of `cargo xtask test`.
 #[derive(clap::Args, Debug)]
@@ -72,10 +76,12 @@ fn is_ci(variable: Option<&str>) -> bool {
 pub fn steps() -> Vec<Step> {
     let mut all = vec![Step::new(In::Host, "unit", "tests on the host", |bench| {
         let mut cargo = bench.workspace.cargo("test");
-        if !bench.host {
-            cargo.arg("--workspace");
+        if bench.host {
+            cargo.arg("--ignore-rust-version");
+        } else {
+            cargo.args(ALL).args(["--features", SUITE]);
         }
-        command::run(cargo.args(["--ignore-rust-version", "--no-fail-fast"]))
+        command::run(cargo.arg("--no-fail-fast"))
     })];
     for board in Board::ALL {
         let name = format!("image-{}", short(board));
@@ -94,16 +100,27 @@ pub fn steps() -> Vec<Step> {
             In::Test,
             "sim",
             "tests of the images in simulation",
-            |bench| in_simulation(bench, &["sim"], &[], "nominal"),
+            |bench| {
+                let tests = [
+                    "--bin=modio-sim",
+                    "--test=command",
+                    "--test=image",
+                    "--test=image_08",
+                ];
+                in_simulation(bench, &tests, &[], "nominal")
+            },
         ),
         Step::new(
             In::Test,
             "conformance",
             "conformance of the images",
-            |bench| in_simulation(bench, &["conformance", "--features", "sim"], &[], "nominal"),
+            |bench| {
+                let tests = ["--test=suite", "--test=hil", "--test=hil_simulator"];
+                in_simulation(bench, &tests, &[], "nominal")
+            },
         ),
         Step::new(In::Test, "modioctl", "modioctl on the simulator", |bench| {
-            in_simulation(bench, &["modioctl", "--test", "simulator"], &[], "nominal")
+            in_simulation(bench, &["--test=simulator"], &[], "nominal")
         }),
         Step::new(
             In::Test,
@@ -141,8 +158,8 @@ pub fn corners() -> impl Iterator<Item = Step> {
         let name = format!("sim-{corner}");
         let what = format!("tests of the images in simulation, {corner} corner");
         Step::new(In::Ci, name, what, move |bench| {
-            in_simulation(bench, &["sim", "--test", "image"], &[], corner)?;
-            in_simulation(bench, &["sim", "--test", "image_08"], &OWN_OF_08, corner)
+            in_simulation(bench, &["--test=image"], &[], corner)?;
+            in_simulation(bench, &["--test=image_08"], &OWN_OF_08, corner)
         })
     })
 }
@@ -158,12 +175,14 @@ const OWN_OF_08: [&str; 6] = [
     "slots::",
 ];
 
-/// Runs tests of a package that run the images in the simulator at a corner of the part: those whose names contain one
-/// of `names`, or all.
-fn in_simulation(bench: &mut Bench, package: &[&str], names: &[&str], corner: &str) -> Result<()> {
+/// Runs tests that run the images in the simulator at a corner of the part: those of these targets whose names contain
+/// one of `names`, or all.
+fn in_simulation(bench: &mut Bench, targets: &[&str], names: &[&str], corner: &str) -> Result<()> {
     let mut cargo = bench.workspace.cargo("test");
-    cargo.args(["--ignore-rust-version", "--no-fail-fast", "--package"]);
-    cargo.args(package).args(["--", "--include-ignored"]);
+    cargo
+        .args(ALL)
+        .args(["--no-fail-fast", "--features", SUITE]);
+    cargo.args(targets).args(["--", "--include-ignored"]);
     cargo.args(names);
     cargo.env("MODIO_ELF", bench.image(&MODIO_02)?);
     cargo.env("MODIO_ELF_08", bench.image(&MODIO_08)?);

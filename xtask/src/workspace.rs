@@ -66,14 +66,19 @@ impl Workspace {
     }
 
     /// Builds a program of this workspace for the host, and returns where it is.
-    pub fn program(&self, package: &str, program: &str) -> Result<PathBuf> {
+    pub fn program(&self, program: &str) -> Result<PathBuf> {
         let mut cargo = self.cargo("build");
-        // The simulator's core, crate rigless, declares a newer rustc than it needs.
-        cargo.args(["--ignore-rust-version", "--package", package]);
-        cargo.args(["--bin", program, MESSAGES]);
+        cargo.args(ALL).args(["--bin", program, MESSAGES]);
         executable(&artifacts(&mut cargo)?, program)
     }
 }
+
+/// The options with which cargo builds parts of the workspace for the host.
+///
+/// All packages are selected, whatever is built: with a single package, dependencies would have fewer features, and the
+/// simulator's core, which takes minutes, would be built once more. This core, crate rigless, declares a newer rustc
+/// than it needs.
+pub const ALL: [&str; 2] = ["--workspace", "--ignore-rust-version"];
 
 /// The option with which cargo reports what it builds.
 pub const MESSAGES: &str = "--message-format=json-render-diagnostics";
