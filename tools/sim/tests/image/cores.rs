@@ -19,7 +19,7 @@ struct State {
     ram: Vec<u8>,
     flash: Vec<u8>,
     driver: Vec<(Time, bool)>,
-    heard: Vec<Received>,
+    received: Vec<Received>,
     log: String,
     findings: Vec<Finding>,
     resets: u32,
@@ -36,7 +36,7 @@ impl State {
             ram: board.ram().to_vec(),
             flash: board.flash().to_vec(),
             driver: board.line().driver_edges().collect(),
-            heard: board.line().take_received(),
+            received: board.line().take_received(),
             log: board.take_log(),
             findings: board.findings().to_vec(),
             resets: board.resets(),
@@ -125,7 +125,7 @@ fn the_run_is_the_same_on_a_new_core_and_on_one_that_another_board_has_used() {
     let expected = run(new);
     let traffic = expected
         .iter()
-        .map(|state| state.heard.len())
+        .map(|state| state.received.len())
         .sum::<usize>();
     assert!(traffic > 50, "{traffic} characters");
     let mut compared = 0;
