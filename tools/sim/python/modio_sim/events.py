@@ -47,7 +47,7 @@ class Events(Iterator[Event]):
 
     def _line(self) -> str:
         """Returns the next line of the stream. StopIteration at its end. Without events, a comment arrives every few
-           seconds."""
+        seconds."""
         try:
             line = self._stream.readline()
         except (OSError, HTTPException) as error:
