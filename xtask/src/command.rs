@@ -1,4 +1,4 @@
-//! Runs other programs, with errors that name the program and say what is missing.
+//! Runs other programs. Errors name the program and the reason.
 
 use std::ffi::{OsStr, OsString};
 use std::io::ErrorKind;
@@ -15,7 +15,7 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a program and returns its output, whatever its exit status.
+/// Runs a program and returns its output, with any exit status.
 pub fn output(command: &mut Command) -> Result<Output> {
     command.output().map_err(|error| no_start(command, error))
 }

@@ -104,7 +104,7 @@ pub fn calls_from_ram(bytes: &[u8]) -> Result<Vec<String>> {
 
 /// Returns the functions of `core::panicking` that are linked, and the panic handler, each with its direct callers.
 ///
-/// Every panic of Rust ends in one of them, and the linker keeps only functions that something can call.
+/// Every panic of Rust calls one of them, and the linker keeps only functions that something can call.
 pub fn panics(bytes: &[u8]) -> Result<Vec<(String, Vec<String>)>> {
     let functions: Vec<Symbol> = symbols(&parse(bytes)?)?
         .into_iter()

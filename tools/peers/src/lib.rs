@@ -31,7 +31,7 @@ const IDLE: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 ///
-/// When the port cannot be opened or no longer be used.
+/// When the port cannot be opened, or can no longer be used.
 pub fn serve(port: &str, mut answer: impl FnMut(&[u8]) -> Option<Vec<u8>>) -> io::Result<()> {
     let mut line = SerialPort::open(port, |mut settings: Settings| {
         settings.set_raw();

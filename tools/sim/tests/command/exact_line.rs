@@ -40,7 +40,7 @@ fn started(more: &[&str]) -> (Running, String, String) {
 }
 
 #[test]
-fn time_stands_still_between_requests() {
+fn no_virtual_time_passes_between_requests() {
     let (_running, line, http) = started(&[]);
     let mut client = Client::connect(&line);
     assert_eq!(client.ask(b"run 0\n"), "ok 100000.000\n");

@@ -187,7 +187,8 @@ fn client_that_only_sends_gets_its_responses_before_the_connection_closes() {
 fn halted_core_is_exception_0a_until_the_debugger_leaves() {
     let arguments = [GATEWAY, FAST, ["--gdb", "127.0.0.1:0"]].concat();
     let (mut running, gateway, _) = ready(Running::start_loop(&arguments));
-    // The reply to the debugger shows that the core is halted. A request on the line at that moment would stay there.
+    // The reply to the debugger confirms that the core is halted. A request that is then on the line would not be
+    // handled.
     let mut debugger = TcpStream::connect(running.endpoint("gdb: ")).unwrap();
     debugger.write_all(b"$?#3f").unwrap();
     debugger.read_exact(&mut [0; 1]).unwrap();

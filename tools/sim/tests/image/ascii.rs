@@ -1,4 +1,4 @@
-//! ASCII mode on the image as it is flashed.
+//! ASCII mode on the release image.
 
 use register_map::configuration::{BAUD, COMM_TIMEOUT, FORMAT, FRAME_GAP, MODE};
 use sim::line::{Character, Format, Settings};
@@ -92,7 +92,7 @@ fn complete_frame_is_answered_despite_a_glitch_after_it() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
+fn valid_frame_followed_by_a_colon_is_counted_as_unanswered() {
     let mut bench = Bench::set_up(Module::Di4, &[(MODE, 1)]);
     let start = bench.board.now();
     let cut = ascii(&READ, "\r\n");

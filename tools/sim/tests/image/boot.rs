@@ -98,7 +98,7 @@ fn the_same_inputs_give_the_same_run_to_the_instruction() {
     assert!(run() == run());
 }
 
-/// Code that leaves the crystal and the PLL running, as a boot loader may, and goes on to the image: HSE on, the PLL
+/// Code that leaves the crystal and the PLL running, as a boot loader may, and branches to the image: HSE on, the PLL
 /// at HSE x4, then a branch to the address in the last word.
 fn boot_loader(entry: u32) -> Vec<u8> {
     let code: [u16; 18] = [
@@ -129,7 +129,7 @@ fn boot_loader(entry: u32) -> Vec<u8> {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn image_entered_with_the_pll_running_waits_for_its_end_before_setting_it_up() {
+fn image_entered_with_the_pll_running_waits_until_the_pll_has_stopped() {
     const LOADER: u32 = 0x2000_4800;
     let mut bench = Bench::cold(Config {
         flash: Some(flash_with(Module::Di4)),

@@ -106,7 +106,7 @@ fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn each_point_has_its_own_safe_value_or_holds() {
+fn each_point_goes_to_its_safe_value_or_keeps_its_value() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     for (safe, commanded, then) in [
         (

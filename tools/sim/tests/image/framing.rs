@@ -120,7 +120,7 @@ fn a_request_too_soon_after_another_joins_it_and_both_are_lost() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn silence_of_own_8n1_characters_ends_a_frame_for_the_unit_and_the_record() {
+fn t35_of_8n1_characters_ends_a_frame_for_the_unit_and_the_recording() {
     let mut bench = Bench::set_up(Module::Di4, &[(FORMAT, 3)]);
     let other = adu(&[2, 1, 0, FIRST, 0, 4]);
     let two = [other.clone(), adu(&READ)].concat();

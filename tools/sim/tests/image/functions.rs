@@ -81,7 +81,7 @@ impl Points {
     }
 
     /// Asserts that the outputs have the values that were written last.
-    fn outputs_stand(&mut self, after: &str) {
+    fn assert_outputs(&mut self, after: &str) {
         if self.kinds.contains(&WordOutput) {
             self.bench.board.run_for(Time::from_ms(20));
         }
@@ -121,7 +121,7 @@ impl Points {
                     .zip(bits)
                     .for_each(|(v, bit)| *v = bit);
             }
-            self.outputs_stand(&format!("0F {start:#x}+{count} {bits:?}"));
+            self.assert_outputs(&format!("0F {start:#x}+{count} {bits:?}"));
         }
         for address in SLOT.saturating_sub(1)..=SLOT + 4 {
             for (value, good) in [(0xFF00, true), (0x0001, false), (0, true), (0xFF01, false)] {
@@ -136,7 +136,7 @@ impl Points {
                 if let (true, Some(range)) = (good, range) {
                     self.image[range.start] = u16::from(value != 0);
                 }
-                self.outputs_stand(&format!("05 {address:#x} {value:#x}"));
+                self.assert_outputs(&format!("05 {address:#x} {value:#x}"));
             }
         }
     }
@@ -155,7 +155,7 @@ impl Points {
                 let written = self.bench.write(start, &spoilt);
                 assert_eq!(written, refused, "10 {start:#x} {spoilt:?}");
             }
-            self.outputs_stand("refused writes");
+            self.assert_outputs("refused writes");
             let written = self.bench.write(start, &words);
             assert_eq!(
                 written,
@@ -165,7 +165,7 @@ impl Points {
             if let Some(range) = range {
                 self.image[range].copy_from_slice(&words);
             }
-            self.outputs_stand(&format!("10 {start:#x} {words:?}"));
+            self.assert_outputs(&format!("10 {start:#x} {words:?}"));
         }
         for address in SLOT.saturating_sub(1)..=SLOT + 4 {
             for value in [0, 4096, 4095, 0xFFFF, 1234] {
@@ -180,7 +180,7 @@ impl Points {
                 if let (Ok(()), Some(range)) = (expected, range) {
                     self.image[range.start] = value;
                 }
-                self.outputs_stand(&format!("06 {address:#x} {value}"));
+                self.assert_outputs(&format!("06 {address:#x} {value}"));
             }
         }
     }
@@ -216,7 +216,7 @@ fn an_empty_slot_has_no_points() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_4di_is_read_as_bits_and_takes_no_write() {
+fn a_4di_is_read_as_bits_and_refuses_writes() {
     let energise = |bench: &mut Bench, given: [u16; 4]| {
         for (channel, on) in (1..).zip(given) {
             bench.board.set_energised(channel, on != 0).unwrap();
@@ -252,7 +252,7 @@ fn apply(bench: &mut Bench, millivolts: &[u16]) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_4ai_is_read_as_words_and_takes_no_write() {
+fn a_4ai_is_read_as_words_and_refuses_writes() {
     Points::new(Module::Ai4, [WordInput; 4]).check(
         |bench, given| apply(bench, &given),
         &[[0, 825, 1650, 2475], [3300, 1, 3299, 100]],

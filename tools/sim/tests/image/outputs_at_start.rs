@@ -18,7 +18,7 @@ fn stored(values: [u16; 4]) -> Vec<(u16, u16)> {
         .collect()
 }
 
-/// Function that causes a start; its name stands beside it.
+/// Function that causes a start.
 type Begin = fn(&mut Bench);
 
 const BEGINNINGS: [(&str, Begin); 4] = [

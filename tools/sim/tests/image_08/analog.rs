@@ -96,7 +96,7 @@ fn inputs_and_outputs_of_mixed_modules_do_not_affect_each_other() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_dac_that_does_not_answer_leaves_the_other_slots_alone() {
+fn a_dac_that_does_not_answer_does_not_affect_the_other_slots() {
     let mut bench = fitted([Module::Ao4; 4], &[]);
     bench.write(0, &[500; 16]).unwrap();
     change(&mut bench, 3, |slot| slot.set_bus_fault(BusFault::Absent));
