@@ -134,7 +134,6 @@ fn counter(bench: &mut Bench, which: u8) -> u8 {
 
 /// Checks a format of seven data bits at the lowest rate, the default rate and the highest rate: the unit answers, and
 /// a character with a wrong parity bit or a low first stop bit invalidates only its own frame.
-/// character with a wrong parity bit or a low first stop bit spoils its frame only.
 fn assert_works(format: Format) {
     for baud in [12, 96, 9216] {
         let code = Format::ALL.iter().position(|known| *known == format);

@@ -23,7 +23,6 @@ fn without_crystal(settings: &[(u16, u16)]) -> Bench {
 
 /// Asserts that the unit's bits have the right length: within half a percent over the last ten characters of a reply.
 /// Before those, the unit may still be calculating the reply.
-/// of a reply, before which it may have been working out the rest.
 fn assert_rate(bench: &mut Bench) {
     let now = bench.board.now();
     let end = bench.board.line().send(now, &adu(&[1, 3, 1, 0x60, 0, 20]));

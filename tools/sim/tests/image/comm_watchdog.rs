@@ -55,7 +55,7 @@ fn digital_outputs_go_to_safe_two_milliseconds_around_the_time_out_at_any_rate()
                 .run_for(Time::from_ms(100 * u64::from(tenths) + 50));
             let edges = bench.board.pin_edges('A', 3);
             let &[.., (at, false)] = edges else {
-                panic!("the output did not go off exactly once: {edges:?}");
+                panic!("the output did not go off: {edges:?}");
             };
             assert!(at > last);
             assert_on_time(last, tenths, at);

@@ -129,7 +129,7 @@ fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     assert!(programmed > 40 * 8, "only {programmed} operations");
     assert!(
         master.late.len() <= 1,
-        "no page was filled: {:?}",
+        "more than one page was filled: {:?}",
         master.late
     );
     assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");

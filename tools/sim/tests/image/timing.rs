@@ -41,7 +41,7 @@ fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
 
         let edges: Vec<_> = line.driver_edges().collect();
         let [.., (on, true), (off, false)] = edges[..] else {
-            panic!("the driver does not go on and off once: {edges:?}");
+            panic!("the driver does not go on and off: {edges:?}");
         };
         assert!(
             on <= frame.start && frame.start - on <= bit + ON.of(corner()),
