@@ -290,7 +290,7 @@ fn t35_without_t15_ends_a_frame() {
 #[test]
 fn the_unit_receives_immediately_after_its_own_reply() {
     let mut unit = unit();
-    unit.characters(&[0x55, 0x55]); // the echo of its own reply, if the receiver was late
+    unit.characters(&[0x55, 0x55]); // the echo of the unit's reply, if the receiver was late
     unit.port.sent();
     unit.must_answer();
     assert_eq!(unit.counters().communication_errors, 0);

@@ -1,5 +1,5 @@
 /*
- * A server on libmodbus, as its manual pages show one: modbus_mapping_new, modbus_receive, modbus_reply. Its one
+ * A server on libmodbus, as in its manual pages: modbus_mapping_new, modbus_receive, modbus_reply. The only
  * argument is the serial port; --version prints the library's version. Prints "ready" when it serves.
  */
 #include <errno.h>

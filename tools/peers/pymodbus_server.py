@@ -1,4 +1,4 @@
-"""The serial server of pymodbus, as its documentation shows one. Its one argument is the serial port.
+"""The serial server of pymodbus, as in its documentation. The only argument is the serial port.
 
 Prints "ready" when it serves.
 """
@@ -34,7 +34,7 @@ def main(port):
         bytesize=8,
         parity="N",
         stopbits=2,
-        # A unit on a line is silent to requests for others, and carries out broadcasts.
+        # A unit on a line does not answer requests for others, and executes broadcasts.
         ignore_missing_devices=True,
         broadcast_enable=True,
         trace_connect=lambda connected: connected and print("ready", flush=True),

@@ -1,7 +1,8 @@
-//! `cargo xtask bench`: the costs of the release image in instructions and bytes, which are the same in every run: every
-//! request, the processor's load, flash and RAM by crate, and servers on other crates for comparison.
+//! `cargo xtask bench`: the costs of the release image in instructions and bytes, which are the same in every run:
+//! every request, the processor's load, flash and RAM by crate, and servers on other crates for comparison.
 //!
-//! `tools/bench` measures. This command builds what that needs, shows the figures and compares them with the baseline.
+//! `tools/bench` measures. This command builds the programs for it, shows the figures and compares them with the
+//! baseline.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -62,7 +63,7 @@ pub fn check(bench: &mut Bench, board: &'static Board) -> Result<()> {
     within_limits(bench.workspace, board, &report)
 }
 
-/// The file with the baseline of a board.
+/// Returns the file with the baseline of a board.
 fn file(workspace: &Workspace, board: &Board) -> PathBuf {
     let name = format!("baseline-{board}.json");
     workspace.root().join("tools/bench").join(name)

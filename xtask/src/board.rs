@@ -1,4 +1,4 @@
-//! What xtask knows of a board beyond the register map: its parts, and how much of them the application may use.
+//! Properties of a board that the register map does not have: its parts, and how much of them the application may use.
 
 use register_map::Board;
 
@@ -7,7 +7,7 @@ const KIB: u32 = 1024;
 /// An amount of memory, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
-    /// The name of a part, as probe-rs has it, or `budget`.
+    /// The name of a part in probe-rs, or `budget`.
     pub name: &'static str,
     /// Bytes of flash.
     pub flash: u32,
@@ -33,7 +33,7 @@ pub struct Hardware {
     pub part: Memory,
     /// Another part that the image must fit as well.
     pub smaller: Option<Memory>,
-    /// What the application may use at most. The rest is for the stack, the configuration store and a loader.
+    /// The most that the application may use. The rest is for the stack, the configuration store and a loader.
     pub budget: Memory,
 }
 
@@ -70,7 +70,7 @@ impl Hardware {
         row.unwrap_or(&HARDWARE[0])
     }
 
-    /// Returns what the image must fit: the parts, the smaller one first, and the budget.
+    /// Returns the limits of the image: the parts, the smaller one first, and the budget.
     pub fn limits(&self) -> impl Iterator<Item = Memory> {
         let parts = self.smaller.into_iter().chain([self.part]);
         parts.chain([self.budget])

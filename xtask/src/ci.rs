@@ -35,7 +35,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     options.steps.run(workspace, In::Ci)
 }
 
-/// All steps, in the order in which they run.
+/// Returns all steps, in the order in which they run.
 pub fn steps() -> Vec<Step> {
     let step = |name: &str, what: &str, run: fn(&mut Bench) -> Result<()>| {
         Step::new(In::Ci, name, what, run)
@@ -113,7 +113,7 @@ pub fn steps() -> Vec<Step> {
 }
 
 fn formatting(bench: &mut Bench) -> Result<()> {
-    // All are checked, whatever fails.
+    // Check all workspaces, even when one fails.
     let checked = WORKSPACES.map(|manifest| {
         let mut cargo = bench.workspace.cargo("fmt");
         command::run(cargo.args(["--all", "--check", "--manifest-path", manifest]))
@@ -121,7 +121,7 @@ fn formatting(bench: &mut Bench) -> Result<()> {
     checked.into_iter().collect()
 }
 
-/// Adds how code is compiled for a board.
+/// Adds the options that compile code for a board.
 fn for_target(cargo: &mut Command, board: &Board) {
     cargo.args(["--profile", build::PROFILE]);
     cargo.args(["--features", &format!("firmware/{board}")]);

@@ -1,4 +1,4 @@
-//! Runs other programs, with errors that name the program and say what is missing.
+//! Runs other programs. Errors name the program and the reason.
 
 use std::ffi::{OsStr, OsString};
 use std::io::ErrorKind;
@@ -15,12 +15,12 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a program and returns its output, whatever its exit status.
+/// Runs a program and returns its output, with any exit status.
 pub fn output(command: &mut Command) -> Result<Output> {
     command.output().map_err(|error| no_start(command, error))
 }
 
-/// Runs a program and returns its standard output. The error has the first line of its complaint.
+/// Runs a program and returns its standard output. The error has the line with the reason from its standard error.
 pub fn read(command: &mut Command) -> Result<String> {
     let output = output(command)?;
     if !output.status.success() {
@@ -29,7 +29,7 @@ pub fn read(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Returns the line in which a program says why it failed: the first with an error, else the last.
+/// Returns the line in which a program reports why it failed: the first with an error, else the last.
 pub fn complaint(output: &Output) -> String {
     let text = [output.stderr.as_slice(), b"\n", &output.stdout].concat();
     let text = String::from_utf8_lossy(&text);
@@ -49,7 +49,7 @@ pub fn shown(command: &Command) -> String {
     parts.join(" ")
 }
 
-/// Returns an argument made of an option and a path.
+/// Returns an argument that consists of an option and a path.
 pub fn joined(option: &str, path: impl AsRef<OsStr>) -> OsString {
     let mut argument = OsString::from(option);
     argument.push(path);
@@ -65,7 +65,7 @@ pub fn no_start(command: &Command, error: std::io::Error) -> anyhow::Error {
     }
 }
 
-/// Replaces this process with a program, which so receives the signals and sets the exit status.
+/// Replaces this process with a program, which then receives the signals and sets the exit status.
 #[cfg(unix)]
 pub fn exec(command: &mut Command) -> Result<()> {
     use std::os::unix::process::CommandExt as _;
@@ -81,7 +81,7 @@ pub fn exec(command: &mut Command) -> Result<()> {
     std::process::exit(status.code().unwrap_or(1))
 }
 
-/// Leaves Ctrl-C to the programs that this one has started.
+/// Makes this process ignore Ctrl-C, which then only the started programs handle.
 pub fn ignore_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {}).context("no handler for Ctrl-C")
 }

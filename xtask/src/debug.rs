@@ -14,7 +14,7 @@ use crate::group::Group;
 use crate::workspace::Workspace;
 use crate::{build, command, image, sim};
 
-/// GDBs that may know Arm, the likely ones first.
+/// GDBs that may support Arm, the likely ones first.
 const GDBS: [&str; 3] = ["arm-none-eabi-gdb", "gdb-multiarch", "gdb"];
 
 /// The image and the board.
@@ -37,7 +37,7 @@ pub struct Options {
     elf: Option<PathBuf>,
 }
 
-/// What `cargo xtask gdb` needs besides.
+/// Additional options of `cargo xtask gdb`.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct GdbOptions {
@@ -56,7 +56,7 @@ pub struct GdbOptions {
 /// `cargo xtask flash`.
 pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let probe_rs = ProbeRs::new(options);
-    // Before the build, which is of no use without a probe.
+    // Check before the build, which is useless without a probe.
     probe_rs.check()?;
     let elf = elf(workspace, options)?;
     probe_rs.write(&elf)?;
@@ -103,7 +103,7 @@ pub fn gdb(workspace: &mut Workspace, options: &GdbOptions) -> Result<()> {
         server.args(["--board", board.build.board.name, "--gdb", &address]);
         server.args(["--http", "127.0.0.1:0", "--elf"]).arg(&elf);
     }
-    // GDB handles Ctrl-C, by which it halts the core.
+    // GDB handles Ctrl-C by halting the core.
     command::ignore_interrupt()?;
     let _server = Group::start(server)?;
     let mut gdb = Command::new(gdb);
@@ -124,7 +124,7 @@ fn elf(workspace: &mut Workspace, options: &Options) -> Result<PathBuf> {
     let Some(elf) = &options.elf else {
         return Ok(build::image(workspace, options.build.board)?.elf);
     };
-    // Another chip may have more flash than the board's.
+    // The chip of `--chip` may have more flash than the board's.
     let size = match options.chip {
         Some(_) => u32::MAX,
         None => Hardware::of(options.build.board).part.flash,
@@ -140,7 +140,7 @@ pub fn free_port() -> Result<u16> {
     Ok(listener.local_addr()?.port())
 }
 
-/// The program probe-rs with the options that each of its commands gets.
+/// The program probe-rs with the options for each of its commands.
 struct ProbeRs {
     program: PathBuf,
     chip: String,
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use crate::script::program;
 
-    /// A program in place of probe-rs that writes down its arguments, a line for each call.
+    /// Makes a replacement for probe-rs that records its arguments, a line for each call.
     fn fake(directory: &Path, script: &str) -> ProbeRs {
         let log = directory.join("log");
         let text = format!("echo \"$@\" >> '{}'\n{script}", log.display());

@@ -7,8 +7,9 @@
 //! | `modio-02.map` | addresses and sizes of what is in the image |
 //! | `modio-02.cdx.json` | the crates in the image, as a CycloneDX bill of materials |
 //!
-//! Besides, there are `modioctl-TARGET`, the host tool for machines like this one, and `modio-sim-TARGET`, the simulator
-//! with the images of all boards inside. `modio-sim-oci.tar`, made on Linux, is that simulator as a container image.
+//! Besides, there are `modioctl-TARGET`, the host tool for machines like this one, and `modio-sim-TARGET`, the
+//! simulator with the images of all boards inside. `modio-sim-oci.tar`, made on Linux, is that simulator as a
+//! container image.
 //!
 //! `SHA256SUMS` has the check sums of all of them: `sha256sum --check SHA256SUMS`.
 //!
@@ -87,7 +88,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 fn files(workspace: &mut Workspace, board: &Board, out: &Path) -> Result<Vec<String>> {
     let named = |extension: &str| format!("{board}.{extension}");
     let map = out.join(named("map"));
-    // A linker that writes no map must not leave that of another image.
+    // A map of an earlier image must not remain when the linker writes none.
     let _ = fs::remove_file(&map);
     let built = build::image_with_map(workspace, board, &map)?;
     ensure!(map.is_file(), "the linker has written no map");
@@ -147,7 +148,7 @@ pub fn host() -> Result<String> {
         .to_owned())
 }
 
-/// Returns the target that programs for a machine are built for.
+/// Returns the target for which programs for a machine are built.
 fn tool_target(host: &str) -> String {
     match host.split_once("-unknown-linux-") {
         Some((processor, _)) => format!("{processor}-unknown-linux-musl"),

@@ -1,12 +1,12 @@
-//! Errors with a meaning beyond their text.
+//! Errors that decide the exit status or the outcome of a step.
 
 use std::fmt;
 
-/// A wrong question or option: exit status 2.
+/// A wrong argument or option: exit status 2.
 #[derive(Debug)]
 pub struct Usage(String);
 
-/// Returns the error of a wrong question or option.
+/// Returns the error of a wrong argument or option.
 pub fn usage(what: impl Into<String>) -> anyhow::Error {
     Usage(what.into()).into()
 }

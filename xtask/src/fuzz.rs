@@ -1,8 +1,8 @@
 //! `cargo xtask fuzz`: the targets of `fuzz/` with libFuzzer, compiled by the installed compiler.
 //!
-//! cargo-fuzz needs a nightly compiler for the address sanitizer, which finds nothing in code without `unsafe`. Coverage
-//! works with any compiler. The source of libFuzzer is in the crate libfuzzer-sys and needs a C++ compiler. New inputs
-//! are written to `target/fuzz`, and the committed corpus does not change.
+//! cargo-fuzz needs a nightly compiler for the address sanitizer, which finds nothing in code without `unsafe`.
+//! Coverage works with any compiler. The source of libFuzzer is in the crate libfuzzer-sys and needs a C++ compiler.
+//! New inputs are written to `target/fuzz`, and the committed corpus does not change.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,7 +15,7 @@ use crate::error::{Missing, usage};
 use crate::workspace::{self, MESSAGES, Workspace};
 use crate::{command, dist};
 
-/// A separate workspace.
+/// The manifest of the fuzz targets, a separate workspace.
 pub const MANIFEST: &str = "fuzz/Cargo.toml";
 
 /// The seeds, a directory for each target.
@@ -47,7 +47,7 @@ const OPTIONS: [&str; 5] = [
 enum Target {
     /// Characters, faults and silences through the RTU receiver
     ReceiverRtu,
-    /// The same through the ASCII receiver
+    /// Characters, faults and silences through the ASCII receiver
     ReceiverAscii,
     /// Requests through the server
     Pdu,
@@ -84,7 +84,7 @@ pub struct Options {
     input: Option<PathBuf>,
 }
 
-/// `cargo xtask fuzz`. Every target runs, whatever the others find.
+/// `cargo xtask fuzz`. Every target runs, even when another one has found a failure.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     let targets = options
         .target
@@ -119,7 +119,7 @@ fn session(workspace: &Workspace, targets: &[Target], seconds: u32) -> Result<()
     Ok(())
 }
 
-/// The directory of everything that fuzzing makes.
+/// Returns the directory of all files that fuzzing writes.
 fn directory(workspace: &Workspace) -> PathBuf {
     workspace.target().join("fuzz")
 }
@@ -169,7 +169,7 @@ fn fuzz(workspace: &Workspace, name: &str, program: &Path, seconds: u32) -> Resu
     let output = command::output(fuzzer.current_dir(workspace.root()))?;
     let text = String::from_utf8_lossy(&output.stderr);
     ensure!(output.status.success(), "{text}\n{name}: {}", output.status);
-    // Without the dictionary that libFuzzer recommends after every run.
+    // Leave out the dictionary that libFuzzer recommends after every run.
     for line in text.lines().filter(|line| line.starts_with("stat::")) {
         say!("{line}");
     }

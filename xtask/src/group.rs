@@ -1,4 +1,4 @@
-//! Programs that start others: ended together with everything they have started, also when this one is interrupted.
+//! Programs that start others: ended together with everything that they have started, even when xtask is interrupted.
 
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,13 +18,13 @@ const POLL: Duration = Duration::from_millis(20);
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C and SIGTERM end the [groups](Group), and make their methods fail.
+/// Makes Ctrl-C and SIGTERM end the [groups](Group) and make their methods fail.
 pub fn end_on_signal() -> Result<()> {
     let handler = || INTERRUPTED.store(true, Ordering::Relaxed);
     ctrlc::set_handler(handler).context("no handler for Ctrl-C")
 }
 
-/// A program and all it has started. Ended when dropped.
+/// A program and everything that it has started. Ended when dropped.
 pub struct Group {
     child: Box<dyn ChildWrapper>,
 }
@@ -69,13 +69,13 @@ fn not_interrupted() -> Result<()> {
 
 impl Drop for Group {
     fn drop(&mut self) {
-        // Many programs end when their input does.
+        // Many programs end when their input ends.
         drop(self.child.stdin().take());
         let end = Instant::now() + GRACE;
         while self.has_ended().is_ok_and(|ended| !ended) && Instant::now() < end {
             thread::sleep(POLL);
         }
-        // Programs that the first has started may still run when it has ended. An error means that none do.
+        // Programs that the first one has started may still run when it has ended. An error means that there are none.
         let _ = self.child.start_kill();
         let _ = self.child.wait();
     }
@@ -85,7 +85,7 @@ impl Drop for Group {
 mod tests {
     use super::*;
 
-    /// Whether a process runs. One that has ended is a zombie until init has read its exit status.
+    /// Returns whether a process runs. A process that has ended is a zombie until init has read its exit status.
     fn runs(pid: &str) -> bool {
         let state = fs_err::read_to_string(format!("/proc/{pid}/stat"));
         state.is_ok_and(|text| !text.contains(") Z "))
@@ -112,7 +112,10 @@ mod tests {
         assert!(runs(&pid));
         let begin = Instant::now();
         drop(group);
-        assert!(begin.elapsed() < GRACE, "the end of the input ends it");
+        assert!(
+            begin.elapsed() < GRACE,
+            "the program does not end with its input"
+        );
         while runs(&pid) && begin.elapsed() < GRACE {
             thread::sleep(POLL);
         }

@@ -1,6 +1,6 @@
 //! `cargo xtask hil`: the image on a real board, tested on its line by `modio-hil` of package conformance.
 //!
-//! That program has all options and does everything, also the writing of the image, for which it calls `cargo xtask
+//! That program has all options and does everything, including writing the image, for which it calls `cargo xtask
 //! flash`. It replaces this process, so that it receives Ctrl-C and SIGTERM, restores the board, and sets the exit
 //! status.
 

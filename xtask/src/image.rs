@@ -1,4 +1,4 @@
-//! The image as an ELF file: the bytes that go into flash, and what its code calls.
+//! The image as an ELF file: the bytes that are written to flash, and the calls of its code.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ const THUNK: &str = "__Thumbv7ABSLongThunk_";
 /// An ELF file for a 32-bit microcontroller.
 pub type Elf<'data> = ElfFile32<'data, Endianness>;
 
-/// Reads an image. A file that cannot be read is a wrong question.
+/// Reads an image. A file that cannot be read is a usage error.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     fs_err::read(path).map_err(|error| usage(error.to_string()))
 }
@@ -61,11 +61,11 @@ pub fn flat(bytes: &[u8], size: u32) -> Result<Vec<u8>> {
 
 /// A symbol of the image.
 pub struct Symbol {
-    /// Path in Rust, or the name that the linker script or the hardware knows it by.
+    /// Path in Rust, or the name in the linker script or of the hardware.
     pub name: String,
-    /// Without the Thumb bit.
+    /// Address without the Thumb bit.
     pub address: u32,
-    /// In bytes.
+    /// Size in bytes.
     pub size: u32,
     /// Whether it is a function.
     pub function: bool,
@@ -104,7 +104,7 @@ pub fn calls_from_ram(bytes: &[u8]) -> Result<Vec<String>> {
 
 /// Returns the functions of `core::panicking` that are linked, and the panic handler, each with its direct callers.
 ///
-/// Every panic of Rust ends in one of them, and the linker keeps only functions that something can call.
+/// Every panic of Rust calls one of them, and the linker keeps only functions that something can call.
 pub fn panics(bytes: &[u8]) -> Result<Vec<(String, Vec<String>)>> {
     let functions: Vec<Symbol> = symbols(&parse(bytes)?)?
         .into_iter()
@@ -134,7 +134,7 @@ pub fn panics(bytes: &[u8]) -> Result<Vec<(String, Vec<String>)>> {
     Ok(with_callers.collect())
 }
 
-/// Whether a function has a direct call to an address. Only functions in flash are searched.
+/// Returns whether a function has a direct call to an address. Only functions in flash are searched.
 fn calls(function: &Symbol, flash: &[u8], target: u32) -> bool {
     let start = function.address.wrapping_sub(FLASH_BASE) as usize;
     let code = flash.get(start..start.saturating_add(function.size as usize));

@@ -1,7 +1,7 @@
-//! `cargo xtask`: the commands that build, test and try this project. One module for each command.
+//! `cargo xtask`: the commands that build, test and run this project. One module for each command.
 //!
-//! An error says in one line what is wrong and what to do about it. Exit status: 1 for a failure, 2 for a wrong
-//! question.
+//! An error reports in one line what is wrong and what to do about it. Exit status: 1 for a failure, 2 for a wrong
+//! argument or option.
 
 #![forbid(unsafe_code)]
 
@@ -13,7 +13,7 @@ use clap::{Parser, Subcommand};
 use error::Usage;
 use workspace::Workspace;
 
-/// As `println!`, but a reader that has ended, such as `head`, is no error.
+/// Like `println!`, but it is not an error when the reader, such as `head`, has ended.
 macro_rules! say {
     ($($text:tt)*) => {{
         use std::io::Write as _;

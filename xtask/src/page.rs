@@ -1,5 +1,5 @@
-//! The simulator's page in Chromium: its tests, and `cargo xtask screenshots`. Chromium must be installed; what drives
-//! it is in a virtual environment under target/.
+//! The simulator's page in Chromium: its tests, and `cargo xtask screenshots`. Chromium must be installed. Playwright,
+//! which controls it, is in a virtual environment under target/.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::{build, command, pymodbus};
 /// The tests, the script for the pictures, and their requirements.
 const SCRIPTS: &str = "tools/sim/tests/page";
 
-/// The pictures in the documents.
+/// The pictures for the documentation.
 const IMAGES: &str = "docs/images";
 
 /// Runs the tests of the page.
@@ -35,7 +35,7 @@ pub fn screenshots(workspace: &mut Workspace) -> Result<()> {
     command::run(script.arg("--to").arg(workspace.root().join(IMAGES)))
 }
 
-/// Returns the interpreter of the environment, when there is a browser.
+/// Returns the interpreter of the environment. The error is [`Missing`] when there is no browser.
 fn tools(workspace: &Workspace) -> Result<PathBuf> {
     let missing = "no browser for the simulator's page (on Debian: apt-get install chromium)";
     ensure!(

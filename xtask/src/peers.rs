@@ -116,7 +116,7 @@ impl Programs {
         })
     }
 
-    /// The directory of the servers in Rust.
+    /// Returns the directory of the servers in Rust.
     fn built(&self) -> &Path {
         self.line.parent().unwrap_or(&self.line)
     }
@@ -193,7 +193,7 @@ fn row(server: &Prepared, report: &Value) -> Result<String> {
     ))
 }
 
-/// Returns the document with another table.
+/// Returns the document with the table replaced.
 fn replaced(document: &str, table: &str) -> Option<String> {
     let (before, rest) = document.split_once(BEGIN)?;
     let (_, after) = rest.split_once(END)?;

@@ -1,6 +1,6 @@
 //! pymodbus and mbpoll, Modbus masters of other authors, against the images in simulation. pymodbus is in a virtual
-//! environment under target/, mbpoll must be installed. The script that runs them also runs the tests of the simulator's
-//! Python client.
+//! environment under target/, mbpoll must be installed. The script that runs them also runs the tests of the
+//! simulator's Python client.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -43,12 +43,12 @@ pub fn environment(workspace: &Workspace) -> Result<PathBuf> {
     .prepare()
 }
 
-/// The file that pins pymodbus and its serial port.
+/// Returns the file that pins pymodbus and its serial port.
 pub fn requirements(workspace: &Workspace) -> PathBuf {
     workspace.root().join(SCRIPTS).join("requirements.txt")
 }
 
-/// The script that runs the tests of a directory.
+/// Returns the script that runs the tests of a directory.
 pub fn runner(workspace: &Workspace) -> PathBuf {
     workspace.root().join(SCRIPTS).join("run.py")
 }
@@ -62,7 +62,7 @@ pub fn script(
     elf_08: &Path,
 ) -> Result<Command> {
     let mut command = Command::new(python);
-    // -B: leaves no __pycache__ in the tree.
+    // -B: do not write __pycache__ to the tree.
     command.arg("-B").arg(script);
     command.arg("--sim").arg(sim::simulator(workspace)?);
     command.arg("--elf").arg(elf).arg("--elf-08").arg(elf_08);

@@ -9,12 +9,12 @@ use fs_err as fs;
 use crate::command;
 use crate::error::Missing;
 
-/// What a virtual environment must have.
+/// Requirements of a virtual environment.
 #[derive(Clone, Copy, Debug)]
 pub struct Environment<'a> {
-    /// What needs it, for messages.
+    /// Name of the tests that need the environment, for messages.
     pub what: &'a str,
-    /// The directory that it is made in.
+    /// The directory of the environment.
     pub directory: &'a Path,
     /// The files that pin its packages.
     pub requirements: &'a [PathBuf],
@@ -25,7 +25,7 @@ pub struct Environment<'a> {
 }
 
 impl Environment<'_> {
-    /// Makes the environment, or uses the one made earlier from the same requirements, and returns its interpreter.
+    /// Makes the environment, or uses an existing one with the same requirements, and returns its interpreter.
     /// The error is [`Missing`].
     pub fn prepare(&self) -> Result<PathBuf> {
         let made = self.prepare_with("python3");
@@ -41,7 +41,7 @@ impl Environment<'_> {
             "bin/python"
         };
         let interpreter = self.directory.join(name);
-        // Written last, so that an interrupted installation is not mistaken for a complete one.
+        // Written last, so that an interrupted installation is not treated as a complete one.
         let stamp = self.directory.join("installed.txt");
         let import = format!("import {}", self.imports);
         let works = || command::read(Command::new(&interpreter).args(["-c", &import]));
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use crate::script::program;
 
-    /// A python3 whose `-m venv` makes an interpreter that writes down its arguments.
+    /// A python3 whose `-m venv` makes an interpreter that records its arguments.
     const MAKES_VENV: &str = r#"
         [ "$2" = venv ] || exit 0
         mkdir -p "$4/bin"

@@ -1,8 +1,8 @@
 //! `cargo xtask renode`: the image on Renode, an emulator of other authors: its own suites, then the conformance suite
 //! with every module, in virtual time. `--interactive` starts the board for a person.
 //!
-//! Nothing else needs Renode. [`checks`], a step of `cargo xtask test`, checks Renode's files without it, and the
-//! simulator of `cargo xtask sim` is the project's own.
+//! Only this command needs Renode. [`checks`], a step of `cargo xtask test`, checks Renode's files without it, and
+//! `cargo xtask sim` uses the project's own simulator.
 
 use std::path::{Path, PathBuf};
 
@@ -68,7 +68,7 @@ pub struct Options {
 
 /// `cargo xtask renode`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    // Before the build, which is of no use without Renode.
+    // Search before the build, which is useless without Renode.
     let renode = Renode::find(options.renode.as_deref(), &find::Places::of_process()?)?;
     eprintln!("{renode}");
     let board = options.build.board;
@@ -109,7 +109,7 @@ impl Bench {
     /// Runs the suites in Renode and then the program `conformance`, and writes a summary of both.
     fn run(&self, conformance: &Path, python: &Path) -> Result<()> {
         group::end_on_signal()?;
-        // Results of another run would be mistaken for those of this one.
+        // Results of an earlier run would be mistaken for those of this one.
         let _ = fs::remove_dir_all(&self.output);
         fs::create_dir_all(&self.output)?;
         let mut done = vec![steps::timed("suites", "suites in Renode", true, || {

@@ -1,4 +1,4 @@
-//! `cargo xtask sim`: builds the images and the simulator, then becomes the simulator.
+//! `cargo xtask sim`: builds the images and the simulator, then replaces this process with the simulator.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -12,8 +12,8 @@ use crate::error::usage;
 use crate::workspace::Workspace;
 use crate::{build, command};
 
-/// `cargo xtask sim`. The `arguments` were parsed into `options` already, so that a wrong one is refused before anything
-/// is built.
+/// `cargo xtask sim`. The `arguments` have already been parsed into `options`, so that a wrong one is refused before
+/// the build.
 pub fn run(
     workspace: &mut Workspace,
     options: &Options,
@@ -51,7 +51,7 @@ pub fn run_image(workspace: &mut Workspace, board: &Board, elf: Option<&Path>) -
     command::exec(&mut simulator)
 }
 
-/// Builds the simulator and returns where it is.
+/// Builds the simulator and returns its path.
 pub fn simulator(workspace: &Workspace) -> Result<PathBuf> {
     workspace.program("modio-sim")
 }

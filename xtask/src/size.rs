@@ -1,5 +1,5 @@
-//! `cargo xtask size`: the flash and RAM of the image, by section and by crate, and what is left of the parts and of the
-//! budget.
+//! `cargo xtask size`: the flash and RAM of the image, by section and by crate, and what is left of the parts and of
+//! the budget.
 
 use std::path::{Path, PathBuf};
 
@@ -83,7 +83,7 @@ fn within_limits(sizes: &Sizes, hardware: &Hardware) -> Result<()> {
     Ok(())
 }
 
-/// Returns what is left of a limit; negative when it is exceeded.
+/// Returns the rest of a limit; negative when the limit is exceeded.
 fn left(limit: u32, taken: u32) -> i64 {
     i64::from(limit) - i64::from(taken)
 }

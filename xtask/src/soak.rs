@@ -1,5 +1,5 @@
-//! `cargo xtask soak` and `cargo xtask matrix`: longer runs of tests that `cargo xtask test` runs too, with fewer frames,
-//! for seconds, and with chosen cases.
+//! `cargo xtask soak` and `cargo xtask matrix`: longer runs of tests that `cargo xtask test` also runs, there with
+//! fewer frames, for seconds, and with selected cases.
 
 use anyhow::Result;
 use register_map::board::MODIO_02;

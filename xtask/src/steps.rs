@@ -1,4 +1,4 @@
-//! The steps of `cargo xtask test` and `cargo xtask ci`: run to the last, whatever fails, and summed up.
+//! The steps of `cargo xtask test` and `cargo xtask ci`: all of them run even when one fails, and a summary follows.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,14 +12,14 @@ use crate::table;
 use crate::workspace::Workspace;
 use crate::{build, steps};
 
-/// How a step ended.
+/// Outcome of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything was right.
+    /// The step found no error.
     Passed,
-    /// What was wrong.
+    /// The step failed, with the reason.
     Failed(String),
-    /// Why the step could not be run on this machine.
+    /// The step could not run on this machine, with the reason.
     Skipped(String),
 }
 
@@ -32,7 +32,7 @@ impl Outcome {
         }
     }
 
-    /// The word for it and the reason.
+    /// Returns the word for the outcome, and the reason.
     pub fn words(&self) -> (&'static str, &str) {
         match self {
             Self::Passed => ("passed", ""),
@@ -42,7 +42,7 @@ impl Outcome {
     }
 }
 
-/// What the steps of a run share.
+/// Data that the steps of a run share.
 pub struct Bench<'a> {
     /// The project on this machine.
     pub workspace: &'a mut Workspace,
@@ -52,7 +52,7 @@ pub struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    /// Nothing is built yet.
+    /// Returns a bench on which no image is built yet.
     pub fn new(workspace: &'a mut Workspace, host: bool) -> Self {
         Self {
             workspace,
@@ -79,7 +79,7 @@ type Run = Box<dyn Fn(&mut Bench) -> Result<()>>;
 /// Which command runs a step when no step is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum In {
-    /// `cargo xtask test --host`, and the other two.
+    /// `cargo xtask test --host`, `cargo xtask test` and `cargo xtask ci`.
     Host,
     /// `cargo xtask test` and `cargo xtask ci`.
     Test,
@@ -89,16 +89,16 @@ pub enum In {
 
 /// A step.
 pub struct Step {
-    /// Its short name, which does not change.
+    /// The short name, which does not change.
     pub name: String,
-    /// Which command runs it.
+    /// The command that runs the step.
     pub part_of: In,
     what: String,
     run: Run,
 }
 
 impl Step {
-    /// A step by its name, what it does, and how.
+    /// Returns a step with its name, its description and its function.
     pub fn new(
         part_of: In,
         name: impl Into<String>,
@@ -119,7 +119,7 @@ pub fn short(board: &Board) -> &'static str {
     board.name.rsplit('-').next().unwrap_or(board.name)
 }
 
-/// Returns the steps of these names, in the order of `all`, or without names those of the command.
+/// Returns the steps of these names, in the order of `all`, or the steps of the command if there are no names.
 pub fn chosen(all: Vec<Step>, names: &[String], command: In) -> Result<Vec<Step>> {
     if let Some(name) = names
         .iter()
@@ -148,7 +148,7 @@ pub fn list(all: &[Step]) {
     say!("{}", table::text(&table));
 }
 
-/// Runs steps, those that lack a tool too when not `strict`, and prints a summary.
+/// Runs steps and prints a summary. When `strict`, a step whose tool is missing fails; otherwise it is skipped.
 pub fn run(all: &[Step], bench: &mut Bench, strict: bool) -> Result<()> {
     let mut done = Vec::new();
     for step in all {
@@ -160,7 +160,7 @@ pub fn run(all: &[Step], bench: &mut Bench, strict: bool) -> Result<()> {
 /// A step that has been run: name, outcome, and duration.
 pub type Done = (String, Outcome, Duration);
 
-/// Runs one step and says how it ended.
+/// Runs one step and prints its outcome.
 pub fn timed(name: &str, what: &str, strict: bool, run: impl FnOnce() -> Result<()>) -> Done {
     eprintln!("==> {name}: {what}");
     let begin = Instant::now();

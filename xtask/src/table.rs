@@ -9,7 +9,7 @@ pub fn new<'a>(headings: impl IntoIterator<Item = &'a str>) -> Table {
     table
 }
 
-/// Aligns the figures to the right: every column but the first.
+/// Aligns the figures to the right: every column except the first.
 pub fn figures(table: &mut Table) {
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);

@@ -10,7 +10,7 @@ use crate::steps::{self, Bench, In, Step, short};
 use crate::workspace::{ALL, Workspace};
 use crate::{ci, command, page, pymodbus, renode, sim, size};
 
-/// The variable that names the corner of the part to the tests of the image.
+/// The variable with the corner of the part for the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
 
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
@@ -52,7 +52,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 }
 
 impl Chosen {
-    /// Runs the chosen steps, or without names those of the command.
+    /// Runs the chosen steps, or the steps of the command if none is named.
     pub fn run(&self, workspace: &mut Workspace, command: In) -> Result<()> {
         let all = ci::steps();
         if self.list {
@@ -67,12 +67,12 @@ impl Chosen {
     }
 }
 
-/// Whether the variable `CI`, which every CI service sets, says that this is one.
+/// Returns whether the variable `CI`, which every CI service sets, means that this process runs in CI.
 fn is_ci(variable: Option<&str>) -> bool {
     !matches!(variable, None | Some("" | "0" | "false"))
 }
 
-/// The steps of `cargo xtask test`.
+/// Returns the steps of `cargo xtask test`.
 pub fn steps() -> Vec<Step> {
     let mut all = vec![Step::new(In::Host, "unit", "tests on the host", |bench| {
         let mut cargo = bench.workspace.cargo("test");
@@ -152,7 +152,7 @@ pub fn steps() -> Vec<Step> {
     all
 }
 
-/// The steps at the corners beside the nominal one.
+/// Returns the steps at the corners other than the nominal one.
 pub fn corners() -> impl Iterator<Item = Step> {
     ["slow", "fast"].into_iter().map(|corner| {
         let name = format!("sim-{corner}");
@@ -164,8 +164,8 @@ pub fn corners() -> impl Iterator<Item = Step> {
     })
 }
 
-/// The tests of the modio-08 that run at the corners: those of the board itself, its start and its store. The others are
-/// the same code as on the modio-02, and would take as long again.
+/// The tests of the modio-08 that run at the corners: those of the board itself, its start and its store. The other
+/// tests run the same code as on the modio-02, and would double the time.
 const OWN_OF_08: [&str; 6] = [
     "analog::",
     "boot::",
@@ -187,7 +187,7 @@ fn in_simulation(bench: &mut Bench, targets: &[&str], names: &[&str], corner: &s
     cargo.env("MODIO_ELF", bench.image(&MODIO_02)?);
     cargo.env("MODIO_ELF_08", bench.image(&MODIO_08)?);
     cargo.env(CORNER, corner);
-    // Tests of one package cannot find the programs of another.
+    // Tests of one package do not know the path of another package's program.
     cargo.env("MODIO_SIM", sim::simulator(bench.workspace)?);
     command::run(&mut cargo)
 }

@@ -24,15 +24,15 @@ use crate::command;
 /// The Cortex-M3, without an operating system.
 pub const TARGET: &str = "thumbv7m-none-eabi";
 
-/// Time for rustup to fetch a target of about 40 MB. A network that drops every packet must not block the build.
+/// Time for rustup to download a target of about 40 MB. A network that drops every packet must not block the build.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(300);
 
-/// The linker that rustc looks for. Debian's package has it as a link to the lld of its LLVM, but does not depend on
-/// that lld.
+/// The linker that rustc looks for. In Debian's package it is a link to the lld of its LLVM, but the package does not
+/// depend on that lld.
 const LINKER: &str = "/usr/bin/rust-lld";
 
-/// Debian's rustc and cargo, which are kept new enough for Firefox, the sources of `core`, which has no package for the
-/// target, lld, and clippy.
+/// Debian's rustc and cargo, which are kept new enough for Firefox; the sources of `core`, because there is no package
+/// for the target; lld; and clippy.
 const PACKAGES: [&str; 5] = [
     "rustc-web",
     "cargo-web",
@@ -64,7 +64,7 @@ impl Way {
             return command;
         }
         let mut command = Command::new("/usr/bin/cargo");
-        // An outer cargo of rustup sets these, and they would lead Debian's cargo to rustup's rustc and libraries.
+        // rustup's cargo sets these variables. With them, Debian's cargo would use rustup's rustc and libraries.
         for name in [
             "CARGO",
             "RUSTC",
@@ -88,12 +88,12 @@ pub fn find(root: &Path, install: bool) -> Result<Way> {
     Machine::default().find(root, install)
 }
 
-/// Has rustup fetch a target for the active toolchain, unless it is installed.
+/// Makes rustup download a target for the active toolchain, unless it is installed.
 pub fn add(root: &Path, target: &str) -> Result<()> {
     Machine::default().add(root, target)
 }
 
-/// The programs of this machine that are asked.
+/// The programs of this machine that are called.
 struct Machine {
     rustc: PathBuf,
     rustup: PathBuf,
@@ -212,7 +212,7 @@ mod tests {
     use super::*;
     use crate::script::program;
 
-    /// A machine without the target, whose programs write down their arguments.
+    /// Makes a machine without the target, whose programs record their arguments.
     fn machine(directory: &Path, rustup: &str, dpkg_query: &str) -> Machine {
         let log = directory.join("log");
         let fake = |name, script: &str| {

@@ -1,4 +1,4 @@
-//! The project on this machine: where it and its build products are, and how cargo is called.
+//! The project on this machine: its directories, and how cargo is called.
 
 use std::collections::BTreeMap;
 use std::io::BufReader;
@@ -17,7 +17,7 @@ pub struct Workspace {
     root: PathBuf,
     target: PathBuf,
     way: Option<Way>,
-    /// Whether Debian packages that are missing may be installed.
+    /// Whether missing Debian packages may be installed.
     pub install: bool,
 }
 
@@ -54,7 +54,7 @@ impl Workspace {
         cargo
     }
 
-    /// Returns cargo for the microcontroller, run at the root. The way to compile for it is searched once.
+    /// Returns cargo for the microcontroller, run at the root. The way to compile for it is searched only once.
     pub fn target_cargo(&mut self, subcommand: &str) -> Result<Command> {
         let way = match self.way {
             Some(way) => way,
@@ -65,7 +65,7 @@ impl Workspace {
         Ok(cargo)
     }
 
-    /// Builds a program of this workspace for the host, and returns where it is.
+    /// Builds a program of this workspace for the host, and returns its path.
     pub fn program(&self, program: &str) -> Result<PathBuf> {
         let mut cargo = self.cargo("build");
         cargo.args(ALL).args(["--bin", program, MESSAGES]);
@@ -83,7 +83,7 @@ pub const ALL: [&str; 2] = ["--workspace", "--ignore-rust-version"];
 /// The option with which cargo reports what it builds.
 pub const MESSAGES: &str = "--message-format=json-render-diagnostics";
 
-/// Runs a build of cargo with the option [`MESSAGES`], and returns what it has made.
+/// Runs a build of cargo with the option [`MESSAGES`], and returns its products.
 pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
     let child = cargo.stdout(Stdio::piped()).spawn();
     let mut child = child.map_err(|error| command::no_start(cargo, error))?;

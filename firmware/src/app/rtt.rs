@@ -31,7 +31,7 @@ static mut CONTROL_BLOCK: MaybeUninit<ControlBlock> = MaybeUninit::zeroed();
 static mut BUFFER: [u8; SIZE] = [0; SIZE];
 static OPEN: AtomicBool = AtomicBool::new(false);
 
-/// Opens the channel, which drops what does not fit. Returns `None` when it is already open.
+/// Opens the channel, which discards text that does not fit. Returns `None` when it is already open.
 pub fn open() -> Option<UpChannel> {
     if OPEN.swap(true, Ordering::Relaxed) {
         return None;

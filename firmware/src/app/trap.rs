@@ -81,7 +81,7 @@ unsafe extern "C" fn NonMaskableInt() -> ! {
     naked_asm!("b {entry}", entry = sym HardFault)
 }
 
-// SAFETY: as above; cortex-m-rt uses this name for every vector without a handler of its own.
+// SAFETY: as above; cortex-m-rt uses this name for every vector without a separate handler.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn DefaultHandler() -> ! {

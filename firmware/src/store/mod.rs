@@ -293,7 +293,7 @@ impl Store {
         }
     }
 
-    /// Returns the page to erase when there is no valid record: the one that is less useful as evidence.
+    /// Returns the page to erase when there is no valid record: the page that is less useful for a diagnosis.
     const fn least_wanted(&self) -> Page {
         if self.first.written {
             Page::Second

@@ -1,4 +1,4 @@
-//! What the Rust servers have in common: the data that they serve, and frames that end by silence.
+//! Shared code of the Rust servers: the data that they serve, and frames that end by silence.
 
 use std::io::{self, ErrorKind};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,7 +8,7 @@ use serial2::{FlowControl, Parity, SerialPort, Settings, StopBits};
 
 /// Unit address of every server.
 pub const UNIT: u8 = 1;
-/// Number of coils and of discrete inputs, at addresses from 0 on. A multiple of 16, for pymodbus has them in words.
+/// Number of coils and of discrete inputs, at addresses from 0 on. A multiple of 16, because pymodbus stores words.
 pub const BITS: usize = 2096;
 /// Number of holding registers and of input registers, at addresses from 0 on.
 pub const WORDS: usize = 200;
@@ -25,13 +25,13 @@ const IDLE: Duration = Duration::from_secs(1);
 
 /// Serves the line at `port` without end. Prints `ready` in a line when the port is open.
 ///
-/// `answer` gets each frame, its CRC included, and returns the reply, its CRC included, or nothing for silence. Frames
-/// that are longer than the standard allows are dropped. A frame that makes `answer` panic gets silence: the next one
-/// is served all the same.
+/// `answer` receives each frame with its CRC, and returns the reply with its CRC, or `None` for no reply. Frames that
+/// are longer than the standard allows are discarded. A frame that makes `answer` panic gets no reply; the next frame
+/// is served as usual.
 ///
 /// # Errors
 ///
-/// When the port cannot be opened or used any more.
+/// When the port cannot be opened, or can no longer be used.
 pub fn serve(port: &str, mut answer: impl FnMut(&[u8]) -> Option<Vec<u8>>) -> io::Result<()> {
     let mut line = SerialPort::open(port, |mut settings: Settings| {
         settings.set_raw();
@@ -47,7 +47,7 @@ pub fn serve(port: &str, mut answer: impl FnMut(&[u8]) -> Option<Vec<u8>>) -> io
         if frame.len() > LONGEST {
             continue;
         }
-        // The panic has been reported on the standard error output.
+        // The panic has already been reported on the standard error output.
         let answer = catch_unwind(AssertUnwindSafe(|| answer(&frame)));
         if let Ok(Some(reply)) = answer {
             line.write_all(&reply)?;
@@ -71,7 +71,7 @@ fn receive(line: &mut SerialPort) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Runs a server on the port that the command line names, up to a failure of the line.
+/// Runs a server on the port that the command line names, until the line fails.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! The example of another board does what docs/simulator.md says.
+//! The example of another board behaves as docs/simulator.md describes.
 
 #[path = "../examples/blue_pill.rs"]
 #[allow(dead_code, reason = "main is for the command line")]
@@ -8,7 +8,8 @@ use sim::Time;
 
 #[test]
 fn blue_pill_blinks_and_sends_lines_at_their_times() {
-    let chip = blue_pill::run(&blue_pill::blinking(), Time::from_ms(200)).expect("it fits");
+    let chip =
+        blue_pill::run(&blue_pill::blinking(), Time::from_ms(200)).expect("the program fits");
     let events: Vec<_> = chip
         .circuit()
         .events

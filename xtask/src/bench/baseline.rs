@@ -1,6 +1,6 @@
-//! The baseline: the figures that a change must not make much worse.
+//! The baseline: the figures with which a change is compared.
 //!
-//! The same image has the same figures, but another toolchain makes another image. So each kind of figure has a
+//! The same image has the same figures, but a different toolchain makes a different image. So each kind of figure has a
 //! tolerance, wide enough for two neighbouring releases of rustc.
 
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::table::{COLUMNS, load_name, rows};
 
-/// By how much a figure may grow: in percent of the baseline, and an amount besides.
+/// Allowed growth of a figure: in percent of the baseline, and an absolute amount in addition.
 const TOLERANCE_PERCENT: f64 = 8.0;
 const TOLERANCE: f64 = 4.0;
 
@@ -25,7 +25,7 @@ const LOAD: &str = "awake_percent";
 /// Figures by their names.
 type Figures = BTreeMap<String, f64>;
 
-/// Returns the figures of a report that the baseline has.
+/// Returns the figures of a report that belong to the baseline.
 fn figures(report: &Value) -> Figures {
     let mut figures = Figures::new();
     let mut add = |name: &str, row: &Value, key: &str| {

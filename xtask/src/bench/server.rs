@@ -1,9 +1,9 @@
-//! The server's share: of the instructions of a request, of flash, and of RAM.
+//! The server's share of the instructions of a request, of flash, and of RAM.
 //!
 //! Other servers are measured without a UART driver, which their users write themselves. For a comparison the
 //! instructions of this server are counted without its line driver: the application's interrupt handlers with RTIC's
-//! locks, the drivers of UART and timer, and the marks by which the watchdog knows that every task runs. The server's
-//! are framing, CRC, functions, and the points, settings and state that requests access.
+//! locks, the drivers of UART and timer, and the marks that show the watchdog that every task runs. The server's
+//! parts are framing, CRC, functions, and the points, settings and state that requests access.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::size::Source;
 /// The server's crate.
 pub const CRATE: &str = "modbus_server";
 
-/// The structures that a line needs, and the number of each.
+/// The structures that a line needs, and their numbers.
 const STRUCTURES: [(&str, u64); 4] = [
     ("Server", 1),
     ("Receiver<u8>", 1),
@@ -24,7 +24,7 @@ const STRUCTURES: [(&str, u64); 4] = [
     ("Adu", 2),
 ];
 
-/// Sources, and whether they are the server's; the first that fits counts. `mem.rs` copies and fills memory for the
+/// Sources, and whether they belong to the server; the first match decides. `mem.rs` copies and fills memory for the
 /// server.
 const SOURCES: [(&str, bool); 8] = [
     ("/board-support/src/mem.rs", true),
@@ -37,7 +37,7 @@ const SOURCES: [(&str, bool); 8] = [
     ("/register-map/src/", true),
 ];
 
-/// Returns whether a source file is the server's, or `None` for a library.
+/// Returns whether a source file belongs to the server, or `None` for a library.
 fn is_server(file: &str) -> Option<bool> {
     let file = file.replace('\\', "/");
     let source = SOURCES.iter().find(|(source, _)| file.contains(source));
@@ -56,7 +56,7 @@ fn replace(report: &mut Value, is_server: impl Fn(u32) -> Option<bool>) -> Optio
         let row = row.as_object_mut()?;
         let mut server = 0;
         for (address, count) in row.remove("addresses")?.as_object()? {
-            // An instruction without a source counts too.
+            // An instruction without a source is counted, too.
             if is_server(address.parse().ok()?) != Some(false) {
                 server += count.as_u64()?;
             }

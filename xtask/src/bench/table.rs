@@ -25,13 +25,13 @@ const BYTE: u64 = 80;
 /// Bytes of flash and RAM that the design allows the server with every function and two buffers.
 const SERVER: [(&str, u64); 2] = [("flash", 9216), ("ram", 900)];
 
-/// Longest time that locks and other handlers may delay an interrupt of the line, in microseconds, at the nominal and at
-/// the slow corner, and the tasks of these interrupts. A character at 921600 bit/s takes 10.8 us.
+/// Longest time that locks and other handlers may delay an interrupt of the line, in microseconds, at the nominal and
+/// at the slow corner, and the tasks of these interrupts. A character at 921600 bit/s takes 10.8 us.
 const LINE_WAIT_US: f64 = 5.0;
 const SLOW_LINE_WAIT_US: f64 = 8.5;
 const LINE_TASKS: [&str; 2] = ["byte", "frame gap"];
 
-/// Instructions of FreeMODBUS for a whole transaction without a UART driver, from what was measured on a Cortex-M3 when
+/// Instructions of FreeMODBUS for a whole transaction without a UART driver, measured on a Cortex-M3 when
 /// modio was designed: 41 for a byte in; from t3.5 to the first byte 415 (one register), 3400 (125) and 3000 (120
 /// written); and 37 for each byte out after that.
 const FREEMODBUS: [(&str, u64); 5] = [
@@ -101,7 +101,7 @@ pub fn over_budget(report: &Value) -> Vec<String> {
     over
 }
 
-/// Returns the budget of a request in a column, where there is one.
+/// Returns the budget of a request in a column, if there is one.
 fn budget(key: &str, request: &str) -> Option<u64> {
     match key {
         "to_first_byte" => Some(TO_FIRST_BYTE),

@@ -8,7 +8,7 @@ use crate::image::FLASH_BASE;
 /// Bytes in a data record: a length that every programmer accepts.
 const BYTES: usize = 16;
 
-/// Returns the file for these bytes from the first address of flash on, and for the address at which the program starts.
+/// Returns the HEX file for these bytes, from the first address of flash on, and for the start address of the program.
 pub fn file(flash: &[u8], entry: u32) -> Result<String> {
     let mut records = Vec::new();
     let mut upper = None;

@@ -20,7 +20,7 @@ use super::sha256;
 const NAME: &str = concat!("modio-sim:", env!("CARGO_PKG_VERSION"));
 /// The program in the image.
 const PROGRAM: &str = "modio-sim";
-/// The ports on which the simulator listens, on all addresses: a container's loopback is not that of its machine.
+/// The ports on which the simulator listens, on all addresses: a container's loopback is not the host's.
 const HTTP: u16 = 8502;
 const TCP: u16 = 5020;
 /// A user without a name and without rights. A volume for `--flash` must be writable by this user.
@@ -30,7 +30,7 @@ const MANIFEST: &str = "application/vnd.oci.image.manifest.v1+json";
 const CONFIG: &str = "application/vnd.oci.image.config.v1+json";
 const LAYER: &str = "application/vnd.oci.image.layer.v1.tar";
 
-/// Returns the archive with this program, for a processor as Rust names it.
+/// Returns the archive with this program, for a processor with its name in Rust.
 pub fn archive(program: &[u8], processor: &str) -> Result<Vec<u8>> {
     let architecture = match processor {
         "x86_64" => "amd64",
@@ -72,7 +72,7 @@ pub fn archive(program: &[u8], processor: &str) -> Result<Vec<u8>> {
     ])
 }
 
-/// Returns how the container starts, and its files.
+/// Returns the configuration of the image: how the container starts, and its files.
 fn config(architecture: &str, layer: &str) -> Value {
     let boards = Board::ALL.map(|board| board.name).join(" and ");
     json!({
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn index_leads_to_the_program_which_starts_without_rights() {
+    fn index_contains_the_program_which_starts_without_rights() {
         let files = unpacked(&archive(b"program", "x86_64").unwrap());
         let json = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).unwrap();
         // Returns the blob that a descriptor names, after a check of its size and sum.

@@ -1,8 +1,8 @@
 //! The bill of materials: the crates that are linked into the image, and their dependencies, in CycloneDX 1.5 (JSON).
 //!
-//! The build itself reports which packages it compiled for the target, `cargo metadata` their origin, and Cargo.lock
-//! their check sums. Procedural macros and build scripts run on the host and are not in the bill. The bill has neither
-//! time nor serial number: the same sources give the same bill.
+//! The build itself reports which packages it compiled for the target, `cargo metadata` has their origin, and
+//! Cargo.lock their check sums. Procedural macros and build scripts run on the host and are not in the bill. The bill
+//! has neither time nor serial number, so the same sources give the same bill.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! The simulator as a file that runs without Rust, with the images of all boards inside, and as a container image.
+//! The simulator as a program that runs without Rust and contains the images of all boards, and as a container image.
 
 use std::path::Path;
 
@@ -11,11 +11,11 @@ use super::{oci, tool};
 use crate::image;
 use crate::workspace::Workspace;
 
-/// Builds the simulator with the images `BOARD.elf` of a directory inside, writes it there, and returns the names of the
+/// Builds the simulator with the images `BOARD.elf` of a directory in it, writes it there, and returns the names of the
 /// files.
 pub fn files(workspace: &Workspace, out: &Path) -> Result<Vec<String>> {
     let images = workspace.target().join("dist-images");
-    // Images that an earlier build has left would be inside as well.
+    // Images of an earlier build would be included as well.
     let _ = fs::remove_dir_all(&images);
     fs::create_dir_all(&images)?;
     for board in Board::ALL {
@@ -41,7 +41,7 @@ pub fn files(workspace: &Workspace, out: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Returns an image without debug information. Its symbols stay, because the simulator finds the log by them.
+/// Returns an image without debug information. Its symbols remain, because the simulator uses them to find the log.
 fn stripped(elf: &[u8]) -> Result<Vec<u8>> {
     let mut builder = Builder::<'_>::read32(elf).context("cannot strip the image")?;
     for section in &mut builder.sections {

@@ -9,7 +9,7 @@ pub type Segment<'a> = (u32, u32, &'a [u8], u32);
 /// A function or variable: name, address, size. The address of a function has the Thumb bit.
 pub type Symbol<'a> = (&'a str, u32, u32);
 
-/// Returns code or constants, used where they are loaded.
+/// Returns code or constants that are used at their load address.
 pub fn code(address: u32, data: &[u8]) -> Segment<'_> {
     (address, address, data, data.len() as u32)
 }
@@ -76,7 +76,7 @@ pub fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
         builder.segments.add().p_type = elf::PT_LOAD;
     }
     builder.set_section_sizes();
-    // Behind the file header and the program headers.
+    // After the file header and the program headers.
     let mut offset = 0x34 + 0x20 * segments.len() as u64;
     for ((section, _), &(_, _, data, _)) in sections.iter().zip(segments) {
         builder.sections.get_mut(*section).sh_offset = offset;

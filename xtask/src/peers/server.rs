@@ -1,4 +1,4 @@
-//! The servers: what each needs, and how it is started.
+//! The servers: the programs and versions they need, and how they are started.
 
 use std::io::{BufRead as _, BufReader, Lines};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use clap::ValueEnum;
 use crate::workspace::{Workspace, locked};
 use crate::{command, pymodbus};
 
-/// The directory in which the servers are built.
+/// Returns the directory in which the servers are built.
 pub fn directory(workspace: &Workspace) -> PathBuf {
     workspace.target().join("peers")
 }
@@ -27,13 +27,13 @@ pub enum Peer {
 /// A server that can be started.
 #[derive(Debug)]
 pub struct Prepared {
-    /// Its name in the table.
+    /// Name in the table.
     pub name: &'static str,
     /// Version of the library.
     pub version: String,
     /// The program.
     pub program: PathBuf,
-    /// Its first arguments; the port follows.
+    /// The first arguments; the port follows.
     pub arguments: Vec<PathBuf>,
 }
 
@@ -46,7 +46,7 @@ impl Peer {
         Self::Rmodbus,
     ];
 
-    /// Its name in the table.
+    /// Returns the name in the table.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Libmodbus => "libmodbus",
@@ -108,7 +108,7 @@ pub fn locked_version(lock: &Path, name: &str) -> Result<String> {
     Ok(version.1)
 }
 
-/// A program that runs beside this one, and is killed when this value is dropped.
+/// A program that runs in parallel to this one, and is killed when this value is dropped.
 pub struct Started {
     name: String,
     child: Child,
@@ -128,13 +128,13 @@ impl Started {
         Ok(Self { name, child, lines })
     }
 
-    /// Returns the next line that it prints.
+    /// Returns the next line that the program prints.
     pub fn line(&mut self) -> Result<String> {
         let line = self.lines.next().transpose()?;
         line.with_context(|| format!("{} has ended at its start", self.name))
     }
 
-    /// Returns its exit status, if it has ended.
+    /// Returns the exit status, if the program has ended.
     pub fn ended(&mut self) -> Option<ExitStatus> {
         self.child.try_wait().ok().flatten()
     }
@@ -142,7 +142,7 @@ impl Started {
 
 impl Drop for Started {
     fn drop(&mut self) {
-        // An error means that it has ended already.
+        // An error means that the program has already ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

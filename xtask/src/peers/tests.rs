@@ -1,4 +1,4 @@
-//! The command with scripts in place of line, server and suite.
+//! Tests of the command with scripts in place of line, server and suite.
 
 use serde_json::json;
 

@@ -1,5 +1,6 @@
-//! Checks of Renode's files without Renode: the Python models do what the firmware needs, the image starts on them, every
-//! suite calls keywords that Renode has with the right arguments, and the suites pass on the project's own simulator.
+//! Checks of Renode's files without Renode: the Python models work as the firmware needs, the image starts on them,
+//! every suite calls keywords that Renode has with the right arguments, and the suites pass on the project's own
+//! simulator.
 //!
 //! Tests of this package (`platform`) check the platform and the scripts.
 
@@ -49,8 +50,8 @@ fn checks(workspace: &Workspace) -> PathBuf {
     workspace.root().join(DIRECTORY).join("checks")
 }
 
-/// Runs the unit tests of the models, of the monitor's commands and of the replacements for Renode, and starts the image
-/// on the models.
+/// Runs the unit tests of the models, of the monitor's commands and of the replacements for Renode, and starts the
+/// image on the models.
 fn models(workspace: &Workspace, python: &Path, board: &Board, elf: &Path) -> Result<()> {
     let presets = presets();
     let tests: [(&str, &[&OsStr]); 6] = [
@@ -63,7 +64,7 @@ fn models(workspace: &Workspace, python: &Path, board: &Board, elf: &Path) -> Re
     ];
     for (test, arguments) in tests {
         let mut python = Command::new(python);
-        // -B: leaves no __pycache__ in the tree.
+        // -B: do not write __pycache__ to the tree.
         python.arg("-B").arg(checks(workspace).join(test));
         python.args(arguments);
         command::run(&mut python)?;
@@ -71,8 +72,8 @@ fn models(workspace: &Workspace, python: &Path, board: &Board, elf: &Path) -> Re
     Ok(())
 }
 
-/// Returns what a new device stores, as JSON rows of board, modules by port, address and bytes: for every module in every
-/// slot alone, and for different modules in all slots.
+/// Returns what a new device stores, as JSON rows of board, modules by port, address and bytes: for every module in
+/// every slot alone, and for different modules in all slots.
 fn presets() -> String {
     let mut presets = Vec::new();
     for board in Board::ALL {
@@ -89,7 +90,7 @@ fn presets() -> String {
                 .collect();
             let mut page = [0xFF; 256];
             let pairs: Vec<_> = configuration::modules(modules).collect();
-            // A setting for each slot fits.
+            // A setting for each slot must fit.
             let length = record::encode_page(0, &pairs, &mut page).unwrap_or_default();
             let hex: String = page[..length]
                 .iter()
@@ -101,7 +102,7 @@ fn presets() -> String {
     Value::Array(presets).to_string()
 }
 
-/// Runs Robot Framework on the suites as renode-test does, with the project's keywords in place of Renode's.
+/// Runs Robot Framework on the suites as renode-test does, with the project's keywords instead of Renode's.
 fn robot(workspace: &Workspace, python: &Path, board: &Board, options: &[&str]) -> Result<()> {
     let output = workspace.target().join("renode-checks");
     let mut robot = Command::new(python);

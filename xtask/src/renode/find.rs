@@ -1,4 +1,4 @@
-//! Where Renode is on this machine, and whether it is new enough.
+//! Finds Renode on this machine and checks its version.
 
 use std::env;
 use std::ffi::{OsStr, OsString};
@@ -15,11 +15,11 @@ use crate::error::usage;
 /// The oldest version in which Python models receive accesses under the names that the project's models use.
 const OLDEST: Version = Version::new(1, 16, 1);
 
-/// What to do about a Renode that is missing or too old.
+/// Advice for a Renode that is missing or too old.
 const GET_IT: &str = "get Renode 1.16.1 or newer from https://github.com/renode/renode/releases, or give its place with \
     --renode PATH or $RENODE; the simulator of `cargo xtask sim` needs none";
 
-/// Names of the program: everywhere, and in the application directory of macOS.
+/// Names of the program: on all systems, and in the application directory of macOS.
 const NAMES: [&str; 2] = ["renode", "macos_run.command"];
 
 /// A Renode that can be used.
@@ -37,17 +37,17 @@ impl fmt::Display for Renode {
     }
 }
 
-/// Where this machine may have programs.
+/// Places where this machine may have programs.
 #[derive(Clone, Debug, Default)]
 pub struct Places {
-    /// `$RENODE`
+    /// Value of `$RENODE`.
     pub variable: Option<PathBuf>,
-    /// The directories of the PATH, and then those into which installers and people put Renode.
+    /// The directories of the PATH, followed by the usual directories of Renode.
     pub path: OsString,
 }
 
 impl Places {
-    /// Those of this process.
+    /// Returns the places of this process.
     pub fn of_process() -> Result<Self> {
         let path = env::var_os("PATH").unwrap_or_default();
         let mut path: Vec<PathBuf> = env::split_paths(&path).collect();
@@ -121,9 +121,9 @@ impl Renode {
         Ok(Self { program, version })
     }
 
-    /// Returns the program that runs suites: from the directory of Renode, or from the PATH.
+    /// Returns the program that runs suites: in the directory of Renode, or on the PATH.
     pub fn tester(&self, places: &Places) -> Result<PathBuf> {
-        // A link in a directory of the PATH leads to the directory that has both.
+        // A link in a directory of the PATH points to the directory that has both programs.
         let linked = self.program.canonicalize();
         let programs = [Some(self.program.clone()), linked.ok()];
         // On Windows the program may be in a subdirectory of the scripts' directory.

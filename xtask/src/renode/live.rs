@@ -28,8 +28,8 @@ const START: Duration = Duration::from_secs(180);
 /// Time for a server of the line to answer.
 const ANSWER: Duration = Duration::from_secs(5);
 
-/// Runs the conformance suite against the board in Renode with this module. The results are in `conformance-MODULE.*` in
-/// the output directory.
+/// Runs the conformance suite against the board in Renode with this module. The results are in `conformance-MODULE.*`
+/// in the output directory.
 pub fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
     let (port, monitor) = (free_port()?, free_port()?);
     let script = write_script(bench, EXACT, module, 1, port)?;
@@ -67,7 +67,7 @@ pub fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Result<()>
     say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the first slot");
     say!("in the monitor: modio_log shows the firmware's log, quit ends Renode");
     let mut renode = Command::new(&bench.renode.program);
-    // With the terminal as its input, from which Renode also receives Ctrl-C.
+    // The terminal is the input, from which Renode also receives Ctrl-C.
     command::run(renode.arg("--console").arg(script))
 }
 
@@ -80,7 +80,7 @@ fn start(bench: &Bench, script: &Path, monitor: u16, log: &Path) -> Result<Group
     Group::start(renode)
 }
 
-/// Asks Renode to end. A Renode that does not answer ends with its group.
+/// Requests Renode to end. A Renode that does not answer is ended with its group.
 fn quit(monitor: u16) {
     if let Ok(mut socket) = TcpStream::connect((Ipv4Addr::LOCALHOST, monitor)) {
         // In a separate line, because the first bytes after the connection may be lost.
@@ -131,7 +131,7 @@ fn last_line(log: &Path) -> String {
     line.unwrap_or("its log is empty").to_owned()
 }
 
-/// Writes the script that sets image and board, and then includes another one.
+/// Writes the script that sets image and board, and then includes another script.
 fn write_script(bench: &Bench, kind: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
     let script = bench.output.join("run.resc");
     let text = format!(

@@ -1,5 +1,5 @@
-//! Tests of the platform and the scripts for Renode: against the types and arguments that Renode has, the part, the board
-//! and the reference manual.
+//! Tests of the platform and the scripts for Renode: against the types and arguments that Renode has, the part, the
+//! board and the reference manual.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -78,8 +78,8 @@ fn text(file: &str) -> String {
     fs_err::read_to_string(directory().join(file)).unwrap()
 }
 
-/// Returns the entries of a board's platform by name: its own, and those of the file for all boards. An entry in both has
-/// the lines of both.
+/// Returns the entries of a board's platform by name: its own entries, and those of the file for all boards. An entry
+/// in both files has the lines of both.
 fn entries(board: &Board) -> BTreeMap<String, Entry> {
     let mut entries = BTreeMap::new();
     for file in ["modio.repl", &format!("{board}.repl")] {
@@ -187,7 +187,7 @@ fn download_of_the_stock_platform_is_replaced_and_its_i2c_removed() {
     assert_eq!((i2c.place.as_str(), &i2c.kind), ("none", &None));
     assert!(text("modio.repl").contains("using \"platforms/cpus/stm32f103.repl\"\n"));
     for board in Board::ALL {
-        // Without `./` Renode searches its own directory.
+        // Without `./`, Renode searches its own directory.
         assert!(text(&format!("{board}.repl")).contains("using \"./modio.repl\"\n"));
     }
 }
@@ -217,7 +217,7 @@ fn models_and_entries_are_at_their_addresses_and_do_not_overlap() {
                 .and_then(|range| range.split_once(", +"))
             {
                 Some((address, size)) => (number(address), number(size)),
-                // A peripheral that knows its size, which is a kilobyte at most.
+                // A peripheral with a fixed size, which is at most a kilobyte.
                 None => (number(place), entry.attribute("size").map_or(0x400, number)),
             };
             ranges.push((address, size, name));
@@ -302,7 +302,7 @@ fn scripts_name_files_and_peripherals_that_exist() {
         let text = text(&format!("{script}.resc"));
         for word in text.split_whitespace() {
             if let Some((_, file)) = word.split_once("$ORIGIN/") {
-                // The image is built later.
+                // The image is built later, so the file need not exist.
                 let there = file.starts_with("../target/") || directory().join(file).is_file();
                 assert!(there, "{script}: {file}");
             }

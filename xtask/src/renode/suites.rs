@@ -31,7 +31,7 @@ pub fn run(bench: &Bench, python: &Path) -> Result<()> {
         tester
     })?
     .wait()?;
-    // Also when tests failed, so that whatever shows results has them.
+    // Convert the results even when tests failed, so that they can be shown.
     let failed = to_junit(
         python,
         &output.join("robot_output.xml"),
@@ -72,8 +72,8 @@ fn to_junit(python: &Path, from: &Path, to: &Path) -> Result<i32> {
     }
 }
 
-/// Returns the suites for a board, in the order of their names: those in tests, which are for any board, and those in the
-/// directory there with the name of the board.
+/// Returns the suites for a board, in the order of their names: those in tests, which are for any board, and those in
+/// the directory there with the name of the board.
 pub fn all(directory: &Path, board: &Board) -> Result<Vec<PathBuf>> {
     let tests = directory.join("tests");
     let of_any = fs::read_dir(&tests)?;

@@ -1,4 +1,4 @@
-//! Renode replaced by scripts: what is found and run, in which order, and how its end is reported.
+//! Tests with scripts in place of Renode: which programs are found and run, their order, and how their end is reported.
 
 use anyhow::Error;
 
@@ -29,7 +29,7 @@ open(os.environ['CALLS'], 'a').write('monitor ' + received)
 wait $!
 "#;
 
-/// Leaves results as the real one does.
+/// Leaves results like the real renode-test.
 const RENODE_TEST: &str = r#"
 echo "renode-test $*" >> "$CALLS"
 echo results > "$2/robot_output.xml"
@@ -38,7 +38,7 @@ echo results > "$2/robot_output.xml"
 /// A Python whose rebot reports no failed test.
 const REBOT: &str = r#"[ "$3" = robot.rebot ] || exit 252; echo "rebot $*" >> "$CALLS""#;
 
-/// Writes down its options.
+/// Records its options.
 const CONFORMANCE: &str = r#"
 echo "conformance $*" >> "$CALLS"
 "#;
@@ -128,7 +128,7 @@ fn renode_is_found_by_option_then_variable_then_path() {
 }
 
 #[test]
-fn place_without_renode_is_a_wrong_question() {
+fn place_without_renode_is_a_usage_error() {
     let is_usage = |error: &Error| error.is::<crate::error::Usage>();
     let places = Places {
         variable: Some("/nowhere/renode".into()),

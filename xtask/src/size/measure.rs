@@ -14,15 +14,15 @@ use crate::image::{self, RAM_BASE};
 /// Bytes of a section that no symbol covers: constants without a name, and padding.
 const UNNAMED: &str = "(unnamed constants, padding)";
 
-/// More than any microcontroller has of a memory, in bytes.
+/// More bytes than any microcontroller has of a memory.
 const LARGEST: u32 = 16 * 1024 * 1024;
 
 /// Bytes of each memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Bytes {
-    /// Of flash, initial values of variables included.
+    /// Bytes of flash, including initial values of variables.
     pub flash: u32,
-    /// Of RAM, without the stack.
+    /// Bytes of RAM, without the stack.
     pub ram: u32,
 }
 
@@ -36,11 +36,11 @@ impl std::ops::AddAssign for Bytes {
 /// The sizes of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
-    /// By section, in the order of the image.
+    /// Sizes by section, in the order of the image.
     pub sections: Vec<(String, Bytes)>,
-    /// By crate, those with most flash first.
+    /// Sizes by crate, those with most flash first.
     pub crates: Vec<(String, Bytes)>,
-    /// Of the whole image.
+    /// Sizes of the whole image.
     pub total: Bytes,
 }
 

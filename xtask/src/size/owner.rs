@@ -1,10 +1,10 @@
 //! The crate of a symbol, from its name.
 
-/// Names that crate `compiler_builtins` gives to what the compiler calls.
+/// Names in crate `compiler_builtins` of the functions that the compiler calls.
 const BUILTINS: [&str; 4] = ["__aeabi_", "mem", "__rust_", "bcmp"];
 
-/// Startup code, exception vectors and interrupt handlers have the names that the linker script or the hardware knows
-/// them by.
+/// Start-up code, exception vectors and interrupt handlers, which have the names of the linker script or of the
+/// hardware.
 pub const NAMED: &str = "(vectors, handlers, start-up)";
 
 /// Returns the crate of a symbol.
@@ -13,13 +13,13 @@ pub fn of(symbol: &str) -> String {
         let builtin = BUILTINS.iter().any(|prefix| symbol.starts_with(prefix));
         return if builtin { "compiler_builtins" } else { NAMED }.to_owned();
     };
-    // Without the hash, or the crate's disambiguator.
+    // Leave out the hash, or the crate's disambiguator.
     let name = format!("{name:#}");
     crate_of(&name).unwrap_or(NAMED).to_owned()
 }
 
-/// Returns the crate at the start of a path. For `<type as trait>` it is that of the type, or where the type has no crate
-/// (`&str`, `u32`, `[T]`) that of the trait.
+/// Returns the crate at the start of a path. For `<type as trait>` it is that of the type, or where the type has no
+/// crate (`&str`, `u32`, `[T]`) that of the trait.
 fn crate_of(path: &str) -> Option<&str> {
     let Some(inner) = path.strip_prefix('<') else {
         return head(path);

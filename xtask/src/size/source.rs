@@ -1,6 +1,6 @@
-//! What the debug information says of an image: the crate of an instruction, and the sizes of structures.
+//! Data from the debug information of an image: the crate of an instruction, and the sizes of structures.
 //!
-//! Symbols do not say which crate code comes from, because much of an optimised image is inlined into a few interrupt
+//! Symbols do not have the crate of the code, because much of an optimised image is inlined into a few interrupt
 //! handlers. Code of `core` that is inlined counts for the crate that uses it.
 
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
-//! A serial line between two programs: two pseudo-terminals, each of which receives what is written to the other.
+//! A serial line between two programs: two pseudo-terminals, each of which receives the bytes written to the other.
 //! Prints their paths, one in a line, and runs until its standard input ends.
 //!
-//! Bytes cross at once, whatever the rate: a pseudo-terminal has none.
+//! Bytes are transferred immediately at every rate, because a pseudo-terminal has no rate.
 
 use std::ffi::OsStr;
 use std::io::{self, Read as _};
@@ -62,6 +62,6 @@ fn main() -> io::Result<()> {
         thread::spawn(move || copy(&from, &to));
     }
     println!("{}\n{}", one.path.display(), other.path.display());
-    // The end of the standard input is the end of the program that started this one.
+    // The standard input ends when the program that started this one ends.
     io::stdin().read_to_end(&mut Vec::new()).map(drop)
 }

@@ -1,5 +1,5 @@
-//! A server on crate modbus-core: its decoder and encoder of RTU frames, the points in arrays. What the crate leaves
-//! to its user is done here: quantities, addresses and broadcasts.
+//! A server on crate modbus-core: its decoder and encoder of RTU frames, the points in arrays. The checks that the
+//! crate leaves to its user are here: quantities, addresses and broadcasts.
 
 use std::io;
 
@@ -14,7 +14,7 @@ use peers::{BITS, LONGEST, UNIT, WORDS};
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
 
-/// What the server serves.
+/// The points that the server serves.
 struct Points {
     coils: [bool; BITS],
     discrete_inputs: [bool; BITS],
@@ -22,7 +22,7 @@ struct Points {
     input_registers: [u16; WORDS],
 }
 
-/// `count` points from `first` on.
+/// Returns `count` points from `first` on.
 fn part<T>(points: &mut [T], first: u16, count: usize) -> Result<&mut [T], Exception> {
     let first = usize::from(first);
     points
@@ -30,7 +30,7 @@ fn part<T>(points: &mut [T], first: u16, count: usize) -> Result<&mut [T], Excep
         .ok_or(Exception::IllegalDataAddress)
 }
 
-/// A quantity from 1 to `most`.
+/// Returns a quantity if it is from 1 to `most`.
 fn quantity(count: u16, most: u16) -> Result<usize, Exception> {
     if (1..=most).contains(&count) {
         Ok(count.into())
@@ -93,7 +93,7 @@ impl Points {
         })
     }
 
-    /// The reply to a frame, if it gets one.
+    /// Returns the reply to a frame, if there is one.
     fn answer(&mut self, frame: &[u8]) -> Option<Vec<u8>> {
         let RequestAdu {
             hdr,

@@ -1,4 +1,4 @@
-//! A server on crate rmodbus, as its documentation shows one: `ModbusFrame` over `ModbusStorage`.
+//! A server on crate rmodbus, as in its documentation: `ModbusFrame` over `ModbusStorage`.
 
 use std::io;
 

@@ -1,7 +1,7 @@
 """Starts and operates virtual modio boards.
 
 The program `modio-sim` runs the firmware of a modio board on an emulated microcontroller. This package starts it, or
-attaches to one that runs, and does through its HTTP interface what hands and eyes do at a real board:
+attaches to a running one, and operates and observes the board through its HTTP interface:
 
     import modio_sim
 
@@ -11,7 +11,7 @@ attaches to one that runs, and does through its HTTP interface what hands and ey
         for frame in sim.frames():
             print(frame.summary)
 
-It needs nothing beyond Python's standard library. All errors are of the class `SimulatorError`.
+The package only needs Python's standard library. All errors are of the class `SimulatorError`.
 """
 
 from .board import Board

@@ -8,37 +8,37 @@ from typing import Any, Callable, List, Optional
 from .connection import Http
 from .model import Faults, Finding, Frame, Json, State, taken
 
-# How often it is looked whether something is so, in seconds.
+# Interval in seconds at which a condition is checked.
 _LOOK = 0.005
 
 
 class Board:
-    """What can be seen of a board and done to it.
+    """A board: its state, and the operations on it.
 
-    A method that changes something gives the state after it. Channels are numbered 1 to 4. With `port` a method
-    means the slot at that port, without it the board's first one."""
+    A method that changes the board returns the new state. Channels are numbered 1 to 4. With `port` a method
+    applies to the slot at that port, without it to the board's first slot."""
 
     def __init__(self, http: Http, path: str):
         self._http = http
         self._path = path
 
     def state(self) -> State:
-        """All that can be seen of the board."""
+        """Returns the state of the board."""
         return State.from_json(self._get("state"))
 
     def frames(self, since: int = 0) -> List[Frame]:
-        """The last 1000 frames on the line, oldest first; only those with numbers above `since`."""
+        """Returns the last 1000 frames on the line, oldest first; only those with numbers above `since`."""
         return [Frame.from_json(frame) for frame in self._get(f"frames?since={since}")["frames"]]
 
     def findings(self) -> List[Finding]:
-        """What the firmware has done that a real microcontroller would not take well, oldest first."""
+        """Returns the actions of the firmware that could fail on a real microcontroller, oldest first."""
         return [taken(Finding, finding) for finding in self._get("findings")["findings"]]
 
     def set_channel(
         self, channel: int, *, energised: Optional[bool] = None, manual: Optional[bool] = None,
         millivolts: Optional[int] = None, port: Optional[int] = None,
     ) -> State:
-        """Sets what the outside world applies to a channel, of which one is given: `energised`, the voltage at a
+        """Sets the outside of a channel. Exactly one value must be given: `energised`, the voltage at a
         digital input; `manual`, the jumper of a relay; `millivolts`, 0 to 3300 at the pin of an analog input."""
         given = {"energised": energised, "manual": manual, "millivolts": millivolts}
         body = {name: value for name, value in given.items() if value is not None}
@@ -51,7 +51,7 @@ class Board:
         return self._post("dip", {"value": value})
 
     def set_module(self, name: str, *, port: Optional[int] = None) -> State:
-        """Plugs another module, such as "4do" or "none"; the power must be off."""
+        """Plugs in another module, such as "4do" or "none". The power must be off."""
         return self._post(f"{_slot(port)}module", {"name": name})
 
     def power_on(self) -> State:
@@ -59,7 +59,7 @@ class Board:
         return self._post("power", {"on": True})
 
     def power_off(self) -> State:
-        """Switches the power off at this instant, whatever the firmware is doing."""
+        """Switches the power off immediately, at any state of the firmware."""
         return self._post("power", {"on": False})
 
     def power_cycle(self) -> State:
@@ -67,18 +67,19 @@ class Board:
         return self._post("power", {"cycle": True})
 
     def faults(self) -> Faults:
-        """The faults that are set."""
+        """Returns the faults that are set."""
         faults: Faults = self._get("faults")
         return faults
 
     def set_faults(self, faults: Faults) -> Faults:
-        """Sets the faults that are given, such as `{"drop_rate": 0.01}`, and leaves the others as they are. Gives all
-        that are set then."""
+        """Sets the given faults, such as `{"drop_rate": 0.01}`, and does not change the others. Returns all faults
+        that are then set."""
         self._http.ask("POST", f"{self._path}/faults", faults)
         return self.faults()
 
     def wait(self, milliseconds: int, *, timeout: float = 60.0) -> None:
-        """Lets so much of the board's own, virtual time pass; TimeoutError when it does not within `timeout` seconds."""
+        """Waits until this much of the board's virtual time has passed. TimeoutError when that takes more than
+        `timeout` seconds."""
         end = self.state().virtual_ms + milliseconds
         what = f"{milliseconds} ms of virtual time did not pass in {timeout:g} s"
         self.wait_for(lambda: self.state().virtual_ms >= end, what=what, timeout=timeout)
@@ -86,7 +87,8 @@ class Board:
     def wait_for(
         self, is_so: Callable[[], Any], *, what: str = "it did not become so", timeout: float = 60.0,
     ) -> None:
-        """Waits until `is_so()` is true; TimeoutError, which says `what`, when it is not within `timeout` seconds."""
+        """Waits until `is_so()` is true. TimeoutError, with the text `what`, when that takes more than `timeout`
+        seconds."""
         end = time.monotonic() + timeout
         while not is_so():
             if time.monotonic() > end:
@@ -101,5 +103,5 @@ class Board:
 
 
 def _slot(port: Optional[int]) -> str:
-    """The part of a path that names a slot."""
+    """Returns the part of a path that names a slot."""
     return "" if port is None else f"slots/{port}/"

@@ -1,4 +1,4 @@
-"""Requests to the simulator and what it answers."""
+"""Requests to the simulator and their answers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from .errors import RefusedError, UnreachableError
 
-# The simulator is on this computer or near: a proxy for the web is no way to it.
+# The simulator runs on this computer or in its network, so a proxy for the web cannot be used.
 _OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
@@ -22,7 +22,7 @@ class Http:
         self.timeout = timeout
 
     def open(self, method: str, path: str, body: Any = None) -> HTTPResponse:
-        """Makes a request and gives the answer, not yet read.
+        """Sends a request and returns the answer, which is not yet read.
 
         RefusedError when the simulator refuses it, UnreachableError when there is no answer."""
         data = None if body is None else json.dumps(body).encode()
@@ -39,7 +39,7 @@ class Http:
             raise self.unreachable(error) from error
 
     def ask(self, method: str, path: str, body: Any = None) -> Any:
-        """Makes a request and gives the JSON that it is answered with."""
+        """Sends a request and returns the JSON of the answer."""
         with self.open(method, path, body) as answer:
             try:
                 return json.load(answer)
@@ -49,12 +49,12 @@ class Http:
                 raise UnreachableError(f"what answers at {self.url} is no simulator") from None
 
     def unreachable(self, error: Exception) -> UnreachableError:
-        """The error that says so, with the reason."""
+        """Returns the error that reports an unreachable simulator, with the reason."""
         return UnreachableError(f"no answer from {self.url}: {getattr(error, 'reason', error) or 'it has ended'}")
 
 
 def _message(refusal: urllib.error.HTTPError) -> str:
-    """What the server says about a refusal."""
+    """Returns the server's message for a refusal."""
     try:
         return str(json.load(refusal)["error"])
     except (OSError, HTTPException, ValueError, KeyError, TypeError):

@@ -1,22 +1,22 @@
-"""What can go wrong."""
+"""Errors of this package."""
 
 
 class SimulatorError(Exception):
-    """Anything that goes wrong with the simulator."""
+    """Base class of all errors of the simulator."""
 
 
 class StartError(SimulatorError):
-    """The simulator does not start; the message is what it says itself."""
+    """Error when the simulator does not start. The message is the simulator's."""
 
 
 class UnreachableError(SimulatorError):
-    """Nothing answers at the simulator's address, or not in time."""
+    """Error when there is no answer at the simulator's address, or not in time."""
 
 
 class RefusedError(SimulatorError):
-    """The simulator refuses a request; the message is its own."""
+    """Error when the simulator refuses a request. The message is the simulator's."""
 
     def __init__(self, status: int, message: str):
         super().__init__(message)
         self.status = status
-        """The HTTP status, such as 409 when a module is changed while the power is on."""
+        """HTTP status, such as 409 when a module is changed while the power is on."""

@@ -1,4 +1,4 @@
-"""What happens, as it happens."""
+"""Events of the simulator, as a stream."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .model import Frame, Lost, State
 
 Event = Union[State, Frame, Lost]
 
-# How each event is made of its data. Others, of a newer simulator, are left out.
+# The type of each event. Other events, which a newer simulator may send, are ignored.
 _KINDS: Dict[str, Callable[[str], Event]] = {
     "state": lambda data: State.from_json(json.loads(data)),
     "frame": lambda data: Frame.from_json(json.loads(data)),
@@ -20,7 +20,7 @@ _KINDS: Dict[str, Callable[[str], Event]] = {
 
 
 class Events(Iterator[Event]):
-    """An iterator over what happens: a `State` at the beginning and whenever something has changed (at most ten a
+    """An iterator over events: a `State` at the beginning and after each change (at most ten a
     second), a `Frame` for each frame on the line as it ends, `Lost` when events were not read in time.
 
     It ends when the simulator does. Close it, or use it in a `with` statement, when it is no longer needed."""
@@ -46,7 +46,8 @@ class Events(Iterator[Event]):
                 name, data = "", []
 
     def _line(self) -> str:
-        """The next line of the stream; StopIteration at its end. Without events a comment comes every few seconds."""
+        """Returns the next line of the stream. StopIteration at its end. Without events, a comment arrives every few
+        seconds."""
         try:
             line = self._stream.readline()
         except (OSError, HTTPException) as error:
@@ -56,7 +57,7 @@ class Events(Iterator[Event]):
         return line.decode().rstrip("\r\n")
 
     def close(self) -> None:
-        """Listens no longer."""
+        """Stops receiving events."""
         self._stream.close()
 
     def __enter__(self) -> Events:

@@ -1,4 +1,4 @@
-"""Types of what the simulator returns. Fields have the names of its HTTP interface."""
+"""Types of the data that the simulator returns. Fields have the names of its HTTP interface."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ T = TypeVar("T")
 
 
 def taken(what: Type[T], data: Mapping[str, Any]) -> T:
-    """Makes a `what` from those members of a JSON object that are its fields. A newer simulator may send more members."""
+    """Returns a `what` from those members of a JSON object that are its fields.
+
+    A newer simulator may send more members."""
     names = {field.name for field in fields(what)}  # type: ignore[arg-type]
     return what(**{name: value for name, value in data.items() if name in names})
 
@@ -25,15 +27,15 @@ class Leds:
 
 @dataclass(frozen=True)
 class Line:
-    """The RS-485 line, as its client has it."""
+    """The RS-485 line, from the side of its client."""
 
     baud: int
     format: str
     """Such as "8N2"."""
     rx_frames: int
-    """How many frames were sent to the unit."""
+    """Number of frames sent to the unit."""
     tx_frames: int
-    """How many frames the unit has sent."""
+    """Number of frames that the unit has sent."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,9 @@ class Channel:
     manual: Optional[bool] = None
     """Of a relay: its jumper is set to manual."""
     millivolts: Optional[int] = None
-    """Of an analog input: what is applied at the pin, 0 to 3300."""
+    """Of an analog input: voltage at the pin in mV, 0 to 3300."""
     code: Optional[int] = None
-    """Of an analog output: what its converter puts out, 0 to 4095."""
+    """Of an analog output: code of its converter, 0 to 4095."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +66,13 @@ class Slot:
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> Slot:
-        """Makes a slot from JSON."""
+        """Returns a slot from JSON."""
         return taken(Slot, {**data, "channels": channels(data)})
 
 
 @dataclass(frozen=True)
 class State:
-    """All that can be seen of a board."""
+    """The state of a board."""
 
     virtual_ms: int
     """Virtual time since the simulator was started."""
@@ -80,7 +82,7 @@ class State:
     dip: int
     """The DIP switch as a number."""
     module: str
-    """What is plugged into the first slot."""
+    """The module in the first slot."""
     leds: Leds
     driver_enable: bool
     """The unit's RS-485 driver is on."""
@@ -94,7 +96,7 @@ class State:
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> State:
-        """Makes a state from JSON."""
+        """Returns a state from JSON."""
         return taken(State, {
             **data,
             "leds": taken(Leds, data["leds"]),
@@ -105,7 +107,7 @@ class State:
         })
 
     def slot(self, port: int) -> Slot:
-        """The slot at a port of a board that has several; KeyError when there is none."""
+        """Returns the slot at a port of a board that has several. KeyError when there is none."""
         for slot in self.slots:
             if slot.port == port:
                 return slot
@@ -113,7 +115,7 @@ class State:
 
 
 def channels(data: Mapping[str, Any]) -> Tuple[Channel, ...]:
-    """The channels of a state or a slot."""
+    """Returns the channels of a state or a slot."""
     return tuple(taken(Channel, channel) for channel in data["channels"])
 
 
@@ -123,30 +125,30 @@ class Frame:
 
     number: int
     direction: str
-    """As the unit sees it: "rx" or "tx"."""
+    """Direction as the unit sees it: "rx" or "tx"."""
     start_us: int
-    """Virtual microseconds."""
+    """Virtual time in microseconds."""
     end_us: int
     bytes: bytes
     summary: str
-    """What it means, in a line."""
+    """Meaning of the frame, in one line."""
     crc_ok: bool
     gap_us: Optional[int]
-    """Silence before it; None for the first frame."""
+    """Silence before the frame. None for the first frame."""
     turnaround_us: Optional[int]
-    """Of a reply: from the end of the request to its start; None for any other frame."""
+    """Of a reply: time from the end of the request to its start. None for any other frame."""
     damaged: bool
-    """A character was collided with, or bad."""
+    """A character collided with another one, or was damaged."""
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> Frame:
-        """Makes a frame from JSON."""
+        """Returns a frame from JSON."""
         return taken(Frame, {**data, "bytes": bytes.fromhex(data["bytes"])})
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that the firmware did and a real microcontroller would not take well."""
+    """An action of the firmware that could fail on a real microcontroller."""
 
     at_us: int
     """Virtual time of the first time."""
@@ -154,7 +156,7 @@ class Finding:
     """Address of the instruction."""
     what: str
     count: int
-    """How often it happened."""
+    """Number of times that it happened."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,7 @@ class BoardInfo:
     """A board on the line."""
 
     name: str
-    """What `Simulator.board` knows it by."""
+    """Name for `Simulator.board`."""
     board: str
     """"modio-02" or "modio-08"."""
     dip: int
@@ -176,7 +178,7 @@ class Lost:
 
 
 class Faults(TypedDict, total=False):
-    """What is wrong with the line, the board or the chip, by intention. What is missing stays as it is."""
+    """Faults of the line, the board or the chip, set on purpose. A missing member does not change its fault."""
 
     bit_error_rate: float
     drop_rate: float
@@ -187,5 +189,5 @@ class Faults(TypedDict, total=False):
     lsi_khz: float
 
 
-# What a request is answered with, as JSON.
+# The JSON of an answer.
 Json = Dict[str, Any]

@@ -1,4 +1,4 @@
-"""The simulator as a process of one's own."""
+"""The simulator as a child process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Argument = Union[str, "os.PathLike[str]"]
 
 
 class Process:
-    """A running simulator and what it says."""
+    """A running simulator and its output."""
 
     def __init__(self, command: Sequence[Argument]):
         self.lines: List[str] = []
@@ -49,11 +49,11 @@ class Process:
 
     @property
     def status(self) -> Union[int, None]:
-        """The exit status, None while it runs."""
+        """The exit status. None while the process runs."""
         return self._process.poll()
 
     def endpoint(self, name: str, timeout: float) -> str:
-        """Waits for an endpoint and returns its address; StartError when the simulator does not announce it."""
+        """Waits for an endpoint and returns its address. StartError when the simulator does not announce it."""
         end = time.monotonic() + timeout
         while name not in self._endpoints:
             if self.status is not None:
@@ -66,12 +66,12 @@ class Process:
         return self._endpoints[name]
 
     def has(self, name: str) -> bool:
-        """Whether this endpoint has been announced."""
+        """Returns whether this endpoint has been announced."""
         return name in self._endpoints
 
     def end(self, timeout: float) -> int:
-        """Ends it as Ctrl-C does, so that it removes its links and keeps its flash file; by force when it has not
-        ended within `timeout` seconds. Gives the exit status."""
+        """Ends the process as Ctrl-C does, so that it removes its links and keeps its flash file; by force when it
+        has not ended within `timeout` seconds. Returns the exit status."""
         if self.status is None:
             self._process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", signal.SIGTERM))
         try:

@@ -1,4 +1,4 @@
-"""The client has all of the HTTP interface that the simulator describes (src/app/openapi.json)."""
+"""The client supports everything in the description of the simulator's HTTP interface (src/app/openapi.json)."""
 
 import ast
 import dataclasses
@@ -23,7 +23,7 @@ STATE = {
     "channels": CHANNELS, "log_tail": [], "slots": [{"port": 1, "module": "4di", "channels": CHANNELS}],
 }
 
-# How each method that makes a request is called, at least once.
+# A call of each method that makes a request, at least one per method.
 CALLS = {
     "board": [], "boards": [{}], "events": [{}], "faults": [{}], "findings": [{}], "frames": [{"since": 7}],
     "openapi": [{}], "power_cycle": [{}], "power_off": [{}], "power_on": [{}],
@@ -31,12 +31,12 @@ CALLS = {
     "set_dip": [{"value": 5}], "set_faults": [{"faults": {"drop_rate": 0.5}}],
     "set_module": [{"name": "4do"}, {"name": "4do", "port": 1}], "state": [{}],
 }
-# Those that make none, or only by others.
+# Methods that make no request, or make requests only through others.
 OTHERS = {"attach", "close", "endpoint", "start", "wait", "wait_for"}
 
 
 class Recorder(Http):
-    """Writes down what is asked, and answers something of the right form."""
+    """Records the requests, and returns answers of the right form."""
 
     def __init__(self):
         super().__init__("http://nowhere", 1)
@@ -54,7 +54,7 @@ class Recorder(Http):
 
 
 def called(simulator, board):
-    """Calls all methods of a simulator, those of a board on `board`; the requests that they make."""
+    """Calls all methods of a simulator, those of a board on `board`. Returns the requests."""
     recorder = simulator._http
     recorder.asked.clear()
     for name, calls in CALLS.items():
@@ -64,7 +64,7 @@ def called(simulator, board):
 
 
 def matches(template, path):
-    """Whether a path is one of a template such as `/api/channels/{channel}`."""
+    """Returns whether a path matches a template such as `/api/channels/{channel}`."""
     return re.fullmatch(re.sub(r"\\{[^/]+\\}", "[^/]+", re.escape(template)), path)
 
 
@@ -81,20 +81,20 @@ class Paths(unittest.TestCase):
         methods = {name for name, _ in inspect.getmembers(modio_sim.Simulator, callable) if name[0] != "_"}
         self.assertEqual(methods, CALLS.keys() | OTHERS)
 
-    def test_every_request_that_is_described_is_made(self):
+    def test_every_described_request_is_made(self):
         asked = called(self.simulator, self.simulator)
         for method, template in self.described():
             made = any(method == kind and matches(template, path) for kind, path in asked)
             self.assertTrue(made, f"no method makes the request {method} {template}")
 
-    def test_a_board_is_asked_by_its_name(self):
+    def test_requests_to_a_board_contain_its_name(self):
         asked = called(self.simulator, self.simulator.board("left/1"))
         of_all = {("GET", "/api/events"), ("GET", "/api/boards"), ("GET", "/api/openapi.json")}
         for method, path in asked - of_all:
             self.assertTrue(path.startswith("/api/boards/left%2F1/"), path)
         self.assertIn(("POST", "/api/boards/left%2F1/slots/1/channels/4"), asked)
 
-    def test_one_thing_is_applied_to_a_channel(self):
+    def test_exactly_one_value_is_applied_to_a_channel(self):
         for given in ({}, {"energised": True, "manual": False}):
             with self.assertRaises(ValueError):
                 self.simulator.set_channel(1, **given)
@@ -102,7 +102,7 @@ class Paths(unittest.TestCase):
 
 
 class Types(unittest.TestCase):
-    def test_every_member_that_is_described_is_a_field(self):
+    def test_every_described_member_is_a_field(self):
         schemas = DESCRIPTION["components"]["schemas"]
         seen = set()
         for schema, of in (("State", modio_sim.State), ("Slot", modio_sim.Slot), ("Channel", modio_sim.Channel),
@@ -114,13 +114,13 @@ class Types(unittest.TestCase):
             kinds = schemas[schema].get("oneOf", [schemas[schema]])
             members = {name for kind in kinds for name in kind["properties"]}
             fields = typing.get_type_hints(of).keys()
-            self.assertEqual(members - fields, set(), f"{of.__name__} lacks them")
+            self.assertEqual(members - fields, set(), f"{of.__name__} does not have these fields")
         for name, of in (("leds", modio_sim.Leds), ("line", modio_sim.Line)):
             members = schemas["State"]["properties"][name]["properties"].keys()
             self.assertEqual(members, {field.name for field in dataclasses.fields(of)})
         self.assertGreaterEqual(seen, {"State", "Slot", "Channel", "Frame", "Finding", "Board"})
 
-    def test_what_a_newer_simulator_tells_more_is_left_out(self):
+    def test_additional_members_of_a_newer_simulator_are_ignored(self):
         state = modio_sim.State.from_json({**STATE, "temperature": 300})
         self.assertEqual(state.virtual_ms, 1)
         self.assertEqual(state.slot(1).module, "4di")
@@ -129,11 +129,11 @@ class Types(unittest.TestCase):
 
 
 class Package(unittest.TestCase):
-    def test_it_is_written_in_the_oldest_python_that_it_names(self):
+    def test_package_compiles_with_its_oldest_python_version(self):
         for file in (HERE.parent / "modio_sim").glob("*.py"):
             ast.parse(file.read_text(), str(file), feature_version=(3, 9))
 
-    def test_its_version_is_that_of_the_simulator(self):
+    def test_version_is_that_of_the_simulator(self):
         versions = {re.search(r'^version = "(.+)"$', file.read_text(), re.MULTILINE)[1]
                     for file in (HERE.parent / "pyproject.toml", HERE.parents[3] / "Cargo.toml")}
         self.assertEqual(len(versions), 1, versions)

@@ -1,4 +1,4 @@
-"""The client with a simulator that runs."""
+"""The client with a running simulator."""
 
 import os
 import pathlib
@@ -12,7 +12,7 @@ import modio_sim
 
 
 def started(**options):
-    """A simulator with the image of the tests."""
+    """Starts a simulator with the image of the tests."""
     return modio_sim.Simulator.start(elf=os.environ["MODIO_ELF"], **options)
 
 
@@ -56,7 +56,7 @@ class Running(unittest.TestCase):
             self.simulator.board("nobody").state()
         self.assertEqual(refused.exception.status, 404)
 
-    def test_a_refusal_has_status_and_message_of_the_simulator(self):
+    def test_refusal_has_status_and_message_of_the_simulator(self):
         for status, message, what in (
                 (404, "numbered 1 to 4", lambda: self.simulator.set_channel(9, manual=True)),
                 (409, "", lambda: self.simulator.set_channel(1, millivolts=5)),
@@ -70,7 +70,7 @@ class Running(unittest.TestCase):
             self.assertNotIn("HTTP status", str(refused.exception))
         self.assertEqual(self.simulator.state().module, "2relay")
 
-    def test_frames_are_those_on_the_line_and_events_tell_them(self):
+    def test_frames_are_those_on_the_line_and_events_contain_them(self):
         before = max((frame.number for frame in self.simulator.frames()), default=0)
         with self.simulator.events() as events:
             self.assertIsInstance(next(events), modio_sim.State)
@@ -95,7 +95,7 @@ class Running(unittest.TestCase):
             self.simulator.wait(10_000_000, timeout=0.05)
         self.assertIn("10000000 ms", str(late.exception))
 
-    def test_one_can_attach_to_it_and_leave_it(self):
+    def test_attached_simulator_keeps_running_after_close(self):
         with modio_sim.Simulator.attach(self.simulator.url + "/") as other:
             other.set_dip(17)
             self.assertEqual((other.pty, other.output), (None, []))
@@ -118,19 +118,19 @@ class Start(unittest.TestCase):
             with started(dip=17, flash=flash, pty=line) as simulator:
                 self.assertEqual(simulator.state().dip, 17)
                 self.assertTrue(os.path.samefile(line, simulator.pty))
-                # Off, on, another module: as at the bench.
+                # Power off, another module, power on.
                 self.assertFalse(simulator.power_off().powered)
                 self.assertEqual(simulator.set_module("4ai").module, "4ai")
                 self.assertTrue(simulator.power_on().powered)
                 self.assertEqual(simulator.set_channel(3, millivolts=825).channels[2].millivolts, 825)
                 simulator.power_cycle()
-            self.assertEqual(simulator.close(), 0, "once more does no harm")
+            self.assertEqual(simulator.close(), 0, "a second close returns the same status")
             self.assertFalse(line.is_symlink())
             self.assertEqual(flash.stat().st_size, 131072)
             with self.assertRaises(modio_sim.UnreachableError):
                 simulator.state()
 
-    def test_what_keeps_it_from_starting_is_told_in_its_words(self):
+    def test_start_error_has_the_message_of_the_simulator(self):
         with self.assertRaises(modio_sim.StartError) as failed:
             started(module="8di")
         self.assertIn("one of none, 4di", str(failed.exception))
@@ -138,7 +138,7 @@ class Start(unittest.TestCase):
             modio_sim.Simulator.start(program="no-such-program-here")
         self.assertIn("no-such-program-here", str(failed.exception))
 
-    def test_one_that_dies_ends_the_events(self):
+    def test_events_end_when_the_simulator_dies(self):
         simulator = started()
         with simulator.events() as events:
             next(events)
@@ -151,7 +151,7 @@ class Start(unittest.TestCase):
                 pass
         self.assertNotEqual(simulator.close(), 0)
 
-    def test_nobody_at_an_address_is_told_with_it(self):
+    def test_unreachable_error_names_the_address(self):
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         with self.assertRaises(modio_sim.UnreachableError) as missing:

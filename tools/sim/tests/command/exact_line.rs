@@ -1,4 +1,4 @@
-//! The exact line of the running command, as a client on its socket finds it.
+//! The exact line of the running command, tested by a client on its socket.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -30,7 +30,7 @@ impl Client {
     }
 }
 
-/// A simulator whose firmware is an endless loop, its line's address and its front panel's.
+/// Returns a simulator whose firmware is an endless loop, the address of its line and the URL of its front panel.
 fn started(more: &[&str]) -> (Running, String, String) {
     let arguments = [&["--exact-line", "127.0.0.1:0"][..], more].concat();
     let mut running = Running::start_loop(&arguments);
@@ -40,13 +40,17 @@ fn started(more: &[&str]) -> (Running, String, String) {
 }
 
 #[test]
-fn time_stands_still_between_requests() {
+fn no_virtual_time_passes_between_requests() {
     let (_running, line, http) = started(&[]);
     let mut client = Client::connect(&line);
     assert_eq!(client.ask(b"run 0\n"), "ok 100000.000\n");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(client.ask(b"run 1500.5\r\n"), "ok 101500.500\n");
-    assert_eq!(state(&http)["virtual_ms"], 101, "the front panel shows it");
+    assert_eq!(
+        state(&http)["virtual_ms"],
+        101,
+        "the front panel shows the virtual time"
+    );
     let hello = client.ask(b"hello 1\n");
     assert!(
         hello.starts_with("ok 101500.500 version=1 line=9600,8N2 "),
@@ -66,7 +70,7 @@ fn line_option_sets_rate_and_format_of_the_client() {
 }
 
 #[test]
-fn bad_lines_get_an_error_each_and_let_no_time_pass() {
+fn each_invalid_line_gets_an_error_and_no_time_passes() {
     let (_running, line, _) = started(&[]);
     let mut client = Client::connect(&line);
     let before = client.ask(b"run 0\n");
@@ -110,12 +114,12 @@ fn a_line_that_is_too_long_ends_the_connection_and_the_next_client_is_served() {
     assert_eq!(served(&line).ask(b"run 0\n"), "ok 100000.000\n");
 }
 
-/// Connects until the server has noticed that the client before has gone.
+/// Connects until the server has noticed that the previous client has disconnected.
 fn served(line: &str) -> Client {
     let end = Instant::now() + Duration::from_secs(60);
     loop {
         let mut client = Client::connect(line);
-        // A refused client may find its connection reset.
+        // The server may reset the connection of a refused client.
         let mut reply = String::new();
         let written = client.stream.get_mut().write_all(b"run 0\n");
         let read = client.stream.read_line(&mut reply);
@@ -128,7 +132,7 @@ fn served(line: &str) -> Client {
 }
 
 #[test]
-fn a_second_client_is_refused_and_the_first_goes_on() {
+fn second_client_is_refused_and_the_first_is_still_served() {
     let (_running, line, _) = started(&[]);
     let mut first = Client::connect(&line);
     assert_eq!(first.ask(b"run 10\n"), "ok 100010.000\n");
@@ -150,7 +154,7 @@ fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
     assert_eq!(
         client.ask(b"run 0\n"),
         "ok 100000.000\n",
-        "half a line is no request"
+        "an incomplete line is not a request"
     );
     // This request takes a minute of virtual time, and its client does not wait for the reply.
     client
@@ -164,7 +168,7 @@ fn a_client_that_disconnects_in_the_middle_is_replaced_by_the_next() {
 
 #[cfg(unix)]
 #[test]
-fn signals_end_it_while_a_long_request_is_carried_out() {
+fn signals_end_the_simulator_during_a_long_request() {
     let (mut running, line, _) = started(&[]);
     let mut client = Client::connect(&line);
     client
@@ -178,7 +182,7 @@ fn signals_end_it_while_a_long_request_is_carried_out() {
 }
 
 #[test]
-fn endpoints_that_follow_the_clock_are_refused_beside_it() {
+fn endpoints_in_real_time_are_refused_together_with_the_exact_line() {
     for other in ["--pty", "--tcp", "--gdb"] {
         let arguments = ["--exact-line", "127.0.0.1:0", other, "127.0.0.1:0"];
         refused(&arguments, &["--exact-line", other]);

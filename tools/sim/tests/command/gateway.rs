@@ -1,4 +1,4 @@
-//! The Modbus TCP gateway of the running command, as clients on its socket find it.
+//! The Modbus TCP gateway of the running command, tested by clients on its socket.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -24,7 +24,7 @@ impl Client {
         self.0.write_all(&frame).unwrap();
     }
 
-    /// Transaction, unit and PDU of the next response.
+    /// Returns transaction, unit and PDU of the next response.
     fn receive(&mut self) -> (u16, u8, Vec<u8>) {
         let mut frame = vec![0; 6];
         self.0.read_exact(&mut frame).unwrap();
@@ -51,12 +51,12 @@ impl Client {
     }
 }
 
-/// The option for a gateway.
+/// Options for a gateway on a free port.
 const GATEWAY: [&str; 2] = ["--modbus-tcp", "127.0.0.1:0"];
-/// A fast line, for a unit that never answers.
+/// Options for a fast line, with a unit that never answers.
 const FAST: [&str; 2] = ["--line", "115200,8N2"];
 
-/// A simulator that has been started with a gateway: the gateway's address, and the front panel's.
+/// Returns a simulator with a gateway, the gateway's address and the URL of the front panel.
 fn ready(mut running: Running) -> (Running, String, String) {
     running.skip_pty();
     let gateway = running.endpoint("modbus-tcp: ");
@@ -64,7 +64,7 @@ fn ready(mut running: Running) -> (Running, String, String) {
     (running, gateway, http)
 }
 
-/// A simulator with a gateway and a unit that never answers.
+/// Returns a simulator with a gateway and a unit that never answers.
 fn silent() -> (Running, String, String) {
     ready(Running::start_loop(&[GATEWAY, FAST].concat()))
 }
@@ -102,7 +102,7 @@ fn broadcast_is_sent_and_not_answered() {
 fn pipelined_requests_are_answered_in_order_with_their_transactions() {
     let (_running, gateway, http) = silent();
     let mut client = Client::connect(&gateway);
-    // More than may wait, some of which need the line.
+    // More requests than the gateway queues. Some of them need the line.
     let unit = |n: u16| if n.is_multiple_of(5) { 9 } else { 250 };
     for n in 0..50 {
         client.send(n, unit(n), READ);
@@ -118,7 +118,7 @@ fn pipelined_requests_are_answered_in_order_with_their_transactions() {
 fn clients_are_served_in_turn_and_idle_ones_do_not_block() {
     let (_running, gateway, _) = silent();
     let mut idle = Client::connect(&gateway);
-    // Half a request.
+    // Half of a request.
     idle.0.write_all(&[0, 1, 0, 0, 0]).unwrap();
     let mut many = Client::connect(&gateway);
     for n in 0..16 {
@@ -167,7 +167,7 @@ fn client_beyond_the_32nd_is_refused_until_one_leaves() {
         if client.0.write_all(&request).is_ok() && matches!(client.0.read(&mut [0; 1]), Ok(1)) {
             return;
         }
-        assert!(Instant::now() < limit, "the place is free");
+        assert!(Instant::now() < limit, "no place became free");
     }
 }
 
@@ -187,7 +187,8 @@ fn client_that_only_sends_gets_its_responses_before_the_connection_closes() {
 fn halted_core_is_exception_0a_until_the_debugger_leaves() {
     let arguments = [GATEWAY, FAST, ["--gdb", "127.0.0.1:0"]].concat();
     let (mut running, gateway, _) = ready(Running::start_loop(&arguments));
-    // The answer to the debugger says that the core is halted. A request on the line at that moment would stay there.
+    // The reply to the debugger confirms that the core is halted. A request that is then on the line would not be
+    // handled.
     let mut debugger = TcpStream::connect(running.endpoint("gdb: ")).unwrap();
     debugger.write_all(b"$?#3f").unwrap();
     debugger.read_exact(&mut [0; 1]).unwrap();
@@ -196,7 +197,7 @@ fn halted_core_is_exception_0a_until_the_debugger_leaves() {
     drop(debugger);
     let limit = Instant::now() + Duration::from_secs(60);
     while client.ask(1, READ) != [0x83, 0x0B] {
-        assert!(Instant::now() < limit, "the core stays halted");
+        assert!(Instant::now() < limit, "the core is still halted");
     }
 }
 
@@ -211,7 +212,7 @@ fn port_in_use_is_refused() {
     refused(&arguments, &["Modbus TCP", &address, IN_USE]);
 }
 
-/// A simulator that runs the image.
+/// Returns a simulator that runs the image.
 fn image(more: &[&str]) -> (Running, String, String) {
     let image = std::env::var("MODIO_ELF").expect("MODIO_ELF names the image");
     let first = ["--elf", &image, "--http", "127.0.0.1:0"];
@@ -240,13 +241,17 @@ fn unit_answers_through_the_gateway() {
     assert_eq!(
         client.ask(17, &[1, 0xFF, 0, 0, 1]),
         [0x81, 2],
-        "the unit's own exception"
+        "the exception of the unit"
     );
-    assert_eq!(client.ask(16, READ), [0x83, 0x0B], "another unit");
+    assert_eq!(
+        client.ask(16, READ),
+        [0x83, 0x0B],
+        "no such unit on the line"
+    );
     assert_eq!(
         client.ask(255, READ),
         [0x83, 0x0B],
-        "no unit in loader mode"
+        "a unit in loader mode does not answer"
     );
     assert_eq!(state(&http)["line"]["tx_frames"], 21);
 }
@@ -260,14 +265,14 @@ fn several_units_answer_through_the_gateway_and_are_recorded() {
     let more = [&units[..], &["--record", path.to_str().unwrap()]].concat();
     let (_running, gateway, _) = image(&more);
     let mut client = Client::connect(&gateway);
-    // The module of the unit's first slot.
+    // The module in the unit's first slot.
     let module = [3, 0x01, 0x14, 0, 1];
     assert_eq!(client.ask(5, &module), [3, 2, 0, 2]);
     assert_eq!(client.ask(6, &module), [0x83, 0x0B]);
     assert_eq!(client.ask(7, &module), [3, 2, 0, 3]);
     let limit = Instant::now() + Duration::from_secs(60);
     while packets(&path).len() < 5 {
-        assert!(Instant::now() < limit, "the frames are in the file");
+        assert!(Instant::now() < limit, "the frames are not in the file");
     }
     let recorded: Vec<_> = packets(&path).into_iter().map(|(_, data)| data).collect();
     let reply = Framing::Rtu.frame(0, 7, &[3, 2, 0, 3]);
@@ -280,7 +285,7 @@ fn several_units_answer_through_the_gateway_and_are_recorded() {
 fn gateway_follows_the_unit_to_ascii_mode_and_another_rate() {
     let (_running, gateway, http) = image(&[]);
     let mut client = Client::connect(&gateway);
-    // KEY; BAUD; MODE; COMMAND: save, restart. MODE does not count before the restart.
+    // KEY; BAUD; MODE; COMMAND: save, restart. MODE is only in force after the restart.
     for (address, value) in [
         (0x0100, 0x5A17),
         (0x0101, 384),
@@ -291,7 +296,7 @@ fn gateway_follows_the_unit_to_ascii_mode_and_another_rate() {
         let pdu = write(address, value);
         assert_eq!(client.ask(1, &pdu), pdu, "{address:#06x}");
     }
-    // It answers first, then starts anew.
+    // The unit answers first, then restarts.
     std::thread::sleep(Duration::from_millis(500));
     assert_eq!(client.ask(1, &[3, 1, 3, 0, 1]), [3, 2, 0, 1]);
     assert_eq!(state(&http)["line"]["baud"], 38_400);

@@ -1,4 +1,4 @@
-//! The GDB server of the running command, spoken to in GDB's remote protocol.
+//! The GDB server of the running command, tested through GDB's remote protocol.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use super::{Running, elf, state};
 
-/// `movs r0, #0`, then again and again `adds r0, #1` and `nop`.
+/// `movs r0, #0`, then repeatedly `adds r0, #1` and `nop`.
 const COUNTING: [u16; 4] = [0x2000, 0x3001, 0xBF00, 0xE7FC];
 const START: u32 = 0x0800_0008;
 const ADD: u32 = START + 2;
 
-/// A simulator with a debugger on it.
+/// A simulator with a GDB server.
 struct Debugged {
     _running: Running,
     http: String,
@@ -52,7 +52,7 @@ impl Debugged {
         state(&self.http)["virtual_ms"].as_u64().unwrap()
     }
 
-    /// Whether virtual time passes.
+    /// Returns whether virtual time passes.
     fn runs(&self) -> bool {
         let before = self.virtual_ms();
         std::thread::sleep(Duration::from_millis(100));
@@ -65,7 +65,7 @@ impl Debugged {
     }
 }
 
-/// A debugger.
+/// A debugger that is connected to the simulator.
 struct Gdb {
     stream: TcpStream,
 }
@@ -78,11 +78,11 @@ impl Gdb {
 
     fn byte(&mut self) -> u8 {
         let mut byte = [0];
-        self.stream.read_exact(&mut byte).expect("an answer");
+        self.stream.read_exact(&mut byte).expect("a reply");
         byte[0]
     }
 
-    /// The next packet, without its run-length coding.
+    /// Returns the next packet, without its run-length coding.
     fn packet(&mut self) -> String {
         while self.byte() != b'$' {}
         let (mut text, mut sum) = (String::new(), 0_u8);
@@ -101,8 +101,8 @@ impl Gdb {
                 }
             }
         }
-        let told = String::from_utf8(vec![self.byte(), self.byte()]).unwrap();
-        assert_eq!(told, format!("{sum:02x}"), "the checksum of {text}");
+        let received = String::from_utf8(vec![self.byte(), self.byte()]).unwrap();
+        assert_eq!(received, format!("{sum:02x}"), "the checksum of {text}");
         self.stream.write_all(b"+").unwrap();
         text
     }
@@ -112,7 +112,7 @@ impl Gdb {
         self.packet()
     }
 
-    /// The core's registers.
+    /// Returns the core's registers.
     fn registers(&mut self) -> Vec<u32> {
         let text = self.ask("g");
         assert_eq!(text.len(), 23 * 8, "{text}");
@@ -122,13 +122,13 @@ impl Gdb {
             .collect()
     }
 
-    /// r0 and the program counter.
+    /// Returns r0 and the program counter.
     fn place(&mut self) -> (u32, u32) {
         let registers = self.registers();
         (registers[0], registers[15])
     }
 
-    /// What a monitor command says.
+    /// Returns the text that a monitor command prints.
     fn monitor(&mut self, command: &str) -> String {
         let hex: String = command.bytes().map(|byte| format!("{byte:02x}")).collect();
         self.send(&format!("qRcmd,{hex}"));
@@ -163,7 +163,7 @@ fn a_debugger_halts_steps_and_resumes_the_core() {
         halted.starts_with("S05") || halted.starts_with("T05"),
         "{halted}"
     );
-    assert!(!debugged.runs(), "time stands still");
+    assert!(!debugged.runs(), "virtual time is stopped");
     let time = gdb.monitor("time");
     assert!(time.ends_with(" s\n"), "{time}");
 
@@ -178,7 +178,7 @@ fn a_debugger_halts_steps_and_resumes_the_core() {
     assert_eq!(
         gdb.ask(&format!("m{ADD:x},2")),
         "0130",
-        "as the image has it"
+        "the memory has the instruction of the image"
     );
     let stopped = gdb.ask("s");
     assert!(
@@ -187,7 +187,7 @@ fn a_debugger_halts_steps_and_resumes_the_core() {
     );
     assert_eq!(gdb.place(), (count + 1, ADD + 2));
     gdb.ask("c");
-    assert_eq!(gdb.place(), (count + 1, ADD), "a round later");
+    assert_eq!(gdb.place(), (count + 1, ADD), "the core is one round later");
     assert_eq!(gdb.ask(&format!("z0,{ADD:x},2")), "OK");
 
     gdb.send("c");
@@ -200,7 +200,7 @@ fn a_debugger_halts_steps_and_resumes_the_core() {
 
     assert_eq!(
         gdb.monitor("reset").trim_end(),
-        "reset; halted before the first instruction"
+        "the core is reset and halted before the first instruction"
     );
     assert_eq!(gdb.place().1, START);
     assert_eq!(gdb.ask(&format!("Z1,{ADD:x},2")), "OK");
@@ -221,7 +221,7 @@ fn a_debugger_reads_and_writes_memory_and_registers() {
     assert_eq!(gdb.ask("me000ed00,4"), "31c21f41", "CPUID");
     assert!(
         gdb.ask("m40021000,4").starts_with('E'),
-        "reading has effects"
+        "an address whose reading has side effects"
     );
     assert!(gdb.ask("M8000000,4:00000000").starts_with('E'));
     assert_eq!(gdb.ask("m8000000,4"), "00500020");
@@ -237,14 +237,17 @@ fn a_debugger_reads_and_writes_memory_and_registers() {
 }
 
 #[test]
-fn a_debugger_that_just_goes_or_talks_nonsense_leaves_the_core_running() {
+fn core_keeps_running_when_a_debugger_disconnects_or_sends_invalid_data() {
     let directory = tempfile::tempdir().unwrap();
     let debugged = Debugged::start(directory.path());
     let mut gdb = debugged.connect();
     assert_eq!(gdb.ask(&format!("Z0,{ADD:x},2")), "OK");
     drop(gdb);
     debugged.runs_on();
-    assert!(debugged.runs(), "its breakpoint has gone with it");
+    assert!(
+        debugged.runs(),
+        "the server removes the breakpoint of a debugger that disconnects"
+    );
     let mut gdb = debugged.connect();
     gdb.stream
         .write_all(b"GET / HTTP/1.1\r\n\r\n$zz#00$")

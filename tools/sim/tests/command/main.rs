@@ -1,5 +1,5 @@
-//! The command `modio-sim` as a process: what it prints, how it ends, what it refuses. Where the simulator has no
-//! pseudo-terminals, its line is reached over TCP.
+//! The command `modio-sim` as a process: its output, its exit status, the options it refuses. Where the simulator has
+//! no pseudo-terminals, the tests reach its line over TCP.
 
 mod exact_line;
 mod gateway;
@@ -15,25 +15,25 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What the system says about an address that is bound already.
+/// Part of the system's error message for an address that is already bound.
 const IN_USE: &str = if cfg!(windows) {
     "Only one usage"
 } else {
     "in use"
 };
-/// What it says about a file or a directory that is not there.
+/// Part of the system's error message for a file or directory that does not exist.
 const NOT_THERE: &str = if cfg!(windows) {
     "cannot find"
 } else {
     "No such file"
 };
 
-/// An ELF file whose firmware is an endless loop.
+/// Writes an ELF file whose firmware is an endless loop.
 fn endless_loop(directory: &Path) -> PathBuf {
     elf(directory, &[0xE7FE])
 }
 
-/// An ELF file with `program` behind a vector table: one load segment at the start of flash.
+/// Writes an ELF file with `program` after a vector table: one load segment at the start of flash.
 fn elf(directory: &Path, program: &[u16]) -> PathBuf {
     let mut code = vec![0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08];
     code.extend(program.iter().flat_map(|half| half.to_le_bytes()));
@@ -62,10 +62,10 @@ fn elf(directory: &Path, program: &[u16]) -> PathBuf {
     path
 }
 
-/// The options that offer the line besides the pseudo-terminal.
+/// Options that provide the line in addition to the pseudo-terminal.
 const LINES: [&str; 3] = ["--tcp", "--modbus-tcp", "--exact-line"];
 
-/// The command with these arguments, and with one more where it would not start without.
+/// Returns the command with these arguments, and with `--tcp` where the simulator would not start without it.
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
     if !sim_options::PTY && !arguments.iter().any(|name| LINES.contains(name)) {
@@ -78,11 +78,11 @@ fn command(arguments: &[&str]) -> Command {
     command
 }
 
-/// A simulator that runs, ended with the test.
+/// A running simulator, which is ended with the test.
 struct Running {
     child: Child,
     lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
-    /// Holds the image of the endless loop, where the simulator runs that.
+    /// Holds the image of the endless loop if the simulator runs that.
     _directory: Option<tempfile::TempDir>,
 }
 
@@ -107,9 +107,9 @@ impl Running {
         running
     }
 
-    /// What follows `prefix` on the next line.
+    /// Returns the text after `prefix` on the next line.
     fn endpoint(&mut self, prefix: &str) -> String {
-        let line = self.lines.next().expect("a line").unwrap();
+        let line = self.lines.next().expect("one more line of output").unwrap();
         line.strip_prefix(prefix)
             .unwrap_or_else(|| panic!("{line:?}"))
             .to_owned()
@@ -140,11 +140,11 @@ impl Running {
         );
     }
 
-    /// The exit status, and what was said on stderr.
+    /// Waits for the end. Returns the exit status and the text on stderr.
     fn end(&mut self) -> (Option<i32>, String) {
         let limit = Instant::now() + Duration::from_secs(60);
         while self.child.try_wait().unwrap().is_none() {
-            assert!(Instant::now() < limit, "it does not end");
+            assert!(Instant::now() < limit, "the simulator does not end");
             std::thread::sleep(Duration::from_millis(5));
         }
         let mut said = String::new();
@@ -160,7 +160,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It has ended already unless the test has failed.
+        // The simulator has already ended unless the test has failed.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -175,17 +175,17 @@ fn connect(address: &str) -> TcpStream {
     stream
 }
 
-/// The body of `GET /api/state` of the simulator at `url`, as host, port and a slash.
+/// Returns the body of `GET /api/state` of the simulator at `url`, given as host, port and a slash.
 fn state(url: &str) -> serde_json::Value {
     get(url, "/api/state")
 }
 
-/// The body of a reply of the simulator at `url`.
+/// Returns the body of a reply of the simulator at `url`.
 fn get(url: &str, path: &str) -> serde_json::Value {
     http(url, &format!("GET {path} HTTP/1.1\r\n"), "")
 }
 
-/// The body of the reply to a POST.
+/// Returns the body of the reply to a POST.
 fn post(url: &str, path: &str, body: &str) -> serde_json::Value {
     let head = format!("POST {path} HTTP/1.1\r\nContent-Length: {}\r\n", body.len());
     http(url, &head, body)
@@ -200,7 +200,7 @@ fn http(url: &str, head: &str, body: &str) -> serde_json::Value {
     serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap()
 }
 
-/// What is wrong is told in one line, which names `parts`, with exit status 2.
+/// Asserts that the command reports the error in one line with all of `parts` in it, and exits with status 2.
 fn refused(arguments: &[&str], parts: &[&str]) {
     let output = command(arguments).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
@@ -209,11 +209,11 @@ fn refused(arguments: &[&str], parts: &[&str]) {
     for part in parts {
         assert!(said.contains(part), "{part}: {said}");
     }
-    assert!(output.stdout.is_empty(), "nothing is announced");
+    assert!(output.stdout.is_empty(), "no endpoint is announced");
 }
 
 #[test]
-fn a_slot_that_the_board_lacks_is_refused() {
+fn slot_that_the_board_does_not_have_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     let elf = elf.to_str().unwrap();
@@ -234,7 +234,7 @@ fn a_board_with_several_slots_shows_them_over_http() {
 }
 
 #[test]
-fn without_pseudo_terminals_it_says_which_option_to_give() {
+fn without_pseudo_terminals_the_error_names_the_missing_option() {
     let mut bare = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
     let output = bare.args(["--http", "127.0.0.1:0"]).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
@@ -245,7 +245,7 @@ fn without_pseudo_terminals_it_says_which_option_to_give() {
 
 #[cfg(unix)]
 #[test]
-fn signals_end_it_well_and_remove_the_link() {
+fn signals_end_the_simulator_with_success_and_remove_the_link() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     for signal in ["-INT", "-TERM"] {
@@ -264,13 +264,13 @@ fn signals_end_it_well_and_remove_the_link() {
         assert_eq!(running.end(), (Some(0), String::new()), "{signal}");
         assert!(
             fs::symlink_metadata(&link).is_err(),
-            "{signal}: the link is gone"
+            "{signal}: the link still exists"
         );
     }
 }
 
 #[test]
-fn it_stops_by_itself_after_the_time_given() {
+fn simulator_ends_after_the_given_time() {
     let begin = Instant::now();
     let mut running = Running::start_loop(&["--for", "300ms"]);
     assert_eq!(running.end().0, Some(0));
@@ -294,7 +294,7 @@ fn every_endpoint_is_announced_and_answers() {
     line.write_all(&[1, 2, 3]).unwrap();
     let end = Instant::now() + Duration::from_secs(60);
     while state(&url)["line"]["rx_frames"] != 1 {
-        assert!(Instant::now() < end, "the bytes cross the line");
+        assert!(Instant::now() < end, "the bytes did not arrive");
     }
 }
 
@@ -330,7 +330,7 @@ fn a_port_or_a_link_in_use_is_refused() {
 }
 
 #[test]
-fn a_flash_that_is_none_or_cannot_be_kept_is_refused() {
+fn flash_file_that_is_invalid_or_cannot_be_written_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
     let elf = elf.to_str().unwrap();
@@ -347,7 +347,7 @@ fn a_flash_that_is_none_or_cannot_be_kept_is_refused() {
 }
 
 #[test]
-fn the_flash_file_is_made_at_the_start_and_holds_image_and_preset() {
+fn flash_file_is_created_at_the_start_with_image_and_preset() {
     assert_preset(&[], &["--module", "4do"], "modio-02", &[(0x0114, 2)]);
     let board = ["--board", "modio-08"];
     let fitting = ["--module", "4do", "--slot", "2=4ai", "--slot", "4=4di"];
@@ -355,8 +355,8 @@ fn the_flash_file_is_made_at_the_start_and_holds_image_and_preset() {
     assert_preset(&board, &fitting, "modio-08", &stored);
 }
 
-/// Asserts that a flash file is as large as the flash of this board, that it holds the image alone without a preset,
-/// and these settings with one.
+/// Asserts that a flash file is as large as the flash of this board, that it holds only the image without a preset, and
+/// the image and these settings with a preset.
 fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16, u16)]) {
     let directory = tempfile::tempdir().unwrap();
     let elf = endless_loop(directory.path());
@@ -373,13 +373,24 @@ fn assert_preset(board: &[&str], fitting: &[&str], name: &str, settings: &[(u16,
     let size = if name == "modio-02" { 128 } else { 256 };
     let bare = run(&["--no-preset"]);
     assert_eq!(bare.len(), size * 1024);
-    assert_eq!(bare[..4], [0x00, 0x50, 0x00, 0x20], "the image");
-    assert!(bare[16..].iter().all(|byte| *byte == 0xFF), "all else");
+    assert_eq!(
+        bare[..4],
+        [0x00, 0x50, 0x00, 0x20],
+        "the file begins with the image"
+    );
+    assert!(
+        bare[16..].iter().all(|byte| *byte == 0xFF),
+        "the rest of the file is erased"
+    );
     let fitted = run(fitting);
     let page = &fitted[(known.store.first - 0x0800_0000) as usize..];
     let (_, record) = register_map::record::records(page).next().unwrap();
     assert!(record.pairs().eq(settings.iter().copied()), "{name}");
-    assert_eq!(run(&["--module", "4ai"]), fitted, "what is stored stays");
+    assert_eq!(
+        run(&["--module", "4ai"]),
+        fitted,
+        "a preset does not change the stored configuration"
+    );
 }
 
 #[test]

@@ -11,7 +11,7 @@ use pcap_file::pcapng::{Block, PcapNgReader};
 
 use super::{Running, endless_loop, refused};
 
-/// Time in ns and data of each packet in a file, which must be whole.
+/// Returns time in ns and data of each packet in a file, which must be complete.
 pub fn packets(path: &Path) -> Vec<(u128, Vec<u8>)> {
     let file = fs::read(path).unwrap();
     let mut reader = PcapNgReader::new(&file[..]).unwrap();
@@ -26,7 +26,7 @@ pub fn packets(path: &Path) -> Vec<(u128, Vec<u8>)> {
 
 #[cfg(unix)]
 #[test]
-fn capture_file_is_readable_while_the_simulator_runs_and_whole_at_its_end() {
+fn capture_file_is_readable_while_the_simulator_runs_and_complete_at_its_end() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("line.pcapng");
     fs::write(&path, "an older file").unwrap();
@@ -35,13 +35,16 @@ fn capture_file_is_readable_while_the_simulator_runs_and_whole_at_its_end() {
         let mut running = Running::start_loop(&[["--tcp", "127.0.0.1:0"], record].concat());
         running.skip_pty();
         let mut line = TcpStream::connect(running.endpoint("tcp: ")).unwrap();
-        assert!(packets(&path).is_empty(), "{signal}: a new file");
+        assert!(packets(&path).is_empty(), "{signal}: the new file is empty");
         let frame = Framing::Rtu.frame(0, 1, &[3, 0, 0, 0, 1]);
         for count in 1..=3 {
             line.write_all(&frame).unwrap();
             let limit = Instant::now() + Duration::from_secs(60);
             while packets(&path).len() < count {
-                assert!(Instant::now() < limit, "{signal}: the frame is in the file");
+                assert!(
+                    Instant::now() < limit,
+                    "{signal}: the frame is not in the file"
+                );
                 std::thread::sleep(Duration::from_millis(2));
             }
         }
@@ -67,7 +70,7 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
             .unwrap();
         let limit = Instant::now() + Duration::from_secs(60);
         while packets(&path).is_empty() {
-            assert!(Instant::now() < limit, "the frame is in the file");
+            assert!(Instant::now() < limit, "the frame is not in the file");
             std::thread::sleep(Duration::from_millis(2));
         }
         running.signal("-TERM");
@@ -75,7 +78,7 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
         files.push(packets(&path));
     }
     assert_eq!(files[0][0].0, 101_000_000, "100 ms of start-up, and 1 ms");
-    assert_eq!(files[0], files[1], "the same in every run");
+    assert_eq!(files[0], files[1], "every run has the same instants");
 }
 
 #[cfg(target_os = "linux")]

@@ -28,7 +28,7 @@ fn each_unit_answers_to_its_own_address_only() {
         .set_read_timeout(Some(Duration::from_millis(300)))
         .unwrap();
     assert_eq!(unit.try_unit(6, &MODULE, 4), None);
-    // Only the unit without power is silent.
+    // Only the unit without power does not answer.
     post(&unit.http, "/api/boards/unit-5/power", r#"{"on":false}"#);
     assert_eq!(unit.try_unit(5, &MODULE, 4), None);
     assert!(unit.ask_unit(7, &MODULE, 4).is_some());

@@ -1,4 +1,4 @@
-//! The real image in the running command, with a master on its TCP line.
+//! The release image in the running command, with a master on its TCP line.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -12,14 +12,14 @@ use super::{Running, state};
 pub const KEY: u16 = 0x0100;
 /// Line rate in 100 bit/s.
 pub const BAUD: u16 = 0x0101;
-/// 1 saves, 2 restarts.
+/// The value 1 saves, 2 restarts.
 pub const COMMAND: u16 = 0x0108;
 /// The first channel's filter time in ms.
 const FILTER: u16 = 0x0130;
-/// Bit 3: changed, not saved.
+/// Status register. Bit 3: changed, not saved.
 const STATUS: u16 = 0x020A;
 
-/// A simulator that runs the image, and the master's end of its line.
+/// A simulator that runs the image, and the master on its line.
 pub struct Unit {
     pub running: Running,
     pub line: TcpStream,
@@ -44,18 +44,18 @@ impl Unit {
         }
     }
 
-    /// Asks unit 1; the reply's PDU, `length` bytes of it.
+    /// Sends a PDU to unit 1. Returns `length` bytes of the reply's PDU.
     fn ask(&mut self, pdu: &[u8], length: usize) -> Vec<u8> {
         let reply = self.ask_unit(1, pdu, length);
-        reply.unwrap_or_else(|| panic!("no answer to {pdu:02X?}"))
+        reply.unwrap_or_else(|| panic!("no reply to {pdu:02X?}"))
     }
 
-    /// Asks a unit; the reply's PDU, `length` bytes of it. What gets lost because the machine is too busy to keep time is
-    /// asked again.
+    /// Sends a PDU to a unit. Returns `length` bytes of the reply's PDU. Repeats requests that are lost because the
+    /// machine is too busy to keep time.
     pub fn ask_unit(&mut self, unit: u8, pdu: &[u8], length: usize) -> Option<Vec<u8>> {
         (0..10).find_map(|_| {
             let reply = self.try_unit(unit, pdu, length)?;
-            let (address, pdu) = Framing::Rtu.open(&reply).expect("a good CRC");
+            let (address, pdu) = Framing::Rtu.open(&reply).expect("a valid CRC");
             assert_eq!(address, unit);
             Some(pdu)
         })
@@ -63,7 +63,7 @@ impl Unit {
 
     /// Sends a request once and returns the reply unchecked: `length` bytes of PDU with address and CRC.
     pub fn try_unit(&mut self, unit: u8, pdu: &[u8], length: usize) -> Option<Vec<u8>> {
-        // The silence before a frame.
+        // The silence in front of a frame.
         std::thread::sleep(Duration::from_millis(20));
         let request = Framing::Rtu.frame(0, unit, pdu);
         self.line.write_all(&request).unwrap();
@@ -95,7 +95,7 @@ impl Unit {
         while self.read(STATUS) & 8 != 0 {}
     }
 
-    /// The rate that the simulator's own end of the line has.
+    /// Returns the rate of the simulator's end of the line.
     pub fn rate(&self) -> u64 {
         state(&self.http)["line"]["baud"].as_u64().unwrap()
     }
@@ -110,7 +110,7 @@ impl Unit {
 #[cfg(unix)]
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_saved_configuration_survives_the_simulator_however_it_ends() {
+fn saved_configuration_survives_every_kind_of_end_of_the_simulator() {
     let directory = tempfile::tempdir().unwrap();
     let flash = directory.path().join("flash");
     let option = ["--flash", flash.to_str().unwrap()];
@@ -127,7 +127,7 @@ fn a_saved_configuration_survives_the_simulator_however_it_ends() {
         assert_eq!(std::fs::metadata(&flash).unwrap().len(), 128 * 1024);
         stored = value;
     }
-    // Another image is written over its own pages; the stored configuration is not among them.
+    // Another image is written over its own pages, which do not include those of the stored configuration.
     let other = super::endless_loop(directory.path());
     let mut running = Running::start(&[
         "--elf",
@@ -147,7 +147,7 @@ fn a_saved_configuration_survives_the_simulator_however_it_ends() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn without_a_file_nothing_survives() {
+fn without_a_flash_file_the_configuration_is_lost() {
     let mut unit = Unit::start(&[]);
     unit.save_filter(50);
     drop(unit);
@@ -162,9 +162,13 @@ fn the_line_follows_the_unit_to_another_rate() {
     unit.write(KEY, 0x5A17);
     unit.write(BAUD, 1152);
     unit.save();
-    assert_eq!(unit.rate(), 9600, "a rate counts from the next start on");
+    assert_eq!(
+        unit.rate(),
+        9600,
+        "a new rate is in force after the next start"
+    );
     unit.write(COMMAND, 2);
-    // It answers first, then starts anew.
+    // The unit answers first, then restarts.
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(unit.read(BAUD), 1152);
     assert_eq!(unit.rate(), 115_200);

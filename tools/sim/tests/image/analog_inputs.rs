@@ -1,4 +1,4 @@
-//! Analog inputs in every RANGE and SCALE: values against floating point, and what is wrong with a signal.
+//! Analog inputs in every RANGE and SCALE: values against floating point, and the status of each signal fault.
 
 use register_map::configuration::{BETA, FILTER, RANGE, SCALE};
 use sim::{Module, Time};
@@ -19,13 +19,13 @@ const OVER: u16 = 2;
 const OPEN: u16 = 3;
 const SHORT: u16 = 4;
 
-/// A 4AI whose channels follow their pins at once.
+/// A 4AI module whose channels follow their pins without delay.
 fn bench() -> Bench {
     let filters: Vec<_> = (0..4).map(|n| (FILTER + SLOT + n, 0)).collect();
     Bench::set_up(Module::Ai4, &filters)
 }
 
-/// The same voltage on all four pins, and time for a few scans.
+/// Applies the same voltage to all four pins and runs for a few scans.
 fn apply(bench: &mut Bench, millivolts: u16) {
     for channel in 1..=4 {
         bench.board.set_millivolts(channel, millivolts).unwrap();
@@ -55,7 +55,7 @@ fn volts_and_milliamps_are_read_raw_and_in_units_on_every_channel() {
             for (scale, top) in [(0, 4095.0), (1, full_scale)] {
                 set(&mut bench, SCALE, scale);
                 let exact = f64::from(millivolts) / 3300.0 * top;
-                // The converter's 4096 steps counted as 4095, its rounding, and the rounding to units.
+                // The error of counting the converter's 4096 steps as 4095, its rounding, and the rounding to units.
                 let steps = 1.5 + f64::from(corner().adc_noise());
                 let slack = steps * top / 4095.0 + 0.5;
                 for function in [3, 4] {
@@ -84,7 +84,7 @@ fn temperatures_are_within_a_fifth_of_a_degree_for_any_beta() {
             if !(-20.0..=80.0).contains(&exact) {
                 continue;
             }
-            // What half a step of the converter is worth here, beside the 0.2 degrees.
+            // The change that half a step of the converter makes here, in addition to the 0.2 degrees.
             let step = (at(millivolts + 1) - exact).abs() / 2.0;
             apply(&mut bench, millivolts);
             for word in bench.registers(SLOT, 4).unwrap() {
@@ -98,7 +98,7 @@ fn temperatures_are_within_a_fifth_of_a_degree_for_any_beta() {
         }
     }
     assert!(compared >= 60, "only {compared} within -20 to 80 degrees");
-    // Below zero is two's complement.
+    // Temperatures below zero are in two's complement.
     set(&mut bench, BETA, 3950);
     apply(&mut bench, 2820);
     let cold = bench.register(SLOT) as i16;
@@ -129,7 +129,7 @@ fn each_fault_of_a_signal_has_its_channel_status_in_either_scale() {
         set(&mut bench, SCALE, scale);
         for (range, millivolts, status) in signals {
             set(&mut bench, RANGE, range);
-            // From a good signal: the thresholds' hysteresis is the drivers' tests' affair.
+            // Start from a valid signal: the tests of the drivers cover the hysteresis of the thresholds.
             apply(&mut bench, 1650);
             assert_eq!(bench.registers(STATUS, 4), Ok(vec![GOOD; 4]));
             assert_eq!(bench.register(MODULE_STATE), 0);
@@ -145,11 +145,11 @@ fn each_fault_of_a_signal_has_its_channel_status_in_either_scale() {
                 "{what}"
             );
             assert_eq!(bench.status(MODULE_FAULT), bad, "{what}");
-            // It is told beside the value, not instead of it.
+            // The status reports the fault; the value can still be read.
             assert!(bench.registers(SLOT, 4).is_ok(), "{what}");
         }
     }
-    // A temperature beyond what a thermistor says ends at what one does.
+    // A temperature outside the thermistor's range is limited to the end of that range.
     set(&mut bench, RANGE, NTC);
     for (millivolts, tenths) in [(0, 1250), (50, 1250), (3260, -400), (3300, -400_i16)] {
         apply(&mut bench, millivolts);
@@ -159,7 +159,7 @@ fn each_fault_of_a_signal_has_its_channel_status_in_either_scale() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn one_channel_s_fault_is_its_own() {
+fn fault_of_a_channel_changes_only_the_status_of_that_channel() {
     let mut bench = bench();
     bench.configure(RANGE + SLOT, &[VOLTS, CURRENT, NTC, CURRENT]);
     bench.configure(SCALE + SLOT, &[1, 1, 1, 0]);
@@ -170,11 +170,11 @@ fn one_channel_s_fault_is_its_own() {
     assert_eq!(bench.registers(STATUS, 4), Ok(vec![GOOD, OPEN, GOOD, GOOD]));
     let words = bench.registers(SLOT, 4).unwrap();
     for (word, (expected, slack)) in words.iter().zip([(5000, 2), (0, 0), (250, 1), (819, 1)]) {
-        // An LSB of noise is up to 5 units.
+        // One LSB of noise is up to 5 units.
         let slack = slack + 5 * corner().adc_noise();
         assert!(word.abs_diff(expected) <= slack, "{words:?}");
     }
-    // Points that are not there have no status.
+    // Points that do not exist have no status.
     assert_eq!(bench.registers(0x0240, 16), Ok(vec![0; 16]));
     assert_eq!(bench.registers(0x0254, 12), Ok(vec![0; 12]));
 }
@@ -190,14 +190,14 @@ fn filter_n_is_a_low_pass_over_two_to_the_n_samples() {
         let noise = corner().adc_noise();
         assert!(bench.register(SLOT) <= noise);
         let slack = 1.0 + f64::from(noise);
-        // A step, and what is left of it after some hundred samples at 1 kHz.
+        // A step, and the remaining difference after about 100 samples at 1 kHz.
         for channel in 1..=4 {
             bench.board.set_millivolts(channel, 3300).unwrap();
         }
         let from = bench.board.now();
         for _ in 0..3 {
             let word = bench.register(SLOT);
-            // The value is taken when the request is over and t3.5 with it.
+            // The unit reads the value when the request and t3.5 are over.
             let samples = (bench.sent + bench.t35() - from).as_us() as f64 / 1000.0;
             let code = |samples: f64| {
                 let left = (1.0 - 1.0 / f64::from(1 << n)).powf(samples.max(0.0));
@@ -213,10 +213,11 @@ fn filter_n_is_a_low_pass_over_two_to_the_n_samples() {
     }
 }
 
-/// The unit samples for 55.5 cycles at 12 MHz, which is good for 50 kOhm (DS5319, RAIN against the sampling time).
+/// The unit samples for 55.5 cycles at 12 MHz, which allows sources of up to 50 kOhm (DS5319, RAIN against the
+/// sampling time).
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn source_of_50_kohm_reads_right_and_one_of_500_kohm_does_not() {
+fn source_of_50_kohm_reads_correctly_and_source_of_500_kohm_does_not() {
     let mut bench = bench();
     for (channel, millivolts) in [(1, 0), (2, 3300), (3, 0), (4, 3300)] {
         bench.board.set_millivolts(channel, millivolts).unwrap();

@@ -5,7 +5,7 @@ use sim::{Channel, Module, Time};
 
 use crate::bench::{Bench, FIRST, SLOT};
 
-/// The codes on the DAC's outputs of these channels.
+/// Returns the codes on the DAC's outputs of these channels.
 pub fn codes<const N: usize>(bench: &Bench, channels: [usize; N]) -> [u16; N] {
     channels.map(|n| match bench.board.channel(n) {
         Channel::Ao { code } => code,
@@ -17,7 +17,7 @@ pub fn codes<const N: usize>(bench: &Bench, channels: [usize; N]) -> [u16; N] {
 #[ignore = "needs the image: cargo xtask test"]
 fn words_become_the_nearest_code_in_every_range_and_scale() {
     let mut bench = Bench::set_up(Module::Ao4, &[]);
-    // Range, scale, least and largest word, full scale at code 4095.
+    // Range, scale, smallest and largest word, word of full scale at code 4095.
     let scales = [
         (0, 0, 0, 4095, 4095),
         (1, 0, 0, 4095, 4095),
@@ -81,13 +81,13 @@ fn another_scale_or_range_does_not_move_an_output() {
         );
         assert_eq!(codes(&bench, [1, 2, 3, 4]), raw, "{range} {scale}");
     }
-    // An output has no NTC.
+    // Outputs have no range NTC.
     assert_eq!(bench.write(RANGE + SLOT, &[2]), Err(3));
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_2ai2ao_has_its_outputs_on_the_dac_s_last_channels() {
+fn a_2ai2ao_has_its_outputs_on_the_last_channels_of_the_dac() {
     let settings = [
         (SCALE + SLOT + 2, 1),
         (SCALE + SLOT + 3, 1),
@@ -101,14 +101,14 @@ fn a_2ai2ao_has_its_outputs_on_the_dac_s_last_channels() {
     assert_eq!(
         [0, 1].map(|n| registers[n].code),
         [0, 0],
-        "A and B drive nothing"
+        "DAC outputs A and B are not used"
     );
     assert_eq!(bench.write(SLOT + 2, &[10_001, 12_000]), Err(3));
     assert_eq!(bench.write(SLOT + 2, &[0, 3_999]), Err(3));
     assert_eq!(
         bench.write(SLOT + 1, &[0, 0, 12_000]),
         Err(2),
-        "from an input on"
+        "the write starts at an input"
     );
     bench.board.run_for(Time::from_ms(20));
     assert_eq!(codes(&bench, [3, 4]), [1024, 2457]);
@@ -116,7 +116,7 @@ fn a_2ai2ao_has_its_outputs_on_the_dac_s_last_channels() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_write_is_at_the_dac_within_ten_milliseconds() {
+fn a_write_reaches_the_dac_within_ten_milliseconds() {
     let mut bench = Bench::set_up(Module::Ao4, &[]);
     for code in [4095, 0, 1234, 77] {
         let frame = crate::bench::adu(&[1, 6, 0, FIRST + 3, (code >> 8) as u8, code as u8]);

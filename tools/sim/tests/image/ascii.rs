@@ -1,4 +1,4 @@
-//! ASCII mode on the image as it is flashed.
+//! ASCII mode on the release image.
 
 use register_map::configuration::{BAUD, COMM_TIMEOUT, FORMAT, FRAME_GAP, MODE};
 use sim::line::{Character, Format, Settings};
@@ -6,10 +6,10 @@ use sim::{Channel, Module, Time};
 
 use crate::bench::{Bench, FIRST};
 
-/// The four inputs.
+/// PDU that reads the four inputs.
 const READ: [u8; 5] = [0x01, 0, FIRST, 0, 4];
 
-/// An ASCII frame of unit 1.
+/// Returns an ASCII frame of unit 1.
 pub fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
     let sum = pdu.iter().fold(1u8, |sum, byte| sum.wrapping_add(*byte));
     let mut text = String::from(":01");
@@ -21,13 +21,13 @@ pub fn ascii(pdu: &[u8], end: &str) -> Vec<u8> {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn in_ascii_mode_the_same_is_said_in_other_words() {
+fn ascii_requests_get_ascii_replies_in_ascii_mode() {
     let mut bench = Bench::new(Module::Di4, 1);
     bench.unlock();
     bench.write(0x0103, &[1]).unwrap();
     bench.save();
     bench.power_cycle();
-    assert_eq!(bench.ask(1, &[0x07]), None, "no RTU any more");
+    assert_eq!(bench.ask(1, &[0x07]), None, "RTU requests get no reply");
     bench.board.set_energised(2, true).unwrap();
     bench.board.run_for(Time::from_ms(50));
 
@@ -36,11 +36,11 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
     bench.board.run_until(end + bench.t35());
     assert!(
         !bench.board.driver_enable(),
-        "the line is left to the master for t3.5"
+        "the unit waits t3.5 before it replies"
     );
     assert_eq!(bench.answer_after(end), ascii(&[0x01, 1, 0b0010], "\r\n"));
 
-    // The end mark is changed, by a reply with the old one, and comes back with a restart.
+    // The end mark changes after the reply, which still has the old one. A restart restores the default.
     let change = [0x08, 0, 3, b'#', 0];
     assert_eq!(
         bench.exchange(&ascii(&change, "\r\n")),
@@ -56,7 +56,7 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
         ascii(&restart, "\r#")
     );
 
-    // A pause of less than a second does not matter, one of more spoils the frame.
+    // A pause of less than a second is allowed; a longer one invalidates the frame.
     let whole = ascii(&READ, "\r\n");
     for (ms, answered) in [(900, true), (1100, false)] {
         let now = bench.board.now();
@@ -74,7 +74,7 @@ fn in_ascii_mode_the_same_is_said_in_other_words() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_frame_that_is_complete_is_answered_whatever_the_driver_leaves_behind_it() {
+fn complete_frame_is_answered_despite_a_glitch_after_it() {
     let mut bench = Bench::set_up(Module::Di4, &[(MODE, 1)]);
     for glitch in [0x00, 0xFF, b'\r'] {
         let start = bench.board.now();
@@ -83,7 +83,7 @@ fn a_frame_that_is_complete_is_answered_whatever_the_driver_leaves_behind_it() {
         let reply = bench.answer_after(end);
         assert_eq!(reply, ascii(&[0x01, 1, 0], "\r\n"), "{glitch:02X}");
     }
-    // But not before another's frame that has begun.
+    // The unit does not reply when a frame for another unit has begun.
     let start = bench.board.now();
     let end = bench.board.line().send(start, &ascii(&READ, "\r\n"));
     let end = bench.board.line().send(end, b":02");
@@ -92,14 +92,14 @@ fn a_frame_that_is_complete_is_answered_whatever_the_driver_leaves_behind_it() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
+fn valid_frame_followed_by_a_colon_is_counted_as_unanswered() {
     let mut bench = Bench::set_up(Module::Di4, &[(MODE, 1)]);
     let start = bench.board.now();
     let cut = ascii(&READ, "\r\n");
     let end = bench.board.line().send(start, &cut);
     let end = bench.board.line().send(end, &cut);
     assert_eq!(bench.answer_after(end), ascii(&[0x01, 1, 0], "\r\n"));
-    // Both frames, and the requests that read the counters.
+    // The counters include both frames and the requests that read the counters.
     for (counter, expected) in [(0x0B, 3), (0x0C, 0), (0x0E, 5), (0x0F, 1), (0x11, 0)] {
         let reply = bench.exchange(&ascii(&[0x08, 0, counter, 0, 0], "\r\n"));
         let expected = ascii(&[0x08, 0, counter, 0, expected], "\r\n");
@@ -109,7 +109,7 @@ fn good_frame_cut_by_the_next_colon_is_counted_as_unanswered() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_communication_watchdog_counts_from_the_request_s_end() {
+fn communication_watchdog_counts_from_the_end_of_the_request() {
     let settings = [(MODE, 1), (FRAME_GAP, 500), (COMM_TIMEOUT, 2)];
     let mut bench = Bench::set_up(Module::Do4, &settings);
     bench.patience = Time::from_ms(60);
@@ -125,16 +125,16 @@ fn the_communication_watchdog_counts_from_the_request_s_end() {
     }
 }
 
-/// Reads a counter of function 08 with the master's settings.
+/// Reads a counter of function 08 with the settings of the master.
 fn counter(bench: &mut Bench, which: u8) -> u8 {
     let reply = bench.exchange(&ascii(&[0x08, 0, which, 0, 0], "\r\n"));
     let known = |count: &u8| ascii(&[0x08, 0, which, 0, *count], "\r\n") == reply;
-    (0..=255).find(known).expect("a counter below 256")
+    (0..=255).find(known).expect("the counter is below 256")
 }
 
-/// At the lowest rate, the factory's, and the highest: the line answers in this format of seven data bits, and a
-/// character with a wrong parity bit or a low first stop bit spoils its frame only.
-fn is_spoken(format: Format) {
+/// Checks a format of seven data bits at the lowest rate, the default rate and the highest rate: the unit answers, and
+/// a character with a wrong parity bit or a low first stop bit invalidates only its own frame.
+fn assert_works(format: Format) {
     for baud in [12, 96, 9216] {
         let code = Format::ALL.iter().position(|known| *known == format);
         let code = code.expect("a code of FORMAT") as u16;
@@ -167,20 +167,20 @@ fn is_spoken(format: Format) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn seven_data_bits_with_even_parity_are_spoken() {
-    is_spoken(Format::SevenE1);
+fn seven_data_bits_with_even_parity_work() {
+    assert_works(Format::SevenE1);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn seven_data_bits_with_odd_parity_are_spoken() {
-    is_spoken(Format::SevenO1);
+fn seven_data_bits_with_odd_parity_work() {
+    assert_works(Format::SevenO1);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn seven_data_bits_with_two_stop_bits_are_spoken() {
-    is_spoken(Format::SevenN2);
+fn seven_data_bits_with_two_stop_bits_work() {
+    assert_works(Format::SevenN2);
 }
 
 #[test]

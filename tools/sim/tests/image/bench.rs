@@ -1,4 +1,4 @@
-//! A board with the image on it and a master on its line.
+//! A board that runs the image, and a master on its line.
 
 use std::{env, ops::Range, path::Path, sync::OnceLock};
 
@@ -14,17 +14,17 @@ use crate::{ELF, LAYOUT};
 pub const PORT: u16 = LAYOUT.board.first_port;
 /// The first point of that slot.
 pub const SLOT: u16 = points::first(PORT);
-/// The same as the low byte of its address; the high byte is 0.
+/// The low byte of that point's address; the high byte is 0.
 pub const FIRST: u8 = SLOT as u8;
-/// MODULE of that slot.
+/// Address of the setting MODULE of that slot.
 pub const MODULE: u16 = configuration::MODULE + PORT - 1;
 
-/// Bytes of a page of the store.
+/// Size of a page of the store in bytes.
 pub const PAGE_SIZE: usize = LAYOUT.board.store.bytes as usize;
-/// The addresses of the store's pages.
+/// Addresses of the store's pages.
 pub const PAGE_ADDRESSES: [u32; 2] = LAYOUT.board.store.addresses();
 
-/// Where the store's pages are in the flash.
+/// Returns the offsets of the store's pages in the flash.
 pub fn pages() -> [Range<usize>; 2] {
     PAGE_ADDRESSES.map(|address| {
         let start = (address - FLASH_START) as usize;
@@ -34,7 +34,7 @@ pub fn pages() -> [Range<usize>; 2] {
 
 const FLASH_START: u32 = 0x0800_0000;
 
-/// The image under test.
+/// Returns the image under test.
 pub fn image() -> &'static Image {
     static IMAGE: OnceLock<Image> = OnceLock::new();
     IMAGE.get_or_init(|| {
@@ -43,18 +43,21 @@ pub fn image() -> &'static Image {
     })
 }
 
-/// A flash whose stored configuration has only the first slot's module.
+/// Returns a flash whose stored configuration has only the first slot's module.
 pub fn flash_with(module: Module) -> Vec<u8> {
     let settings: Vec<_> = configuration::modules([(PORT, module)]).collect();
     flash_with_settings(&settings)
 }
 
-/// A flash whose stored configuration is these settings: address and value.
+/// Returns a flash whose stored configuration has these settings: address and value.
 pub fn flash_with_settings(pairs: &[(u16, u16)]) -> Vec<u8> {
-    LAYOUT.flash_with(pairs).expect("they fit")
+    LAYOUT
+        .flash_with(pairs)
+        .expect("the settings fit in the store")
 }
 
-/// CRC-16/MODBUS bit by bit, as the standard's appendix B says it: slow, and nobody else's code.
+/// Returns the CRC-16/MODBUS, calculated bit by bit as in the standard's appendix B: slow, but independent of the
+/// project's other code.
 pub fn crc(bytes: &[u8]) -> [u8; 2] {
     let mut crc = 0xFFFFu16;
     for byte in bytes {
@@ -70,18 +73,18 @@ pub fn crc(bytes: &[u8]) -> [u8; 2] {
     crc.to_le_bytes()
 }
 
-/// A supply below the detector's threshold of 2.78 V, far above the 2.0 V at which the part is reset.
+/// A supply voltage below the detector's threshold of 2.78 V, far above the 2.0 V at which the part is reset.
 pub const LOW_MV: u16 = 2700;
-/// A supply that flash can be programmed with.
+/// A supply voltage that is high enough to program the flash.
 pub const GOOD_MV: u16 = 3300;
 
-/// The corner of the part that the tests run at: `MODIO_CORNER`, nominal without it.
+/// Returns the corner of the part at which the tests run: `MODIO_CORNER`, or nominal without that variable.
 pub fn corner() -> Corner {
     let name = env::var("MODIO_CORNER");
     name.map_or(Corner::Nominal, |name| name.parse().expect("MODIO_CORNER"))
 }
 
-/// A time that depends on what instructions cost: at most this long at the nominal corner, and at the slow one.
+/// Upper limit of a time that depends on the cost of instructions: at the nominal corner, and at the slow one.
 pub struct Most(pub Time, pub Time);
 
 impl Most {
@@ -93,12 +96,12 @@ impl Most {
     }
 }
 
-/// A frequency that is `hz` from an exact crystal, from the crystal of the corner.
+/// Returns the frequency for the crystal of the corner that is `hz` with an exact crystal.
 pub fn on_crystal(hz: u32) -> u32 {
     scaled(hz, corner().oscillators().hse)
 }
 
-/// A frequency that is `hz` from an exact HSI, from the HSI of the corner.
+/// Returns the frequency for the HSI of the corner that is `hz` with an exact HSI.
 pub fn on_hsi(hz: u32) -> u32 {
     scaled(hz, corner().oscillators().hsi)
 }
@@ -107,12 +110,12 @@ fn scaled(hz: u32, oscillator: u32) -> u32 {
     (u64::from(hz) * u64::from(oscillator) / 8_000_000) as u32
 }
 
-/// An ADU: these bytes and their CRC.
+/// Returns an ADU: these bytes and their CRC.
 pub fn adu(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc(bytes)].concat()
 }
 
-/// The line's format for a value of FORMAT.
+/// Returns the line's format for a value of FORMAT.
 pub fn format(code: u16) -> Format {
     Format::ALL[usize::from(code)]
 }
@@ -121,16 +124,16 @@ pub fn format(code: u16) -> Format {
 pub struct Bench {
     pub board: Board,
     settings: Settings,
-    /// The end of the last stop bit of what was sent last.
+    /// End of the last stop bit that was sent.
     pub sent: Time,
-    /// How much later than after t3.5 a reply may begin: the unit's response delay.
+    /// Longest time after t3.5 before a reply begins: the unit's response delay.
     pub patience: Time,
-    /// Findings, resets and the like are what the test is about.
+    /// Whether the test expects findings, resets and the like.
     pub tolerant: bool,
 }
 
 impl Bench {
-    /// A board with this module and switch, powered and given time to start.
+    /// Returns a board with this module and switch, powered and with time to start.
     pub fn new(module: Module, dip: u8) -> Self {
         Self::with(Config {
             dip,
@@ -140,7 +143,7 @@ impl Bench {
         })
     }
 
-    /// A board with this module and unit address 1, and settings stored beside that of the module.
+    /// Returns a board with this module, unit address 1 and more stored settings.
     pub fn set_up(module: Module, settings: &[(u16, u16)]) -> Self {
         let pairs = [&[(MODULE, module.code())], settings].concat();
         let mut bench = Self::with(Config {
@@ -156,14 +159,14 @@ impl Bench {
         bench
     }
 
-    /// A board fitted like this, powered and given time to start.
+    /// Returns a board with this configuration, powered and with time to start.
     pub fn with(config: Config) -> Self {
         let mut bench = Self::cold(config);
         bench.board.run_for(Time::from_ms(150));
         bench
     }
 
-    /// A board powered just now, at the corner that the tests run at.
+    /// Returns a board that was powered just now, at the corner at which the tests run.
     pub fn cold(config: Config) -> Self {
         let config = Config {
             corner: corner(),
@@ -185,34 +188,34 @@ impl Bench {
         self.board.line().set_settings(settings);
     }
 
-    /// The length of `n` characters on the line.
+    /// Returns the duration of `n` characters on the line.
     pub fn characters(&self, n: u64) -> Time {
         self.settings.characters(n)
     }
 
-    /// The length of a bit on the line.
+    /// Returns the duration of a bit on the line.
     pub fn bit(&self) -> Time {
         self.settings.rate().bits(1)
     }
 
-    /// By how much the unit's receiver may misjudge an instant on the line: a sixteenth of a bit.
+    /// Returns the largest error with which the unit's receiver sees an instant on the line: a sixteenth of a bit.
     pub fn sixteenth(&self) -> Time {
         self.settings.rate().sixteenths(1)
     }
 
-    /// t3.5 on the line.
+    /// Returns t3.5 on the line.
     pub fn t35(&self) -> Time {
         self.settings.frame_silence()
     }
 
-    /// Sends bytes as they are, now, and gives the unit time to answer in. What it says, if anything.
+    /// Sends these bytes now and gives the unit time to answer. Returns the bytes of the reply, if there is one.
     pub fn exchange(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.board.now();
         self.sent = self.board.line().send(now, bytes);
         self.answer_after(self.sent)
     }
 
-    /// What the unit says within a moment after `end`, the end of what it was sent.
+    /// Returns the bytes of a reply to a request that ended at `end`; empty when the unit does not reply in time.
     pub fn answer_after(&mut self, end: Time) -> Vec<u8> {
         self.board.run_until(end + self.t35() + self.characters(2));
         let last = end + self.t35() + self.patience;
@@ -225,17 +228,17 @@ impl Bench {
         while self.board.driver_enable() {
             self.board.run_for(self.characters(1));
         }
-        // The next request is to find the line silent.
+        // The line must be silent before the next request.
         self.board.run_for(self.t35() + self.characters(1));
-        let heard = self.board.line().take_received();
+        let received = self.board.line().take_received();
         assert!(
-            heard.iter().all(sim::line::Received::is_good),
-            "the unit's characters are good: {heard:?}"
+            received.iter().all(sim::line::Received::is_good),
+            "the unit sent a damaged character: {received:?}"
         );
-        heard.iter().map(|character| character.byte).collect()
+        received.iter().map(|character| character.byte).collect()
     }
 
-    /// Sends a PDU to a unit; its reply's PDU, or `None` when it is silent. Checks the reply's frame.
+    /// Sends a PDU to a unit. Returns the PDU of the reply, or `None` when there is no reply. Checks the reply's frame.
     pub fn ask(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
         let reply = self.exchange(&adu(&[&[unit], pdu].concat()));
         if reply.is_empty() {
@@ -253,15 +256,15 @@ impl Bench {
         let reply = self.ask(unit, &[1, 0, FIRST, 0, 4]);
         assert!(
             matches!(reply.as_deref(), Some([1, 1, _])),
-            "a good request is answered: {reply:02X?}"
+            "a valid request was not answered: {reply:02X?}"
         );
     }
 
-    /// Asserts that the firmware did nothing a real part would not take well.
+    /// Asserts that the firmware did nothing that could fail on a real part.
     pub fn assert_sound(&mut self) {
-        assert_eq!(self.board.findings(), [], "nothing odd on the bus");
-        assert!(!self.board.locked_up(), "the core runs");
-        assert_eq!(self.board.resets(), 0, "no reset since power-on");
+        assert_eq!(self.board.findings(), [], "findings on the bus");
+        assert!(!self.board.locked_up(), "the core is locked up");
+        assert_eq!(self.board.resets(), 0, "resets since power-on");
     }
 }
 

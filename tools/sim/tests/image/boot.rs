@@ -1,4 +1,4 @@
-//! Starting up.
+//! Start-up.
 
 use sim::{Config, Module, Time};
 
@@ -6,7 +6,7 @@ use crate::bench::{Bench, FIRST, PORT, corner, flash_with, on_crystal};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_log_says_what_the_device_is() {
+fn log_reports_module_line_settings_reset_cause_and_unit_address() {
     let mut bench = Bench::new(Module::Do4, 17);
     let log = bench.board.take_log();
     let slot = format!("slot {PORT}: 4do");
@@ -23,7 +23,7 @@ fn the_log_says_what_the_device_is() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn it_answers_within_a_hundred_milliseconds_of_power_on() {
+fn unit_answers_within_a_hundred_milliseconds_of_power_on() {
     let mut bench = Bench::cold(Config {
         flash: Some(flash_with(Module::Di4)),
         ..Config::default()
@@ -34,7 +34,7 @@ fn it_answers_within_a_hundred_milliseconds_of_power_on() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn without_a_crystal_it_runs_on_the_internal_oscillator_and_says_so() {
+fn without_a_crystal_the_unit_logs_it_and_runs_on_the_internal_oscillator() {
     let mut bench = Bench::with(Config {
         crystal: false,
         flash: Some(flash_with(Module::Di4)),
@@ -55,7 +55,7 @@ fn without_a_crystal_it_runs_on_the_internal_oscillator_and_says_so() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_run_led_blinks_and_the_watchdog_is_content() {
+fn the_run_led_blinks_and_the_watchdog_does_not_reset() {
     let mut bench = Bench::new(Module::Di4, 1);
     bench.board.watch_pin('C', 13);
     bench.board.run_for(Time::from_secs(10));
@@ -70,7 +70,7 @@ fn a_request_lights_the_activity_led() {
     let mut bench = Bench::new(Module::Di4, 1);
     bench.board.run_for(Time::from_ms(200));
     assert!(!bench.board.leds().activity);
-    // Another's request is no activity.
+    // A request to another unit does not light the LED.
     bench.ask(2, &[1, 0, FIRST, 0, 4]);
     assert!(!bench.board.leds().activity);
     bench.assert_answers(1);
@@ -98,7 +98,7 @@ fn the_same_inputs_give_the_same_run_to_the_instruction() {
     assert!(run() == run());
 }
 
-/// Code that leaves the crystal and the PLL running, as a boot loader may, and goes on to the image: HSE on, the PLL
+/// Code that leaves the crystal and the PLL running, as a boot loader may, and branches to the image: HSE on, the PLL
 /// at HSE x4, then a branch to the address in the last word.
 fn boot_loader(entry: u32) -> Vec<u8> {
     let code: [u16; 18] = [
@@ -129,7 +129,7 @@ fn boot_loader(entry: u32) -> Vec<u8> {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn image_entered_with_the_pll_running_waits_for_its_end_before_setting_it_up() {
+fn image_entered_with_the_pll_running_waits_until_the_pll_has_stopped() {
     const LOADER: u32 = 0x2000_4800;
     let mut bench = Bench::cold(Config {
         flash: Some(flash_with(Module::Di4)),
@@ -146,7 +146,7 @@ fn image_entered_with_the_pll_running_waits_for_its_end_before_setting_it_up() {
     bench.assert_answers(1);
 }
 
-/// What takes this many milliseconds on an LSI of 40 kHz.
+/// Returns the real duration of a watchdog time given for an LSI of 40 kHz.
 fn lsi_ms(milliseconds: u64) -> Time {
     Time::cycles(40 * milliseconds, corner().oscillators().lsi)
 }
@@ -179,11 +179,15 @@ fn start_that_hangs_is_reset_by_the_watchdog() {
     while bench.board.resets() == 0 {
         bench.board.run_for(Time::from_ms(1));
         let hangs = bench.board.now() - from;
-        assert!(hangs < lsi_ms(1_300), "it hangs for ever");
+        assert!(hangs < lsi_ms(1_300), "the watchdog did not reset the unit");
     }
     assert!(bench.board.now() - from > lsi_ms(1_000));
     bench.board.patch_code(hung, &was).unwrap();
     bench.started();
     assert_eq!(bench.board.resets(), 1);
-    assert_eq!(bench.register(0x0207) & 4, 4, "the watchdog");
+    assert_eq!(
+        bench.register(0x0207) & 4,
+        4,
+        "the reset cause is the watchdog"
+    );
 }

@@ -6,7 +6,7 @@ use sim::{Board, Bus, Channel, Config, Module, Time};
 use crate::LAYOUT;
 use crate::bench::{FIRST, adu, corner, flash_with, image};
 
-/// Boards with these switches on one bus, given time to start.
+/// Returns boards with these switches on one bus, with time to start.
 fn bus(dips: impl IntoIterator<Item = u8>) -> Bus {
     let boards = dips.into_iter().map(board).collect();
     let mut bus = Bus::new(boards);
@@ -38,7 +38,7 @@ fn exchange(bus: &mut Bus, bytes: &[u8]) -> Vec<Received> {
     bus.line().take_received()
 }
 
-/// Sends a PDU to a unit; the PDU of its reply.
+/// Sends a PDU to a unit. Returns the PDU of its reply.
 fn ask(bus: &mut Bus, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
     let received = exchange(bus, &adu(&[&[unit], pdu].concat()));
     assert!(received.iter().all(Received::is_good), "{received:?}");
@@ -53,7 +53,7 @@ fn read_inputs(bus: &mut Bus, unit: u8) -> Option<Vec<u8>> {
     ask(bus, unit, &[2, 0, FIRST, 0, 4])
 }
 
-/// A counter of function 08.
+/// Returns a counter of function 08.
 fn counter(bus: &mut Bus, unit: u8, which: u8) -> u16 {
     match ask(bus, unit, &[8, 0, which, 0, 0]).as_deref() {
         Some(&[8, 0, echo, high, low]) if echo == which => u16::from_be_bytes([high, low]),
@@ -90,13 +90,13 @@ fn each_unit_answers_only_when_it_is_asked() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn units_that_only_listen_count_every_message_and_no_error() {
+fn units_in_listen_only_mode_count_every_message_and_no_error() {
     let mut bus = bus([1, 2, 3]);
     for _ in 0..40 {
         assert!(read_inputs(&mut bus, 1).is_some());
     }
     for unit in [2, 3] {
-        // The messages before, and the request itself.
+        // The earlier messages and this request.
         let frames = bus.line().frames().count() as u16;
         assert_eq!(counter(&mut bus, unit, 0x0B), frames + 1);
         assert_eq!(counter(&mut bus, unit, 0x0C), 0);
@@ -118,7 +118,7 @@ fn replies_of_two_units_with_the_same_address_collide() {
     };
     let (received, frames, collisions) = run();
     assert!(received.iter().all(|received| received.collided));
-    // The replies differ in the inputs and in the CRC: what both leave high is high.
+    // The replies differ in the inputs and in the CRC. A bit that both units send as high is high.
     let (one, other) = (adu(&[1, 2, 1, 0]), adu(&[1, 2, 1, 1]));
     let wired: Vec<u8> = one.iter().zip(&other).map(|(a, b)| a & b).collect();
     let bytes: Vec<u8> = received.iter().map(|received| received.byte).collect();
@@ -126,9 +126,9 @@ fn replies_of_two_units_with_the_same_address_collide() {
     assert_ne!(bytes, one);
     assert_eq!(frames.len(), 2);
     assert!(frames[1].damaged && !frames[1].crc_ok);
-    // From the first start bit to the end of the last stop bit both drivers are on.
+    // Both drivers are on from the first start bit to the end of the last stop bit.
     let [collision] = collisions[..] else {
-        panic!("one collision: {collisions:?}");
+        panic!("not one collision: {collisions:?}");
     };
     assert!(
         collision.start <= frames[1].start && frames[1].end <= collision.end + Time::from_us(1)
@@ -151,12 +151,12 @@ fn a_broadcast_acts_on_all_units() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_unit_that_loses_power_in_mid_reply_lets_go_of_the_line() {
+fn a_unit_that_loses_power_in_mid_reply_releases_the_line() {
     let mut bus = bus([1, 2]);
     let now = bus.now();
     let sent = bus.line().send(now, &adu(&[1, 2, 0, FIRST, 0, 4]));
     let settings = bus.line().settings();
-    // In the middle of the third byte: the reply begins within a character after t3.5.
+    // Run to the middle of the third byte: the reply begins within a character after t3.5.
     while !bus.board(0).driver_enable() {
         bus.run_for(settings.rate().bits(1));
     }
@@ -173,7 +173,7 @@ fn a_unit_that_loses_power_in_mid_reply_lets_go_of_the_line() {
             .count(),
         0
     );
-    // The other unit has received an incomplete message, and still answers.
+    // The other unit has received an incomplete message and still answers requests.
     assert_eq!(read_inputs(&mut bus, 1), None);
     assert!(read_inputs(&mut bus, 2).is_some());
     let before = bus.now();
@@ -189,7 +189,7 @@ fn a_unit_that_loses_power_in_mid_reply_lets_go_of_the_line() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn one_board_on_a_bus_is_the_board_alone() {
+fn one_board_on_a_bus_behaves_like_a_board_without_a_bus() {
     let mut alone = board(1);
     let mut bus = Bus::new(vec![board(1)]);
     let request = adu(&[1, 2, 0, FIRST, 0, 4]);
@@ -220,7 +220,7 @@ fn one_board_on_a_bus_is_the_board_alone() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_unit_replies_the_same_whether_others_listen_or_not() {
+fn a_unit_replies_the_same_with_and_without_other_units() {
     let replies = |dips: &[u8]| {
         let mut bus = bus(dips.iter().copied());
         for _ in 0..5 {

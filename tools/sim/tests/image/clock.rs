@@ -1,4 +1,4 @@
-//! The clock: a crystal that is missing, or dies.
+//! The clock with a missing crystal, and with a crystal that fails.
 //!
 //! Every frequency is that of the oscillator at the corner.
 
@@ -6,10 +6,10 @@ use sim::{Config, Module, Time};
 
 use crate::bench::{Bench, MODULE, SLOT, adu, flash_with_settings, format, on_crystal, on_hsi};
 
-/// The status bit for the internal oscillator.
+/// Status bit: the unit runs on the internal oscillator.
 const INTERNAL: u16 = 1 << 6;
 
-/// The fault record's kind for a crystal that failed.
+/// Kind of the fault record for a failed crystal.
 const CRYSTAL: u16 = 4;
 
 fn without_crystal(settings: &[(u16, u16)]) -> Bench {
@@ -21,8 +21,8 @@ fn without_crystal(settings: &[(u16, u16)]) -> Bench {
     })
 }
 
-/// That the unit's bits are as long as they should be: within half a percent over the last ten characters
-/// of a reply, before which it may have been working out the rest.
+/// Asserts that the unit's bits have the right length: within half a percent over the last ten characters of a reply.
+/// Before those, the unit may still be calculating the reply.
 fn assert_rate(bench: &mut Bench) {
     let now = bench.board.now();
     let end = bench.board.line().send(now, &adu(&[1, 3, 1, 0x60, 0, 20]));
@@ -33,7 +33,7 @@ fn assert_rate(bench: &mut Bench) {
     assert_eq!(reply.len(), 45);
     assert!(reply.iter().all(sim::line::Received::is_good));
     let took = reply[44].start - reply[34].start;
-    // By the oscillator that the board runs from.
+    // The error of the oscillator that the board uses is not an error of the firmware.
     let (is, exact) = match bench.board.hclk() {
         hclk if hclk == on_crystal(72_000_000) => (hclk, 72e6),
         hclk => (hclk, 60e6),
@@ -41,12 +41,12 @@ fn assert_rate(bench: &mut Bench) {
     let exact = bench.characters(10).as_ps() as f64 * exact / f64::from(is);
     let nominal = Time::from_ps(exact as u64);
     let off = took.max(nominal) - took.min(nominal);
-    assert!(off * 200 <= nominal, "{took:?}, not {nominal:?}");
+    assert!(off * 200 <= nominal, "took {took:?}, nominal {nominal:?}");
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn without_a_crystal_every_rate_is_right() {
+fn every_rate_is_accurate_without_a_crystal() {
     for (baud, code) in [(96, 0), (1152, 1), (9216, 3)] {
         let mut bench = without_crystal(&[(0x0101, baud), (0x0102, code)]);
         bench.board.run_for(Time::from_ms(300));
@@ -57,7 +57,7 @@ fn without_a_crystal_every_rate_is_right() {
         assert_rate(&mut bench);
         bench.write_bits(SLOT, &[true, false, true, false]).unwrap();
         assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true, false, true, false]));
-        // At every phase of what else the unit does, which is slower on this clock.
+        // At every phase of the unit's other work, which takes longer with this clock.
         for n in 0..400 {
             bench.board.run_for(Time::from_us(n * 37 % 1_100));
             bench.assert_answers(1);
@@ -69,7 +69,7 @@ fn without_a_crystal_every_rate_is_right() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn without_a_crystal_a_second_is_a_second() {
+fn uptime_is_accurate_without_a_crystal() {
     let mut bench = without_crystal(&[]);
     bench.board.run_for(Time::from_ms(300));
     let (from, uptime) = (bench.board.now(), bench.long(0x0208));
@@ -80,7 +80,7 @@ fn without_a_crystal_a_second_is_a_second() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
+fn crystal_failure_while_running_restarts_the_unit_on_the_internal_oscillator() {
     let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152)]);
     bench.tolerant = true;
     bench.write_bits(SLOT, &[true; 4]).unwrap();
@@ -88,7 +88,7 @@ fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
     let died = bench.board.now();
     bench.board.set_crystal(false);
     bench.board.run_for(Time::from_ms(600));
-    assert_eq!(bench.board.resets(), 1, "it restarted");
+    assert_eq!(bench.board.resets(), 1, "one restart");
     let (off, level) = bench.board.pin_edges('A', 0)[0];
     assert!(
         !level && off - died < Time::from_ms(1),
@@ -102,7 +102,7 @@ fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
     assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]));
     let log = bench.board.take_log();
     assert!(log.contains("crystal did not start"), "{log}");
-    // With a new one it runs on that again.
+    // With a new crystal the unit runs on the crystal again.
     bench.board.set_crystal(true);
     bench.power_cycle();
     assert!(!bench.board.take_log().contains("crystal did not start"));
@@ -112,8 +112,8 @@ fn a_crystal_that_dies_while_running_restarts_it_on_the_internal_oscillator() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn crystal_that_fails_after_each_start_is_given_up_after_two_faults_until_power_on() {
-    // Output 1 is on by START.
+fn crystal_that_fails_after_each_start_is_not_used_after_two_faults_until_power_on() {
+    // START switches output 1 on.
     let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152), (0x01E0 + SLOT, 1)]);
     bench.tolerant = true;
     assert!(!bench.status(INTERNAL));
@@ -135,7 +135,7 @@ fn crystal_that_fails_after_each_start_is_given_up_after_two_faults_until_power_
         bench.board.run_for(Time::from_ms(100));
     }
     assert_eq!(bench.board.resets(), 2);
-    // Off at a fault, on at the start after it, and not again.
+    // Output 1 goes off at each fault and on at the next start, and does not change again.
     let levels = bench.board.pin_edges('A', 0).iter().map(|edge| edge.1);
     assert_eq!(levels.collect::<Vec<_>>(), [false, true, false, true]);
     bench.board.line().take_received();
@@ -147,7 +147,7 @@ fn crystal_that_fails_after_each_start_is_given_up_after_two_faults_until_power_
     );
     let log = bench.board.take_log();
     assert!(log.contains("crystal failed twice"), "{log}");
-    // A reset by software does not forget the faults, a power-on does.
+    // A reset by software keeps the count of faults, a power-on clears it.
     bench.restart();
     assert_eq!(bench.board.hclk(), on_hsi(60_000_000));
     assert!(bench.status(INTERNAL));

@@ -1,4 +1,4 @@
-//! The communication watchdog: on time, per point, fed by the right requests alone, and how it ends.
+//! The communication watchdog: its accuracy, the safe value of each point, the frames that restart it, and its end.
 
 use register_map::configuration::{COMM_TIMEOUT, HOLD, SAFE};
 use sim::{Channel, Module, Time};
@@ -17,7 +17,7 @@ fn outputs(bench: &Bench) -> [bool; 4] {
     })
 }
 
-/// That `at` is the time-out after `from`, give or take 2 ms and the 100 ppm of the crystal.
+/// Asserts that `at` is the time-out after `from`, within 2 ms and the crystal's 100 ppm.
 fn assert_on_time(from: Time, tenths: u16, at: Time) {
     let due = from + Time::from_ms(100 * u64::from(tenths));
     let off = at.max(due) - at.min(due);
@@ -29,7 +29,7 @@ fn assert_on_time(from: Time, tenths: u16, at: Time) {
     );
 }
 
-/// What a master sets up: a time-out in 100 ms, everything on.
+/// Sets a time-out in units of 100 ms and switches all outputs on.
 fn armed(bench: &mut Bench, tenths: u16) {
     bench.configure(COMM_TIMEOUT, &[tenths]);
     bench.write_bits(SLOT, &[true; 4]).unwrap();
@@ -45,7 +45,7 @@ fn digital_outputs_go_to_safe_two_milliseconds_around_the_time_out_at_any_rate()
         for (n, tenths) in (0..).zip([1, 2, 3, 7, 10, 1, 5, 1, 20, 1]) {
             let tenths = tenths + more;
             armed(&mut bench, tenths);
-            // At any place between two scans.
+            // At any phase between two scans.
             bench.board.run_for(Time::from_us(n * 137));
             bench.board.watch_pin('A', 3);
             assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![true; 4]));
@@ -55,7 +55,7 @@ fn digital_outputs_go_to_safe_two_milliseconds_around_the_time_out_at_any_rate()
                 .run_for(Time::from_ms(100 * u64::from(tenths) + 50));
             let edges = bench.board.pin_edges('A', 3);
             let &[.., (at, false)] = edges else {
-                panic!("it went off: {edges:?}");
+                panic!("the output did not go off: {edges:?}");
             };
             assert!(at > last);
             assert_on_time(last, tenths, at);
@@ -80,7 +80,7 @@ fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
         bench
             .board
             .run_until(last + Time::from_ms(100 * u64::from(tenths) - 10));
-        // Each of the four channels by itself: the DAC takes them one by one.
+        // Each of the four channels on its own: the DAC receives them one after another.
         let (mut first, mut all) = (None, None);
         while all.is_none()
             && bench.board.now() < last + Time::from_ms(100 * u64::from(tenths) + 50)
@@ -94,19 +94,19 @@ fn analog_outputs_go_to_safe_two_milliseconds_around_the_time_out() {
                 all = Some(bench.board.now());
             }
         }
-        assert_on_time(last, tenths, first.expect("it trips"));
-        assert_on_time(last, tenths, all.expect("all go to SAFE"));
+        assert_on_time(last, tenths, first.expect("the watchdog did not trip"));
+        assert_on_time(last, tenths, all.expect("not all outputs went to SAFE"));
         assert_eq!(
             bench.registers(SLOT, 4),
             Ok(vec![4095, 0, 3, 1234]),
-            "and read back"
+            "reads return the SAFE values"
         );
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn each_point_has_its_own_safe_value_or_holds() {
+fn each_point_goes_to_its_safe_value_or_keeps_its_value() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     for (safe, commanded, then) in [
         (
@@ -127,7 +127,7 @@ fn each_point_has_its_own_safe_value_or_holds() {
         bench.write_bits(SLOT, &commanded).unwrap();
         bench.board.run_for(Time::from_ms(150));
         assert_eq!(outputs(&bench), then, "{safe:?}");
-        assert_eq!(bench.bits(1, SLOT, 4), Ok(then.to_vec()), "what is read");
+        assert_eq!(bench.bits(1, SLOT, 4), Ok(then.to_vec()), "the bits read");
     }
 
     let stored = [
@@ -152,17 +152,21 @@ fn each_point_has_its_own_safe_value_or_holds() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn requests_and_broadcasts_feed_it_and_nothing_else_does() {
+fn only_requests_and_broadcasts_restart_the_watchdog() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
-    // A pause of 60 ms and 15 to 25 for the frame and its reply: never 100.
+    // A pause of 60 ms, and 15 to 25 ms for the frame and its reply, always stay below 100 ms.
     let hold = |bench: &mut Bench, what: &str, frame: &[u8]| {
         armed(bench, 1);
         for _ in 0..10 {
             bench.board.run_for(Time::from_ms(60));
             bench.exchange(frame);
         }
-        assert_eq!(outputs(bench)[1..], [true; 3], "{what} feeds it");
-        assert!(!bench.status(TRIPPED), "{what} feeds it");
+        assert_eq!(
+            outputs(bench)[1..],
+            [true; 3],
+            "{what} restarts the watchdog"
+        );
+        assert!(!bench.status(TRIPPED), "{what} restarts the watchdog");
     };
     hold(&mut bench, "a request", &adu(&[1, 1, 0, FIRST, 0, 4]));
     hold(&mut bench, "a broadcast", &adu(&[0, 5, 0, FIRST, 0, 0]));
@@ -188,7 +192,7 @@ fn requests_and_broadcasts_feed_it_and_nothing_else_does() {
         }
         let edges = bench.board.pin_edges('A', 0);
         let &[.., (at, false)] = edges else {
-            panic!("{what} fed it: {edges:?}");
+            panic!("{what} restarted the watchdog: {edges:?}");
         };
         assert_on_time(last, 3, at);
         assert!(bench.status(TRIPPED), "{what}");
@@ -207,26 +211,26 @@ fn outputs_stay_safe_until_they_are_written_and_the_flag_until_it_is_cleared() {
     let safe = [false, false, true, false];
     assert_eq!(outputs(&bench), safe);
 
-    // The line is back: reads and refused writes move nothing.
+    // The master is back: reads and refused writes change no output.
     for _ in 0..20 {
         assert_eq!(bench.bits(1, SLOT, 4), Ok(safe.to_vec()));
         assert_eq!(bench.write_single(5, SLOT, 0x0100), Err(3));
         assert_eq!(bench.write_bits(SLOT + 2, &[true; 3]), Err(2));
-        assert!(bench.status(TRIPPED), "it latches");
+        assert!(bench.status(TRIPPED), "the flag stays set");
     }
     assert_eq!(outputs(&bench), safe);
     bench.write_bit(SLOT, true).unwrap();
     assert_eq!(
         outputs(&bench),
         [true, false, true, false],
-        "the one that was written"
+        "only the written output"
     );
-    assert!(bench.status(TRIPPED), "a write does not clear it");
+    assert!(bench.status(TRIPPED), "a write does not clear the flag");
     bench.command(5);
     assert!(!bench.status(TRIPPED));
     assert_eq!(outputs(&bench), [true, false, true, false]);
 
-    // It trips again, and a restart clears the flag too.
+    // The watchdog trips again. A restart clears the flag, too.
     bench.board.run_for(Time::from_ms(300));
     assert_eq!(outputs(&bench), safe);
     assert!(bench.status(TRIPPED));
@@ -237,13 +241,13 @@ fn outputs_stay_safe_until_they_are_written_and_the_flag_until_it_is_cleared() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn off_it_never_trips_and_set_anew_it_counts_at_once() {
+fn time_out_of_zero_never_trips_and_a_new_time_out_is_in_force_immediately() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     armed(&mut bench, 0);
     bench.board.run_for(Time::from_secs(20));
     assert_eq!(outputs(&bench), [true; 4]);
     assert!(!bench.status(TRIPPED));
-    // From long to short, in the middle of the time: the write itself is a request.
+    // Change a long time-out to a short one before it ends: the write is a request, too.
     armed(&mut bench, 36_000);
     bench.board.run_for(Time::from_secs(10));
     assert_eq!(outputs(&bench), [true; 4]);
@@ -256,7 +260,7 @@ fn off_it_never_trips_and_set_anew_it_counts_at_once() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_master_that_never_speaks_after_power_on_is_noticed_too() {
+fn watchdog_trips_without_any_request_since_power_on() {
     let stored = [(COMM_TIMEOUT, 5), (0x01E0 + SLOT, 1), (SAFE + SLOT + 1, 1)];
     let mut bench = Bench::set_up(Module::Do4, &stored);
     bench.power_cycle();

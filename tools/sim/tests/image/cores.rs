@@ -1,4 +1,4 @@
-//! A board whose core goes on with what it has translated for another board runs as one with a new core does: the same
+//! A board whose core reuses code that it translated for another board runs like a board with a new core: the same
 //! instructions at the same instants, the same edges on the line, the same memories.
 
 use sim::{Board, Config, Corner, Finding, Module, Time, line::Received};
@@ -6,10 +6,10 @@ use sim::{Board, Config, Corner, Finding, Module, Time, line::Received};
 use crate::LAYOUT;
 use crate::bench::{Bench, FIRST, adu, corner, flash_with, image};
 
-/// Boards that are made in search of a used core: the other tests of this process may take the one left behind.
+/// Number of boards that are made to find a used core: other tests of this process may take the core that was left.
 const TRIES: usize = 1_000;
 
-/// What a board has done up to an instant.
+/// State of a board at an instant.
 #[derive(Debug, PartialEq, Eq)]
 struct State {
     now: Time,
@@ -19,7 +19,7 @@ struct State {
     ram: Vec<u8>,
     flash: Vec<u8>,
     driver: Vec<(Time, bool)>,
-    heard: Vec<Received>,
+    received: Vec<Received>,
     log: String,
     findings: Vec<Finding>,
     resets: u32,
@@ -36,7 +36,7 @@ impl State {
             ram: board.ram().to_vec(),
             flash: board.flash().to_vec(),
             driver: board.line().driver_edges().collect(),
-            heard: board.line().take_received(),
+            received: board.line().take_received(),
             log: board.take_log(),
             findings: board.findings().to_vec(),
             resets: board.resets(),
@@ -52,7 +52,7 @@ fn config(new_core: bool) -> Config {
     }
 }
 
-/// A start, requests, a save, a power cut in the middle of a save, a reset: the state of the board at many instants.
+/// Runs a start, requests, a save, a power cut during a save, and a reset. Returns the board's state at many instants.
 fn run(mut bench: Bench) -> Vec<State> {
     bench.tolerant = true;
     let mut states = Vec::new();
@@ -64,7 +64,7 @@ fn run(mut bench: Bench) -> Vec<State> {
     };
     let requests: [&[u8]; 5] = [
         &[1, 1, 0, FIRST, 0, 4],
-        // Unlocked, a filter changed, saved.
+        // Unlock, change a filter, save.
         &[1, 6, 1, 0, 0x5A, 0x17],
         &[1, 6, 1, 0x20 + FIRST, 0, 99],
         &[1, 6, 1, 8, 0, 1],
@@ -90,7 +90,7 @@ fn run(mut bench: Bench) -> Vec<State> {
     states
 }
 
-/// Leaves a core behind that has run other code at another corner.
+/// Leaves a core that has run other code at another corner.
 fn leave_a_core(left: usize) {
     let corner = if corner() == Corner::Slow {
         Corner::Fast
@@ -107,7 +107,7 @@ fn leave_a_core(left: usize) {
     };
     let mut board = Board::new(image(), config).expect("the image fits");
     board.run_for(Time::from_ms(60));
-    // The code that the core runs is replaced, in flash from its first instruction on and in SRAM.
+    // Replace the code that the core runs: in flash from its first instruction on, and in SRAM.
     let start = image().entry() & !1;
     board.patch_code(start, &[0xFE, 0xE7].repeat(64)).unwrap();
     let ram = board.ram().len();
@@ -125,7 +125,7 @@ fn the_run_is_the_same_on_a_new_core_and_on_one_that_another_board_has_used() {
     let expected = run(new);
     let traffic = expected
         .iter()
-        .map(|state| state.heard.len())
+        .map(|state| state.received.len())
         .sum::<usize>();
     assert!(traffic > 50, "{traffic} characters");
     let mut compared = 0;
@@ -161,5 +161,5 @@ fn the_run_is_the_same_on_a_new_core_and_on_one_that_another_board_has_used() {
             return;
         }
     }
-    panic!("no core was left behind");
+    panic!("no board received a used core");
 }

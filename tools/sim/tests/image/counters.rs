@@ -1,4 +1,4 @@
-//! The pulse counters of digital inputs, and the debounce before them.
+//! The pulse counters of digital inputs, and their debounce filter.
 
 use register_map::configuration::FILTER;
 use sim::{Module, Time};
@@ -29,7 +29,7 @@ fn rising_edges_are_counted_on_each_channel_after_its_debounce() {
         for _ in 0..5 {
             pulse(&mut bench, channel, settled, settled);
         }
-        // Shorter than the debounce by more than a scan: not seen, high or low.
+        // Pulses that are shorter than the debounce time by more than a scan are not counted, high or low.
         if let Some(short) = (u64::from(debounce_ms) * 1000).checked_sub(1_500) {
             pulse(&mut bench, channel, short, settled);
             bench.board.set_energised(channel, true).unwrap();
@@ -44,7 +44,7 @@ fn rising_edges_are_counted_on_each_channel_after_its_debounce() {
         expected[..channel].fill(6);
         assert_eq!(counts(&mut bench), expected, "{debounce_ms} ms");
     }
-    // Both functions, one counter, all of them at once; the ports without a slot stand at 0.
+    // Both functions read the same counters, and all of them in one request; ports without a slot return 0.
     for function in [3, 4] {
         assert_eq!(bench.words(function, PULSES + 2, 2), Ok(vec![0, 6]));
         let all = bench.words(function, 0x0300, 64).unwrap();
@@ -56,7 +56,7 @@ fn rising_edges_are_counted_on_each_channel_after_its_debounce() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn an_input_that_is_on_at_power_on_is_no_edge() {
+fn an_input_that_is_on_at_power_on_is_not_counted() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     for channel in 1..=4 {
         bench.board.set_energised(channel, true).unwrap();
@@ -68,7 +68,7 @@ fn an_input_that_is_on_at_power_on_is_no_edge() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_counter_is_cleared_by_zeros_to_both_its_words_and_by_nothing_else() {
+fn a_counter_is_cleared_only_by_writing_zero_to_both_words() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     let settled = 8_000;
     for channel in 1..=4 {
@@ -95,7 +95,11 @@ fn a_counter_is_cleared_by_zeros_to_both_its_words_and_by_nothing_else() {
             "{address:#x} {words:?}"
         );
     }
-    assert_eq!(bench.write_single(6, PULSES, 0), Err(3), "half a counter");
+    assert_eq!(
+        bench.write_single(6, PULSES, 0),
+        Err(3),
+        "a write to half a counter"
+    );
     assert_eq!(
         counts(&mut bench),
         full,
@@ -107,7 +111,7 @@ fn a_counter_is_cleared_by_zeros_to_both_its_words_and_by_nothing_else() {
     assert_eq!(counts(&mut bench), [3, 0, 0, 0]);
     pulse(&mut bench, 2, settled, settled);
     assert_eq!(counts(&mut bench), [3, 1, 0, 0]);
-    // Not kept over a power cycle, and not by the configuration's lock.
+    // Counters are lost in a power cycle. The configuration lock does not protect them.
     bench.power_cycle();
     assert_eq!(counts(&mut bench), [0; 4]);
 }
@@ -115,9 +119,9 @@ fn a_counter_is_cleared_by_zeros_to_both_its_words_and_by_nothing_else() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_counter_is_read_as_one_snapshot_while_its_low_word_overflows() {
-    // At 115200, with pulses all the time: the 32 bits read never go backwards nor jump by a word.
+    // At 115200 bit/s, with continuous pulses: the 32 bits never decrease and never jump by a word.
     let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 1152), (FILTER + SLOT, 0)]);
-    // 65 536 pulses take minutes; the counter is brought near its overflow by finding it in RAM.
+    // 65 536 pulses take minutes, so the test writes the counter in RAM to a value near its overflow.
     for _ in 0..5 {
         pulse(&mut bench, 1, 2_000, 2_000);
     }
@@ -137,10 +141,10 @@ fn a_counter_is_read_as_one_snapshot_while_its_low_word_overflows() {
         crossed |= last < 0x1_0000 && now >= 0x1_0000;
         last = now;
     }
-    assert!(crossed, "it never overflowed: {last:#x}");
+    assert!(crossed, "the counter never overflowed: {last:#x}");
 }
 
-/// Where channel 1's counter is in RAM: the only word that follows its pulses.
+/// Returns the offset of channel 1's counter in RAM: the only word that follows its pulses.
 fn find_counter(bench: &mut Bench) -> usize {
     let words = |bench: &Bench| -> Vec<u32> {
         let words = bench.board.ram().chunks(4);
@@ -156,6 +160,10 @@ fn find_counter(bench: &mut Bench) -> usize {
         pulse(bench, 1, 2_000, 2_000);
         count = bench.long(PULSES);
     }
-    assert_eq!(places.len(), 1, "one word counts pulses: {places:?}");
+    assert_eq!(
+        places.len(),
+        1,
+        "not exactly one word counts pulses: {places:?}"
+    );
     places[0] * 4
 }

@@ -1,5 +1,5 @@
-//! A DAC that is absent, or a bus that is held: exception 04 and a state to read, a line that does not
-//! wait for it, and recovery without help.
+//! A DAC that is missing, or a bus that is held low: requests get exception 04, the status reports the fault, the line
+//! does not wait for the bus, and the unit recovers automatically.
 
 use sim::{Module, Time, line::Direction, slot::BusFault};
 
@@ -10,7 +10,7 @@ use crate::{
 
 const MODULE_STATE: u16 = 0x0217 + PORT;
 const MODULE_FAULT: u16 = 4;
-/// A device is taken to be gone, or back, within this time: what a master may count on.
+/// Longest time after which the unit reports that a device is missing or has returned: the value for masters.
 const NOTICED: Time = Time::from_ms(500);
 
 const FAULTS: [BusFault; 3] = [
@@ -19,19 +19,22 @@ const FAULTS: [BusFault; 3] = [
     BusFault::HoldsSda { clocks: None },
 ];
 
-/// Every request to the DAC's points is 04, whether it reads or writes; the analog inputs beside them, and the
-/// rest of the device, go on.
+/// Asserts that every request to the DAC's points gets exception 04, reads and writes alike, and that the analog
+/// inputs and the rest of the device still work.
 fn assert_out(bench: &mut Bench, first: u16) {
     for function in [3, 4] {
         assert_eq!(bench.words(function, first, 1), Err(4));
         assert_eq!(bench.words(function, SLOT, 4), Err(4));
         for input in SLOT..first {
-            assert!(bench.words(function, input, 1).is_ok(), "an analog input");
+            assert!(
+                bench.words(function, input, 1).is_ok(),
+                "the analog inputs still work"
+            );
         }
     }
     assert_eq!(bench.write(SLOT + 2, &[1, 2]), Err(4));
     assert_eq!(bench.write_single(6, SLOT + 3, 1), Err(4));
-    // Address and value come before the module's state.
+    // The checks of address and value come before the check of the module's state.
     assert_eq!(bench.registers(SLOT, 5), Err(2));
     assert_eq!(bench.write_single(6, SLOT + 3, 4096), Err(3));
     assert_eq!(bench.register(MODULE_STATE), 2);
@@ -40,7 +43,7 @@ fn assert_out(bench: &mut Bench, first: u16) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn points_answer_04_and_come_back_by_themselves() {
+fn points_return_exception_04_and_recover_automatically() {
     for (module, channels) in [(Module::Ao4, [1, 4]), (Module::Ai2Ao2, [3, 4])] {
         let first = SLOT + channels[0] as u16 - 1;
         let mut bench = Bench::set_up(module, &[]);
@@ -54,7 +57,7 @@ fn points_answer_04_and_come_back_by_themselves() {
             assert_out(&mut bench, first);
             bench.board.run_for(Time::from_secs(2));
             assert_out(&mut bench, first);
-            assert!(bench.board.leds().fault, "the fault LED says so");
+            assert!(bench.board.leds().fault, "the fault LED is on");
 
             bench.board.set_bus_fault(BusFault::None);
             bench.board.run_for(NOTICED);
@@ -64,7 +67,7 @@ fn points_answer_04_and_come_back_by_themselves() {
             assert_eq!(
                 codes(&bench, channels),
                 commanded,
-                "a refused write was done"
+                "a refused write changed an output"
             );
             bench.write_single(6, SLOT + 3, 17).unwrap();
             bench.board.run_for(Time::from_ms(30));
@@ -75,14 +78,18 @@ fn points_answer_04_and_come_back_by_themselves() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_device_that_lost_count_of_its_clocks_is_clocked_free() {
+fn device_that_holds_the_bus_is_released_by_clock_pulses() {
     let mut bench = Bench::set_up(Module::Ao4, &[]);
     bench
         .board
         .set_bus_fault(BusFault::HoldsSda { clocks: Some(7) });
     bench.write(SLOT, &[10, 20, 30, 40]).unwrap();
     bench.board.run_for(NOTICED);
-    assert_eq!(bench.board.slot().bus_fault(), BusFault::None, "it let go");
+    assert_eq!(
+        bench.board.slot().bus_fault(),
+        BusFault::None,
+        "the device released the bus"
+    );
     assert_eq!(bench.registers(SLOT, 4), Ok(vec![10, 20, 30, 40]));
     assert_eq!(codes(&bench, [1, 2, 3, 4]), [10, 20, 30, 40]);
     assert_eq!(bench.register(MODULE_STATE), 0);
@@ -97,7 +104,7 @@ fn the_line_never_waits_for_the_bus() {
         let mut asked = 0;
         let from = bench.board.now();
         while bench.board.now() < from + Time::from_secs(2) {
-            // Registers that have nothing to do with the module, and points that have.
+            // Read registers that do not depend on the module, and points that do.
             let good = bench.registers(0x0200, 2).is_ok();
             assert!(good);
             asked += 1;
@@ -126,7 +133,7 @@ fn assert_in_time(bench: &mut Bench) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_device_without_its_dac_starts_and_finds_it_later() {
+fn unit_without_a_dac_starts_and_uses_the_dac_once_it_is_present() {
     let mut bench = Bench::set_up(
         Module::Ao4,
         &[(0x01E0 + SLOT, 1000), (0x01E0 + SLOT + 3, 4000)],
@@ -144,10 +151,10 @@ fn a_device_without_its_dac_starts_and_finds_it_later() {
     }
 }
 
-/// The errata sheet's locked filters show a busy bus, which no reset of the block clears.
+/// The locked filters of the errata sheet make the bus look busy, and no reset of the block ends that.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn locked_filters_of_the_bus_are_freed_at_a_start_and_while_running() {
+fn locked_filters_of_the_bus_are_released_at_a_start_and_while_running() {
     let mut bench = Bench::set_up(Module::Ao4, &[(0x01E0 + SLOT, 1000)]);
     bench.board.power_off();
     bench.board.lock_i2c_filters();

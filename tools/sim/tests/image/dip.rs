@@ -1,4 +1,4 @@
-//! SW01.
+//! The DIP switch SW01.
 
 use sim::{Config, Module, Time};
 
@@ -6,7 +6,7 @@ use crate::bench::{Bench, FIRST, flash_with};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_unit_answers_to_its_own_address_alone() {
+fn a_unit_answers_only_to_its_own_address() {
     for dip in [1, 2, 17, 64, 128, 170, 247] {
         let mut bench = Bench::new(Module::Di4, dip);
         bench.assert_answers(dip);
@@ -14,7 +14,7 @@ fn a_unit_answers_to_its_own_address_alone() {
             assert_eq!(
                 bench.ask(other, &[1, 0, FIRST, 0, 4]),
                 None,
-                "{dip} hears {other}"
+                "switch {dip} answers unit {other}"
             );
             assert_eq!(bench.ask(other, &[0x55]), None);
         }
@@ -34,21 +34,24 @@ fn with_all_positions_on_it_is_unit_255_at_9600_8n2() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn without_a_unit_address_it_is_silent_and_blinks() {
+fn unit_without_an_address_does_not_answer_and_blinks() {
     for dip in [0, 248, 251, 254] {
         let mut bench = Bench::new(Module::Do4, dip);
         for unit in [0, 1, dip, 255] {
             assert_eq!(
                 bench.ask(unit, &[1, 0, FIRST, 0, 4]),
                 None,
-                "{dip} hears {unit}"
+                "switch {dip} answers unit {unit}"
             );
         }
         bench.board.watch_pin('B', 9);
         let from = bench.board.now();
         bench.board.run_for(Time::from_secs(2));
         let edges = bench.board.pin_edges('B', 9);
-        assert!((8..=12).contains(&edges.len()), "{dip} blinks: {edges:?}");
+        assert!(
+            (8..=12).contains(&edges.len()),
+            "switch {dip}: LED edges {edges:?}"
+        );
         assert!(edges.iter().all(|(at, _)| *at > from));
         assert_eq!(bench.board.line().driver_edges().count(), 0);
         let log = bench.board.take_log();
@@ -58,7 +61,7 @@ fn without_a_unit_address_it_is_silent_and_blinks() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_switch_counts_at_power_on_only() {
+fn the_switch_is_read_only_at_power_on() {
     let mut bench = Bench::new(Module::Di4, 17);
     bench.board.set_dip(18);
     bench.board.run_for(Time::from_secs(1));
@@ -116,7 +119,7 @@ fn reset_of_any_kind_keeps_the_address_of_power_on() {
     bench.started();
     assert_eq!(bench.board.resets(), 1);
     bench.assert_answers(17);
-    // By the pin.
+    // By the reset pin.
     bench.board.reset();
     bench.started();
     assert_eq!(bench.board.resets(), 2);

@@ -1,4 +1,5 @@
-//! Faults of the core: outputs safe at once, a record of where it was, and a restart.
+//! Faults of the core: the outputs go to a safe state immediately, the record has the place of the fault, and the unit
+//! restarts.
 
 use sim::{Channel, Module, Time};
 
@@ -9,10 +10,11 @@ const STACK_OVERFLOW: u16 = 5;
 
 /// `udf #0`
 const UNDEFINED: &[u16] = &[0xDE00];
-/// `movs r0, #0; ldr r0, [r0]` would read the vector table; this reads 0xFFFFFFF0, where nothing is:
+/// `movs r0, #0; ldr r0, [r0]` would read the vector table. This code reads address 0xFFFFFFF0, where there is no
+/// memory:
 /// `movs r0, #15; mvns r0, r0; ldr r0, [r0]`.
 const WILD_READ: &[u16] = &[0x200F, 0x43C0, 0x6800];
-/// `push {r0-r7, lr}; b .-2`: until the stack is at its end.
+/// `push {r0-r7, lr}; b .-2`: pushes until the stack overflows.
 const RECURSION: &[u16] = &[0xB5FF, 0xE7FD];
 
 const HANDLERS: [&str; 6] = ["USART1", "TIM2", "TIM4", "EXTI3", "EXTI1", "EXTI0"];
@@ -23,7 +25,7 @@ fn bench() -> Bench {
     bench
 }
 
-/// Puts `code` in the place of a handler until the device has reset itself because of it.
+/// Replaces the start of a handler by `code` until the device has reset itself because of it.
 fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
     bench.write_bits(SLOT, &[true; 4]).unwrap();
     let before = bench.board.resets();
@@ -34,7 +36,7 @@ fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
     let from = bench.board.now();
     bench.board.line().send(from, &adu(&[1, 1, 0, FIRST, 0, 4]));
     let called = bench.board.run_until_pc(address, from + Time::from_ms(120));
-    assert!(called, "{handler} runs");
+    assert!(called, "{handler} did not run");
     let called = bench.board.now();
     while bench.board.resets() == before {
         bench.board.run_for(Time::from_us(20));
@@ -46,7 +48,7 @@ fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
     }
     let edges = bench.board.pin_edges('A', 3);
     let &[.., (off, false)] = edges else {
-        panic!("{handler}: the output went off: {edges:?}");
+        panic!("{handler}: the output did not go off: {edges:?}");
     };
     let after = off - called;
     assert!(
@@ -69,7 +71,7 @@ fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn an_instruction_that_is_none_is_recorded_with_its_place() {
+fn undefined_instruction_is_recorded_with_its_address() {
     let mut bench = bench();
     for (count, handler) in (1..).zip(HANDLERS) {
         let address = fault_in(&mut bench, handler, UNDEFINED);
@@ -85,8 +87,8 @@ fn an_instruction_that_is_none_is_recorded_with_its_place() {
             1,
             "{handler}: CFSR says UNDEFINSTR"
         );
-        assert_eq!(bench.long(0x0268), 0, "no address failed");
-        assert_eq!(bench.register(0x026C), 0, "no watchdog");
+        assert_eq!(bench.long(0x0268), 0, "no faulty address");
+        assert_eq!(bench.register(0x026C), 0, "no watchdog marks");
     }
     let log = bench.board.take_log();
     assert!(log.contains("hard fault"), "{log}");
@@ -94,7 +96,7 @@ fn an_instruction_that_is_none_is_recorded_with_its_place() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn an_access_to_nothing_is_recorded_with_its_address() {
+fn access_outside_of_memory_is_recorded_with_its_address() {
     let mut bench = bench();
     let address = fault_in(&mut bench, "EXTI1", WILD_READ);
     assert_eq!(bench.register(0x0260), HARD_FAULT);
@@ -105,7 +107,7 @@ fn an_access_to_nothing_is_recorded_with_its_address() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_stack_that_overflows_harms_nothing_and_is_recorded_as_that() {
+fn stack_overflow_is_recorded_and_overwrites_no_data() {
     let mut bench = bench();
     for handler in HANDLERS {
         fault_in(&mut bench, handler, RECURSION);

@@ -1,4 +1,4 @@
-//! Flash operations on a part at its limits: a late BSY, a missing EOP, a supply that is too low.
+//! Flash operations on a part at its limits: a late BSY, a missing EOP, a supply voltage that is too low.
 
 use sim::{Config, Module, Time};
 
@@ -55,7 +55,11 @@ fn save_waits_for_the_supply() {
     bench.board.run_for(Time::from_secs(2));
     assert_eq!(bench.board.flash_operations(), operations);
     assert!(bench.status(UNSAVED));
-    assert_eq!(bench.write(0x0108, &SAVE), Err(6), "the save still waits");
+    assert_eq!(
+        bench.write(0x0108, &SAVE),
+        Err(6),
+        "the save is still waiting"
+    );
     let log = bench.board.take_log();
     assert_eq!(log.matches("supply is too low").count(), 1, "{log}");
     bench.board.set_supply_mv(GOOD_MV).unwrap();

@@ -1,4 +1,4 @@
-//! Frames that are damaged, cut, joined or somebody else's.
+//! Frames that are damaged, cut short, joined, or addressed to other units.
 
 use register_map::configuration::FORMAT;
 use sim::{
@@ -10,7 +10,7 @@ use crate::bench::{Bench, FIRST, adu, flash_with};
 
 const READ: [u8; 6] = [1, 1, 0, FIRST, 0, 4];
 
-/// Sends `bytes` with a silence before the byte at `index`, and what the unit says.
+/// Sends `bytes` with a silence in front of the byte at `index`. Returns the bytes of the reply.
 fn with_gap(bench: &mut Bench, bytes: &[u8], index: usize, gap: Time) -> Vec<u8> {
     let (first, rest) = bytes.split_at(index);
     let now = bench.board.now();
@@ -21,7 +21,7 @@ fn with_gap(bench: &mut Bench, bytes: &[u8], index: usize, gap: Time) -> Vec<u8>
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_frame_with_a_wrong_crc_gets_silence() {
+fn frame_with_a_wrong_crc_gets_no_reply() {
     let mut bench = Bench::new(Module::Di4, 1);
     let good = adu(&READ);
     for bit in 0..good.len() * 8 {
@@ -44,7 +44,7 @@ fn a_frame_with_a_wrong_crc_gets_silence() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn short_noise_gets_silence() {
+fn short_noise_gets_no_reply() {
     let mut bench = Bench::new(Module::Di4, 1);
     for length in 1..=3 {
         for byte in [0x00, 0x01, 0xFF] {
@@ -52,7 +52,7 @@ fn short_noise_gets_silence() {
             bench.assert_answers(1);
         }
     }
-    // A unit address whose CRC is right, but nothing between them.
+    // A unit address with a valid CRC, but no PDU between them.
     assert_eq!(bench.exchange(&adu(&[1])), []);
     assert_eq!(bench.exchange(&adu(&[])), []);
     bench.assert_answers(1);
@@ -60,7 +60,7 @@ fn short_noise_gets_silence() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_frame_of_256_bytes_is_taken_and_a_longer_one_dropped_whole() {
+fn frame_of_256_bytes_is_accepted_and_a_longer_one_is_discarded_completely() {
     let mut bench = Bench::new(Module::Di4, 1);
     let longest = adu(&[&[1, 0x41][..], &[0x33; 252]].concat());
     assert_eq!(longest.len(), 256);
@@ -71,7 +71,7 @@ fn a_frame_of_256_bytes_is_taken_and_a_longer_one_dropped_whole() {
         assert_eq!(bench.exchange(&long), [], "{length} bytes");
         bench.assert_answers(1);
     }
-    // 44 bytes too many in front of a good request, without a gap between them.
+    // 300 bytes directly in front of a valid request, without a gap: 44 more than a frame may have.
     let joined = [&[0x33; 300][..], &adu(&READ)].concat();
     assert_eq!(bench.exchange(&joined), []);
     bench.assert_answers(1);
@@ -79,7 +79,7 @@ fn a_frame_of_256_bytes_is_taken_and_a_longer_one_dropped_whole() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn gaps_inside_a_frame_are_taken_up_to_t35_and_split_it_beyond() {
+fn gaps_inside_a_frame_are_accepted_up_to_t35_and_split_it_beyond() {
     let mut bench = Bench::new(Module::Di4, 1);
     let request = adu(&READ);
     let reply = adu(&[1, 1, 1, 0]);
@@ -87,13 +87,16 @@ fn gaps_inside_a_frame_are_taken_up_to_t35_and_split_it_beyond() {
     for index in [1, 2, 4, 7] {
         for tenths in [1, 5, 10, 14, 16, 20, 25, 27, 30, 33, 34] {
             let gap = Time::from_ps(character.as_ps() * tenths / 10);
-            let heard = with_gap(&mut bench, &request, index, gap);
-            assert_eq!(heard, reply, "{tenths}/10 characters before byte {index}");
+            let received = with_gap(&mut bench, &request, index, gap);
+            assert_eq!(
+                received, reply,
+                "{tenths}/10 characters before byte {index}"
+            );
         }
         for tenths in [37, 40, 50, 80, 300] {
             let gap = Time::from_ps(character.as_ps() * tenths / 10);
-            let heard = with_gap(&mut bench, &request, index, gap);
-            assert_eq!(heard, [], "{tenths}/10 characters before byte {index}");
+            let received = with_gap(&mut bench, &request, index, gap);
+            assert_eq!(received, [], "{tenths}/10 characters before byte {index}");
         }
     }
     bench.assert_answers(1);
@@ -107,17 +110,17 @@ fn a_request_too_soon_after_another_joins_it_and_both_are_lost() {
     let gap = bench.characters(3);
     assert_eq!(with_gap(&mut bench, &two, 8, gap), []);
     assert_eq!(with_gap(&mut bench, &two, 8, Time::ZERO), []);
-    // To another unit, and the second to this one.
+    // The first request is for another unit, the second for this one.
     let other = [adu(&[2, 1, 0, FIRST, 0, 4]), adu(&READ)].concat();
     assert_eq!(with_gap(&mut bench, &other, 8, gap), []);
-    // With t3.5 between them the second is answered.
+    // With t3.5 between them the second request is answered.
     let gap = bench.t35() + bench.bit();
     assert_eq!(with_gap(&mut bench, &other, 8, gap), adu(&[1, 1, 1, 0]));
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn silence_of_own_8n1_characters_ends_a_frame_for_the_unit_and_the_record() {
+fn t35_of_8n1_characters_ends_a_frame_for_the_unit_and_the_recording() {
     let mut bench = Bench::set_up(Module::Di4, &[(FORMAT, 3)]);
     let other = adu(&[2, 1, 0, FIRST, 0, 4]);
     let two = [other.clone(), adu(&READ)].concat();
@@ -136,7 +139,7 @@ fn silence_of_own_8n1_characters_ends_a_frame_for_the_unit_and_the_record() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_master_need_not_wait_after_the_units_own_reply() {
+fn request_directly_after_the_units_reply_is_answered() {
     let mut bench = Bench::new(Module::Di4, 1);
     let now = bench.board.now();
     let end = bench.board.line().send(now, &adu(&READ));
@@ -146,24 +149,24 @@ fn a_master_need_not_wait_after_the_units_own_reply() {
     while bench.board.driver_enable() {
         bench.board.run_for(Time::from_us(10));
     }
-    // A bit or two after the reply's last stop bit.
+    // The next request begins two bits after the reply's last stop bit.
     let start = bench.board.now() + bench.bit() * 2;
     let end = bench.board.line().send(start, &adu(&READ));
-    let heard = bench.answer_after(end);
+    let received = bench.answer_after(end);
     let reply = adu(&[1, 1, 1, 0]);
-    assert_eq!(heard, [reply.clone(), reply].concat());
+    assert_eq!(received, [reply.clone(), reply].concat());
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_character_with_a_fault_spoils_its_frame() {
+fn character_with_a_framing_error_invalidates_its_frame() {
     let mut bench = Bench::new(Module::Di4, 1);
     let request = adu(&READ);
     for index in 0..request.len() {
         let now = bench.board.now();
         let line = bench.board.line();
         let mut end = line.send(now, &request[..index]);
-        // The stop bits are low: a framing error, with the right data.
+        // The stop bits are low: a framing error, but the data bits are right.
         let mut character = Character::new(Settings::default(), request[index]);
         character.levels &= (1 << 9) - 1;
         character.levels |= 1 << 10;
@@ -176,7 +179,7 @@ fn a_character_with_a_fault_spoils_its_frame() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_break_and_a_stray_zero_cost_their_own_frame_at_most() {
+fn break_or_stray_zero_invalidates_at_most_one_frame() {
     let mut bench = Bench::new(Module::Di4, 1);
     let now = bench.board.now();
     let long = Character::line_break(Settings::default().rate(), 15);
@@ -186,14 +189,14 @@ fn a_break_and_a_stray_zero_cost_their_own_frame_at_most() {
     let stray = [&[0][..], &adu(&READ)].concat();
     assert_eq!(bench.exchange(&stray), []);
     bench.assert_answers(1);
-    // Far enough ahead it costs nothing.
+    // With enough distance, a break has no effect on the next request.
     let gap = bench.characters(5);
     assert_eq!(with_gap(&mut bench, &stray, 1, gap), adu(&[1, 1, 1, 0]));
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn other_units_traffic_makes_it_neither_deaf_nor_talkative() {
+fn traffic_of_other_units_gets_no_reply_and_own_requests_do() {
     let mut bench = Bench::new(Module::Di4, 1);
     let others: [&[u8]; 6] = [
         &adu(&[2, 3, 0, 0, 0, 2]),
@@ -222,12 +225,12 @@ fn other_units_traffic_makes_it_neither_deaf_nor_talkative() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn switched_on_in_the_middle_of_traffic_it_waits_for_a_silence() {
+fn unit_that_starts_during_traffic_waits_for_a_silence() {
     let mut bench = Bench::cold(Config {
         flash: Some(flash_with(Module::Di4)),
         ..Config::default()
     });
-    // Traffic from before the start to well after it, ending in what would be a good request.
+    // The traffic begins before the start, lasts well beyond it, and ends with bytes that look like a valid request.
     let traffic = [vec![0x55; 300], adu(&READ)].concat();
     let end = bench.board.line().send(Time::from_us(1), &traffic);
     assert!(end > Time::from_ms(300));
@@ -237,7 +240,7 @@ fn switched_on_in_the_middle_of_traffic_it_waits_for_a_silence() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_truncated_request_is_forgotten() {
+fn truncated_request_is_discarded() {
     let mut bench = Bench::new(Module::Di4, 1);
     let request = adu(&READ);
     for length in 1..request.len() {
@@ -248,10 +251,10 @@ fn a_truncated_request_is_forgotten() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn its_own_echo_is_not_taken_for_a_request() {
+fn echo_of_a_reply_is_not_treated_as_a_request() {
     let mut bench = Bench::new(Module::Do4, 1);
     bench.board.line().set_echo(true);
-    // The reply to a write is the request: taken for one it would be answered for ever.
+    // The reply to a write equals the request. If the unit took its echo for a request, it would answer without end.
     let request = adu(&[1, 5, 0, FIRST, 0xFF, 0]);
     for _ in 0..20 {
         assert_eq!(bench.exchange(&request), request);
@@ -260,7 +263,7 @@ fn its_own_echo_is_not_taken_for_a_request() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn glitches_on_an_idle_line_cost_nothing() {
+fn idle_line_glitches_do_not_disturb_the_next_request() {
     let mut bench = Bench::new(Module::Di4, 1);
     for us in [1, 5, 20, 40] {
         let now = bench.board.now();

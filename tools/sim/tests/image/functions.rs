@@ -1,5 +1,5 @@
-//! Every module through every function code that reaches a point: all spans around the slot's four
-//! points, what may be read and written and what may not, and that a refused write changes nothing.
+//! Every module through every function code that accesses a point: all spans around the slot's four points, which
+//! points can be read and written, and that a refused write changes nothing.
 
 use sim::{Channel, Module, Time};
 
@@ -7,7 +7,7 @@ use Kind::{BitInput, BitOutput, Nothing, WordInput, WordOutput};
 
 use crate::bench::{Bench, SLOT};
 
-/// What the manual makes of a point, on its own account: not taken from the firmware's table.
+/// Kind of a point according to the manual, written out here so that the test does not use the firmware's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Nothing,
@@ -17,13 +17,13 @@ enum Kind {
     WordOutput,
 }
 
-/// Values of word outputs: distinct bits, both ends.
+/// Values of word outputs: different bits, and both ends of the range.
 const CODES: [u16; 6] = [0, 4095, 1, 0x0A5A, 0x05A5, 2048];
 
 struct Points {
     bench: Bench,
     kinds: [Kind; 4],
-    /// What stands in each point.
+    /// Value of each point.
     image: [u16; 4],
     writes: usize,
 }
@@ -38,7 +38,7 @@ impl Points {
         }
     }
 
-    /// The points of a span as indices, if they are all there and `will_do`.
+    /// Returns the points of a span as indices if all of them exist and are of these kinds.
     fn span(&self, start: u16, count: u16, will_do: &[Kind]) -> Option<std::ops::Range<usize>> {
         let first = usize::from(start.checked_sub(SLOT)?);
         let range = first..first + usize::from(count);
@@ -80,8 +80,8 @@ impl Points {
         }
     }
 
-    /// What the outside sees is what was written last.
-    fn outputs_stand(&mut self, after: &str) {
+    /// Asserts that the outputs have the values that were written last.
+    fn assert_outputs(&mut self, after: &str) {
         if self.kinds.contains(&WordOutput) {
             self.bench.board.run_for(Time::from_ms(20));
         }
@@ -121,7 +121,7 @@ impl Points {
                     .zip(bits)
                     .for_each(|(v, bit)| *v = bit);
             }
-            self.outputs_stand(&format!("0F {start:#x}+{count} {bits:?}"));
+            self.assert_outputs(&format!("0F {start:#x}+{count} {bits:?}"));
         }
         for address in SLOT.saturating_sub(1)..=SLOT + 4 {
             for (value, good) in [(0xFF00, true), (0x0001, false), (0, true), (0xFF01, false)] {
@@ -136,7 +136,7 @@ impl Points {
                 if let (true, Some(range)) = (good, range) {
                     self.image[range.start] = u16::from(value != 0);
                 }
-                self.outputs_stand(&format!("05 {address:#x} {value:#x}"));
+                self.assert_outputs(&format!("05 {address:#x} {value:#x}"));
             }
         }
     }
@@ -147,7 +147,7 @@ impl Points {
             let words = CODES.iter().cycle().skip(self.writes).take(count.into());
             let words: Vec<u16> = words.copied().collect();
             let range = self.span(start, count, &[WordOutput]);
-            // One word out of range, wherever it stands, spoils all; a bad address comes before it.
+            // One word out of range at any place refuses the whole write. The check of the address comes before that.
             for bad in 0..words.len() {
                 let mut spoilt = words.clone();
                 spoilt[bad] = [4096, 0xFFFF][bad % 2];
@@ -155,7 +155,7 @@ impl Points {
                 let written = self.bench.write(start, &spoilt);
                 assert_eq!(written, refused, "10 {start:#x} {spoilt:?}");
             }
-            self.outputs_stand("refused writes");
+            self.assert_outputs("refused writes");
             let written = self.bench.write(start, &words);
             assert_eq!(
                 written,
@@ -165,7 +165,7 @@ impl Points {
             if let Some(range) = range {
                 self.image[range].copy_from_slice(&words);
             }
-            self.outputs_stand(&format!("10 {start:#x} {words:?}"));
+            self.assert_outputs(&format!("10 {start:#x} {words:?}"));
         }
         for address in SLOT.saturating_sub(1)..=SLOT + 4 {
             for value in [0, 4096, 4095, 0xFFFF, 1234] {
@@ -180,12 +180,12 @@ impl Points {
                 if let (Ok(()), Some(range)) = (expected, range) {
                     self.image[range.start] = value;
                 }
-                self.outputs_stand(&format!("06 {address:#x} {value}"));
+                self.assert_outputs(&format!("06 {address:#x} {value}"));
             }
         }
     }
 
-    /// Everything, with what the outside applies as `image` has it for the inputs.
+    /// Tests all accesses; `outside` applies each of the values in `inputs` to the input pins.
     fn check(mut self, outside: impl Fn(&mut Bench, [u16; 4]), inputs: &[[u16; 4]]) {
         for given in inputs {
             outside(&mut self.bench, *given);
@@ -193,7 +193,7 @@ impl Points {
             for (point, kind) in self.kinds.into_iter().enumerate() {
                 match kind {
                     BitInput => self.image[point] = given[point],
-                    // A code of 12 bits for a pin's 0 to 3300 mV.
+                    // A pin's 0 to 3300 mV as a code of 12 bits.
                     WordInput => {
                         self.image[point] = ((u32::from(given[point]) * 4095 + 1650) / 3300) as u16
                     }
@@ -216,7 +216,7 @@ fn an_empty_slot_has_no_points() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_4di_is_read_as_bits_and_takes_no_write() {
+fn a_4di_is_read_as_bits_and_refuses_writes() {
     let energise = |bench: &mut Bench, given: [u16; 4]| {
         for (channel, on) in (1..).zip(given) {
             bench.board.set_energised(channel, on != 0).unwrap();
@@ -252,7 +252,7 @@ fn apply(bench: &mut Bench, millivolts: &[u16]) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_4ai_is_read_as_words_and_takes_no_write() {
+fn a_4ai_is_read_as_words_and_refuses_writes() {
     Points::new(Module::Ai4, [WordInput; 4]).check(
         |bench, given| apply(bench, &given),
         &[[0, 825, 1650, 2475], [3300, 1, 3299, 100]],

@@ -1,15 +1,15 @@
-//! A task that hangs, or is never run any more: the watchdog resets the device, outputs are safe, and
-//! the next start can tell that it was the watchdog, and whose mark was missing.
+//! A task that hangs, or that no longer runs: the watchdog resets the device, the outputs are safe, and after the next
+//! start the fault record has the watchdog as the cause and the tasks whose marks were missing.
 //!
-//! The watchdog's time is 500 ms on an LSI of 40 kHz (333 to 667 ms over the part's spread), counted from
-//! the last feed. A task shows that it is alive every 100 ms at least, so a hang between two proofs may
-//! see one feed more: the device is reset 600 ms after it at the latest.
+//! The watchdog's time is 500 ms with an LSI of 40 kHz (333 to 667 ms over the part's spread), counted from the last
+//! refresh. A task sets its mark at least every 100 ms, so one more refresh may follow a hang. The device is reset
+//! 600 ms after the hang at the latest.
 
 use sim::{Channel, Module, Time};
 
 use crate::bench::{Bench, FIRST, SLOT, adu, corner};
 
-/// 500 ms at 40 kHz, by the LSI there is, and a proof more.
+/// Returns the longest time to the reset: 500 ms at 40 kHz, converted to the real LSI, and one more period of marks.
 fn limit() -> Time {
     Time::cycles(20_000, corner().oscillators().lsi) + Time::from_ms(102)
 }
@@ -19,9 +19,9 @@ const SERVE: u16 = 1 << 1;
 const SCAN: u16 = 1 << 2;
 const BACKGROUND: u16 = 1 << 3;
 
-/// A branch to itself.
+/// A branch to its own address.
 const SPIN: u16 = 0xE7FE;
-/// Return at once.
+/// A return from the function.
 const RETURN: u16 = 0x4770;
 
 /// A board whose outputs are all on.
@@ -33,8 +33,8 @@ fn bench() -> Bench {
     bench
 }
 
-/// Writes `code` over the program at `address` until the device is reset, with requests coming in, and
-/// checks what a hang must lead to. The tasks whose marks were missing.
+/// Writes `code` over the program at `address` until the device is reset, while requests arrive, and checks the
+/// effects of the hang. Returns the tasks whose marks were missing.
 fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
     bench.write_bits(SLOT, &[true; 4]).unwrap();
     let faults = bench.register(0x0261);
@@ -46,7 +46,7 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
         .patch_code(address, &code.to_le_bytes())
         .unwrap();
     let from = bench.board.now();
-    // The timers' and the line's handlers need a request to be called.
+    // The handlers of the timers and the line only run when there is a request.
     bench.board.line().send(from, &adu(&[1, 1, 0, FIRST, 0, 4]));
     while bench.board.resets() == before {
         assert!(bench.board.now() < from + limit(), "{what}: no reset");
@@ -59,7 +59,7 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
             "{what}"
         );
     }
-    assert!(!bench.board.driver_enable(), "{what}: the bus is free");
+    assert!(!bench.board.driver_enable(), "{what}: the driver is off");
     bench.board.patch_code(address, &was).unwrap();
     bench.started();
     assert_eq!(bench.board.resets(), before + 1, "{what}: one reset");
@@ -74,17 +74,17 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
     assert_eq!(
         bench.register(0x0207) & 0x3F,
         0b10_0100,
-        "{what}: watchdog, pin"
+        "{what}: the reset cause"
     );
-    assert_eq!(bench.register(0x0260), 3, "{what}: the watchdog bit");
+    assert_eq!(bench.register(0x0260), 3, "{what}: the kind of the fault");
     assert_eq!(bench.register(0x0261), faults + 1, "{what}: one fault more");
-    assert_eq!(bench.long(0x0262), 0, "nobody knows where");
+    assert_eq!(bench.long(0x0262), 0, "the address of the fault is unknown");
     bench.register(0x026C)
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn every_task_that_spins_is_bitten_out_of_it() {
+fn task_in_an_endless_loop_is_ended_by_a_watchdog_reset() {
     let mut bench = bench();
     for handler in ["USART1", "TIM2", "TIM4", "EXTI3", "EXTI1", "EXTI0"] {
         let address = bench.board.symbol(handler).expect("the task's handler");
@@ -92,13 +92,13 @@ fn every_task_that_spins_is_bitten_out_of_it() {
     }
 }
 
-/// An address that a handler comes by, some way behind its entry.
+/// Returns an address that a handler executes, some instructions after its entry.
 fn within(bench: &mut Bench, handler: &str) -> u32 {
     let entry = bench.board.symbol(handler).expect("the task's handler") & !1;
     let now = bench.board.now();
     bench.board.line().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
     assert!(bench.board.run_until_pc(entry, now + Time::from_ms(50)));
-    // The number of the exception, the rest are flags (PM0056 2.1.3).
+    // The number of the exception. The other bits are flags (PM0056 2.1.3).
     let exception = |bench: &Bench| bench.board.register(16).map(|xpsr| xpsr & 0x1FF);
     let entered = exception(bench);
     bench.board.step(40);
@@ -111,7 +111,7 @@ fn within(bench: &mut Bench, handler: &str) -> u32 {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_task_that_hangs_on_its_way_is_named() {
+fn task_that_hangs_after_its_entry_is_named_in_the_record() {
     let mut bench = bench();
     for (handler, own) in [
         ("USART1", LINE),
@@ -129,23 +129,23 @@ fn a_task_that_hangs_on_its_way_is_named() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn idle_that_spins_is_bitten_though_all_others_live() {
+fn endless_loop_in_idle_causes_a_watchdog_reset_although_all_tasks_run() {
     let mut bench = bench();
     while !bench.board.asleep() {
         bench.board.run_for(Time::from_us(1));
     }
-    // Behind its WFI.
+    // At the instruction after the WFI.
     let address = bench.board.pc();
     let marks = break_at(&mut bench, "idle", address, SPIN);
-    assert_eq!(marks, 0, "all had left their marks");
+    assert_eq!(marks, 0, "all tasks had set their marks");
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn every_task_that_does_nothing_any_more_is_missed() {
+fn task_that_returns_without_setting_its_mark_causes_a_watchdog_reset() {
     let mut bench = bench();
     for (handler, missing) in [("USART1", LINE), ("EXTI3", SERVE), ("EXTI0", BACKGROUND)] {
-        // A task that stops after its mark of this round has left one. Stop it in front of that.
+        // A task that stops after its mark of this round has set that mark, so stop it in front of the mark.
         bench.board.run_for(Time::from_ms(20));
         let address = bench.board.symbol(handler).expect("the task's handler");
         let marks = break_at(&mut bench, handler, address, RETURN);
@@ -155,7 +155,7 @@ fn every_task_that_does_nothing_any_more_is_missed() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_record_keeps_the_uptime_and_outlives_other_resets_but_not_the_power() {
+fn record_has_the_uptime_and_survives_resets_but_not_a_power_cycle() {
     let mut bench = bench();
     bench.board.run_for(Time::from_secs(5));
     let scan = bench.board.symbol("EXTI1").unwrap();
@@ -165,10 +165,18 @@ fn the_record_keeps_the_uptime_and_outlives_other_resets_but_not_the_power() {
     let record = bench.registers(0x0260, 16).unwrap();
     bench.board.reset();
     bench.started();
-    assert_eq!(bench.register(0x0207), 0b10_0000, "by the pin");
+    assert_eq!(
+        bench.register(0x0207),
+        0b10_0000,
+        "the reset cause is the pin"
+    );
     assert_eq!(bench.registers(0x0260, 16), Ok(record));
     assert_eq!(bench.registers(0x0260, 17), Err(2), "the record ends here");
-    assert_eq!(bench.write(0x0260, &[0]), Err(2), "and cannot be written");
+    assert_eq!(
+        bench.write(0x0260, &[0]),
+        Err(2),
+        "the record cannot be written"
+    );
     bench.power_cycle();
     assert_eq!(bench.registers(0x0260, 16), Ok(vec![0; 16]));
 }

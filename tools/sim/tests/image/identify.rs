@@ -1,4 +1,4 @@
-//! COMMAND 6: a person at the board sees which unit it is.
+//! COMMAND 6: the LEDs show which unit on the bus it is.
 
 use sim::{Module, Time, board::Leds};
 
@@ -16,7 +16,7 @@ const DARK: Leds = Leds {
 };
 
 impl Bench {
-    /// What the LEDs show during this time, looked at every 50 ms, from the middle of a pattern's tick on.
+    /// Returns the state of the LEDs every 50 ms during this time, starting in the middle of a tick of the pattern.
     fn watch_leds(&mut self, time: Time) -> Vec<Leds> {
         let end = self.board.now() + time;
         let mut seen = Vec::new();
@@ -33,7 +33,7 @@ impl Bench {
 fn identify_makes_all_leds_blink_for_ten_seconds() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.command(6);
-    // The command ends this long before the LEDs are looked at.
+    // Stop just before the command ends.
     let seen = bench.watch_leds(Time::from_ms(9500));
     assert!(
         seen.iter().all(|leds| [LIT, DARK].contains(leds)),

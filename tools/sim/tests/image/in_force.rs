@@ -1,4 +1,5 @@
-//! When a setting counts: "restart" ones after the next start, "now" ones at once.
+//! When a setting comes into force: settings of kind "restart" after the next start, settings of kind "now"
+//! immediately.
 
 use register_map::codes::Baud;
 use sim::{Module, Time, line::Settings};
@@ -11,7 +12,7 @@ const RESPONSE_DELAY: u16 = 0x0105;
 const FRAME_GAP: u16 = 0x0106;
 const STRICT_T15: u16 = 0x0107;
 
-/// How long after the request's end the reply to a read begins.
+/// Returns the time from the end of the request to the start of the reply to a read.
 fn turnaround(bench: &mut Bench) -> Time {
     bench.bits(1, SLOT, 4).unwrap();
     let sent = bench.sent;
@@ -19,14 +20,14 @@ fn turnaround(bench: &mut Bench) -> Time {
     line.frames().next_back().expect("a reply").start - sent
 }
 
-/// `at` is `due` or up to `slack` later.
+/// Asserts that `at` is at `due` or up to `slack` later.
 fn assert_at(at: Time, due: Time, slack: Time) {
     assert!(at >= due && at <= due + slack, "{at:?}, due at {due:?}");
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
+fn new_rate_and_format_are_in_force_after_the_restart_and_not_before() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.tolerant = true;
     let mut before = Settings::default();
@@ -40,15 +41,23 @@ fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
         bench.configure(BAUD, &[baud.code(), code]);
         assert_eq!(bench.registers(BAUD, 2), Ok(vec![baud.code(), code]));
         bench.save();
-        assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]), "still the old");
-        assert_eq!(bench.status(16), settings != before, "waits for a restart");
+        assert_eq!(
+            bench.bits(1, SLOT, 4),
+            Ok(vec![false; 4]),
+            "the old settings are in force"
+        );
+        assert_eq!(
+            bench.status(16),
+            settings != before,
+            "the status reports settings that wait for a restart"
+        );
 
-        // The response to the restart goes out under the old settings: `restart` checks it.
+        // The unit sends the response to the restart with the old settings; `restart` checks it.
         bench.restart();
         if settings != before {
-            // The old master is not understood, nor spoken to.
-            let heard = bench.exchange(&adu(&[1, 1, 0, FIRST, 0, 4]));
-            assert_eq!(heard, [], "{settings:?}");
+            // A master with the old settings gets no valid reply.
+            let received = bench.exchange(&adu(&[1, 1, 0, FIRST, 0, 4]));
+            assert_eq!(received, [], "{settings:?}");
             bench.board.run_for(Time::from_ms(50));
         }
         bench.settings(settings);
@@ -70,7 +79,7 @@ fn every_rate_and_format_is_spoken_after_the_restart_and_not_before() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_921600_and_115200_a_thousand_of_the_longest_requests_lose_nothing() {
+fn at_921600_and_115200_no_byte_of_a_thousand_longest_requests_is_lost() {
     for baud in [1152, 9216] {
         let mut bench = Bench::set_up(Module::Di4, &[(BAUD, baud)]);
         bench.unlock();
@@ -86,7 +95,7 @@ fn at_921600_and_115200_a_thousand_of_the_longest_requests_lose_nothing() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_response_delay_counts_at_once() {
+fn response_delay_is_in_force_immediately() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     for ms in [10, 1, 250, 1000, 0] {
         bench.patience = Time::from_ms(1_002);
@@ -101,7 +110,7 @@ fn a_response_delay_counts_at_once() {
     }
 }
 
-/// Sends a read with a pause of `gap` in its middle; whether it is answered.
+/// Sends a read with a pause of `gap` in its middle. Returns whether the unit answers.
 fn answered_with_gap(bench: &mut Bench, gap: Time) -> bool {
     let frame = adu(&[1, 1, 0, FIRST, 0, 4]);
     let now = bench.board.now();
@@ -114,7 +123,7 @@ fn answered_with_gap(bench: &mut Bench, gap: Time) -> bool {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_longer_frame_gap_counts_after_the_restart() {
+fn longer_frame_gap_is_in_force_after_the_restart() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.tolerant = true;
     bench.configure(FRAME_GAP, &[100]);
@@ -139,7 +148,7 @@ fn a_longer_frame_gap_counts_after_the_restart() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_shorter_frame_gap_counts_after_the_restart() {
+fn shorter_frame_gap_is_in_force_after_the_restart() {
     let mut bench = Bench::set_up(Module::Di4, &[(FRAME_GAP, 20)]);
     // 2 ms at 9600: less than two characters.
     assert_at(
@@ -153,7 +162,7 @@ fn a_shorter_frame_gap_counts_after_the_restart() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn no_frame_gap_is_too_short_to_be_understood() {
+fn requests_are_answered_with_every_frame_gap() {
     for (baud, format, gap) in [
         (12, 0, 5),
         (12, 3, 36),
@@ -166,7 +175,7 @@ fn no_frame_gap_is_too_short_to_be_understood() {
         for _ in 0..3 {
             bench.assert_answers(1);
         }
-        // With and without edges in its bytes.
+        // With and without edges in the data bytes.
         bench.configure(0x01C0, &[0; 32]);
         let gap = Time::from_us(100 * u64::from(gap));
         let shortest = bench.characters(1) + bench.bit();
@@ -177,13 +186,14 @@ fn no_frame_gap_is_too_short_to_be_understood() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_delayed_response_stays_away_when_the_bus_has_gone_on_without_it() {
+fn delayed_response_is_dropped_when_other_traffic_has_begun() {
     let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 300)]);
     let read = adu(&[1, 1, 0, FIRST, 0, 4]);
     let others = adu(&[&[2, 3, 200], &[0x55; 200][..]].concat());
     bench.patience = Time::from_ms(400);
     for (other, from_ms, answered) in [
-        // Under way when the delay is over; rubbish, and a good frame, long over by then.
+        // Traffic that is still on the line when the delay ends; short invalid bytes; a valid frame that ends long
+        // before.
         (&others[..], 200, false),
         (&others[..30], 20, true),
         (&adu(&[2, 1, 0, FIRST, 0, 4])[..], 20, false),
@@ -200,7 +210,7 @@ fn a_delayed_response_stays_away_when_the_bus_has_gone_on_without_it() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_loader_mode_answers_at_once() {
+fn the_loader_mode_is_in_force_immediately() {
     let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 1000)]);
     bench.board.set_dip(255);
     bench.power_cycle();
@@ -209,10 +219,10 @@ fn the_loader_mode_answers_at_once() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn gaps_above_t15_are_counted_or_cost_the_frame() {
+fn gaps_above_t15_are_counted_or_invalidate_the_frame() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.tolerant = true;
-    // Of silence: a character, and nearly two and a half.
+    // Silences between characters: of one character, and of nearly two and a half.
     let (within, between) = (bench.characters(1), bench.bit() * 27);
     assert!(answered_with_gap(&mut bench, within));
     assert_eq!(bench.register(0x0238), 0);
@@ -220,10 +230,13 @@ fn gaps_above_t15_are_counted_or_cost_the_frame() {
     assert_eq!(bench.register(0x0238), 1, "counted");
     bench.configure(STRICT_T15, &[1]);
     bench.save();
-    assert!(answered_with_gap(&mut bench, between), "not yet");
+    assert!(
+        answered_with_gap(&mut bench, between),
+        "the gap was refused before the restart"
+    );
     bench.restart();
     assert!(answered_with_gap(&mut bench, within));
     assert!(!answered_with_gap(&mut bench, between), "dropped");
     bench.assert_answers(1);
-    assert_eq!(bench.register(0x0238), 1, "counted as well");
+    assert_eq!(bench.register(0x0238), 1, "the gap was not counted");
 }

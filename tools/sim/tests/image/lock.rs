@@ -1,4 +1,4 @@
-//! The configuration's lock, and what the status register says of changes.
+//! The configuration's lock, and the status bits for changed settings.
 
 use sim::{Module, Time};
 
@@ -13,7 +13,7 @@ const UNLOCKED: u16 = 32;
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn while_it_is_closed_nothing_can_be_written_and_everything_read() {
+fn closed_lock_refuses_every_write_and_allows_every_read() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     for (address, value, code) in [
         (COMM_TIMEOUT, 10, 6),
@@ -22,7 +22,7 @@ fn while_it_is_closed_nothing_can_be_written_and_everything_read() {
         (MODULE, 2, 6),
         (FILTER, 0, 6),
         (0x01E0 + SLOT, 1, 6),
-        // Value and address come first.
+        // The checks of value and address come before the check of the lock.
         (COMM_TIMEOUT, 36_001, 3),
         (0x0109, 1, 2),
         (0x0100, 0x5A16, 3),
@@ -38,7 +38,7 @@ fn while_it_is_closed_nothing_can_be_written_and_everything_read() {
     assert_eq!(
         bench.write(0x0100, &[0x5A17, 96]),
         Err(6),
-        "KEY opens it alone"
+        "only KEY opens the lock"
     );
     assert_eq!(bench.register(0x0100), 0);
     assert!(!bench.status(UNLOCKED | UNSAVED | WAITING));
@@ -46,7 +46,7 @@ fn while_it_is_closed_nothing_can_be_written_and_everything_read() {
         bench.registers(0x0100, 9),
         Ok(vec![0, 96, 0, 0, 0, 0, 0, 0, 0])
     );
-    // A broadcast cannot either.
+    // A broadcast cannot write either.
     bench.exchange(&adu(&[0, 6, 1, 4, 0, 10]));
     assert_eq!(bench.register(COMM_TIMEOUT), 0);
     assert_eq!(bench.board.resets(), 0);
@@ -54,14 +54,14 @@ fn while_it_is_closed_nothing_can_be_written_and_everything_read() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn it_closes_sixty_seconds_after_the_last_configuration_write() {
+fn lock_closes_sixty_seconds_after_the_last_configuration_write() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.unlock();
     let opened = bench.sent;
     assert_eq!(bench.register(0x0100), 1);
     bench.board.run_until(opened + Time::from_ms(59_900));
     assert!(bench.status(UNLOCKED));
-    // A write keeps it open, a refused one or a point's does not.
+    // A successful configuration write keeps the lock open; a refused write or a write to a point does not.
     bench.write(COMM_TIMEOUT, &[0]).unwrap();
     let written = bench.sent;
     bench.board.run_until(written + Time::from_ms(30_000));
@@ -75,12 +75,16 @@ fn it_closes_sixty_seconds_after_the_last_configuration_write() {
     assert_eq!(bench.write(COMM_TIMEOUT, &[0]), Err(6));
     bench.unlock();
     bench.power_cycle();
-    assert_eq!(bench.register(0x0100), 0, "closed at every start");
+    assert_eq!(
+        bench.register(0x0100),
+        0,
+        "the lock is closed after every start"
+    );
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_write_is_whole_or_not_at_all() {
+fn refused_write_changes_no_register_of_its_range() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.configure(COMM_TIMEOUT, &[10, 0, 0, 1]);
     for (address, words, code) in [
@@ -106,7 +110,7 @@ fn a_write_is_whole_or_not_at_all() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn gaps_are_not_there() {
+fn access_to_a_gap_between_registers_gets_exception_02() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.unlock();
     for (gap, count) in [
@@ -142,7 +146,7 @@ fn gaps_are_not_there() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_status_tells_unsaved_and_waiting_changes() {
+fn status_reports_unsaved_changes_and_changes_that_wait_for_a_restart() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.tolerant = true;
     let of = |bench: &mut Bench| (bench.status(UNSAVED), bench.status(WAITING));
@@ -150,13 +154,13 @@ fn the_status_tells_unsaved_and_waiting_changes() {
     bench.configure(FILTER, &[50]);
     assert_eq!(of(&mut bench), (true, false));
     bench.configure(FILTER, &[5]);
-    assert_eq!(of(&mut bench), (false, false), "as it was");
+    assert_eq!(of(&mut bench), (false, false), "the old value is back");
     bench.configure(FILTER, &[50]);
     bench.save();
     assert_eq!(
         of(&mut bench),
         (false, false),
-        "saved, and in force already"
+        "the value is saved and in force"
     );
     bench.configure(0x0101, &[192]);
     assert_eq!(of(&mut bench), (true, false));
@@ -164,7 +168,11 @@ fn the_status_tells_unsaved_and_waiting_changes() {
     assert_eq!(of(&mut bench), (false, true));
     bench.configure(0x0101, &[96]);
     bench.save();
-    assert_eq!(of(&mut bench), (false, false), "as it was when it started");
+    assert_eq!(
+        of(&mut bench),
+        (false, false),
+        "the value is that of the start"
+    );
 
     bench.configure(FILTER, &[60, 61, 62, 63]);
     bench.command(4);
@@ -172,9 +180,13 @@ fn the_status_tells_unsaved_and_waiting_changes() {
     assert_eq!(of(&mut bench), (false, false));
     bench.command(3);
     assert_eq!(bench.registers(FILTER, 4), Ok(vec![5; 4]), "defaults");
-    assert_eq!(bench.register(MODULE), 0, "MODULE too");
+    assert_eq!(bench.register(MODULE), 0, "MODULE has its default, too");
     assert_eq!(of(&mut bench), (true, false));
     bench.power_cycle();
-    assert_eq!(bench.register(FILTER), 50, "defaults that were not saved");
+    assert_eq!(
+        bench.register(FILTER),
+        50,
+        "the default, which is not saved"
+    );
     assert_eq!(bench.register(MODULE), 1);
 }

@@ -1,4 +1,4 @@
-//! A long run in virtual time: the unit works at the end as at the start, and the simulator uses no more memory.
+//! A long run in virtual time: the unit still works at the end, and the simulator uses no more memory.
 //!
 //! `cargo xtask soak --hours H` runs this test for H hours of virtual time.
 
@@ -10,7 +10,7 @@ use crate::bench::{Bench, FIRST};
 
 /// Environment variable with the number of hours.
 const VARIABLE: &str = "MODIO_SOAK_HOURS";
-/// Number of seconds without the variable.
+/// Number of seconds of the test when the variable is not set.
 const SECONDS: u64 = 20;
 /// Memory that the simulator may use in addition at the end, compared with half of the time, in KiB. In the first nine
 /// hours its history of the driver's edges fills up, with 115 KiB in an hour.

@@ -1,5 +1,4 @@
-//! The real release image on the virtual board: what a master on the line, and a person at the board,
-//! get to see.
+//! The release image on the virtual board: its behaviour for a master on the line and for a person at the board.
 //!
 //! The image comes from `MODIO_ELF`, which `cargo xtask test` sets after building it. It is that of the modio-02. The
 //! tests of the modio-08's image are in `tests/image_08`; they use most of the files here as well, which name the

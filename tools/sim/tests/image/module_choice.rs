@@ -1,4 +1,4 @@
-//! MODULE: another module needs a setting and a restart, and no other firmware.
+//! MODULE: a different module needs a setting and a restart, but no different firmware.
 
 use register_map::configuration::{FILTER, RANGE, SAFE, SCALE, START};
 use sim::{Module, Time};
@@ -6,7 +6,7 @@ use sim::{Module, Time};
 use crate::LAYOUT;
 use crate::bench::{Bench, MODULE, PORT, SLOT};
 
-/// What the points of a module answer to a read of bits and of words.
+/// Checks the replies of a module's points to a read of bits and to a read of words.
 fn assert_points(bench: &mut Bench, module: Module) {
     let [bits, words] = match module {
         Module::None => [false, false],
@@ -25,9 +25,9 @@ fn assert_points(bench: &mut Bench, module: Module) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn every_module_can_follow_every_other() {
+fn every_module_can_replace_every_other_module() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
-    // An Euler tour through all ordered pairs: each step leads from one module to another.
+    // An Euler tour of all ordered pairs: each step changes from one module to another.
     let mut last = Module::Di4;
     let mut pairs: Vec<(Module, Module)> = Module::ALL
         .iter()
@@ -36,7 +36,7 @@ fn every_module_can_follow_every_other() {
         .collect();
     let mut steps = 0;
     while !pairs.is_empty() {
-        // Hierholzer's choice is not needed: what is left over is reached by a step that repeats.
+        // Hierholzer's algorithm is not needed: repeated steps reach the remaining pairs.
         let next = pairs.iter().position(|(from, _)| *from == last);
         let (_, module) = next.map_or((last, pairs[0].0), |at| pairs.remove(at));
         bench.configure(MODULE, &[module.code()]);
@@ -47,7 +47,10 @@ fn every_module_can_follow_every_other() {
         );
         assert_points(&mut bench, last);
         bench.save();
-        assert!(bench.status(16), "waits for a restart");
+        assert!(
+            bench.status(16),
+            "the status reports a setting that waits for a restart"
+        );
         bench.board.power_off();
         bench.board.set_module(module).unwrap();
         bench.board.power_on();
@@ -62,7 +65,7 @@ fn every_module_can_follow_every_other() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn only_ports_with_a_slot_take_a_module() {
+fn only_ports_with_a_slot_accept_a_module() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.unlock();
     for port in (1..=8).filter(|port| !LAYOUT.board.has_slot(*port)) {
@@ -74,7 +77,11 @@ fn only_ports_with_a_slot_take_a_module() {
     let mut modules = [0; 8];
     modules[usize::from(PORT) - 1] = 2;
     modules[7] = 1;
-    assert_eq!(bench.write(0x0110, &modules), Err(3), "all or nothing");
+    assert_eq!(
+        bench.write(0x0110, &modules),
+        Err(3),
+        "one invalid value refuses all"
+    );
     assert_eq!(bench.register(MODULE), 1);
     modules[7] = 0;
     assert_eq!(bench.write(0x0110, &modules), Ok(()));
@@ -102,7 +109,7 @@ fn settings_made_for_one_module_switch_nothing_on_at_another() {
             "{first:#x}"
         );
     }
-    // And takes the values of the new one from now on.
+    // New values must now fit the new module.
     assert_eq!(bench.write(START + SLOT, &[2]), Err(3));
     bench.write(START + SLOT, &[1, 0, 0, 1]).unwrap();
     bench.save();
@@ -116,7 +123,7 @@ fn settings_made_for_one_module_switch_nothing_on_at_another() {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn settings_for_the_next_module_do_not_disturb_the_one_in_force() {
-    // A running 4DO, told that a 4AO comes next, with a SAFE no bit has.
+    // A running 4DO, with a 4AO set for the next start and a SAFE value that no bit can have.
     let mut bench = Bench::set_up(Module::Do4, &[]);
     bench.write_bits(SLOT, &[true; 4]).unwrap();
     bench.configure(MODULE, &[Module::Ao4.code()]);

@@ -1,5 +1,5 @@
-//! Endurance: whatever is on the line, the device answers the next good request, and never answers a
-//! damaged one.
+//! Endurance: the device answers the next valid request after any bytes on the line, and never answers a damaged
+//! request.
 //!
 //! `cargo xtask soak` runs [`soak`] with a million frames.
 
@@ -17,30 +17,30 @@ use crate::bench::{Bench, Most, adu, corner, crc};
 use damage::{Damaged, KINDS};
 use traffic::Outputs;
 
-/// Frames of each test, unless there is another number in the environment.
+/// Number of frames in each test when the environment variable is not set.
 const FRAMES: usize = 10_000;
 const VARIABLE: &str = "MODIO_SOAK_FRAMES";
 
-/// How long an interrupt of the line may have to wait.
+/// Longest time that an interrupt of the line may be delayed.
 const WAIT: Most = Most(Time::from_us(6), Time::from_us(11));
 
-/// The lines of the soak: BAUD, FORMAT, `STRICT_T15`.
+/// Line settings of the soak test: BAUD, FORMAT, `STRICT_T15`.
 const LINES: [[u16; 3]; 4] = [[96, 0, 0], [192, 1, 1], [1152, 3, 0], [9216, 2, 1]];
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn ten_thousand_random_frames_leave_it_answering() {
+fn unit_answers_after_ten_thousand_random_frames() {
     let mut rng = Rng::with_seed(0x6D6F_6469_6F01);
     let mut bench = Bench::new(Module::Do4, 1);
     for number in 0..FRAMES {
-        // Mostly short, some up to and beyond the longest there can be.
+        // Most frames are short; a few have the maximum length or more.
         let length = match rng.u8(0..20) {
             0 => rng.usize(200..320),
             1..=4 => rng.usize(20..60),
             _ => rng.usize(1..20),
         };
         let mut frame: Vec<u8> = (0..length).map(|_| rng.u8(..)).collect();
-        // Half of them begin as if they were for this unit, with a function there is.
+        // Half of the frames begin with this unit's address and a supported function code.
         if rng.bool() {
             frame[0] = 1;
             if let Some(function) = frame.get_mut(1) {
@@ -60,10 +60,9 @@ fn ten_thousand_random_frames_leave_it_answering() {
     bench.assert_answers(1);
 }
 
-/// Good frames, and frames damaged in every way, one behind the other with no more silence between them
-/// than there must be. Every good one is answered as it should be, or obeyed, or left to others; no
-/// damaged one leaves any trace but its count. The exception is what no CRC can tell: a frame whose CRC
-/// is right after the damage.
+/// Sends valid frames and frames damaged in every way, with the shortest allowed silence between them. The unit must
+/// answer or obey every valid frame for it, ignore frames for other units, and only count damaged frames. The exception
+/// is damage that a CRC cannot detect: the damaged frame has a valid CRC by chance.
 #[test]
 #[ignore = "needs the image: cargo xtask test, cargo xtask soak"]
 fn soak() {
@@ -80,13 +79,13 @@ fn is_good(frame: &[u8]) -> bool {
     (4..=256).contains(&frame.len()) && frame[split..] == crc(&frame[..split])
 }
 
-/// What has been sent, on all lines.
+/// Numbers of frames sent on all lines.
 struct Soak {
     frames: usize,
     good: usize,
     answered: usize,
     damaged: [usize; KINDS.len()],
-    /// Damaged, and the CRC is right nevertheless.
+    /// Number of damaged frames whose CRC is valid nevertheless.
     undetectable: usize,
     begin: Instant,
     told: Instant,
@@ -109,11 +108,11 @@ impl Soak {
         self.good + self.undetectable + self.damaged.iter().sum::<usize>()
     }
 
-    /// Goes on, on this line, until so many frames have been sent in all.
+    /// Continues on this line until `until` frames have been sent on all lines together.
     fn line(&mut self, index: usize, [baud, format, strict]: [u16; 3], until: usize) {
         let stored = [(BAUD, baud), (FORMAT, format), (STRICT_T15, strict)];
         let mut bench = Bench::set_up(Module::Do4, &stored);
-        // What else is due at the end of the silence delays a reply.
+        // Other work that is due at the end of the silence delays a reply.
         bench.patience = Time::from_us(60);
         let mut rng = Rng::with_seed(0x6D6F_6469_6F02 + index as u64);
         let mut outputs = Outputs::default();
@@ -126,7 +125,7 @@ impl Soak {
         for (channel, on) in (1..).zip(outputs.0) {
             assert_eq!(bench.board.channel(channel), Channel::Do { on });
         }
-        // The unit has counted as this has, in 16 bits.
+        // The unit must have counted the same number of frames, in 16 bits.
         let good = self.good - good + self.undetectable - undetectable;
         let bad = self.damaged.iter().sum::<usize>() - bad;
         for (sub, count) in [(0x0B, good + 1), (0x0C, bad)] {
@@ -136,21 +135,23 @@ impl Soak {
         }
     }
 
-    /// Some damaged frames, then a good one.
+    /// Sends some damaged frames, then a valid one.
     fn round(&mut self, bench: &mut Bench, rng: &mut Rng, outputs: &mut Outputs) {
-        // A receiver that has lost its place may take the end of a damaged frame for a character that ends almost a
-        // character later. The unit measures its silence from the interrupt, which may have to wait.
+        // A receiver that has lost the start of a character may see the end of a damaged frame as a character that
+        // ends almost one character later. The unit measures the silence from the interrupt, which may be delayed.
         let silence = bench.t35() + bench.characters(1) + WAIT.of(corner());
         let mut at = bench.board.now();
         let mut before = Vec::new();
         for _ in 0..rng.usize(0..4) {
             let damaged = damage::damaged(rng, outputs);
             if !damaged.has_fault() && is_good(&damaged.bytes) {
-                // It must be nobody's business what is done about it; so it comes alone.
+                // The unit may treat this frame as valid, so send it alone and switch the outputs off afterwards.
                 self.undetectable += 1;
                 bench.board.run_until(at);
                 bench.exchange(&damaged.bytes);
-                bench.ask(1, &outputs.all_off()).expect("it is obeyed");
+                bench
+                    .ask(1, &outputs.all_off())
+                    .expect("the unit executes the write");
                 self.good += 1;
                 self.answered += 1;
                 at = bench.board.now();
@@ -162,17 +163,17 @@ impl Soak {
         }
         let (request, reply) = traffic::request(rng, outputs);
         bench.sent = bench.board.line().send(at, &adu(&request));
-        let heard = bench.answer_after(bench.sent);
+        let received = bench.answer_after(bench.sent);
         let expected = reply.map(|reply| adu(&reply)).unwrap_or_default();
         assert!(
-            heard == expected,
-            "{request:02X?} got {heard:02X?}, not {expected:02X?}, after {before:02X?}"
+            received == expected,
+            "{request:02X?} got {received:02X?}, not {expected:02X?}, after {before:02X?}"
         );
         self.good += 1;
-        self.answered += usize::from(!heard.is_empty());
+        self.answered += usize::from(!received.is_empty());
     }
 
-    /// Tells how far it is, now and then.
+    /// Prints the progress from time to time.
     fn tell(&mut self) {
         if self.told.elapsed() > Duration::from_secs(10) {
             self.told = Instant::now();
@@ -184,7 +185,7 @@ impl Soak {
     fn sum_up(&self) {
         let damaged: usize = self.damaged.iter().sum();
         println!(
-            "{} good frames, of which {} were to be answered: none was lost",
+            "{} good frames, of which {} needed a reply: none was lost",
             self.good, self.answered
         );
         println!("{damaged} damaged frames: none was accepted");
@@ -192,16 +193,16 @@ impl Soak {
             println!("  {count:>8}  {kind:?}");
         }
         println!(
-            "{} more were damaged, and their CRC was right",
+            "{} more damaged frames had a valid CRC by chance",
             self.undetectable
         );
-        // One in 65 536 on the average, where any damage is equally likely: here it is less.
+        // If every damage had the same probability, the average would be one in 65 536. Here it is less.
         assert!(self.undetectable <= 5 + damaged / 10_000);
         assert!(self.frames < 1000 || self.damaged.iter().all(|count| *count > 0));
     }
 }
 
-/// Sends it at `at`; the end of the last stop bit.
+/// Sends the frame at `at`. Returns the end of the last stop bit.
 fn send(bench: &mut Bench, at: sim::Time, damaged: &Damaged) -> sim::Time {
     let line = bench.board.line();
     let settings = line.settings();

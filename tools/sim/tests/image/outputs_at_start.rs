@@ -1,4 +1,4 @@
-//! Outputs from reset to the first scan: off, then START, with nothing in between, whatever the reset.
+//! Outputs from the reset to the first scan: off, then START, with no state in between, for every kind of reset.
 
 use register_map::configuration::START;
 use sim::{Module, Time};
@@ -8,7 +8,7 @@ use crate::{
     bench::{Bench, SLOT},
 };
 
-/// From reset to outputs that stand at START: what a plant may count on.
+/// Longest time from the reset until the outputs have their START values: the value for users.
 const SOON: Time = Time::from_ms(50);
 
 fn stored(values: [u16; 4]) -> Vec<(u16, u16)> {
@@ -18,7 +18,7 @@ fn stored(values: [u16; 4]) -> Vec<(u16, u16)> {
         .collect()
 }
 
-/// How a start comes about, and what it is called.
+/// Function that causes a start.
 type Begin = fn(&mut Bench);
 
 const BEGINNINGS: [(&str, Begin); 4] = [
@@ -28,7 +28,7 @@ const BEGINNINGS: [(&str, Begin); 4] = [
         bench.command(2);
     }),
     ("the watchdog", |bench| {
-        // The scan's handler: a branch to itself.
+        // A branch to its own address at the entry of the scan's handler.
         let scan = bench.board.symbol("EXTI1").expect("the handler") & !1;
         let was = bench
             .board
@@ -44,11 +44,11 @@ const BEGINNINGS: [(&str, Begin); 4] = [
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn digital_outputs_are_off_and_then_at_start_without_a_click() {
+fn digital_outputs_go_off_and_then_to_start_without_other_edges() {
     let mut bench = Bench::set_up(Module::Do4, &stored([1, 0, 1, 0]));
     bench.tolerant = true;
     for (what, begin) in BEGINNINGS {
-        // Before it, each output is what START is not.
+        // Before the start, each output has the opposite of its START value.
         bench.write_bits(SLOT, &[false, true, false, true]).unwrap();
         (0..4).for_each(|pin| bench.board.watch_pin('A', pin));
         let from = bench.board.now();
@@ -66,7 +66,7 @@ fn digital_outputs_are_off_and_then_at_start_without_a_click() {
                 _ => panic!("{what}, pin {pin}: {edges:?}"),
             }
         }
-        // The two that went off did so at the reset; START came soon after.
+        // The two outputs that went off did so at the reset. START followed soon after.
         let off = bench.board.pin_edges('A', 1).last().unwrap().0;
         let on = bench.board.pin_edges('A', 0).last().unwrap().0;
         let cut = if what == "power-on" {
@@ -101,7 +101,7 @@ fn relays_do_not_click_at_power_on() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn analog_outputs_go_from_what_the_dac_had_straight_to_start() {
+fn analog_outputs_go_from_the_stored_dac_values_directly_to_start() {
     let start = [100, 4095, 0, 2048];
     let mut bench = Bench::set_up(Module::Ao4, &stored(start));
     bench.tolerant = true;
@@ -115,7 +115,7 @@ fn analog_outputs_go_from_what_the_dac_had_straight_to_start() {
             bench.board.run_for(Time::from_us(100));
             let now = codes(&bench, [1, 2, 3, 4]);
             let known = (0..4).all(|n| now[n] == before[n] || now[n] == start[n]);
-            // COMMAND 2 restarts some milliseconds after its response.
+            // COMMAND 2 restarts the unit some milliseconds after its response.
             assert!(known, "{what}: {now:?}");
             assert!(
                 bench.board.now() - from < Time::from_ms(100),
@@ -129,16 +129,20 @@ fn analog_outputs_go_from_what_the_dac_had_straight_to_start() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn start_counts_from_the_next_start_and_only_when_saved() {
+fn start_values_are_used_from_the_next_start_and_only_when_saved() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     bench.tolerant = true;
     bench.configure(START + SLOT, &[1, 1, 0, 1]);
-    assert_eq!(bench.bits(1, SLOT, 4), Ok(vec![false; 4]), "not now");
+    assert_eq!(
+        bench.bits(1, SLOT, 4),
+        Ok(vec![false; 4]),
+        "START must not change an output now"
+    );
     bench.power_cycle();
     assert_eq!(
         bench.bits(1, SLOT, 4),
         Ok(vec![false; 4]),
-        "it was not saved"
+        "START was not saved"
     );
     bench.configure(START + SLOT, &[1, 1, 0, 1]);
     bench.save();

@@ -1,10 +1,10 @@
-//! The points of the slot, by every function that reaches them.
+//! The points of the slot, through every function that accesses them.
 
 use sim::{Channel, Module, Time};
 
 use crate::bench::{Bench, FIRST, adu};
 
-/// What a channel's output is.
+/// Returns whether a channel's output is on.
 fn on(bench: &Bench, channel: usize) -> bool {
     match bench.board.channel(channel) {
         Channel::Do { on } => on,
@@ -14,7 +14,7 @@ fn on(bench: &Bench, channel: usize) -> bool {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn four_inputs_follow_the_outside_by_both_functions() {
+fn four_inputs_return_the_pin_levels_through_both_functions() {
     let mut bench = Bench::new(Module::Di4, 1);
     for pattern in [0b0000u8, 0b0001, 0b1010, 0b0101, 0b1111, 0b1000, 0b0000] {
         for channel in 1..=4 {
@@ -43,20 +43,20 @@ fn an_input_is_debounced_for_five_milliseconds() {
     bench.board.run_for(Time::from_ms(3));
     bench.board.set_energised(1, false).unwrap();
     bench.board.run_for(Time::from_ms(10));
-    assert_eq!(read(&mut bench), 0, "a pulse of 3 ms is not seen");
+    assert_eq!(read(&mut bench), 0, "a pulse of 3 ms must be filtered");
     bench.board.set_energised(1, true).unwrap();
-    // The reply is made up some 13 ms later, at the end of the request and its t3.5.
-    assert_eq!(read(&mut bench), 1, "a level that stays is");
+    // The unit builds the reply about 13 ms later, at the end of the request and t3.5.
+    assert_eq!(read(&mut bench), 1, "a constant level must be read");
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn four_outputs_do_as_they_are_told_and_read_back() {
+fn four_outputs_follow_every_write_and_read_back() {
     let mut bench = Bench::new(Module::Do4, 1);
     let states = |bench: &Bench| [1, 2, 3, 4].map(|channel| on(bench, channel));
     assert_eq!(states(&bench), [false; 4]);
 
-    // One at a time: the reply is the request.
+    // One output at a time: the reply equals the request.
     for (address, value, expected) in [
         (0x10, 0xFF, [true, false, false, false]),
         (0x13, 0xFF, [true, false, false, true]),
@@ -67,7 +67,7 @@ fn four_outputs_do_as_they_are_told_and_read_back() {
         assert_eq!(states(&bench), expected);
     }
 
-    // Several at once; what is beyond the quantity in the byte does not count.
+    // Several outputs together; bits of the byte beyond the quantity are ignored.
     let reply = bench.ask(1, &[0x0F, 0, FIRST + 1, 0, 3, 1, 0b1111_0011]);
     assert_eq!(reply.as_deref(), Some(&[0x0F, 0, FIRST + 1, 0, 3][..]));
     assert_eq!(states(&bench), [false, true, true, false]);
@@ -98,7 +98,7 @@ fn a_write_reaches_its_output_before_the_reply_is_out() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_write_to_several_outputs_is_whole_or_not_at_all() {
+fn refused_write_to_several_outputs_changes_none_of_them() {
     let mut bench = Bench::new(Module::Do4, 1);
     for pin in 0..4 {
         bench.board.watch_pin('A', pin);
@@ -111,15 +111,18 @@ fn a_write_to_several_outputs_is_whole_or_not_at_all() {
     for pin in 0..4 {
         assert_eq!(bench.board.pin_edges('A', pin), []);
     }
-    // And one that is good moves all its pins together.
+    // A valid write changes all its pins together.
     bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x0F]).unwrap();
     let at = |pin| bench.board.pin_edges('A', pin)[0].0;
-    assert!(at(3) - at(0) < Time::from_us(20), "within one scan");
+    assert!(
+        at(3) - at(0) < Time::from_us(20),
+        "the pins change within one scan"
+    );
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_broadcast_is_done_in_silence() {
+fn broadcast_is_executed_without_a_reply() {
     let mut bench = Bench::new(Module::Do4, 1);
     assert_eq!(bench.ask(0, &[5, 0, FIRST + 1, 0xFF, 0]), None);
     assert!(on(&bench, 2));
@@ -128,7 +131,7 @@ fn a_broadcast_is_done_in_silence() {
         [1, 2, 3, 4].map(|c| on(&bench, c)),
         [true, false, false, true]
     );
-    // A read, an exception and nonsense are silence too, and change nothing.
+    // A read, an exception and an invalid request as broadcasts get no reply and change nothing.
     for pdu in [
         &[1, 0, FIRST, 0, 4][..],
         &[5, 0, 0x20, 0xFF, 0],
@@ -157,7 +160,7 @@ fn outputs_are_off_from_the_first_instant_and_after_every_power_on() {
     }
     bench.board.run_for(Time::from_ms(300));
     for pin in 0..4 {
-        assert_eq!(bench.board.pin_edges('A', pin), [], "no click at power-up");
+        assert_eq!(bench.board.pin_edges('A', pin), [], "no edge at power-up");
     }
     bench.ask(1, &[0x0F, 0, FIRST, 0, 4, 1, 0x0F]).unwrap();
     assert!(on(&bench, 1));

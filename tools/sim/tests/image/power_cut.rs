@@ -1,5 +1,5 @@
-//! Power cuts: at every single flash operation of a save and of the start after it, and at any instant
-//! under traffic. The configuration is the old or the new one, whole, and the device lives on.
+//! Power cuts: at every flash operation of a save and of the start after it, and at any instant under traffic. After
+//! the cut, the configuration is completely the old or completely the new one, and the device still works.
 
 use fastrand::Rng;
 use sim::{Channel, Module, Time, periph::flash::Torn};
@@ -10,19 +10,19 @@ use crate::bench::{
 
 const FILTER: u16 = 0x0120 + SLOT;
 const INVALID: u16 = 2;
-/// How far an operation is when the power goes. Each leaves other cells unsteady.
+/// Progress of the operation when the power fails. Each fraction leaves other cells unstable.
 const FRACTIONS: [f64; 4] = [0.0, 0.5, 0.75, 1.0];
-/// The half-words of the record these tests save: head, six pairs, CRC, seals.
+/// Number of half-words of the record that these tests save: head, six pairs, CRC, seals.
 const HALF_WORDS: u64 = 21;
-/// What makes a page spare: destroy its mark, erase, mark.
+/// Number of operations that prepare a spare page: destroy its mark, erase, write the mark.
 const ERASE: u64 = 3;
-/// Saves that may fail in a row: the place of the record may not read as erased, and then another is taken.
+/// Number of saves that may fail in a row: the place for the record may not read as erased; then the next is used.
 const TRIES: usize = 2;
-/// A save takes 2 ms, one that has to erase 30 more, in which the line is not served.
+/// A save takes 2 ms. A save that has to erase takes 30 ms more, during which the unit does not serve the line.
 const SAVE: Time = Time::from_ms(60);
 /// Time after which a save that only programs half-words has ended. A save that also erases takes longer.
 const PLAIN_SAVE: Time = Time::from_ms(6);
-/// Starts after a cut. Unsteady cells read differently at each of them.
+/// Number of starts after a cut. Unstable cells read differently at each start.
 const STARTS: usize = 2;
 
 fn bench() -> Bench {
@@ -31,12 +31,12 @@ fn bench() -> Bench {
     bench
 }
 
-/// Four settings that no other round has.
+/// Returns four settings that no other round has.
 fn set(round: u16) -> [u16; 4] {
     [0, 1, 2, 3].map(|n| 10 + (round * 4 + n) % 900)
 }
 
-/// Saves these settings; the lock is open.
+/// Saves these settings. The lock must be open.
 fn save(bench: &mut Bench, values: [u16; 4]) {
     bench.write(FILTER, &values).unwrap();
     for _ in 0..TRIES {
@@ -53,7 +53,7 @@ fn save(bench: &mut Bench, values: [u16; 4]) {
     panic!("{values:?} are not saved");
 }
 
-/// Erased bytes at the end of each of the store's pages.
+/// Returns the number of erased bytes at the end of each of the store's pages.
 fn rooms(bench: &Bench) -> [usize; 2] {
     let flash = bench.board.flash();
     pages().map(|page| {
@@ -62,7 +62,7 @@ fn rooms(bench: &Bench) -> [usize; 2] {
     })
 }
 
-/// Which of two sets is stored after a cut, and that all else is as it should be.
+/// Returns the index of the set that is stored after a cut. Asserts that the rest of the device is in order.
 fn after_cut(bench: &mut Bench, sets: [[u16; 4]; 2], what: &str) -> usize {
     let mut first = None;
     for start in 0..STARTS {
@@ -87,14 +87,14 @@ fn after_cut(bench: &mut Bench, sets: [[u16; 4]; 2], what: &str) -> usize {
     place.unwrap_or_else(|| panic!("{what}: {values:?} is neither of {sets:?}"))
 }
 
-/// Cuts the power in every operation of a save. `prepare` brings the store to where that save is to
-/// find it. The number of operations the save has.
+/// Cuts the power in every operation of a save. `prepare` brings the store to the state before that save. Returns the
+/// number of operations of the save.
 fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u64 {
     let mut bench = bench();
     let mut round = 0;
     let mut seen = [0, 0];
     for operation in 1.. {
-        // Two of the four instants, by turns: over neighbouring half-words all come.
+        // Two of the four instants, in turns: neighbouring half-words together cover all of them.
         for fraction in FRACTIONS
             .into_iter()
             .skip(operation as usize % 2)
@@ -109,7 +109,7 @@ fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u6
             bench.configure(FILTER, &sets[1]);
             bench.board.cut_in_flash_operation(operation, fraction);
             bench.write(0x0108, &[1]).unwrap();
-            // It may have waited for the supply.
+            // The save may have waited for the supply.
             bench.board.run_for(Time::from_ms(20));
             bench.board.set_supply_mv(GOOD_MV).unwrap();
             bench.board.run_for(Time::from_ms(100));
@@ -124,9 +124,9 @@ fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u6
     unreachable!()
 }
 
-/// Saves until the page in use has no room for another record; the other one is spare.
+/// Saves until the page in use has no room for another record. The other page is then spare.
 fn fill(bench: &mut Bench, round: &mut u16) {
-    // Both pages have something, or a mark; the one with more is in use.
+    // Both pages have records or a mark; the page with more bytes is in use.
     while rooms(bench).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
         *round += 1;
         save(bench, set(*round));
@@ -140,24 +140,24 @@ fn fill(bench: &mut Bench, round: &mut u16) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_any_operation_of_a_save_behind_the_last_record() {
-    let operations = every_cut_of_a_save(|_, _| {}, "behind the last");
+fn at_any_operation_of_a_save_after_the_last_record() {
+    let operations = every_cut_of_a_save(|_, _| {}, "after the last record");
     assert_eq!(operations, HALF_WORDS, "half-words of the record alone");
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_a_save_that_changes_pages() {
-    let operations = every_cut_of_a_save(fill, "onto the other page");
+    let operations = every_cut_of_a_save(fill, "to the other page");
     assert_eq!(
         operations,
         HALF_WORDS + ERASE,
-        "it finds the other page erased, and erases the one it leaves"
+        "the other page is already erased; the save erases the old page"
     );
 }
 
-/// A save that is ordered while the supply is too low, when neither page has room: the start could not erase the page
-/// that is not in use, so the save has to when the supply is back.
+/// A save that is requested while the supply is too low, when neither page has room. The start could not erase the page
+/// that is not in use, so the save has to erase it when the supply is back.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn at_any_operation_of_a_save_that_has_to_erase() {
@@ -175,14 +175,14 @@ fn at_any_operation_of_a_save_that_has_to_erase() {
         bench.started();
         bench.unlock();
     };
-    let operations = every_cut_of_a_save(prepare, "with an erase before it");
+    let operations = every_cut_of_a_save(prepare, "with an erase in front");
     assert!(
         operations >= HALF_WORDS + 2 * (ERASE - 1),
-        "{operations} operations: an erase before it and one behind it"
+        "{operations} operations: one erase in front of the record and one after it"
     );
 }
 
-/// Cuts the power in every operation of the start that makes room again, which leaves `torn`.
+/// Cuts the power in every operation of the start that makes room again. `torn` is how cut operations read.
 fn every_cut_of_the_start_that_makes_room_again(torn: Torn) {
     let mut bench = bench();
     bench.board.set_torn(torn);
@@ -193,7 +193,7 @@ fn every_cut_of_the_start_that_makes_room_again(torn: Torn) {
             bench.unlock();
             save(&mut bench, set(round));
             bench.configure(FILTER, &set(round + 1));
-            // A record cut in two: the next start moves the one before it to the other page.
+            // A record cut in two: the next start moves the record before it to the other page.
             bench.board.cut_in_flash_operation(HALF_WORDS / 2, 0.5);
             bench.write(0x0108, &[1]).unwrap();
             bench.board.run_for(Time::from_ms(60));
@@ -216,23 +216,23 @@ fn every_cut_of_the_start_that_makes_room_again(torn: Torn) {
     }
 }
 
-// One test for each, so that they run side by side: they are the longest there are.
+// One test for each kind, so that they run in parallel: they take longest.
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_any_operation_of_the_start_that_makes_room_again_with_a_mess() {
+fn at_any_operation_of_the_start_that_makes_room_with_unsteady_cells() {
     every_cut_of_the_start_that_makes_room_again(Torn::Mess);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_any_operation_of_the_start_that_makes_room_again_with_nothing_changed() {
+fn at_any_operation_of_the_start_that_makes_room_with_old_bits() {
     every_cut_of_the_start_that_makes_room_again(Torn::Before);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_any_operation_of_the_start_that_makes_room_again_with_all_changed() {
+fn at_any_operation_of_the_start_that_makes_room_with_new_bits() {
     every_cut_of_the_start_that_makes_room_again(Torn::After);
 }
 
@@ -263,10 +263,10 @@ fn at_any_operation_of_the_very_first_start() {
             bench.started();
             assert!(
                 !bench.status(INVALID),
-                "nothing was stored: operation {operation}"
+                "an empty store is not invalid: operation {operation}"
             );
             assert_eq!(bench.register(0x0101), 96);
-            // What is saved now is there to stay.
+            // A save now must be kept.
             bench.unlock();
             save(&mut bench, set(1));
             bench.power_cycle();
@@ -277,14 +277,14 @@ fn at_any_operation_of_the_very_first_start() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_any_instant_under_traffic_and_it_answers_again() {
+fn at_any_instant_under_traffic() {
     let mut rng = Rng::with_seed(0x6D6F_6469_6F03);
     let mut bench = Bench::set_up(Module::Do4, &[(0x0101, 1152)]);
     bench.tolerant = true;
     let mut stored = [0u16; 4];
     let mut saves = 0;
     for round in 0..150 {
-        // What may have come to be stored by the end of this round.
+        // The settings that may be stored at the end of this round.
         let mut candidates = vec![stored];
         let cut = bench.board.now() + Time::from_us(rng.u64(1_000..150_000));
         bench.unlock();

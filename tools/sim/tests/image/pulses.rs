@@ -1,5 +1,5 @@
-//! Pulses of noise on the line, each too short for a start bit (RM0008 27.3.3): they delay a reply by one
-//! character at most, and a real character that begins just before t3.5 still belongs to the frame.
+//! Pulses of noise on the line, each too short for a start bit (RM0008 27.3.3): they delay a reply by at most one
+//! character, and a real character that begins just before t3.5 still belongs to the frame.
 
 use register_map::{codes::Baud, configuration};
 use sim::{Module, Time};
@@ -9,18 +9,18 @@ use crate::bench::{Bench, FIRST, adu};
 /// A read of the four inputs.
 const REQUEST: [u8; 6] = [1, 2, 0, FIRST, 0, 4];
 
-/// Rates of pulses, in pulses a second.
+/// Number of pulses per second.
 const PULSE_RATES: [u32; 6] = [10, 100, 333, 1000, 10_000, 100_000];
 
 fn at(baud: Baud) -> Bench {
     let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
-    // The first t3.5 of silence.
+    // Wait for the first t3.5 of silence.
     bench.board.run_for(Time::from_ms(40));
     bench
 }
 
-/// Widths of a pulse, from the shortest that TIM1 sees to the longest that is no start bit, and that leave the
-/// line high for three quarters of the time.
+/// Returns widths of pulses, from the shortest that TIM1 detects to the longest that is not a start bit, with the line
+/// high for at least three quarters of the time.
 fn widths(bench: &Bench, period: Time) -> Vec<Time> {
     let bit = bench.bit().as_ns();
     let widths = [100, bit / 20, bit / 4, bit * 9 / 20].map(Time::from_ns);
@@ -42,8 +42,8 @@ fn pulses(bench: &mut Bench, from: Time, to: Time, period: Time, width: Time) {
     }
 }
 
-/// From the end of the request to the unit's taking the bus; `None` when there is no reply. The driver shows it,
-/// because a pulse just before the reply may hide its first start bit from the listener.
+/// Returns the time from the end of the request until the unit enables its driver; `None` when there is no reply. The
+/// time is taken from the driver because a pulse just before the reply may hide its first start bit from the listener.
 fn turnaround(bench: &mut Bench, end: Time) -> Option<Time> {
     let limit = end + bench.t35() * 3 + bench.characters(20);
     while bench.board.now() < limit {
@@ -63,8 +63,8 @@ fn turnaround(bench: &mut Bench, end: Time) -> Option<Time> {
     None
 }
 
-/// The latest that a reply begins without pulses, after the end of its request. The receiver may see that end a
-/// sixteenth of a bit late.
+/// Returns the latest time after the end of a request at which the reply begins when there are no pulses. The receiver
+/// may see that end a sixteenth of a bit late.
 fn latest(bench: &Bench) -> Time {
     bench.t35() + bench.sixteenth() + Time::from_us(60)
 }
@@ -132,7 +132,7 @@ fn pulses_before_a_request_do_not_delay_its_reply() {
             let period = Time::cycles(1, rate);
             for width in widths(&bench, period) {
                 let begin = bench.board.now();
-                // The receiver looks at a pulse for most of a bit before it takes it for noise.
+                // The receiver samples a pulse for most of a bit before it rejects the pulse as noise.
                 let start = begin + Time::from_ms(20);
                 let last = start - bench.bit();
                 pulses(&mut bench, begin, last, period, width);
@@ -155,7 +155,7 @@ fn pulses_between_the_characters_of_a_request_do_not_damage_it() {
         let mut bench = at(baud);
         let now = bench.board.now();
         let mut end = now;
-        // Each character followed by a character's silence, with a pulse in it.
+        // A silence of one character follows each character, with a pulse in it.
         for byte in adu(&REQUEST) {
             end = bench.board.line().send(end, &[byte]);
             let pause = bench.characters(1);
@@ -196,7 +196,7 @@ fn a_character_that_begins_just_before_t35_belongs_to_the_frame_with_pulses_too(
             let (first, rest) = frame.split_at(5);
             let now = bench.board.now();
             let pause = bench.board.line().send(now, first);
-            // Two bits are what the receiver needs to see the last character's end.
+            // The receiver needs two bits to detect the end of the last character.
             let gap = bench.t35() - bench.bit() * 2;
             if noisy {
                 let (at, width) = (pause + bench.bit(), Time::from_us(1).min(bench.bit()));

@@ -1,7 +1,7 @@
-//! Every configuration register takes the ends of its range and refuses what is just beyond.
+//! Every configuration register accepts the ends of its range and refuses the values just outside.
 //!
-//! Driven by the register map's rules, which firmware and documentation share; that those are the
-//! contract's is for `register-map`'s own tests.
+//! The values are the rules of the register map, which firmware and documentation share. The tests of `register-map`
+//! compare those rules with the contract.
 
 use register_map::{
     Module, Rule, Values,
@@ -15,10 +15,10 @@ use sim::Time;
 use crate::LAYOUT;
 use crate::bench::{Bench, SLOT};
 
-/// Allowed by the map, but refused as a value until the firmware can do it: the LoRa line.
+/// Values that the map allows and the firmware refuses because it does not support them yet: the LoRa line.
 const NOT_YET: [(u16, u16); 1] = [(LORA, 1)];
 
-/// The values at the ends of a set, and those just outside.
+/// Returns the values at the ends of a set, and the values just outside.
 fn ends(values: Values) -> (Vec<u16>, Vec<u16>) {
     let inside: Vec<u16> = match values {
         Values::Range { min, max } => vec![min, max],
@@ -33,7 +33,7 @@ fn ends(values: Values) -> (Vec<u16>, Vec<u16>) {
     (inside, outside)
 }
 
-/// The registers of a rule to try: all of a few, the first, the slot's and the last of those by point.
+/// Returns the registers of a rule to try: all if there are few, otherwise the first, the slot's and the last.
 fn some(rule: &Rule) -> Vec<u16> {
     let slot = rule.first + SLOT;
     match point_of(rule.first) {
@@ -57,7 +57,7 @@ fn try_every_register(module: Module) {
         .filter(|rule| ![KEY, COMMAND].contains(&rule.first))
     {
         for address in some(rule) {
-            // MODULE of a slot is for `module_choice`: it changes what others take.
+            // `module_choice` tests MODULE of a slot, which changes the values that other registers accept.
             let port = (address.wrapping_sub(MODULES) < PORTS).then(|| address - MODULES + 1);
             if port.is_some_and(|port| LAYOUT.board.has_slot(port)) {
                 continue;
@@ -67,17 +67,17 @@ fn try_every_register(module: Module) {
                 .and_then(|channel| module.points().get(usize::from(channel)).copied())
                 .unwrap_or(Kind::None);
             let (inside, outside) = ends(match port {
-                // Without a slot there is no module.
+                // A port without a slot cannot have a module.
                 Some(_) => Values::only(0),
                 None => rule.values_for(kind),
             });
             let stored = bench.register(address);
             bench.unlock();
-            // What it says of itself counts at once.
+            // The response delay is in force immediately.
             let delayed = address == RESPONSE_DELAY;
             bench.patience = Time::from_ms(if delayed { 1_002 } else { 0 });
             for value in inside {
-                // Seven data bits are for ASCII mode.
+                // Seven data bits are only allowed in ASCII mode.
                 let seven_bits = address == FORMAT && value > 3;
                 let expected = if seven_bits || NOT_YET.contains(&(address, value)) {
                     Err(3)
@@ -109,7 +109,7 @@ fn try_every_register(module: Module) {
         }
     }
     assert!(tried > 100, "only {tried}");
-    assert!(!bench.status(8), "all are as they were");
+    assert!(!bench.status(8), "all settings are restored");
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn with_word_inputs_and_outputs() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn key_and_command_take_what_they_name_alone() {
+fn key_and_command_accept_only_their_defined_values() {
     let mut bench = Bench::set_up(Module::Do4, &[]);
     bench.unlock();
     for value in [0, 1, 0x5A16, 0x5A18, 0x175A, 0xFFFF] {

@@ -1,4 +1,4 @@
-//! Requests that are refused: the exception code, and that nothing changes.
+//! Refused requests: their exception code, and that they change nothing.
 
 use sim::{Channel, Module};
 
@@ -14,14 +14,14 @@ fn exception(bench: &mut Bench, pdu: &[u8]) -> u8 {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn each_fault_has_its_exception_and_the_first_check_that_fails_decides() {
+fn first_failed_check_decides_the_exception_code() {
     let mut bench = Bench::new(Module::Do4, 1);
     let cases: &[(&[u8], u8)] = &[
-        // 01: no such function.
+        // 01: unknown function.
         (&[0x41], 1),
         (&[0x09], 1),
         (&[0x7F, 0, 0, 0, 0], 1),
-        // 03: quantity, before the address is looked at.
+        // 03: the quantity, which is checked before the address.
         (&[0x01, 0, FIRST, 0, 0], 3),
         (&[0x01, 0, FIRST, 0x07, 0xD1], 3),
         (&[0x02, 0xFF, 0xFF, 0, 0], 3),
@@ -37,18 +37,18 @@ fn each_fault_has_its_exception_and_the_first_check_that_fails_decides() {
         (&[0x10, 0, FIRST, 0, 1, 3, 0, 0, 0], 3),
         (&[0x10, 0, FIRST, 0, 2, 2, 0, 0], 3),
         (&[0x10, 0, FIRST, 0, 1, 255, 0, 1], 3),
-        // 03: the form of a coil's value, before its address.
+        // 03: an invalid coil value, which is checked before the address.
         (&[0x05, 0, FIRST, 0x00, 0x01], 3),
         (&[0x05, 0, FIRST, 0x12, 0x34], 3),
         (&[0x05, 0, FIRST, 0xFF, 0x01], 3),
         (&[0x05, 0x7F, 0x10, 0x12, 0x34], 3),
-        // 03: cut short, or with bytes to spare.
+        // 03: requests that are too short or too long.
         (&[0x01, 0, FIRST, 0], 3),
         (&[0x01, 0, FIRST, 0, 4, 0], 3),
         (&[0x05, 0, FIRST, 0xFF], 3),
         (&[0x0F, 0, FIRST, 0, 4, 1, 0x0F, 0], 3),
         (&[0x06, 0, FIRST, 0], 3),
-        // 02: what is not there.
+        // 02: addresses without a point.
         (&[0x01, 0, 0x0F, 0, 1], 2),
         (&[0x01, 0, 0x14, 0, 1], 2),
         (&[0x01, 0, FIRST, 0, 5], 2),
@@ -86,21 +86,21 @@ fn inputs_cannot_be_written() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_largest_requests_are_taken() {
+fn the_largest_requests_are_accepted() {
     let mut bench = Bench::new(Module::Do4, 1);
-    // 1968 coils: 255 bytes on the line, refused for their address alone.
+    // 1968 coils: 255 bytes on the line, refused only because of the address.
     let coils = [&[0x0F, 0, FIRST, 0x07, 0xB0, 246][..], &[0xFF; 246]].concat();
     assert_eq!(exception(&mut bench, &coils), 2);
     let registers = [&[0x10, 0, FIRST, 0, 123, 246][..], &[0; 246]].concat();
     assert_eq!(exception(&mut bench, &registers), 2);
-    // 1969 are one too many.
+    // 1969 coils are one too many.
     let coils = [&[0x0F, 0, FIRST, 0x07, 0xB1, 247][..], &[0xFF; 247]].concat();
     assert_eq!(exception(&mut bench, &coils), 3);
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_function_code_that_is_none_gets_silence() {
+fn invalid_function_code_gets_no_reply() {
     let mut bench = Bench::new(Module::Do4, 1);
     for function in [0x00, 0x80, 0x81, 0x8F, 0xFF] {
         assert_eq!(

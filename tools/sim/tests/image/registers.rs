@@ -5,7 +5,7 @@ use sim::Time;
 use crate::bench::Bench;
 
 impl Bench {
-    /// What is behind the function code of the reply to a PDU, or the exception's code.
+    /// Sends a PDU. Returns the bytes after the function code of the reply, or the exception code.
     pub fn request(&mut self, pdu: &[u8]) -> Result<Vec<u8>, u8> {
         // The first reply after a save may wait for an erase.
         let patience = self.patience;
@@ -26,7 +26,7 @@ impl Bench {
         Ok(data[1..].to_vec())
     }
 
-    /// Bits by function 01 or 02.
+    /// Reads bits by function 01 or 02.
     pub fn bits(&mut self, function: u8, address: u16, count: u16) -> Result<Vec<bool>, u8> {
         let data = self.read(function, address, count)?;
         let bits = data
@@ -42,7 +42,7 @@ impl Bench {
         Ok(bits)
     }
 
-    /// Words by function 03 or 04.
+    /// Reads words by function 03 or 04.
     pub fn words(&mut self, function: u8, address: u16, count: u16) -> Result<Vec<u16>, u8> {
         let data = self.read(function, address, count)?;
         assert_eq!(data.len(), usize::from(count) * 2);
@@ -50,23 +50,23 @@ impl Bench {
         Ok(words.map(|w| u16::from_be_bytes([w[0], w[1]])).collect())
     }
 
-    /// Registers by function 03, or the exception.
+    /// Reads registers by function 03. Returns the values or the exception code.
     pub fn registers(&mut self, address: u16, count: u16) -> Result<Vec<u16>, u8> {
         self.words(3, address, count)
     }
 
-    /// One register by function 03, which must exist.
+    /// Returns one register, which must exist, by function 03.
     pub fn register(&mut self, address: u16) -> u16 {
         self.registers(address, 1).expect("the register exists")[0]
     }
 
-    /// A value of two registers, high word first.
+    /// Returns a value of two registers, high word first.
     pub fn long(&mut self, address: u16) -> u32 {
         let words = self.registers(address, 2).expect("the registers exist");
         u32::from(words[0]) << 16 | u32::from(words[1])
     }
 
-    /// Writes by function 05 or 06, the value as it stands in the frame.
+    /// Writes by function 05 or 06, with the value exactly as in the frame.
     pub fn write_single(&mut self, function: u8, address: u16, value: u16) -> Result<(), u8> {
         let [[a, b], [c, d]] = [address, value].map(u16::to_be_bytes);
         let echo = self.request(&[function, a, b, c, d])?;
@@ -74,7 +74,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Switches one bit by function 05.
+    /// Sets or clears one bit by function 05.
     pub fn write_bit(&mut self, address: u16, on: bool) -> Result<(), u8> {
         self.write_single(5, address, if on { 0xFF00 } else { 0 })
     }
@@ -88,7 +88,7 @@ impl Bench {
         self.write_several(15, address, bits.len(), &bytes)
     }
 
-    /// Writes registers by function 10, or the exception.
+    /// Writes registers by function 10. Returns the exception code if there is one.
     pub fn write(&mut self, address: u16, values: &[u16]) -> Result<(), u8> {
         let bytes: Vec<u8> = values
             .iter()
@@ -111,7 +111,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Whether a bit of the status register (0x020A) is set.
+    /// Returns whether a bit of the status register (0x020A) is set.
     pub fn status(&mut self, mask: u16) -> bool {
         self.register(0x020A) & mask != 0
     }
@@ -128,33 +128,33 @@ impl Bench {
             .unwrap_or_else(|code| panic!("{address:#06x} <- {values:?}: exception {code}"));
     }
 
-    /// Gives a COMMAND, with the lock opened for it.
+    /// Opens the lock and writes a value to COMMAND.
     pub fn command(&mut self, command: u16) {
         self.configure(0x0108, &[command]);
     }
 
     /// Saves the configuration and waits for it.
     pub fn save(&mut self) {
-        self.write(0x0108, &[1]).expect("COMMAND takes a save");
+        self.write(0x0108, &[1]).expect("COMMAND accepts a save");
         self.board.run_for(sim::Time::from_ms(100));
-        assert!(!self.status(8), "it is saved");
+        assert!(!self.status(8), "the configuration is saved");
     }
 
-    /// Power off and on, and time to start.
+    /// Switches the power off and on, with time to start.
     pub fn power_cycle(&mut self) {
         self.board.cycle();
         self.started();
     }
 
-    /// Orders a restart over the line, and gives it time.
+    /// Requests a restart over the line, with time for it.
     pub fn restart(&mut self) {
         let before = self.board.resets();
         self.command(2);
         self.started();
-        assert_eq!(self.board.resets(), before + 1, "it restarted once");
+        assert_eq!(self.board.resets(), before + 1, "one restart");
     }
 
-    /// Time to start, then an empty line.
+    /// Waits for the start and discards the bytes on the line.
     pub fn started(&mut self) {
         self.board.run_for(sim::Time::from_ms(300));
         self.board.line().take_received();

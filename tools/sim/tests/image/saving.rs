@@ -1,4 +1,4 @@
-//! Saving while the line is busy: at 115200, each request t3.5 behind the last reply, none is lost.
+//! Saving while the line is busy: at 115200 bit/s, with each request t3.5 after the last reply, no request is lost.
 
 use register_map::{codes::Baud, configuration};
 use sim::{Corner, Module, Time, periph::flash::Durations};
@@ -8,13 +8,13 @@ use crate::bench::{Bench, FIRST, PAGE_SIZE, SLOT, adu, corner, pages};
 const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
 
-/// The slowest flash there is (DS5319 table 28).
+/// The longest durations of flash operations (DS5319 table 28).
 const SLOWEST: Durations = Durations {
     erase: Time::from_ms(40),
     program: Time::from_us(70),
 };
 
-/// Settings by point, with a value that is not the default: the register of the first point and the value.
+/// Settings by point, each with a value that is not the default: the register of the first point and the value.
 const BLOCKS: [(u16, u16); 6] = [
     (0x0160, 4000),
     (0x01A0, 1),
@@ -24,15 +24,16 @@ const BLOCKS: [(u16, u16); 6] = [
     (0x01E0, 1),
 ];
 
-/// Settings whose record fills two fifths of a page: the third record goes to the other page, and a start makes room.
+/// Returns settings whose record fills two fifths of a page: the third record goes to the other page, and a start makes
+/// room.
 fn large() -> Vec<(u16, u16)> {
-    // Three blocks are 400 bytes, six 800.
+    // Three blocks need 400 bytes, six need 800.
     let blocks = BLOCKS.iter().take(3 * PAGE_SIZE / 1024);
     let pairs = blocks.map(|&(first, value)| (0..32).map(move |n| (first + n, value)));
     pairs.flatten().collect()
 }
 
-/// A master that asks without a pause, and keeps count.
+/// A master that sends requests without a pause and counts them.
 struct Master {
     bench: Bench,
     asked: u32,
@@ -51,19 +52,20 @@ impl Master {
         }
     }
 
-    /// One request t3.5 after the last reply; its reply must come.
+    /// Sends a request t3.5 after the last reply and returns the reply, which must arrive.
     fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
         let reply = self.try_ask(pdu);
-        reply.unwrap_or_else(|| panic!("request {} {pdu:02X?} got no answer", self.asked))
+        reply.unwrap_or_else(|| panic!("request {} {pdu:02X?} got no reply", self.asked))
     }
 
-    /// The same; `None` when no reply begins within 60 ms. How late it began is kept, if it was.
+    /// Sends a request as `ask` does. Returns `None` when no reply begins within 60 ms. Stores the delay of a late
+    /// reply.
     fn try_ask(&mut self, pdu: &[u8]) -> Option<Vec<u8>> {
         let bench = &mut self.bench;
         self.asked += 1;
         let now = bench.board.now();
         let end = bench.board.line().send(now, &adu(&[&[1], pdu].concat()));
-        // A half-word's programming may hold the reply up by as long as it takes.
+        // Programming a half-word may delay the reply by the duration of the operation.
         let due = end + bench.t35() + Time::from_us(300);
         bench.board.run_until(due);
         while !bench.board.driver_enable() && bench.board.now() < due + Time::from_ms(60) {
@@ -76,8 +78,8 @@ impl Master {
             bench.board.run_for(Time::from_us(20));
         }
         bench.board.run_for(bench.t35());
-        let heard = bench.board.line().take_received();
-        let reply: Vec<u8> = heard.iter().map(|character| character.byte).collect();
+        let received = bench.board.line().take_received();
+        let reply: Vec<u8> = received.iter().map(|character| character.byte).collect();
         if reply.is_empty() {
             return None;
         }
@@ -95,12 +97,12 @@ impl Master {
         self.ask(&[6, a, b, c, d]);
     }
 
-    /// Orders a save, and asks on until it is complete.
+    /// Requests a save and sends requests until it is complete.
     fn save(&mut self) {
         self.write(0x0108, 1);
         let from = self.asked;
         loop {
-            // Short and long ones, reads and writes.
+            // Short and long requests, reads and writes.
             self.ask(&[1, 0, FIRST, 0, 4]);
             self.ask(&[3, 1, 0x20, 0, 32]);
             self.ask(&[16, 3, 0x30, 0, 2, 4, 0, 0, 0, 0]);
@@ -127,7 +129,7 @@ fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     assert!(programmed > 40 * 8, "only {programmed} operations");
     assert!(
         master.late.len() <= 1,
-        "one page was filled: {:?}",
+        "more than one page was filled: {:?}",
         master.late
     );
     assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
@@ -136,11 +138,11 @@ fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![46, 47, 48, 49]));
 }
 
-/// The page that is no longer needed is erased behind the save: one reply is late by what is left of the erase when the
-/// request ends, and nothing is lost.
+/// The page that is no longer needed is erased after the save. One reply is late by the rest of the erase at the end of
+/// the request, and nothing is lost.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn not_even_the_erases_of_many_saves_lose_a_request() {
+fn erases_of_many_saves_lose_no_request() {
     let mut master = Master::new(Module::Di4, &large());
     master.write(0x0100, 0x5A17);
     for n in 0..14 {
@@ -150,7 +152,7 @@ fn not_even_the_erases_of_many_saves_lose_a_request() {
     let late = &master.late;
     assert!(
         (5..=8).contains(&late.len()),
-        "one each two saves: {late:?}"
+        "one late reply for every two saves: {late:?}"
     );
     assert!(late.iter().all(|late| *late < SLOWEST.erase), "{late:?}");
     assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
@@ -198,17 +200,17 @@ fn a_change_made_while_a_save_runs_is_not_part_of_it_and_another_save_is_busy() 
     assert_eq!(
         bench.write(0x0108, &[1]),
         Err(6),
-        "the last is not complete"
+        "the last save is not complete"
     );
     bench.board.run_for(Time::from_ms(300));
     assert_eq!(bench.register(FILTER), 88);
-    assert!(bench.status(UNSAVED), "88 is not saved");
+    assert!(bench.status(UNSAVED), "the value 88 is not saved");
     bench.power_cycle();
     assert_eq!(bench.register(FILTER), 77);
 }
 
-/// While the background holds the device, no request is served. Neither is one while flash is programmed, by code in
-/// RAM: that takes as long as it takes.
+/// No request is served while the background task holds the device, nor while code in RAM programs the flash, which
+/// takes the time of the flash operation.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time_35_at_the_slow_corner() {
@@ -236,7 +238,10 @@ fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time_35_at_t
             since = None;
         }
     }
-    assert!(board.flash_operations() > operations + 190, "it was saved");
+    assert!(
+        board.flash_operations() > operations + 190,
+        "the save is complete"
+    );
     let most = if corner() == Corner::Slow { 35 } else { 20 };
     assert!(
         longest < Time::from_us(most),
@@ -257,7 +262,8 @@ fn a_restart_waits_for_a_running_save() {
     assert_eq!(bench.register(FILTER), 77);
 }
 
-/// Others talk on the bus without a pause while settings are saved and pages are erased: every frame is heard.
+/// Other units communicate without a pause while settings are saved and pages are erased: the unit receives every
+/// frame.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn no_byte_is_lost_at_any_rate_while_saves_run() {
@@ -273,7 +279,7 @@ fn no_byte_is_lost_at_any_rate_while_saves_run() {
             assert_eq!(bench.ask(1, &[8, 0, 10, 0, 0]), Some(vec![8, 0, 10, 0, 0]));
             let operations = bench.board.flash_operations();
             bench.write(0x0108, &[1]).unwrap();
-            // A read of this unit's neighbour, and its reply, again and again.
+            // A read of another unit and its reply, repeated.
             let request = adu(&[2, 3, 0, 0, 0, 100]);
             let reply = adu(&[&[2, 3, 200][..], &[0x5A; 200]].concat());
             let end = bench.board.now() + Time::from_ms(200);
@@ -290,17 +296,17 @@ fn no_byte_is_lost_at_any_rate_while_saves_run() {
             }
             let operations = bench.board.flash_operations() - operations;
             assert!(operations > 190, "{baud:?}: {operations} operations");
-            let heard = bench.ask(1, &[8, 0, 11, 0, 0]).expect("an answer");
-            let heard = u16::from_be_bytes([heard[3], heard[4]]);
-            // The order to save and the question are heard, too.
-            assert_eq!(heard, sent + 2, "{baud:?}, save {n}");
-            let errors = bench.ask(1, &[8, 0, 12, 0, 0]).expect("an answer");
+            let counted = bench.ask(1, &[8, 0, 11, 0, 0]).expect("a reply");
+            let counted = u16::from_be_bytes([counted[3], counted[4]]);
+            // The unit has also received the request to save and the request that reads the counter.
+            assert_eq!(counted, sent + 2, "{baud:?}, save {n}");
+            let errors = bench.ask(1, &[8, 0, 12, 0, 0]).expect("a reply");
             assert_eq!(errors, [8, 0, 12, 0, 0], "{baud:?}");
         }
     }
 }
 
-/// All tasks but those in RAM stand still in an erase: the clocks make up for it.
+/// All tasks except those in RAM stop during an erase: the clocks correct for it.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn uptime_and_communication_watchdog_are_right_over_many_erases() {
@@ -309,7 +315,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
     master.write(0x0100, 0x5A17);
     let bench = &mut master.bench;
     bench.write_bits(SLOT, &[true; 4]).unwrap();
-    // Waits until the uptime shows another second. Gives the time, some 20 ms late, and that second.
+    // Waits until the uptime shows another second. Returns the time, about 20 ms late, and that second.
     let next_second = |bench: &mut Bench| {
         bench.patience = Time::ZERO;
         let was = bench.long(0x0208);
@@ -331,7 +337,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
         bench.configure(FILTER, &[10 + n]);
         let before = spare(bench);
         bench.write(0x0108, &[1]).unwrap();
-        // A request every 90 ms holds a time-out of 100 ms off, also when it comes in an erase.
+        // A request every 90 ms keeps a time-out of 100 ms from tripping, even during an erase.
         for _ in 0..6 {
             let next = bench.sent + Time::from_ms(90);
             bench.board.run_until(next);
@@ -350,7 +356,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
         counted.abs_diff(passed) <= 100,
         "{counted} ms of {passed} ms"
     );
-    // Without requests it trips.
+    // Without requests the watchdog trips.
     bench.board.run_for(Time::from_ms(110));
     assert!(bench.status(1));
 }

@@ -7,10 +7,10 @@ use sim::Module;
 use crate::LAYOUT;
 use crate::bench::{Bench, MODULE, PORT};
 
-/// Groups of records: file, first record and how many.
+/// Groups of records: file, first record and number of records.
 type Groups<'a> = &'a [(u16, u16, u16)];
 
-/// The PDU of function 14.
+/// Returns the PDU of function 14.
 fn request(groups: Groups<'_>) -> Vec<u8> {
     let mut pdu = vec![0x14, groups.len() as u8 * 7];
     for (file, record, count) in groups {
@@ -25,7 +25,7 @@ fn request(groups: Groups<'_>) -> Vec<u8> {
 }
 
 impl Bench {
-    /// Reads groups of records by one request; the bytes of each, or the exception.
+    /// Reads groups of records by one request. Returns the bytes of each group, or the exception code.
     fn read_file(&mut self, groups: Groups<'_>) -> Result<Vec<Vec<u8>>, u8> {
         let data = self.request(&request(groups))?;
         assert_eq!(usize::from(data[0]), data.len() - 1, "the byte count");
@@ -33,7 +33,7 @@ impl Bench {
         let read = groups.iter().map(|(_, _, count)| {
             let bytes = usize::from(*count) * 2;
             let (group, others) = rest.split_at(2 + bytes);
-            assert_eq!(group[..2], [bytes as u8 + 1, 6], "the group's head");
+            assert_eq!(group[..2], [bytes as u8 + 1, 6], "the header of the group");
             rest = others;
             group[2..].to_vec()
         });
@@ -46,7 +46,7 @@ impl Bench {
     fn self_description(&mut self, groups: u16) -> Vec<u8> {
         let head = self.read_file(&[(1, 0, 2)]).unwrap().concat();
         let records = records(u16::from_be_bytes([head[0], head[1]]));
-        // A reply has 251 bytes for groups; each begins with 2 bytes.
+        // A reply has 251 bytes for groups, and each group begins with 2 bytes.
         let of_each = (251 / groups - 2) / 2;
         let starts: Vec<u16> = (0..records).step_by(of_each.into()).collect();
         let mut file = Vec::new();
@@ -57,7 +57,11 @@ impl Bench {
                 .collect();
             file.extend(self.read_file(&wanted).unwrap().concat());
         }
-        assert_eq!(self.read_file(&[(1, records, 1)]), Err(2), "beyond the end");
+        assert_eq!(
+            self.read_file(&[(1, records, 1)]),
+            Err(2),
+            "a record beyond the end"
+        );
         file
     }
 
@@ -77,7 +81,7 @@ impl Bench {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn file_1_describes_the_unit_however_it_is_read() {
+fn file_1_describes_the_unit_with_any_number_of_groups() {
     let mut bench = Bench::set_up(Module::Ai4, &[]);
     let file = bench.self_description(1);
     bench.assert_described(Known::Ai4, &file);
@@ -94,7 +98,11 @@ fn crc_changes_with_the_module_in_force() {
     let before = bench.assert_described(Known::Di4, &file);
     bench.configure(MODULE, &[Known::Ai2Ao2.code()]);
     bench.save();
-    assert_eq!(bench.self_description(1), file, "not in force yet");
+    assert_eq!(
+        bench.self_description(1),
+        file,
+        "the new module is not in force yet"
+    );
     bench.tolerant = true;
     bench.restart();
     let file = bench.self_description(3);
@@ -122,10 +130,10 @@ fn a_request_for_other_records_is_refused() {
         assert_eq!(bench.read_file(groups), Err(code), "{groups:?}");
     }
     for (pdu, code) in [
-        // Another reference type.
+        // A different reference type.
         (&[0x14, 7, 5, 0, 1, 0, 0, 0, 1][..], 2),
         (&[0x14, 7, 7, 0, 1, 0, 0, 0, 1], 2),
-        // Byte counts that are not allowed, or not those of the data.
+        // Byte counts that are not allowed, or that do not match the data.
         (&[0x14], 3),
         (&[0x14, 0], 3),
         (&[0x14, 6, 6, 0, 1, 0, 0, 0], 3),

@@ -1,4 +1,4 @@
-//! How much of the stack is left.
+//! Free stack after a long run.
 
 use sim::{Module, Time};
 
@@ -6,7 +6,7 @@ use crate::bench::Bench;
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn there_is_stack_to_spare_after_all_kinds_of_work() {
+fn at_least_a_kibibyte_of_stack_is_free_after_all_kinds_of_work() {
     let mut bench = Bench::set_up(Module::Ai2Ao2, &[]);
     for address in (0x0100..0x0340).step_by(16) {
         let _ = bench.registers(address, 16);

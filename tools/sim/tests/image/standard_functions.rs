@@ -1,4 +1,4 @@
-//! The functions beside reading and writing points, on the image as it is flashed.
+//! The functions that do not read or write points, on the release image.
 
 use sim::{Channel, Module, Time};
 
@@ -6,7 +6,7 @@ use crate::bench::{Bench, FIRST};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_device_tells_of_itself() {
+fn device_returns_its_identification() {
     let mut bench = Bench::new(Module::Di4, 1);
     let mut ask = |pdu: &[u8]| bench.ask(1, pdu).expect("a reply");
     assert_eq!(ask(&[0x07]), [0x07, 0]);
@@ -32,13 +32,13 @@ fn the_device_tells_of_itself() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn registers_are_masked_and_written_and_read_at_once() {
+fn registers_are_masked_and_written_and_read_in_one_request() {
     let mut bench = Bench::new(Module::Di4, 1);
     bench.unlock();
     let mask = [0x16, 1, 4, 0xFF, 0xF0, 0, 0x0A];
     assert_eq!(bench.ask(1, &mask).as_deref(), Some(&mask[..]));
     assert_eq!(bench.register(0x0104), 10);
-    // COMM_TIMEOUT back to 0, and BAUD to STRICT_T15 read with it.
+    // COMM_TIMEOUT is set back to 0, and BAUD to STRICT_T15 are read in the same request.
     let both = [0x17, 1, 1, 0, 7, 1, 4, 0, 1, 2, 0, 0];
     let reply = bench.ask(1, &both).expect("a reply");
     assert_eq!(reply, [0x17, 14, 0, 96, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
@@ -47,7 +47,7 @@ fn registers_are_masked_and_written_and_read_at_once() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn while_it_only_listens_its_outputs_fall_to_safe() {
+fn outputs_go_to_safe_in_listen_only_mode() {
     let mut bench = Bench::new(Module::Do4, 1);
     bench.unlock();
     bench.write(0x0104, &[2]).unwrap();
@@ -63,9 +63,9 @@ fn while_it_only_listens_its_outputs_fall_to_safe() {
     assert_eq!(
         bench.ask(1, &[0x08, 0, 1, 0, 0]),
         None,
-        "the restart, in silence"
+        "the restart gets no reply"
     );
-    // Communication lost, not saved, unlocked.
+    // The status is: communication lost, not saved, unlocked.
     assert_eq!(bench.ask(1, &[0x07]), Some(vec![0x07, 0b10_1001]));
     bench.assert_sound();
 }

@@ -1,4 +1,4 @@
-//! What is saved survives, what is not does not, and what a damaged store leads to.
+//! Saved settings survive a restart, unsaved settings do not, and a damaged store leads to the defaults.
 
 use sim::{
     Module,
@@ -12,7 +12,7 @@ const INVALID: u16 = 2;
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn what_is_saved_survives_and_what_is_not_does_not() {
+fn saved_settings_survive_and_unsaved_settings_do_not() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.configure(FILTER, &[50, 60, 70, 80]);
     bench.save();
@@ -20,7 +20,7 @@ fn what_is_saved_survives_and_what_is_not_does_not() {
     bench.power_cycle();
     assert_eq!(bench.registers(FILTER, 4), Ok(vec![50, 60, 70, 80]));
     assert_eq!(bench.register(MODULE), 1);
-    // Thirty saves and some restarts: pages fill and are made room in.
+    // After thirty saves and some restarts, pages have been filled and erased.
     for n in 0..30 {
         bench.configure(FILTER, &[100 + n]);
         bench.save();
@@ -33,7 +33,7 @@ fn what_is_saved_survives_and_what_is_not_does_not() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn everything_there_is_to_set_survives_together() {
+fn record_of_all_settings_survives() {
     // The largest record: every register differs from its default.
     let mut bench = Bench::set_up(Module::Ai2Ao2, &[(0x0101, 1152)]);
     bench.patience = sim::Time::from_ms(5);
@@ -68,14 +68,14 @@ fn everything_there_is_to_set_survives_together() {
         assert_eq!(bench.registers(0x0140, 6), Ok(vec![0, 513, 11, 4, 2, 60]));
         assert!(!bench.status(INVALID));
         bench.configure(0x0105, &[3]);
-        // Another record: what is stored already is not written again.
+        // Change one value so that a new record is written: an unchanged configuration is not written again.
         bench.write(0x0141, &[513]).unwrap();
     }
 }
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn saving_what_is_stored_already_wears_nothing() {
+fn save_of_the_stored_configuration_programs_no_flash() {
     let mut bench = Bench::set_up(Module::Di4, &[]);
     bench.configure(FILTER, &[50]);
     bench.save();
@@ -91,7 +91,7 @@ fn saving_what_is_stored_already_wears_nothing() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_damaged_store_leaves_defaults_and_says_so_until_something_is_saved() {
+fn damaged_store_leads_to_defaults_and_a_status_bit_until_the_next_save() {
     let mut bench = Bench::set_up(Module::Di4, &[(0x0104, 77)]);
     bench.board.power_off();
     let [first, second] = pages();
@@ -116,15 +116,15 @@ fn a_damaged_store_leaves_defaults_and_says_so_until_something_is_saved() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn all_switches_on_is_the_factory_s_line_whatever_is_stored() {
+fn all_switches_on_selects_the_default_line_settings_with_any_stored_settings() {
     let mut bench = Bench::set_up(Module::Di4, &[(0x0101, 9216), (0x0102, 2)]);
     assert_eq!(bench.register(0x0101), 9216);
     bench.board.set_dip(255);
     bench.power_cycle();
     bench.settings(Settings::default());
-    let reply = bench.ask(255, &[3, 1, 1, 0, 2]).expect("it can be reached");
-    assert_eq!(reply, [3, 4, 0x24, 0, 0, 2], "what is stored is shown");
-    // And mended.
+    let reply = bench.ask(255, &[3, 1, 1, 0, 2]).expect("the unit answers");
+    assert_eq!(reply, [3, 4, 0x24, 0, 0, 2], "the stored values are read");
+    // Correct the stored values.
     bench.ask(255, &[6, 1, 0, 0x5A, 0x17]).unwrap();
     bench.ask(255, &[16, 1, 1, 0, 2, 4, 0, 192, 0, 1]).unwrap();
     bench.ask(255, &[6, 1, 8, 0, 1]).unwrap();
@@ -138,7 +138,7 @@ fn all_switches_on_is_the_factory_s_line_whatever_is_stored() {
     bench.assert_answers(1);
 }
 
-/// A master that writes outputs all day must not wear the flash out.
+/// A master that writes outputs all day must not wear out the flash.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn writing_outputs_over_and_over_programs_no_flash() {
@@ -148,5 +148,5 @@ fn writing_outputs_over_and_over_programs_no_flash() {
         bench.write_bit(SLOT + n % 4, n % 3 == 0).unwrap();
     }
     assert_eq!(bench.board.flash_operations(), operations);
-    assert!(!bench.status(8), "nothing waits to be saved");
+    assert!(!bench.status(8), "no unsaved change");
 }

@@ -1,4 +1,4 @@
-//! When the unit speaks, and how long it holds the bus.
+//! When the unit sends, and how long its driver is enabled.
 
 use register_map::{codes::Baud, configuration};
 use sim::{Module, Time, line::Direction};
@@ -6,13 +6,13 @@ use sim::{Module, Time, line::Direction};
 use crate::ascii::ascii;
 use crate::bench::{Bench, FIRST, Most, adu, corner};
 
-/// From t3.5 to the first byte in the UART's data register. The baud generator adds up to a bit.
+/// From t3.5 to the write of the first byte to the UART's data register. The baud generator adds up to a bit.
 const LATE: Most = Most(Time::from_us(13), Time::from_us(24));
-/// From the driver's switching on to the first byte in the UART's data register.
+/// From enabling the driver to the write of the first byte to the UART's data register.
 const ON: Most = Most(Time::from_us(1), Time::from_us(1));
-/// From the last stop bit to the driver's switching off.
+/// From the last stop bit to disabling the driver.
 const OFF: Most = Most(Time::from_ns(1_250), Time::from_ns(2_300));
-/// The same when another interrupt of the line, the 1 kHz beat as a rule, has just come: the longest waits that
+/// The same when another interrupt of the line, usually the 1 kHz tick, has just occurred: the longest waits that
 /// `cargo xtask bench` allows, 5.0 and 8.5 us, and the handler.
 const OFF_BEHIND: Most = Most(Time::from_ns(6_250), Time::from_ns(10_800));
 /// Between the first byte, which does not depend on the request, and the second. t1.5 is 750 us.
@@ -20,7 +20,7 @@ const GAP: Most = Most(Time::from_us(16), Time::from_us(30));
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_reply_starts_at_t35_and_the_driver_is_on_just_as_long_as_needed() {
+fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
     let mut bench = Bench::new(Module::Di4, 1);
     let (bit, sixteenth) = (bench.bit(), bench.sixteenth());
     for _ in 0..10 {
@@ -35,13 +35,13 @@ fn the_reply_starts_at_t35_and_the_driver_is_on_just_as_long_as_needed() {
         let turnaround = frame.start - end;
         assert!(turnaround >= Settings::T35, "{turnaround:?} is before t3.5");
         let late = turnaround - Settings::T35;
-        // The receiver sees the end of the request up to a sixteenth of a bit early, which t3.5 allows for.
+        // The receiver may see the end of the request up to a sixteenth of a bit early, which t3.5 allows for.
         let most = bit + sixteenth + LATE.of(corner());
         assert!(late <= most, "{late:?} after t3.5");
 
         let edges: Vec<_> = line.driver_edges().collect();
         let [.., (on, true), (off, false)] = edges[..] else {
-            panic!("the driver goes on and off: {edges:?}");
+            panic!("the driver does not go on and off: {edges:?}");
         };
         assert!(
             on <= frame.start && frame.start - on <= bit + ON.of(corner()),
@@ -70,7 +70,7 @@ impl Settings {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn nothing_leaves_the_unit_but_replies() {
+fn unit_sends_only_replies() {
     let mut bench = Bench::new(Module::Di4, 1);
     for unit in [1, 2, 1, 0, 1] {
         bench.exchange(&adu(&[unit, 1, 0, FIRST, 0, 4]));
@@ -86,7 +86,7 @@ fn nothing_leaves_the_unit_but_replies() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn requests_back_to_back_at_t35_are_all_answered() {
+fn requests_t35_after_each_reply_are_all_answered() {
     let mut bench = Bench::new(Module::Di4, 1);
     let request = adu(&[1, 1, 0, FIRST, 0, 4]);
     let mut replies = 0;
@@ -105,15 +105,15 @@ fn requests_back_to_back_at_t35_are_all_answered() {
     assert_eq!(replies, 200);
 }
 
-/// The driver is off within a bit up to 460800 bit/s, and within two at 921600 bit/s, where a bit is 1.085 us: what
-/// the interrupt takes counts there. In a few replies of a thousand the beat comes just before: then it is off within
-/// some microseconds, which is within a bit up to 115200 bit/s.
+/// The driver is off within a bit up to 460800 bit/s, and within two bits at 921600 bit/s. There a bit is 1.085 us, and
+/// the time of the interrupt is significant. In a few of a thousand replies, the tick occurs just before the end. Then
+/// the driver is off within some microseconds, which is within a bit up to 115200 bit/s.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
+fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
     for baud in Baud::ALL {
         for format in 0..7 {
-            // Seven data bits need ASCII mode. Three rates of them are enough: the driver is the same.
+            // Seven data bits need ASCII mode. Three rates are enough for them, because the driver is the same.
             let mode = u16::from(format >= 4);
             if mode == 1 && ![Baud::B9600, Baud::B19200, Baud::B921600].contains(baud) {
                 continue;
@@ -124,7 +124,7 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
                 (configuration::MODE, mode),
             ];
             let mut bench = Bench::set_up(Module::Di4, &line);
-            // At the highest rates the bench would not wait as long.
+            // At the highest rates the bench would not wait this long.
             bench.patience = LATE.of(corner());
             let bit = bench.bit();
             let request = match mode {
@@ -152,8 +152,8 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
                     frame.start
                 );
                 let held = off.as_ps().checked_sub(frame.end.as_ps());
-                // The end is the master's: its clock and the unit's differ by 100 ppm, and the divider by half a
-                // cycle a bit.
+                // The end is in the master's time: its clock and the unit's differ by 100 ppm, and the divider by half
+                // a cycle a bit.
                 let clocks = Time::from_ps(character.as_ps() / 10_000) + Time::from_ns(80);
                 let most = OFF_BEHIND.of(corner()) + clocks;
                 let held = held.filter(|held| *held <= most.as_ps());
@@ -164,7 +164,7 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
                     )
                 });
                 least = least.min(held.saturating_sub(clocks.as_ps()));
-                // At the highest rates the values are put together while the first bytes leave.
+                // At the highest rates the values are assembled while the first bytes are sent.
                 let gap = frame.longest_gap;
                 let most = character.max(GAP.of(corner()));
                 assert!(gap <= most, "{baud:?}: gap of {gap:?}");
@@ -180,10 +180,10 @@ fn at_every_rate_and_format_the_driver_is_on_for_the_reply_and_little_more() {
 /// character before the last one then ends while the last one is being given to the UART.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn replies_at_the_highest_rate_are_whole_at_every_phase_of_the_scan() {
+fn replies_at_the_highest_rate_are_complete_at_every_phase_of_the_scan() {
     let mut bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, Baud::B921600.code())]);
     for phase in 0..1500 {
-        // The scan comes every millisecond.
+        // The scan runs every millisecond.
         let next = Time::from_ms(bench.board.now().as_ms() + 1);
         bench.board.run_until(next + Time::from_ns(667 * phase));
         let reply = bench.exchange(&adu(&[1, 3, 2, 0, 0, 2]));

@@ -1,5 +1,5 @@
-//! Registers of the line's UART and timers that change by themselves, as a disturbance of the part makes them: the
-//! driver goes off in time, and the line serves again.
+//! Registers of the line's UART and timers that change on their own, as in a disturbance of the part: the driver goes
+//! off in time, and the unit serves the line again.
 
 use register_map::{codes::Baud, configuration, fault};
 use sim::soc::map::Block;
@@ -7,10 +7,10 @@ use sim::{Module, Time};
 
 use crate::bench::{Bench, FIRST, adu};
 
-/// Registers that are disturbed: block, offset, bits, and the name for messages. RM0008 27.6 (USART),
-/// 14.4 (TIM1), 15.4 (TIM2).
+/// Registers that are disturbed: block, offset, bits, and the name for messages. RM0008 27.6 (USART), 14.4 (TIM1),
+/// 15.4 (TIM2).
 const REGISTERS: [(Block, u32, u16, &str); 17] = [
-    // Clearing TC is what an inverted bit of SR can do.
+    // An inverted bit of SR can clear TC.
     (Block::Usart1, 0x00, 1 << 6, "USART1 SR.TC"),
     (Block::Usart1, 0x08, 0xFFFF, "USART1 BRR"),
     (Block::Usart1, 0x0C, 0x3FFF, "USART1 CR1"),
@@ -30,11 +30,11 @@ const REGISTERS: [(Block, u32, u16, &str); 17] = [
     (Block::Tim1, 0x20, 0x0FFF, "TIM1 CCER"),
 ];
 
-/// A read of 125 registers: its reply is the longest.
+/// A read of 9 registers: the reply has 23 characters.
 const LONG: [u8; 6] = [1, 3, 1, 0, 0, 9];
 
-/// Instants after the start of a request at which bits change, in characters: while the line is idle, in the
-/// request, in t3.5, at the beginning, in the middle and at the end of the reply.
+/// Returns the instants after the start of a request at which bits change: while the line is idle, in the request, in
+/// t3.5, at the beginning, in the middle and at the end of the reply.
 fn instants(bench: &Bench) -> [Time; 7] {
     let request = bench.characters(8);
     let reply = request + bench.t35();
@@ -50,8 +50,8 @@ fn instants(bench: &Bench) -> [Time; 7] {
     ]
 }
 
-/// The longest reply at the bench's rate, with the half of a millisecond that the server may take in it, and a tenth
-/// more.
+/// Returns the duration of the longest reply at the bench's rate, plus the half of a millisecond that the server may
+/// add, plus a tenth.
 fn bound(bench: &Bench) -> Time {
     let longest = bench.characters(256) + Time::from_us(500);
     Time::from_ps(longest.as_ps() * 11 / 10)
@@ -70,7 +70,7 @@ fn any_bit_of_the_lines_registers_may_change_at_any_instant() {
                 for (n, after) in instants(&bench).into_iter().enumerate() {
                     if !survives(&mut bench, after, block, offset, 1 << bit) {
                         failures.push(format!("{baud:?} {name} bit {bit}, instant {n}"));
-                        // The next one begins on a board that is whole.
+                        // Start the next case on a new board.
                         bench = Bench::set_up(Module::Di4, &[(configuration::BAUD, baud.code())]);
                         bench.tolerant = true;
                         bench.board.run_for(Time::from_ms(40));
@@ -86,7 +86,7 @@ fn any_bit_of_the_lines_registers_may_change_at_any_instant() {
     );
 }
 
-/// Whether the driver is off in time and a request is answered 100 ms later, without a reset.
+/// Returns whether the driver is off in time and a request is answered 100 ms later, without a reset.
 fn survives(bench: &mut Bench, after: Time, block: Block, offset: u32, mask: u32) -> bool {
     let resets = bench.board.resets();
     let begin = bench.board.now();
@@ -110,7 +110,7 @@ fn survives(bench: &mut Bench, after: Time, block: Block, offset: u32, mask: u32
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_line_that_was_set_up_again_is_counted_and_logged() {
+fn line_that_is_set_up_again_is_counted_and_logged() {
     let mut bench = Bench::new(Module::Di4, 1);
     bench.tolerant = true;
     let repairs = |bench: &mut Bench| {
@@ -119,7 +119,7 @@ fn a_line_that_was_set_up_again_is_counted_and_logged() {
     };
     assert_eq!(repairs(&mut bench), Some(vec![3, 2, 0, 0]));
     bench.board.take_log();
-    // BRR: another rate.
+    // Set BRR to another rate.
     bench.board.upset(Block::Usart1, 0x08, 0x0400);
     bench.board.run_for(Time::from_ms(100));
     assert_eq!(repairs(&mut bench), Some(vec![3, 2, 0, 1]));
@@ -148,7 +148,7 @@ fn a_reply_whose_end_is_never_reported_is_cut_off_by_the_second_clock_too() {
     bench.assert_answers(1);
 }
 
-/// Stops the transmitter in a reply, so that TC never comes; the driver must go off in time.
+/// Stops the transmitter in a reply, so that TC is never set. The driver must go off in time.
 fn stays_within_the_bound(bench: &mut Bench, more: impl FnOnce(&mut Bench)) {
     bench.tolerant = true;
     let now = bench.board.now();
@@ -159,7 +159,7 @@ fn stays_within_the_bound(bench: &mut Bench, more: impl FnOnce(&mut Bench)) {
     let begin = bench.board.now();
     let limit = begin + bound(bench);
     bench.board.run_for(Time::from_us(5));
-    // TE.
+    // Clear TE.
     bench.board.upset(Block::Usart1, 0x0C, 1 << 3);
     more(bench);
     bench.board.run_until(limit);

@@ -26,7 +26,7 @@ fn assert_reads(bench: &mut Bench, first: u16, millivolts: &[u16]) {
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn every_analog_input_reads_its_own_voltage() {
-    // No low-pass.
+    // Switch the low-pass filters off.
     let filters: Vec<_> = (0..16).map(|point| (FILTER + point, 0)).collect();
     let mut bench = fitted([Module::Ai4; 4], &filters);
     for round in 0..4 {
@@ -67,7 +67,7 @@ fn four_dacs_on_one_bus_get_their_own_codes() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn inputs_and_outputs_of_mixed_modules_stay_apart() {
+fn inputs_and_outputs_of_mixed_modules_do_not_affect_each_other() {
     let plugged = [Module::Ai2Ao2, Module::Ao4, Module::Ai2Ao2, Module::Ai4];
     let filters: Vec<_> = (0..16).map(|point| (FILTER + point, 0)).collect();
     let mut bench = fitted(plugged, &filters);
@@ -96,7 +96,7 @@ fn inputs_and_outputs_of_mixed_modules_stay_apart() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_dac_that_does_not_answer_leaves_the_other_slots_alone() {
+fn a_dac_that_does_not_answer_does_not_affect_the_other_slots() {
     let mut bench = fitted([Module::Ao4; 4], &[]);
     bench.write(0, &[500; 16]).unwrap();
     change(&mut bench, 3, |slot| slot.set_bus_fault(BusFault::Absent));

@@ -26,7 +26,7 @@ fn a_fault_makes_the_lines_of_all_slots_floating_before_the_reset() {
         bench.board.line().send(from, &[1]);
         assert!(bench.board.run_until_pc(address, from + Time::from_ms(10)));
         let called = bench.board.now();
-        // The last look before the reset counts: the reset itself makes inputs of all pins.
+        // Keep the last state before the reset, because the reset itself makes all pins inputs.
         let mut floating = Vec::new();
         loop {
             bench.board.step(1);
@@ -40,7 +40,7 @@ fn a_fault_makes_the_lines_of_all_slots_floating_before_the_reset() {
         assert_eq!(floating, [true; 16], "{handler}");
         bench.board.patch_code(address, &was).unwrap();
         bench.started();
-        assert_eq!(bench.register(0x0260), 2, "a hard fault");
+        assert_eq!(bench.register(0x0260), 2, "the fault is a hard fault");
         assert_eq!(bench.bits(1, 0, 16), Ok(vec![false; 16]));
     }
 }

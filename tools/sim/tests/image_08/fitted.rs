@@ -7,7 +7,7 @@ use sim::{Channel, Config, Module};
 use crate::LAYOUT;
 use crate::bench::{Bench, flash_with_settings};
 
-/// The lines of all slots, port 1 first, as the board's schematic has them: port of the part and number of the pin.
+/// The lines of all slots, port 1 first, as in the board's schematic: port of the part and number of the pin.
 pub const LINES: [[(char, u8); 4]; 4] = [
     [('A', 0), ('A', 1), ('A', 2), ('A', 3)],
     [('A', 4), ('A', 5), ('A', 6), ('A', 7)],
@@ -15,8 +15,8 @@ pub const LINES: [[(char, u8); 4]; 4] = [
     [('B', 0), ('B', 1), ('C', 4), ('C', 5)],
 ];
 
-/// A board with these modules in the slots of ports 1 to 4, which its configuration knows, and these settings stored
-/// beside them.
+/// Returns a board with these modules in the slots of ports 1 to 4 and in its stored configuration, together with
+/// these settings.
 pub fn fitted(plugged: [Module; 4], settings: &[(u16, u16)]) -> Bench {
     let slots: Vec<_> = (1..).zip(plugged).collect();
     let mut stored: Vec<_> = modules(slots.iter().copied()).collect();
@@ -29,22 +29,25 @@ pub fn fitted(plugged: [Module; 4], settings: &[(u16, u16)]) -> Bench {
     })
 }
 
-/// Changes what is outside the slot at a port.
+/// Changes the outside of the slot at a port.
 pub fn change<T>(bench: &mut Bench, port: u8, action: impl FnOnce(&mut Slot) -> T) -> T {
-    bench.board.change_slot(port, action).expect("a slot")
+    bench
+        .board
+        .change_slot(port, action)
+        .expect("the port has a slot")
 }
 
-/// The four channels of the slot at a port.
+/// Returns the four channels of the slot at a port.
 pub fn channels(bench: &Bench, port: u8) -> [Channel; 4] {
     let (_, slot) = bench
         .board
         .slots()
         .find(|(other, _)| *other == port)
-        .expect("a slot");
+        .expect("the port has a slot");
     [1, 2, 3, 4].map(|n| slot.channel(n))
 }
 
-/// The states of the outputs of a 4DO.
+/// Returns the states of the outputs of a 4DO.
 pub fn outputs(bench: &Bench, port: u8) -> [bool; 4] {
     channels(bench, port).map(|channel| match channel {
         Channel::Do { on } => on,
@@ -52,7 +55,7 @@ pub fn outputs(bench: &Bench, port: u8) -> [bool; 4] {
     })
 }
 
-/// The codes at the outputs of a 4AO.
+/// Returns the codes at the outputs of a 4AO.
 pub fn codes(bench: &Bench, port: u8) -> [u16; 4] {
     channels(bench, port).map(|channel| match channel {
         Channel::Ao { code } => code,

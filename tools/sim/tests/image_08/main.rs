@@ -1,8 +1,8 @@
-//! The release image of the modio-08 on the virtual board. The image comes from `MODIO_ELF_08`, which `cargo xtask test`
-//! sets after building it.
+//! The release image of the modio-08 on the virtual board. The image comes from `MODIO_ELF_08`, which `cargo xtask
+//! test` sets after building it.
 //!
-//! What is special about a board with four slots is in `slots`, `analog`, `digital` and `faults_of_slots`. The other
-//! files are those of the modio-02's tests, with one module in the first slot.
+//! The tests of the four slots are in `slots`, `analog`, `digital` and `faults_of_slots`. The other files are those of
+//! the modio-02's tests, with one module in the first slot.
 
 use sim::board::{Layout, MODIO_08};
 

@@ -1,4 +1,4 @@
-//! Several modules at once: what a master reads and writes, and what is stored.
+//! Several modules on one board: the points that a master reads and writes, and the stored settings.
 
 use sim::{Module, Time};
 
@@ -57,7 +57,7 @@ fn four_different_modules_answer_side_by_side() {
         let request = [function, a, b, c, d];
         assert_eq!(bench.request(&request), Err(2), "{request:?}");
     }
-    // A write that reaches an input point changes nothing at all.
+    // A write that includes an input point changes nothing.
     assert_eq!(bench.write_bits(3, &[true; 5]), Err(2));
     assert_eq!(bench.write(0x0B, &[7; 5]), Err(2));
     bench.board.run_for(Time::from_ms(50));
@@ -68,7 +68,7 @@ fn four_different_modules_answer_side_by_side() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn relays_beside_an_analog_module_and_empty_slots() {
+fn empty_slots_beside_relays_and_an_analog_module_have_no_points() {
     let plugged = [Module::None, Module::Relay2, Module::Ai2Ao2, Module::None];
     let mut bench = fitted(plugged, &[]);
     assert_eq!(bench.registers(IN_FORCE, 4), Ok(vec![0, 3, 6, 0]));
@@ -96,7 +96,7 @@ fn relays_beside_an_analog_module_and_empty_slots() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn only_ports_1_to_4_take_a_module() {
+fn only_ports_1_to_4_accept_a_module() {
     let mut bench = fitted([Module::None; 4], &[]);
     bench.unlock();
     for port in 1..=8 {
@@ -110,10 +110,18 @@ fn only_ports_1_to_4_take_a_module() {
         assert_eq!(bench.write(address, &[0]), Ok(()), "port {port}");
     }
     assert_eq!(bench.write(MODULE, &[1, 2, 3, 4, 5, 0, 0, 0]), Err(3));
-    assert_eq!(bench.registers(MODULE, 8), Ok(vec![0; 8]), "all or nothing");
+    assert_eq!(
+        bench.registers(MODULE, 8),
+        Ok(vec![0; 8]),
+        "one invalid module refuses all"
+    );
     bench.write(MODULE, &[1, 2, 3, 4, 0, 0, 0, 0]).unwrap();
     assert_eq!(bench.registers(MODULE, 4), Ok(vec![1, 2, 3, 4]));
-    assert_eq!(bench.registers(IN_FORCE, 8), Ok(vec![0; 8]), "not yet");
+    assert_eq!(
+        bench.registers(IN_FORCE, 8),
+        Ok(vec![0; 8]),
+        "the modules are not in force yet"
+    );
 }
 
 /// Plugs these modules while the power is off.
@@ -128,7 +136,7 @@ fn plug(bench: &mut Bench, plugged: [Module; 4]) {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn modules_that_are_saved_are_in_force_after_the_restart() {
+fn saved_modules_are_in_force_after_the_restart() {
     let mut bench = fitted([Module::Di4; 4], &[]);
     let next = [Module::Do4, Module::Ai4, Module::Ao4, Module::Relay2];
     bench.configure(MODULE, &next.map(|module| module.code()));
@@ -139,7 +147,10 @@ fn modules_that_are_saved_are_in_force_after_the_restart() {
     assert_eq!(bench.registers(IN_FORCE, 4), Ok(vec![1; 4]));
     assert_eq!(bench.bits(2, 0, 16), Ok(vec![false; 16]));
     bench.save();
-    assert!(bench.status(16), "waits for a restart");
+    assert!(
+        bench.status(16),
+        "the status reports a setting that waits for a restart"
+    );
     plug(&mut bench, next);
     assert!(!bench.status(16 | 8 | 2));
     assert_eq!(bench.registers(IN_FORCE, 4), Ok(vec![2, 4, 5, 3]));
@@ -159,14 +170,14 @@ fn modules_that_are_saved_are_in_force_after_the_restart() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn a_module_in_force_that_is_not_plugged_does_not_stop_the_others() {
+fn a_missing_module_does_not_affect_the_other_slots() {
     let mut bench = fitted([Module::Ao4, Module::Do4, Module::Ai4, Module::Di4], &[]);
     plug(
         &mut bench,
         [Module::None, Module::Do4, Module::None, Module::Di4],
     );
     bench.board.run_for(Time::from_ms(500));
-    assert_eq!(bench.registers(0, 4), Err(4), "no DAC");
+    assert_eq!(bench.registers(0, 4), Err(4), "the DAC is missing");
     assert_eq!(bench.registers(STATE, 1), Ok(vec![2]));
     bench.write_bits(4, &[true; 4]).unwrap();
     bench.board.run_for(Time::from_ms(5));

@@ -1,14 +1,14 @@
-//! A very small Thumb-2 assembler, enough to write the programs of these tests with their intent in sight.
+//! A small Thumb-2 assembler that keeps the programs of these tests readable.
 //!
-//! Registers are `r0` to `r7`. `set`, `store` and the waits use `r0`, `r1` and `r2` for themselves.
+//! Registers are `r0` to `r7`. `set`, `store` and the wait functions overwrite `r0`, `r1` and `r2`.
 
 use sim::Image;
 
-/// Where code starts: after the vector table of 16 + 43 entries.
+/// Address of the first instruction, after the vector table of 16 + 43 entries.
 const CODE: u32 = 0x0800_0100;
 const STACK: u32 = 0x2000_5000;
 
-/// When a branch is taken.
+/// Condition of a branch.
 #[derive(Clone, Copy)]
 pub enum When {
     Always,
@@ -16,11 +16,11 @@ pub enum When {
     NotEqual,
 }
 
-/// A place to branch back to.
+/// Target of a backward branch.
 #[derive(Clone, Copy)]
 pub struct Label(usize);
 
-/// A branch forward whose end is not known yet.
+/// A forward branch whose target is not known yet.
 pub struct Forward(usize, When);
 
 /// A program under construction, at [`CODE`] in flash or anywhere in SRAM.
@@ -31,12 +31,12 @@ pub struct Asm {
 }
 
 impl Asm {
-    /// A program in flash, with a vector table.
+    /// Returns an empty program in flash, with a vector table.
     pub fn new() -> Self {
         Self::at(CODE)
     }
 
-    /// A piece of code that runs at `base`.
+    /// Returns an empty piece of code that runs at `base`.
     pub fn at(base: u32) -> Self {
         Self {
             base,
@@ -45,7 +45,7 @@ impl Asm {
         }
     }
 
-    /// The address of the next instruction.
+    /// Returns the address of the next instruction.
     pub fn address(&self) -> u32 {
         self.base + 2 * self.code.len() as u32
     }
@@ -54,7 +54,7 @@ impl Asm {
         Label(self.code.len())
     }
 
-    /// What follows handles exception `number` (3 = hard fault, 15 = SysTick, 16 + n = interrupt n).
+    /// Makes the following code the handler of exception `number` (3 = hard fault, 15 = SysTick, 16 + n = interrupt n).
     pub fn handler(&mut self, number: usize) {
         self.vectors.push((number, self.address() | 1));
     }
@@ -105,7 +105,7 @@ impl Asm {
         self.raw(0x2800 | rn << 8 | value);
     }
 
-    /// Flags of `rn & rm`.
+    /// Sets the flags of `rn & rm`.
     pub fn tst(&mut self, rn: u16, rm: u16) {
         self.raw(0x4200 | rm << 3 | rn);
     }
@@ -115,7 +115,7 @@ impl Asm {
         self.raw(0x4040 | rm << 3 | rd);
     }
 
-    /// Branches to the address in `rm`; 14 is the link register.
+    /// Branches to the address in `rm`; register 14 is the link register.
     pub fn bx(&mut self, rm: u16) {
         self.raw(0x4700 | rm << 3);
     }
@@ -140,7 +140,7 @@ impl Asm {
         self.code[from.0] = encode(from.1, distance);
     }
 
-    /// An endless loop that does count instructions.
+    /// An endless loop whose instructions are counted.
     pub fn spin(&mut self) {
         let top = self.here();
         self.nop();
@@ -172,7 +172,7 @@ impl Asm {
         self.branch(When::Equal, top);
     }
 
-    /// The bytes of the code alone.
+    /// Returns the bytes of the code without the vector table.
     pub fn bytes(&self) -> Vec<u8> {
         self.code
             .iter()
@@ -180,7 +180,7 @@ impl Asm {
             .collect()
     }
 
-    /// The program with its vector table; exceptions without a handler loop for ever.
+    /// Returns the program with its vector table. Exceptions without a handler loop endlessly.
     pub fn image(mut self) -> Image {
         let idle = self.address() | 1;
         self.raw(0xE7FE);
@@ -192,7 +192,7 @@ impl Asm {
         }
         let mut bytes: Vec<u8> = table.iter().flat_map(|word| word.to_le_bytes()).collect();
         bytes.extend(self.bytes());
-        Image::from_bytes(&bytes).expect("a program that fits")
+        Image::from_bytes(&bytes).expect("the program fits")
     }
 }
 

@@ -1,4 +1,4 @@
-//! The core on its bus: instruction counts and times, faults, bit-banding, SysTick, interrupts.
+//! The core on its bus: counts and times of instructions, faults, bit-banding, SysTick, interrupts.
 
 use sim::Time;
 use sim::finding::What;
@@ -8,7 +8,7 @@ use super::regs::*;
 use super::{START, board, findings, out};
 
 #[test]
-fn step_does_exactly_that_many_instructions_at_their_costs() {
+fn step_executes_the_given_number_of_instructions_at_their_costs() {
     let mut program = Asm::new();
     program.spin();
     let mut board = board(program);
@@ -16,14 +16,14 @@ fn step_does_exactly_that_many_instructions_at_their_costs() {
     assert_eq!(board.instructions(), 1);
     board.step(63);
     assert_eq!(board.instructions(), 64);
-    // A NOP of one cycle and a branch of three, of 8 MHz, without wait states.
+    // A NOP of one cycle and a branch of three cycles, at 8 MHz without wait states.
     assert_eq!(board.now(), START + Time::cycles(32 * 4, 8_000_000));
     board.run_until(START + Time::from_ms(77));
     assert_eq!(board.instructions(), 308_000);
 }
 
 #[test]
-fn run_until_pc_stops_there_and_goes_on_from_there() {
+fn run_until_pc_stops_at_the_address_and_resumes_from_it() {
     let mut program = Asm::new();
     program.set(3, 0);
     let top = program.here();
@@ -65,7 +65,7 @@ fn bit_banding_reaches_single_bits_of_peripherals_and_sram() {
 }
 
 #[test]
-fn an_access_without_its_clock_is_lost_and_reported_where_it_was() {
+fn access_to_a_block_without_clock_is_lost_and_reported_with_its_address() {
     let mut program = Asm::new();
     program.set(0, GPIOA);
     program.set(1, 0x33);
@@ -92,7 +92,7 @@ fn an_access_without_its_clock_is_lost_and_reported_where_it_was() {
 }
 
 #[test]
-fn what_is_not_modelled_or_not_allowed_is_reported() {
+fn accesses_that_are_not_modelled_or_not_allowed_are_reported() {
     let mut program = Asm::new();
     program.copy(0x4002_3000, OUT);
     program.copy(0x4000_0C00, OUT);
@@ -113,7 +113,7 @@ fn what_is_not_modelled_or_not_allowed_is_reported() {
 }
 
 #[test]
-fn an_address_with_nothing_behind_it_faults() {
+fn access_to_an_address_without_memory_faults() {
     let mut program = Asm::new();
     program.copy(0x2000_5000, OUT);
     program.spin();
@@ -134,7 +134,7 @@ fn an_address_with_nothing_behind_it_faults() {
 }
 
 #[test]
-fn a_fault_in_the_fault_handler_locks_up_and_time_goes_on() {
+fn a_fault_in_the_fault_handler_locks_up_the_core_and_time_passes() {
     let mut program = Asm::new();
     program.raw(0xDE00);
     program.handler(3);
@@ -146,11 +146,11 @@ fn a_fault_in_the_fault_handler_locks_up_and_time_goes_on() {
     assert_eq!(findings(&board), ["the core locked up"]);
     let done = board.instructions();
     board.step(10);
-    assert_eq!(board.instructions(), done, "it gives up");
+    assert_eq!(board.instructions(), done, "the core executes nothing more");
 }
 
 #[test]
-fn deeper_sleep_than_sleep_is_reported() {
+fn deep_sleep_is_reported() {
     let mut program = Asm::new();
     program.store(0xE000_ED10, 4);
     program.wfi();
@@ -161,7 +161,7 @@ fn deeper_sleep_than_sleep_is_reported() {
     assert!(findings(&board)[0].contains("SLEEPDEEP"));
 }
 
-/// SysTick every 8000 cycles toggles PC13: first at 8 MHz from the HSI, then at 72 MHz from the PLL.
+/// Returns a program whose SysTick toggles PC13 every 8000 cycles, either at 8 MHz or at 72 MHz from the PLL.
 fn systick_program(fast: bool) -> Asm {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 1 << 4);
@@ -193,7 +193,7 @@ fn systick_program(fast: bool) -> Asm {
 }
 
 #[test]
-fn systick_counts_hclk_and_wakes_the_core_on_the_cycle() {
+fn systick_counts_hclk_and_wakes_the_core_on_the_right_cycle() {
     for (fast, hz) in [(false, 8_000_000), (true, 72_000_000)] {
         let mut board = board(systick_program(fast));
         board.watch_pin('C', 13);
@@ -273,10 +273,10 @@ fn a_program_too_fast_for_its_wait_states_is_reported() {
 }
 
 #[test]
-fn the_same_run_twice_is_the_same_to_the_instruction_however_it_is_cut() {
+fn run_is_the_same_to_the_instruction_in_steps_of_any_length() {
     let program = || {
         let mut program = systick_program(true);
-        // The handler's work is seen in SRAM too.
+        // The handler also counts in SRAM, so a difference shows there.
         program.handler(16 + 28);
         program.bx(14);
         program.image()

@@ -1,5 +1,4 @@
-//! What code costs at the two corners of the core, against the classes of `sim::machine::costs`, worked out by
-//! hand.
+//! Costs of code at the two corners of the core, against the classes of `sim::machine::costs`, calculated by hand.
 
 use sim::{Board, Config, Corner, Time};
 
@@ -7,7 +6,7 @@ use super::asm::{Asm, When};
 use super::board_with;
 use super::regs::*;
 
-/// Brings the part to 72 MHz from the crystal, with two wait states and the prefetch buffer.
+/// Sets the part to 72 MHz from the crystal, with two wait states and the prefetch buffer.
 fn fast() -> Asm {
     let mut program = Asm::new();
     program.store(FLASH_ACR, 0x12);
@@ -23,14 +22,14 @@ fn fast() -> Asm {
     program
 }
 
-/// Aligns what follows to a line of the flash.
+/// Aligns the following code to a line of the flash.
 fn align(program: &mut Asm) {
     while !program.address().is_multiple_of(8) {
         program.nop();
     }
 }
 
-/// Goes on at the start of a line, after a line of NOPs that a branch has led to.
+/// Aligns the following code to a line, after a branch to a line of NOPs.
 fn after_a_line(program: &mut Asm) {
     let over = program.forward(When::Always);
     align(program);
@@ -38,7 +37,7 @@ fn after_a_line(program: &mut Asm) {
     (0..4).for_each(|_| program.nop());
 }
 
-/// The cycles between two places of the program, at a corner.
+/// Returns the cycles between two addresses of the program, at a corner.
 fn cycles(program: Asm, [from, to]: [u32; 2], corner: Corner) -> u64 {
     let config = Config {
         corner,
@@ -54,7 +53,7 @@ fn cycles(program: Asm, [from, to]: [u32; 2], corner: Corner) -> u64 {
     run_to(&mut board, to) - before
 }
 
-/// The cycles of `code`, which starts at the start of a line, at the nominal and at the slow corner.
+/// Returns the cycles of `code`, which starts at the start of a line, at the nominal and at the slow corner.
 fn costs(code: impl Fn(&mut Asm)) -> [u64; 2] {
     [Corner::Nominal, Corner::Slow].map(|corner| {
         let mut program = fast();
@@ -75,7 +74,7 @@ fn code_in_sequence_waits_for_the_flash_only_at_the_slow_corner() {
     // Two lines of four NOPs each.
     let nops = costs(|program| (0..8).for_each(|_| program.nop()));
     assert_eq!(nops, [8, 8 + 2 * 2]);
-    // Wide instructions use a line up in two cycles: the read of three does not keep up.
+    // Wide instructions use up a line in two cycles; the prefetch, which takes three, is too slow.
     let wide = costs(|program| (0..4).for_each(|_| program.set(0, 1)));
     assert_eq!(wide, [8 + 3, 8 + 4 * 2]);
 }
@@ -97,7 +96,7 @@ fn loads_and_stores_cost_more_without_pipelining_and_write_buffer() {
 
 #[test]
 fn an_access_to_an_apb_takes_cycles_of_its_clock() {
-    // APB2 runs at HCLK, APB1 at half of it.
+    // APB2 runs at HCLK, APB1 at half of HCLK.
     let apb2 = costs(|program| program.ldr(0, 4, 8));
     assert_eq!(apb2, [2 + 2, 2 + 2 + 3 + 1]);
     let apb1 = costs(|program| program.ldr(0, 5, 0x24));
@@ -107,14 +106,14 @@ fn an_access_to_an_apb_takes_cycles_of_its_clock() {
 }
 
 #[test]
-fn a_literal_pays_the_wait_states_of_the_flash() {
-    // LDR r0, [pc, #0] reads what follows.
+fn literal_costs_the_wait_states_of_the_flash() {
+    // LDR r0, [pc, #0] reads the following word.
     let literal = costs(|program| {
         program.raw(0x4800);
         program.nop();
     });
     assert_eq!(literal, [2 + 2 + 1, 2 + 2 + 2 + 3 + 1]);
-    // A table in flash, by a register: the vector table.
+    // A read of a table in flash through a register: the vector table.
     let table = costs(|program| {
         program.raw(0x2100); // movs r1, #0
         program.ldr(0, 1, 4);
@@ -123,7 +122,7 @@ fn a_literal_pays_the_wait_states_of_the_flash() {
 }
 
 #[test]
-fn a_literal_is_charged_after_a_reset_too() {
+fn literal_costs_the_wait_states_after_a_reset_too() {
     let mut program = fast();
     after_a_line(&mut program);
     let from = program.address();
@@ -160,12 +159,12 @@ fn branches_refill_the_pipeline() {
         })
     };
     assert_eq!(branch(When::Equal), [2 + 2 + 2, 2 + 2 + 3 + 2 + 3]);
-    // Not taken: two NOPs up to the line's end, then a line of four.
+    // Not taken: two NOPs up to the end of the line, then a line of four NOPs.
     assert_eq!(branch(When::NotEqual), [2 + 2 + 4, 2 + 2 + 3 + 2 + 2 + 4]);
 }
 
 #[test]
-fn a_division_and_a_long_multiplication_take_their_range() {
+fn division_and_long_multiplication_cost_their_range() {
     // UDIV r0, r0, r1; UMULL r0, r1, r2, r3.
     let code = |halves: [u16; 2]| {
         costs(move |program| halves.into_iter().for_each(|half| program.raw(half)))
@@ -175,7 +174,7 @@ fn a_division_and_a_long_multiplication_take_their_range() {
 }
 
 #[test]
-fn an_exception_pays_for_entry_return_and_tail_chain() {
+fn exception_costs_entry_return_and_tail_chain() {
     const SVCALL: usize = 11;
     const PENDSV: usize = 14;
     const ICSR: u32 = 0xE000_ED04;
@@ -201,11 +200,11 @@ fn an_exception_pays_for_entry_return_and_tail_chain() {
             cycles(program, [from, to], corner)
         })
     };
-    // SVC, entry; BX, return.
+    // SVC with exception entry, and BX with the return.
     let [nominal, slow] = total(false);
     assert_eq!(nominal, 1 + (12 + 2) + 1 + (12 + 2));
     assert_eq!(slow, 2 + 1 + (16 + 2 * 2 + 3) + 1 + (12 + 2 + 3));
-    // And the store that pends the other one, its own BX, and the way from handler to handler.
+    // In addition the store that pends the other exception, its BX, and the change from one handler to the other.
     let [chained, slow_chained] = total(true);
     assert_eq!(chained - nominal, 1 + (6 + 2) + 1);
     assert_eq!(slow_chained - slow, 2 + (6 + 2 * 2 + 3) + 1);

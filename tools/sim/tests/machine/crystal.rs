@@ -1,4 +1,4 @@
-//! The crystal dies while the part runs from it, and comes back.
+//! The crystal fails while the part runs from it, and returns.
 
 use sim::{Board, Time};
 
@@ -12,10 +12,10 @@ const RCC_CIR: u32 = 0x4002_1008;
 const CSSF: u32 = 1 << 7;
 const CSSC: u32 = 1 << 23;
 
-/// So long after power-on every program here runs from the crystal.
+/// Time after power-on from which every program here runs from the crystal.
 const RUNNING: Time = Time::from_ms(10);
 
-/// Starts the crystal and 72 MHz from it, with the clock security system or without.
+/// Starts the crystal and 72 MHz from it, with or without the clock security system.
 fn fast(security: bool) -> Asm {
     let cr = 0x1_0083 | if security { CSSON } else { 0 };
     let mut program = Asm::new();
@@ -31,8 +31,8 @@ fn fast(security: bool) -> Asm {
     program
 }
 
-/// An endless loop; its NMI handler counts its entries in r6, puts RCC's registers out and, in its
-/// `clears`th round, clears CSSF.
+/// An endless loop. Its NMI handler counts its entries in r6, stores RCC's registers, and clears CSSF in its `clears`th
+/// round.
 fn with_handler(mut program: Asm, clears: u16) -> Board {
     program.spin();
     program.handler(2);
@@ -50,35 +50,39 @@ fn with_handler(mut program: Asm, clears: u16) -> Board {
 }
 
 #[test]
-fn the_clock_security_system_goes_to_the_hsi_and_raises_the_nmi() {
+fn clock_security_system_selects_the_hsi_and_raises_the_nmi() {
     let mut board = with_handler(fast(true), 1);
     board.run_until(RUNNING);
     assert_eq!((board.hclk(), board.register(6)), (72_000_000, Some(0)));
     board.set_crystal(false);
     assert!(!board.crystal());
     board.step(1);
-    assert_eq!(board.register(16).unwrap() & 0x1FF, 2, "in the NMI at once");
+    assert_eq!(
+        board.register(16).unwrap() & 0x1FF,
+        2,
+        "the NMI follows immediately"
+    );
     assert_eq!(board.hclk(), 8_000_000);
     board.run_for(Time::from_ms(1));
     assert_eq!(board.register(6), Some(1), "once");
     let [cr, cfgr, cir, cleared] = [0, 1, 2, 3].map(|n| out(&board, n));
     // HSEON, HSERDY, PLLON and PLLRDY are off, HSION and HSIRDY on.
     assert_eq!(cr & 0x0303_0003, 3, "{cr:#x}");
-    assert_eq!(cfgr & 0xF, 0, "SW and SWS say HSI: {cfgr:#x}");
+    assert_eq!(cfgr & 0xF, 0, "SW and SWS select the HSI: {cfgr:#x}");
     assert_eq!((cir & CSSF, cleared & CSSF), (CSSF, 0));
-    // A NOP, and a branch with the wait states of its target: 6 cycles for 2 instructions, now of 8 MHz.
+    // A NOP, and a branch with the wait states of its target: 6 cycles for 2 instructions, now at 8 MHz.
     let before = (board.now(), board.instructions());
     board.step(64_000);
     assert_eq!(
         board.now() - before.0,
         Time::cycles(192_000, 8_000_000),
-        "time goes by the HSI"
+        "the core runs at the HSI's rate"
     );
     assert_eq!(findings(&board), [""; 0]);
 }
 
 #[test]
-fn the_nmi_comes_again_until_cssc_is_written() {
+fn nmi_is_raised_again_until_cssc_is_written() {
     let mut board = with_handler(fast(true), 5);
     board.run_until(RUNNING);
     board.set_crystal(false);
@@ -90,7 +94,7 @@ fn the_nmi_comes_again_until_cssc_is_written() {
 }
 
 #[test]
-fn the_nmi_wakes_a_core_that_sleeps() {
+fn nmi_wakes_a_sleeping_core() {
     let mut program = fast(true);
     program.wfi();
     let mut board = with_handler(program, 1);
@@ -103,7 +107,7 @@ fn the_nmi_wakes_a_core_that_sleeps() {
 }
 
 #[test]
-fn a_crystal_that_nothing_runs_from_leaves_the_clock_alone() {
+fn failure_of_an_unused_crystal_does_not_change_the_clock() {
     let mut program = Asm::new();
     program.set(6, 0);
     program.store(RCC_CR, 0x1_0083 | CSSON);
@@ -112,13 +116,13 @@ fn a_crystal_that_nothing_runs_from_leaves_the_clock_alone() {
     board.run_until(RUNNING);
     board.set_crystal(false);
     board.run_for(Time::from_ms(1));
-    assert_eq!(board.register(6), Some(1), "the NMI comes all the same");
+    assert_eq!(board.register(6), Some(1), "the NMI occurs nevertheless");
     assert_eq!(out(&board, 0) & (1 << 16 | HSERDY), 0);
     assert_eq!(board.hclk(), 8_000_000);
 }
 
 #[test]
-fn without_the_security_system_the_core_stands_still_until_the_crystal_is_back() {
+fn without_the_security_system_the_core_stops_until_the_crystal_is_back() {
     let mut board = with_handler(fast(false), 1);
     board.run_until(RUNNING);
     board.set_crystal(false);
@@ -126,9 +130,9 @@ fn without_the_security_system_the_core_stands_still_until_the_crystal_is_back()
     let died = board.now();
     board.run_for(Time::from_secs(1));
     assert_eq!((board.instructions(), board.hclk()), (done, 0));
-    assert_eq!(board.now(), died + Time::from_secs(1), "time goes on");
+    assert_eq!(board.now(), died + Time::from_secs(1), "time passes");
     board.step(10);
-    assert_eq!(board.instructions(), done, "it gives up");
+    assert_eq!(board.instructions(), done, "the core executes nothing");
     assert_eq!(findings(&board).len(), 1);
     assert!(findings(&board)[0].contains("clock security system off"));
     let back = board.now();
@@ -144,13 +148,13 @@ fn without_the_security_system_the_core_stands_still_until_the_crystal_is_back()
 }
 
 #[test]
-fn the_watchdog_gets_a_core_without_a_clock_going_again() {
+fn watchdog_restarts_a_core_without_a_clock() {
     let mut program = fast(false);
     program.store(IWDG_KR, 0xCCCC);
     let mut board = with_handler(program, 1);
     board.run_until(RUNNING);
     board.set_crystal(false);
-    // 4096 x 4 / 40 kHz are 409.6 ms; the program then waits for the crystal in vain.
+    // 4096 x 4 / 40 kHz are 409.6 ms. The program then waits for the crystal without success.
     board.run_for(Time::from_ms(420));
     assert_eq!((board.resets(), board.hclk()), (1, 8_000_000));
     let done = board.instructions();
@@ -159,14 +163,14 @@ fn the_watchdog_gets_a_core_without_a_clock_going_again() {
 }
 
 #[test]
-fn rc_oscillators_off_their_rates_change_the_core_and_the_watchdog() {
+fn rates_of_the_rc_oscillators_change_the_core_and_the_watchdog() {
     let mut program = Asm::new();
     program.store(IWDG_KR, 0xCCCC);
     let mut board = with_handler(program, 1);
     assert_eq!(board.rc_oscillators(), (8_000_000, 40_000));
     board.set_rc_oscillators(8_200_000, 20_000).unwrap();
     assert_eq!(board.hclk(), 8_200_000);
-    // The same instructions at the typical rate took as many cycles.
+    // The same instructions take as many cycles as at the typical rate.
     let before = (board.now(), board.cycles());
     board.step(64_000);
     let cycles = board.cycles() - before.1;
@@ -174,9 +178,9 @@ fn rc_oscillators_off_their_rates_change_the_core_and_the_watchdog() {
     assert_eq!(
         (board.now() - before.0).as_ns(),
         Time::cycles(cycles, 8_200_000).as_ns(),
-        "time goes by the HSI"
+        "the core runs at the HSI's rate"
     );
-    // 4096 x 4 / 20 kHz are 819.2 ms, counted from a little after the start.
+    // 4096 x 4 / 20 kHz are 819.2 ms, counted from shortly after the start.
     board.run_until(Time::from_ms(800));
     assert_eq!(board.resets(), 0);
     board.run_until(Time::from_ms(840));

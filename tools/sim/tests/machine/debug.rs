@@ -6,7 +6,7 @@ use super::asm::{Asm, When};
 use super::regs::*;
 use super::{START, board, findings, out};
 
-/// Counts in r3, round after round; where the counting is, and the program.
+/// A program that counts in r3 without end. Returns the address of the addition, and the program.
 fn counting() -> (u32, Asm) {
     let mut program = Asm::new();
     program.set(3, 0);
@@ -19,7 +19,7 @@ fn counting() -> (u32, Asm) {
 }
 
 #[test]
-fn a_breakpoint_halts_every_time_it_is_come_to_and_only_a_debugged_run() {
+fn breakpoint_halts_a_debugged_run_every_time_and_no_other_run() {
     let (address, program) = counting();
     let mut board = board(program);
     let before = board.flash().to_vec();
@@ -28,16 +28,22 @@ fn a_breakpoint_halts_every_time_it_is_come_to_and_only_a_debugged_run() {
     for round in 0..3 {
         assert!(board.run_debugged(limit));
         assert_eq!((board.pc(), board.register(3)), (address, Some(round)));
-        assert!(board.run_debugged(limit), "not passed, it is still there");
+        assert!(
+            board.run_debugged(limit),
+            "the core stays at the breakpoint until it is passed"
+        );
         assert_eq!(board.register(3), Some(round));
         board.pass_breakpoint();
     }
-    assert_eq!(board.flash(), before, "the firmware sees none of it");
+    assert_eq!(board.flash(), before, "the flash is unchanged");
     board.run_until(Time::from_ms(3));
-    assert!(board.register(3) > Some(500), "a plain run passes it");
+    assert!(
+        board.register(3) > Some(500),
+        "a plain run ignores the breakpoint"
+    );
     assert!(
         board.run_until_pc(address + 2, limit),
-        "and so does one to another place"
+        "a run to another address ignores the breakpoint"
     );
     board.remove_breakpoint(address);
     assert!(!board.run_debugged(limit));
@@ -45,7 +51,7 @@ fn a_breakpoint_halts_every_time_it_is_come_to_and_only_a_debugged_run() {
 }
 
 #[test]
-fn a_breakpoint_outlasts_a_reset() {
+fn breakpoint_remains_after_a_reset() {
     let (address, program) = counting();
     let mut board = board(program);
     board.add_breakpoint(address);
@@ -57,7 +63,7 @@ fn a_breakpoint_outlasts_a_reset() {
 }
 
 #[test]
-fn a_step_is_one_instruction_and_takes_no_interrupt() {
+fn step_is_one_instruction_and_enters_no_interrupt() {
     let mut program = Asm::new();
     program.store(NVIC_ISER, 1 << 28);
     program.store(NVIC_ISER + 0x100, 1 << 28); // ISPR
@@ -81,15 +87,19 @@ fn a_step_is_one_instruction_and_takes_no_interrupt() {
         assert!(board.now() - now < Time::from_us(1));
     }
     board.step_instruction();
-    assert_eq!(board.pc(), behind + 4, "a branch to itself is a step, too");
+    assert_eq!(
+        board.pc(),
+        behind + 4,
+        "a branch to its own address is a step, too"
+    );
     assert!(
         board.run_until_pc(handler, Time::from_ms(10)),
-        "it was kept"
+        "the interrupt stays pending"
     );
 }
 
 #[test]
-fn a_step_of_a_core_that_sleeps_waits_for_what_wakes_it() {
+fn step_of_a_sleeping_core_waits_for_the_interrupt_that_wakes_it() {
     let mut program = Asm::new();
     program.store(SYST_RVR, 79_999);
     program.store(SYST_CVR, 0);
@@ -106,7 +116,7 @@ fn a_step_of_a_core_that_sleeps_waits_for_what_wakes_it() {
     board.step_instruction();
     assert_eq!(board.pc(), handler + 2);
     assert_eq!((board.now() - START).as_ms(), 10);
-    // And one that nothing wakes is let be.
+    // A step of a core that nothing wakes ends after a second.
     let mut program = Asm::new();
     program.wfi();
     let mut board = super::board(program);
@@ -131,13 +141,13 @@ fn registers_can_be_changed() {
         (Some(0x2000_5000), Some(0x2000_5000))
     );
     board.set_register(13, 0x2000_4000).unwrap();
-    assert_eq!(board.register(17), Some(0x2000_4000), "MSP is in use");
+    assert_eq!(board.register(17), Some(0x2000_4000), "the core uses MSP");
     assert_eq!(board.register(23), None);
     assert!(matches!(board.set_register(23, 0), Err(Error::Range(_))));
 }
 
 #[test]
-fn memory_is_read_and_sram_written_without_notice() {
+fn memory_is_read_and_sram_written_without_side_effects() {
     let (_, program) = counting();
     let mut board = board(program);
     let mut word = [0; 4];
@@ -153,7 +163,7 @@ fn memory_is_read_and_sram_written_without_notice() {
     assert_eq!(
         board.read_memory(0x0801_FFFE, &mut word),
         2,
-        "up to the end"
+        "the read stops at the end of the memory"
     );
     assert_eq!(board.read_memory(0xFFFF_FFFE, &mut word), 0);
     board.write_memory(OUT, &[1, 2, 3, 4]).unwrap();

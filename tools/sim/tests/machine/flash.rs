@@ -1,4 +1,4 @@
-//! The flash: stalls, code in SRAM beside an operation, power cuts.
+//! The flash: stalls, code in SRAM during an operation, power cuts.
 
 use sim::periph::flash::{Durations, Torn};
 use sim::{Config, Time};
@@ -7,7 +7,7 @@ use super::asm::{Asm, When};
 use super::regs::*;
 use super::{board, board_with, findings, out};
 
-/// The page the programs work on: the last but one.
+/// Address of the page that the programs use: the last but one.
 const PAGE: u32 = 0x0801_F800;
 const OFFSET: usize = 0x1_F800;
 
@@ -16,14 +16,14 @@ fn unlock(program: &mut Asm) {
     program.store(FLASH_KEYR, 0xCDEF_89AB);
 }
 
-/// Erases [`PAGE`]; the last instruction starts it.
+/// Erases [`PAGE`]. The last instruction starts the erase.
 fn erase(program: &mut Asm) {
     program.store(FLASH_CR, 2);
     program.store(FLASH_AR, PAGE);
     program.store(FLASH_CR, 0x42);
 }
 
-/// The eight instructions that the core may have fetched ahead; the next one waits for the operation's end.
+/// The eight instructions that the core may have fetched in advance. The next one waits for the end of the operation.
 fn wait(program: &mut Asm) {
     (0..8).for_each(|_| program.nop());
 }
@@ -62,14 +62,14 @@ fn code_in_flash_stalls_for_the_whole_operation() {
     let (before, count) = (board.now(), board.instructions());
     assert!(board.run_until_pc(after, limit));
     assert_eq!(board.instructions(), count + 1);
-    // Two moves and the load of FLASH_SR: BSY is late.
+    // Two moves and the load of FLASH_SR: BSY is set late.
     board.step(3);
     assert_eq!((board.register(1), board.flash()[OFFSET]), (Some(0), 0));
-    // The rest of what the core may have fetched ahead.
+    // The rest of the instructions that the core may have fetched in advance.
     board.step(5);
     assert!(board.now() < before + Time::from_ms(1));
     board.step(1);
-    // The store and a load beside the 30 ms.
+    // The store and a load in addition to the 30 ms.
     let more = (board.now() - before).as_ps() - 30_000_000_000;
     assert_eq!(more, Time::cycles(3, 8_000_000).as_ps());
     assert!(board.run_until_pc(programmed, limit));
@@ -81,12 +81,16 @@ fn code_in_flash_stalls_for_the_whole_operation() {
     assert_eq!(board.flash()[OFFSET..OFFSET + 2], [0x34, 0x12]);
     assert_eq!(board.flash()[OFFSET - 1], 0);
     let read = [0, 1, 2, 3].map(|n| out(&board, n));
-    assert_eq!(read, [0, 0x20, 0x20, 0x20], "late BSY, EOP, EOP is kept");
+    assert_eq!(
+        read,
+        [0, 0x20, 0x20, 0x20],
+        "BSY is set late, then EOP is set and stays set"
+    );
     assert_eq!(findings(&board), [""; 0]);
 }
 
 #[test]
-fn time_can_be_stopped_in_the_middle_of_a_stall() {
+fn a_run_can_end_in_the_middle_of_a_stall() {
     let mut program = Asm::new();
     unlock(&mut program);
     erase(&mut program);
@@ -98,15 +102,15 @@ fn time_can_be_stopped_in_the_middle_of_a_stall() {
     let count = board.instructions();
     board.run_until(Time::from_ms(30));
     assert_eq!(board.instructions(), count);
-    assert_eq!(board.flash()[OFFSET], 0, "not yet");
+    assert_eq!(board.flash()[OFFSET], 0, "the page is not erased yet");
     board.run_until(Time::from_ms(40));
     assert!(board.instructions() > count);
     assert_eq!(board.flash()[OFFSET], 0xFF);
 }
 
-/// A piece of code in SRAM that erases, counts in r7 while BSY is set, and comes back.
+/// A piece of code in SRAM that starts an erase, counts in r7 while BSY is set, and returns.
 #[test]
-fn code_in_sram_goes_on_beside_an_operation_and_stalls_on_its_way_back() {
+fn code_in_sram_runs_during_an_operation_and_stalls_when_it_returns() {
     const CODE: u32 = 0x2000_1000;
     let mut ram = Asm::at(CODE);
     erase(&mut ram);
@@ -132,10 +136,14 @@ fn code_in_sram_goes_on_beside_an_operation_and_stalls_on_its_way_back() {
 
     assert!(board.run_until_pc(back, Time::from_ms(200)));
     assert_eq!(out(&board, 0), 1, "BSY is seen from SRAM");
-    // 100 000 instructions are 15 ms; the erase lasts twice that.
+    // 100 000 instructions take 15 ms; the erase takes twice as long.
     assert!(board.instructions() > 100_000);
     board.step(10);
-    assert_eq!(out(&board, 1), 0x20, "and over when flash is fetched again");
+    assert_eq!(
+        out(&board, 1),
+        0x20,
+        "the operation has ended when flash is fetched again"
+    );
     let at = board.now().as_us();
     assert!((32_500..32_700).contains(&at), "{at}");
 }
@@ -168,7 +176,7 @@ fn code_in_sram_that_reads_flash_stalls_until_the_operation_ends() {
 
 #[test]
 fn program_reads_unsteady_cells_differently_from_read_to_read() {
-    // Erases a page that holds 0; of another it reads sixteen words twice each.
+    // Erases a page that holds 0, and reads sixteen words of another page twice each.
     let mut program = Asm::new();
     program.set(3, PAGE);
     program.ldr(4, 3, 0);
@@ -198,7 +206,7 @@ fn program_reads_unsteady_cells_differently_from_read_to_read() {
 }
 
 #[test]
-fn a_power_cut_in_an_erase_leaves_a_mess_that_is_the_same_every_time() {
+fn power_cut_in_an_erase_leaves_the_same_cells_every_time() {
     let run = |fraction, torn| {
         let mut program = Asm::new();
         unlock(&mut program);
@@ -222,8 +230,8 @@ fn a_power_cut_in_an_erase_leaves_a_mess_that_is_the_same_every_time() {
 }
 
 #[test]
-fn a_power_cut_between_any_two_instructions_keeps_what_was_written() {
-    // Programs 0x1111 to 0x4444 into four half-words, then spins.
+fn power_cut_between_any_two_instructions_keeps_the_written_half_words() {
+    // The program writes 0x1111 to 0x4444 to four half-words, then loops.
     let image = || {
         let mut program = Asm::new();
         unlock(&mut program);
@@ -238,25 +246,25 @@ fn a_power_cut_between_any_two_instructions_keeps_what_was_written() {
     let all: Vec<u8> = (1..=4u8).flat_map(|n| [n * 0x11; 2]).collect();
     for cut in 0..100 {
         let mut board = board_with(&image(), Config::default());
-        // What a torn half-word takes afterwards is another matter.
+        // The test does not cover the cells of a torn half-word.
         board.set_torn(Torn::Before);
         board.step(cut);
         board.power_off();
         let left = board.flash()[OFFSET..OFFSET + 8].to_vec();
         let written = left.iter().take_while(|&&b| b != 0xFF).count();
-        assert_eq!(written % 2, 0, "an operation that had ended stands whole");
+        assert_eq!(written % 2, 0, "every half-word is completely old or new");
         assert_eq!(left[..written], all[..written], "after {cut}");
         board.power_on();
         assert_eq!(board.resets(), 0);
         assert_eq!(board.flash()[OFFSET..OFFSET + 8], left);
         board.run_for(Time::from_ms(10));
-        // Programming the same value again is refused, so the rest is as the second run left it.
+        // The flash refuses to program the same value again, so the rest is as the second run left it.
         assert_eq!(board.flash()[OFFSET..OFFSET + 8], all, "after {cut}");
     }
 }
 
 #[test]
-fn durations_can_be_set_and_a_locked_flash_refuses() {
+fn durations_can_be_set_and_a_locked_flash_refuses_writes() {
     let mut program = Asm::new();
     program.store(FLASH_CR, 2);
     program.store(FLASH_CR, 0x42);
@@ -293,8 +301,8 @@ fn a_wrong_key_is_a_bus_fault() {
 }
 
 #[test]
-fn new_code_in_flash_is_what_runs() {
-    // A function at PAGE returns 1; it is erased and programmed to return 2, called each time.
+fn new_code_in_flash_is_executed() {
+    // A function at PAGE returns 1. It is erased, programmed to return 2, and called each time.
     let mut program = Asm::new();
     program.set(3, PAGE | 1);
     program.blx(3);
@@ -324,7 +332,7 @@ fn new_code_in_flash_is_what_runs() {
 }
 
 #[test]
-fn code_that_every_start_copies_to_sram_runs_as_it_was_copied_last() {
+fn code_copied_to_sram_at_every_start_runs_in_its_last_version() {
     const CODE: u32 = 0x2000_1000;
     let mut program = Asm::new();
     program.copy(PAGE, CODE);

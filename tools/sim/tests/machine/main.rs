@@ -1,4 +1,4 @@
-//! The machine, with programs written by hand: time, stalls, faults, resets, power cuts, wires.
+//! The machine with programs written by hand: time, stalls, faults, resets, power cuts, wires.
 
 mod asm;
 mod core;
@@ -16,10 +16,10 @@ mod wires;
 use asm::Asm;
 use sim::{Board, Config, Image, Time};
 
-/// From power-on to the first instruction: the part's own reset delay.
+/// Time from power-on to the first instruction: the reset delay of the part.
 const START: Time = Time::from_us(2_500);
 
-/// A board with `program` on it.
+/// Returns a board that runs `program`.
 fn board(program: Asm) -> Board {
     board_with(&program.image(), Config::default())
 }
@@ -28,12 +28,12 @@ fn board_with(image: &Image, config: Config) -> Board {
     Board::new(image, config).expect("the program fits")
 }
 
-/// The `n`th word that a program has put out.
+/// Returns the `n`th word that a program has stored at [`regs::OUT`].
 fn out(board: &Board, n: u32) -> u32 {
     board.word(regs::OUT + 4 * n).expect("in SRAM")
 }
 
-/// The findings, as text.
+/// Returns the findings as text.
 fn findings(board: &Board) -> Vec<String> {
     board
         .findings()

@@ -1,4 +1,4 @@
-//! Measurements: where the core's time goes, and how long interrupts wait.
+//! Measurements: the load of the core, and the waiting times of interrupts.
 
 use sim::{Board, CoreTime, Time, Wait};
 
@@ -12,13 +12,13 @@ const TIM2_IRQ: usize = 16 + 28;
 const PENDSV: usize = 14;
 const SYSTICK: usize = 15;
 
-/// The time of `n` cycles of the HSI, from which the programs run without wait states.
+/// Returns the time of `n` cycles of the HSI, from which the programs run without wait states.
 fn cycles(n: u64) -> Time {
     Time::cycles(n, 8_000_000)
 }
 
-/// Cycles of [`delay`]: two to set the count, one for the subtraction and one for the NOP of each round, three
-/// for the branch back and one for the last, which is not taken.
+/// Returns the cycles of [`delay`]: two to set the count; in each round one for the subtraction, one for the NOP and
+/// three for the branch; one for the last branch, which is not taken.
 const fn delay_cycles(n: u64) -> u64 {
     2 + 5 * n - 2
 }
@@ -26,18 +26,18 @@ const fn delay_cycles(n: u64) -> u64 {
 /// Cycles of an exception's entry.
 const ENTRY: u64 = 12;
 
-/// The same but for what is rounded.
+/// Asserts that two times are equal except for rounding.
 fn assert_close(a: Time, b: Time) {
     let off = a.max(b) - a.min(b);
     assert!(off <= Time::from_ns(1), "{a} is not {b}");
 }
 
-/// Switches interrupts off or on at PRIMASK.
+/// Disables or enables interrupts with PRIMASK.
 fn mask(program: &mut Asm, on: bool) {
     program.raw(if on { 0xB672 } else { 0xB662 });
 }
 
-/// `3 n` instructions and one, in r7.
+/// A delay of `3 n` instructions and one, which uses r7.
 fn delay(program: &mut Asm, n: u32) {
     program.set(7, n);
     let top = program.here();
@@ -46,8 +46,8 @@ fn delay(program: &mut Asm, n: u32) {
     program.branch(When::NotEqual, top);
 }
 
-/// TIM2 interrupts every millisecond, started by the instruction that is returned; its handler takes
-/// `3 rounds + 7` instructions.
+/// A program in which TIM2 interrupts every millisecond. Returns the address of the instruction that starts TIM2. The
+/// handler takes `3 rounds + 7` instructions.
 fn ticking(program: &mut Asm) -> u32 {
     program.store(RCC_APB1ENR, 1);
     program.store(TIM2 + 0x28, 7);
@@ -71,7 +71,7 @@ fn tick_handler(program: &mut Asm, rounds: u32) {
 }
 
 #[test]
-fn the_load_is_what_the_instructions_take() {
+fn load_is_the_time_of_the_executed_instructions() {
     let mut program = Asm::new();
     ticking(&mut program);
     let top = program.here();
@@ -85,9 +85,9 @@ fn the_load_is_what_the_instructions_take() {
     board.run_for(Time::from_ms(100));
     let spent = board.core_time().since(before);
     let done = board.instructions() - done;
-    // Two of the loop, and the handler's.
+    // Two instructions of the loop, and those of the handler.
     assert_eq!(done, 100 * (2 + 1 + 2 + 150 + 1));
-    // WFI and the branch back; entry, the store to APB1, the delay, the return.
+    // WFI and the branch back; exception entry, the store to APB1, the delay, the return.
     let each = 1 + 3 + ENTRY + 2 + delay_cycles(50) + 1 + 12;
     assert_close(spent.running, cycles(100 * each));
     assert_close(spent.asleep, Time::from_ms(100) - spent.running);
@@ -98,7 +98,7 @@ fn the_load_is_what_the_instructions_take() {
 }
 
 #[test]
-fn a_branch_to_itself_is_no_sleep_and_a_board_without_power_is_off() {
+fn endless_loop_is_not_sleep_and_board_without_power_is_off() {
     let mut program = Asm::new();
     program.raw(0xE7FE);
     let mut board = board(program);
@@ -124,7 +124,7 @@ fn a_flash_operation_stalls_the_core() {
     program.store(FLASH_CR, 1 << 1);
     program.store(FLASH_AR, 0x0800_4000);
     program.store(FLASH_CR, 1 << 1 | 1 << 6);
-    // What the core may have fetched ahead runs before it stalls.
+    // The instructions that the core may have fetched in advance run before the stall.
     (0..8).for_each(|_| program.nop());
     program.wfi();
     let mut board = board(program);
@@ -135,7 +135,8 @@ fn a_flash_operation_stalls_the_core() {
     assert!(spent.running < Time::from_us(10));
 }
 
-/// Counts what the interrupt has waited by two places in the program: where it is pended, and its handler.
+/// Returns the waiting time of the interrupt, from two addresses of the program (where it is pended, and its handler),
+/// and the simulator's measurement.
 fn waited(mut board: Board, number: usize, pended: u32, handler: u32) -> (Time, Wait) {
     board.measure_waits(true);
     let limit = Time::from_secs(1);
@@ -157,7 +158,7 @@ fn a_masked_interrupt_waits_from_its_request_to_its_handler() {
     tick_handler(&mut program, 1);
     let (between, wait) = waited(board(program), TIM2_IRQ, started, handler);
     assert_eq!(wait.entries, 1);
-    // The timer asks a millisecond after its start; the core sees it at the end of an instruction.
+    // The timer requests the interrupt a millisecond after its start; the core enters it at the end of an instruction.
     let expected = between - Time::from_ms(1) - cycles(ENTRY);
     let off = wait.longest.max(expected) - wait.longest.min(expected);
     assert!(off < cycles(4), "{} is not {expected}", wait.longest);
@@ -165,7 +166,7 @@ fn a_masked_interrupt_waits_from_its_request_to_its_handler() {
 }
 
 #[test]
-fn what_software_pends_waits_from_the_instruction_that_pends_it() {
+fn wait_of_a_pended_interrupt_begins_with_the_instruction_that_pends_it() {
     for (number, register, bit) in [
         (TIM2_IRQ, NVIC_ISPR, 28),
         (PENDSV, ICSR, 28),
@@ -190,7 +191,7 @@ fn what_software_pends_waits_from_the_instruction_that_pends_it() {
 }
 
 #[test]
-fn systick_s_wait_begins_with_its_event() {
+fn wait_of_systick_begins_with_its_event() {
     let mut program = Asm::new();
     mask(&mut program, true);
     program.store(SYST_RVR, 7_999);
@@ -210,7 +211,7 @@ fn systick_s_wait_begins_with_its_event() {
 }
 
 #[test]
-fn an_interrupt_does_not_wait_before_it_is_enabled_nor_after_it_is_withdrawn() {
+fn wait_is_not_counted_before_enabling_or_after_clearing_an_interrupt() {
     let mut program = Asm::new();
     program.store(NVIC_ISPR, 1 << 28);
     delay(&mut program, 1_000);
@@ -236,7 +237,7 @@ fn an_interrupt_does_not_wait_before_it_is_enabled_nor_after_it_is_withdrawn() {
 }
 
 #[test]
-fn a_measured_run_is_the_same_run() {
+fn measuring_does_not_change_the_run() {
     let program = || {
         let mut program = Asm::new();
         ticking(&mut program);

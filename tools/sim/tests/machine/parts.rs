@@ -13,7 +13,7 @@ const IDCODE: u32 = 0xE004_2000;
 const TIM5: u32 = 0x4000_0C00;
 const GPIOC_IDR: u32 = GPIOC + 8;
 
-/// A part with `program` in it and nothing connected to its pins.
+/// Returns a part that runs `program`, with nothing connected to its pins.
 fn alone(part: &'static Part, program: Asm) -> Chip<()> {
     let config = chip::Config {
         part,
@@ -22,7 +22,7 @@ fn alone(part: &'static Part, program: Asm) -> Chip<()> {
     Chip::in_circuit(&program.image(), config, ()).expect("the program fits")
 }
 
-/// Copies the words at `addresses` to [`OUT`], one after the other.
+/// Copies the words at `addresses` to consecutive words from [`OUT`].
 fn copies(addresses: &[u32]) -> Asm {
     let mut program = Asm::new();
     for (from, n) in addresses.iter().zip(0..) {
@@ -99,7 +99,7 @@ fn a_high_density_part_erases_a_page_of_2_kib_while_its_code_stalls() {
     let page = LAST as usize - 0x0800_0000;
     assert!(chip.flash()[page..].iter().all(|byte| *byte == 0xFF));
     assert_eq!(chip.flash()[page - 1], 0);
-    // The eight instructions that were fetched ahead run in the first microsecond of the erase.
+    // The eight instructions that were fetched in advance run in the first microsecond of the erase.
     let stalled = Time::from_ms(30) - Time::from_us(1);
     assert_eq!(chip.core_time().stalled, stalled);
     assert_eq!(findings(&chip), [""; 0]);
@@ -133,7 +133,7 @@ fn a_block_of_larger_parts_is_reported_by_its_name() {
     }
 }
 
-/// Holds PC0 high, a pin of the packages with 64 pins.
+/// A circuit that drives PC0 high, a pin of the packages with 64 pins.
 struct HighPc0;
 
 impl Circuit for HighPc0 {
@@ -152,20 +152,21 @@ fn a_circuit_drives_the_pins_of_a_larger_package() {
         part: &STM32F103RC,
         ..chip::Config::default()
     };
-    let mut chip = Chip::in_circuit(&program.image(), config, HighPc0).expect("it fits");
+    let mut chip = Chip::in_circuit(&program.image(), config, HighPc0).expect("the program fits");
     chip.run_until(Time::from_ms(3));
     assert_eq!(out(&chip, 0), 1);
 }
 
 #[test]
 #[should_panic(expected = "STM32F103CB has no such pin")]
-fn a_circuit_cannot_drive_a_pin_that_the_package_lacks() {
+fn circuit_cannot_drive_a_pin_that_the_package_does_not_have() {
     let _ = Chip::in_circuit(&copies(&[]).image(), chip::Config::default(), HighPc0);
 }
 
 #[test]
 fn an_image_that_is_too_large_for_the_part_is_refused() {
-    let image = sim::Image::from_bytes(&[0; 64 * 1024 + 1]).expect("fits some part");
+    let image =
+        sim::Image::from_bytes(&[0; 64 * 1024 + 1]).expect("the image fits at least one part");
     for (part, fits) in [(&STM32F103C8, false), (&STM32F103CB, true)] {
         let config = chip::Config {
             part,

@@ -1,4 +1,4 @@
-//! The register addresses the programs use (RM0008).
+//! The register addresses that the programs use (RM0008).
 
 pub const RCC_CR: u32 = 0x4002_1000;
 pub const RCC_CFGR: u32 = 0x4002_1004;
@@ -27,10 +27,10 @@ pub const AIRCR: u32 = 0xE000_ED0C;
 pub const DEMCR: u32 = 0xE000_EDFC;
 pub const DWT_CTRL: u32 = 0xE000_1000;
 pub const DWT_CYCCNT: u32 = 0xE000_1004;
-/// Where the programs put their results.
+/// Address where the programs store their results.
 pub const OUT: u32 = 0x2000_0000;
 
-/// The bit-band alias of `bit` of the word at `address` in the peripheral region (PM0056 2.2.5).
+/// Returns the bit-band alias of `bit` of the word at `address` in the peripheral region (PM0056 2.2.5).
 pub const fn bit_band(address: u32, bit: u32) -> u32 {
     0x4200_0000 + (address - 0x4000_0000) * 32 + bit * 4
 }

@@ -1,4 +1,4 @@
-//! Resets and start-up: flags, the watchdog, the crystal, the power.
+//! Resets and start-up: flags, the watchdog, the crystal, the power supply.
 
 use sim::{Config, Time};
 
@@ -11,7 +11,7 @@ const PIN: u32 = 0x0400_0000;
 const SOFTWARE: u32 = 0x1400_0000;
 const WATCHDOG: u32 = 0x2400_0000;
 
-/// Puts RCC_CSR out, clears its flags, then goes on with what is added.
+/// A program that stores RCC_CSR and clears its flags; the caller adds the rest.
 fn report_cause() -> Asm {
     let mut program = Asm::new();
     program.copy(RCC_CSR, OUT);
@@ -30,7 +30,7 @@ fn wait_a_moment(program: &mut Asm) {
 }
 
 #[test]
-fn watchdog_settings_do_not_arrive_while_the_lsi_is_off() {
+fn watchdog_settings_are_not_in_force_while_the_lsi_is_off() {
     let mut program = Asm::new();
     program.store(IWDG_KR, 0x5555);
     program.store(IWDG_PR, 1);
@@ -46,9 +46,9 @@ fn watchdog_settings_do_not_arrive_while_the_lsi_is_off() {
 }
 
 #[test]
-fn the_watchdog_resets_after_its_timeout_and_says_so() {
+fn watchdog_resets_after_its_time_out_and_sets_its_flag() {
     let mut program = report_cause();
-    // The start turns the LSI on, which takes the prescaler over.
+    // Starting the watchdog enables the LSI, which transfers the prescaler.
     program.store(IWDG_KR, 0xCCCC);
     program.store(IWDG_KR, 0x5555);
     program.store(IWDG_PR, 1);
@@ -71,7 +71,7 @@ fn the_watchdog_resets_after_its_timeout_and_says_so() {
 }
 
 #[test]
-fn a_fed_watchdog_stays_quiet_and_wakes_a_locked_core() {
+fn refreshed_watchdog_does_not_reset_and_a_locked_core_is_reset() {
     let mut program = report_cause();
     program.store(IWDG_KR, 0xCCCC);
     let top = program.here();
@@ -95,7 +95,7 @@ fn a_fed_watchdog_stays_quiet_and_wakes_a_locked_core() {
 }
 
 #[test]
-fn a_software_reset_keeps_sram_and_starts_anew() {
+fn software_reset_keeps_sram_and_restarts_the_program() {
     let mut program = report_cause();
     program.set(0, OUT + 4);
     program.ldr(1, 0, 0);
@@ -119,7 +119,7 @@ fn a_software_reset_keeps_sram_and_starts_anew() {
 }
 
 #[test]
-fn a_power_cycle_forgets_sram_and_says_power_on() {
+fn power_cycle_loses_sram_and_sets_the_power_on_flag() {
     let mut program = report_cause();
     program.spin();
     let mut board = board(program);
@@ -142,7 +142,7 @@ fn a_power_cycle_forgets_sram_and_says_power_on() {
 }
 
 #[test]
-fn the_crystal_comes_after_two_milliseconds_or_never() {
+fn crystal_is_ready_after_two_milliseconds_or_never() {
     for crystal in [true, false] {
         let mut program = Asm::new();
         program.store(RCC_CR, 0x1_0083);

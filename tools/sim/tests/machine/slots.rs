@@ -22,7 +22,9 @@ fn modio_08(slots: &[(u8, Module)], program: Asm) -> Board {
 
 fn output(board: &Board, port: u8, channel: usize) -> Channel {
     let mut slots = board.slots();
-    let slot = slots.find(|(known, _)| *known == port).expect("a slot");
+    let slot = slots
+        .find(|(known, _)| *known == port)
+        .expect("the port has a slot");
     slot.1.channel(channel)
 }
 
@@ -30,7 +32,7 @@ fn output(board: &Board, port: u8, channel: usize) -> Channel {
 fn each_slot_and_the_switch_have_their_pins() {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 0b1_1100);
-    // Inputs with pull-ups, all but the lines of port 4: PB0, PB1, PC4 and PC5 are outputs.
+    // Inputs with pull-ups, except the lines of port 4: PB0, PB1, PC4 and PC5 are outputs.
     for gpio in [GPIOA, GPIOB, GPIOC] {
         program.store(gpio + 0x0C, 0xFFFF);
     }
@@ -88,7 +90,7 @@ fn an_analog_input_of_port_4_is_at_its_input_of_the_adc() {
     program.spin();
     let mut board = modio_08(&[(4, Module::Ai4)], program);
     let set = board.change_slot(4, |slot| {
-        // A source without impedance, so that the shortest sampling time is enough.
+        // A source without impedance: the shortest sampling time is then enough.
         slot.set_source_ohms(3, 0)?;
         slot.set_millivolts(3, 1650)
     });
@@ -142,7 +144,7 @@ fn the_dac_of_each_slot_has_its_own_address() {
 }
 
 #[test]
-fn a_slot_that_the_board_lacks_is_refused() {
+fn slot_that_the_board_does_not_have_is_refused() {
     let config = Config {
         slots: vec![(1, Module::Do4)],
         ..Config::default()

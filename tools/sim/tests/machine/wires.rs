@@ -10,7 +10,7 @@ use super::{board, board_with, findings, out};
 const SR: u16 = 0;
 const DR: u16 = 4;
 
-/// USART1 at 19200 8N1 from 8 MHz; sends back each byte plus one, with the driver on until TC.
+/// USART1 at 19200 8N1 from 8 MHz. The program returns each byte plus one, with the driver on until TC.
 fn echo_program(release: bool) -> Asm {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 1 << 14 | 1 << 2);
@@ -39,7 +39,7 @@ fn echo_program(release: bool) -> Asm {
 }
 
 #[test]
-fn a_byte_crosses_the_line_and_comes_back() {
+fn byte_is_received_and_sent_back() {
     let mut board = board(echo_program(true));
     board.line().set_settings(Settings {
         baud: 19_200,
@@ -59,8 +59,8 @@ fn a_byte_crosses_the_line_and_comes_back() {
         (Direction::FromUnit, &b"B"[..])
     );
     assert!(!frames[1].damaged);
-    // RXNE comes at ten sixteenths of the stop bit, and the answer begins at the next tick of the baud generator: a
-    // bit of 52 us later at most.
+    // RXNE is set at ten sixteenths of the stop bit, and the reply begins at the next tick of the baud generator: at
+    // most a bit of 52 us later.
     assert!(frames[1].start < end + Time::from_us(40), "{frames:?}");
     assert!(!board.driver_enable());
     let edges: Vec<_> = board.line().driver_edges().collect();
@@ -70,7 +70,7 @@ fn a_byte_crosses_the_line_and_comes_back() {
 }
 
 #[test]
-fn a_driver_that_stays_on_makes_the_unit_deaf() {
+fn unit_whose_driver_stays_on_receives_nothing() {
     let mut board = board(echo_program(false));
     board.line().set_settings(Settings {
         baud: 19_200,
@@ -80,13 +80,13 @@ fn a_driver_that_stays_on_makes_the_unit_deaf() {
     board.line().send(Time::from_ms(10), b"A");
     board.line().send(Time::from_ms(20), b"C");
     board.run_until(Time::from_ms(40));
-    let heard: Vec<_> = board.line().received().map(|word| word.byte).collect();
-    assert_eq!(heard, b"B");
+    let received: Vec<_> = board.line().received().map(|word| word.byte).collect();
+    assert_eq!(received, b"B");
     assert!(board.driver_enable());
 }
 
 #[test]
-fn a_receiver_behind_an_output_pin_is_reported() {
+fn receiver_whose_pin_is_an_output_is_reported() {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 1 << 14 | 1 << 2);
     program.store(GPIOA + 4, 0x4444_43B3);
@@ -126,7 +126,7 @@ fn the_switch_pulls_its_pins_low() {
 }
 
 #[test]
-fn the_slot_sees_outputs_and_gives_inputs_and_voltages() {
+fn slot_follows_outputs_and_drives_inputs_and_voltages() {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 1 << 2);
     program.store(GPIOA + 0x0C, 0b0111);
@@ -149,20 +149,24 @@ fn the_slot_sees_outputs_and_gives_inputs_and_voltages() {
     assert_eq!(out(&board, 0) & 3, 1);
     assert_eq!(board.channel(2), relay(false, true));
     board.power_off();
-    assert_eq!(board.channel(1), relay(false, false), "no power, no coil");
+    assert_eq!(
+        board.channel(1),
+        relay(false, false),
+        "a coil without power is released"
+    );
     board.set_module(Module::Ai4).unwrap();
     board.power_on();
     assert_eq!(board.set_module(Module::None), Err(sim::Error::Powered));
 }
 
 #[test]
-fn the_adc_converts_what_stands_at_the_pin() {
+fn adc_converts_the_voltage_at_the_pin() {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 1 << 2 | 1 << 9);
     program.store(GPIOA, 0x4444_4400);
     program.store(ADC1 + 8, 1);
     program.store(ADC1 + 0x34, 1);
-    // Power-up and calibration each take less than 200 rounds.
+    // Power-up and calibration take less than 200 rounds each.
     for control in [1 << 2 | 1, 7 << 17 | 1 << 20 | 1] {
         program.set(3, 200);
         let settle = program.here();
@@ -190,7 +194,7 @@ fn the_adc_converts_what_stands_at_the_pin() {
 }
 
 #[test]
-fn a_timer_interrupt_comes_on_time_and_wakes_the_core() {
+fn timer_interrupt_occurs_on_time_and_wakes_the_core() {
     let mut program = Asm::new();
     program.store(RCC_APB1ENR, 1);
     program.store(RCC_APB2ENR, 1 << 4);

@@ -1,4 +1,4 @@
-"""The simulator's page in Chromium without a window."""
+"""The simulator's page in headless Chromium."""
 
 import re
 import shutil
@@ -8,9 +8,9 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
 from simulator import PATIENCE, Simulator
 
-# Debian's package; playwright's own browsers are not needed.
+# Debian's package. The browsers that playwright brings are not needed.
 CHROMIUM = "chromium"
-# For a container: run as root, without graphics, and without requests of the browser itself.
+# For a container: runs as root, without graphics, and without requests of the browser's own.
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync"]
 
@@ -50,8 +50,8 @@ class OnPage(unittest.TestCase):
         self.page = self.open()
 
     def open(self, *, viewport=None, scheme="light", load=True, **more) -> Page:
-        """Opens the page in a window of its own. When the test ends, the page must have reported no error and
-        asked nobody but the simulator."""
+        """Opens the page in a new window. At the end of the test, the page must have reported no error and
+        sent requests only to the simulator."""
         context = self.browser.new_context(viewport=viewport or self.VIEWPORT, color_scheme=scheme, **more)
         self.addCleanup(context.close)
         foreign, errors = [], []
@@ -75,7 +75,7 @@ class OnPage(unittest.TestCase):
         return page
 
     def is_expected(self, message) -> bool:
-        """Whether the console may have this error."""
+        """Returns whether the console may have this error."""
         return False
 
     def load(self, page: Page):
@@ -85,7 +85,7 @@ class OnPage(unittest.TestCase):
         expect(page.locator(".slot")).not_to_have_count(0)
 
     def switch(self, name: str):
-        """A switch or lamp of the page by its name."""
+        """Returns a switch or lamp of the page by its name."""
         return self.page.get_by_role("switch", name=name, exact=True)
 
     def is_on(self, name: str, text: str, on: bool = True):
@@ -94,15 +94,15 @@ class OnPage(unittest.TestCase):
         expect(self.switch(name)).to_have_attribute("aria-checked", "true" if on else "false")
 
     def good(self, answer):
-        """An answer that is no exception."""
+        """Returns the answer, which must not be an exception."""
         self.assertFalse(answer.isError(), answer)
         return answer
 
     def eventually(self, what, wanted, within_ms: int = 1000):
-        """`what()` becomes `wanted` within this much of the board's time."""
+        """Waits until `what()` returns `wanted`, for this much of the board's virtual time."""
         end = self.simulator.state().virtual_ms + within_ms
         while (seen := what()) != wanted and self.simulator.state().virtual_ms < end:
-            # Lets the page's requests through, too, which pass this process.
+            # This also lets the page's requests pass, which run through this process.
             self.page.wait_for_timeout(5)
         self.assertEqual(seen, wanted)
 

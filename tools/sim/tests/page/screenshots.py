@@ -1,4 +1,4 @@
-"""Takes the pictures of the simulator's page for the documents: `cargo xtask screenshots`.
+"""Takes the pictures of the simulator's page for the documentation: `cargo xtask screenshots`.
 
 The board's time and the page's stand still between steps, so a picture hardly changes unless the page or the firmware does.
 """
@@ -13,7 +13,7 @@ import sys
 from PIL import Image
 from playwright.sync_api import expect, sync_playwright
 
-# The tests of pymodbus have the simulator, by its Python client.
+# The tests with pymodbus have the class of the simulator, based on its Python client.
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / "pymodbus"),
                 str(pathlib.Path(__file__).resolve().parents[2] / "python")]
 import simulator  # noqa: E402
@@ -24,12 +24,12 @@ EXACT = ["--exact-line", "127.0.0.1:0"]
 
 
 class Line:
-    """The board's line by the exact-line protocol of docs/conformance.md."""
+    """The board's line through the exact-line protocol of docs/conformance.md."""
 
     def __init__(self, address: str):
         host, port = address.rsplit(":", 1)
         with socket.create_connection((host, int(port)), timeout=simulator.PATIENCE) as connection:
-            # Keeps the connection until it is closed itself.
+            # The file keeps the connection until it is closed itself.
             self.file = connection.makefile("rw")
         self.ask("hello 1")
 
@@ -40,13 +40,13 @@ class Line:
         assert answer.startswith("ok "), (request, answer)
 
     def request(self, body: str, run_ms: int):
-        """Sends a request, and lets time pass."""
+        """Sends a request and runs the board."""
         self.ask(f"send {simulator.crc(bytes.fromhex(body)).hex()}")
         self.ask(f"run {run_ms * 1000}")
 
 
 def value(second: int, channel: int) -> int:
-    """Millivolts at an input: a slow wave, each channel at its own level."""
+    """Returns the voltage at an input in mV: a slow wave, with a different level for each channel."""
     return round(1650 + (900 - 150 * channel) * math.sin(second / (6 + 2 * channel) + channel))
 
 
@@ -98,8 +98,8 @@ def shows(page, slider: str, millivolts: int):
 
 
 def shoot(page, file: pathlib.Path, last):
-    """A picture of the page down to the element `last`, in 256 colours."""
-    # The last frame and the state after it have come.
+    """Takes a picture of the page down to the element `last`, in 256 colours."""
+    # Wait for the last frame and the state after it.
     page.wait_for_load_state()
     page.clock.run_for(500)
     box = last.bounding_box()
@@ -112,8 +112,8 @@ def shoot(page, file: pathlib.Path, last):
 
 
 def reduced(picture: Image.Image) -> Image.Image:
-    """The picture in 256 colours: the most frequent ones as they are, so that grounds keep theirs, and others that are
-    far from these, so that an LED keeps its."""
+    """Returns the picture in 256 colours: the most frequent ones, so that backgrounds keep their colour, and others
+    that differ most from these, so that an LED keeps its colour."""
     counted = sorted(picture.getcolors(picture.width * picture.height), reverse=True)
     frequent = [colour for _, colour in counted[:128]]
     far = picture.quantize(128, Image.Quantize.MAXCOVERAGE).getpalette()[:3 * 128]

@@ -18,11 +18,11 @@ class Analog(OnPage):
             self.simulator.set_channel(number, millivolts=0)
 
     def codes(self):
-        """What the inputs read, in codes of the 12-bit converter, within one of what was applied."""
+        """Returns the values of the inputs in codes of the 12-bit converter."""
         return self.good(self.master.read_input_registers(FIRST, count=2)).registers
 
     def reads(self, number: int, millivolts: int):
-        """An input register follows its pin within a code, and the filter's time."""
+        """Waits until an input register has the voltage of its pin, within one code, after the filter's time."""
         wanted = millivolts * 4095 / 3300
         self.eventually(lambda: abs(self.codes()[number - 1] - wanted) <= 1.5, True)
 
@@ -63,7 +63,7 @@ class Analog(OnPage):
         self.at_pin(2, 330)
         self.reads(2, 330)
 
-    def test_slider_tells_the_value_in_the_chosen_range_and_at_the_pin(self):
+    def test_slider_has_the_value_in_the_chosen_range_and_at_the_pin(self):
         for unit, value in (("V", "5"), ("mA", "10"), ("°C", "25")):
             self.page.get_by_label("Range of analog input 1").select_option(label=unit)
             self.field(1).fill(value)
@@ -73,20 +73,20 @@ class Analog(OnPage):
             expect(self.slider(1)).to_have_value("1650")
         self.reads(1, 1650)
 
-    def test_temperature_is_what_a_thermistor_at_that_temperature_gives(self):
+    def test_temperature_sets_the_voltage_of_a_thermistor_at_that_temperature(self):
         self.page.get_by_label("Range of analog input 1").select_option(label="°C")
         self.field(1).fill("60")
         self.page.keyboard.press("Enter")
         ohms = 10e3 * math.exp(3950 * (1 / 333.15 - 1 / 298.15))
         self.at_pin(1, round(3300 * ohms / (ohms + 10e3)))
 
-    def test_value_beyond_the_range_stops_at_its_end(self):
+    def test_value_outside_the_range_is_limited_to_its_end(self):
         self.field(1).fill("12")
         self.page.keyboard.press("Enter")
         self.at_pin(1, 3300)
         expect(self.field(1)).to_have_value("10")
 
-    def test_change_from_elsewhere_moves_the_slider(self):
+    def test_change_by_another_client_moves_the_slider(self):
         self.simulator.set_channel(1, millivolts=990)
         expect(self.slider(1)).to_have_value("990")
         expect(self.field(1)).to_have_value("3")

@@ -1,4 +1,4 @@
-"""Switch, power, modules, LEDs, both boards, and what a page has to be for everybody."""
+"""Switch, power, modules, LEDs, both boards, and accessibility."""
 
 from axe_playwright_python.sync_playwright import Axe
 from browser import DESKTOP, PHONE, OnPage
@@ -7,7 +7,7 @@ from pymodbus.exceptions import ModbusIOException
 from simulator import GIVE_UP, Simulator
 
 
-# The elements that stick out at the right of the window, or of the channel that they belong to.
+# The elements that extend beyond the right edge of the window or of the channel that contains them.
 WIDER = """() => [...document.querySelectorAll("main *")].filter((each) => {
     const channel = each.parentElement.closest(".channel");
     const right = channel ? channel.getBoundingClientRect().right : innerWidth;
@@ -23,7 +23,7 @@ class Switch(OnPage):
         self.simulator.wait(200)
 
     def answers(self, unit: int) -> bool:
-        """Whether the unit with this address answers."""
+        """Returns whether the unit with this address answers."""
         self.master.close()
         master = self.simulator.master(timeout=GIVE_UP)
         try:
@@ -57,7 +57,7 @@ class Switch(OnPage):
         expect(self.page.locator("#log")).to_contain_text("unit address 18")
         self.assertEqual((self.answers(1), self.answers(18)), (False, True), "after the power cycle")
 
-    def test_switch_and_power_work_by_keyboard_alone(self):
+    def test_switch_and_power_work_with_the_keyboard_only(self):
         press = self.page.keyboard.press
         self.tab_to(self.rocker(1))
         press("Space")
@@ -145,7 +145,7 @@ class LargerBoard(OnPage):
 
 
 class ForEverybody(OnPage):
-    """axe-core finds nothing serious, and nothing is wider than the window."""
+    """axe-core finds no serious violation, and no element is wider than the window."""
 
     # Every kind of channel, with the power on and off.
     SIMULATORS = (("modio-02", "4do", ()),
@@ -157,11 +157,11 @@ class ForEverybody(OnPage):
             self.addCleanup(other.close)
             master = other.master()
             self.good(master.read_holding_registers(0x0100, count=4))
-            # A damaged frame has its own colour.
+            # A damaged frame has a different colour.
             master.close()
             with other.wire() as wire:
                 wire.write(b"\x01\x02\x03")
-            other.wait_for(lambda: len(other.frames()) == 3, what="no bad frame came")
+            other.wait_for(lambda: len(other.frames()) == 3, what="no bad frame was recorded")
             other.power_off() if module == "4do" else other.power_on()
             for viewport in (DESKTOP, PHONE):
                 for scheme in ("light", "dark"):
@@ -179,4 +179,4 @@ class ForEverybody(OnPage):
         serious = [f"{each['id']}: {[node['target'] for node in each['nodes']]}" for each in found
                    if each["impact"] in ("serious", "critical")]
         self.assertEqual(serious, [])
-        self.assertEqual(page.evaluate(WIDER), [], "beyond the window, or beyond their channel")
+        self.assertEqual(page.evaluate(WIDER), [], "elements wider than the window or their channel")

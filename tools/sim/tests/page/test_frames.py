@@ -1,4 +1,4 @@
-"""The frame log, findings, and a page that stays open."""
+"""The frame log, the findings, and a page that stays open."""
 
 import re
 import socket
@@ -107,7 +107,7 @@ class StartedAgain(OnPage):
     def is_expected(self, message) -> bool:
         return super().is_expected(message) or "CONNECTION_REFUSED" in message.text or "net::ERR" in message.text
 
-    def test_page_goes_on_with_a_simulator_that_has_started_again(self):
+    def test_page_reconnects_to_a_restarted_simulator(self):
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             address = f"127.0.0.1:{free.getsockname()[1]}"

@@ -1,4 +1,4 @@
-"""What the page shows of faults made on purpose, and of several boards on one line."""
+"""The faults that a user can set, and several boards on one line."""
 
 from browser import OnPage
 from playwright.sync_api import expect
@@ -37,13 +37,13 @@ class Faults(OnPage):
         self.eventually(self.in_force("hse_failed"), False)
         self.simulator.power_cycle()
 
-    def test_refused_fault_is_told_and_taken_back(self):
+    def test_refused_fault_is_reported_and_reset(self):
         self.page.get_by_label("Bit errors, share of bits").fill("7")
         self.page.keyboard.press("Tab")
         expect(self.page.get_by_role("alert")).to_contain_text("from 0 to 0.5")
         expect(self.page.get_by_label("Bit errors, share of bits")).to_have_value("0")
 
-    def test_faults_that_begin_by_themselves_are_shown(self):
+    def test_faults_set_by_another_client_are_shown(self):
         expect(self.page.get_by_label("DAC does not answer on I2C")).not_to_be_checked()
         self.simulator.set_faults({"i2c_absent": True})
         expect(self.page.get_by_label("DAC does not answer on I2C")).to_be_checked()

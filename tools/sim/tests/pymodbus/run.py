@@ -1,8 +1,8 @@
-"""Tests the firmware image in simulation with pymodbus, a Modbus master nobody here wrote, and with it the Python client
+"""Tests the firmware image in simulation with pymodbus, an independent Modbus master, and with it the Python client
 of the simulator.
 
-`cargo xtask test` makes the virtual environment and runs the tests here, and with `--tests` those of the simulator's
-page. By hand:
+`cargo xtask test` creates the virtual environment and runs these tests, and with `--tests` those of the simulator's
+page. To run them directly:
 
     python run.py --sim target/debug/modio-sim --elf target/thumbv7m-none-eabi/firmware/modio
 """
@@ -18,7 +18,7 @@ import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
 CLIENT = HERE.parents[1] / "python"
-# mbpoll gives up by the wall clock, so these tests have the machine for themselves.
+# mbpoll times out by the wall clock, so its tests run alone on the machine.
 ALONE = "test_mbpoll.py"
 
 
@@ -30,7 +30,7 @@ def main() -> int:
     parser.add_argument("--tests", type=pathlib.Path, help="the tests of this directory instead")
     parser.add_argument("--only", type=pathlib.Path, metavar="FILE", help="the tests of one file")
     options = parser.parse_args()
-    # Where the tests, and the client, look for them.
+    # The tests and the client read these variables.
     for variable, file in (
             ("MODIO_SIM", options.sim), ("MODIO_ELF", options.elf), ("MODIO_ELF_08", options.elf_08)):
         if file is None:
@@ -44,10 +44,10 @@ def main() -> int:
 
 
 def all_files(directories: list[pathlib.Path]) -> int:
-    """Runs the files side by side, each in a process of its own: the simulators follow the wall clock, so the tests
-    mostly wait."""
+    """Runs the files in parallel, each in a separate process: the simulators follow the wall clock, so the tests mostly
+       wait."""
     files = [file for directory in directories for file in directory.glob("test_*.py")]
-    # The largest first, so that none is left to run on its own at the end.
+    # Start the largest first, so that none runs alone at the end.
     files.sort(key=lambda file: -file.stat().st_size)
     side_by_side = [file for file in files if file.name != ALONE]
 
@@ -70,18 +70,18 @@ def all_files(directories: list[pathlib.Path]) -> int:
             report(file, run(file))
     if failed:
         print(f"failed: {', '.join(failed)}", file=sys.stderr)
-    # No tests at all must not look like success.
+    # A run without any tests must fail.
     return 0 if files and not failed else 1
 
 
 def tests_of(file: pathlib.Path) -> int:
-    """Runs the tests of one file, which may use what is here and the client."""
+    """Runs the tests of one file, which can import the modules of this directory and the client."""
     sys.path[:0] = [str(CLIENT), str(HERE)]
-    # That a unit stays silent is what many tests want, and nothing to log.
+    # Many tests expect that a unit does not answer, so do not log that.
     logging.getLogger("pymodbus").addHandler(logging.NullHandler())
     tests = unittest.defaultTestLoader.discover(str(file.parent), pattern=file.name)
     result = unittest.TextTestRunner(verbosity=2).run(tests)
-    # No tests at all must not look like success.
+    # A run without any tests must fail.
     return 0 if result.wasSuccessful() and result.testsRun else 1
 
 

@@ -10,52 +10,51 @@ from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusIOException
 
-# Virtual time stays behind the wall clock where the machine is busy, so what the unit does, or does not
-# do, is judged by virtual time, and the wall clock only says when the simulator is taken to be dead.
+# Virtual time falls behind the wall clock on a busy machine. So the tests measure what the unit does in virtual
+# time, and use the wall clock only to detect that the simulator has stopped.
 
-# Seconds of the wall clock for anything that has to happen.
+# Seconds of the wall clock within which anything expected must happen.
 PATIENCE = 60.0
-# Virtual milliseconds after which no answer is taken to mean silence: many times t3.5 and the longest
-# response.
+# Virtual milliseconds after which the unit counts as silent: many times t3.5 and the longest response time.
 SILENCE_MS = 500
-# Seconds after which a master that gets no answer gives up, where it gets none.
+# Seconds after which a master without a reply gives up, in tests that expect no reply.
 GIVE_UP = 0.5
 
 
 class Simulator(modio_sim.Simulator):
-    """A simulator, and what masters do with it."""
+    """A simulator, and the operations of masters on its line."""
 
-    # What masters speak from now on.
+    # The framing that masters use from now on.
     framer = FramerType.RTU
 
     @classmethod
     def of(cls, *, board: str = "modio-02", options=(), **more) -> "Simulator":
-        """A simulator with the image for this board, which run.py names."""
+        """Starts a simulator with the image for this board, which run.py names."""
         image = {"modio-02": "MODIO_ELF", "modio-08": "MODIO_ELF_08"}[board]
         return cls.start(board=board, elf=os.environ[image], options=options, **more)
 
     def end_well(self):
-        """Ends it as Ctrl-C would. It must end without an error and must not have printed any complaint."""
+        """Ends the simulator as Ctrl-C does. It must end without an error and without any output on stderr."""
         status = self.close()
         if status != 0 or self.complaints:
             raise AssertionError(f"exit status {status}, stderr {self.complaints}")
 
     @property
     def gateway(self) -> str:
-        """Where masters with Modbus TCP find the line."""
+        """Address of the line for masters with Modbus TCP."""
         return self.endpoint("modbus-tcp")
 
     def outputs(self) -> list[bool]:
-        """The four digital outputs, as they stand."""
+        """States of the four digital outputs."""
         return [channel.on for channel in self.state().channels]
 
     def last_frame(self) -> int:
-        """The number of the last frame, once the line has been silent for many times t3.5."""
+        """Waits until the line has been silent for many times t3.5 and returns the number of the last frame."""
         self.wait(60)
         return max((frame.number for frame in self.frames()), default=0)
 
     def answer_to(self, since: int) -> bytes:
-        """What the unit answers to the first frame after number `since`; empty for silence."""
+        """Returns the unit's answer to the first frame after number `since`; empty if there is none."""
         requests = lambda: [f for f in self.frames(since) if f.direction == "rx"]
         self.wait_for(requests, what="there is no request")
         request = requests()[0]
@@ -67,7 +66,7 @@ class Simulator(modio_sim.Simulator):
 
     def master(self, timeout: float = PATIENCE, baudrate: int = 9600,
                stopbits: int = 2) -> ModbusSerialClient:
-        """pymodbus on the line, which asks once. Without parity: a pseudo-terminal has none."""
+        """Returns pymodbus on the line, with one attempt per request. Without parity: a pseudo-terminal has none."""
         client = ModbusSerialClient(
             self.pty, framer=self.framer, baudrate=baudrate, stopbits=stopbits, timeout=timeout,
             retries=0)
@@ -75,12 +74,12 @@ class Simulator(modio_sim.Simulator):
         return client
 
     def wire(self) -> serial.Serial:
-        """The line for bytes of one's own."""
+        """Opens the line for a test that sends its own bytes."""
         return serial.Serial(self.pty, 9600, stopbits=2, timeout=PATIENCE)
 
 
 class OnSimulator(unittest.TestCase):
-    """Tests that share a simulator of their class."""
+    """Tests that share the simulator of their class."""
 
     DIP = 1
     MODULE = "4di"
@@ -97,18 +96,18 @@ class OnSimulator(unittest.TestCase):
         self.addCleanup(self.master.close)
 
     def bits(self, answer, count: int) -> list[bool]:
-        """The bits of a good answer."""
+        """Returns the bits of an answer, which must not be an exception."""
         self.assertFalse(answer.isError(), answer)
         return answer.bits[:count]
 
     def refused(self, answer, code: int):
-        """An exception response with this code."""
+        """Asserts that the answer is an exception response with this code."""
         self.assertTrue(answer.isError(), answer)
         self.assertEqual(answer.exception_code, code, answer)
 
     def silent(self, ask):
-        """`ask(master)` gets no answer."""
-        # pymodbus wants the port for itself.
+        """Asserts that `ask(master)` gets no answer."""
+        # pymodbus must be the only user of the port.
         self.master.close()
         master = self.simulator.master(timeout=GIVE_UP)
         try:
@@ -121,7 +120,7 @@ class OnSimulator(unittest.TestCase):
             assert self.master.connect()
 
     def eventually(self, what, wanted, within_ms: int = 1000):
-        """`what()` becomes `wanted` within a second: an input is debounced, an output is scanned."""
+        """Waits until `what()` returns `wanted`, which takes time: an input is debounced, an output is scanned."""
         end = self.simulator.state().virtual_ms + within_ms
         while (seen := what()) != wanted and self.simulator.state().virtual_ms < end:
             time.sleep(0.005)
@@ -129,7 +128,7 @@ class OnSimulator(unittest.TestCase):
 
 
 class AsciiLine:
-    """Put before a class of tests: the same in ASCII mode, at 115200 bit/s."""
+    """Mixin in front of a class of tests: runs the same tests in ASCII mode, at 115200 bit/s."""
 
     @classmethod
     def setUpClass(cls):
@@ -146,7 +145,7 @@ class AsciiLine:
 
 
 def crc(frame: bytes) -> bytes:
-    """A frame with its CRC (Modbus over Serial Line V1.02, 6.2.2)."""
+    """Returns a frame with its CRC (Modbus over Serial Line V1.02, 6.2.2)."""
     value = 0xFFFF
     for byte in frame:
         value ^= byte

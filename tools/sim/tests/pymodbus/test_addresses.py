@@ -1,4 +1,4 @@
-"""The DIP switch: which unit answers, and which stays silent."""
+"""The DIP switch: which unit answers, and which does not."""
 
 from simulator import OnSimulator
 
@@ -30,17 +30,17 @@ class Unit247(Unit1):
 
 
 class Loader(Unit1):
-    """Loader mode: 9600 8N2, unit 255, whatever is stored."""
+    """Loader mode: 9600 8N2, unit 255, with any stored settings."""
 
     DIP = 255
 
 
 class NoUnit(OnSimulator):
-    """0 is no unit address: silence, and the fault LED blinks."""
+    """0 is not a unit address: the unit does not answer, and the fault LED blinks."""
 
     DIP = 0
 
-    def test_nobody_answers(self):
+    def test_no_unit_answers(self):
         for unit in (0, self.DIP, *UNITS):
             with self.subTest(unit=unit):
                 self.silent(lambda master: master.read_coils(FIRST, count=4, device_id=unit))
@@ -51,13 +51,13 @@ class NoUnit(OnSimulator):
 
 
 class ReservedUnit(NoUnit):
-    """So is 248."""
+    """248 is not a unit address either."""
 
     DIP = 248
 
 
 class SwitchMoved(OnSimulator):
-    def test_the_switch_counts_from_the_next_power_on(self):
+    def test_switch_is_read_at_the_next_power_on(self):
         self.simulator.set_dip(17)
         self.bits(self.master.read_coils(FIRST, count=4, device_id=1), 4)
         self.simulator.power_off()

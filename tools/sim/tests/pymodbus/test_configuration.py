@@ -1,4 +1,4 @@
-"""Setting the device up over the line: lock, refusals, save, restart, another rate, the watchdog."""
+"""Configuration over the line: lock, refusals, save, restart, another rate, the watchdog."""
 
 from simulator import OnSimulator
 
@@ -11,7 +11,7 @@ TRIPPED, UNSAVED, WAITING, UNLOCKED = 1, 8, 16, 32
 
 
 class Configuration(OnSimulator):
-    """What a master sets up. Settings stay, so each test begins with those of the factory."""
+    """Settings by a master. Settings remain, so each test begins with the default settings."""
 
     MODULE = "4do"
 
@@ -21,7 +21,7 @@ class Configuration(OnSimulator):
 
     @classmethod
     def setUpDevice(cls):
-        """Factory settings but for the module."""
+        """Sets default settings except for the module."""
         master = cls.simulator.master()
         for address, value in ((KEY, 0x5A17), (COMMAND, 3), (MODULE, 2), (COMMAND, SAVE)):
             answer = master.write_register(address, value)
@@ -53,7 +53,7 @@ class Configuration(OnSimulator):
         self.master = self.simulator.master(**settings)
         self.addCleanup(self.master.close)
 
-    def test_the_lock_keeps_settings_from_being_written(self):
+    def test_closed_lock_refuses_writes_to_settings(self):
         self.assertEqual(self.register(KEY), 0)
         for address in (BAUD, COMM_TIMEOUT, FILTER, MODULE):
             value = self.register(address)
@@ -65,7 +65,7 @@ class Configuration(OnSimulator):
         self.assertEqual(self.register(KEY), 1)
         self.assertTrue(self.register(STATUS) & UNLOCKED)
 
-    def test_values_out_of_range_are_refused_and_a_write_is_whole_or_not_at_all(self):
+    def test_values_out_of_range_are_refused_and_a_refused_write_changes_nothing(self):
         self.unlock()
         for address, value in ((BAUD, 97), (FORMAT, 4), (COMM_TIMEOUT, 36001), (MODULE, 7),
                                (FILTER, 1001), (SAFE, 2), (START, 0xFFFF), (COMMAND, 0)):
@@ -76,7 +76,7 @@ class Configuration(OnSimulator):
         self.assertEqual(self.register(BAUD, 4), [96, 0, 0, 0])
         self.assertFalse(self.register(STATUS) & UNSAVED)
 
-    def test_the_rate_is_changed_saved_and_spoken_after_the_restart(self):
+    def test_new_rate_is_saved_and_in_force_after_the_restart(self):
         self.unlock()
         self.written(BAUD, 1152, 3)
         self.assertTrue(self.register(STATUS) & UNSAVED)
@@ -88,11 +88,11 @@ class Configuration(OnSimulator):
         line = self.simulator.state().line
         self.assertEqual((line.baud, line.format), (115200, "8N1"))
         self.assertEqual(self.register(BAUD, 2), [1152, 3])
-        self.assertTrue(self.register(RESET_CAUSE) & 8, "by software")
+        self.assertTrue(self.register(RESET_CAUSE) & 8, "the reset cause is software")
         self.assertEqual(self.register(STATUS), 0)
         self.bits(self.master.write_coils(FIRST, [True] * 4), 0)
         self.eventually(self.simulator.outputs, [True] * 4)
-        # It is there after a power cycle too; and back.
+        # The rate is the same after a power cycle; then the test sets it back.
         self.simulator.power_cycle()
         self.reconnect(baudrate=115200, stopbits=1)
         self.unlock()
@@ -103,7 +103,7 @@ class Configuration(OnSimulator):
         self.assertEqual(self.simulator.state().line.baud, 9600)
         self.assertEqual(self.register(BAUD, 2), [96, 0])
 
-    def test_what_is_not_saved_is_lost_or_dropped(self):
+    def test_unsaved_settings_are_lost_or_discarded(self):
         self.unlock()
         self.written(FILTER, 50)
         self.save()
@@ -115,7 +115,7 @@ class Configuration(OnSimulator):
         self.reconnect()
         self.assertEqual(self.register(FILTER), 50)
 
-    def test_start_values_stand_after_a_power_cycle(self):
+    def test_outputs_have_start_values_after_a_power_cycle(self):
         self.unlock()
         self.written(START, 1, 0, 0, 1)
         self.save()
@@ -123,7 +123,7 @@ class Configuration(OnSimulator):
         self.simulator.power_cycle()
         self.eventually(self.simulator.outputs, [True, False, False, True])
 
-    def test_another_module_needs_no_other_firmware(self):
+    def test_another_module_works_with_the_same_firmware(self):
         self.unlock()
         self.written(MODULE, 5)
         self.save()
@@ -146,7 +146,7 @@ class Configuration(OnSimulator):
         self.written(SAFE, 0, 1, 0xFFFF, 0)
         self.written(COMM_TIMEOUT, 30)
         self.bits(self.master.write_coils(FIRST, [True, False, True, True]), 0)
-        # As long as it is asked it stays.
+        # The outputs do not change as long as requests arrive.
         for _ in range(20):
             self.simulator.wait(200)
             coils = self.bits(self.master.read_coils(FIRST, count=4), 4)
@@ -157,6 +157,6 @@ class Configuration(OnSimulator):
         self.assertEqual(self.simulator.outputs(), [False, True, True, False])
         self.bits(self.master.write_coil(FIRST + 3, True), 0)
         self.eventually(self.simulator.outputs, [False, True, True, True])
-        self.assertTrue(self.register(STATUS) & TRIPPED, "it latches")
+        self.assertTrue(self.register(STATUS) & TRIPPED, "the flag stays set")
         self.written(COMMAND, CLEAR_FLAG)
         self.assertFalse(self.register(STATUS) & TRIPPED)

@@ -1,4 +1,4 @@
-"""Frames that no decent master sends, byte by byte on the line."""
+"""Frames that a correct master never sends, byte by byte on the line."""
 
 from simulator import OnSimulator, crc
 
@@ -14,21 +14,21 @@ class Frames(OnSimulator):
         self.addCleanup(self.line.close)
 
     def ask(self, frame: bytes) -> bytes:
-        """The answer to a frame; empty for silence."""
+        """Returns the answer to a frame; empty if there is none."""
         since = self.simulator.last_frame()
         self.line.write(frame)
         answer = self.simulator.answer_to(since)
-        # What was on the line is what the master gets, and no more.
+        # The master must receive exactly the bytes that were on the line.
         self.assertEqual(self.line.read(len(answer)), answer)
         self.assertEqual(self.line.in_waiting, 0)
         return answer
 
     def answers(self):
-        """A good request is answered, whatever went before."""
+        """Asserts that a valid request is answered."""
         self.assertEqual(self.ask(GOOD), crc(bytes([1, 1, 1, 0])))
 
     def ignored(self, frame: bytes):
-        """Silence; and the unit is still there."""
+        """Asserts that a frame gets no answer, and that the unit still answers the next request."""
         self.assertEqual(self.ask(frame), b"", frame.hex(" "))
         self.answers()
 
@@ -83,7 +83,7 @@ class Frames(OnSimulator):
         self.assertEqual((request.direction, response.direction), ("rx", "tx"))
         self.assertEqual(request.bytes, GOOD)
         self.assertTrue(request.crc_ok and response.crc_ok)
-        # t3.5 at 9600 baud is 4.01 ms: no answer before, and none much later.
+        # t3.5 at 9600 bit/s is 4.01 ms: the answer must not begin before, nor much later.
         gap = response.start_us - request.end_us
         self.assertGreaterEqual(gap, 4010)
         self.assertLess(gap, 6000)

@@ -1,4 +1,4 @@
-"""The functions beside reading and writing points, in RTU and in ASCII mode."""
+"""The functions that do not read or write points, in RTU and in ASCII mode."""
 
 from pymodbus import FramerType
 from pymodbus.pdu.device import ModbusControlBlock
@@ -14,7 +14,7 @@ TRIPPED, UNSAVED, UNLOCKED = 1, 8, 32
 
 
 class Rtu(OnSimulator):
-    """Everything pymodbus has of functions 07, 08, 0B, 0C, 11, 14, 16, 17 and 2B/0E."""
+    """All of functions 07, 08, 0B, 0C, 11, 14, 16, 17 and 2B/0E that pymodbus supports."""
 
     def setUp(self):
         super().setUp()
@@ -29,7 +29,7 @@ class Rtu(OnSimulator):
     def registers(self, address, count):
         return self.good(self.master.read_holding_registers(address, count=count)).registers
 
-    def test_07_and_08_02_tell_the_status(self):
+    def test_07_and_08_02_return_the_status(self):
         status, = self.registers(STATUS, 1)
         self.assertTrue(status & UNLOCKED)
         self.assertEqual(self.good(self.master.read_exception_status()).status, status)
@@ -39,21 +39,21 @@ class Rtu(OnSimulator):
         self.good(self.master.diag_clear_counters())
         self.assertEqual(self.good(self.master.diag_read_diagnostic_register()).message, 0)
         self.assertTrue(self.good(self.master.read_exception_status()).status & UNLOCKED)
-        # What comes up anew is told again.
+        # A new event is reported again.
         self.good(self.master.write_register(FILTER, 6))
         status, = self.registers(STATUS, 1)
         self.assertTrue(status & UNSAVED)
         self.assertEqual(self.good(self.master.diag_read_diagnostic_register()).message, UNSAVED)
 
     def test_08_00_sends_the_data_back(self):
-        # pymodbus takes an echo over RTU for two bytes, whatever was sent.
+        # pymodbus expects an echo of two bytes over RTU for any data.
         for data in (b"\x00\x00", b"\xA5\x37", b"\xFF\x00"):
             self.assertEqual(self.good(self.master.diag_query_data(data)).message, data)
 
     def test_08_0a_to_14_count_and_clear(self):
         master = self.master
         self.good(master.diag_clear_counters())
-        # Each of these is itself a message, to this unit, and counted before it is answered.
+        # Each of these requests is itself a message to this unit, and counted before it is answered.
         self.assertEqual(self.good(master.diag_read_bus_message_count()).message, 1)
         self.assertEqual(self.good(master.diag_read_device_message_count()).message, 2)
         for count in (master.diag_read_bus_comm_error_count, master.diag_read_bus_exception_error_count,
@@ -64,14 +64,14 @@ class Rtu(OnSimulator):
         self.refused(master.read_coils(0, count=1), 2)
         self.good(master.read_exception_status())
         self.refused(master.write_registers(COMMAND, [0]), 3)
-        # Two broadcasts; the read has no effect and is as silent.
+        # Two broadcasts. The read has no effect and gets no answer either.
         for ask in (lambda m: m.write_coil(FIRST, False, device_id=0, no_response_expected=True),
                     lambda m: m.read_coils(FIRST, count=1, device_id=0, no_response_expected=True),
                     lambda m: m.read_coils(FIRST, count=1, device_id=9, no_response_expected=True)):
             since = self.simulator.last_frame()
             ask(master)
             self.assertEqual(self.simulator.answer_to(since), b"")
-        # The broadcast write is refused, for an input cannot be written.
+        # The broadcast write is refused because an input cannot be written.
         self.assertEqual(self.good(master.diag_read_bus_exception_error_count()).message, 3)
         self.assertEqual(self.good(master.diag_read_device_no_response_count()).message, 2)
         self.assertEqual(self.good(master.diag_read_bus_message_count()).message, 8 + 3 + 3 + 3)
@@ -92,18 +92,18 @@ class Rtu(OnSimulator):
         self.assertEqual(self.good(self.master.diag_get_comm_event_log()).events[:6],
                          [0x80, 0x40, 0x80, 0x40, 0x80, 0x82])
 
-    # Function 07 of unit 1 with a wrong check.
+    # Function 07 of unit 1 with an invalid CRC.
     DAMAGED = bytes([1, 7, 0, 0])
 
     def test_busy_is_counted(self):
-        # The lock is closed after it.
+        # The power cycle closes the lock.
         self.simulator.power_cycle()
         self.simulator.wait(300)
         self.refused(self.master.write_register(FILTER, 6), 6)
         self.assertEqual(self.good(self.master.diag_read_device_busy_count()).message, 1)
         self.assertEqual(self.good(self.master.diag_read_device_nak_count()).message, 0)
 
-    def test_what_is_not_there_is_refused(self):
+    def test_unsupported_functions_and_addresses_are_refused(self):
         self.refused(self.master.diag_read_iop_overrun_count(), 1)
         self.refused(self.master.diag_getclear_modbus_response(), 1)
         self.refused(self.master.read_fifo_queue(address=FIRST), 1)
@@ -123,9 +123,9 @@ class Rtu(OnSimulator):
         # A CBOR array of three items, the first of which is the format version 1.
         self.assertEqual(document.record_data, b"\x83\x01")
 
-    def test_0b_counts_what_went_well(self):
+    def test_0b_counts_successful_requests(self):
         before = self.good(self.master.diag_get_comm_event_counter())
-        self.assertTrue(before.status, "nothing is being processed")
+        self.assertTrue(before.status, "the status must not be busy")
         for _ in range(3):
             self.registers(STATUS, 1)
         self.refused(self.master.read_coils(0, count=1), 2)
@@ -134,9 +134,9 @@ class Rtu(OnSimulator):
 
     def test_0c_lists_the_last_64_events(self):
         log = self.good(self.master.diag_get_comm_event_log())
-        # Restarted, then this request. setUp has cleared what was before.
+        # The events: a restart, then this request. setUp has cleared the earlier ones.
         self.assertEqual((log.status, log.events), (True, [0x80, 0x00]))
-        # As function 0B has it, which counts neither itself nor this.
+        # The counts are those of function 0B, which counts neither itself nor this request.
         self.assertEqual((log.event_count, log.message_count), (0, 1))
         for _ in range(40):
             self.refused(self.master.read_coils(0, count=1), 2)
@@ -147,18 +147,19 @@ class Rtu(OnSimulator):
         log = self.good(self.master.diag_get_comm_event_log())
         self.assertEqual(log.event_count, self.good(self.master.diag_get_comm_event_counter()).count)
 
-    def test_listening_it_says_and_does_nothing_until_communication_restarts(self):
+    def test_listen_only_mode_ignores_requests_until_communication_restarts(self):
         self.good(self.master.diag_query_data(b"\x00\x00"))
         for ask in (lambda master: master.diag_force_listen_only(no_response_expected=False),
                     lambda master: master.write_register(FILTER, 77),
                     lambda master: master.diag_restart_communication(False)):
             self.silent(ask)
-        self.assertEqual(self.registers(FILTER, 1), [5], "the write was not obeyed")
+        self.assertEqual(self.registers(FILTER, 1), [5], "the write must have no effect")
         log = self.good(self.master.diag_get_comm_event_log()).events
-        # Newest first: this, the read, restarted; received and dealt with while listening, twice; listening.
+        # Newest first: this request, the read, the restart; two requests received and executed in listen-only mode;
+        # the start of that mode.
         self.assertEqual(log[:10], [0x80, 0x40, 0x80, 0x00, 0x60, 0xA0, 0x60, 0xA0, 0x04, 0x40])
 
-    def test_11_tells_what_it_is_and_whether_it_does_its_work(self):
+    def test_11_returns_the_identification_and_the_run_indicator(self):
         answer = self.good(self.master.report_device_id())
         self.assertEqual((answer.identifier, answer.status), (b"\x01", True))
         self.good(self.master.write_register(COMM_TIMEOUT, 5))
@@ -197,15 +198,15 @@ class Rtu(OnSimulator):
                 (FILTER, [1001], FILTER, 4, 3), (STATUS, [0], FILTER, 4, 2), (FILTER, [6], 0x0400, 1, 2),
                 (FILTER, [6, 6], FIRST, 4, 2)):
             self.refused(both(write, values, read, count), code)
-        self.assertEqual(self.registers(FILTER, 4), [5, 11, 12, 5], "all or nothing")
+        self.assertEqual(self.registers(FILTER, 4), [5, 11, 12, 5], "a refused write changes nothing")
 
-    def test_2b_tells_who_it_is(self):
+    def test_2b_returns_the_identification(self):
         version, patch = self.registers(VERSION, 2)
         serial = "".join(f"{word:04X}" for word in self.registers(UNIQUE_ID, 6)).encode()
         objects = {0: b"modio", 1: b"23835860", 2: f"{version >> 8}.{version & 0xFF}.{patch}".encode(),
                    4: b"modio-02", 5: b"LLD-ModbusIO-02", 6: b"Modbus I/O", 0x80: serial, 0x81: b"4di"}
         for code, there in ((1, range(3)), (2, range(7)), (3, (*range(7), 0x80, 0x81))):
-            # From an object that is not there a stream begins anew.
+            # A stream from an object that does not exist starts at the first object.
             for first in (0, 0x0A):
                 answer = self.good(self.master.read_device_information(read_code=code, object_id=first))
                 self.assertEqual((answer.conformity, answer.more_follows), (0x83, 0))
@@ -223,11 +224,11 @@ class Rtu(OnSimulator):
 
 
 class Ascii(AsciiLine, Rtu):
-    """The same functions in ASCII mode, and points and settings too."""
+    """The same functions in ASCII mode, and in addition points and settings."""
 
     DAMAGED = b":0107FF\r\n"
 
-    def test_rtu_is_not_understood(self):
+    def test_rtu_frames_get_no_answer(self):
         self.simulator.framer = FramerType.RTU
         try:
             self.silent(lambda master: master.read_coils(FIRST, count=4))
@@ -257,7 +258,7 @@ class Ascii(AsciiLine, Rtu):
 
     def test_08_03_changes_the_end_of_a_frame_until_a_restart(self):
         try:
-            # pymodbus puts the character where it is told to: in the high byte.
+            # pymodbus puts the character at the given place: in the high byte.
             self.good(self.master.diag_change_ascii_input_delimeter(delimiter=ord("#") << 8))
             ModbusControlBlock().Delimiter = "#"
             self.assertEqual(self.registers(FILTER, 1), [5])
@@ -275,7 +276,7 @@ class RtuDelimiter(OnSimulator):
 
 
 class AnalogPoints(OnSimulator):
-    """16 and 17 on points, where there are words to write."""
+    """Functions 16 and 17 on points, with a module that has words to write."""
 
     MODULE = "4ao"
 

@@ -1,4 +1,4 @@
-"""Modbus TCP through the gateway: pymodbus and mbpoll on the same unit as the masters of the line."""
+"""Modbus TCP through the gateway: pymodbus and mbpoll access the unit that the masters on the line access."""
 
 import concurrent.futures
 import subprocess
@@ -18,7 +18,7 @@ class Gateway(OnSimulator):
     MODULE = "4do"
 
     def setUp(self):
-        # The line is the gateway's.
+        # The gateway is the master on the line.
         self.client = self.connect()
 
     def connect(self) -> ModbusTcpClient:
@@ -35,7 +35,7 @@ class Gateway(OnSimulator):
             self.eventually(self.simulator.outputs, pattern)
             self.assertEqual(self.bits(self.client.read_coils(FIRST, count=4, device_id=17), 4), pattern)
 
-    def test_units_that_are_not_there_have_an_exception(self):
+    def test_missing_units_get_an_exception(self):
         self.refused(self.client.read_coils(FIRST, device_id=18), NO_ANSWER)
         self.refused(self.client.read_coils(FIRST, device_id=250), NO_PATH)
         self.simulator.power_off()
@@ -44,7 +44,7 @@ class Gateway(OnSimulator):
         self.simulator.wait(300)
         self.bits(self.client.read_coils(FIRST, device_id=17), 1)
 
-    def test_clients_are_served_side_by_side(self):
+    def test_clients_are_served_in_parallel(self):
         def reads(client):
             return [client.read_holding_registers(0x0200, count=2, device_id=17).registers
                     for _ in range(10)]

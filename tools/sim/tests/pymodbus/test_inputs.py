@@ -1,4 +1,4 @@
-"""Module 4di: four inputs that follow the world outside, and take no writes."""
+"""Module 4di: four inputs that follow the outside voltages and refuse writes."""
 
 import itertools
 
@@ -40,13 +40,13 @@ class Inputs(OnSimulator):
         self.refused(self.master.write_coils(FIRST, [True] * 4), 2)
         self.assertEqual(self.read(), [False] * 4)
 
-    def test_beyond_the_slot_there_is_nothing(self):
+    def test_addresses_beyond_the_slot_are_refused(self):
         for first, count in ((0x0000, 1), (0x000F, 1), (0x000F, 2), (0x0014, 1), (0x0013, 2), (0x0010, 5)):
             with self.subTest(first=hex(first), count=count):
                 self.refused(self.master.read_coils(first, count=count), 2)
                 self.refused(self.master.read_discrete_inputs(first, count=count), 2)
 
-    def test_bit_points_are_no_words(self):
+    def test_bit_points_cannot_be_read_as_words(self):
         self.refused(self.master.read_holding_registers(FIRST, count=1), 2)
         self.refused(self.master.read_input_registers(FIRST, count=4), 2)
         self.refused(self.master.write_register(FIRST, 1), 2)

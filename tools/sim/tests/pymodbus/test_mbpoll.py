@@ -1,4 +1,4 @@
-"""mbpoll, a second master that nobody here wrote, on libmodbus: a module of each kind by every function it has."""
+"""mbpoll, a second independent master, on libmodbus: a module of each kind with every function that mbpoll has."""
 
 import re
 import shutil
@@ -9,13 +9,13 @@ from simulator import PATIENCE, OnSimulator
 
 MBPOLL = shutil.which("mbpoll")
 FIRST = 0x0010
-# Its names for the tables: functions 01, 02, 04 and 03; 05 and 0F write coils, 06 and 10 registers.
+# mbpoll's codes for the tables: functions 01, 02, 04 and 03; 05 and 0F write coils, 06 and 10 registers.
 COILS, DISCRETE_INPUTS, INPUT_REGISTERS, HOLDING_REGISTERS = "0", "1", "3", "4"
 BITS, WORDS = (COILS, DISCRETE_INPUTS), (INPUT_REGISTERS, HOLDING_REGISTERS)
 ADDRESS, VALUE, FAILURE, BUSY = (
     "Illegal data address", "Illegal data value", "Slave device or server failure",
     "Slave device or server is busy")
-# Seconds it waits for an answer, the most it can; and for silence.
+# Time in seconds that mbpoll waits for an answer: its maximum, and the time in tests that expect none.
 ANSWER, SILENCE = "10.00", "0.50"
 
 
@@ -24,11 +24,11 @@ class Mbpoll(OnSimulator):
     MODULE = "none"
 
     def setUp(self):
-        # The line is mbpoll's.
+        # mbpoll is the master on the line.
         pass
 
     def call(self, *arguments, unit=1, baudrate=9600, wait=ANSWER):
-        """Asks once; what it prints, and why it failed, if it did."""
+        """Sends a request once. Returns the output, and the reason if it failed."""
         command = [MBPOLL, "-m", "rtu", "-b", str(baudrate), "-P", "none", "-s", "2", "-0", "-1",
                    "-a", str(unit), "-o", wait, *arguments]
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
@@ -37,7 +37,7 @@ class Mbpoll(OnSimulator):
         return done.stdout, complaint.rpartition(": ")[2]
 
     def read(self, table, address, count=1, **settings):
-        """The values, or why there are none."""
+        """Returns the values, or the reason why there are none."""
         output, refusal = self.call(
             "-t", table, "-r", str(address), "-c", str(count), self.simulator.pty, **settings)
         values = [int(value) for value in re.findall(r"^\[\d+\]:\s+(-?\d+)", output, re.MULTILINE)]
@@ -45,14 +45,14 @@ class Mbpoll(OnSimulator):
         return refusal or values
 
     def write(self, table, address, *values, **settings):
-        """None, or why it was refused."""
+        """Returns None, or the reason of a refusal."""
         output, refusal = self.call(
             "-t", table, "-r", str(address), self.simulator.pty, *map(str, values), **settings)
         self.assertEqual(f"Written {len(values)} references." in output, not refusal, output)
         return refusal or None
 
     def assert_nothing_is_written(self, table, first=FIRST, count=4):
-        """Neither one by one nor together."""
+        """Asserts that neither single nor multiple writes succeed."""
         before = self.simulator.state().channels
         for address in range(first, first + count):
             self.assertEqual(self.write(table, address, 1), ADDRESS)
@@ -61,26 +61,26 @@ class Mbpoll(OnSimulator):
 
 
 class Empty(Mbpoll):
-    def test_there_are_no_points(self):
+    def test_reads_and_writes_of_points_are_refused(self):
         for table in (*BITS, *WORDS):
             self.assertEqual(self.read(table, FIRST), ADDRESS)
         self.assert_nothing_is_written(COILS)
         self.assert_nothing_is_written(HOLDING_REGISTERS)
 
-    def test_another_unit_is_silent(self):
+    def test_another_unit_does_not_answer(self):
         sent = self.simulator.state().line.tx_frames
         self.assertEqual(self.read(COILS, FIRST, unit=2, wait=SILENCE), "Connection timed out")
         self.simulator.wait(500)
         self.assertEqual(self.simulator.state().line.tx_frames, sent)
 
-    def test_it_says_what_it_is(self):
-        """Function 11, read as libmodbus reads it: an identity of one byte, and the run indicator."""
+    def test_11_returns_identity_and_run_indicator(self):
+        """Function 11 as libmodbus reads it: an identity of one byte, and the run indicator."""
         output, refusal = self.call("-u", self.simulator.pty)
         self.assertEqual(refusal, "")
         self.assertRegex(output, r"Length: 2\nId    : 0x01\nStatus: On\n")
 
-    def test_it_polls_several_units_and_goes_on_where_one_is_silent(self):
-        # Long enough for the one that answers, on a busy machine too.
+    def test_polling_several_units_continues_after_a_missing_one(self):
+        # Long enough for the unit that answers, even on a busy machine.
         output, refusal = self.call(
             "-t", HOLDING_REGISTERS, "-r", "518", self.simulator.pty, unit="2,1,3", wait="3.00")
         self.assertEqual(refusal, "Connection timed out")
@@ -94,9 +94,9 @@ class Empty(Mbpoll):
 
 
 class Numbers(Mbpoll):
-    def test_pairs_of_registers_are_numbers_too(self):
-        """Integers and floating-point numbers of 32 bits, either word first: LORA_ADDRESS takes any
-        word, LORA_CHANNEL behind it 0 to 31."""
+    def test_pairs_of_registers_are_read_and_written_as_numbers(self):
+        """Integers and floating-point numbers of 32 bits, either word first: LORA_ADDRESS accepts any
+        word, LORA_CHANNEL after it 0 to 31."""
         first = ("-r", str(0x0141))
 
         def pair(kind, value, *options):
@@ -118,7 +118,7 @@ class Numbers(Mbpoll):
         self.assertEqual(pair("float", "100", "-B"), ("100", [0x42C8, 0]))
         self.assertEqual(pair("float", "-2.5", "-B"), ("-2.5", [0xC020, 0]))
         self.assertEqual(pair("int", "32", "-B"), VALUE)
-        self.assertEqual(self.read(HOLDING_REGISTERS, 0x0141, 2), [0xC020, 0], "all or nothing")
+        self.assertEqual(self.read(HOLDING_REGISTERS, 0x0141, 2), [0xC020, 0], "a refused write changes nothing")
         for table in WORDS:
             output, _ = self.call("-t", f"{table}:hex", *first, "-c", "2", self.simulator.pty)
             self.assertRegex(output, r"\[321\]:\s+0xC020\n\[322\]:\s+0x0000\n")
@@ -241,11 +241,11 @@ class AnalogInputsAndOutputs(AnalogOutputs):
 
 
 class NoModule(Mbpoll):
-    """The setting says 4ao, and there is none."""
+    """The setting is 4ao, but no module is plugged."""
 
     MODULE = "4ao"
 
-    def test_its_points_fail(self):
+    def test_points_return_a_device_failure(self):
         self.simulator.power_off()
         self.simulator.set_module("none")
         self.simulator.power_on()

@@ -1,27 +1,27 @@
-"""Every module through every function that pymodbus has for its points."""
+"""Every module with every function that pymodbus has for its points."""
 
 from simulator import AsciiLine, OnSimulator
 
 FIRST = 0x0010
 POINTS = range(4)
-# What the manual makes of the points: input or output, of bits or words; None is no point.
+# Kinds of points according to the manual: input or output, of bits or words; None if there is no point.
 BIT_IN, BIT_OUT, WORD_IN, WORD_OUT = "bit in", "bit out", "word in", "word out"
 
 
 class Module:
-    """What holds for any module; KINDS has its four points."""
+    """Tests for any module; KINDS has its four points."""
 
     KINDS = [None] * 4
 
     def spans(self, *kinds):
-        """Every span of points of these kinds alone, and some of those that are not."""
+        """Returns every span that only has points of these kinds, and some of the other spans."""
         for offset in range(-1, 5):
             for count in (1, 2, 4):
                 covered = [self.KINDS[n] if n in POINTS else None for n in range(offset, offset + count)]
                 yield FIRST + offset, count, all(kind in kinds for kind in covered)
 
     def reads(self, good, read):
-        """FC 01 and 02, or 03 and 04: the same answer, or the same refusal."""
+        """Asserts that FC 01 and 02, or 03 and 04, give the same answer or the same refusal."""
         for function in read:
             for address, count, exists in self.spans(*good):
                 with self.subTest(function=function.__name__, address=hex(address), count=count):
@@ -31,10 +31,10 @@ class Module:
                     else:
                         self.refused(answer, 2)
 
-    def test_bits_are_read_where_there_are_bits(self):
+    def test_bits_are_read_only_from_bit_points(self):
         self.reads((BIT_IN, BIT_OUT), (self.master.read_coils, self.master.read_discrete_inputs))
 
-    def test_words_are_read_where_there_are_words(self):
+    def test_words_are_read_only_from_word_points(self):
         read = (self.master.read_holding_registers, self.master.read_input_registers)
         self.reads((WORD_IN, WORD_OUT), read)
 
@@ -53,25 +53,25 @@ class Module:
         self.assertEqual(self.simulator.state().channels, before)
 
     def words(self, count=4):
-        """The points as words, read both ways."""
+        """Returns the points as words, read by both functions."""
         holding = self.master.read_holding_registers(FIRST, count=count)
         inputs = self.master.read_input_registers(FIRST, count=count)
         self.assertFalse(holding.isError() or inputs.isError(), (holding, inputs))
         return holding.registers, inputs.registers
 
     def assert_words(self, wanted):
-        """Both ways read these words, give or take a step of the converter."""
+        """Asserts that both functions read these words, within one step of the converter."""
         for read in self.words():
             near = all(abs(word - value) <= 1 for word, value in zip(read, wanted, strict=True))
             self.assertTrue(near, f"{read}, not {wanted}")
 
     def settled(self, wanted):
-        """The filters of analog inputs have come to these codes."""
+        """Waits until the filters of the analog inputs have reached these codes."""
         self.eventually(lambda: [round(word / 4) for word in self.words()[0]],
                         [round(code / 4) for code in wanted])
 
     def codes(self):
-        """What stands at the DAC, None where there is no output."""
+        """Returns the codes at the DAC; None where there is no output."""
         return [channel.code for channel in self.simulator.state().channels]
 
 
@@ -109,7 +109,7 @@ class Relays(Module, OnSimulator):
         for relay in (1, 2):
             self.bits(self.master.write_coil(FIRST + 1 + relay, True), 0)
         self.eventually(self.coils, [True, True])
-        # Over a jumper into a coil: nothing of it happens.
+        # A write that spans a jumper and a coil changes nothing.
         self.refused(self.master.write_coils(FIRST + 1, [False, False]), 2)
         self.assertEqual(self.coils(), [True, True])
         self.bits(self.master.write_coils(FIRST + 2, [False, False]), 0)
@@ -143,7 +143,7 @@ class AnalogOutputs(Module, OnSimulator):
             self.assertFalse(self.master.write_register(FIRST + offset, wanted[offset]).isError())
             self.eventually(self.codes, wanted)
 
-    def test_a_code_beyond_twelve_bits_spoils_the_whole_write(self):
+    def test_code_above_twelve_bits_refuses_the_whole_write(self):
         wanted = [7, 8, 9, 10]
         self.assertFalse(self.master.write_registers(FIRST, wanted).isError())
         for offset in POINTS:

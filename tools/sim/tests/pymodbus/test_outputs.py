@@ -1,4 +1,4 @@
-"""Module 4do: four outputs, written one by one and together, and read back."""
+"""Module 4do: four outputs, written separately and together, and read back."""
 
 import itertools
 
@@ -45,14 +45,14 @@ class Outputs(OnSimulator):
         self.assertEqual(self.read(), [False] * 4)
         self.assertEqual(self.simulator.outputs(), [False] * 4)
 
-    def test_bit_points_are_no_words(self):
+    def test_bit_points_cannot_be_read_as_words(self):
         self.refused(self.master.read_holding_registers(FIRST, count=4), 2)
         self.refused(self.master.read_input_registers(FIRST, count=1), 2)
         self.refused(self.master.write_register(FIRST, 0xFF00), 2)
         self.refused(self.master.write_registers(FIRST, [0xFF00]), 2)
         self.assertEqual(self.simulator.outputs(), [False] * 4)
 
-    def test_a_broadcast_is_done_in_silence(self):
+    def test_broadcast_is_executed_without_an_answer(self):
         sent = self.simulator.state().line.tx_frames
         self.master.write_coils(FIRST, [True, False, True, True], device_id=0, no_response_expected=True)
         self.eventually(self.simulator.outputs, [True, False, True, True])

@@ -1,4 +1,4 @@
-//! Frames that are not as they were sent.
+//! Damaged frames.
 
 use fastrand::Rng;
 use sim::line::{Character, Settings};
@@ -6,36 +6,36 @@ use sim::line::{Character, Settings};
 use super::traffic::{self, Outputs};
 use crate::bench::adu;
 
-/// What happened to a frame.
+/// Kind of damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// One to eight bits anywhere.
+    /// One to eight inverted bits anywhere.
     Bits,
-    /// Some of up to 16 bits in a row: a CRC of 16 bits finds them all.
+    /// Inverted bits within 16 bits in a row: a CRC of 16 bits detects all such bursts.
     Burst,
     /// The end is missing.
     CutShort,
     /// The beginning is missing.
     Beheaded,
-    /// More bytes somewhere within.
+    /// Additional bytes within the frame.
     Inserted,
-    /// Fewer.
+    /// Missing bytes within the frame.
     Left,
     /// The CRC with its high byte first.
     Swapped,
     /// Two frames without a silence.
     Joined,
-    /// Nothing of a frame in it.
+    /// Random bytes, without any part of a frame.
     Noise,
-    /// The CRC is right, but no frame is so long.
+    /// A valid CRC, but more bytes than a frame may have.
     Overlong,
-    /// All bytes are right, but a character lacks its stop bit.
+    /// All bytes are right, but a character has no stop bit.
     StopBit,
-    /// All bytes are right, but one does not agree with its parity; where there is none, as before.
+    /// All bytes are right, but the parity bit of one is wrong; without parity, its stop bit is missing.
     Parity,
 }
 
-/// All of them.
+/// All kinds of damage.
 pub const KINDS: [Kind; 12] = [
     Kind::Bits,
     Kind::Burst,
@@ -51,22 +51,22 @@ pub const KINDS: [Kind; 12] = [
     Kind::Parity,
 ];
 
-/// A frame that is not as it was sent.
+/// A damaged frame.
 #[derive(Debug)]
 pub struct Damaged {
     pub kind: Kind,
     pub bytes: Vec<u8>,
-    /// The character with a fault.
+    /// Index of the character with a fault.
     fault: usize,
 }
 
 impl Damaged {
-    /// Whether a character has a fault, with which no frame can be good.
+    /// Returns whether a character has a fault that makes the frame invalid.
     pub fn has_fault(&self) -> bool {
         matches!(self.kind, Kind::StopBit | Kind::Parity)
     }
 
-    /// Its characters.
+    /// Returns the characters of the frame.
     pub fn characters(&self, settings: Settings) -> impl Iterator<Item = Character> {
         let fault = self.has_fault().then_some(self.fault);
         let parity = self.kind == Kind::Parity && settings.format.parity().is_some();
@@ -83,9 +83,9 @@ impl Damaged {
     }
 }
 
-/// A damaged frame, mostly one that would change an output.
+/// Returns a damaged frame, usually one that would change an output if it were executed.
 pub fn damaged(rng: &mut Rng, outputs: &Outputs) -> Damaged {
-    let kind = *rng.choice(&KINDS).expect("there are some");
+    let kind = *rng.choice(&KINDS).expect("KINDS is not empty");
     let sent = frame(rng, outputs);
     loop {
         let bytes = damage(kind, rng, outputs, &sent);
@@ -137,7 +137,7 @@ fn damage(kind: Kind, rng: &mut Rng, outputs: &Outputs, sent: &[u8]) -> Vec<u8> 
             let last = bytes.len() - 1;
             bytes.swap(last - 1, last);
             if bytes == sent {
-                // Both bytes were the same.
+                // Both bytes of the CRC were the same.
                 bytes[last] ^= 1;
             }
         }
@@ -147,7 +147,7 @@ fn damage(kind: Kind, rng: &mut Rng, outputs: &Outputs, sent: &[u8]) -> Vec<u8> 
             bytes = (0..rng.usize(1..=most)).map(|_| rng.u8(..)).collect();
         }
         Kind::Overlong => {
-            // An echo of more data than there may be.
+            // An echo request with more data than the function allows.
             let mut request = vec![1, 8, 0, 0];
             request.extend((0..rng.usize(251..280)).map(|_| rng.u8(..)));
             bytes = adu(&request);

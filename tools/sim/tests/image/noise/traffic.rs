@@ -1,10 +1,10 @@
-//! Good requests, and what a unit with four outputs makes of them.
+//! Valid requests, and their effect on a unit with four outputs.
 
 use fastrand::Rng;
 
 use crate::bench::FIRST;
 
-/// The outputs of unit 1, as they must be.
+/// Expected states of the outputs of unit 1.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs(pub [bool; 4]);
 
@@ -14,15 +14,14 @@ impl Outputs {
         bits.fold(0, |byte, on| byte << 1 | u8::from(*on))
     }
 
-    /// Switches all off: the PDU that does so.
+    /// Switches all outputs off. Returns the PDU of this write.
     pub fn all_off(&mut self) -> [u8; 7] {
         self.0 = [false; 4];
         [15, 0, FIRST, 0, 4, 1, 0]
     }
 }
 
-/// A write to the outputs that changes at least one, without unit address: the PDU, and what it makes of
-/// them.
+/// Returns a write that changes at least one output: the PDU without unit address, and the outputs after it.
 pub fn write(rng: &mut Rng, outputs: &Outputs) -> (Vec<u8>, Outputs) {
     let mut after = outputs.clone();
     if rng.bool() {
@@ -43,12 +42,12 @@ pub fn write(rng: &mut Rng, outputs: &Outputs) -> (Vec<u8>, Outputs) {
     (vec![15, 0, FIRST + first, 0, count, 1, bits], after)
 }
 
-/// A good request and its reply, if it gets one: unit addresses and PDUs. What it does is done to
+/// Returns a valid request and its reply, if there is one, each as unit address and PDU. Applies the request to
 /// `outputs`.
 pub fn request(rng: &mut Rng, outputs: &mut Outputs) -> (Vec<u8>, Option<Vec<u8>>) {
     let with = |unit: u8, pdu: &[u8]| [&[unit], pdu].concat();
     let (unit, pdu, reply) = match rng.u8(0..12) {
-        // Reads of the outputs tell whether anything was written that should not be.
+        // Reads of the outputs show whether a write that should have been ignored changed them.
         0..=3 => {
             let count = rng.u8(1..=4);
             let first = rng.u8(0..=4 - count);
@@ -74,7 +73,8 @@ pub fn request(rng: &mut Rng, outputs: &mut Outputs) -> (Vec<u8>, Option<Vec<u8>
             (1, vec![3, 2, 0, 0, 2], Some([&[3, 4], &code[..]].concat()))
         }
         9 => {
-            // Any data, mostly little of it: with unit, function, sub-function and CRC up to 256 bytes.
+            // Random data, usually only a little: a frame may have up to 256 bytes with unit, function, sub-function
+            // and CRC.
             let most = if rng.u8(0..20) == 0 { 249 } else { 8 };
             let data: Vec<u8> = (0..rng.usize(2..=most)).map(|_| rng.u8(..)).collect();
             let pdu = [&[8, 0, 0], &data[..]].concat();
