@@ -8,7 +8,7 @@ use crate::Board;
 use crate::line::{Character, Format, Settings};
 use crate::time::Time;
 
-/// What has been reported to the client of a board's line.
+/// What the client of a board's line knows already.
 #[derive(Clone, Debug, Default)]
 pub struct Session {
     /// Driver edges up to this instant were reported.

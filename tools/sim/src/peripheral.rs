@@ -28,8 +28,7 @@ pub trait Peripheral {
     /// [`Unmodelled`] for a register or feature the block does not have: the bus records a finding.
     fn write(&mut self, offset: u32, value: u32, now: Time) -> Result<(), Unmodelled>;
 
-    /// The earliest instant at which this block does something by itself; never in the past of the last
-    /// `advance`.
+    /// The instant of the next event of this block; never before the last `advance`.
     fn next_event(&self) -> Option<Time> {
         None
     }

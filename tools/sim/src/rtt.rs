@@ -5,8 +5,8 @@
 //! +16  number of up channels                (32-bit words)
 //! +20  number of down channels
 //! ```
-//! The read offset is moved at fixed instants of the virtual time, [`POLL`] apart, however a caller cuts the run
-//! into pieces, so that what the firmware finds in its buffer depends on nothing but the run itself.
+//! The read offset is moved at fixed instants of the virtual time, [`POLL`] apart, whatever the pieces in which a caller
+//! lets the time pass. So the state of the buffer at an instant is the same in every run.
 
 use crate::machine::memory::RAM_BASE;
 use crate::time::Time;
@@ -22,7 +22,7 @@ const SIZE: usize = UP_0 + 8;
 const WRITE: usize = UP_0 + 12;
 const READ: usize = UP_0 + 16;
 
-/// What has been read so far.
+/// The text read so far.
 #[derive(Debug, Default)]
 pub struct Log {
     /// The control block's offset into SRAM, when the image has one.

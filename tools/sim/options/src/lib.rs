@@ -14,7 +14,7 @@ pub use fitting::{Fitting, toml_error};
 /// Whether the simulator has pseudo-terminals on this system. macOS has them too, but nobody has tried them there.
 pub const PTY: bool = cfg!(all(unix, not(target_os = "macos")));
 
-/// What the simulator is told on its command line.
+/// The options of the simulator's command line.
 #[derive(clap::Args, Clone, Debug, PartialEq, Eq)]
 #[group(skip)]
 pub struct Options {
@@ -150,7 +150,7 @@ impl Options {
 }
 
 impl Options {
-    /// The image that was named for a board: the last one that names its type, else the last one for all.
+    /// The image for a board: the last one given for its type, or else the last one given for all boards.
     #[must_use]
     pub fn elf_of(&self, board: &Board) -> Option<&Path> {
         let last = |wanted: Option<&Board>| {

@@ -198,7 +198,7 @@ impl Bench {
         self.bus.line().send(now, &bytes);
     }
 
-    /// What the master has heard on the line since the last call.
+    /// The bytes that the master has received since the last call.
     pub fn heard(&mut self) -> Vec<u8> {
         let heard = self.bus.line().take_received();
         let bytes = heard.iter().map(|character| character.byte);

@@ -1,8 +1,8 @@
-//! The flash in a file (`--flash`): taken up at the start, and kept up to date while the unit runs.
+//! The flash in a file (`--flash`): read at the start, and kept up to date while the unit runs.
 //!
-//! The file is the flash as it is. It is never written in place: the new contents go into a
-//! file beside it, which then takes its name, so that whoever looks, and whenever the simulator dies, finds
-//! the old contents or the new ones whole.
+//! The file has the bytes of the flash. It is never written in place: the new contents go into a file beside it, which
+//! is then renamed. So the file always has the complete old or the complete new contents, also when the simulator is
+//! killed.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
@@ -18,7 +18,7 @@ pub struct FlashFile {
     /// [`Board::flash_changes`] of what it holds; `None` when it has not been written yet, or the last
     /// attempt has failed.
     holds: Option<u64>,
-    /// What kept it from being written, told already.
+    /// The reason why it could not be written, which has been reported already.
     told: Option<String>,
 }
 
@@ -80,7 +80,7 @@ impl FlashFile {
         Ok(())
     }
 
-    /// The same while the unit runs: a failure is told on stderr, once as long as it stays the same.
+    /// The same while the unit runs: a failure is reported on stderr, once as long as it stays the same.
     pub fn keep_or_tell(&mut self, board: &Board) {
         if let Err(what) = self.keep(board)
             && self.told.as_ref() != Some(&what)
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_takes_no_file_is_told_and_tried_again() {
+    fn a_folder_that_takes_no_file_is_reported_and_tried_again() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("missing").join("flash");
         let board = testing::board(Module::Di4);

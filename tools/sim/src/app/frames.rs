@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_is_told_with_its_times_and_meaning() {
+    fn a_frame_has_its_times_and_its_meaning() {
         let seen = Frame {
             number: 7,
             direction: Direction::FromMaster,

@@ -7,8 +7,8 @@ use sim::{Config, Image, Time};
 /// Boards by name, and their images as ELF files.
 const IMAGES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/images.rs"));
 
-/// So long after the start the firmware has said which it is.
-const TOLD: Time = Time::from_ms(100);
+/// Time after the start by which the firmware has logged its version.
+const LOGGED: Time = Time::from_ms(100);
 
 /// The image of a board.
 ///
@@ -22,7 +22,8 @@ pub fn image(board: &Board) -> Result<Image, String> {
     Image::from_elf(&elf).map_err(|error| format!("cannot run the image inside: {error}"))
 }
 
-/// The image of a board as an ELF file, if it is inside; a copy, for in the program it is not aligned as its reader needs.
+/// The image of a board as an ELF file, if it is inside. It is a copy, because the bytes in the program are not aligned
+/// as their reader needs.
 fn elf(board: &Board) -> Option<Vec<u8>> {
     let inside = IMAGES.iter().find(|(name, _)| *name == board.name);
     inside.map(|(_, elf)| elf.to_vec())
@@ -47,7 +48,7 @@ fn firmware(layout: &'static Layout, elf: &[u8]) -> Option<String> {
         ..Config::default()
     };
     let mut board = sim::Board::new(&Image::from_elf(elf).ok()?, config).ok()?;
-    board.run_until(TOLD);
+    board.run_until(LOGGED);
     let log = board.take_log();
     let (version, _) = log.strip_prefix("modio ")?.split_once(" on ")?;
     Some(version.to_owned())
@@ -58,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_image_inside_is_of_a_board_and_tells_its_version() {
+    fn every_image_inside_is_for_a_board_and_reports_its_version() {
         let mut lines = version().lines().map(str::to_owned).collect::<Vec<_>>();
         assert_eq!(
             lines.remove(0),
@@ -72,7 +73,7 @@ mod tests {
 
     #[test]
     #[ignore = "needs the image: cargo xtask test"]
-    fn an_image_tells_its_version() {
+    fn an_image_reports_its_version() {
         let path = std::env::var_os("MODIO_ELF").expect("MODIO_ELF names the image");
         let elf = std::fs::read(path).unwrap();
         let layout = Layout::of(&register_map::board::MODIO_02).unwrap();

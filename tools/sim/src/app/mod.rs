@@ -71,7 +71,7 @@ enum Event {
     Stop,
 }
 
-/// Runs the simulator until it is told to stop or its time is up.
+/// Runs the simulator until something stops it or its time is over.
 ///
 /// # Errors
 ///

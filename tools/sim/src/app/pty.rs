@@ -1,9 +1,9 @@
 //! The RS-485 line on a pseudo-terminal, which a Modbus master opens like a serial port.
 //!
-//! Its settings are raw. Whatever rate a master sets, bytes cross the line at the rate of the unit, unless the line's
-//! client is to keep its own rate: then it is the one that the master sets. A pseudo-terminal keeps no parity and no length
-//! of characters, so the format never comes from there. As on a serial port, what comes while nobody has it open is lost: a master never
-//! finds answers to questions it did not ask.
+//! Its settings are raw. Bytes cross the line at the rate of the unit, unless the client of the line has a fixed rate:
+//! then the rate is the one that the master sets. A pseudo-terminal stores neither parity nor length of characters, so
+//! the format never comes from there. As on a serial port, bytes that arrive while no program has it open are lost: a
+//! master never finds replies to requests that it did not send.
 
 use std::fs;
 use std::os::fd::OwnedFd;
@@ -21,7 +21,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::Event;
 
-/// So often it is looked whether somebody has opened the terminal.
+/// How often the simulator checks whether somebody has opened the terminal.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// The terminal, and the link to it.
@@ -90,7 +90,7 @@ impl Pty {
         changed.then_some(now)
     }
 
-    /// Lets whoever has the terminal open read these bytes; never waits. What does not fit is lost.
+    /// Offers these bytes to the program that has the terminal open; never waits. Bytes that do not fit are lost.
     pub fn write(&self, bytes: &[u8]) {
         let state = state(&self.master, PollFlags::OUT, Some(Duration::ZERO));
         if !state.contains(PollFlags::HUP) {
@@ -118,8 +118,8 @@ fn raw_terminal() -> rustix::io::Result<(OwnedFd, PathBuf)> {
     unlockpt(&master)?;
     let name = ptsname(&master, Vec::new())?;
     let path = PathBuf::from(std::ffi::OsStr::from_bytes(name.as_bytes()));
-    // The settings last as long as our side is open. That the other side has been open once, and is not
-    // now, is what makes poll tell whether somebody has opened it.
+    // The settings last as long as our side is open. The other side is opened once and closed here: only after that
+    // does poll show whether a program has opened it.
     let other = rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())?;
     let mut settings = tcgetattr(&other)?;
     settings.make_raw();

@@ -1,4 +1,4 @@
-//! Runs the boards in step with the wall clock, or on request, and passes on what comes in and goes out.
+//! Runs the boards in step with the wall clock, or on request, and passes on input and output.
 
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};

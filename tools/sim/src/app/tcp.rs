@@ -1,5 +1,5 @@
-//! The RS-485 line as raw bytes on a TCP socket: every client hears what the unit sends, and what any
-//! client sends goes out on the line.
+//! The RS-485 line as raw bytes on a TCP socket: every client receives what the unit sends, and the
+//! bytes of all clients go out on the line.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -131,14 +131,14 @@ mod tests {
         }
 
         drop(first);
-        eventually("the one that left is forgotten", || {
+        eventually("the client that left is dropped", || {
             tcp.write(&[6]);
             tcp.clients.lock().unwrap().len() == 1
         });
     }
 
     #[test]
-    fn a_port_in_use_is_told() {
+    fn a_port_in_use_is_an_error() {
         let taken = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = taken.local_addr().unwrap();
         let text = Tcp::listen(address, mpsc::channel().0).err().unwrap();

@@ -1,26 +1,26 @@
 //! Several boards on one RS-485 line.
 //!
-//! Each board has a clock of its own and its own end of the line. What the master sends is known beforehand, and what
-//! a unit has sent is known at the end of the bus afterwards. What is left are the units that listen to each other:
-//! none of them may pass an instant at which another one could still pull the line low.
+//! Each board has its clock and its end of the line. The edges of the master are known beforehand, and those of a unit
+//! reach the record of the bus afterwards. This leaves the units that receive each other: none of them may pass an
+//! instant at which another one could still pull the line low.
 //!
 //! A unit can do that only when its transmitter begins a character: at the end of the one under way, or at a tick of
 //! its baud generator while its core executes instructions. So each board goes on up to the earliest such instant of
-//! the others, all of them at the same time on as many threads as the host has cores; then they hear what the others
-//! have said, and go on. What a board does is the same whatever the number of threads. A core that sleeps does nothing
+//! the others, all of them at the same time on as many threads as the host has cores; then they receive what the others
+//! have sent, and go on. What a board does is the same whatever the number of threads. A core that sleeps does nothing
 //! until its next event, and its board stays behind until then, or until the run ends. All edges of a character are
 //! known when it begins.
 //!
-//! That is exact but for two things:
+//! This is exact, with two exceptions:
 //!
-//! - A core that is stopped in the middle of something costs much more than one that goes on until it sleeps. So a
-//!   board may be half a bit, [`LATEST`] at most, and the end of an instruction past the beginning of a character
-//!   when it hears of it. The edge counts from its own instant all the same ([`crate::line`]): the character is
-//!   sampled where it is, and comes when it would have come. Only what shows the edge itself, such as a timer's
-//!   capture or the level at the pin, is so late for the firmware.
-//! - A unit that breaks off a character, by its driver, its pin or its supply, or that pulls the line low by a plain
-//!   output, does so between two ticks. The others may be up to one bit of that unit past it by then, or [`FARTHEST`]
-//!   while its transmitter is off, and hear of it then.
+//! - To stop a core in the middle of its work costs much more than to let it go on until it sleeps. So a board may be
+//!   past the beginning of a character when it receives the edge: by half a bit, [`LATEST`] at most, and the end of an
+//!   instruction. The edge still counts from its true instant ([`crate::line`]): the character is sampled at its true
+//!   bits, and arrives at its true time. Only what shows the edge itself, such as the capture of a timer or the level
+//!   at the pin, is late for the firmware by that much.
+//! - A unit can break off a character by its driver, its pin or its supply, or pull the line low by a plain output. It
+//!   does so between two ticks. The others may then be past it by up to one bit of that unit, or by [`FARTHEST`] while
+//!   its transmitter is off, and receive the edge late.
 
 use rayon::prelude::*;
 
@@ -51,7 +51,7 @@ struct Plan {
     bound: Time,
 }
 
-/// Up to where boards can run before they hear from each other: no other one begins a character before.
+/// How far boards can run before they exchange what they have sent: no other board begins a character before.
 #[derive(Clone, Copy, Debug)]
 struct Horizon {
     /// The board whose bound is the least, which runs up to the next one.
@@ -98,9 +98,9 @@ impl Horizon {
 
 /// Boards on one RS-485 line.
 ///
-/// With one board it is that board with its own line. With several, [`Bus::line`] is the bus: the master is at it, and
-/// it has the record. The line of a board on it ([`Board::line`]) is then only the end of the line at that board: its
-/// driver's edges and its echo are there, frames are not.
+/// With one board it is that board with its line. With several, [`Bus::line`] is the bus: the master is connected to
+/// it, and it has the record. The line of a board on it ([`Board::line`]) is then only the end at that board: it has the
+/// edges of the driver and the echo, but no frames.
 #[derive(Debug)]
 pub struct Bus {
     boards: Vec<Board>,
@@ -134,7 +134,7 @@ impl Bus {
             lent: vec![true; boards.len()],
             boards,
             line: Line::of_bus(now),
-            // Not that of the line: the boards have not heard of any.
+            // Not the version of the line: no board knows of a version yet.
             version: u64::MAX,
         }
     }
@@ -163,7 +163,7 @@ impl Bus {
     }
 
     /// The same, to do something to it. What lets its time pass on its own leaves the other boards behind: they catch
-    /// up in the next run, and cannot be heard by it before that.
+    /// up in the next run. Until then it receives nothing from them.
     ///
     /// # Panics
     ///
@@ -228,7 +228,7 @@ impl Bus {
         }
     }
 
-    /// Takes up what has been done to the boards and the line since the last run.
+    /// Takes over the changes to the boards and the line since the last run.
     fn take_up(&mut self) {
         for n in 0..self.boards.len() {
             if core::mem::take(&mut self.lent[n]) {
@@ -247,7 +247,7 @@ impl Bus {
         }
     }
 
-    /// Runs each board until the instant that `to` gives, if any, and lets everyone hear what they have said.
+    /// Runs each board until the instant that `to` gives, if any, and passes on what they have sent.
     fn run_boards(&mut self, to: impl Fn(usize, &Plan) -> Option<Time>) {
         let mut due: Vec<_> = self
             .boards
@@ -283,7 +283,7 @@ impl Bus {
         self.line.pass(known, settings);
     }
 
-    /// Lets everyone hear what unit `n` has to say.
+    /// Passes on to all others what unit `n` has sent.
     fn pass_on(&mut self, n: usize) {
         let Some(said) = self.boards[n].take_said() else {
             return;

@@ -57,7 +57,7 @@ impl<C: Circuit> Chip<C> {
     }
 
     /// Reads memory from `address` on into `bytes`: SRAM, flash (at 0 too) and the system control space, none of
-    /// which takes notice. Tells how many bytes it got.
+    /// which takes notice. Returns how many bytes it received.
     pub fn read_memory(&mut self, address: u32, bytes: &mut [u8]) -> usize {
         for (n, byte) in (0..).zip(bytes.iter_mut()) {
             let Some(read) = self.byte(address.wrapping_add(n)) else {

@@ -7,14 +7,13 @@ use modbus_frames::adu::Framing;
 use crate::serial::Word;
 use crate::time::Time;
 
-/// Frames kept unless the record is told to keep them all.
+/// Number of frames kept, unless the record keeps all.
 pub const KEPT: usize = 1000;
 
-/// A frame is cut after so many bytes: sixteen times the longest that RTU has, for a line that never falls
-/// silent.
+/// Number of bytes after which a frame is cut, for a line that is never silent: sixteen times the longest RTU frame.
 pub const LONGEST: usize = 4096;
 
-/// Who spoke.
+/// Who sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// The master, or noise.
@@ -23,13 +22,13 @@ pub enum Direction {
     FromUnit,
 }
 
-/// A frame on the line, as a listener with the master's settings hears it: characters of one side with less
+/// A frame on the line, as a listener with the master's settings receives it: characters of one side with less
 /// than t3.5 of silence between them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Its number, from 1, never used again on this line.
     pub number: u64,
-    /// Who spoke.
+    /// Who sent.
     pub direction: Direction,
     /// The first start bit.
     pub start: Time,
@@ -71,7 +70,7 @@ impl Record {
         self.trim();
     }
 
-    /// A word was heard. `silence` is what ends a frame.
+    /// A word was received. A silence of `silence` ends a frame.
     pub fn word(&mut self, word: &Word, direction: Direction, collided: bool, silence: Time) {
         let continues = self.open.as_ref().is_some_and(|frame| {
             frame.direction == direction
@@ -101,7 +100,7 @@ impl Record {
         frame.damaged |= collided || word.parity_error || word.framing_error || word.noise;
     }
 
-    /// Nothing but silence up to `now`: a frame that has been followed by `silence` is complete.
+    /// The line is silent up to `now`: a frame that has been followed by `silence` is complete.
     pub fn quiet(&mut self, now: Time, silence: Time) {
         if self.open.as_ref().is_some_and(|f| f.end + silence <= now) {
             self.close();

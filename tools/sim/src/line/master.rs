@@ -1,4 +1,4 @@
-//! The master's end of the line: what it queues to send, and what it hears.
+//! The master's end of the line: what it queues to send, and what it receives.
 
 use std::collections::VecDeque;
 
@@ -6,7 +6,7 @@ use super::{Character, Line, Span};
 use crate::serial::Wave;
 use crate::time::Time;
 
-/// A character the master heard while the unit spoke.
+/// A character that the master received while the unit was sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received {
     /// Its data bits, the parity bit not among them.
@@ -92,9 +92,9 @@ impl Line {
         character.end()
     }
 
-    /// Noise turns the bus over from `at` for `width`: a low glitch on an idle line, an inverted stretch of
-    /// a character. Bursts come in order; one that begins before the last one's end is cut to what is
-    /// left of it.
+    /// Noise inverts the bus from `at` for `width`: it is a low pulse on an idle line, or an inverted part of a
+    /// character. Bursts come in order. When one begins before the end of the last one, only its rest behind that end
+    /// counts.
     pub fn noise(&mut self, at: Time, width: Time) {
         let end = at + width;
         let start = at.max(self.earliest());
@@ -115,7 +115,7 @@ impl Line {
         self.master.queued_until.max(self.earliest())
     }
 
-    /// What the master has heard of the unit, oldest first: the last 65 536 characters unless everything
+    /// What the master has received from the unit, oldest first: the last 65 536 characters unless everything
     /// is kept. It does not hear itself.
     pub fn received(&self) -> impl DoubleEndedIterator<Item = &Received> {
         self.received.iter()

@@ -2,7 +2,7 @@
 //!
 //! Every talker is a level over time: the master, the unit through its driver, and noise. The bus is low
 //! when either talker pulls it low (a wired AND: what a receiver makes of two drivers at once), and noise turns
-//! it over. What a listener hears is sampled from that level at the listener's own rate, so a wrong rate, a
+//! it over. What a listener receives is sampled from that level at the listener's own rate, so a wrong rate, a
 //! wrong parity, a break, a cut character or a collision come out as they do on a wire.
 //!
 //! ```text
@@ -39,7 +39,7 @@ use shared::Shared;
 /// How long the bus can be looked back at, [`Line::level_at`].
 pub const HISTORY: Time = Time::from_ms(100);
 
-/// Words and driver edges kept unless the line is told to keep everything.
+/// Number of words and driver edges kept, unless the line keeps everything.
 const KEPT_EVENTS: usize = 65_536;
 
 /// A stretch of time.
@@ -68,7 +68,7 @@ pub struct Line {
     /// What the unit's driver puts on the bus; high while it is off.
     unit: Wave,
     bus: Wave,
-    /// The level of the unit's RX pin, and its edges the USART has not heard of yet.
+    /// The level of the unit's RX pin, and its edges that the USART has not received yet.
     rx: bool,
     rx_edges: Vec<(Time, bool)>,
     listener: Receiver,
@@ -126,8 +126,8 @@ impl Line {
         self.settings = settings;
     }
 
-    /// Whether the master takes over the unit's rate and format by itself, whenever it has nothing left to
-    /// send: for a line whose master carries no settings of its own, such as a pseudo-terminal.
+    /// Whether the master takes over the unit's rate and format whenever it has nothing left to
+    /// send: for a line whose master has no settings, such as a pseudo-terminal.
     pub fn set_follow(&mut self, follow: bool) {
         self.follow = follow;
     }

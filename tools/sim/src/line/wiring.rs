@@ -98,7 +98,7 @@ impl Line {
         self.settle(now);
     }
 
-    /// Whether the unit hears itself: the receiver stays on while the driver is. Off at first: DE and RE
+    /// Whether the unit receives its echo: the receiver stays on while the driver is on. Off at first: DE and RE
     /// are tied.
     pub fn set_echo(&mut self, echo: bool) {
         self.echo = echo;
@@ -221,7 +221,7 @@ impl Line {
         }
     }
 
-    /// The listener hears what has come so far; what it needs no more is dropped.
+    /// The listener receives everything up to now. Edges that nobody needs any more are dropped.
     pub(super) fn listen(&mut self) {
         let framing = Framing::of(self.settings);
         let silence = self.settings.frame_silence();

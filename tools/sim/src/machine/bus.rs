@@ -1,7 +1,6 @@
-//! The bus: what answers at every address that the core does not answer by itself, and what the core is told
-//! in return.
+//! The bus: the answers at every address that is outside the core.
 //!
-//! The core reads flash and reads and writes SRAM without asking. All else comes here: stores to flash, the
+//! The core reads flash, and reads and writes SRAM, without the bus. All other accesses come here: stores to flash, the
 //! register blocks, the factory's words, the debug blocks. Bit-band aliases arrive as a read and a write of
 //! the word they stand for (PM0056 2.2.5).
 //!

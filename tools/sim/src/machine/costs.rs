@@ -155,7 +155,7 @@ impl Pace {
         }
     }
 
-    /// What a taken branch to flash or to SRAM costs on top of its own cycle.
+    /// The cycles that a taken branch to flash or to SRAM takes beside its first one.
     #[must_use]
     pub const fn taken(&self, to_flash: bool) -> u32 {
         if to_flash {
@@ -165,7 +165,7 @@ impl Pace {
         }
     }
 
-    /// What a branch in flash that is not taken costs on top of its own cycle.
+    /// The cycles that a branch in flash takes beside its first one when it is not taken.
     #[must_use]
     pub const fn not_taken(&self) -> u32 {
         if self.costs.needless_fetch {

@@ -1,9 +1,9 @@
 //! Reads of flash that are not those of plain memory: while flash is being erased or programmed, and of unsteady cells.
 //!
-//! A read by code in SRAM stalls the core until the operation ends (PM0075 2.3.1), be it a literal, a table or the
-//! vector of an interrupt. The core reads flash without asking, so all of flash is sent to the bus while an
-//! operation runs: always, where every read of constants is charged ([`super::costs`]). Pages with unsteady cells
-//! always are; instructions are fetched from the likelier bits.
+//! A read by code in SRAM stalls the core until the operation ends (PM0075 2.3.1): of a literal, a table or the vector
+//! of an interrupt. The core reads flash without the bus, so all reads of flash are sent to the bus while an operation
+//! runs, and always where every read of constants is charged ([`super::costs`]). Reads of pages with unsteady cells are
+//! always sent there; instructions are fetched from the more probable bits.
 
 use rigless::emulator::Queued;
 

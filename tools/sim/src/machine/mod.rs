@@ -67,7 +67,7 @@ pub struct Machine<C> {
     core: Core,
     /// Everything else.
     pub bus: Bus<C>,
-    /// The core's state out of reset, as it saved it. Loading it keeps what has been translated.
+    /// The core's state out of reset, as it saved it. Loading it keeps the translated code.
     fresh: Vec<u8>,
     /// Instructions done before the core's last reset.
     counted: u64,

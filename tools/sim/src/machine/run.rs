@@ -1,6 +1,6 @@
 //! The run loop: from event to event, in exact order.
 //!
-//! The core runs up to the next thing that happens by itself, a block's event, its own SysTick, a limit, and
+//! The core runs up to the next event of a block, of its SysTick, or a limit, and
 //! stops there; then the event happens, then the core goes on. While it waits (WFI), stalls on the flash or is
 //! held in reset, time jumps from event to event.
 
@@ -140,7 +140,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Tells DWT whether DEMCR.TRCENA is set.
+    /// Passes on to DWT whether DEMCR.TRCENA is set.
     fn look_at_trace(&mut self) {
         if self.bus.dwt.in_use() {
             let cycle = self.cycles();
@@ -211,7 +211,7 @@ impl<C: Circuit> Machine<C> {
         self.bus.flash_offset(pc).is_some()
     }
 
-    /// What is pending now, for the measurement of waits; the core is told of its lines first.
+    /// Looks at what is pending, for the measurement of waits. The core gets the state of its lines first.
     fn look_at_waits(&mut self, now: Time) {
         if self.bus.waits.is_none() || !self.powered {
             return;

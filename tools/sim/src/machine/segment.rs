@@ -105,7 +105,7 @@ impl Segment {
         segment
     }
 
-    /// Whether the instruction after its first `n` is one of its own, and is at `pc`.
+    /// Whether the segment has an instruction after its first `n`, and this instruction is at `pc`.
     #[inline]
     #[must_use]
     pub fn goes_on(&self, n: u64, pc: u32) -> bool {
@@ -246,7 +246,7 @@ pub struct Segments {
     kept: Vec<Kept>,
 }
 
-/// A segment, and what a lookup needs: little, for every machine has a table of its own.
+/// A segment, and what a lookup needs. It is small, because every machine has its table of these.
 #[derive(Clone, Debug, Default)]
 struct Kept {
     start: u32,

@@ -73,7 +73,7 @@ impl Waits {
         self.table
     }
 
-    /// The core was reset: nothing waits any more, and the vector table is to be found again.
+    /// The core was reset: no exception waits any more, and the vector table has to be found again.
     pub(super) fn reset(&mut self, core: &mut dyn Processor) {
         self.since = [None; EXCEPTIONS];
         self.leave(core);

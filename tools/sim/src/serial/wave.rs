@@ -21,7 +21,7 @@ impl Default for Wave {
 }
 
 impl Wave {
-    /// A wire that has been at `level` for ever.
+    /// A wire that has always been at `level`.
     #[must_use]
     pub const fn new(level: bool) -> Self {
         Self {
@@ -63,7 +63,7 @@ impl Wave {
         }
     }
 
-    /// The level at `at`: the one after an edge at that very instant.
+    /// The level at `at`: the one after an edge that is exactly then.
     #[must_use]
     pub fn level_at(&self, at: Time) -> bool {
         match self.index_after(at) {

@@ -29,7 +29,7 @@ pub enum Channel {
     },
     /// An analog input.
     Ai {
-        /// What stands at the pin, 0 to 3300 mV.
+        /// The voltage at the pin, 0 to 3300 mV.
         millivolts: u16,
     },
     /// An analog output.

@@ -1,9 +1,9 @@
 //! The part around its core: every register block, its clock, its interrupt lines, the wires between the
 //! blocks, and its pins, to which a [`Circuit`] is connected.
 //!
-//! Blocks know nothing of each other. Whatever one means to another goes through [`wires`], after every
-//! access to a block and after everything a block does by itself. Time moves from event to event: each
-//! block's next one is remembered, and [`Soc::advance`] takes them in their order.
+//! Blocks do not know each other. Their signals to each other go through [`wires`], after every access to a block and
+//! after every event of a block. Time moves from event to event: the next event of each block is known, and
+//! [`Soc::advance`] takes the events in their order.
 
 mod circuit;
 pub mod map;
@@ -61,7 +61,7 @@ pub struct Soc<C> {
     i2c_by_hand: u16,
     clocks: Clocks,
     flash_access: (u32, bool),
-    /// When each block acts by itself next, and the earliest of them.
+    /// When each block has its next event, and the earliest of these instants.
     due: [Time; BLOCKS],
     next: Time,
     /// The levels of the interrupt lines, one bit each, and those that changed.
@@ -202,7 +202,7 @@ impl<C: Circuit> Soc<C> {
         !self.notes.is_empty()
     }
 
-    /// The earliest instant at which any block acts by itself; [`Time::MAX`] for never.
+    /// The earliest instant at which a block has an event; [`Time::MAX`] for never.
     #[must_use]
     pub fn next_event(&self) -> Time {
         self.next
@@ -288,7 +288,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// A block's own past, and what comes to it over a wire, up to `now`.
+    /// Brings a block up to `now`, with its wires.
     fn catch_up(&mut self, block: Block, now: Time) {
         match block {
             Block::Usart1 | Block::Usart3 | Block::GpioA | Block::GpioB => {

@@ -50,7 +50,7 @@ pub(super) const SERIALS: [Serial; 2] = [
 
 /// The USART whose RX pin is TIM1's channel 3 as well.
 pub(super) const CAPTURED: &Serial = &SERIALS[0];
-/// TIM1's channel at that pin.
+/// The channel of TIM1 at the pin.
 pub(super) const RX_CAPTURE: usize = 3;
 
 /// I2C1's pins.

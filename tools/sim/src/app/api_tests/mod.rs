@@ -117,7 +117,7 @@ fn power_and_switch_and_module() {
 }
 
 #[test]
-fn frames_are_told_from_a_number_on() {
+fn frames_are_listed_from_a_number_on() {
     let mut bench = bench(Module::Di4);
     for _ in 0..2 {
         bench.bus.run_for(sim::Time::from_ms(1));

@@ -13,7 +13,7 @@ const BEGINS: Time = Time::from_ms(200);
 /// The pause after a broadcast, in which every unit carries it out (V1.02, 2.4.1: 100 to 200 ms).
 const TURNAROUND: Time = Time::from_ms(100);
 
-/// What has become of a request.
+/// The outcome of a request.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The reply may still be received.
@@ -60,7 +60,7 @@ impl Exchange {
         }
     }
 
-    /// Returns what has become of the request by now.
+    /// Returns the outcome of the request up to now.
     pub fn outcome(&self, line: &Line) -> Outcome {
         let over = line.now() >= self.until;
         let reply = match self.unit {

@@ -38,7 +38,7 @@ const NO_ANSWER: u8 = 0x0B;
 /// busy.
 const AT_ONCE: usize = 64;
 
-/// What the clients' threads tell the thread that has the line.
+/// Messages from the clients' threads to the thread that has the line.
 pub enum Message {
     /// A client has connected.
     Joined(Client),
@@ -75,7 +75,7 @@ impl Gateway {
         self.address
     }
 
-    /// Takes up what came from a client. What is to be done is done by the next [`update`](Self::update).
+    /// Accepts a message from a client. The next [`update`](Self::update) acts on it.
     pub fn take(&mut self, message: Message) {
         match message {
             Message::Joined(client) => self.clients.push_back(client),

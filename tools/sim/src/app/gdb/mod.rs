@@ -18,7 +18,7 @@ mod wire;
 pub use session::Session;
 pub use target::Debug;
 
-/// What comes from the debugger.
+/// Events from the debugger.
 pub enum Message {
     /// It has connected; this end is for writing.
     Connected(TcpStream),

@@ -52,7 +52,7 @@ impl Session {
     }
 
     fn start(&mut self, stream: TcpStream, bench: &mut Bench) {
-        // One that has gone already is none, and neither is one that cannot be answered.
+        // A debugger that has gone already gets no session, nor does one that cannot be answered.
         self.machine = Wire::new(stream)
             .ok()
             .and_then(|wire| GdbStub::new(wire).run_state_machine(bench).ok());
@@ -66,7 +66,7 @@ impl Session {
         }
     }
 
-    /// Tells the debugger that the core has halted.
+    /// Reports to the debugger that the core has halted.
     fn stopped(&mut self, bench: &mut Bench, reason: SingleThreadStopReason<u32>) {
         self.drive(bench, |machine, bench| match machine {
             GdbStubStateMachine::Running(running) => running.report_stop(bench, reason).ok(),

@@ -18,7 +18,7 @@ use gdbstub::target::{Target, TargetError, TargetResult};
 
 use super::super::bench::Bench;
 
-/// Registers told to GDB, in the order of [`CortexM::target_description_xml`] and of [`sim::Board::register`].
+/// Registers that GDB gets, in the order of [`CortexM::target_description_xml`] and of [`sim::Board::register`].
 const REGISTERS: usize = 23;
 const PC: usize = 15;
 

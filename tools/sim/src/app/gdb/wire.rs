@@ -9,7 +9,7 @@ use gdbstub::conn::Connection;
 /// A debugger that does not read for this long is given up: the board's thread waits for it.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What goes to the debugger, sent in whole packets. The connection closes with it.
+/// The way to the debugger, which sends whole packets. The connection is closed when it is dropped.
 #[derive(Debug)]
 pub struct Wire {
     stream: TcpStream,

@@ -62,7 +62,7 @@ fn the_driver_on_an_idle_transmitter_makes_no_edge() {
 }
 
 #[test]
-fn both_at_once_collide_and_the_master_hears_the_mix() {
+fn both_at_once_collide_and_the_master_receives_the_mixture() {
     let mut bench = Bench::new();
     bench.line.send(bench.now, &[0xF0]);
     bench.driver(true);
@@ -82,7 +82,7 @@ fn both_at_once_collide_and_the_master_hears_the_mix() {
 }
 
 #[test]
-fn a_driver_let_go_in_the_middle_of_the_masters_byte_hears_its_rest() {
+fn a_driver_switched_off_during_the_masters_byte_receives_the_rest_of_it() {
     let mut bench = Bench::new();
     bench.driver(true);
     let t = Time::from_ms(2);

@@ -1,4 +1,4 @@
-//! The bus with a USART on it: who hears what, and when.
+//! The bus with a USART on it: who receives what, and when.
 
 mod faults;
 mod several;
@@ -103,7 +103,7 @@ impl Bench {
 }
 
 #[test]
-fn a_request_and_its_answer_are_heard_and_recorded() {
+fn a_request_and_its_answer_are_received_and_recorded() {
     let mut bench = Bench::new();
     let request = [0x11, 0x01, 0x00, 0x13, 0x00, 0x25, 0x0E, 0x84];
     let sent = Time::from_ms(2);
@@ -162,7 +162,7 @@ fn one_big_step_is_the_same_as_many_small_ones() {
 }
 
 #[test]
-fn the_unit_hears_its_echo_only_when_wired_so() {
+fn the_unit_receives_its_echo_only_when_wired_so() {
     for echo in [false, true] {
         let mut bench = Bench::new();
         bench.line.set_echo(echo);

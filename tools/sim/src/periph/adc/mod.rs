@@ -46,7 +46,7 @@ mod cr1 {
     pub const EOCIE: u32 = 1 << 5;
     pub const SCAN: u32 = 1 << 8;
     pub const MASK: u32 = 0x00CF_FFFF;
-    /// What has no effect without the features below.
+    /// Bits without an effect while the features below are off.
     pub const IDLE: u32 = 0xE01F;
 }
 
@@ -112,7 +112,7 @@ pub struct Adc {
     /// The calibration under way began too early.
     too_early: bool,
     powered_at: Time,
-    /// The bit, CAL or RSTCAL, that is cleared at that instant.
+    /// The bit to be cleared then, CAL or RSTCAL.
     calibration: Option<(u32, Time)>,
     run: Option<Run>,
     /// How far a conversion may be off, in LSB either way, and the state of the generator that picks how far

@@ -85,7 +85,7 @@ fn adon_written_twice_starts_but_not_with_another_change() {
 }
 
 #[test]
-fn calibration_ends_by_itself() {
+fn calibration_clears_its_bit_at_its_end() {
     let (mut adc, t) = settled();
     write(&mut adc, offset::CR2, ON | cr2::RSTCAL, t);
     assert_eq!(read(&mut adc, offset::CR2, t + cycles(3)), ON | cr2::RSTCAL);

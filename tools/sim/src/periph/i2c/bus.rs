@@ -45,13 +45,13 @@ impl Bus for NoDevice {
 
 /// The devices on a bus, all of them together.
 pub trait Bus {
-    /// What the devices, and whoever drives the pins by hand, do to the wires.
+    /// What the devices do to the wires, and what the firmware does when it drives the pins itself.
     fn wires(&self) -> Wires;
 
-    /// A start condition and an address byte (bit 0 = read) have come. Tells whether someone acknowledges.
+    /// A start condition and an address byte (bit 0 = read) were received. Returns whether a device acknowledges.
     fn address(&mut self, byte: u8, now: Time) -> bool;
 
-    /// A data byte has come from the master. Tells whether it is acknowledged.
+    /// A data byte was received from the master. Returns whether it is acknowledged.
     fn write(&mut self, byte: u8, now: Time) -> bool;
 
     /// The next byte for the master: 0xFF when nobody drives the wire.

@@ -41,7 +41,7 @@ impl Peripheral for I2c {
                     return Err(Unmodelled("I2C DMA (CR2)"));
                 }
             }
-            // Addresses of its own: without another master nobody calls them.
+            // The own addresses: without another master nobody uses them.
             offset::OAR1 => self.oar[0] = value & 0xC3FF,
             offset::OAR2 => self.oar[1] = value & 0xFF,
             offset::DR => return self.write_data(value as u8, now),

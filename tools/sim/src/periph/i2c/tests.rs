@@ -10,7 +10,7 @@ use crate::slot::{BusFault, Channel, Slot};
 const HZ: u32 = 36_000_000;
 const ON: u32 = cr1::PE | cr1::ACK;
 
-/// The block and the bus, with a clock of its own that the register accesses move.
+/// The block and the bus, and a time that each register access moves on.
 struct Bench {
     i2c: I2c,
     slot: Slot,

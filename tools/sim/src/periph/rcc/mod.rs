@@ -193,7 +193,7 @@ impl Rcc {
         self.rstr
     }
 
-    /// What has changed since the last call.
+    /// The changes since the last call.
     pub fn take_changes(&mut self) -> Changes {
         core::mem::take(&mut self.changes)
     }

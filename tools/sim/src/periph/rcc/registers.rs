@@ -61,8 +61,8 @@ impl Peripheral for Rcc {
     }
 
     fn next_event(&self) -> Option<Time> {
-        // Only a switch that waits for its clock happens by itself, and a clock that comes back; ready flags
-        // are worked out when read.
+        // Events are a switch that waits for its clock, and a clock that comes back. Ready flags are computed when
+        // they are read.
         if self.stopped() {
             return self.source(self.sws).filter(|&at| at < Time::MAX);
         }

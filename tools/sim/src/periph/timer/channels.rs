@@ -8,7 +8,7 @@ use crate::time::Time;
 
 impl Timer {
     /// Whether an edge at the input of `channel` (1 to 4) can raise an interrupt now: only then must edges
-    /// be told as they come.
+    /// be passed on at once.
     #[must_use]
     pub fn capture_interrupt_enabled(&self, channel: usize) -> bool {
         let n = channel - 1;

@@ -136,8 +136,7 @@ impl Counter {
         flags
     }
 
-    /// When one of `wanted` flags may rise next: at that instant it does, or the way there is to be
-    /// worked out again.
+    /// When one of the `wanted` flags may rise next. At that instant it rises, or the instant has to be computed again.
     pub fn next(&self, wanted: u32) -> Option<Time> {
         if wanted == 0 || !self.counts() || self.hz == 0 {
             return None;

@@ -39,7 +39,7 @@ fn play(usart: &mut Usart, c: Character) {
     usart.receive_edge(c.end(), true);
 }
 
-/// SR without IDLE, which has a test of its own.
+/// SR without IDLE, which another test checks.
 fn status(usart: &mut Usart, at: Time) -> u32 {
     usart.advance(at);
     usart.read(offset::SR, at).expect("modelled") & !sr::IDLE
@@ -243,7 +243,7 @@ fn a_deaf_receiver_joins_at_the_next_edge() {
 }
 
 #[test]
-fn the_wrong_rate_is_heard_wrongly() {
+fn a_wrong_rate_gives_wrong_bytes() {
     let mut usart = receiver(0, 0);
     let slow = Settings {
         baud: 57_600,

@@ -8,7 +8,7 @@ use crate::time::Time;
 pub enum Sent {
     /// A character whose start bit has begun, or begins at the next tick of the baud generator.
     Character(Character),
-    /// The pin goes high at that instant: the character under way is lost from there on.
+    /// The pin goes high: the rest of the character under way is lost.
     Cut(Time),
 }
 
@@ -103,7 +103,7 @@ impl Transmitter {
         self.break_wanted = wanted;
     }
 
-    /// Starts what waits, at the first tick of the baud generator from `at` on, if the shift register is free. Tells what became of it.
+    /// Starts what waits, at the first tick of the baud generator from `at` on, if the shift register is free. Returns what was started.
     pub fn start(&mut self, at: Time, shape: Shape) -> Option<Ended> {
         if self.shift.is_some() {
             return None;
@@ -142,7 +142,7 @@ impl Transmitter {
     }
 
     /// The shift register is empty from `at` on, where it said it would be. `shape` is `None` when the
-    /// transmitter may not begin anything new. Also tells whether it was a break that ended.
+    /// transmitter may not begin anything new. Also returns whether it was a break that ended.
     pub fn finish(&mut self, at: Time, shape: Option<Shape>) -> (Ended, bool) {
         let was_break = matches!(self.shift, Some((Content::Break, _)));
         self.shift = None;
@@ -150,7 +150,7 @@ impl Transmitter {
         (next.unwrap_or(Ended::Complete), was_break)
     }
 
-    /// TE is cleared at `now`: what is under way is lost. Tells whether that was a character or a break.
+    /// TE is cleared at `now`: a character under way is lost. Returns whether it was a character or a break.
     pub fn stop(&mut self, now: Time) -> bool {
         let sending = self.is_sending();
         if sending {

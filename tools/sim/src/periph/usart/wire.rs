@@ -81,7 +81,7 @@ impl Usart {
         }
     }
 
-    /// The next instant at which something happens in the USART, by itself or because of its wire.
+    /// The next instant at which something happens in the USART, caused by itself or by its wire.
     #[must_use]
     pub fn next_exchange(&self, wire: &dyn Wire) -> Option<Time> {
         let listens = self.awaits_start() || wire.has_edges();

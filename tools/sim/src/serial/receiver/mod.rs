@@ -14,7 +14,7 @@ use super::settings::{Parity, Rate, Settings};
 use super::wave::Wave;
 use crate::time::Time;
 
-/// How a receiver cuts what it hears into words.
+/// How a receiver divides what it receives into words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Framing {
     /// The receiver's own bit rate.
@@ -200,7 +200,7 @@ impl Receiver {
 enum Verdict {
     /// Not all of them have been taken.
     Open,
-    /// It was a glitch; the receiver knew at that instant.
+    /// It was a glitch; the receiver knew this at the given instant.
     Fails(Time),
     /// It is a start bit.
     Stands,

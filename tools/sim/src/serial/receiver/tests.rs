@@ -49,7 +49,7 @@ fn a_byte_of_each_format_arrives_and_when() {
 
 #[test]
 fn back_to_back_characters_of_a_fast_sender_arrive() {
-    // 2 % fast, one stop bit heard by a receiver set to two.
+    // 2 % fast, one stop bit, received with two set.
     let sender = settings(9792, Format::N1);
     let mut wave = Wave::default();
     for n in 0..200_u8 {

@@ -154,7 +154,7 @@ impl Mcp4728 {
         self.to_store = [false; 4];
     }
 
-    /// An address byte after a start condition; tells whether it is acknowledged. The general call is.
+    /// An address byte after a start condition; returns whether it is acknowledged. The general call is.
     pub fn address(&mut self, byte: u8, now: Time) -> bool {
         self.store(now);
         self.cursor = 0;
@@ -166,7 +166,7 @@ impl Mcp4728 {
         byte == 0 || byte >> 1 == self.address
     }
 
-    /// A data byte from the master; tells whether it is acknowledged.
+    /// A data byte from the master; returns whether it is acknowledged.
     pub fn write(&mut self, byte: u8, now: Time) -> bool {
         self.expect = match self.expect {
             Expect::Nothing => return false,

@@ -61,7 +61,7 @@ fn sequential_write_goes_to_the_eeprom_and_takes_its_time() {
     assert_eq!(outputs(&dac), [0, 0x111, 0x222, 0x333]);
     assert_eq!(dac.eeprom()[3].code, 0x333);
     assert_eq!(read_all(&mut dac, t)[0], 0x40, "busy");
-    // A single write meanwhile reaches the register, not the EEPROM.
+    // A single write during that time changes the register, not the EEPROM.
     send(&mut dac, &[0x58, 0x07, 0x77], t + Time::from_ms(1));
     assert_eq!((dac.output(0), dac.eeprom()[0].code), (0x777, 0));
     let ready = t + EEPROM_WRITE;
