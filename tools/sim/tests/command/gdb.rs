@@ -200,7 +200,7 @@ fn a_debugger_halts_steps_and_resumes_the_core() {
 
     assert_eq!(
         gdb.monitor("reset").trim_end(),
-        "the core is reset and halted before the first instruction"
+        "reset; halted before the first instruction"
     );
     assert_eq!(gdb.place().1, START);
     assert_eq!(gdb.ask(&format!("Z1,{ADD:x},2")), "OK");
