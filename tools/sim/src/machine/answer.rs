@@ -15,7 +15,7 @@ use crate::time::Time;
 pub(super) const PPB: u32 = 0xE000_0000;
 const DBGMCU: u32 = 0xE004_2000;
 
-/// An access as the blocks see it.
+/// An access, in the form in which the blocks receive it.
 #[derive(Clone, Copy)]
 pub(super) struct Request {
     pub(super) address: u32,
@@ -185,7 +185,7 @@ impl<C: Circuit> Bus<C> {
         }
     }
 
-    /// The private peripheral bus outside what the core answers itself.
+    /// Answers an access to the private peripheral bus that the core does not answer itself.
     fn debug_block(&mut self, request: Request) -> u32 {
         let Request {
             address,
@@ -219,8 +219,9 @@ impl<C: Circuit> Bus<C> {
         }
     }
 
-    /// The core reads and writes SRAM without asking, all but the page of the vector table while
-    /// [`Waits`](super::waits::Waits) has it sent here, and the pages of [`RamCode`](super::ram_code::RamCode).
+    /// Answers an access to SRAM that is sent to the bus: to the page of the vector table while
+    /// [`Waits`](super::waits::Waits) watches it, and to the pages of [`RamCode`](super::ram_code::RamCode). The core
+    /// accesses all other pages directly.
     fn routed_ram(&mut self, request: Request, offset: u32) -> u32 {
         if let Some(value) = request.write {
             let bytes = value.to_le_bytes();
@@ -235,8 +236,8 @@ impl<C: Circuit> Bus<C> {
         word_of(self.ram.bytes(), request, offset)
     }
 
-    /// The core reads the flash without asking, all but pages with unsteady cells, and the page of the vector
-    /// table while [`Waits`](super::waits::Waits) has it sent here.
+    /// Answers a read of flash that is sent to the bus: of pages with unsteady cells, and of the page of the vector
+    /// table while [`Waits`](super::waits::Waits) watches it. The core reads all other pages directly.
     fn flash_word(&mut self, request: Request, offset: u32) -> u32 {
         let at = (offset & !3) as usize;
         request.part_of(self.soc.flash.read_word(at))
@@ -265,7 +266,7 @@ impl<C: Circuit> Bus<C> {
     }
 }
 
-/// What a read at `offset` of `memory` gives.
+/// Returns the value of a read at `offset` of `memory`.
 fn word_of(memory: &[u8], request: Request, offset: u32) -> u32 {
     let at = (offset & !3) as usize;
     request.part_of(u32::from_le_bytes([0, 1, 2, 3].map(|n| memory[at + n])))

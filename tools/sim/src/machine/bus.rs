@@ -4,8 +4,8 @@
 //! register blocks, the factory's words, the debug blocks. Bit-band aliases arrive as a read and a write of
 //! the word they stand for (PM0056 2.2.5).
 //!
-//! Bus faults are precise, as crate rigless has them. On the part the fault of a buffered store is imprecise: the
-//! program counter is some instructions on, and BFAR is not valid (PM0056 4.4.11, 4.4.14).
+//! All bus faults are precise, as in crate rigless. On the part the fault of a buffered store is imprecise: the
+//! program counter is already some instructions further, and BFAR is not valid (PM0056 4.4.11, 4.4.14).
 
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
@@ -25,16 +25,16 @@ use crate::periph::ident::Ident;
 use crate::soc::{Circuit, Soc};
 use crate::time::Time;
 
-/// Everything the core is lent while it runs, except the memories mapped into it.
+/// Everything that the core uses while it runs, except the memories mapped into it.
 #[derive(Debug)]
 pub struct Bus<C> {
     /// Which part it is.
     pub(super) part: &'static Part,
     /// The part around the core.
     pub soc: Soc<C>,
-    /// Instructions to time.
+    /// Converts instructions to time.
     pub clock: InstructionClock,
-    /// What was wrong.
+    /// The findings so far.
     pub findings: Findings,
     pub(super) ident: Ident,
     pub(super) dbgmcu: Dbgmcu,
@@ -43,26 +43,26 @@ pub struct Bus<C> {
     pub(super) stop: (Time, u64),
     /// An operation of the flash ran when the core was let run last.
     pub(super) busy: bool,
-    /// The core has to come back at once.
+    /// The core has to return immediately.
     pub(super) halt: bool,
-    /// What the core has to do before its next instruction.
+    /// Actions of the core before its next instruction.
     pub(super) queued: Vec<Queued>,
     /// The instruction that made the last access.
     pub(super) pc: u32,
-    /// How long interrupts wait, when that is measured.
+    /// The measurement of interrupt waits, while it is on.
     pub(super) waits: Option<Box<Waits>>,
     /// The SRAM.
     pub(super) ram: Memory,
-    /// What the code costs.
+    /// The costs of the code.
     pub(super) segments: Segments,
     /// Reads of flash come here: all of them, or those of these pages of the core's.
     pub(super) flash_is_watched: bool,
     pub(super) routed_pages: Vec<bool>,
     /// The core has read flash while an operation runs, and waits for its end.
     pub(super) read_stalls: bool,
-    /// A block has been accessed, so its next event may be another one.
+    /// A block has been accessed, so its next event may have changed.
     pub(super) touched: bool,
-    /// The access under way leaves the core free to go on.
+    /// The core may continue after the access under way.
     pub(super) carries_on: bool,
 }
 
@@ -121,7 +121,7 @@ impl<C: Circuit> Bus<C> {
         self.segments.pace().costs.charges_tables
     }
 
-    /// What an access costs beyond one of SRAM.
+    /// Returns the cost of an access beyond the cost of an access to SRAM.
     fn cost_of(&self, access: &Access, from_code: bool) -> u32 {
         let pace = self.segments.pace();
         let address = access.address as u32;

@@ -1,4 +1,4 @@
-//! The core of the part, as crate rigless is asked for it.
+//! The configuration of the part's core for crate rigless.
 
 use core::num::{NonZeroU32, NonZeroU64};
 

@@ -1,4 +1,4 @@
-//! What the core's instructions and exceptions cost in cycles of HCLK, by class.
+//! Costs of the core's instructions and exceptions in cycles of HCLK, by class.
 //!
 //! Sources: the Cortex-M3 TRM, DDI 0337E, 18.2 (instruction timings) and 18.3 (load-store timings), for a memory
 //! without wait states; PM0075 and RM0008 3.3.3 for the flash, which reads 64 bits in one cycle and its wait
@@ -28,7 +28,7 @@ pub struct Costs {
     pub prefetch_under_way: bool,
     /// P of the TRM's table: the pipeline's refill.
     pub refill: u32,
-    /// A branch that is not taken has the target fetched nevertheless.
+    /// The target is fetched even when the branch is not taken.
     pub needless_fetch: bool,
     /// A load, on its own.
     pub load: u32,
@@ -48,15 +48,15 @@ pub struct Costs {
     pub system: u32,
     /// DMB and DSB.
     pub barrier: u32,
-    /// Code in SRAM: what each data access costs more, as it shares the system bus with the fetches.
+    /// Code in SRAM: additional cost of each data access, which shares the system bus with the fetches.
     pub shared_bus: u32,
-    /// Code in SRAM: what each word fetched costs more.
+    /// Code in SRAM: additional cost of each word fetched.
     pub sram_fetch: u32,
     /// APB: cycles of PCLK for a load, and cycles of HCLK on top.
     pub apb_load: (u32, u32),
     /// The same for a store.
     pub apb_store: (u32, u32),
-    /// A register on the AHB: what it costs more than SRAM.
+    /// A register on the AHB: additional cost compared with SRAM.
     pub ahb: u32,
     /// Exception entry without wait states.
     pub entry: u32,
@@ -71,7 +71,7 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// What the TRM and the manuals give as usual.
+    /// The usual costs by the TRM and the manuals.
     pub const NOMINAL: Self = Self {
         overlapped_fetch: true,
         prefetch_under_way: false,
@@ -99,7 +99,7 @@ impl Costs {
         charges_tables: false,
     };
 
-    /// The slow corner: every cost at its most, none overlapped.
+    /// The slow corner: every cost at its maximum, without overlap.
     pub const SLOW: Self = Self {
         overlapped_fetch: false,
         prefetch_under_way: true,
@@ -140,7 +140,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// What a read of constants in flash costs more than one of SRAM.
+    /// Additional cost of a read of constants in flash, compared with a read of SRAM.
     #[must_use]
     pub const fn flash_read(&self) -> u32 {
         self.wait_states + self.conflict()
@@ -193,8 +193,8 @@ impl Pace {
         self.costs.tail_chain + self.costs.entry_reads * self.wait_states + self.conflict()
     }
 
-    /// What an access to a block costs beyond one to SRAM: on the AHB, or on an APB that runs at HCLK divided
-    /// by `divider`.
+    /// Additional cost of an access to a block, compared with an access to SRAM: on the AHB, or on an APB that runs at
+    /// HCLK divided by `divider`.
     #[must_use]
     pub const fn block(&self, write: bool, divider: Option<u32>) -> u32 {
         let Some(divider) = divider else {

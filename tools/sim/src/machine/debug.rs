@@ -1,4 +1,4 @@
-//! What a debugger does to the core: breakpoints, single steps, registers, the system control space.
+//! The debugger's access to the core: breakpoints, single steps, registers, the system control space.
 
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
@@ -14,14 +14,14 @@ const SCS: core::ops::Range<u32> = 0xE000_E000..0xE000_F000;
 const STEP_LIMIT: Time = Time::from_secs(1);
 
 impl<C: Circuit> Machine<C> {
-    /// A run with breakpoints ends before the instruction at `address`. The memory is left alone. As many
-    /// removals as additions take it away.
+    /// Adds a breakpoint: a run with breakpoints ends before the instruction at `address`. The memory is not changed.
+    /// The breakpoint is removed after as many removals as additions.
     pub fn add_breakpoint(&mut self, address: u32) {
         self.debugged = true;
         self.core.add_breakpoint(u64::from(address & !1));
     }
 
-    /// Takes back one [`Machine::add_breakpoint`].
+    /// Reverts one [`Machine::add_breakpoint`].
     pub fn remove_breakpoint(&mut self, address: u32) {
         self.core.remove_breakpoint(u64::from(address & !1));
     }

@@ -13,7 +13,7 @@ pub enum Class {
     Table,
     /// A store of one register.
     Store,
-    /// A load or store of so many registers.
+    /// A load or store of this number of registers.
     Multiple(u32),
     /// MLA, MLS.
     Accumulate,
@@ -27,14 +27,14 @@ pub enum Class {
     System,
     /// DMB, DSB.
     Barrier,
-    /// ISB: fetches again what follows.
+    /// ISB: the following instructions are fetched again.
     Refill,
 }
 
 /// How a segment of code ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// What follows is executed next.
+    /// The following instruction is executed next.
     Sequential,
     /// By a branch, which may not be taken.
     Branch,

@@ -178,7 +178,7 @@ impl<C: Circuit> Machine<C> {
         self.register(XPSR).unwrap_or_default() & IPSR
     }
 
-    /// Another exception is being handled, or none.
+    /// Records a change of the exception being handled.
     fn note_active(&mut self) {
         let number = self.exception();
         let now = VirtualNanos(self.cycles());
@@ -201,11 +201,11 @@ impl<C: Circuit> Machine<C> {
     }
 }
 
-/// What a branch did to the exception being handled.
+/// Effect of a branch on the exception being handled.
 enum Left {
-    /// Nothing: it stays within the handler.
+    /// None: the branch stays within the handler.
     Not,
-    /// It returned from it.
+    /// The branch returned from the exception.
     Return,
     /// Another one, or the same again, follows at once.
     TailChain,

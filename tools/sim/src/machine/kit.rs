@@ -1,9 +1,9 @@
-//! A core with the memories mapped into it, which the next machine of this process takes over.
+//! A core with the memories mapped into it, which the next machine of this process reuses.
 //!
-//! To translate the firmware takes the core several times as long as to run its start. So a machine that goes leaves
-//! its core behind with what that has translated, and the next one of the same part takes it: the core loads the
-//! state that it had out of reset, as for every other reset, the flash gets the new contents, and only what was
-//! translated from bytes that differ is translated anew. The run is the same as on a new core.
+//! The translation of the firmware takes several times as long as the run of its start. A dropped machine therefore
+//! keeps its core, with the translated code, for the next machine of the same part. That machine loads the core's
+//! state after reset, as for every other reset, and writes the new contents of the flash. Only the code whose bytes
+//! differ is translated again. The run is the same as on a new core.
 
 use core::fmt;
 use core::ops::{Deref, DerefMut};
@@ -17,12 +17,12 @@ use super::{Machine, cortex};
 use crate::part::Part;
 use crate::periph::flash::Flash;
 
-/// Cores that are kept: more than a test on each of the host's cores has in use at a time is not needed.
+/// Maximum number of cores that are kept. One for each test that runs at the same time is enough.
 const MOST: usize = 8;
 /// Length in bytes of the pieces in which flash is compared.
 const PIECE: usize = 64;
 
-/// What machines have left behind.
+/// The cores of dropped machines.
 static LEFT: Mutex<Vec<Kit>> = Mutex::new(Vec::new());
 
 /// The core of a machine.
@@ -65,7 +65,7 @@ struct Kit {
     ram_code: RamCode,
 }
 
-/// What a machine is built around.
+/// The parts that a new machine is built from.
 pub(super) struct Parts {
     /// The core, out of reset, with the flash and `ram` mapped into it.
     pub core: Core,
@@ -73,7 +73,7 @@ pub(super) struct Parts {
     pub fresh: Vec<u8>,
     pub ram: Memory,
     pub ram_code: RamCode,
-    /// Another machine has used them.
+    /// Whether another machine has used these parts.
     pub used: bool,
 }
 

@@ -69,7 +69,7 @@ pub struct Machine<C> {
     pub bus: Bus<C>,
     /// The core's state out of reset, as it saved it. Loading it keeps the translated code.
     fresh: Vec<u8>,
-    /// Instructions done before the core's last reset.
+    /// Instructions executed before the core's last reset.
     counted: u64,
     powered: bool,
     /// The core is held in reset until then.
@@ -81,18 +81,18 @@ pub struct Machine<C> {
     cut_at: Option<Time>,
     resting: Resting,
     log: Log,
-    /// When the log is emptied next.
+    /// When the log is read next.
     poll_at: Time,
     /// The exception being handled.
     active: Active,
-    /// Where the code goes on that has just ended without a branch.
+    /// Address at which the code continues after a segment without a branch at its end.
     sequential: Option<u32>,
     /// An exception may be entered before the next instruction.
     unsettled: bool,
-    /// The core's own timer has gone off since the core executed something.
+    /// The core's SysTick has expired, or the core was reset, since it last executed an instruction.
     stirred: bool,
     ram_code: RamCode,
-    /// The core was another machine's before.
+    /// Another machine used the core before.
     core_is_used: bool,
     /// A debugger has set something in the core.
     debugged: bool,
@@ -203,7 +203,7 @@ impl<C: Circuit> Machine<C> {
         self.resting.of(self.now())
     }
 
-    /// Measures how long interrupts wait from now on, anew, or no longer.
+    /// Starts the measurement of interrupt waits again from zero, or stops it.
     pub fn measure_waits(&mut self, on: bool) {
         self.ram_code.end(&mut *self.core, &self.bus.ram);
         if let Some(mut waits) = self.bus.waits.take() {
@@ -314,7 +314,7 @@ impl<C: Circuit> Machine<C> {
         Some(u32::from_le_bytes(bytes.try_into().ok()?))
     }
 
-    /// The power comes on, with SRAM as a cold part has it; nothing when it is on.
+    /// Switches the power on, with the SRAM contents of a cold part. Does nothing while the power is on.
     pub fn power_on(&mut self) {
         if self.powered {
             return;
@@ -330,7 +330,7 @@ impl<C: Circuit> Machine<C> {
         self.resets = 0;
     }
 
-    /// The power goes at this instant; nothing when it is off.
+    /// Switches the power off at this instant. Does nothing while the power is off.
     pub fn power_off(&mut self) {
         if !self.powered {
             return;
@@ -355,7 +355,7 @@ impl<C: Circuit> Machine<C> {
         });
     }
 
-    /// A reset of the whole part.
+    /// Resets the whole part.
     pub fn reset(&mut self, cause: Cause) {
         let now = self.now();
         self.log.poll(self.bus.ram.bytes_mut());
@@ -397,7 +397,7 @@ impl<C: Circuit> Machine<C> {
     }
 }
 
-/// What SRAM holds after power-on: anything, but the same in every run (xorshift64).
+/// Fills the SRAM after power-on with arbitrary bytes, which are the same in every run (xorshift64).
 fn fill_with_noise(bytes: &mut [u8], seed: u64) {
     let mut state = 0x9E37_79B9_7F4A_7C15 ^ seed;
     for chunk in bytes.chunks_mut(8) {

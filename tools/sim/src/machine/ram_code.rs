@@ -1,8 +1,8 @@
 //! Code in SRAM that a start copies there again.
 //!
-//! The core drops what it has translated when the bytes it came from are stored, also when they are stored as they
-//! were. So from a reset on the stores to pages with code are sent to the bus, until code in SRAM runs: then what
-//! was translated from bytes that have changed is dropped, and the rest is kept.
+//! The core discards translated code when its source bytes are stored, even with the same values. From a reset on,
+//! stores to pages with code are therefore sent to the bus until code in SRAM runs. Then only the code whose source
+//! bytes have changed is discarded.
 
 use rigless::emulator::{Processor, Queued};
 
@@ -18,7 +18,7 @@ pub(super) struct RamCode {
 }
 
 impl RamCode {
-    /// A reset: stores to code come to the bus from now on.
+    /// Handles a reset: stores to pages with code are sent to the bus from now on.
     pub(super) fn reset(&mut self, core: &mut dyn Processor, ram: &Memory) {
         if self.pages == 0 || self.translated.is_some() {
             return;
@@ -29,13 +29,13 @@ impl RamCode {
         }
     }
 
-    /// Code at this offset of SRAM is about to run.
+    /// Called before code at this offset of SRAM runs.
     pub(super) fn runs(&mut self, offset: usize, core: &mut dyn Processor, ram: &Memory) {
         self.end(core, ram);
         self.pages |= 1 << (offset % ram.bytes().len() / PAGE);
     }
 
-    /// Stores to code come to the bus no more.
+    /// Stops sending stores to pages with code to the bus.
     pub(super) fn end(&mut self, core: &mut dyn Processor, ram: &Memory) {
         let Some(translated) = self.translated.take() else {
             return;

@@ -53,9 +53,9 @@ pub struct Limit {
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// The instant has come.
+    /// The instant was reached.
     Time,
-    /// The instructions are done.
+    /// The number of instructions was reached.
     Instructions,
     /// The instruction at the address is next.
     Pc,

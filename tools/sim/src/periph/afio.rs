@@ -1,4 +1,4 @@
-//! Alternate-function I/O, RM0008 section 9.4: which port an EXTI line listens to, and the debug port's pins.
+//! Alternate-function I/O, RM0008 section 9.4: the port that feeds each EXTI line, and the debug port's pins.
 //!
 //! Pin remapping is not modelled: every peripheral is on its default pins.
 
@@ -15,7 +15,7 @@ pub struct Afio {
 }
 
 impl Afio {
-    /// The port that EXTI line `line` (0 to 15) listens to: 0 = A, 1 = B, ...
+    /// The port that feeds EXTI line `line` (0 to 15): 0 = A, 1 = B, ...
     #[must_use]
     pub fn exti_port(&self, line: usize) -> usize {
         (self.exticr[line / 4] >> (4 * (line % 4)) & 0xF) as usize

@@ -2,12 +2,12 @@
 
 use crate::time::Time;
 
-/// The internal oscillator, as typical.
+/// Typical frequency of the internal oscillator (HSI), in Hz.
 pub const HSI_HZ: u32 = 8_000_000;
-/// The usual crystal.
+/// Frequency of the usual crystal (HSE), in Hz.
 pub const HSE_HZ: u32 = 8_000_000;
 
-/// The most that SYSCLK may be in Hz (RM0008 7.2), and what a crystal 100 ppm above its frequency makes of it.
+/// Maximum SYSCLK in Hz (RM0008 7.2), plus the 100 ppm by which a crystal may be fast.
 pub const MAX_SYSCLK: u32 = 72_000_000 + 72_000_000 / 10_000;
 
 /// The part's oscillators.
@@ -19,12 +19,12 @@ pub struct Oscillators {
     pub hse: u32,
     /// The LSI in Hz.
     pub lsi: u32,
-    /// From HSEON to HSERDY.
+    /// Time from HSEON to HSERDY.
     pub hse_start: Time,
 }
 
 impl Oscillators {
-    /// As typical: the start of the crystal by DS5319 table 22, the LSI by table 25.
+    /// Typical oscillators: the start-up of the crystal by DS5319 table 22, the LSI by table 25.
     pub const TYPICAL: Self = Self {
         hsi: HSI_HZ,
         hse: HSE_HZ,
@@ -32,7 +32,8 @@ impl Oscillators {
         hse_start: Time::from_us(2_000),
     };
 
-    /// The same with a crystal of `hz`, as many parts per million off as this one is from [`HSE_HZ`].
+    /// Returns the same oscillators with a crystal of nominally `hz`. Its error in parts per million is the error
+    /// of this crystal against [`HSE_HZ`].
     #[must_use]
     pub const fn with_crystal(self, hz: u32) -> Self {
         let hse = self.hse as u64 * hz as u64 / HSE_HZ as u64;
@@ -63,7 +64,7 @@ pub struct Clocks {
 }
 
 impl Clocks {
-    /// SYSCLK's source has died, and nothing took its place.
+    /// The frequencies after SYSCLK's source has failed without a replacement.
     pub const STOPPED: Self = Self {
         sysclk: 0,
         hclk: 0,
@@ -97,7 +98,7 @@ impl Clocks {
         }
     }
 
-    /// What is above the part's limits (RM0008 7.2), if anything is.
+    /// Names the clock that is above the part's limits (RM0008 7.2); `None` when all are within them.
     #[must_use]
     pub const fn over_limit(&self) -> Option<&'static str> {
         if self.sysclk > MAX_SYSCLK {

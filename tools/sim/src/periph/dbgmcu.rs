@@ -11,7 +11,7 @@ pub struct Dbgmcu {
 }
 
 impl Dbgmcu {
-    /// That of a part with this DBGMCU_IDCODE, after power-on.
+    /// Returns the block of a part with this DBGMCU_IDCODE, after power-on.
     #[must_use]
     pub const fn new(idcode: u32) -> Self {
         Self { idcode, cr: 0 }
@@ -39,7 +39,7 @@ impl Peripheral for Dbgmcu {
     }
 
     fn reset(&mut self, _now: Time) {
-        // DBGMCU_CR is reset by power-on alone (RM0008 31.16.3): the machine makes a new one then.
+        // Only power-on resets DBGMCU_CR (RM0008 31.16.3); the machine makes a new block then.
     }
 }
 

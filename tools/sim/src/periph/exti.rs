@@ -20,19 +20,19 @@ pub struct Exti {
 }
 
 impl Exti {
-    /// Pins have changed: `changed` and the levels after it, one bit for each line.
+    /// Takes a change of the pins: the lines in `changed`, and the levels after the change, one bit for each line.
     pub fn pins(&mut self, changed: u16, level: u16) {
         let (changed, level) = (u32::from(changed), u32::from(level));
         self.pr |= changed & (level & self.rtsr | !level & self.ftsr);
     }
 
-    /// Whether any line listens for edges.
+    /// Whether any line detects edges.
     #[must_use]
     pub fn listens(&self) -> bool {
         self.rtsr | self.ftsr != 0
     }
 
-    /// The lines that ask for an interrupt, one bit each.
+    /// The lines that request an interrupt, one bit each.
     #[must_use]
     pub fn requests(&self) -> u32 {
         self.pr & self.imr

@@ -1,9 +1,9 @@
-//! What the factory wrote: flash size and unique identity (RM0008 chapter 30), and the option bytes
-//! (PM0075 2.5) as they leave the factory. All of it can only be read.
+//! The contents that the factory wrote: flash size and unique identity (RM0008 chapter 30), and the option bytes
+//! (PM0075 2.5) with their factory values. All of them are read-only.
 
 use crate::part::Part;
 
-/// Where this memory starts.
+/// Start address of this memory.
 pub const BASE: u32 = 0x1FFF_F7E0;
 /// Bytes up to the end of the option bytes.
 pub const SIZE: u32 = 0x30;
@@ -15,7 +15,8 @@ pub struct Ident {
 }
 
 impl Ident {
-    /// Those of `part` with this unique identity and these write-protection bits (FLASH_WRPR: 0 = protected).
+    /// Returns the words of `part` with this unique identity and these write-protection bits (FLASH_WRPR:
+    /// 0 = protected).
     #[must_use]
     pub fn new(part: &Part, unique_id: [u8; 12], wrpr: u32) -> Self {
         let mut bytes = [0xFF; SIZE as usize];

@@ -1,15 +1,15 @@
 //! The independent watchdog, RM0008 chapter 19: a 12-bit down-counter on the LSI that only a reset stops.
 //!
-//! PR and RLR live in the LSI's domain. A write takes up to five cycles of the LSI to arrive (19.4.4), and PVU or
-//! RVU is set for so long. Without the LSI it never arrives: the flag stays set, and further writes are lost. The
-//! start by 0xCCCC turns the LSI on (7.2.9). The counter takes PR and RLR over at the start and at each reload,
-//! as they have arrived by then.
+//! PR and RLR are in the LSI's clock domain. A write takes effect after up to five cycles of the LSI (19.4.4); PVU
+//! or RVU is set until then. Without the LSI the write never takes effect: the flag stays set, and further writes
+//! are lost. The start by 0xCCCC turns the LSI on (7.2.9). At the start and at each reload the counter uses the
+//! values of PR and RLR that are in effect at that moment.
 
 use crate::periph::clocks::Oscillators;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-/// PR and RLR take up to this many LSI cycles to arrive (RM0008 19.4.4).
+/// LSI cycles until a write to PR or RLR takes effect, at most (RM0008 19.4.4).
 const UPDATE_CYCLES: u64 = 5;
 
 const KEY_RELOAD: u32 = 0xAAAA;
@@ -20,7 +20,7 @@ const KEY_START: u32 = 0xCCCC;
 #[derive(Debug)]
 struct Setting {
     in_force: u32,
-    /// A value on its way, and when it was written.
+    /// A value that was written but is not yet in effect, and when it was written.
     written: Option<(u32, Time)>,
 }
 
@@ -32,7 +32,7 @@ impl Setting {
         }
     }
 
-    /// Takes a value over that has arrived, on an LSI of `hz` Hz that runs since `lsi`.
+    /// Puts a written value into effect once it is due, on an LSI of `hz` Hz that has run since `lsi`.
     fn advance(&mut self, lsi: Option<Time>, hz: u32, now: Time) {
         if let (Some((value, at)), Some(lsi)) = (self.written, lsi)
             && at.max(lsi) + Time::cycles(UPDATE_CYCLES, hz) <= now
@@ -51,10 +51,10 @@ pub struct Iwdg {
     open: bool,
     prescaler: Setting,
     reload: Setting,
-    /// Since when the LSI runs, or from when it will.
+    /// Instant from which the LSI runs; it may be in the future.
     lsi: Option<Time>,
     started: bool,
-    /// When it resets the part, once it counts.
+    /// When it resets the part; `None` until it counts.
     bites: Option<Time>,
     bitten: bool,
 }
@@ -87,12 +87,12 @@ impl Iwdg {
         self.started
     }
 
-    /// The LSI runs at `hz` Hz. What is being counted ends as it began.
+    /// Sets the rate of the LSI, in Hz. A count under way keeps its end.
     pub fn set_rate(&mut self, hz: u32) {
         self.hz = hz;
     }
 
-    /// The LSI runs from `since` on, or does not run.
+    /// Sets the instant from which the LSI runs; `None` while it is off.
     pub fn set_lsi(&mut self, since: Option<Time>) {
         self.lsi = since;
         if self.started && self.bites.is_none() && !self.bitten {
@@ -100,14 +100,14 @@ impl Iwdg {
         }
     }
 
-    /// Whether it has asked for a reset since the last call.
+    /// Whether it has requested a reset since the last call.
     pub fn take_bite(&mut self) -> bool {
         core::mem::take(&mut self.bitten)
     }
 
-    /// From a reload to the reset (RM0008 table 96).
+    /// Time from a reload to the reset (RM0008 table 96).
     fn timeout(&self) -> Time {
-        // PR 0 to 6 divide by 4 to 256; 7 does as 6.
+        // PR 0 to 6 divide by 4 to 256; 7 also divides by 256.
         let divider = 4u64 << self.prescaler.in_force.min(6);
         Time::cycles(u64::from(self.reload.in_force + 1) * divider, self.hz)
     }
@@ -188,7 +188,7 @@ mod tests {
         now
     }
 
-    /// With its LSI running since 0 and the settings opened.
+    /// Returns a watchdog whose LSI runs from instant 0 and whose settings are unlocked.
     fn open() -> Iwdg {
         let mut dog = Iwdg::default();
         dog.set_lsi(Some(Time::ZERO));

@@ -1,4 +1,4 @@
-//! The register blocks of the STM32F103, one in each file, each against its section of RM0008.
+//! The register blocks of the STM32F103, one in each file, modelled after their sections of RM0008.
 
 pub mod adc;
 pub mod afio;

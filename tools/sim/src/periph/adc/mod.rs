@@ -1,15 +1,16 @@
 //! ADC1: the regular sequence, started by software, without DMA, injected channels and watchdog
 //! (RM0008 11).
 //!
-//! It goes by ADCCLK, which its clock is set to. Inputs are levels in millivolts against 3300 mV of VDDA. What
-//! a real converter would do badly without saying so is reported: a clock above 14 MHz, a start before it has
-//! settled, a start while it calibrates.
+//! The converter is clocked by ADCCLK. Inputs are levels in millivolts against 3300 mV of VDDA. Misuse that makes
+//! a real converter inaccurate without an error flag is reported: a clock above 14 MHz, a start before the
+//! converter has settled, a start during calibration.
 //!
-//! It converts badly, too. Before a calibration is complete (11.4), and within tSTAB of power-up, codes are off by
-//! [`UNCALIBRATED`] and [`UNSETTLED`]; the manual gives no figures, these are far beyond the accuracy of the data
-//! sheet. The sampling capacitor charges through the source's impedance and the switch for the sampling time,
-//! from the level of the conversion before: the circuit behind equation 1 of the data sheet (DS5319, ADC
-//! characteristics), RAIN < TS / (fADC x CADC x ln 2^14) - RADC for an error below a quarter of a step.
+//! The model also reproduces the inaccuracy. Before a calibration is complete (11.4), and within tSTAB of
+//! power-up, codes are off by [`UNCALIBRATED`] and [`UNSETTLED`]. The manual gives no figures; these are far beyond
+//! the accuracy of the data sheet. The sampling capacitor charges through the source's impedance and the switch
+//! for the sampling time, from the level of the previous conversion. That is the circuit of equation 1 of the data
+//! sheet (DS5319, ADC characteristics): RAIN < TS / (fADC x CADC x ln 2^14) - RADC for an error below a quarter of
+//! a step.
 
 mod sequence;
 
@@ -76,21 +77,21 @@ const TEMPERATURE_MV: u16 = 1430;
 const REFERENCE_MV: u16 = 1200;
 /// VDDA = VREF+.
 const SUPPLY_MV: u32 = 3300;
-/// RADC at most, in ohms (DS5319, ADC characteristics).
+/// Maximum RADC, in ohms (DS5319, ADC characteristics).
 const SWITCH_OHMS: u32 = 1_000;
-/// CADC at most, in farads (DS5319, ADC characteristics).
+/// Maximum CADC, in farads (DS5319, ADC characteristics).
 const CAPACITANCE: f64 = 8e-12;
 /// Steps by which an uncalibrated converter reads too high.
 const UNCALIBRATED: u16 = 64;
-/// Steps by which a converter reads too low that has not settled.
+/// Steps by which a converter that has not settled reads too low.
 const UNSETTLED: u16 = 128;
-/// fADC at most (DS5319 table 46).
+/// Maximum fADC (DS5319 table 46).
 const MAX_HZ: u32 = 14_000_000;
-/// tSTAB at most (DS5319 table 46).
+/// Maximum tSTAB (DS5319 table 46).
 const SETTLING: Time = Time::from_us(1);
 /// tCAL in ADCCLK cycles (DS5319 table 46).
 const CALIBRATION_CYCLES: u64 = 83;
-/// The reset of the calibration registers: the manual names no time; a few cycles.
+/// Duration of the reset of the calibration registers. The manual gives none; a few cycles are assumed.
 const RESET_CALIBRATION_CYCLES: u64 = 4;
 
 /// ADC1.
@@ -115,8 +116,8 @@ pub struct Adc {
     /// The bit to be cleared then, CAL or RSTCAL.
     calibration: Option<(u32, Time)>,
     run: Option<Run>,
-    /// How far a conversion may be off, in LSB either way, and the state of the generator that picks how far
-    /// it is (xorshift32).
+    /// Largest error of a conversion, in LSB either way, followed by the state of the generator that picks the
+    /// error (xorshift32).
     noise: u16,
     random: u32,
 }
@@ -156,12 +157,12 @@ impl Adc {
         }
     }
 
-    /// Conversions are off by up to `lsb` either way from now on, the same in every run.
+    /// Adds an error of up to `lsb` either way to every conversion from now on. The errors are the same in every run.
     pub fn set_noise(&mut self, lsb: u16) {
         self.noise = lsb;
     }
 
-    /// A code with noise on it.
+    /// Returns `code` with the noise added.
     fn with_noise(&mut self, code: u16) -> u16 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 17;
@@ -171,7 +172,7 @@ impl Adc {
         (code + off).saturating_sub(self.noise).min(4095)
     }
 
-    /// The voltage at the pin of `channel`, 0 to 15, is `millivolts` from `now` on. Any other channel is
+    /// Sets the voltage at the pin of `channel`, 0 to 15, to `millivolts` from `now` on. Any other channel is
     /// ignored.
     pub fn set_millivolts(&mut self, channel: usize, millivolts: u16, now: Time) {
         self.advance(now);
@@ -180,7 +181,8 @@ impl Adc {
         }
     }
 
-    /// The impedance of what drives `channel`, 0 to 15, is `ohms` from `now` on. Any other channel is ignored.
+    /// Sets the impedance of the source that drives `channel`, 0 to 15, to `ohms` from `now` on. Any other channel
+    /// is ignored.
     pub fn set_source_ohms(&mut self, channel: usize, ohms: u32, now: Time) {
         self.advance(now);
         if channel < TEMPERATURE {
@@ -188,8 +190,8 @@ impl Adc {
         }
     }
 
-    /// What a channel converts to that was sampled up to `end`: the nearest of 4096 steps (11.1; the last one
-    /// saturates).
+    /// Returns the code of the conversion `run`, sampled up to its end: the nearest of 4096 steps (11.1; the last
+    /// step saturates).
     fn convert(&mut self, run: &Run) -> u16 {
         let channel = run.channel;
         let internal = channel >= TEMPERATURE;
@@ -254,7 +256,7 @@ impl Adc {
     fn write_cr2(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
         let value = value & cr2::MASK;
         let old = std::mem::replace(&mut self.cr2, value & !cr2::SWSTART);
-        // A calibration bit stays until its time is over; it cannot be cleared (11.12.3).
+        // Software cannot clear a calibration bit; hardware clears it at the end of the calibration (11.12.3).
         let running = self.calibration.map_or(0, |(bit, _)| bit);
         self.cr2 |= running;
         if value & cr2::ADON == 0 {
@@ -262,7 +264,7 @@ impl Adc {
             self.calibration = None;
             self.cr2 &= !(cr2::CAL | cr2::RSTCAL);
         } else if old & cr2::ADON == 0 {
-            // 11.4: to be calibrated after each power-up.
+            // 11.4: the converter has to be calibrated after each power-up.
             self.calibrated = false;
             self.powered_at = now;
         }
@@ -287,14 +289,14 @@ impl Adc {
             }
             return self.start(now);
         }
-        // 11.12.3, ADON: written as 1 again with nothing else changed, it starts a conversion.
+        // 11.12.3: writing ADON as 1 again, with no other bit changed, starts a conversion.
         if old & cr2::ADON != 0 && value == old {
             return self.start(now);
         }
         Ok(())
     }
 
-    /// The conversion under way has ended.
+    /// Ends the conversion under way.
     fn finish(&mut self, mut run: Run) {
         let code = run.sampled.take().unwrap_or(0);
         self.data = if self.cr2 & cr2::ALIGN == 0 {
@@ -305,7 +307,7 @@ impl Adc {
         let scan = self.cr1 & cr1::SCAN != 0;
         let last = !scan || run.rank + 1 >= self.sequence.length();
         if last {
-            // 11.12.1: at the end of the group.
+            // 11.12.1: EOC is set at the end of the group.
             self.sr |= sr::EOC;
         }
         self.run = if !last {
@@ -368,7 +370,7 @@ impl Peripheral for Adc {
     }
 
     fn next_event(&self) -> Option<Time> {
-        // Only an interrupt is an event; the rest is worked out when it is looked at.
+        // Only an interrupt is an event; everything else is calculated when a register is read.
         let waits = self.cr1 & cr1::EOCIE != 0 && self.sr & sr::EOC == 0;
         self.run.filter(|_| waits).map(|run| run.end())
     }
@@ -413,7 +415,7 @@ impl Peripheral for Adc {
         };
     }
 
-    /// The clock of a conversion under way is not changed.
+    /// Sets ADCCLK. A conversion under way keeps its clock.
     fn set_clock(&mut self, hz: u32, _now: Time) {
         self.hz = hz;
     }

@@ -1,4 +1,4 @@
-//! The regular sequence of a converter: which channel comes when, and how long it takes.
+//! The regular sequence of a converter: the order of the channels, and the duration of each conversion.
 
 use crate::time::Time;
 
@@ -28,7 +28,7 @@ impl Sequence {
         (register >> (5 * (rank % 6)) & 0x1F) as usize
     }
 
-    /// Half cycles a channel is sampled for.
+    /// Sampling time of a channel, in half cycles.
     pub const fn sample_halves(&self, channel: usize) -> u64 {
         let code = if channel < 10 {
             self.smpr[1] >> (3 * channel)
@@ -44,7 +44,7 @@ impl Sequence {
     }
 }
 
-/// A run of conversions without a gap: the clock it goes by, and how far it has come.
+/// A run of conversions without a gap: its clock and its progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
     base: Time,
@@ -57,7 +57,7 @@ pub struct Run {
     pub channel: usize,
     sample: u64,
     total: u64,
-    /// What was sampled, once it has been.
+    /// The sampled code; `None` before the end of the sampling.
     pub sampled: Option<u16>,
 }
 
@@ -78,7 +78,7 @@ impl Run {
         run
     }
 
-    /// Goes on with rank `rank`, right where the last conversion ended.
+    /// Continues with rank `rank`, without a gap after the last conversion.
     pub fn next(&mut self, sequence: &Sequence, rank: usize) {
         self.halves += self.total;
         self.take(sequence, rank);
@@ -92,17 +92,17 @@ impl Run {
         self.sampled = None;
     }
 
-    /// How long the input is sampled, in seconds.
+    /// Sampling time of the input, in seconds.
     pub fn sample_seconds(&self) -> f64 {
         self.sample as f64 / (2.0 * f64::from(self.hz))
     }
 
-    /// When the input is disconnected: the level just then is what is converted.
+    /// Instant at which the input is disconnected. The level at that instant is converted.
     pub fn sample_end(&self) -> Time {
         self.at(self.halves + self.sample)
     }
 
-    /// When the result is there.
+    /// Instant at which the result is available.
     pub fn end(&self) -> Time {
         self.at(self.halves + self.total)
     }

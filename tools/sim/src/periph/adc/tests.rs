@@ -1,4 +1,4 @@
-//! Times and codes of conversions, by the numbers of RM0008 11 and DS5319.
+//! Times and codes of conversions against the figures in RM0008 11 and DS5319.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn settled() -> (Adc, Time) {
 fn converted(adc: &mut Adc, code: u32, at: Time) -> u16 {
     write(adc, offset::SMPR2, code, at);
     adc.advance(at);
-    // Findings are another test's.
+    // Another test checks the findings.
     let _ = adc.write(offset::CR2, ON | cr2::SWSTART, at);
     let done = at + Time::from_us(40);
     read(adc, offset::DR, done) as u16
@@ -184,7 +184,7 @@ fn codes_are_off_until_a_calibration_is_complete_and_after_each_power_up() {
     write(&mut adc, offset::CR2, 0, at(7));
     write(&mut adc, offset::CR2, ON, at(8));
     assert_eq!(converted(&mut adc, 5, at(9)), 2048 + UNCALIBRATED);
-    // Begun within two cycles of power-up, a calibration is worth nothing (11.4).
+    // A calibration begun within two cycles of power-up has no effect (11.4).
     write(&mut adc, offset::CR2, 0, at(10));
     write(&mut adc, offset::CR2, ON, at(11));
     assert!(adc.write(offset::CR2, ON | cr2::CAL, at(11)).is_err());

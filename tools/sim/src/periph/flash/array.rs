@@ -1,9 +1,9 @@
-//! The flash's cells, and what an operation does to them: whole, or torn by a power cut or a reset.
+//! The flash's cells, and the effect of an operation on them, complete or torn by a power cut or a reset.
 //!
 //! PM0075 promises nothing about a half-word or a page whose operation was interrupted. The model takes the
 //! worst case that a floating-gate cell allows: a cell that was left near the threshold of the sense amplifier
-//! reads as 0 or as 1, anew at every read, until its page is erased whole. A complete program of the
-//! half-word drives the cells that it programs to 0; the rest of the half-word stays as it was left.
+//! reads as 0 or as 1, anew at every read, until its page is completely erased. A complete program of the
+//! half-word drives the cells that it programs to 0; the other cells of the half-word do not change.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use crate::machine::memory::Memory;
 use crate::part::Part;
 
-/// What an interrupted operation leaves. The part promises nothing; each choice is the same in every run.
+/// The result of an interrupted operation. The part guarantees nothing; each choice is the same in every run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Torn {
     /// Each cell that was to change has its own speed, drawn from its place and the part's seed. Cells that
@@ -37,7 +37,7 @@ pub(super) enum Operation {
 }
 
 impl Operation {
-    /// What the byte at `at` is to become from `old`.
+    /// Returns the value that the operation gives the byte at `at`, which is `old` now.
     const fn target(self, at: usize, old: u8) -> u8 {
         match self {
             Self::Program { at: start, value } => old & value.to_le_bytes()[at - start],
@@ -46,8 +46,8 @@ impl Operation {
     }
 }
 
-/// How far from the threshold a cell may be left and still read either way, in parts of 65536 of the whole
-/// operation. No data sheet gives a figure; a quarter leaves several such cells in most torn half-words.
+/// Distance from the threshold within which a cell reads either way, in parts of 65536 of the whole operation.
+/// No data sheet gives a figure; a quarter leaves several such cells in most torn half-words.
 const UNSTEADY: u32 = 16_384;
 
 /// The cells of one byte that read differently from read to read.
@@ -55,13 +55,13 @@ const UNSTEADY: u32 = 16_384;
 struct Unsteady {
     /// Those cells.
     bits: u8,
-    /// What they were to become.
+    /// The value that the operation was to give the byte.
     target: u8,
     /// How much of the operation was done, of 65536.
     parts: u32,
 }
 
-/// The cells. A reader that needs no more than one answer, such as the file of the flash, gets the likelier one.
+/// The cells. A reader that needs only one answer, such as the flash file, gets the likelier value of each bit.
 #[derive(Debug)]
 pub(super) struct Cells {
     memory: Memory,
@@ -69,7 +69,7 @@ pub(super) struct Cells {
     page: usize,
     unsteady: BTreeMap<usize, Unsteady>,
     seed: u64,
-    /// Draws what an unsteady cell reads as.
+    /// Draws the value of each read of an unsteady cell.
     noise: fastrand::Rng,
 }
 
@@ -101,7 +101,7 @@ impl Cells {
         self.memory.bytes()
     }
 
-    /// The bytes, to change from outside, by a programmer that leaves every cell steady.
+    /// The bytes, for changes from outside. Such a change leaves every cell steady, as a programmer does.
     pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
         self.unsteady.clear();
         self.memory.bytes_mut()
@@ -142,7 +142,7 @@ impl Cells {
         }
     }
 
-    /// Does `operation` whole; returns the bytes changed, first and end.
+    /// Completes `operation`; returns the bytes changed, first and end.
     pub(super) fn finish(&mut self, operation: Operation) -> (usize, usize) {
         let (first, end) = self.span(operation);
         for at in first..end {
@@ -195,7 +195,7 @@ impl Cells {
     }
 }
 
-/// A number from 0 to 65535 that depends on the seed and the bit's place alone (the mixer of splitmix64).
+/// Returns a number from 0 to 65535 that depends only on the seed and the bit's place (the mixer of splitmix64).
 fn draw(seed: u64, bit: usize) -> u32 {
     let mut z = (seed ^ (bit as u64 + 1)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -1,7 +1,7 @@
 //! The flash program and erase controller, PM0075 (STM32F10xxx flash programming manual) chapters 2 and 3.
 //!
-//! It owns the flash's cells. An operation takes real time and changes them when it ends, or half-way when
-//! the power goes or the part is reset ([`mod@array`]). Option bytes can be read but not programmed.
+//! It owns the flash's cells. An operation takes time, and changes the cells when it ends. A power cut or a reset
+//! during the operation leaves it incomplete ([`mod@array`]). Option bytes can be read but not programmed.
 
 mod array;
 mod operations;
@@ -29,7 +29,7 @@ const SR_WRPRTERR: u32 = 1 << 4;
 const SR_EOP: u32 = 1 << 5;
 
 /// Instructions that the core may run from its prefetch buffer before an operation stalls its fetches: two
-/// lines of 64 bits (PM0075 2.2) hold eight Thumb instructions. The worst case.
+/// lines of 64 bits (PM0075 2.2) hold eight Thumb instructions at most.
 const FETCHED_AHEAD: u32 = 8;
 
 const CR_PG: u32 = 1 << 0;
@@ -42,7 +42,7 @@ const CR_EOPIE: u32 = 1 << 12;
 const CR_OPTION: u32 = 1 << 4 | 1 << 5 | 1 << 9;
 const CR_WRITABLE: u32 = CR_PG | CR_PER | CR_MER | CR_ERRIE | CR_EOPIE;
 
-/// How long the part takes; DS5319 table 28 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
+/// Durations of the operations; DS5319 table 28 gives 20 to 40 ms for an erase, 40 to 70 us for a half-word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Durations {
     /// A page erase or a mass erase; 30 ms, the middle of the range, unless set.
@@ -60,16 +60,16 @@ impl Default for Durations {
     }
 }
 
-/// What the controller has against a write.
+/// The reason why the controller rejects a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Complaint {
-    /// In words.
+    /// The reason in words.
     pub text: &'static str,
     /// Whether the part answers with a bus error, a fault in the core.
     pub bus_error: bool,
 }
 
-/// How the key sequence stands.
+/// State of the key sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lock {
     /// This many keys were right so far.
@@ -93,11 +93,11 @@ pub struct Flash {
     cells: Cells,
     /// How long operations take.
     pub durations: Durations,
-    /// What a power cut in the middle of one leaves.
+    /// The result of a power cut during an operation.
     pub torn: Torn,
     /// Whether the HSI, which times the operations, runs (PM0075 2.3).
     pub hsi_on: bool,
-    /// FLASH_WRPR: each bit that is clear protects 4 KiB, the last one all that follow, too.
+    /// FLASH_WRPR: each clear bit protects 4 KiB; the last bit also protects everything after its 4 KiB.
     wrpr: u32,
     acr: u32,
     lock: Lock,
@@ -105,14 +105,14 @@ pub struct Flash {
     sr: u32,
     ar: u32,
     busy: Option<Busy>,
-    /// Instructions left in the prefetch buffer: the core does not stall before it has run them.
+    /// Instructions left in the prefetch buffer. The core stalls only after it has run them.
     ahead: u32,
     /// BSY still reads 0 although an operation runs: it rises a cycle late (errata sheet of the STM32F10xx4 and
-    /// STM32F10xx6, 2.11 "Flash memory BSY bit delay versus STRT bit setting", for an erase; here for this part and
-    /// for a half-word, too). The worst case: until the first read of a register of this block, or until the core
-    /// stalls.
+    /// STM32F10xx6, 2.11 "Flash memory BSY bit delay versus STRT bit setting"). The errata sheet says so for an
+    /// erase; the model also applies it to this part and to a half-word. In the worst case, modelled here, BSY reads
+    /// 0 until the first read of a register of this block, or until the core stalls.
     bsy_is_late: bool,
-    /// The operation that is to end without EOP, counted as `started` does.
+    /// Number of the operation that is to end without EOP, counted like `started`.
     without_eop: Option<u64>,
     /// Operations started since the part was made.
     started: u64,
@@ -122,8 +122,8 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// The controller of `part` after power-on over an erased flash, with these write-protection bits. `seed`
-    /// decides what torn operations leave.
+    /// Returns the controller of `part` after power-on, with an erased flash and these write-protection bits. `seed`
+    /// decides the results of torn operations.
     #[must_use]
     pub fn new(part: &Part, wrpr: u32, seed: u64) -> Self {
         Self {
@@ -148,17 +148,17 @@ impl Flash {
         }
     }
 
-    /// Where the core finds the cells ([`crate::machine::memory::Memory::host`]).
+    /// Host address of the cells, for the core ([`crate::machine::memory::Memory::host`]).
     pub fn host(&mut self) -> *mut u8 {
         self.cells.host()
     }
 
-    /// The cells move to `memory`, which is as large, and what is there now is lost.
+    /// Moves the cells to `memory`, which has the same size. The previous contents of `memory` are lost.
     pub(crate) fn move_to(&mut self, memory: Memory) {
         self.cells.move_to(memory);
     }
 
-    /// Takes the memory of the cells, of a flash that is not needed any more.
+    /// Takes the memory of the cells, for a flash that is no longer needed.
     pub(crate) fn take_memory(&mut self) -> Memory {
         self.cells.take_memory()
     }
@@ -169,7 +169,7 @@ impl Flash {
         self.cells.bytes()
     }
 
-    /// The contents, to change from outside.
+    /// The contents, for changes from outside.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         self.changes = self.changes.saturating_add(1);
         self.cells.bytes_mut()
@@ -187,20 +187,20 @@ impl Flash {
         self.busy.map(|busy| busy.until)
     }
 
-    /// Until when a fetch from flash stalls. It does not yet while the prefetch buffer has instructions.
+    /// Instant until which a fetch from flash stalls. No fetch stalls while the prefetch buffer has instructions.
     #[must_use]
     pub fn stalled_until(&self) -> Option<Time> {
         self.busy_until().filter(|_| self.ahead == 0)
     }
 
-    /// The core has run this many instructions since the operation began.
+    /// Counts the instructions that the core has run since the operation began.
     pub fn ran(&mut self, instructions: u64) {
         let instructions = u32::try_from(instructions).unwrap_or(u32::MAX);
         self.ahead = self.ahead.saturating_sub(instructions);
         self.bsy_is_late &= self.ahead > 0;
     }
 
-    /// The `nth` operation from now (1 = the next) changes the cells as usual, but ends without EOP.
+    /// Makes the `nth` operation from now (1 = the next) end without EOP. It still changes the cells as usual.
     pub fn end_without_eop(&mut self, nth: u64) {
         self.without_eop = Some(self.started + nth.max(1));
     }
@@ -228,13 +228,13 @@ impl Flash {
         u32::from_le_bytes(self.cells.read(at))
     }
 
-    /// Whether there are unsteady cells among these bytes. The core reads all others without asking.
+    /// Whether there are unsteady cells among these bytes. The core reads bytes without such cells directly.
     #[must_use]
     pub fn is_unsteady(&self, bytes: core::ops::Range<usize>) -> bool {
         self.cells.is_unsteady(bytes)
     }
 
-    /// What there was against the last write, since the last call.
+    /// Takes the complaint about a write since the last call.
     pub fn take_complaint(&mut self) -> Option<Complaint> {
         self.complaint.take()
     }

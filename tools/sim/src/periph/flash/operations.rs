@@ -1,4 +1,4 @@
-//! The operations: what starts one, and what the controller has against it.
+//! The start of the operations, and the reasons why the controller rejects them.
 
 use super::array::Operation;
 use super::{
@@ -12,7 +12,7 @@ use crate::time::Time;
 const PROTECTED: usize = 4096;
 
 impl Flash {
-    /// The power goes at `now`: an operation under way is torn.
+    /// Cuts the power at `now`: an operation under way is torn.
     pub fn power_off(&mut self, now: Time) {
         self.ahead = 0;
         self.bsy_is_late = false;
@@ -25,7 +25,7 @@ impl Flash {
         }
     }
 
-    /// The core stores `value` at `offset` into the flash; `half` when the store is 16 bits wide.
+    /// Stores `value` at `offset` into the flash for the core; `half` when the store is 16 bits wide.
     pub fn program(&mut self, offset: u32, half: bool, value: u16, now: Time) {
         let complain = |text, bus_error| Some(Complaint { text, bus_error });
         if !half {
@@ -75,7 +75,7 @@ impl Flash {
         });
     }
 
-    /// STRT: the erase that PER or MER asks for.
+    /// Handles STRT: starts the erase that PER or MER selects.
     pub(super) fn erase(&mut self, now: Time) {
         let complain = |text| {
             Some(Complaint {

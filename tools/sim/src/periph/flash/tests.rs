@@ -22,7 +22,7 @@ fn program(flash: &mut Flash, offset: u32, value: u16) {
 }
 
 #[test]
-fn a_half_word_takes_its_time_and_then_stands() {
+fn half_word_is_stored_after_the_program_time() {
     let mut flash = open();
     program(&mut flash, 0x400, 0x1234);
     assert_eq!(flash.read(0x0C, NOW), Ok(0), "BSY is late");

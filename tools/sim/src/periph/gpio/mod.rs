@@ -1,17 +1,17 @@
-//! One GPIO port, RM0008 chapter 9: what the part puts on its sixteen pins and what it reads from them.
+//! One GPIO port, RM0008 chapter 9: the levels that the part drives and reads at its sixteen pins.
 //!
-//! An alternate-function output stands at its idle level, high, for USART and I2C alike: what they send is
-//! followed character by character on the line and byte by byte on the I2C bus, not edge by edge here.
-//! Levels are worked out for the whole port at once, as bit masks. A pin that nothing holds, inside or
-//! outside, reads low: a real one reads anything, and low is what an active-low input should fear.
+//! An alternate-function output stays at its idle level, high, for USART and I2C alike. Their traffic is modelled
+//! character by character on the line and byte by byte on the I2C bus, not edge by edge here.
+//! Levels are calculated for the whole port together, as bit masks. A pin that is driven neither inside nor
+//! outside reads low. A real floating pin reads either level; low is the worst case for an active-low input.
 
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 
-/// What the outside of the part does to a pin.
+/// How the circuit outside the part drives a pin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Drive {
-    /// Nothing: open.
+    /// Not driven: open.
     #[default]
     Floating,
     /// Held low, as a closed switch to ground does.
@@ -24,7 +24,7 @@ pub enum Drive {
     Millivolts(u16),
 }
 
-/// A digital input reads high from here on: between VIL and VIH (DS5319 table 35), at half the supply.
+/// Lowest voltage that a digital input reads as high: between VIL and VIH (DS5319 table 35), at half the supply.
 const THRESHOLD_MV: u16 = 1650;
 const CRL_RESET: u32 = 0x4444_4444;
 const LCKK: u32 = 1 << 16;
@@ -36,7 +36,7 @@ pub struct Gpio {
     crh: u32,
     odr: u16,
     lckr: u32,
-    /// How far the LCKR key sequence has come (RM0008 9.2.7): 0 to 3.
+    /// Progress of the LCKR key sequence (RM0008 9.2.7): 0 to 3.
     lock_step: u8,
     modes: Modes,
     drives: [Drive; 16],
@@ -59,7 +59,7 @@ struct Modes {
     pulled: u16,
 }
 
-/// Pins by what the outside does, one bit each.
+/// Pins by how the outside drives them, one bit each.
 #[derive(Clone, Copy, Debug, Default)]
 struct Outside {
     low: u16,
@@ -88,7 +88,7 @@ impl Default for Gpio {
 }
 
 impl Gpio {
-    /// A port some of whose pins (`slow`, one bit each) may not be faster than 2 MHz as outputs.
+    /// Returns a port whose pins in `slow`, one bit each, may not be faster than 2 MHz as outputs.
     #[must_use]
     pub fn with_slow_pins(slow: u16) -> Self {
         Self {
@@ -105,7 +105,7 @@ impl Gpio {
         })
     }
 
-    /// The levels at the pins, as a logic probe sees them, one bit each.
+    /// The levels at the pins, as a logic probe shows them, one bit each.
     #[must_use]
     pub fn level(&self) -> u16 {
         self.level
@@ -166,7 +166,7 @@ impl Gpio {
         core::mem::take(&mut self.contention)
     }
 
-    /// Changes what the outside does to `pin` (0 to 15).
+    /// Changes how the outside drives `pin` (0 to 15).
     pub fn drive(&mut self, pin: usize, drive: Drive, now: Time) {
         if self.drives[pin] == drive {
             return;
@@ -199,12 +199,12 @@ impl Gpio {
         &self.edges[pin]
     }
 
-    /// The part loses its power: its outputs let go.
+    /// Removes the power: the part no longer drives its outputs.
     pub fn power_off(&mut self, now: Time) {
         self.reset(now);
     }
 
-    /// Works the levels out anew.
+    /// Calculates the levels again.
     fn settle(&mut self, now: Time) {
         let Modes {
             output,

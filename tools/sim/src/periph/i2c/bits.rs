@@ -22,7 +22,7 @@ pub mod cr1 {
     pub const POS: u32 = 1 << 11;
     pub const SWRST: u32 = 1 << 15;
     pub const MASK: u32 = 0xBFFB;
-    /// What this model has.
+    /// The bits that this model implements.
     pub const MODELLED: u32 = PE | START | STOP | ACK | POS | SWRST;
 }
 

@@ -1,8 +1,8 @@
-//! What an I2C master meets on its bus, byte by byte.
+//! The bus as an I2C master uses it, byte by byte.
 
 use crate::time::Time;
 
-/// The two wires as everyone but the I2C block leaves them: `true` = released, pulled high.
+/// The levels of the two wires without the I2C block: `true` = released, pulled high.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wires {
     /// The clock.
@@ -54,7 +54,7 @@ pub trait Bus {
     /// A data byte was received from the master. Returns whether it is acknowledged.
     fn write(&mut self, byte: u8, now: Time) -> bool;
 
-    /// The next byte for the master: 0xFF when nobody drives the wire.
+    /// Returns the next byte for the master: 0xFF when no device drives the wire.
     fn read(&mut self, now: Time) -> u8;
 
     /// A stop condition.

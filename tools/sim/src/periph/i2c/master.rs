@@ -1,14 +1,13 @@
 //! The I2C master's sequence: start, address, bytes, stop, one SCL bit time at a time (RM0008 26.3.3).
 //!
-//! The clock is stretched wherever the manual says so, that is: nothing goes on until the program has
-//! done its part.
+//! The block stretches the clock where the manual says so: the transfer waits for the program.
 
 use super::I2c;
 use super::bits::{cr1, sr1, sr2};
 use super::bus::{Bus, Wires};
 use crate::time::Time;
 
-/// Where the sequence is. Those with an end take time, the others wait for the program.
+/// State of the sequence. A state with an end takes time; every other state waits for the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
     /// Not the bus's master.
@@ -17,20 +16,20 @@ pub(super) enum Phase {
     Start,
     /// SB: the address byte is awaited.
     Started,
-    /// An address byte is going out.
+    /// An address byte is being sent.
     Address(u8),
     /// ADDR: stretched until it is cleared; `true` = as a receiver.
     Addressed(bool),
-    /// A data byte is going out.
+    /// A data byte is being sent.
     Send(u8),
     /// Stretched: the next byte to send is awaited.
     SendWait,
-    /// A byte is coming in. `ack` is the acknowledge when POS rules it.
+    /// A byte is being received. `ack` is the acknowledge when POS selects it.
     Receive {
-        /// ACK as it stood when the byte began.
+        /// Value of ACK when the byte began.
         ack: bool,
     },
-    /// Stretched: a received byte waits behind DR.
+    /// Stretched: a received byte waits in the shift register until DR is read.
     ReceiveWait,
     /// A byte was not acknowledged, by either side: a stop or start is awaited.
     Over,
@@ -39,14 +38,14 @@ pub(super) enum Phase {
 }
 
 impl I2c {
-    /// Everything up to `now` happens between the block and the bus, in order: this takes the place of
-    /// `advance(now)`. To be called before each access, at each event, and when a wire of the bus changes.
+    /// Runs the block and the bus up to `now`, in order; this replaces `advance(now)`. Call it before each access,
+    /// at each event, and when a wire of the bus changes.
     pub fn exchange(&mut self, bus: &mut dyn Bus, now: Time) {
         self.look(bus.wires(), now);
         while let Some(due) = self.due.filter(|&due| due <= now) {
             self.due = None;
             if self.stretched_by_others() {
-                // 26.3.3: a slave may stretch the clock; the bit goes on when it lets go.
+                // 26.3.3: a slave may stretch the clock; the bit continues when the slave releases it.
                 self.stalled = true;
                 break;
             }
@@ -56,14 +55,14 @@ impl I2c {
         self.begin(now);
     }
 
-    /// Whether someone else keeps what is under way from ending.
+    /// Whether a held wire delays the end of the current state, or pins that are not in alternate open drain.
     fn stretched_by_others(&self) -> bool {
         !self.connected
             || !self.wires.scl
             || (matches!(self.phase, Phase::Stop | Phase::Start) && !self.wires.sda)
     }
 
-    /// Takes note of the wires: BUSY rises with any low, falls with a stop condition (26.6.7).
+    /// Samples the wires: BUSY is set by any low level and cleared by a stop condition (26.6.7).
     pub(super) fn look(&mut self, lines: Wires, now: Time) {
         // An edge on a wire unlocks its filter (errata sheet, 2.13.7).
         self.filters.scl |= lines.scl != self.lines.scl;
@@ -87,7 +86,7 @@ impl I2c {
         }
     }
 
-    /// Starts what the program has asked for, if it can be started now.
+    /// Starts what the program has requested, if that can start now.
     pub(super) fn begin(&mut self, now: Time) {
         if self.due.is_some() || self.stalled || self.cr1 & cr1::PE == 0 || !self.connected {
             return;
@@ -106,13 +105,13 @@ impl I2c {
         }
     }
 
-    /// Goes over to `phase`, which takes `bits` bit times from `now`.
+    /// Enters `phase`, which takes `bits` bit times from `now`.
     fn enter(&mut self, phase: Phase, bits: u64, now: Time) {
         self.phase = phase;
         self.due = Some(now + self.bits(bits));
     }
 
-    /// What is under way ends at `at`.
+    /// Ends the current state at `at`.
     fn step(&mut self, bus: &mut dyn Bus, at: Time) {
         match self.phase {
             Phase::Start => {
@@ -133,13 +132,14 @@ impl I2c {
                 self.phase = Phase::Idle;
                 self.busy = self.latched || self.wires != Wires::FREE;
             }
-            // The others wait for the program and have no end.
+            // The other states wait for the program and have no end.
             _ => {}
         }
         self.begin(at);
     }
 
-    /// A byte with a one in it while the data wire is held low: another master seems to win (26.3.4).
+    /// Handles the loss of arbitration: `byte` contains a one while the data wire is held low (26.3.4). Returns
+    /// whether the master has lost.
     fn loses(&mut self, byte: u8) -> bool {
         let lost = !self.wires.sda && byte != 0;
         if lost {
@@ -187,7 +187,7 @@ impl I2c {
         }
     }
 
-    /// The byte in DR, if there is one, goes into the shift register.
+    /// Moves the byte in DR, if any, to the shift register.
     pub(super) fn send_next(&mut self, now: Time) {
         if let Some(byte) = self.pending.take() {
             self.sr1 = self.sr1 & !sr1::BTF | sr1::TXE;
@@ -197,7 +197,7 @@ impl I2c {
 
     fn received(&mut self, began_with_ack: bool, bus: &mut dyn Bus, at: Time) {
         let byte = if self.wires.sda { bus.read(at) } else { 0 };
-        // 26.6.1, POS: ACK rules the byte under way, or the one after it.
+        // 26.6.1, POS: ACK applies to the byte under way, or to the byte after it.
         let ack = if self.cr1 & cr1::POS == 0 {
             self.cr1 & cr1::ACK != 0
         } else {
@@ -221,7 +221,7 @@ impl I2c {
         }
     }
 
-    /// The next byte starts to come in.
+    /// Starts the reception of the next byte.
     pub(super) fn receive_next(&mut self, now: Time) {
         let ack = self.cr1 & cr1::ACK != 0;
         self.enter(Phase::Receive { ack }, 9, now);

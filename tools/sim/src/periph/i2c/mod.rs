@@ -1,18 +1,17 @@
 //! I2C1 as a bus master in 7-bit addressing, without DMA, SMBus, PEC and slave mode (RM0008 26).
 //!
-//! What happens on the bus happens in [`I2c::exchange`]. One bit lasts what CCR says of PCLK1 (26.6.8): 2, 3
-//! or 25 times CCR cycles; the wires' rise time is not counted. A start or stop condition takes one bit.
-//! Without both pins in alternate open drain (RM0008 9.1.11) nothing is driven, so nothing that was asked for
-//! begins or ends.
+//! [`I2c::exchange`] runs the bus. One bit lasts 2, 3 or 25 times CCR cycles of PCLK1 (26.6.8); the rise time of
+//! the wires is not counted. A start or stop condition takes one bit. Unless both pins are in alternate open drain
+//! (RM0008 9.1.11), the block drives nothing, so no requested transfer begins or ends.
 //!
-//! Two ways in which the block fails are modelled. Its analog filters may stay low while the wires are high
+//! Two failures of the block are modelled. Its analog filters may stay low while the wires are high
 //! (errata sheet of the STM32F10xx8 and STM32F10xxB, 2.13.7 "I2C analog filter may provide wrong value,
 //! locking BUSY flag and preventing master mode entry"): [`I2c::lock_filters`]. BUSY is then set after every
 //! reset, until each wire has had an edge and the block a software reset. A start or stop condition of
 //! someone else in the middle of a byte is a bus error (26.3.4): [`I2c::disturb`].
 //!
-//! Rules that a real block enforces by misbehaving are reported: CR1 written while START or STOP is
-//! pending, CCR written while PE = 1, FREQ that is not PCLK1's.
+//! Misuse that makes a real block misbehave is reported: CR1 written while START or STOP is pending, CCR written
+//! while PE = 1, FREQ that differs from PCLK1.
 
 mod bits;
 mod bus;
@@ -44,24 +43,24 @@ pub struct I2c {
     /// MSL and TRA; BUSY is `busy`.
     sr2: u32,
     busy: bool,
-    /// The flags that the last read of SR1 showed: the first half of a clearing sequence.
+    /// The flags that the last read of SR1 returned: the first half of a clearing sequence.
     shown: u32,
-    /// DR as received.
+    /// The received byte in DR.
     data: u8,
-    /// A received byte that waits for DR to be read.
+    /// A received byte in the shift register that waits until DR is read.
     behind: Option<u8>,
-    /// DR as written, waiting for the shift register.
+    /// The byte written to DR, which waits for the shift register.
     pending: Option<u8>,
     phase: Phase,
-    /// When what is under way ends.
+    /// When the current state ends.
     due: Option<Time>,
-    /// It has ended but for a wire that someone holds.
+    /// The current state can end only when the wires are released and both pins are connected.
     stalled: bool,
-    /// The wires as the analog filters show what the others leave.
+    /// The levels of the wires without this block, after the analog filters.
     wires: Wires,
-    /// The wires themselves.
+    /// The levels of the wires without this block, before the filters.
     lines: Wires,
-    /// The analog filters: `false` for one that is locked low.
+    /// The analog filters: `false` for a filter that is locked low.
     filters: Wires,
     /// BUSY stays set until a software reset finds both filters free.
     latched: bool,
@@ -76,7 +75,7 @@ impl Default for I2c {
 }
 
 impl I2c {
-    /// A block out of reset, without a clock.
+    /// Returns a block after reset, without a clock.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -104,7 +103,7 @@ impl I2c {
         }
     }
 
-    /// Whether both pins are in alternate open drain from `now` on.
+    /// Sets whether both pins are in alternate open drain from `now` on.
     pub fn set_connected(&mut self, connected: bool, now: Time) {
         self.connected = connected;
         self.look(self.lines, now);
@@ -120,8 +119,8 @@ impl I2c {
         self.look(self.lines, now);
     }
 
-    /// Somebody else makes a start condition. In the middle of a byte that is a bus error, which leaves the
-    /// master's state as it is (26.3.4); on a free bus it makes the bus busy.
+    /// Makes a start condition of another master. In the middle of a byte that is a bus error, which leaves the
+    /// master's state unchanged (26.3.4); on a free bus it makes the bus busy.
     /// Returns whether it was a bus error.
     pub fn disturb(&mut self) -> bool {
         let in_byte = matches!(
@@ -160,7 +159,7 @@ impl I2c {
         u64::from(self.ccr & ccr::CCR) * factor
     }
 
-    /// The span of `n` bits.
+    /// Duration of `n` bits.
     fn bits(&self, n: u64) -> Time {
         Time::cycles(n * self.bit_cycles(), self.hz)
     }
@@ -168,7 +167,7 @@ impl I2c {
     fn read_data(&mut self, now: Time) -> u32 {
         let data = u32::from(self.data);
         match self.behind.take() {
-            // The byte behind it moves up and RXNE stays (26.3.3, master receiver).
+            // The byte in the shift register moves to DR and RXNE stays set (26.3.3, master receiver).
             Some(next) => {
                 self.data = next;
                 self.sr1 &= !sr1::BTF;
@@ -210,7 +209,7 @@ impl I2c {
         Ok(())
     }
 
-    /// SR1 has been read; reading SR2 now clears ADDR, and the transfer goes on.
+    /// Handles the read of SR2 after SR1: clears ADDR, so that the transfer continues.
     fn clear_addr(&mut self, now: Time) {
         if self.shown & self.sr1 & sr1::ADDR == 0 {
             return;
@@ -236,7 +235,7 @@ impl I2c {
             return Ok(());
         }
         if self.cr1 & cr1::SWRST != 0 {
-            // Out of reset BUSY is what the filters show.
+            // After reset, BUSY follows the filters.
             self.latched = self.filters != Wires::FREE;
             self.busy = self.wires != Wires::FREE;
         }
@@ -272,7 +271,7 @@ impl I2c {
         finding
     }
 
-    /// PE is 0: the flags and requests are dropped.
+    /// Handles PE = 0: clears the flags and requests.
     fn disable(&mut self) -> Result<(), Unmodelled> {
         let idle = self.phase == Phase::Idle;
         self.cr1 &= !(cr1::START | cr1::STOP | cr1::ACK);
@@ -291,12 +290,12 @@ impl I2c {
         }
     }
 
-    /// What must be right before a transfer can be (26.6.2, 26.6.8).
+    /// Checks the clock settings before a transfer (26.6.2, 26.6.8).
     fn check_timing(&self) -> Result<(), Unmodelled> {
         let fast = self.ccr & ccr::FAST != 0;
         let count = self.ccr & ccr::CCR;
         let limit = if fast { 400_000 } else { 100_000 };
-        // What the oscillator is off by is not the firmware's to know.
+        // The firmware cannot know the error of the oscillator.
         let set = (self.cr2 & cr2::FREQ) * 1_000_000;
         if self.hz.abs_diff(set) > self.hz / 33 || !(2..=36).contains(&(self.cr2 & cr2::FREQ)) {
             return Err(Unmodelled(

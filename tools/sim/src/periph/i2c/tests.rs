@@ -1,4 +1,4 @@
-//! Transfers with an MCP4728 as stm32f1xx-hal 0.11 makes them, their times, and a bus that misbehaves.
+//! Transfers with an MCP4728 in the sequence that stm32f1xx-hal 0.11 uses, their times, and bus faults.
 
 use register_map::Module;
 
@@ -63,7 +63,7 @@ impl Bench {
         self.write(offset::CR1, cr1 & !bits);
     }
 
-    /// Waits for one of `flags` in SR1, event by event; `false` when nothing will ever happen.
+    /// Waits for one of `flags` in SR1, event by event; `false` when there is no further event.
     fn wait(&mut self, flags: u32) -> bool {
         while self.read(offset::SR1) & flags == 0 {
             match self.i2c.next_event() {
@@ -127,7 +127,7 @@ fn a_fast_write_takes_nine_bits_a_byte() {
 }
 
 #[test]
-fn flags_of_a_write_as_the_manual_has_them() {
+fn flags_of_a_write_match_the_manual() {
     let mut bench = Bench::new();
     bench.set(cr1::START);
     assert!(bench.wait(sr1::SB));
@@ -136,7 +136,7 @@ fn flags_of_a_write_as_the_manual_has_them() {
     assert!(bench.wait(sr1::ADDR));
     assert_eq!(bench.read(offset::SR1), sr1::ADDR | sr1::TXE);
     assert_eq!(bench.read(offset::SR2), sr2::MSL | sr2::BUSY | sr2::TRA);
-    // Stretched until there is a byte; it goes straight on to the shift register.
+    // The clock is stretched until a byte is written. The byte then moves directly to the shift register.
     assert_eq!(bench.i2c.next_event(), None);
     bench.write(offset::DR, 0x00);
     assert_eq!(bench.read(offset::SR1), sr1::TXE);
@@ -225,7 +225,7 @@ fn one_two_and_twenty_four_bytes_are_read_back() {
         assert_eq!(receive(&mut bench, n), all[..n], "{n} bytes");
         assert_eq!(bench.read(offset::SR1), 0);
         assert_eq!(bench.read(offset::SR2), 0);
-        // Nothing is stretched by a program that takes no time: exact to the bit.
+        // The program takes no time, so the clock is never stretched and the duration is exact to the bit.
         let bits = 1 + 9 + 9 * n as u64 + 1;
         let off = (bench.now - began)
             .as_ps()
@@ -235,7 +235,7 @@ fn one_two_and_twenty_four_bytes_are_read_back() {
 }
 
 #[test]
-fn a_repeated_start_turns_round() {
+fn repeated_start_changes_the_direction() {
     let mut bench = Bench::new();
     assert!(bench.address(0xC0));
     bench.clear_addr();
@@ -356,7 +356,7 @@ fn misuse_is_reported() {
 }
 
 #[test]
-fn nothing_starts_without_the_pins_and_it_starts_once_they_are_set() {
+fn transfer_starts_only_once_the_pins_are_configured() {
     let mut bench = Bench::new();
     bench.i2c.set_connected(false, bench.now);
     let cr1 = bench.read(offset::CR1);
@@ -378,7 +378,7 @@ fn byte_stands_still_while_the_pins_are_not_the_block_s() {
     assert!(bench.wait(sr1::ADDR));
 }
 
-/// Moves the wires by hand, the pins being outputs.
+/// Drives the wires by hand, with the pins as outputs.
 fn by_hand(bench: &mut Bench, scl: bool, sda: bool) {
     bench.slot.set_pins(Wires { scl, sda });
     bench.i2c.exchange(&mut bench.slot, bench.now);

@@ -1,11 +1,11 @@
-//! The crystal dies, or comes back, while the part runs: the clock security system (RM0008 7.2.7), and what
-//! happens without it.
+//! Failure and recovery of the crystal while the part runs, with the clock security system (RM0008 7.2.7) and
+//! without it.
 //!
-//! With CSSON the HSE is switched off, and when SYSCLK came from it, directly or through the PLL, the PLL too,
-//! and the HSI takes over at once. CSSF then holds the NMI until CSSC is written. Without CSSON nothing takes
-//! over: HSERDY falls, and a SYSCLK that came from the crystal stands still until it is back or the part is
-//! reset. (A real PLL without its input runs wild for a while; nothing can be said about that.) The break input
-//! of TIM1 is not modelled.
+//! With CSSON, a failure switches the HSE off. If SYSCLK was derived from the HSE, directly or through the PLL, the
+//! PLL is switched off too and the HSI replaces it immediately. CSSF then holds the NMI until CSSC is written.
+//! Without CSSON there is no replacement: HSERDY is cleared, and a SYSCLK derived from the crystal stops until the
+//! crystal recovers or the part is reset. (A real PLL without its input runs at an undefined frequency for a while;
+//! that is not modelled.) The break input of TIM1 is not modelled.
 
 use super::{CFGR_SW, CR_CSSON, CR_HSEON, CR_HSION, CR_PLLON, Rcc};
 use crate::time::Time;
@@ -17,7 +17,7 @@ impl Rcc {
         self.crystal
     }
 
-    /// From `now` on the crystal works or does not.
+    /// Sets whether the crystal works from `now` on.
     pub fn set_crystal(&mut self, works: bool, now: Time) {
         if works == self.crystal {
             return;
@@ -41,13 +41,13 @@ impl Rcc {
         self.failed
     }
 
-    /// Whether SYSCLK's source has died, and nothing took its place.
+    /// Whether SYSCLK's source has failed without a replacement.
     #[must_use]
     pub fn stopped(&self) -> bool {
         !self.is_ready(self.source(self.sws))
     }
 
-    /// When an HSE switched on now is ready.
+    /// Instant at which an HSE that is switched on now is ready.
     pub(super) fn hse_start(&self, now: Time) -> Time {
         if self.crystal {
             now + self.oscillators.hse_start
@@ -56,7 +56,7 @@ impl Rcc {
         }
     }
 
-    /// The clock security system acts.
+    /// Handles a failure of the HSE with the clock security system.
     fn fail_over(&mut self, now: Time) {
         self.failed = true;
         if self.hse_in_use() {
@@ -74,7 +74,7 @@ impl Rcc {
         self.wait_for_hse(Time::MAX);
     }
 
-    /// Nothing watches it: what it fed waits for it.
+    /// Handles a failure of the HSE without the clock security system: the clocks derived from it stop.
     fn die(&mut self) {
         if self.hse.is_some() {
             self.hse = Some(Time::MAX);
@@ -91,7 +91,7 @@ impl Rcc {
         }
     }
 
-    /// A PLL that runs from the HSE locks at `lock`.
+    /// Sets the instant `lock` at which a PLL that runs from the HSE locks.
     fn wait_for_hse(&mut self, lock: Time) {
         if self.pll_from_hse() {
             self.pll = self.pll.map(|_| lock);

@@ -1,6 +1,6 @@
 //! Reset and clock control, RM0008 chapter 7: oscillators, PLL, prescalers, clock enables, reset flags.
 //!
-//! The backup domain (BDCR), ready interrupts (CIR) and MCO are not modelled. What a dying crystal does is in
+//! The backup domain (BDCR), ready interrupts (CIR) and MCO are not modelled. The failure of the crystal is in
 //! [`mod@crystal`].
 
 mod crystal;
@@ -18,8 +18,8 @@ const LSI_START: Time = Time::from_us(85);
 /// PLL lock: DS5319 table 27, maximum.
 const PLL_LOCK: Time = Time::from_us(200);
 
-/// From PLLON = 0 to PLLRDY = 0. RM0008 gives no time; this is pessimistic, so that a firmware that does not wait
-/// for it raises a finding.
+/// Time from PLLON = 0 to PLLRDY = 0. RM0008 gives no time. This value is pessimistic, so that firmware that does
+/// not wait for PLLRDY raises a finding.
 const PLL_STOP: Time = Time::from_us(10);
 
 /// CSSF in CIR, and CSSC, which clears it (RM0008 7.3.3).
@@ -50,11 +50,11 @@ const CSR_RMVF: u32 = 1 << 24;
 /// SRAMEN and FLITFEN.
 const AHBENR_RESET: u32 = 0x14;
 
-/// What reset the part: the flag in RCC_CSR (RM0008 7.3.10). Every reset pulls NRST low as well
-/// (RM0008 7.1.1), so PINRSTF always comes with it.
+/// Cause of a reset: the flag in RCC_CSR (RM0008 7.3.10). Every reset also pulls NRST low (RM0008 7.1.1), so
+/// PINRSTF is always set too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Power came on.
+    /// Power-on.
     PowerOn,
     /// The NRST pin alone.
     Pin,
@@ -76,7 +76,7 @@ impl Cause {
     }
 }
 
-/// What the part asks of the rest after a write to RCC.
+/// Changes that a write to RCC requests from the rest of the part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
     /// Clock frequencies or clock enables have changed.
@@ -103,11 +103,11 @@ pub struct Rcc {
     hsi: Ready,
     hse: Ready,
     pll: Ready,
-    /// Until when PLLRDY is still set after the PLL was switched off.
+    /// Instant until which PLLRDY stays set after the PLL was switched off.
     pll_stops: Time,
     lsi: Ready,
     iwdg_needs_lsi: bool,
-    /// CSSF: the clock security system has seen the HSE die.
+    /// CSSF: the clock security system has detected a failure of the HSE.
     failed: bool,
     now: Time,
     changes: Changes,
@@ -120,7 +120,7 @@ impl Rcc {
         self.oscillators
     }
 
-    /// The RC oscillators have these rates in Hz from now on.
+    /// Sets the rates of the RC oscillators in Hz from now on.
     pub fn set_rc_oscillators(&mut self, hsi: u32, lsi: u32) {
         self.oscillators = Oscillators {
             hsi,
@@ -130,7 +130,7 @@ impl Rcc {
         self.changes.clocks = true;
     }
 
-    /// RCC as power-on leaves it, on a board with these oscillators, whose crystal works or not.
+    /// Returns RCC after power-on, on a board with these oscillators, with a working crystal or without one.
     #[must_use]
     pub fn new(crystal: bool, oscillators: Oscillators) -> Self {
         Self {
@@ -155,7 +155,7 @@ impl Rcc {
         }
     }
 
-    /// Notes why the part was reset; a power-on forgets the flags before it.
+    /// Records why the part was reset; a power-on clears the earlier flags.
     pub fn note_reset(&mut self, cause: Cause) {
         if cause == Cause::PowerOn {
             self.csr_flags = 0;
@@ -163,13 +163,13 @@ impl Rcc {
         self.csr_flags |= cause.flags();
     }
 
-    /// The watchdog has started and keeps the LSI on (RM0008 7.2.9).
+    /// Keeps the LSI on for the watchdog, which has started (RM0008 7.2.9).
     pub fn hold_lsi(&mut self, now: Time) {
         self.iwdg_needs_lsi = true;
         self.lsi.get_or_insert(now + LSI_START);
     }
 
-    /// Since when the LSI runs, or from when it will; `None` while it is off.
+    /// Instant from which the LSI runs, which may be in the future; `None` while it is off.
     #[must_use]
     pub const fn lsi(&self) -> Option<Time> {
         self.lsi
@@ -211,7 +211,7 @@ impl Rcc {
         source.is_some_and(|at| at <= self.now)
     }
 
-    /// The source SW asks for.
+    /// The source that SW selects.
     fn wanted(&self) -> Ready {
         self.source(self.cfgr & CFGR_SW)
     }
@@ -224,7 +224,7 @@ impl Rcc {
         }
     }
 
-    /// A switch happens once the clock asked for is ready (RM0008 7.2.6).
+    /// Switches SYSCLK to the selected source once that source is ready (RM0008 7.2.6).
     fn switch(&mut self) {
         let wanted = self.cfgr & CFGR_SW;
         if wanted != self.sws && self.is_ready(self.wanted()) {
@@ -283,7 +283,7 @@ impl Rcc {
         self.cr = cr;
     }
 
-    /// When a PLL switched on now locks: once its source runs.
+    /// Instant at which a PLL that is switched on now locks; its source has to run first.
     fn pll_lock(&self, now: Time) -> Time {
         let source = if self.pll_from_hse() {
             self.hse
@@ -300,7 +300,7 @@ impl Rcc {
             value = value & !CFGR_PLL | self.cfgr & CFGR_PLL;
         }
         if value & CFGR_SW == 3 {
-            // "Not allowed" (RM0008 7.3.2): the switch stays where it was.
+            // "Not allowed" (RM0008 7.3.2): SW keeps its value.
             value = value & !CFGR_SW | self.cfgr & CFGR_SW;
         }
         self.cfgr = value;

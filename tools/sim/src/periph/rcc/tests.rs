@@ -9,7 +9,7 @@ fn at(rcc: &mut Rcc, us: u64) -> Time {
     now
 }
 
-/// HSE on, PLL x9, APB1 / 2, as the HAL does it for 72 MHz.
+/// HSE on, PLL x9, APB1 / 2, in the sequence that the HAL uses for 72 MHz.
 #[test]
 fn the_pll_from_the_crystal_gives_72_mhz_when_both_are_ready() {
     let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
@@ -45,7 +45,7 @@ fn a_dead_crystal_never_gets_ready() {
 }
 
 #[test]
-fn reset_flags_gather_until_rmvf() {
+fn reset_flags_accumulate_until_rmvf() {
     let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     assert_eq!(rcc.read(0x24, Time::ZERO).unwrap(), 0x0C00_0000);
     rcc.note_reset(Cause::Iwdg);
@@ -88,7 +88,7 @@ fn after_a_failure_the_crystal_can_be_taken_into_use_again() {
     assert_eq!(rcc.read(4, now).unwrap(), 0x001D_0400);
     rcc.write(8, CIR_CSSC, now).unwrap();
     assert!(!rcc.nmi());
-    // It is back: nothing happens before it is switched on again.
+    // The crystal works again, but the HSE stays off until it is switched on again.
     let now = at(&mut rcc, 7_000);
     rcc.set_crystal(true, now);
     let now = at(&mut rcc, 17_000);
@@ -131,7 +131,7 @@ fn the_security_system_can_be_switched_off() {
 }
 
 #[test]
-fn the_hsi_as_the_pll_s_source_outlives_the_crystal() {
+fn pll_fed_by_the_hsi_keeps_running_when_the_crystal_fails() {
     let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
     let now = at(&mut rcc, 0);
     rcc.write(4, 0x0038_0400, now).unwrap();

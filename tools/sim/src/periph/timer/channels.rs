@@ -7,8 +7,8 @@ use crate::peripheral::Unmodelled;
 use crate::time::Time;
 
 impl Timer {
-    /// Whether an edge at the input of `channel` (1 to 4) can raise an interrupt now: only then must edges
-    /// be passed on at once.
+    /// Whether an edge at the input of `channel` (1 to 4) can raise an interrupt now. Only then must edges be passed
+    /// on immediately.
     #[must_use]
     pub fn capture_interrupt_enabled(&self, channel: usize) -> bool {
         let n = channel - 1;

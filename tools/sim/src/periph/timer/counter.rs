@@ -1,8 +1,8 @@
 //! The time base of a timer: prescaler, counter and the values they are compared with, up-counting
 //! (RM0008 15.3.1, 15.3.2).
 //!
-//! Nothing happens cycle by cycle: the counter is worked out when it is looked at, from whole cycles of the
-//! timer clock since an anchor, so that it is exact however rarely that is.
+//! The counter is not simulated cycle by cycle. Each read calculates it from whole cycles of the timer clock since
+//! an anchor, so it is exact however rarely it is read.
 
 use crate::time::Time;
 
@@ -17,9 +17,9 @@ pub const fn compare(n: usize) -> u32 {
 /// A register with a shadow that takes its value at the update event.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Buffered {
-    /// What the program wrote.
+    /// The value that the program wrote.
     pub preload: u32,
-    /// What the counter works with.
+    /// The value that the counter uses.
     pub active: u32,
 }
 
@@ -61,7 +61,7 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Stopped, at 0, as out of reset.
+    /// Returns a stopped counter at 0, as after reset.
     pub fn new(hz: u32, now: Time) -> Self {
         Self {
             hz,
@@ -86,12 +86,12 @@ impl Counter {
         self.count
     }
 
-    /// Writes CNT; the prescaler goes on where it is.
+    /// Writes CNT; the prescaler keeps its count.
     pub const fn set_count(&mut self, count: u32) {
         self.count = count;
     }
 
-    /// The timer clock changes.
+    /// Changes the timer clock.
     pub fn set_clock(&mut self, hz: u32, now: Time) -> u32 {
         let flags = self.run(now);
         self.hz = hz;
@@ -100,7 +100,7 @@ impl Counter {
         flags
     }
 
-    /// CEN is set: the counter starts one cycle later (15.3.1).
+    /// Starts the counter, one cycle after CEN is set (15.3.1).
     pub fn start(&mut self) {
         if !self.running {
             self.running = true;
@@ -108,8 +108,8 @@ impl Counter {
         }
     }
 
-    /// UG: counter and prescaler start anew, with an update event unless there are none (15.4.6). Returns
-    /// the compare flags; the update flag is the caller's to decide (URS).
+    /// Handles UG: restarts counter and prescaler, with an update event unless update events are disabled (15.4.6).
+    /// Returns the compare flags; the caller decides about the update flag (URS).
     pub fn restart(&mut self) -> u32 {
         self.count = 0;
         self.prescaler = 0;
@@ -159,8 +159,8 @@ impl Counter {
         u64::from(self.divider.active) + 1
     }
 
-    /// The last value before the counter wraps: one that is already past the reload value counts on to
-    /// its end.
+    /// The last value before the counter wraps. A counter that is already past the reload value counts up to its
+    /// maximum.
     const fn top(&self) -> u32 {
         if self.count <= self.reload.active {
             self.reload.active
@@ -210,7 +210,7 @@ impl Counter {
         flags | self.matches(0, 0)
     }
 
-    /// Leaves out whole periods, each like the one before: they raise every flag there is.
+    /// Skips whole identical periods. Each of them raises every flag that can rise.
     fn skip(&self, cycles: u64, flags: &mut u32) -> u64 {
         if !self.counts() || self.count != 0 || self.prescaler != 0 {
             return cycles;
@@ -225,8 +225,8 @@ impl Counter {
         cycles % whole
     }
 
-    /// The update event: the buffered registers are loaded, a one-pulse counter stops. `false` when there
-    /// are none.
+    /// Makes the update event: loads the buffered registers and stops a one-pulse counter. Returns `false` when update
+    /// events are disabled.
     fn update(&mut self) -> bool {
         if self.no_updates {
             return false;

@@ -3,10 +3,9 @@
 //!
 //! Output pins are not wired: a compare mode that would drive one is reported. So are down and centre-aligned
 //! counting, slave modes, triggers, DMA, capture filters and the repetition counter. A flag that raises no
-//! interrupt costs no event: it is worked out when the register is read.
+//! interrupt causes no event: it is calculated when the register is read.
 //!
-//! In one-pulse mode every update event stops the counter, the one made by UG included: that is what 15.4.1
-//! says of OPM.
+//! In one-pulse mode every update event stops the counter, including the event that UG makes: see OPM in 15.4.1.
 
 mod channels;
 mod counter;
@@ -58,7 +57,7 @@ const OVERCAPTURE: u32 = 1 << 9;
 /// BDTR.MOE.
 const MOE: u32 = 1 << 15;
 
-/// Which kind of timer.
+/// The kind of a timer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// TIM2, TIM3, TIM4.
@@ -85,7 +84,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// A timer out of reset, without a clock.
+    /// Returns a timer after reset, without a clock.
     #[must_use]
     pub fn new(kind: Kind) -> Self {
         Self {
@@ -254,7 +253,7 @@ impl Peripheral for Timer {
     }
 
     fn advance(&mut self, now: Time) {
-        // Without an interrupt due, the counter can wait until it is looked at.
+        // When no interrupt is due, the counter is only updated when it is read.
         if self.next_event().is_some_and(|at| at <= now) {
             self.sync(now);
         }

@@ -1,4 +1,4 @@
-//! Instants and flags of the timers, by hand from RM0008 15.
+//! Instants and flags of the timers, calculated by hand from RM0008 15.
 
 use super::*;
 
@@ -133,7 +133,7 @@ fn a_thousand_hertz_for_an_hour_is_exact() {
         assert!(timer.irq());
         write(&mut timer, offset::SR, 0, at);
     }
-    // Left alone for an hour it is at the right count, and asked rarely costs nothing.
+    // Without an enabled interrupt there are no events. After an hour without an access the count is right.
     let hour = cycles(1 + 72_000_000 * 3600 + 72 * 250);
     write(&mut timer, offset::DIER, 0, cycles(1 + 72_000 * 10_000));
     assert_eq!(timer.next_event(), None);
@@ -159,7 +159,7 @@ fn compare_flags_rise_at_their_counts() {
 }
 
 #[test]
-fn a_count_past_the_reload_value_goes_round_without_an_update() {
+fn count_past_the_reload_value_wraps_without_an_update() {
     let mut timer = timer();
     write(&mut timer, offset::CNT, 100, Time::ZERO);
     write(&mut timer, offset::CR1, CEN, Time::ZERO);
@@ -221,7 +221,7 @@ fn a_falling_edge_is_captured_with_its_count() {
 }
 
 #[test]
-fn what_is_not_modelled_is_said() {
+fn features_not_modelled_are_reported() {
     let mut timer = capturing();
     for (offset, value) in [
         (offset::CR1, 1 << 4),

@@ -84,7 +84,7 @@ impl Default for Usart {
 }
 
 impl Usart {
-    /// A USART out of reset, without a clock.
+    /// Returns a USART after reset, without a clock.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -114,8 +114,8 @@ impl Usart {
         self.data_writes
     }
 
-    /// What the transmitter did to its TX pin since the last call, in order: a character is there as soon
-    /// as its start bit has begun.
+    /// Takes what the transmitter sent since the last call, in order. A character is included as soon as its start
+    /// bit has begun.
     pub fn take_sent(&mut self) -> Vec<Sent> {
         self.tx.take_sent()
     }
@@ -179,7 +179,7 @@ impl Usart {
         })
     }
 
-    /// Starts what waits, if the transmitter is on and free.
+    /// Starts the next transmission, if one is waiting and the transmitter is on and free.
     fn kick(&mut self, now: Time) {
         if let Some(Ended::More { took_data: true }) =
             self.shape().and_then(|shape| self.tx.start(now, shape))
@@ -230,7 +230,7 @@ impl Usart {
         Ok(())
     }
 
-    /// The word as it goes out: its highest bit is the parity bit when PCE is set (27.3.7).
+    /// Returns the word as it is sent: its highest bit is the parity bit when PCE is set (27.3.7).
     fn with_parity(&self, data: u16) -> u16 {
         let bits = self.data_bits();
         match self.parity() {

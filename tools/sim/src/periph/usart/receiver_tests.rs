@@ -1,4 +1,4 @@
-//! What the receiver makes of its pin, and how its flags are cleared.
+//! The words and flags that the receiver produces from the edges at its pin, and how its flags are cleared.
 
 use super::*;
 use crate::serial::{Character, Rate};
@@ -225,7 +225,7 @@ fn a_break_is_a_framing_error_once_and_the_next_start_needs_an_edge() {
 }
 
 #[test]
-fn a_deaf_receiver_joins_at_the_next_edge() {
+fn receiver_enabled_in_mid_character_waits_for_the_next_edge() {
     let mut usart = receiver(0, 0);
     usart
         .write(offset::CR1, cr1::UE, Time::ZERO)

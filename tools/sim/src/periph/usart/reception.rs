@@ -55,10 +55,10 @@ impl Usart {
         self.rx_pin.drop_before(needed);
     }
 
-    /// A word is complete (27.3.3).
+    /// Takes a complete word (27.3.3).
     fn take_word(&mut self, word: Word) {
         if self.sr & sr::RXNE != 0 {
-            // The word is lost, RDR stays; of its errors only the overrun shows.
+            // The word is lost and RDR keeps its contents; of the word's errors only the overrun is reported.
             self.sr |= sr::ORE;
         } else {
             self.received = word.data;

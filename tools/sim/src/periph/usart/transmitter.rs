@@ -12,7 +12,7 @@ pub enum Sent {
     Cut(Time),
 }
 
-/// How the next character is cut.
+/// Format and bit length of the next character.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// Cycles of the kernel clock in one bit: BRR.
@@ -41,9 +41,9 @@ enum Content {
 /// What the end of a character means to the registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// Something else has begun at once.
+    /// The next transmission has begun immediately.
     More {
-        /// The transmit data register went into the shift register.
+        /// Whether the transmit data register was moved to the shift register.
         took_data: bool,
     },
     /// Nothing is left to send.
@@ -65,7 +65,7 @@ pub struct Transmitter {
 }
 
 impl Transmitter {
-    /// An empty transmitter that still owes its listener what was sent before a reset.
+    /// Returns an empty transmitter that still has to report what was sent before a reset.
     pub fn with_sent(sent: Vec<Sent>) -> Self {
         Self {
             sent,
@@ -78,7 +78,7 @@ impl Transmitter {
         self.shift.map(|(_, end)| end)
     }
 
-    /// Whether a character or a break is on its way out.
+    /// Whether a character or a break is being sent.
     pub fn is_sending(&self) -> bool {
         matches!(self.shift, Some((Content::Data | Content::Break, _)))
     }
@@ -93,12 +93,12 @@ impl Transmitter {
         self.data = Some(word);
     }
 
-    /// The next thing sent is the preamble: TE has been set.
+    /// Requests the preamble as the next transmission: TE has been set.
     pub fn want_preamble(&mut self) {
         self.preamble = true;
     }
 
-    /// A break is sent after the character under way, or is not any more: SBK.
+    /// Requests a break after the character under way, or withdraws the request: SBK.
     pub fn want_break(&mut self, wanted: bool) {
         self.break_wanted = wanted;
     }
@@ -161,12 +161,12 @@ impl Transmitter {
         sending
     }
 
-    /// Whether something went out since the last [`Transmitter::take_sent`].
+    /// Whether something was sent since the last [`Transmitter::take_sent`].
     pub fn has_sent(&self) -> bool {
         !self.sent.is_empty()
     }
 
-    /// What went out since the last call.
+    /// Takes what was sent since the last call.
     pub fn take_sent(&mut self) -> Vec<Sent> {
         std::mem::take(&mut self.sent)
     }

@@ -1,4 +1,4 @@
-//! What the transmitter sends, when, and how its flags go.
+//! The characters that the transmitter sends, their times, and its flags.
 #![expect(
     clippy::unusual_byte_groupings,
     reason = "grouped as stop bits, parity, data, start bit"
@@ -204,7 +204,7 @@ fn interrupts_follow_their_enables() {
 }
 
 #[test]
-fn what_is_not_modelled_is_said() {
+fn features_not_modelled_are_reported() {
     let mut usart = transmitter(0, 0);
     for (offset, value) in [
         (offset::CR1, ON | cr1::RWU),

@@ -1,4 +1,4 @@
-//! What is connected to the pins of a USART, and how both pass through time together.
+//! The wire at the pins of a USART, and the exchange that advances both in time together.
 
 use super::{Sent, Usart};
 use crate::peripheral::Peripheral;
@@ -19,10 +19,10 @@ pub trait Wire {
     /// The USART did something to its TX pin. A character is passed when its start bit begins.
     fn sent(&mut self, _sent: Sent) {}
 
-    /// The TX pin is driven like this from `now` on.
+    /// Sets how the TX pin is driven from `now` on.
     fn set_tx_pin(&mut self, _pin: TxPin, _now: Time) {}
 
-    /// Everything on the wire up to `to` happens.
+    /// Advances the wire to `to`.
     fn advance(&mut self, to: Time);
 
     /// The instant of the last [`Wire::advance`].
@@ -49,13 +49,13 @@ pub trait Wire {
         true
     }
 
-    /// The wire and its USART have reached the same instant.
+    /// Called when the wire and its USART have reached the same instant.
     fn caught_up(&mut self, _usart: &Usart) {}
 }
 
 impl Usart {
-    /// Everything up to `now` happens in the USART and on its wire, in order: this takes the place of
-    /// [`Peripheral::advance`]. To be called before each access, before the pins change, and at each event.
+    /// Runs the USART and its wire up to `now`, in order; this replaces [`Peripheral::advance`]. Call it before each
+    /// access, before the pins change, and at each event.
     pub fn exchange(&mut self, wire: &mut dyn Wire, now: Time) {
         self.pass_sent(wire);
         loop {
