@@ -4,18 +4,17 @@
 //! `tools/bench` measures. This command builds the programs for it, shows the figures and compares them with the
 //! baseline.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::steps::Bench;
 use crate::workspace::{self, MESSAGES, Workspace};
 use crate::{build, command, image, size};
 
-mod baseline;
+mod figures;
 mod server;
 mod table;
 
@@ -42,66 +41,58 @@ pub struct Options {
 /// `cargo xtask bench`. A figure over its budget or worse than the baseline is an error.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let board = options.build.board;
-    let elf = build::image(workspace, board)?.elf;
-    let report = measure(workspace, &elf, board)?;
+    let report = measure(workspace, board)?;
     if options.json {
         say!("{report:#}");
     } else {
         say!("{}", table::of(&report));
     }
     if options.bless {
-        return baseline::write(&file(workspace, board), &report);
+        return figures::write(&baseline(workspace, board), &report);
     }
     within_limits(workspace, board, &report)
 }
 
 /// The step of `cargo xtask ci`.
-pub fn check(bench: &mut Bench, board: &'static Board) -> Result<()> {
-    let elf = bench.image(board)?;
-    let report = measure(bench.workspace, &elf, board)?;
+pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+    let report = measure(workspace, board)?;
     say!("{}", table::of(&report));
-    within_limits(bench.workspace, board, &report)
+    within_limits(workspace, board, &report)
 }
 
 /// Returns the file with the baseline of a board.
-fn file(workspace: &Workspace, board: &Board) -> PathBuf {
-    let name = format!("baseline-{board}.json");
-    workspace.root().join("tools/bench").join(name)
+fn baseline(workspace: &Workspace, board: &Board) -> PathBuf {
+    let name = format!("tools/bench/baseline-{board}.json");
+    workspace.root().join(name)
 }
 
 fn within_limits(workspace: &Workspace, board: &Board, report: &Value) -> Result<()> {
-    let over = table::over_budget(report);
+    let over = figures::over_budget(report);
     ensure!(over.is_empty(), "over budget: {}", over.join("; "));
-    baseline::compare_with(&file(workspace, board), report)
+    figures::compare(&baseline(workspace, board), report)
 }
 
-fn measure(workspace: &mut Workspace, elf: &Path, board: &Board) -> Result<Value> {
-    let rivals = rivals(workspace)?;
+fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
+    let elf = build::image(workspace, board)?.elf;
+    let mut build = rivals(workspace, "build")?;
+    let rivals = workspace::artifacts(build.args(["--quiet", MESSAGES]))?;
     let mut program = Command::new(workspace.program("modio-bench")?);
-    program.arg(elf).args(["--board", board.name, "--rivals"]);
-    let text = command::read(program.args(rivals))?;
-    let mut report: Value =
-        serde_json::from_str(&text).context("the report of tools/bench is broken")?;
-    let bytes = image::read(elf)?;
-    let parsed = image::parse(&bytes)?;
-    server::add_instructions(&mut report, &parsed)?;
-    report["image"] = size::report(elf, board)?;
-    let structures = size::structures(&parsed, server::CRATE)?;
-    report["server"] = json!({
-        "flash": server::flash(&report["image"])?,
-        "ram": server::ram(&structures)?,
-    });
+    program.arg(&elf).args(["--board", board.name, "--rivals"]);
+    for name in RIVAL_NAMES {
+        program.arg(workspace::executable(&rivals, name)?);
+    }
+    let report = serde_json::from_str(&command::read(&mut program)?);
+    let mut report: Value = report.context("the report of tools/bench is broken")?;
+    report["image"] = size::report(&elf, board)?;
+    server::add(&mut report, &image::parse(&image::read(&elf)?)?)?;
     Ok(report)
 }
 
-/// Builds the rivals and returns where they are.
-fn rivals(workspace: &mut Workspace) -> Result<Vec<PathBuf>> {
+/// Returns cargo for the rivals.
+pub fn rivals(workspace: &mut Workspace, subcommand: &str) -> Result<Command> {
     let target = workspace.target().join("rivals");
-    let mut cargo = workspace.target_cargo("build")?;
-    cargo.args(["--quiet", "--release", "--manifest-path", RIVALS, MESSAGES]);
-    let artifacts = workspace::artifacts(cargo.arg("--target-dir").arg(&target))?;
-    let programs = RIVAL_NAMES
-        .iter()
-        .map(|name| workspace::executable(&artifacts, name));
-    programs.collect()
+    let mut cargo = workspace.target_cargo(subcommand)?;
+    cargo.args(["--release", "--manifest-path", RIVALS]);
+    cargo.arg("--target-dir").arg(target);
+    Ok(cargo)
 }

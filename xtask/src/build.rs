@@ -3,16 +3,17 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use cargo_metadata::PackageId;
 use fs_err as fs;
 use register_map::Board;
 use register_map::board::MODIO_02;
 
 use crate::board::Hardware;
+use crate::error::usage;
+use crate::image;
 use crate::toolchain::TARGET;
 use crate::workspace::{self, MESSAGES, Workspace};
-use crate::{command, image};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
@@ -54,32 +55,35 @@ pub fn image_with_map(workspace: &mut Workspace, board: &Board, map: &Path) -> R
     linked(workspace, board, Some(map))
 }
 
+/// Returns the image that an option names, or builds it. An image that does not fit the board is a usage error.
+pub fn given(workspace: &mut Workspace, board: &Board, elf: Option<&Path>) -> Result<PathBuf> {
+    let Some(elf) = elf else {
+        return Ok(image(workspace, board)?.elf);
+    };
+    let flat = image::read(elf).and_then(|bytes| image::flat(&bytes, u32::MAX));
+    flat.map_err(|why| usage(format!("{}: {why:#}", elf.display())))?;
+    Ok(std::path::absolute(elf)?)
+}
+
 fn linked(workspace: &mut Workspace, board: &Board, map: Option<&Path>) -> Result<Image> {
     let target = target(workspace.target(), board);
-    // Only `cargo rustc` has options for the linker with which dependencies are not compiled again.
-    let subcommand = if map.is_some() { "rustc" } else { "build" };
-    let mut cargo = workspace.target_cargo(subcommand)?;
+    let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--profile", PROFILE, "--package", "firmware"]);
     cargo.args(["--bin", "modio", "--features", board.name, MESSAGES]);
     cargo.arg("--target-dir").arg(&target);
     if let Some(map) = map {
-        cargo.arg("--");
-        cargo.arg(command::joined("-Clink-arg=-Map=", map));
+        // The variable that firmware/build.rs reads.
+        cargo.env("MODIO_MAP", map);
     }
     let artifacts = workspace::artifacts(&mut cargo)?;
-    let for_target = target.join(TARGET);
-    let compiled = artifacts.iter().filter(|artifact| {
-        let mut files = artifact.filenames.iter();
-        files.any(|file| file.as_std_path().starts_with(&for_target))
-    });
     let elf = workspace::executable(&artifacts, "modio")?;
     let bin = elf.with_extension("bin");
     let bytes = image::read(&elf)?;
     let flash = image::flat(&bytes, Hardware::of(board).part.flash)?;
-    check(&bytes)?;
+    image::check(&bytes)?;
     fs::write(&bin, flash)?;
     Ok(Image {
-        packages: compiled.map(|built| built.package_id.clone()).collect(),
+        packages: workspace::packages(&artifacts, &target.join(TARGET)),
         elf,
         bin,
     })
@@ -93,28 +97,4 @@ pub fn target(directory: &Path, board: &Board) -> PathBuf {
     } else {
         directory.join(board.name)
     }
-}
-
-/// Refuses an image that can panic, or whose code in RAM calls functions in flash.
-fn check(image: &[u8]) -> Result<()> {
-    let panics = image::panics(image)?;
-    if !panics.is_empty() {
-        let lines = panics
-            .iter()
-            .map(|(panic, callers)| match callers.as_slice() {
-                [] => format!("\n  {panic}, which nothing calls directly"),
-                callers => format!("\n  {panic}, called by {}", callers.join(", ")),
-            });
-        let lines: String = lines.collect();
-        bail!("the image can panic, which a release image must not; remove the calls to{lines}");
-    }
-    let called = image::calls_from_ram(image)?;
-    if !called.is_empty() {
-        bail!(
-            "code in RAM calls functions in flash, which cannot run during a save; add them to .ram_code in \
-             firmware/memory/sections.x\n  {}",
-            called.join("\n  ")
-        );
-    }
-    Ok(())
 }

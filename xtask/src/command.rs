@@ -1,10 +1,9 @@
 //! Runs other programs. Errors name the program and the reason.
 
-use std::ffi::{OsStr, OsString};
 use std::io::ErrorKind;
 use std::process::{Command, Output};
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 
 /// Runs a program that shows its own output.
 pub fn run(command: &mut Command) -> Result<()> {
@@ -29,17 +28,18 @@ pub fn read(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Returns the line in which a program reports why it failed: the first with an error, else the last.
+/// Returns the line in which a program reports why it failed.
 pub fn complaint(output: &Output) -> String {
     let text = [output.stderr.as_slice(), b"\n", &output.stdout].concat();
-    let text = String::from_utf8_lossy(&text);
+    reason(&String::from_utf8_lossy(&text)).unwrap_or_else(|| output.status.to_string())
+}
+
+/// Returns the first line with an error, else the last line.
+pub fn reason(text: &str) -> Option<String> {
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     let is_error = |line: &&str| line.to_lowercase().contains("error") || line.starts_with("E:");
-    lines
-        .clone()
-        .find(is_error)
-        .or_else(|| lines.next_back())
-        .map_or_else(|| output.status.to_string(), str::to_owned)
+    let line = lines.clone().find(is_error).or_else(|| lines.next_back());
+    line.map(str::to_owned)
 }
 
 /// Returns the command as typed in a shell.
@@ -47,13 +47,6 @@ pub fn shown(command: &Command) -> String {
     let parts = std::iter::once(command.get_program()).chain(command.get_args());
     let parts: Vec<_> = parts.map(|part| part.to_string_lossy()).collect();
     parts.join(" ")
-}
-
-/// Returns an argument that consists of an option and a path.
-pub fn joined(option: &str, path: impl AsRef<OsStr>) -> OsString {
-    let mut argument = OsString::from(option);
-    argument.push(path);
-    argument
 }
 
 /// Returns the error of a program that does not start.
@@ -76,14 +69,9 @@ pub fn exec(command: &mut Command) -> Result<()> {
 /// Runs a program, which receives Ctrl-C too, and ends with its exit status.
 #[cfg(not(unix))]
 pub fn exec(command: &mut Command) -> Result<()> {
-    ignore_interrupt()?;
+    ctrlc::set_handler(|| {})?;
     let status = command.status().map_err(|error| no_start(command, error))?;
     std::process::exit(status.code().unwrap_or(1))
-}
-
-/// Makes this process ignore Ctrl-C, which then only the started programs handle.
-pub fn ignore_interrupt() -> Result<()> {
-    ctrlc::set_handler(|| {}).context("no handler for Ctrl-C")
 }
 
 #[cfg(test)]
@@ -96,9 +84,7 @@ mod tests {
         assert_eq!(error.to_string(), "no-such-program-here is not installed");
         let script = "echo starting >&2; echo 'error: no network' >&2; exit 3";
         let error = read(Command::new("sh").args(["-c", script])).unwrap_err();
-        assert!(
-            error.to_string().ends_with("failed: error: no network"),
-            "{error}"
-        );
+        let text = error.to_string();
+        assert!(text.ends_with("failed: error: no network"), "{text}");
     }
 }

@@ -7,17 +7,19 @@
 //! | `modio-02.map` | addresses and sizes of what is in the image |
 //! | `modio-02.cdx.json` | the crates in the image, as a CycloneDX bill of materials |
 //!
-//! Besides, there are `modioctl-TARGET`, the host tool for machines like this one, and `modio-sim-TARGET`, the
-//! simulator with the images of all boards inside. `modio-sim-oci.tar`, made on Linux, is that simulator as a
-//! container image.
+//! | file, for each program in [`programs`] | for |
+//! |---|---|
+//! | `modioctl-TARGET` | machines like this one |
+//! | `modioctl-TARGET.cdx.json` | the crates in the program |
 //!
-//! `SHA256SUMS` has the check sums of all of them: `sha256sum --check SHA256SUMS`.
+//! `modio-sim` contains the images of all boards. `modio-sim-oci.tar`, made on Linux, is the simulator as a container
+//! image. Besides, there are the licences of this project, those of the crates in the files, the section of the
+//! changelog, and `SHA256SUMS`, which is written last and has the check sums of all other files.
 //!
-//! The same sources and toolchain give the same .bin, .hex and bill in any directory and at any time.
+//! On Linux the same commit and the same rustc give the same bytes in any directory and at any time: see [`paths`].
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
@@ -26,141 +28,149 @@ use register_map::Board;
 use sha2::{Digest as _, Sha256};
 
 use crate::error::usage;
-use crate::workspace::{self, MESSAGES, Workspace};
-use crate::{build, command, image, toolchain};
+use crate::workspace::Workspace;
+use crate::{build, image};
 
 mod hex;
+mod notices;
 mod oci;
+mod paths;
+mod programs;
 mod sbom;
-mod simulator;
+
+pub use programs::host;
+
+use notices::Notices;
+use paths::Paths;
 
 /// What to build, and where to write it.
 #[derive(clap::Args, Clone, Debug)]
 #[group(skip)]
 pub struct Options {
-    /// The directory for the files [default: target/dist]
+    /// An empty or new directory for the files [default: target/dist, which is emptied first]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Build only if this is the tag of the sources' version
+    /// Build only if this is the tag of the sources' version and no file differs from the commit
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
 
-    /// Only the host tool, for machines like this one
-    #[arg(long)]
-    tool: bool,
+    /// Build only the programs, with the images BOARD.elf of this directory in the simulator
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
 }
 
 /// The tag of this version. All packages have the workspace's version.
 const TAG: &str = concat!("v", env!("CARGO_PKG_VERSION"));
 
 /// `cargo xtask dist`.
-pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    if let Some(tag) = options.tag.as_ref().filter(|tag| *tag != TAG) {
+pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
+    if let Some(tag) = &options.tag {
+        check_tag(tag, commit::commit!())?;
+    }
+    let out = match &options.out {
+        Some(out) => std::path::absolute(out)?,
+        None => {
+            let out = workspace.target().join("dist");
+            let _ = fs::remove_dir_all(&out);
+            out
+        }
+    };
+    fs::create_dir_all(&out)?;
+    if fs::read_dir(&out)?.next().is_some() {
+        return Err(usage(format!("{} is not empty", out.display())));
+    }
+    let paths = Paths::of(workspace)?;
+    let target = programs::target()?;
+    let workspace = &mut paths.reproducible(workspace, &target);
+    let mut notices = Notices::default();
+    if options.images.is_none() {
+        for board in Board::ALL {
+            files(workspace, board, &out, &paths, &mut notices)?;
+        }
+        let root = workspace.root();
+        for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+            fs::copy(root.join(name), out.join(name))?;
+        }
+        let changes = fs::read_to_string(root.join("CHANGELOG.md"))?;
+        let section = section(&changes, env!("CARGO_PKG_VERSION"))?;
+        fs::write(out.join("RELEASE-NOTES.md"), section)?;
+    }
+    let images = options.images.as_ref().unwrap_or(&out);
+    programs::files(workspace, &target, images, &out, &mut notices)?;
+    notices.write(&target, &out)?;
+    let sums = sums(&out)?;
+    fs::write(out.join("SHA256SUMS"), &sums)?;
+    say!("{sums}{}", out.join("SHA256SUMS").display());
+    Ok(())
+}
+
+/// Refuses a tag of another version, and sources that no commit has.
+fn check_tag(tag: &str, commit: &str) -> Result<()> {
+    if tag != TAG {
         return Err(usage(format!(
             "the tag {tag} is not the tag of these sources, {TAG}"
         )));
     }
-    let out = match &options.out {
-        // The linker runs in another directory.
-        Some(out) => std::path::absolute(out)?,
-        None => workspace.target().join("dist"),
-    };
-    fs::create_dir_all(&out)?;
-    let mut names = Vec::new();
-    if !options.tool {
-        for board in Board::ALL {
-            names.extend(files(workspace, board, &out)?);
-        }
-        names.extend(simulator::files(workspace, &out)?);
-    }
-    let (file, name) = tool(workspace, "modioctl", "modioctl", |_| ())?;
-    fs::copy(&file, out.join(&name))?;
-    names.push(name);
-    fs::write(out.join("SHA256SUMS"), sums(&out, &names)?)?;
-    for name in names.iter().map(String::as_str).chain(["SHA256SUMS"]) {
-        say!("{}", out.join(name).display());
+    if commit.ends_with("-dirty") || commit == "unknown" {
+        return Err(usage(format!(
+            "the commit of these sources is {commit}; a tag needs a commit without changes"
+        )));
     }
     Ok(())
 }
 
-/// Makes the files of a board. Returns their names in alphabetical order.
-fn files(workspace: &mut Workspace, board: &Board, out: &Path) -> Result<Vec<String>> {
-    let named = |extension: &str| format!("{board}.{extension}");
-    let map = out.join(named("map"));
-    // A map of an earlier image must not remain when the linker writes none.
-    let _ = fs::remove_file(&map);
+/// Makes the files of a board.
+fn files(
+    workspace: &mut Workspace,
+    board: &Board,
+    out: &Path,
+    paths: &Paths,
+    notices: &mut Notices,
+) -> Result<()> {
+    let map = workspace.target().join(format!("{board}.map"));
     let built = build::image_with_map(workspace, board, &map)?;
-    ensure!(map.is_file(), "the linker has written no map");
     let elf = image::read(&built.elf)?;
     let flash = image::read(&built.bin)?;
     let entry = image::parse(&elf)?.entry() as u32;
-    let bill = sbom::of_image(workspace, board, &built, &sha256(&flash))?;
-    let mut names = vec![named("map")];
+    let bill = sbom::of_image(workspace, board, &built, &sha256(&flash), notices)?;
     for (extension, content) in [
+        ("map", paths.replaced(&fs::read_to_string(map)?).into()),
         ("elf", elf),
         ("hex", hex::file(&flash, entry)?.into_bytes()),
         ("bin", flash),
         ("cdx.json", format!("{bill:#}\n").into_bytes()),
     ] {
-        fs::write(out.join(named(extension)), &content)?;
-        names.push(named(extension));
+        fs::write(out.join(format!("{board}.{extension}")), content)?;
     }
+    Ok(())
+}
+
+/// Returns the section of a version in a changelog, without its heading.
+fn section<'a>(changes: &'a str, version: &str) -> Result<&'a str> {
+    let mut sections = changes.split("\n## ");
+    let found = sections.find_map(|section| {
+        let (heading, text) = section.split_once('\n')?;
+        (heading.split_whitespace().next() == Some(version)).then_some(text)
+    });
+    let text = found.with_context(|| format!("CHANGELOG.md has no section \"## {version}\""))?;
+    ensure!(
+        !text.trim().is_empty(),
+        "the section {version} of CHANGELOG.md is empty"
+    );
+    Ok(text.trim_start())
+}
+
+/// Returns the sums of all files in a directory, in the order of their names, as `sha256sum` writes them.
+fn sums(directory: &Path) -> Result<String> {
+    let names: Result<Vec<_>, _> = fs::read_dir(directory)?
+        .map(|file| file.map(|file| file.file_name().to_string_lossy().into_owned()))
+        .collect();
+    let mut names = names?;
     names.sort_unstable();
-    Ok(names)
-}
-
-/// Builds a package's program so that it runs without Rust and without this repository. Returns its file, and its name
-/// in a release.
-///
-/// On Linux it is linked with musl, so that it needs no library of the system and runs on every distribution.
-fn tool(
-    workspace: &Workspace,
-    package: &str,
-    program: &str,
-    with: impl FnOnce(&mut Command),
-) -> Result<(PathBuf, String)> {
-    let target = tool_target(&host()?);
-    toolchain::add(workspace.root(), &target)?;
-    let mut cargo = workspace.cargo("build");
-    cargo.args(["--locked", "--ignore-rust-version", "--profile", "tool"]);
-    cargo.args([
-        "--package",
-        package,
-        "--bin",
-        program,
-        "--target",
-        &target,
-        MESSAGES,
-    ]);
-    with(&mut cargo);
-    let file = workspace::executable(&workspace::artifacts(&mut cargo)?, program)?;
-    let suffix = std::env::consts::EXE_SUFFIX;
-    Ok((file, format!("{program}-{target}{suffix}")))
-}
-
-/// Returns the target of this machine.
-pub fn host() -> Result<String> {
-    let version = command::read(Command::new("rustc").arg("-vV"))?;
-    let host = version.lines().find_map(|line| line.strip_prefix("host: "));
-    Ok(host
-        .context("rustc does not report the target of this machine")?
-        .to_owned())
-}
-
-/// Returns the target for which programs for a machine are built.
-fn tool_target(host: &str) -> String {
-    match host.split_once("-unknown-linux-") {
-        Some((processor, _)) => format!("{processor}-unknown-linux-musl"),
-        None => host.to_owned(),
-    }
-}
-
-/// Returns the sums of these files, as `sha256sum` writes them.
-fn sums(directory: &Path, names: &[String]) -> Result<String> {
     let mut text = String::new();
     for name in names {
-        let sum = sha256(&fs::read(directory.join(name))?);
+        let sum = sha256(&fs::read(directory.join(&name))?);
         writeln!(text, "{sum}  {name}")?;
     }
     Ok(text)
@@ -175,23 +185,42 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_are_those_of_sha256sum() {
+    fn sums_are_those_of_sha256sum_in_the_order_of_names() {
         let directory = tempfile::tempdir().unwrap();
-        fs::write(directory.path().join("a"), "abc").unwrap();
-        let text = sums(directory.path(), &["a".to_owned()]).unwrap();
-        // The example of FIPS 180-4.
-        let sum = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(text, format!("{sum}  a\n"));
+        fs::write(directory.path().join("b"), "abc").unwrap();
+        fs::write(directory.path().join("a"), "").unwrap();
+        let text = sums(directory.path()).unwrap();
+        // The examples of FIPS 180-4 and of an empty file.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        let empty = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+        assert_eq!(text, format!("{empty}  a\n{abc}  b\n"));
     }
 
     #[test]
-    fn tool_for_linux_needs_no_library_of_the_system() {
-        for (host, target) in [
-            ("aarch64-unknown-linux-gnu", "aarch64-unknown-linux-musl"),
-            ("x86_64-pc-windows-msvc", "x86_64-pc-windows-msvc"),
-            ("aarch64-apple-darwin", "aarch64-apple-darwin"),
+    fn release_notes_are_the_section_of_the_version() {
+        let changes = "# Changelog\n\n## Unreleased\n\n## 0.2.0 - 2026-11-23\n\n### Added\n\n- A.\n\n## 0.1.0\n\n- B.\n";
+        assert_eq!(section(changes, "0.2.0").unwrap(), "### Added\n\n- A.\n");
+        assert_eq!(section(changes, "0.1.0").unwrap(), "- B.\n");
+        for absent in ["0.2", "Unreleased"] {
+            assert!(section(changes, absent).is_err(), "{absent}");
+        }
+    }
+
+    #[test]
+    fn changelog_has_a_section_for_this_version() {
+        let changes = include_str!("../../CHANGELOG.md");
+        assert!(section(changes, env!("CARGO_PKG_VERSION")).is_ok());
+    }
+
+    #[test]
+    fn tag_needs_its_version_and_a_commit_without_changes() {
+        assert!(check_tag(TAG, "1a2b3c4d").is_ok());
+        for (tag, commit) in [
+            ("v9.9.9", "1a2b3c4d"),
+            (TAG, "1a2b3c4d-dirty"),
+            (TAG, "unknown"),
         ] {
-            assert_eq!(tool_target(host), target);
+            assert!(check_tag(tag, commit).is_err(), "{tag} {commit}");
         }
     }
 }

@@ -1,31 +1,23 @@
 //! Errors that decide the exit status or the outcome of a step.
 
-use std::fmt;
+use thiserror::Error;
 
 /// A wrong argument or option: exit status 2.
-#[derive(Debug)]
+#[derive(Debug, Error)]
+#[error("{0}")]
 pub struct Usage(String);
+
+/// A tool is missing on this machine: a step of `cargo xtask test` is skipped, unless in CI.
+#[derive(Debug, Error)]
+#[error("{0}")]
+pub struct Missing(pub String);
 
 /// Returns the error of a wrong argument or option.
 pub fn usage(what: impl Into<String>) -> anyhow::Error {
     Usage(what.into()).into()
 }
 
-/// A tool is missing on this machine: a step of `cargo xtask test` is skipped, unless in CI.
-#[derive(Debug)]
-pub struct Missing(pub String);
-
-impl fmt::Display for Usage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
+/// Returns the error of a missing tool.
+pub fn missing(what: impl Into<String>) -> anyhow::Error {
+    Missing(what.into()).into()
 }
-
-impl fmt::Display for Missing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Usage {}
-impl std::error::Error for Missing {}

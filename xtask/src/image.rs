@@ -88,79 +88,71 @@ pub fn symbols(elf: &Elf<'_>) -> Result<Vec<Symbol>> {
         .collect()
 }
 
-/// Returns the path of a Rust symbol, without its hash.
-pub fn demangled(name: &str) -> String {
-    format!("{:#}", rustc_demangle::demangle(name))
-}
-
-/// Returns the functions in flash that code in RAM calls. A branch from RAM does not reach flash, so lld makes a thunk
-/// for each such call and places it near the caller.
-pub fn calls_from_ram(bytes: &[u8]) -> Result<Vec<String>> {
-    let symbols = symbols(&parse(bytes)?)?;
-    let in_ram = symbols.iter().filter(|symbol| symbol.address >= RAM_BASE);
-    let called = in_ram.filter_map(|symbol| symbol.name.strip_prefix(THUNK));
-    Ok(called.map(demangled).collect())
-}
-
-/// Returns the functions of `core::panicking` that are linked, and the panic handler, each with its direct callers.
+/// Refuses an image that can panic, or whose code in RAM calls functions in flash.
 ///
-/// Every panic of Rust calls one of them, and the linker keeps only functions that something can call.
-pub fn panics(bytes: &[u8]) -> Result<Vec<(String, Vec<String>)>> {
-    let functions: Vec<Symbol> = symbols(&parse(bytes)?)?
-        .into_iter()
-        .filter(|symbol| symbol.function)
-        .map(|symbol| Symbol {
-            name: demangled(&symbol.name),
-            ..symbol
-        })
-        .collect();
+/// Every panic of Rust calls a function of `core::panicking` or the panic handler, and the linker keeps only functions
+/// that something can call. A branch from RAM does not reach flash, so lld makes a thunk for each such call and places
+/// it near the caller.
+pub fn check(bytes: &[u8]) -> Result<()> {
+    let symbols = symbols(&parse(bytes)?)?;
+    let (mut functions, mut called) = (Vec::new(), Vec::new());
+    for symbol in &symbols {
+        let thunk = symbol.name.strip_prefix(THUNK);
+        called.extend(thunk.filter(|_| symbol.address >= RAM_BASE).map(demangled));
+        if symbol.function {
+            functions.push((demangled(&symbol.name), symbol));
+        }
+    }
     ensure!(
         !functions.is_empty(),
         "the image has no symbols, so it is unknown whether it can panic"
     );
     let flash = flat(bytes, u32::MAX)?;
-    let panics = functions.iter().filter(|function| {
-        function.name.starts_with("core::panicking::")
-            || function.name.ends_with("rust_begin_unwind")
-    });
-    let with_callers = panics.map(|panic| {
-        let calls = |function: &&Symbol| calls(function, &flash, panic.address);
-        let callers = functions.iter().filter(calls);
-        (
-            panic.name.clone(),
-            callers.map(|caller| caller.name.clone()).collect(),
-        )
-    });
-    Ok(with_callers.collect())
+    let mut panics = String::new();
+    for (name, panic) in &functions {
+        if name.starts_with("core::panicking::") || name.ends_with("rust_begin_unwind") {
+            let mut callers = Vec::new();
+            for (caller, function) in &functions {
+                callers.extend(calls(function, &flash, panic.address).then_some(caller.as_str()));
+            }
+            panics += &format!("\n  {name}, called by {}", callers.join(", "));
+        }
+    }
+    ensure!(
+        panics.is_empty(),
+        "the image can panic, which a release image must not; remove the calls to{panics}"
+    );
+    ensure!(
+        called.is_empty(),
+        "code in RAM calls functions in flash, which cannot run during a save; add them to .ram_code in \
+         firmware/memory/sections.x\n  {}",
+        called.join("\n  ")
+    );
+    Ok(())
 }
 
-/// Returns whether a function has a direct call to an address. Only functions in flash are searched.
+/// Returns the path of a Rust symbol, without its hash.
+fn demangled(name: &str) -> String {
+    format!("{:#}", rustc_demangle::demangle(name))
+}
+
+/// Returns whether a function has a direct call to an address: a BL or a B.W, encodings T1 and T4 (Armv7-M manual
+/// A7.7.18 and A7.7.12). Only functions in flash are searched.
 fn calls(function: &Symbol, flash: &[u8], target: u32) -> bool {
     let start = function.address.wrapping_sub(FLASH_BASE) as usize;
     let code = flash.get(start..start.saturating_add(function.size as usize));
-    let halves: Vec<u16> = code
-        .unwrap_or_default()
-        .chunks_exact(2)
-        .map(|half| u16::from_le_bytes([half[0], half[1]]))
-        .collect();
-    let mut pairs = (function.address..).step_by(2).zip(halves.windows(2));
-    pairs.any(|(at, pair)| branch(at, pair[0], pair[1]) == Some(target))
-}
-
-/// Returns the target of a BL or a B.W, encodings T1 and T4 (Armv7-M manual A7.7.18 and A7.7.12), or `None` for any
-/// other pair of half-words.
-fn branch(at: u32, first: u16, second: u16) -> Option<u32> {
-    if first & 0xF800 != 0xF000 || second & 0x9000 != 0x9000 {
-        return None;
-    }
-    let (first, second) = (u32::from(first), u32::from(second));
-    let sign = first >> 10 & 1;
-    let i1 = 1 ^ (second >> 13 & 1) ^ sign;
-    let i2 = 1 ^ (second >> 11 & 1) ^ sign;
-    let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
-    // 25 bits with a sign.
-    let offset = (offset << 7).cast_signed() >> 7;
-    Some(at.wrapping_add(4).wrapping_add_signed(offset))
+    let code = code.unwrap_or_default().windows(4).step_by(2);
+    code.zip((function.address..).step_by(2)).any(|(pair, at)| {
+        let [first, second] = [0, 2].map(|n| u32::from(u16::from_le_bytes([pair[n], pair[n + 1]])));
+        // 25 bits with a sign: S, I1, I2, imm10, imm11 and a zero. I1 and I2 are inverted unless S is set.
+        let sign = first >> 10 & 1;
+        let [i1, i2] = [13, 11].map(|bit| 1 ^ (second >> bit & 1) ^ sign);
+        let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12;
+        let offset = ((offset | (second & 0x7FF) << 1) << 7).cast_signed() >> 7;
+        first & 0xF800 == 0xF000
+            && second & 0x9000 == 0x9000
+            && at.wrapping_add(4).wrapping_add_signed(offset) == target
+    })
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -24,19 +25,14 @@ macro_rules! say {
 mod bench;
 mod board;
 mod build;
-mod ci;
 mod command;
 mod debug;
 mod dist;
-mod docs;
 mod error;
 mod fuzz;
 mod group;
-mod hil;
 mod image;
-mod page;
 mod peers;
-mod pymodbus;
 mod python;
 mod renode;
 mod sim;
@@ -50,7 +46,7 @@ mod workspace;
 
 /// The command line of `cargo xtask`.
 #[derive(Parser, Debug)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", about, long_about = None)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version = commit::version!(), about, long_about = None)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -73,7 +69,7 @@ enum Command {
     /// Run the steps that a change must pass, or those named
     Test(test::Options),
     /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
-    Ci(ci::Options),
+    Ci(test::Chosen),
     /// Show flash and RAM by crate and section, and what is left of the parts and the budget
     Size(size::Options),
     /// Count the instructions of every request, the processor's load, flash and RAM
@@ -84,7 +80,15 @@ enum Command {
     Renode(renode::Options),
     /// Test a real board on its serial line: conformance, timing, wires
     #[command(disable_help_flag = true)]
-    Hil(hil::Options),
+    Hil {
+        /// Options of modio-hil; --help lists them
+        #[arg(
+            value_name = "OPTIONS",
+            trailing_var_arg = true,
+            allow_hyphen_values = true
+        )]
+        arguments: Vec<OsString>,
+    },
     /// Test well-known Modbus servers with the conformance suite, and renew the table in docs/conformance.md
     Peers(peers::Options),
     /// Run the fuzz targets: framers, server and configuration store
@@ -128,18 +132,31 @@ fn run(cli: Cli) -> Result<()> {
         Command::Gdb(options) => debug::gdb(workspace, &options),
         Command::Sim(options) => sim::run(workspace, &options, std::env::args_os().skip(2)),
         Command::Test(options) => test::run(workspace, &options),
-        Command::Ci(options) => ci::run(workspace, &options),
+        Command::Ci(options) => test::ci(workspace, &options),
         Command::Size(options) => size::run(workspace, &options),
         Command::Bench(options) => bench::run(workspace, &options),
         Command::Dist(options) => dist::run(workspace, &options),
         Command::Renode(options) => renode::run(workspace, &options),
-        Command::Hil(options) => hil::run(workspace, &options),
+        Command::Hil { arguments } => {
+            // This program has all options and does everything, including writing the image, for which it calls
+            // `cargo xtask flash`. It replaces this process, so that it receives Ctrl-C and SIGTERM, restores the board,
+            // and sets the exit status.
+            let program = workspace.program("modio-hil")?;
+            command::exec(std::process::Command::new(program).args(arguments))
+        }
         Command::Peers(options) => peers::run(workspace, &options),
         Command::Fuzz(options) => fuzz::run(workspace, &options),
         Command::Soak(options) => soak::run(workspace, &options),
         Command::Matrix => soak::matrix(workspace),
-        Command::Docs => docs::run(workspace),
-        Command::Screenshots => page::screenshots(workspace),
+        Command::Docs => {
+            let mut text = String::new();
+            register_map::docs::write_markdown(&mut text)?;
+            let path = workspace.root().join("docs/register-map.md");
+            fs_err::write(&path, text)?;
+            say!("wrote {}", path.display());
+            Ok(())
+        }
+        Command::Screenshots => python::screenshots(workspace),
     }
 }
 
@@ -151,18 +168,22 @@ mod tests {
     fn command_line_is_well_formed() {
         use clap::CommandFactory;
         Cli::command().debug_assert();
+        let error = Cli::try_parse_from(["xtask", "build", "--board", "nucleo"]).unwrap_err();
+        let text = sim_options::one_line(&error);
+        assert!(
+            text.contains("'nucleo'") && text.contains("one of modio-02, modio-08"),
+            "{text}"
+        );
     }
 
     #[test]
-    fn unknown_board_is_refused_with_the_list_of_boards() {
-        for command in ["build", "flash", "run", "size", "bench", "sim", "renode"] {
-            let error = Cli::try_parse_from(["xtask", command, "--board", "nucleo"]).unwrap_err();
-            let text = sim_options::one_line(&error);
-            assert!(
-                text.contains("'nucleo'") && text.contains("one of modio-02, modio-08"),
-                "{command}: {text}"
-            );
-        }
+    fn every_argument_of_hil_is_passed_on_unchanged() {
+        let arguments = ["--bench", "b.toml", "-h", "--help", "--version", "--", "x"];
+        let all = ["xtask", "hil"].iter().chain(&arguments);
+        let Command::Hil { arguments: passed } = Cli::try_parse_from(all).unwrap().command else {
+            panic!("another command");
+        };
+        assert_eq!(passed, arguments);
     }
 }
 

@@ -2,20 +2,15 @@
 //! docs/conformance.md. tools/peers has a small host program for each; the line is a pair of pseudo-terminals.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use fs_err as fs;
 use serde_json::Value;
 
-use crate::command;
-use crate::workspace::{self, MESSAGES, Workspace};
-
-mod server;
-#[cfg(all(test, unix))]
-mod tests;
-
-use server::{Peer, Prepared, Started};
+use crate::group::Group;
+use crate::workspace::{self, MESSAGES, Workspace, locked};
+use crate::{command, python};
 
 /// The servers' package, a separate workspace.
 pub const MANIFEST: &str = "tools/peers/Cargo.toml";
@@ -28,6 +23,9 @@ const DOCUMENT: &str = "docs/conformance.md";
 const BEGIN: &str = "<!-- `cargo xtask peers` writes from here -->\n";
 const END: &str = "<!-- to here -->\n";
 
+/// The servers, in the order of the table.
+const PEERS: [&str; 4] = ["libmodbus", "modbus-core", "pymodbus", "rmodbus"];
+
 /// The case that `cargo xtask ci` runs on every server. It reads 125 registers.
 const SMOKE: &str = "fc03/quantity-most";
 
@@ -35,8 +33,8 @@ const SMOKE: &str = "fc03/quantity-most";
 #[derive(clap::Args, Debug)]
 pub struct Options {
     /// Test only this server, print its row, and do not write the document; may be repeated
-    #[arg(long, value_name = "NAME")]
-    only: Vec<Peer>,
+    #[arg(long, value_name = "NAME", value_parser = PEERS)]
+    only: Vec<String>,
 
     /// Write what every server sent and received, and every failed case, to files in this directory
     #[arg(long, value_name = "DIR")]
@@ -44,103 +42,132 @@ pub struct Options {
 }
 
 /// `cargo xtask peers`. A server whose library is missing is left out of the table, with the reason after it.
-pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
+pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let programs = Programs::build(workspace)?;
     let mut table =
         "| server | version | passed | failed | could not be asked | failed cases by group |\n\
                      |---|---|---|---|---|---|\n"
             .to_owned();
-    let mut missing = String::new();
-    for &peer in Peer::ALL {
-        if !options.only.is_empty() && !options.only.contains(&peer) {
+    let mut left_out = String::new();
+    for name in PEERS {
+        if !options.only.is_empty() && !options.only.iter().any(|only| only == name) {
             continue;
         }
-        let name = peer.name();
         eprintln!("testing {name}, which takes minutes");
-        match peer.prepare(workspace, programs.built()) {
-            Ok(server) => {
+        match programs.server(name) {
+            Ok((server, version)) => {
                 let cases = ["--standard-only", "--trace"];
-                let report = programs.test(&server, &cases, options.traces.as_deref())?;
-                table += &row(&server, &report)?;
+                let report = programs.test(name, server, &cases, options.traces.as_deref())?;
+                table += &row(name, version.trim(), &report)?;
             }
-            Err(why) => missing += &format!("\nLeft out: {name}: {why:#}.\n"),
+            Err(why) => left_out += &format!("\nLeft out: {name}: {why:#}.\n"),
         }
     }
-    let table = table + &missing;
+    table += &left_out;
     say!("{}", table.trim_end());
     if options.only.is_empty() {
         let path = workspace.root().join(DOCUMENT);
         let document = replaced(&fs::read_to_string(&path)?, &table);
-        fs::write(
-            &path,
-            document.with_context(|| format!("{DOCUMENT} has no {BEGIN:?} with {END:?}"))?,
-        )?;
+        let document =
+            document.with_context(|| format!("{DOCUMENT} has no {BEGIN:?} with {END:?}"))?;
+        fs::write(&path, document)?;
     }
     Ok(())
 }
 
 /// Builds every server, and reads registers of each.
-pub fn check(workspace: &Workspace) -> Result<()> {
+pub fn check(workspace: &mut Workspace) -> Result<()> {
     let programs = Programs::build(workspace)?;
-    for peer in Peer::ALL {
-        let server = peer.prepare(workspace, programs.built())?;
-        let report = programs.test(&server, &["--only", SMOKE], None)?;
+    for name in PEERS {
+        let (server, _) = programs.server(name)?;
+        let report = programs.test(name, server, &["--only", SMOKE], None)?;
         let cases = report["cases"].as_array().into_iter().flatten();
         let passed = cases.filter(|case| case["result"] == "passed").count();
-        ensure!(passed > 0, "{} does not pass {SMOKE}", peer.name());
+        ensure!(passed > 0, "{name} does not pass {SMOKE}");
     }
     Ok(())
 }
 
 /// The programs of a test.
-struct Programs {
+struct Programs<'a> {
+    workspace: &'a Workspace,
     /// Joins two pseudo-terminals.
     line: PathBuf,
     suite: PathBuf,
-    profile: PathBuf,
-    /// Directory of the reports.
-    scratch: PathBuf,
 }
 
-impl Programs {
-    fn build(workspace: &Workspace) -> Result<Self> {
-        let scratch = server::directory(workspace);
-        let mut cargo = workspace.cargo("build");
-        cargo.args(["--quiet", "--locked", "--manifest-path", MANIFEST, MESSAGES]);
-        let artifacts = workspace::artifacts(cargo.arg("--target-dir").arg(&scratch))?;
+impl<'a> Programs<'a> {
+    fn build(workspace: &'a Workspace) -> Result<Self> {
+        let mut cargo = workspace.other("build", MANIFEST, "peers");
+        let artifacts = workspace::artifacts(cargo.args(["--quiet", MESSAGES]))?;
         Ok(Self {
+            workspace,
             line: workspace::executable(&artifacts, "peer-line")?,
             suite: workspace.program("modio-conformance")?,
-            profile: workspace.root().join(PROFILE),
-            scratch,
         })
     }
 
-    /// Returns the directory of the servers in Rust.
-    fn built(&self) -> &Path {
-        self.line.parent().unwrap_or(&self.line)
+    /// Prepares a server. Returns its program, to which the port is the last argument, and the version of its library.
+    fn server(&self, name: &str) -> Result<(Command, String)> {
+        let peers = self.workspace.root().join("tools/peers");
+        // Those in Rust have been built with the line.
+        let mut program = self.line.with_file_name(format!("peer-{name}"));
+        match name {
+            "libmodbus" => {
+                let mut pkg_config = Command::new("pkg-config");
+                pkg_config.args(["--cflags", "--libs", "libmodbus"]);
+                let flags = command::read(&mut pkg_config).context(
+                    "libmodbus is not installed (on Debian: apt-get install gcc pkg-config libmodbus-dev)",
+                )?;
+                let mut cc = Command::new("cc");
+                cc.args(["-Wall", "-Wextra", "-Werror", "-o"]).arg(&program);
+                cc.arg(peers.join("libmodbus.c"));
+                command::run(cc.args(flags.split_whitespace()))?;
+                let version = command::read(Command::new(&program).arg("--version"))?;
+                Ok((Command::new(program), version))
+            }
+            "pymodbus" => {
+                program = python::environment(self.workspace, name, &[python::PYMODBUS])?;
+                let version = "import pymodbus; print(pymodbus.__version__)";
+                let version = command::read(Command::new(&program).args(["-c", version]))?;
+                let mut server = Command::new(program);
+                // -B: leaves no __pycache__ in the tree.
+                server.arg("-B").arg(peers.join("pymodbus_server.py"));
+                Ok((server, version))
+            }
+            _ => {
+                let version = locked_version(&peers.join("Cargo.lock"), name)?;
+                Ok((Command::new(program), version))
+            }
+        }
     }
 
     /// Starts a server on a new line, runs these cases against it, and returns the suite's report.
-    fn test(&self, server: &Prepared, cases: &[&str], traces: Option<&Path>) -> Result<Value> {
-        let name = server.name;
-        let mut line = Started::new(Command::new(&self.line))?;
+    fn test(
+        &self,
+        name: &str,
+        mut server: Command,
+        cases: &[&str],
+        traces: Option<&Path>,
+    ) -> Result<Value> {
+        let start = |mut command: Command| {
+            // The suite reports the bad frames that a server logs, so its log is not shown.
+            command.stdout(Stdio::piped()).stderr(Stdio::null());
+            Group::start(command)
+        };
+        let mut line = start(Command::new(&self.line))?;
         let [port, other] = [line.line()?, line.line()?];
-        let mut program = Command::new(&server.program);
-        program.args(&server.arguments).arg(port);
-        let mut running = Started::new(program)?;
-        let ready = running.line()?;
+        server.arg(port);
+        let mut running = start(server)?;
+        let ready = running.line().with_context(|| name.to_owned())?;
         ensure!(ready == "ready", "{name} does not start: {ready}");
-        let json = self.scratch.join(format!("{name}.json"));
+        let json = self.line.with_file_name(format!("{name}.json"));
         let mut suite = Command::new(&self.suite);
-        suite.arg("--serial").arg(other);
-        suite.args(["--baud", "19200", "--format", "8N2", "--profile"]);
+        suite.args(["--serial", &other, "--baud", "19200", "--format", "8N2"]);
         suite
-            .arg(&self.profile)
-            .args(cases)
-            .arg("--json")
-            .arg(&json);
-        let output = command::output(&mut suite)?;
+            .arg("--profile")
+            .arg(self.workspace.root().join(PROFILE));
+        let output = command::output(suite.args(cases).arg("--json").arg(&json))?;
         if let Some(directory) = traces {
             fs::create_dir_all(directory)?;
             fs::write(directory.join(format!("{name}.cases")), &output.stdout)?;
@@ -150,44 +177,46 @@ impl Programs {
         if !matches!(output.status.code(), Some(0 | 1)) {
             bail!("{name} cannot be tested: {}", command::complaint(&output));
         }
-        if let Some(status) = running.ended() {
+        if let Some(status) = running.ended()? {
             bail!("{name} has ended during the test ({status})");
         }
-        let report = serde_json::from_str(&fs::read_to_string(&json)?);
-        report.with_context(|| json.display().to_string())
+        Ok(serde_json::from_str(&fs::read_to_string(&json)?)?)
     }
 }
 
+/// Returns the version of a package in a Cargo.lock.
+fn locked_version(lock: &Path, name: &str) -> Result<String> {
+    let mut packages = locked(lock, "version")?.into_keys();
+    let package = packages.find(|(package, _)| package == name);
+    Ok(package
+        .with_context(|| format!("{} has no {name}", lock.display()))?
+        .1)
+}
+
 /// Returns the row of a server in the table, from the suite's report.
-fn row(server: &Prepared, report: &Value) -> Result<String> {
+fn row(name: &str, version: &str, report: &Value) -> Result<String> {
+    let cases = report["cases"].as_array();
+    let cases = cases.context("modio-conformance reports no cases")?;
     let (mut passed, mut failed, mut skipped) = (0, 0, 0);
     // Groups of cases with the number of those that failed, in the order of the suite.
     let mut groups: Vec<(&str, usize)> = Vec::new();
-    for case in report["cases"]
-        .as_array()
-        .context("modio-conformance reports no cases")?
-    {
+    for case in cases {
+        let group = case["name"].as_str().unwrap_or_default();
+        let group = group.split('/').next().unwrap_or_default();
         match case["result"].as_str() {
             Some("passed") => passed += 1,
             Some("skipped") => skipped += 1,
-            _ => {
-                failed += 1;
-                let group = case["name"]
-                    .as_str()
-                    .and_then(|name| name.split('/').next());
-                let group = group.unwrap_or_default();
-                match groups.iter_mut().find(|(name, _)| *name == group) {
-                    Some((_, count)) => *count += 1,
-                    None => groups.push((group, 1)),
-                }
-            }
+            _ => match groups.iter_mut().find(|(name, _)| *name == group) {
+                Some((_, count)) => *count += 1,
+                None => groups.push((group, 1)),
+            },
         }
     }
+    groups.iter().for_each(|(_, count)| failed += count);
     let groups = groups
         .iter()
-        .map(|(name, count)| format!("`{name}` {count}"));
+        .map(|(group, count)| format!("`{group}` {count}"));
     let groups = groups.collect::<Vec<_>>().join(", ");
-    let Prepared { name, version, .. } = server;
     Ok(format!(
         "| {name} | {version} | {passed} | {failed} | {skipped} | {groups} |\n"
     ))
@@ -198,4 +227,46 @@ fn replaced(document: &str, table: &str) -> Option<String> {
     let (before, rest) = document.split_once(BEGIN)?;
     let (_, after) = rest.split_once(END)?;
     Some(format!("{before}{BEGIN}{table}{END}{after}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn failures_are_counted_by_group() {
+        let case = |name: &str, result: &str| json!({ "name": name, "result": result });
+        let report = json!({ "cases": [
+            case("fc01/data", "passed"),
+            case("fc01/length", "failed"),
+            case("fc05/value", "failed"),
+            case("fc05/address", "failed"),
+            case("power/answers", "skipped"),
+        ] });
+        let row = row("fake", "1.2", &report).unwrap();
+        assert_eq!(row, "| fake | 1.2 | 1 | 3 | 1 | `fc01` 1, `fc05` 2 |\n");
+    }
+
+    #[test]
+    fn document_has_a_place_for_the_table_and_the_locked_versions() {
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        let document = fs::read_to_string(root.join(DOCUMENT)).unwrap();
+        let new = replaced(&document, "a table\n").unwrap();
+        assert!(new.contains("-->\na table\n<!--"));
+        let lock = root.join("tools/peers/Cargo.lock");
+        let python = fs::read_to_string(root.join(python::PYMODBUS)).unwrap();
+        let pymodbus = python
+            .lines()
+            .find_map(|line| line.strip_prefix("pymodbus=="));
+        for (name, version) in [
+            ("modbus-core", locked_version(&lock, "modbus-core").unwrap()),
+            ("rmodbus", locked_version(&lock, "rmodbus").unwrap()),
+            ("pymodbus", pymodbus.unwrap().to_owned()),
+        ] {
+            let row = format!("| {name} | {version} |");
+            assert!(document.contains(&row), "{row}: run `cargo xtask peers`");
+        }
+    }
 }

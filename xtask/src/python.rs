@@ -1,136 +1,107 @@
-//! Virtual environments of Python under target/, for the tests that run programs written in Python.
+//! Tests that are written in Python: other Modbus masters and the simulator's Python client, the simulator's page, and
+//! its pictures for the documents. Their packages are in virtual environments under target/.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context as _, Result};
-use fs_err as fs;
+use anyhow::{Context as _, Result, ensure};
+use register_map::board::{MODIO_02, MODIO_08};
 
-use crate::command;
-use crate::error::Missing;
+use crate::error::missing;
+use crate::workspace::Workspace;
+use crate::{build, command};
 
-/// Requirements of a virtual environment.
-#[derive(Clone, Copy, Debug)]
-pub struct Environment<'a> {
-    /// Name of the tests that need the environment, for messages.
-    pub what: &'a str,
-    /// The directory of the environment.
-    pub directory: &'a Path,
-    /// The files that pin its packages.
-    pub requirements: &'a [PathBuf],
-    /// Modules whose import shows that the packages work, separated by commas.
-    pub imports: &'a str,
-    /// The oldest minor version of Python 3 that the packages run on.
-    pub oldest: u8,
+/// The file that pins pymodbus and its serial port.
+pub const PYMODBUS: &str = "tools/sim/tests/pymodbus/requirements.txt";
+
+/// The script that runs the tests of a directory.
+const RUN: &str = "tools/sim/tests/pymodbus/run.py";
+
+/// The tests of the simulator's page, and the script for its pictures. Chromium shows the page, and Playwright controls
+/// Chromium.
+const PAGE: &str = "tools/sim/tests/page";
+
+/// Returns the interpreter of the environment `target/NAME-venv`, in which the packages of these files are installed.
+/// The error is [`Missing`](crate::error::Missing).
+pub fn environment(workspace: &Workspace, name: &str, requirements: &[&str]) -> Result<PathBuf> {
+    let made = made(workspace, name, requirements);
+    made.map_err(|why| missing(format!("no Python packages for {name}: {why:#}")))
 }
 
-impl Environment<'_> {
-    /// Makes the environment, or uses an existing one with the same requirements, and returns its interpreter.
-    /// The error is [`Missing`].
-    pub fn prepare(&self) -> Result<PathBuf> {
-        let made = self.prepare_with("python3");
-        made.map_err(|error| Missing(format!("{error:#}")).into())
+fn made(workspace: &Workspace, name: &str, requirements: &[&str]) -> Result<PathBuf> {
+    let directory = workspace.target().join(format!("{name}-venv"));
+    let program = if cfg!(windows) {
+        "Scripts/python.exe"
+    } else {
+        "bin/python"
+    };
+    let interpreter = directory.join(program);
+    let mut pip = Command::new(&interpreter);
+    pip.args("-m pip install --quiet --disable-pip-version-check".split(' '));
+    for file in requirements {
+        pip.arg("--requirement").arg(workspace.root().join(file));
     }
-
-    fn prepare_with(&self, python: &str) -> Result<PathBuf> {
-        let wanted = self.requirements.iter().map(fs::read_to_string);
-        let wanted: String = wanted.collect::<Result<_, _>>()?;
-        let name = if cfg!(windows) {
-            "Scripts/python.exe"
-        } else {
-            "bin/python"
-        };
-        let interpreter = self.directory.join(name);
-        // Written last, so that an interrupted installation is not treated as a complete one.
-        let stamp = self.directory.join("installed.txt");
-        let import = format!("import {}", self.imports);
-        let works = || command::read(Command::new(&interpreter).args(["-c", &import]));
-        if fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) && works().is_ok()
-        {
-            return Ok(interpreter);
-        }
-        let Self { what, oldest, .. } = self;
-        let version = format!("import sys; sys.exit(sys.version_info < (3, {oldest}))");
-        command::read(Command::new(python).args(["-c", &version])).with_context(|| {
-            format!("{what} needs Python 3.{oldest} or newer as python3 on the PATH")
-        })?;
-        eprintln!("making {}", self.directory.display());
-        let mut venv = Command::new(python);
-        command::read(venv.args(["-m", "venv", "--clear"]).arg(self.directory))
+    // pip needs no network when the packages are already installed. It fails when there is no environment yet, and
+    // after an update of Python, which has other directories.
+    if command::read(&mut pip).is_err() {
+        eprintln!("making {}", directory.display());
+        let mut venv = Command::new("python3");
+        command::read(venv.args(["-m", "venv", "--clear"]).arg(directory))
             .context("no virtual environment (on Debian: apt-get install python3-venv)")?;
-        let mut pip = Command::new(&interpreter);
-        pip.args([
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-        ]);
-        for file in self.requirements {
-            pip.arg("--requirement").arg(file);
-        }
-        command::read(&mut pip).with_context(|| format!("{what} cannot be installed from PyPI"))?;
-        fs::write(&stamp, wanted)?;
-        Ok(interpreter)
+        command::read(&mut pip)?;
     }
+    Ok(interpreter)
 }
 
-#[cfg(all(test, unix))]
-mod tests {
-    use super::*;
-    use crate::script::program;
+/// Runs pymodbus and mbpoll as masters of the images. Without mbpoll the script leaves out the tests with it, and the
+/// others must pass.
+pub fn masters(workspace: &mut Workspace) -> Result<()> {
+    let python = environment(workspace, "pymodbus", &[PYMODBUS])?;
+    command::run(&mut script(workspace, &python, RUN)?)?;
+    ensure!(
+        which::which("mbpoll").is_ok(),
+        missing("passed with pymodbus, but mbpoll was not run (on Debian: apt-get install mbpoll)")
+    );
+    Ok(())
+}
 
-    /// A python3 whose `-m venv` makes an interpreter that records its arguments.
-    const MAKES_VENV: &str = r#"
-        [ "$2" = venv ] || exit 0
-        mkdir -p "$4/bin"
-        printf '#!/bin/sh\necho "$@" >> "%s/calls"\n' "$4" > "$4/bin/python"
-        chmod +x "$4/bin/python""#;
+/// Runs the tests of the simulator's page.
+pub fn page(workspace: &mut Workspace) -> Result<()> {
+    let mut script = on_page(workspace, RUN)?;
+    command::run(script.arg("--tests").arg(workspace.root().join(PAGE)))
+}
 
-    /// Prepares an environment with two files of requirements in this directory.
-    fn prepare(directory: &Path, script: &str) -> Result<PathBuf> {
-        let at = |name| directory.join(name);
-        Environment {
-            what: "pymodbus",
-            directory: &at("venv"),
-            requirements: &[at("one.txt"), at("two.txt")],
-            imports: "pymodbus, serial",
-            oldest: 10,
-        }
-        .prepare_with(&program(directory, "python3", script).to_string_lossy())
-    }
+/// `cargo xtask screenshots`.
+pub fn screenshots(workspace: &mut Workspace) -> Result<()> {
+    let mut script = on_page(workspace, &format!("{PAGE}/screenshots.py"))?;
+    command::run(script.arg("--to").arg(workspace.root().join("docs/images")))
+}
 
-    fn directory() -> tempfile::TempDir {
-        let directory = tempfile::tempdir().unwrap();
-        fs::write(directory.path().join("one.txt"), "pymodbus==3.0\n").unwrap();
-        fs::write(directory.path().join("two.txt"), "pillow==1.0\n").unwrap();
-        directory
-    }
+fn on_page(workspace: &mut Workspace, name: &str) -> Result<Command> {
+    ensure!(
+        which::which("chromium").is_ok(),
+        missing("no browser for the simulator's page (on Debian: apt-get install chromium)")
+    );
+    let playwright = format!("{PAGE}/requirements.txt");
+    let python = environment(workspace, "page", &[&playwright, PYMODBUS])?;
+    script(workspace, &python, name)
+}
 
-    #[test]
-    fn environment_is_made_once_and_again_for_other_versions() {
-        let directory = directory();
-        let calls = || fs::read_to_string(directory.path().join("venv/calls")).unwrap();
-        let installations = || {
-            prepare(directory.path(), MAKES_VENV).unwrap();
-            calls().matches("pip install").count()
-        };
-        assert_eq!(installations(), 1);
-        assert!(calls().contains("one.txt") && calls().contains("two.txt"));
-        assert_eq!(installations(), 1, "the environment exists already");
-        fs::write(directory.path().join("two.txt"), "pillow==1.1\n").unwrap();
-        assert_eq!(installations(), 2, "the versions have changed");
-    }
-
-    #[test]
-    fn missing_python_or_venv_is_reported_with_what_to_install() {
-        let directory = directory();
-        let text = |script| format!("{:#}", prepare(directory.path(), script).unwrap_err());
-        assert!(text("exit 1").contains("pymodbus needs Python 3.10"));
-        let venv = text("[ \"$2\" = venv ] && { echo no ensurepip >&2; exit 1; }; exit 0");
-        assert!(
-            venv.contains("python3-venv") && venv.contains("no ensurepip"),
-            "{venv}"
-        );
-    }
+/// Returns the call of a script that tests the images in the simulator.
+fn script(workspace: &mut Workspace, python: &Path, name: &str) -> Result<Command> {
+    let mut script = Command::new(python);
+    // -B: do not write __pycache__ to the tree.
+    script.arg("-B").arg(workspace.root().join(name));
+    let (elf, elf_08) = (
+        build::image(workspace, &MODIO_02)?,
+        build::image(workspace, &MODIO_08)?,
+    );
+    script.arg("--sim").arg(workspace.simulator()?);
+    script
+        .arg("--elf")
+        .arg(elf.elf)
+        .arg("--elf-08")
+        .arg(elf_08.elf);
+    script.current_dir(workspace.root());
+    Ok(script)
 }

@@ -9,11 +9,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use fs_err as fs;
 use register_map::{Board, Module};
-use serde_json::{Value, json};
+use serde_json::json;
 
-use crate::error::usage;
 use crate::workspace::Workspace;
-use crate::{build, group, steps};
+use crate::{build, steps};
 
 pub mod checks;
 mod find;
@@ -49,16 +48,11 @@ pub struct Options {
     interactive: bool,
 
     /// The module in the first slot of --interactive: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "4di",
-        requires = "interactive"
-    )]
+    #[arg(long, default_value = "4di", requires = "interactive")]
     module: Module,
 
     /// The DIP switch of --interactive: the unit's address
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "interactive")]
+    #[arg(long, default_value_t = 1, requires = "interactive")]
     dip: u8,
 
     /// The line's TCP port of --interactive
@@ -69,29 +63,22 @@ pub struct Options {
 /// `cargo xtask renode`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     // Search before the build, which is useless without Renode.
-    let renode = Renode::find(options.renode.as_deref(), &find::Places::of_process()?)?;
-    eprintln!("{renode}");
+    let renode = Renode::find_on_this_machine(options.renode.as_deref())?;
+    eprintln!("Renode {} at {}", renode.version, renode.program.display());
     let board = options.build.board;
-    let elf = match &options.elf {
-        Some(elf) if !elf.is_file() => {
-            return Err(usage(format!("there is no image {}", elf.display())));
-        }
-        Some(elf) => std::path::absolute(elf)?,
-        None => build::image(workspace, board)?.elf,
-    };
     let bench = Bench {
         directory: workspace.root().join(DIRECTORY),
         output: workspace.target().join("renode").join(board.name),
         board,
         renode,
-        elf,
+        elf: build::given(workspace, board, options.elf.as_deref())?,
     };
     if options.interactive {
         return live::interact(&bench, options.module, options.dip, options.port);
     }
     let conformance = workspace.program("modio-conformance")?;
-    let rebot = checks::python(workspace)?;
-    bench.run(&conformance, &rebot)
+    let python = checks::python(workspace)?;
+    bench.run(&conformance, &python)
 }
 
 /// Everything that a run in Renode needs.
@@ -108,32 +95,25 @@ struct Bench {
 impl Bench {
     /// Runs the suites in Renode and then the program `conformance`, and writes a summary of both.
     fn run(&self, conformance: &Path, python: &Path) -> Result<()> {
-        group::end_on_signal()?;
         // Results of an earlier run would be mistaken for those of this one.
         let _ = fs::remove_dir_all(&self.output);
         fs::create_dir_all(&self.output)?;
-        let mut done = vec![steps::timed("suites", "suites in Renode", true, || {
-            suites::run(self, python)
-        })];
+        let suites = || suites::run(self, python);
+        let mut done = vec![steps::timed("suites", "suites in Renode", true, suites)];
         for module in Module::ALL {
             let name = format!("conformance-{module}");
             let what = format!("conformance in Renode, {module}");
-            done.push(steps::timed(&name, &what, true, || {
-                live::conformance(self, module, conformance)
-            }));
+            let run = || live::conformance(self, module, conformance);
+            done.push(steps::timed(&name, &what, true, run));
         }
-        let summary = self.summary(&done);
+        let steps = done.iter().map(|done| {
+            let (outcome, seconds) = (done.outcome.to_lowercase(), done.took.as_secs_f64());
+            json!({ "step": done.name, "outcome": outcome, "why": done.why, "seconds": seconds })
+        });
+        let steps: Vec<_> = steps.collect();
+        let summary = json!({ "renode": self.renode.version.to_string(), "steps": steps });
         fs::write(self.output.join("summary.json"), format!("{summary:#}\n"))?;
         say!("\nresults: {}", self.output.display());
         steps::finish(&done)
-    }
-
-    /// Returns the version of Renode, and the outcome and duration of every step.
-    fn summary(&self, done: &[steps::Done]) -> Value {
-        let steps = done.iter().map(|(name, outcome, took)| {
-            let (word, why) = outcome.words();
-            json!({ "step": name, "outcome": word.to_lowercase(), "why": why, "seconds": took.as_secs_f64() })
-        });
-        json!({ "renode": self.renode.version.to_string(), "steps": steps.collect::<Vec<_>>() })
     }
 }

@@ -1,10 +1,9 @@
 //! `cargo xtask sim`: builds the images and the simulator, then replaces this process with the simulator.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Error, Result};
+use anyhow::Result;
 use register_map::Board;
 use sim_options::Options;
 
@@ -21,7 +20,7 @@ pub fn run(
 ) -> Result<()> {
     options.check_line().map_err(usage)?;
     if let Some((_, elf)) = options.elf.iter().find(|(_, elf)| !elf.is_file()) {
-        return Err(no_image(elf));
+        return Err(usage(format!("there is no image {}", elf.display())));
     }
     let fittings = options.fittings().map_err(usage)?;
     let mut built = Vec::new();
@@ -29,33 +28,9 @@ pub fn run(
         let wanted = fittings.iter().any(|fitting| fitting.board == board);
         if wanted && options.elf_of(board).is_none() {
             let elf = build::image(workspace, board)?.elf;
-            built.push(command::joined(&format!("--elf={}=", board.name), elf));
+            built.push(format!("--elf={}={}", board.name, elf.display()));
         }
     }
-    let mut simulator = Command::new(simulator(workspace)?);
+    let mut simulator = Command::new(workspace.simulator()?);
     command::exec(simulator.args(arguments).args(built))
-}
-
-/// Runs a board in the simulator, with this image or one that is built.
-pub fn run_image(workspace: &mut Workspace, board: &Board, elf: Option<&Path>) -> Result<()> {
-    let elf = match elf {
-        Some(elf) if !elf.is_file() => return Err(no_image(elf)),
-        Some(elf) => elf.to_owned(),
-        None => build::image(workspace, board)?.elf,
-    };
-    let mut simulator = Command::new(simulator(workspace)?);
-    simulator
-        .args(["--board", board.name])
-        .arg("--elf")
-        .arg(elf);
-    command::exec(&mut simulator)
-}
-
-/// Builds the simulator and returns its path.
-pub fn simulator(workspace: &Workspace) -> Result<PathBuf> {
-    workspace.program("modio-sim")
-}
-
-fn no_image(elf: &Path) -> Error {
-    usage(format!("there is no image {}", elf.display()))
 }

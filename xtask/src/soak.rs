@@ -16,64 +16,47 @@ pub struct Options {
     frames: u64,
 
     /// Instead of frames without pause: hours of virtual time, such as 24, with a request every second
-    #[arg(long, conflicts_with = "frames", value_parser = hours)]
-    hours: Option<f64>,
+    // Virtual time ends after 213 days.
+    #[arg(long, conflicts_with = "frames", value_parser = clap::value_parser!(u16).range(1..=2400))]
+    hours: Option<u16>,
 
     /// Corner of the part: nominal, slow or fast
     #[arg(long, default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
     corner: String,
 }
 
-/// Parses a number of hours.
-fn hours(text: &str) -> Result<f64, String> {
-    let hours: f64 = text.parse().map_err(|_| "not a number of hours")?;
-    // Virtual time ends after 213 days.
-    if (0.01..=2400.0).contains(&hours) {
-        Ok(hours)
-    } else {
-        Err("0.01 to 2400 hours".to_owned())
-    }
-}
-
 /// `cargo xtask soak`: tests `noise` and `long_run` of `tools/sim/tests/image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let frames = options.frames.to_string();
-    let hours = options.hours.map(|hours| hours.to_string());
-    let (name, variable, value) = match &hours {
+    let frames = ("MODIO_SOAK_FRAMES", options.frames.to_string());
+    let (name, length) = match options.hours {
         Some(hours) => (
             "long_run::an_input_changes_and_is_read_every_second_for_hours",
-            "MODIO_SOAK_HOURS",
-            hours,
+            ("MODIO_SOAK_HOURS", hours.to_string()),
         ),
-        None => ("noise::soak", "MODIO_SOAK_FRAMES", &frames),
+        None => ("noise::soak", frames),
     };
-    one_test(
-        workspace,
-        "image",
-        name,
-        &[(variable, value), (test::CORNER, &options.corner)],
-    )
+    let corner = (test::CORNER, options.corner.clone());
+    one_test(workspace, "image", name, [length, corner])
 }
 
 /// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, the test
 /// `matrix` of `tools/conformance/tests/suite`.
 pub fn matrix(workspace: &mut Workspace) -> Result<()> {
     let name = "matrix::every_rate_and_format_conforms";
-    let every_case = [("MODIO_MATRIX", "every case")];
-    one_test(workspace, "suite", name, &every_case)
+    let every_case = ("MODIO_MATRIX", "every case".to_owned());
+    one_test(workspace, "suite", name, [every_case])
 }
 
-fn one_test(
+fn one_test<const N: usize>(
     workspace: &mut Workspace,
     test: &str,
     name: &str,
-    variables: &[(&str, &str)],
+    variables: [(&str, String); N],
 ) -> Result<()> {
     let elf = build::image(workspace, &MODIO_02)?.elf;
     let mut cargo = workspace.cargo("test");
     cargo.args(ALL).args(["--quiet", "--features", test::SUITE]);
     cargo.args(["--test", test, "--"]);
     cargo.args(["--include-ignored", "--nocapture", "--exact", name]);
-    cargo.env("MODIO_ELF", elf).envs(variables.iter().copied());
-    command::run(&mut cargo)
+    command::run(cargo.env("MODIO_ELF", elf).envs(variables))
 }

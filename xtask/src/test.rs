@@ -1,14 +1,21 @@
-//! `cargo xtask test`: the steps that a change must pass.
+//! `cargo xtask test`, the steps that a change must pass, and `cargo xtask ci`, which adds formatting, lints and
+//! documentation with every warning an error, and steps that take longer.
 
 use std::env;
+use std::process::Command;
 
+use In::{Ci, Host, Test};
+use Run::{Each, Once};
 use anyhow::Result;
 use register_map::Board;
 use register_map::board::{MODIO_02, MODIO_08};
 
-use crate::steps::{self, Bench, In, Step, short};
+use crate::error::usage;
+use crate::python::{masters, page};
+use crate::renode::checks;
+use crate::steps::{self, Done};
 use crate::workspace::{ALL, Workspace};
-use crate::{ci, command, page, pymodbus, renode, sim, size};
+use crate::{bench, build, command, fuzz, group, peers, size, table};
 
 /// The variable with the corner of the part for the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
@@ -16,6 +23,61 @@ pub const CORNER: &str = "MODIO_CORNER";
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
 /// built twice.
 pub const SUITE: &str = "conformance/sim";
+
+/// The packages of the image.
+const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
+
+/// The workspaces of this project.
+const WORKSPACES: [&str; 4] = ["Cargo.toml", fuzz::MANIFEST, bench::RIVALS, peers::MANIFEST];
+
+/// The tests of the modio-08 that run at the corners: those of the board itself, its start and its store. The other
+/// tests run the same code as on the modio-02, and would double the time.
+const OWN_OF_08: &str = "analog:: boot:: digital:: faults_of_slots:: power_cut:: slots::";
+
+/// Which command runs a step when no step is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum In {
+    /// `cargo xtask test --host`, `cargo xtask test` and `cargo xtask ci`.
+    Host,
+    /// `cargo xtask test` and `cargo xtask ci`.
+    Test,
+    /// `cargo xtask ci` only.
+    Ci,
+}
+
+/// The function of a step: for the project, or for each board.
+enum Run {
+    Once(fn(&mut Workspace) -> Result<()>),
+    Each(fn(&mut Workspace, &'static Board) -> Result<()>),
+}
+
+/// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
+/// runs for each board has the board's number at the end of its name, such as `lint-02`.
+const STEPS: [(In, &str, &str, Run); 23] = [
+    (Ci, "fmt", "formatting", Once(formatting)),
+    (Ci, "lint-host", "lints, host", Once(lint_host)),
+    (Ci, "lint", "lints, target", Each(lint_target)),
+    (Ci, "lint-fuzz", "lints, fuzz targets", Once(lint_fuzz)),
+    (Ci, "lint-rivals", "lints, rivals", Once(lint_rivals)),
+    (Ci, "lint-peers", "lints, peers", Once(lint_peers)),
+    (Ci, "doc-host", "documentation, host", Once(doc_host)),
+    (Ci, "doc", "documentation, target", Each(doc_target)),
+    (Host, "unit", "tests on the host", Once(unit)),
+    (Host, "image", "release image, no panics", Each(image)),
+    (Host, "size", "size of the image", Each(size::check)),
+    (Test, "sim", "tests of the images in simulation", Once(sim)),
+    (Test, "conformance", "the conformance suite", Once(suite)),
+    (Test, "modioctl", "modioctl on the simulator", Once(tool)),
+    (Test, "pymodbus", "pymodbus and mbpoll", Once(masters)),
+    (Test, "page", "the simulator's page", Once(page)),
+    (Test, "renode", "files for Renode", Each(checks::files)),
+    (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
+    (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
+    (Ci, "bench", "instructions and bytes", Each(bench::check)),
+    (Ci, "suites", "suites for Renode", Each(checks::suites)),
+    (Ci, "peers", "Modbus servers, briefly", Once(peers::check)),
+    (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
+];
 
 /// The options of `cargo xtask test`.
 #[derive(clap::Args, Debug)]
@@ -34,179 +96,251 @@ pub struct Options {
 pub struct Chosen {
     /// Run only these steps; --list shows their names
     #[arg(value_name = "STEP")]
-    pub names: Vec<String>,
+    names: Vec<String>,
 
     /// List the steps instead of running them
     #[arg(long, conflicts_with = "names")]
-    pub list: bool,
+    list: bool,
 
     /// Install missing Debian packages of the toolchain with apt-get, as root
     #[arg(long)]
-    pub install_packages: bool,
+    install_packages: bool,
 }
 
-/// `cargo xtask test`.
-pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let command = if options.host { In::Host } else { In::Test };
-    options.steps.run(workspace, command)
-}
+/// A step, for one board if its function is for each: command, name, description, function.
+type Step = (In, String, String, Box<Function>);
+type Function = dyn Fn(&mut Workspace) -> Result<()>;
 
-impl Chosen {
-    /// Runs the chosen steps, or the steps of the command if none is named.
-    pub fn run(&self, workspace: &mut Workspace, command: In) -> Result<()> {
-        let all = ci::steps();
-        if self.list {
-            steps::list(&all);
-            return Ok(());
+fn all() -> Vec<Step> {
+    let mut all: Vec<Step> = Vec::new();
+    for (part_of, name, what, run) in STEPS {
+        match run {
+            Once(run) => all.push((part_of, name.to_owned(), what.to_owned(), Box::new(run))),
+            Each(run) => {
+                for board in Board::ALL {
+                    let name = name.to_owned() + board.name.trim_start_matches("modio");
+                    let run = Box::new(move |workspace: &mut Workspace| run(workspace, board));
+                    all.push((part_of, name, format!("{what}, {board}"), run));
+                }
+            }
         }
-        workspace.install = self.install_packages;
-        let chosen = steps::chosen(all, &self.names, command)?;
-        let strict = command == In::Ci || is_ci(env::var("CI").ok().as_deref());
-        let mut bench = Bench::new(workspace, command == In::Host);
-        steps::run(&chosen, &mut bench, strict)
-    }
-}
-
-/// Returns whether the variable `CI`, which every CI service sets, means that this process runs in CI.
-fn is_ci(variable: Option<&str>) -> bool {
-    !matches!(variable, None | Some("" | "0" | "false"))
-}
-
-/// Returns the steps of `cargo xtask test`.
-pub fn steps() -> Vec<Step> {
-    let mut all = vec![Step::new(In::Host, "unit", "tests on the host", |bench| {
-        let mut cargo = bench.workspace.cargo("test");
-        if bench.host {
-            cargo.arg("--ignore-rust-version");
-        } else {
-            cargo.args(ALL).args(["--features", SUITE]);
-        }
-        command::run(cargo.arg("--no-fail-fast"))
-    })];
-    for board in Board::ALL {
-        let name = format!("image-{}", short(board));
-        let what = format!("release image of the {board}, which must not panic");
-        all.push(Step::new(In::Host, name, what, |bench| {
-            bench.image(board).map(drop)
-        }));
-        let name = format!("size-{}", short(board));
-        let what = format!("size of the image of the {board}");
-        all.push(Step::new(In::Host, name, what, |bench| {
-            size::check(&bench.image(board)?, board)
-        }));
-    }
-    all.extend([
-        Step::new(
-            In::Test,
-            "sim",
-            "tests of the images in simulation",
-            |bench| {
-                let tests = [
-                    "--bin=modio-sim",
-                    "--test=command",
-                    "--test=image",
-                    "--test=image_08",
-                ];
-                in_simulation(bench, &tests, &[], "nominal")
-            },
-        ),
-        Step::new(
-            In::Test,
-            "conformance",
-            "conformance of the images",
-            |bench| {
-                let tests = ["--test=suite", "--test=hil", "--test=hil_simulator"];
-                in_simulation(bench, &tests, &[], "nominal")
-            },
-        ),
-        Step::new(In::Test, "modioctl", "modioctl on the simulator", |bench| {
-            in_simulation(bench, &["--test=simulator"], &[], "nominal")
-        }),
-        Step::new(
-            In::Test,
-            "pymodbus",
-            "pymodbus and mbpoll as masters",
-            |bench| {
-                let (elf, elf_08) = (bench.image(&MODIO_02)?, bench.image(&MODIO_08)?);
-                pymodbus::check(bench.workspace, &elf, &elf_08)
-            },
-        ),
-        Step::new(
-            In::Test,
-            "page",
-            "the simulator's page in Chromium",
-            |bench| {
-                let (elf, elf_08) = (bench.image(&MODIO_02)?, bench.image(&MODIO_08)?);
-                page::check(bench.workspace, &elf, &elf_08)
-            },
-        ),
-    ]);
-    for board in Board::ALL {
-        let name = format!("renode-{}", short(board));
-        let what = format!("files for Renode, {board}");
-        all.push(Step::new(In::Test, name, what, |bench| {
-            let elf = bench.image(board)?;
-            renode::checks::files(bench.workspace, board, &elf)
-        }));
     }
     all
 }
 
-/// Returns the steps at the corners other than the nominal one.
-pub fn corners() -> impl Iterator<Item = Step> {
-    ["slow", "fast"].into_iter().map(|corner| {
-        let name = format!("sim-{corner}");
-        let what = format!("tests of the images in simulation, {corner} corner");
-        Step::new(In::Ci, name, what, move |bench| {
-            in_simulation(bench, &["--test=image"], &[], corner)?;
-            in_simulation(bench, &["--test=image_08"], &OWN_OF_08, corner)
-        })
-    })
+/// Returns the steps of these names, in the order of [`STEPS`], or the steps of the command if there are no names.
+fn chosen(names: &[String], command: In) -> Result<Vec<Step>> {
+    let mut all = all();
+    let unknown = |name: &&String| !all.iter().any(|step| step.1 == **name);
+    if let Some(name) = names.iter().find(unknown) {
+        return Err(usage(format!("no step {name:?}; --list shows the steps")));
+    }
+    all.retain(|(part_of, name, ..)| match names {
+        [] => *part_of <= command,
+        names => names.contains(name),
+    });
+    Ok(all)
 }
 
-/// The tests of the modio-08 that run at the corners: those of the board itself, its start and its store. The other
-/// tests run the same code as on the modio-02, and would double the time.
-const OWN_OF_08: [&str; 6] = [
-    "analog::",
-    "boot::",
-    "digital::",
-    "faults_of_slots::",
-    "power_cut::",
-    "slots::",
-];
+/// `cargo xtask test`.
+pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
+    workspace.host = options.host;
+    let command = if options.host { Host } else { Test };
+    options.steps.run(workspace, command)
+}
+
+/// `cargo xtask ci`. A step whose tool is missing fails.
+pub fn ci(workspace: &mut Workspace, options: &Chosen) -> Result<()> {
+    options.run(workspace, Ci)
+}
+
+impl Chosen {
+    fn run(&self, workspace: &mut Workspace, command: In) -> Result<()> {
+        if self.list {
+            let rows = all().into_iter().map(|(part_of, name, what, _)| {
+                let part_of = match part_of {
+                    Host => "test --host, test, ci",
+                    Test => "test, ci",
+                    Ci => "ci",
+                };
+                [name, part_of.to_owned(), what]
+            });
+            say!("{}", table::text(&["step", "runs in", "what"], rows));
+            return Ok(());
+        }
+        workspace.install = self.install_packages;
+        // Every CI service sets this variable.
+        let is_ci = !matches!(env::var("CI").as_deref(), Err(_) | Ok("" | "0" | "false"));
+        let strict = command == Ci || is_ci;
+        let mut done: Vec<Done> = Vec::new();
+        for (_, name, what, run) in chosen(&self.names, command)? {
+            group::not_interrupted()?;
+            done.push(steps::timed(&name, &what, strict, || run(workspace)));
+        }
+        steps::finish(&done)
+    }
+}
+
+fn formatting(workspace: &mut Workspace) -> Result<()> {
+    // Check all workspaces, even when one fails.
+    let checked = WORKSPACES.map(|manifest| {
+        let mut cargo = workspace.cargo("fmt");
+        command::run(cargo.args(["--all", "--check", "--manifest-path", manifest]))
+    });
+    checked.into_iter().collect()
+}
+
+fn deny_warnings(mut cargo: Command) -> Result<()> {
+    command::run(cargo.args(["--", "-Dwarnings"]))
+}
+
+fn lint_host(workspace: &mut Workspace) -> Result<()> {
+    let mut cargo = workspace.cargo("clippy");
+    cargo.args(ALL).arg("--all-targets");
+    deny_warnings(cargo)
+}
+
+/// Returns cargo with the options that compile code for a board.
+fn for_target(workspace: &mut Workspace, subcommand: &str, board: &Board) -> Result<Command> {
+    let mut cargo = workspace.target_cargo(subcommand)?;
+    cargo.args(["--profile", build::PROFILE]);
+    cargo.args(["--features", &format!("firmware/{board}")]);
+    Ok(cargo)
+}
+
+fn lint_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+    let mut cargo = for_target(workspace, "clippy", board)?;
+    for package in TARGET_PACKAGES.split(' ') {
+        cargo.args(["--package", package]);
+    }
+    deny_warnings(cargo)
+}
+
+fn lint_fuzz(workspace: &mut Workspace) -> Result<()> {
+    deny_warnings(workspace.other("clippy", fuzz::MANIFEST, "fuzz"))
+}
+
+fn lint_rivals(workspace: &mut Workspace) -> Result<()> {
+    deny_warnings(bench::rivals(workspace, "clippy")?)
+}
+
+fn lint_peers(workspace: &mut Workspace) -> Result<()> {
+    deny_warnings(workspace.other("clippy", peers::MANIFEST, "peers"))
+}
+
+fn documentation(mut cargo: Command) -> Result<()> {
+    cargo.args(["--no-deps", "--document-private-items"]);
+    // Private items are documented too, so links to them are valid.
+    let flags = "-Dwarnings -Arustdoc::private-intra-doc-links";
+    command::run(cargo.env("RUSTDOCFLAGS", flags))
+}
+
+fn doc_host(workspace: &mut Workspace) -> Result<()> {
+    let mut cargo = workspace.cargo("doc");
+    // Most of board-support exists for the target only.
+    cargo.args(ALL).args(["--exclude", "board-support"]);
+    documentation(cargo)
+}
+
+fn doc_target(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+    let mut cargo = for_target(workspace, "doc", board)?;
+    cargo.args(["--package", "board-support", "--package", "firmware"]);
+    documentation(cargo)
+}
+
+fn unit(workspace: &mut Workspace) -> Result<()> {
+    let mut cargo = workspace.cargo("test");
+    if workspace.host {
+        cargo.arg("--ignore-rust-version");
+    } else {
+        cargo.args(ALL).args(["--features", SUITE]);
+    }
+    command::run(cargo.arg("--no-fail-fast"))
+}
+
+fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+    build::image(workspace, board).map(drop)
+}
+
+fn sim(workspace: &mut Workspace) -> Result<()> {
+    let tests = "--bin=modio-sim --test=command --test=image --test=image_08";
+    in_simulation(workspace, tests, "", "nominal")
+}
+
+fn suite(workspace: &mut Workspace) -> Result<()> {
+    let tests = "--test=suite --test=hil --test=hil_simulator";
+    in_simulation(workspace, tests, "", "nominal")
+}
+
+fn tool(workspace: &mut Workspace) -> Result<()> {
+    in_simulation(workspace, "--test=simulator", "", "nominal")
+}
+
+fn sim_slow(workspace: &mut Workspace) -> Result<()> {
+    in_simulation(workspace, "--test=image", "", "slow")?;
+    in_simulation(workspace, "--test=image_08", OWN_OF_08, "slow")
+}
+
+fn sim_fast(workspace: &mut Workspace) -> Result<()> {
+    in_simulation(workspace, "--test=image", "", "fast")?;
+    in_simulation(workspace, "--test=image_08", OWN_OF_08, "fast")
+}
 
 /// Runs tests that run the images in the simulator at a corner of the part: those of these targets whose names contain
-/// one of `names`, or all.
-fn in_simulation(bench: &mut Bench, targets: &[&str], names: &[&str], corner: &str) -> Result<()> {
-    let mut cargo = bench.workspace.cargo("test");
+/// one of `names`, or all. Spaces separate targets and names.
+fn in_simulation(workspace: &mut Workspace, targets: &str, names: &str, at: &str) -> Result<()> {
+    let mut cargo = workspace.cargo("test");
     cargo
         .args(ALL)
         .args(["--no-fail-fast", "--features", SUITE]);
-    cargo.args(targets).args(["--", "--include-ignored"]);
-    cargo.args(names);
-    cargo.env("MODIO_ELF", bench.image(&MODIO_02)?);
-    cargo.env("MODIO_ELF_08", bench.image(&MODIO_08)?);
-    cargo.env(CORNER, corner);
+    cargo
+        .args(targets.split(' '))
+        .args(["--", "--include-ignored"]);
+    cargo.args(names.split_whitespace()).env(CORNER, at);
+    cargo.env("MODIO_ELF", build::image(workspace, &MODIO_02)?.elf);
+    cargo.env("MODIO_ELF_08", build::image(workspace, &MODIO_08)?.elf);
     // Tests of one package do not know the path of another package's program.
-    cargo.env("MODIO_SIM", sim::simulator(bench.workspace)?);
+    cargo.env("MODIO_SIM", workspace.simulator()?);
     command::run(&mut cargo)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
+    fn names(names: &[&str], command: In) -> Result<Vec<String>> {
+        let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+        let chosen = chosen(&names, command)?;
+        Ok(chosen.into_iter().map(|step| step.1).collect())
+    }
+
     #[test]
-    fn ci_is_recognised_by_its_variable() {
-        for (variable, expected) in [
-            (None, false),
-            (Some(""), false),
-            (Some("false"), false),
-            (Some("0"), false),
-            (Some("true"), true),
-            (Some("1"), true),
-        ] {
-            assert_eq!(is_ci(variable), expected, "{variable:?}");
+    fn steps_are_chosen_by_command_or_name() {
+        let host = names(&[], Host).unwrap();
+        assert_eq!(host, ["unit", "image-02", "image-08", "size-02", "size-08"]);
+        let test = names(&[], Test).unwrap();
+        assert!(host.iter().all(|name| test.contains(name)) && !test.contains(&"fuzz".to_owned()));
+        assert_eq!(
+            names(&["size-08", "fmt"], Test).unwrap(),
+            ["fmt", "size-08"]
+        );
+        let error = names(&["no-step"], Test).unwrap_err();
+        assert!(error.is::<crate::error::Usage>(), "{error}");
+    }
+
+    #[test]
+    fn workflow_runs_every_step_under_a_unique_name() {
+        let workflow = include_str!("../../.github/workflows/ci.yml");
+        let words: BTreeSet<&str> = workflow.split_whitespace().collect();
+        let mut seen = BTreeSet::new();
+        for name in names(&[], Ci).unwrap() {
+            assert!(
+                words.contains(name.as_str()),
+                "{name} is in no job of ci.yml"
+            );
+            assert!(seen.insert(name.clone()), "{name} is the name of two steps");
         }
     }
 }

@@ -12,14 +12,14 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use semver::{Version, VersionReq};
-use wait_timeout::ChildExt as _;
 
 use crate::command;
+use crate::group::Group;
 
 /// The Cortex-M3, without an operating system.
 pub const TARGET: &str = "thumbv7m-none-eabi";
@@ -33,13 +33,10 @@ const LINKER: &str = "/usr/bin/rust-lld";
 
 /// Debian's rustc and cargo, which are kept new enough for Firefox; the sources of `core`, because there is no package
 /// for the target; lld; and clippy.
-const PACKAGES: [&str; 5] = [
-    "rustc-web",
-    "cargo-web",
-    "rust-web-src",
-    "rust-web-llvm",
-    "rust-web-clippy",
-];
+const PACKAGES: &str = "rustc-web cargo-web rust-web-src rust-web-llvm rust-web-clippy";
+
+/// Variables that rustup's cargo sets. With them, Debian's cargo would use rustup's rustc and libraries.
+const RUSTUPS: &str = "CARGO RUSTC RUSTDOC RUSTUP_TOOLCHAIN LD_LIBRARY_PATH";
 
 /// A way to compile for the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,14 +61,7 @@ impl Way {
             return command;
         }
         let mut command = Command::new("/usr/bin/cargo");
-        // rustup's cargo sets these variables. With them, Debian's cargo would use rustup's rustc and libraries.
-        for name in [
-            "CARGO",
-            "RUSTC",
-            "RUSTDOC",
-            "RUSTUP_TOOLCHAIN",
-            "LD_LIBRARY_PATH",
-        ] {
+        for name in RUSTUPS.split(' ') {
             command.env_remove(name);
         }
         let path = std::env::var("PATH").unwrap_or_default();
@@ -85,36 +75,22 @@ impl Way {
 
 /// Finds a way to compile for the target, and prints it in one line. Debian packages are only installed with `install`.
 pub fn find(root: &Path, install: bool) -> Result<Way> {
-    Machine::default().find(root, install)
+    Machine(PathBuf::new()).find(root, install)
 }
 
 /// Makes rustup download a target for the active toolchain, unless it is installed.
 pub fn add(root: &Path, target: &str) -> Result<()> {
-    Machine::default().add(root, target)
+    Machine(PathBuf::new()).add(root, target)
 }
 
-/// The programs of this machine that are called.
-struct Machine {
-    rustc: PathBuf,
-    rustup: PathBuf,
-    dpkg_query: PathBuf,
-    apt_get: PathBuf,
-    debian_rustc: PathBuf,
-}
-
-impl Default for Machine {
-    fn default() -> Self {
-        Self {
-            rustc: "rustc".into(),
-            rustup: "rustup".into(),
-            dpkg_query: "dpkg-query".into(),
-            apt_get: "/usr/bin/apt-get".into(),
-            debian_rustc: "/usr/bin/rustc".into(),
-        }
-    }
-}
+/// The directory of the programs that are called. An empty path stands for the PATH.
+struct Machine(PathBuf);
 
 impl Machine {
+    fn program(&self, name: &str) -> Command {
+        Command::new(self.0.join(name))
+    }
+
     fn find(&self, root: &Path, install: bool) -> Result<Way> {
         let Err(rustup) = self.add(root, TARGET) else {
             eprintln!("{TARGET}: installed in the active toolchain");
@@ -123,9 +99,8 @@ impl Machine {
         self.debian(install).map_err(|debian| {
             anyhow!(
                 "no way to compile for {TARGET}: install rustup (https://rustup.rs) and run `rustup target add \
-                 {TARGET}`, or on Debian run as root `apt-get install --no-install-recommends {}` (rustup: \
-                 {rustup:#}; Debian: {debian:#})",
-                PACKAGES.join(" ")
+                 {TARGET}`, or on Debian run as root `apt-get install --no-install-recommends {PACKAGES}` (rustup: \
+                 {rustup:#}; Debian: {debian:#})"
             )
         })?;
         eprintln!("{TARGET}: core built with Debian's rustc-web (rustup: {rustup:#})");
@@ -133,59 +108,56 @@ impl Machine {
     }
 
     fn add(&self, root: &Path, target: &str) -> Result<()> {
-        let mut rustc = Command::new(&self.rustc);
+        let mut rustc = self.program("rustc");
         rustc.args(["--print", "target-libdir", "--target", target]);
         let directory = command::read(rustc.current_dir(root))?;
         if Path::new(directory.trim()).is_dir() {
             return Ok(());
         }
-        let mut rustup = Command::new(&self.rustup);
+        let mut rustup = self.program("rustup");
         rustup.args(["target", "add", target]).current_dir(root);
-        let child = rustup.stdin(Stdio::null()).spawn();
-        let mut child = child.map_err(|error| command::no_start(&rustup, error))?;
-        match child.wait_timeout(RUSTUP_LIMIT)? {
+        match Group::start(rustup)?.wait(RUSTUP_LIMIT)? {
             Some(status) if status.success() => Ok(()),
             Some(_) => bail!("`rustup target add {target}` failed"),
-            None => {
-                child.kill()?;
-                child.wait()?;
-                bail!("`rustup target add {target}` did not end")
-            }
+            None => bail!("`rustup target add {target}` did not end"),
         }
     }
 
     fn debian(&self, install: bool) -> Result<()> {
-        if !self.has_packages() {
-            if !install {
-                bail!(
-                    "the packages are not installed; `cargo xtask ci --install-packages` installs them as root"
-                );
-            }
-            eprintln!("{TARGET}: apt-get installs {}", PACKAGES.join(" "));
-            let mut update = Command::new(&self.apt_get);
-            command::run(update.args(["-q", "update"]))?;
-            self.install(&PACKAGES)?;
+        let mut version = self.rustc_web();
+        if install && version.is_none() {
+            eprintln!("{TARGET}: apt-get installs {PACKAGES}");
+            command::run(self.program("apt-get").args(["-q", "update"]))?;
+            self.install(PACKAGES)?;
             if let Some(package) = missing_linker(Path::new(LINKER)) {
-                self.install(&[&package])?;
+                self.install(&package)?;
             }
+            version = self.rustc_web();
         }
-        let version = command::read(Command::new(&self.debian_rustc).arg("--version"))?;
+        let version = version.context(
+            "the packages are not installed; `cargo xtask ci --install-packages` installs them as root",
+        )?;
         new_enough(&version, env!("CARGO_PKG_RUST_VERSION"))
     }
 
-    fn has_packages(&self) -> bool {
-        let mut query = Command::new(&self.dpkg_query);
-        query.args(["--show", "--showformat", "${db:Status-Status}\\n"]);
-        let states = command::read(query.args(PACKAGES)).unwrap_or_default();
-        let installed = states.lines().filter(|state| *state == "installed");
-        installed.count() == PACKAGES.len() && missing_linker(Path::new(LINKER)).is_none()
+    /// Returns the version of Debian's rustc, if all packages are installed.
+    fn rustc_web(&self) -> Option<String> {
+        let mut query = self.program("dpkg-query");
+        let format = "${db:Status-Status} ${Version}\\n";
+        query.args(["--show", "--showformat", format]);
+        let states = command::read(query.args(PACKAGES.split(' '))).ok()?;
+        let mut versions = states.lines().map(|line| line.strip_prefix("installed "));
+        let first = versions.next()??;
+        let all = versions.all(|version| version.is_some());
+        let linked = missing_linker(Path::new(LINKER)).is_none();
+        (all && linked).then(|| first.to_owned())
     }
 
-    fn install(&self, packages: &[&str]) -> Result<()> {
-        let mut apt_get = Command::new(&self.apt_get);
+    fn install(&self, packages: &str) -> Result<()> {
+        let mut apt_get = self.program("apt-get");
         apt_get.env("DEBIAN_FRONTEND", "noninteractive");
         apt_get.args(["-q", "install", "-y", "--no-install-recommends"]);
-        command::run(apt_get.args(packages))
+        command::run(apt_get.args(packages.split(' ')))
     }
 }
 
@@ -195,85 +167,57 @@ fn missing_linker(link: &Path) -> Option<String> {
     Some(target.file_name()?.to_str()?.to_owned())
 }
 
-/// Compares the version in `rustc 1.96.0 (...)` with one such as `1.95`.
-fn new_enough(rustc: &str, least: &str) -> Result<()> {
-    let found = rustc.split_whitespace().nth(1).unwrap_or_default();
-    let version = Version::parse(found).with_context(|| format!("its rustc is {found:?}"))?;
-    if !VersionReq::parse(&format!(">={least}"))?.matches(&version) {
-        bail!("its rustc is {version}, {least} is needed");
-    }
+/// Compares the version of a Debian package, `1.96.0+dfsg1-1`, with one such as `1.95`.
+fn new_enough(package: &str, least: &str) -> Result<()> {
+    let upstream = package.split(['+', '-', '~']).next().unwrap_or_default();
+    let version = Version::parse(upstream).with_context(|| format!("its rustc is {package:?}"))?;
+    let enough = VersionReq::parse(&format!(">={least}"))?.matches(&version);
+    ensure!(enough, "its rustc is {version}, {least} is needed");
     Ok(())
 }
 
 #[cfg(all(test, unix))]
 mod tests {
-    use std::ffi::OsStr;
-
     use super::*;
     use crate::script::program;
 
-    /// Makes a machine without the target, whose programs record their arguments.
+    /// Makes a machine without the target, whose rustup and dpkg-query are these scripts, and whose apt-get records its
+    /// arguments.
     fn machine(directory: &Path, rustup: &str, dpkg_query: &str) -> Machine {
-        let log = directory.join("log");
-        let fake = |name, script: &str| {
-            let text = format!("echo {name} \"$@\" >> '{}'\n{script}", log.display());
-            program(directory, name, &text)
+        program(directory, "rustc", "echo /nowhere");
+        program(directory, "rustup", rustup);
+        program(directory, "dpkg-query", dpkg_query);
+        let log = directory.join("log").display().to_string();
+        program(directory, "apt-get", &format!("echo \"$@\" >> '{log}'"));
+        Machine(directory.to_owned())
+    }
+
+    #[test]
+    fn rustup_is_preferred_and_debian_packages_are_installed_only_on_request() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path();
+        let packages = |version| format!("for n in 1 2 3 4 5; do echo installed {version}; done");
+        let find = |rustup, dpkg_query: &str, install| {
+            let way = machine(path, rustup, dpkg_query).find(path, install);
+            way.map_err(|error| format!("{error:#}"))
         };
-        Machine {
-            rustc: fake("rustc", "echo /nowhere"),
-            rustup: fake("rustup", rustup),
-            dpkg_query: fake("dpkg-query", dpkg_query),
-            apt_get: fake("apt-get", ""),
-            debian_rustc: fake("debian-rustc", "echo rustc 1.99.0"),
+        assert_eq!(find("exit 0", "exit 1", true), Ok(Way::Rustup));
+        let new = packages("1.196.0+dfsg1-1~deb13u1");
+        assert_eq!(find("exit 1", &new, false), Ok(Way::Debian));
+        let old = find("exit 1", &packages("1.85.0+dfsg3-1"), false).unwrap_err();
+        assert!(old.contains("its rustc is 1.85.0, 1.95 is needed"), "{old}");
+        let text = find("exit 1", "exit 1", false).unwrap_err();
+        for part in [
+            "rustup target add thumbv7m",
+            "--no-install-recommends rustc-web",
+            "as root",
+        ] {
+            assert!(text.contains(part) && !text.contains('\n'), "{text}");
         }
-    }
-
-    fn installed(directory: &Path) -> String {
-        let log = fs_err::read_to_string(directory.join("log")).unwrap();
-        log.lines()
-            .filter(|line| line.contains("install"))
-            .collect()
-    }
-
-    #[test]
-    fn rustup_is_preferred_to_debian() {
-        let directory = tempfile::tempdir().unwrap();
-        let machine = machine(directory.path(), "exit 0", "exit 1");
-        let way = machine.find(directory.path(), true);
-        assert_eq!(way.unwrap(), Way::Rustup);
-        assert_eq!(installed(directory.path()), "");
-    }
-
-    #[test]
-    fn debian_packages_are_used_and_installed_only_on_request() {
-        let directory = tempfile::tempdir().unwrap();
-        let five = "for n in 1 2 3 4 5; do echo installed; done";
-        let machine = |dpkg_query| machine(directory.path(), "exit 1", dpkg_query);
-        let way = machine(five).find(directory.path(), false);
-        assert_eq!(way.unwrap(), Way::Debian);
-        let error = machine("exit 1").find(directory.path(), false).unwrap_err();
-        let text = format!("{error:#}");
-        assert!(
-            text.contains("rustup target add thumbv7m-none-eabi"),
-            "{text}"
-        );
-        assert!(
-            text.contains("apt-get install --no-install-recommends rustc-web"),
-            "{text}"
-        );
-        assert!(!text.contains('\n'), "{text}");
-        assert_eq!(installed(directory.path()), "");
-        let way = machine("exit 1").find(directory.path(), true);
-        assert_eq!(way.unwrap(), Way::Debian);
-        assert!(installed(directory.path()).ends_with("rust-web-clippy"));
-    }
-
-    #[test]
-    fn old_rustc_is_refused() {
-        assert!(new_enough("rustc 1.100.0 (ac68faa20 2026-05-25)", "1.95").is_ok());
-        let old = new_enough("rustc 1.85.1 (Debian)", "1.95").unwrap_err();
-        assert_eq!(old.to_string(), "its rustc is 1.85.1, 1.95 is needed");
-        assert!(new_enough("", "1.95").is_err());
+        assert!(!path.join("log").exists(), "nothing was installed");
+        assert!(find("exit 1", "exit 1", true).is_err());
+        let installed = fs_err::read_to_string(path.join("log")).unwrap();
+        assert!(installed.ends_with("rust-web-clippy\n"), "{installed}");
     }
 
     #[test]
@@ -285,18 +229,5 @@ mod tests {
         assert_eq!(missing_linker(&link).as_deref(), Some("lld-22"));
         fs_err::write(directory.path().join("lld-22"), "").unwrap();
         assert_eq!(missing_linker(&link), None);
-    }
-
-    #[test]
-    fn debian_cargo_ignores_rustups_toolchain() {
-        let command = Way::Debian.cargo("build");
-        let environment: Vec<_> = command.get_envs().collect();
-        for cleared in ["RUSTUP_TOOLCHAIN", "RUSTC", "CARGO", "LD_LIBRARY_PATH"] {
-            assert!(
-                environment.contains(&(OsStr::new(cleared), None)),
-                "{cleared}"
-            );
-        }
-        assert!(Way::Rustup.cargo("build").get_envs().next().is_none());
     }
 }

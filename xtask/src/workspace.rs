@@ -6,19 +6,23 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail};
-use cargo_metadata::{Artifact, Message, MetadataCommand};
+use cargo_metadata::{Artifact, Message, MetadataCommand, PackageId};
 
 use crate::command;
 use crate::toolchain::{self, Way};
 
 /// The project on this machine.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Workspace {
     root: PathBuf,
     target: PathBuf,
     way: Option<Way>,
+    /// Further arguments of every cargo.
+    arguments: Vec<String>,
     /// Whether missing Debian packages may be installed.
     pub install: bool,
+    /// Whether host tests leave out the simulator.
+    pub host: bool,
 }
 
 impl Workspace {
@@ -32,9 +36,18 @@ impl Workspace {
         Ok(Self {
             target: metadata.exec()?.target_directory.into(),
             root,
-            way: None,
-            install: false,
+            ..Self::default()
         })
+    }
+
+    /// Returns the same project with another target directory, and with further arguments of every cargo.
+    pub fn with(&self, target: PathBuf, arguments: Vec<String>) -> Self {
+        Self {
+            root: self.root.clone(),
+            target,
+            arguments,
+            ..*self
+        }
     }
 
     /// The directory of the root Cargo.toml.
@@ -51,6 +64,15 @@ impl Workspace {
     pub fn cargo(&self, subcommand: &str) -> Command {
         let mut cargo = Command::new(toolchain::cargo());
         cargo.current_dir(&self.root).arg(subcommand);
+        cargo.args(&self.arguments);
+        cargo
+    }
+
+    /// Returns cargo for the host that builds a separate workspace in `directory` of the target directory.
+    pub fn other(&self, subcommand: &str, manifest: &str, directory: &str) -> Command {
+        let mut cargo = self.cargo(subcommand);
+        cargo.args(["--locked", "--manifest-path", manifest]);
+        cargo.arg("--target-dir").arg(self.target.join(directory));
         cargo
     }
 
@@ -61,7 +83,7 @@ impl Workspace {
             None => *self.way.insert(toolchain::find(&self.root, self.install)?),
         };
         let mut cargo = way.cargo(subcommand);
-        cargo.current_dir(&self.root);
+        cargo.current_dir(&self.root).args(&self.arguments);
         Ok(cargo)
     }
 
@@ -70,6 +92,11 @@ impl Workspace {
         let mut cargo = self.cargo("build");
         cargo.args(ALL).args(["--bin", program, MESSAGES]);
         executable(&artifacts(&mut cargo)?, program)
+    }
+
+    /// Builds the simulator and returns its path.
+    pub fn simulator(&self) -> Result<PathBuf> {
+        self.program("modio-sim")
     }
 }
 
@@ -101,13 +128,22 @@ pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
     Ok(artifacts)
 }
 
+/// Returns the packages that were compiled into a directory.
+pub fn packages(artifacts: &[Artifact], directory: &Path) -> Vec<PackageId> {
+    let compiled = artifacts.iter().filter(|artifact| {
+        let mut files = artifact.filenames.iter();
+        files.any(|file| file.as_std_path().starts_with(directory))
+    });
+    compiled.map(|built| built.package_id.clone()).collect()
+}
+
 /// Returns the file of a program that was built.
 pub fn executable(artifacts: &[Artifact], program: &str) -> Result<PathBuf> {
     // A library may have the same name.
-    let mut built = artifacts
+    let built = artifacts
         .iter()
         .filter(|built| built.target.name == program);
-    let file = built.find_map(|built| built.executable.clone());
+    let file = built.filter_map(|built| built.executable.clone()).next();
     let file = file.with_context(|| format!("cargo has built no program {program}"))?;
     Ok(file.into())
 }

@@ -8,13 +8,13 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Context as _, Result};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::image::Elf;
-use crate::size::Source;
+use crate::size::{Source, structures};
 
 /// The server's crate.
-pub const CRATE: &str = "modbus_server";
+const CRATE: &str = "modbus_server";
 
 /// The structures that a line needs, and their numbers.
 const STRUCTURES: [(&str, u64); 4] = [
@@ -44,11 +44,19 @@ fn is_server(file: &str) -> Option<bool> {
     source.map(|(_, server)| *server)
 }
 
-/// Replaces the counts by address in each request of a report by the server's share, `server`.
-pub fn add_instructions(report: &mut Value, elf: &Elf<'_>) -> Result<()> {
+/// Adds the server's share to a report: `server` in each request, in place of the counts by address, and flash and RAM.
+pub fn add(report: &mut Value, elf: &Elf<'_>) -> Result<()> {
     let source = Source::new(elf)?;
     replace(report, |address| source.innermost(address, is_server))
-        .context("the report of tools/bench has no counts by address")
+        .context("the report of tools/bench has no counts by address")?;
+    let crates = report["image"]["crates"].as_array();
+    let row = crates
+        .into_iter()
+        .flatten()
+        .find(|row| row["name"] == CRATE);
+    let flash = row.with_context(|| format!("the image has no code of {CRATE}"))?["flash"].clone();
+    report["server"] = json!({ "flash": flash, "ram": ram(&structures(elf, CRATE)?)? });
+    Ok(())
 }
 
 fn replace(report: &mut Value, is_server: impl Fn(u32) -> Option<bool>) -> Option<()> {
@@ -66,16 +74,8 @@ fn replace(report: &mut Value, is_server: impl Fn(u32) -> Option<bool>) -> Optio
     Some(())
 }
 
-/// Returns the server's flash, by the source of its code, from the sizes of an image.
-pub fn flash(image: &Value) -> Result<u64> {
-    let mut crates = image["crates"].as_array().into_iter().flatten();
-    let row = crates.find(|row| row["name"] == CRATE);
-    let flash = row.and_then(|row| row["flash"].as_u64());
-    flash.with_context(|| format!("the image has no code of {CRATE}"))
-}
-
 /// Returns the server's RAM: its structures, with the two buffers of a line.
-pub fn ram(sizes: &BTreeMap<String, u64>) -> Result<u64> {
+fn ram(sizes: &BTreeMap<String, u64>) -> Result<u64> {
     let size = |(name, count): &(&str, u64)| {
         let size = sizes.get(*name).map(|size| size * count);
         size.with_context(|| format!("the debug information has no {CRATE}::{name}"))
@@ -86,15 +86,12 @@ pub fn ram(sizes: &BTreeMap<String, u64>) -> Result<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn source_is_the_servers_or_the_drivers_or_a_library() {
         for (file, server) in [
             ("/m/modbus-server/src/line/receiver.rs", Some(true)),
-            ("/m/firmware/src/device/points.rs", Some(true)),
             ("C:\\m\\firmware\\src\\app\\line.rs", Some(false)),
-            ("/m/firmware/src/alive.rs", Some(false)),
             ("/m/board-support/src/rs485.rs", Some(false)),
             ("/m/board-support/src/mem.rs", Some(true)),
             ("/r/registry/src/index/vcell-0.1.3/src/lib.rs", None),
@@ -106,29 +103,9 @@ mod tests {
     #[test]
     fn instructions_of_the_driver_are_left_out() {
         let mut report = json!({ "requests": [{ "addresses": { "2": 10, "4": 200, "6": 3000 } }] });
-        let is_server = |address| {
-            [(2, true), (4, false)]
-                .into_iter()
-                .find(|row| row.0 == address)
-        };
-        let is_server = |address| is_server(address).map(|row| row.1);
+        let is_server = |address| (address != 6).then_some(address == 2);
         replace(&mut report, is_server).unwrap();
         assert_eq!(report, json!({ "requests": [{ "server": 3010 }] }));
         assert!(replace(&mut report, is_server).is_none());
-    }
-
-    #[test]
-    fn line_has_two_buffers() {
-        let sizes = [
-            ("Server", 100),
-            ("Receiver<u8>", 40),
-            ("Transmitter", 30),
-            ("Adu", 260),
-        ];
-        let mut sizes = sizes.map(|(name, size)| (name.to_owned(), size)).into();
-        assert_eq!(ram(&sizes).unwrap(), 690);
-        sizes.remove("Adu");
-        let missing = ram(&sizes).unwrap_err().to_string();
-        assert!(missing.contains("modbus_server::Adu"), "{missing}");
     }
 }

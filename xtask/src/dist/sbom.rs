@@ -1,40 +1,142 @@
-//! The bill of materials: the crates that are linked into the image, and their dependencies, in CycloneDX 1.5 (JSON).
+//! The bills of materials: the crates that are linked into an image or a program, and their dependencies, in CycloneDX
+//! 1.5 (JSON).
 //!
 //! The build itself reports which packages it compiled for the target, `cargo metadata` has their origin, and
-//! Cargo.lock their check sums. Procedural macros and build scripts run on the host and are not in the bill. The bill
-//! has neither time nor serial number, so the same sources give the same bill.
+//! Cargo.lock their check sums. Procedural macros and build scripts run on the host and are not in a bill. A bill has
+//! neither time nor serial number, so the same sources give the same bill.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package, PackageId};
 use object::{Object as _, ObjectSection as _};
 use register_map::Board;
 use serde_json::{Value, json};
 
+use super::notices::{self, Notices};
 use crate::build::Image;
-use crate::image;
 use crate::toolchain::TARGET;
 use crate::workspace::{Workspace, locked};
+use crate::{command, image};
 
-/// Returns the bill of an image. `flash` is the SHA-256 of its .bin.
-pub fn of_image(workspace: &Workspace, board: &Board, built: &Image, flash: &str) -> Result<Value> {
+/// The file that a bill is for.
+struct Subject<'a> {
+    name: &'a str,
+    /// Its kind in CycloneDX.
+    kind: &'a str,
+    /// The package that it is built from.
+    package: &'a str,
+    /// The version of the rustc that has compiled it.
+    compiler: &'a str,
+    sha256: &'a str,
+}
+
+/// Returns the bill of an image, and notes its packages. `flash` is the SHA-256 of its .bin.
+pub fn of_image(
+    workspace: &Workspace,
+    board: &Board,
+    built: &Image,
+    flash: &str,
+    notices: &mut Notices,
+) -> Result<Value> {
+    let elf = image::read(&built.elf)?;
+    let subject = Subject {
+        name: board.name,
+        kind: "firmware",
+        package: "firmware",
+        compiler: &compiler(&elf)?,
+        sha256: flash,
+    };
+    let metadata = metadata(workspace, TARGET, &format!("firmware/{board}"))?;
+    of(workspace, &subject, &metadata, &built.packages, notices)
+}
+
+/// Returns the bill of a program, and notes its packages.
+pub fn of_program(
+    workspace: &Workspace,
+    target: &str,
+    (package, program): (&str, &str),
+    compiled: &[PackageId],
+    sha256: &str,
+    notices: &mut Notices,
+) -> Result<Value> {
+    let version = command::read(Command::new("rustc").arg("--version"))?;
+    let subject = Subject {
+        name: program,
+        kind: "application",
+        package,
+        compiler: version.trim().trim_start_matches("rustc "),
+        sha256,
+    };
+    let metadata = metadata(workspace, target, "")?;
+    of(workspace, &subject, &metadata, compiled, notices)
+}
+
+fn of(
+    workspace: &Workspace,
+    subject: &Subject,
+    metadata: &Metadata,
+    compiled: &[PackageId],
+    notices: &mut Notices,
+) -> Result<Value> {
+    let linked = linked(metadata, subject.package, compiled)?;
+    notices.note(linked.values().copied());
+    let sums = locked(&workspace.root().join("Cargo.lock"), "checksum")?;
+    bill(subject, &linked, metadata, &sums)
+}
+
+fn metadata(workspace: &Workspace, target: &str, features: &str) -> Result<Metadata> {
     let mut metadata = MetadataCommand::new();
     metadata.current_dir(workspace.root());
     metadata.other_options([
-        format!("--filter-platform={TARGET}"),
-        format!("--features=firmware/{board}"),
+        "--locked".to_owned(),
+        format!("--filter-platform={target}"),
+        format!("--features={features}"),
     ]);
-    let sums = locked(&workspace.root().join("Cargo.lock"), "checksum")?;
-    let elf = image::read(&built.elf)?;
-    bill(
-        board,
-        &built.packages,
-        &metadata.exec()?,
-        &sums,
-        &compiler(&elf)?,
-        flash,
-    )
+    Ok(metadata.exec()?)
+}
+
+/// Returns a package and those of its dependencies, direct or not, that were compiled for the target.
+fn linked<'a>(
+    metadata: &'a Metadata,
+    root: &str,
+    compiled: &[PackageId],
+) -> Result<BTreeMap<&'a PackageId, &'a Package>> {
+    let packages: BTreeMap<&PackageId, &Package> = metadata
+        .packages
+        .iter()
+        .filter(|package| compiled.contains(&package.id))
+        .map(|package| (&package.id, package))
+        .collect();
+    let root = packages.values().find(|package| *package.name == root);
+    let root = root.with_context(|| format!("the build has not compiled {root:?}"))?;
+    let mut found = BTreeMap::new();
+    let mut open = vec![&root.id];
+    while let Some(id) = open.pop() {
+        let Some((id, package)) = packages.get_key_value(id) else {
+            continue;
+        };
+        if found.insert(*id, *package).is_none() {
+            open.extend(normal_dependencies(metadata, id));
+        }
+    }
+    Ok(found)
+}
+
+/// Returns the dependencies of a package, without those of its tests and its build script.
+fn normal_dependencies<'a>(
+    metadata: &'a Metadata,
+    of: &PackageId,
+) -> impl Iterator<Item = &'a PackageId> {
+    let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
+    let node = nodes.into_iter().find(|node| node.id == *of);
+    let dependencies = node.into_iter().flat_map(|node| &node.deps);
+    let normal = dependencies.filter(|dependency| {
+        let mut kinds = dependency.dep_kinds.iter();
+        kinds.any(|kind| kind.kind == DependencyKind::Normal)
+    });
+    normal.map(|dependency| &dependency.pkg)
 }
 
 /// Returns the version of the rustc that has compiled the image, from a comment in the image.
@@ -53,51 +155,36 @@ fn compiler(elf: &[u8]) -> Result<String> {
 }
 
 fn bill(
-    board: &Board,
-    linked: &[PackageId],
+    subject: &Subject,
+    linked: &BTreeMap<&PackageId, &Package>,
     metadata: &Metadata,
     sums: &BTreeMap<(String, String), String>,
-    compiler: &str,
-    flash: &str,
 ) -> Result<Value> {
-    let linked: BTreeMap<&PackageId, &Package> = metadata
-        .packages
-        .iter()
-        .filter(|package| linked.contains(&package.id))
-        .map(|package| (&package.id, package))
-        .collect();
     let (root, mut libraries): (Vec<&Package>, Vec<&Package>) = linked
         .values()
-        .partition(|package| *package.name == "firmware");
-    ensure!(root.len() == 1, "the image has not one package firmware");
+        .partition(|package| *package.name == subject.package);
+    let root = root.first().context("the subject is not linked")?;
     libraries.sort_by_key(|package| reference(package));
-    let mut main = component(root[0], sums);
-    main["type"] = json!("firmware");
-    main["name"] = json!(board.name);
-    main["hashes"] = json!([{ "alg": "SHA-256", "content": flash }]);
+    let mut main = component(root, sums)?;
+    main["type"] = json!(subject.kind);
+    main["name"] = json!(subject.name);
+    main["hashes"] = json!([{ "alg": "SHA-256", "content": subject.sha256 }]);
 
-    let resolve = metadata
-        .resolve
-        .as_ref()
-        .context("cargo reports no dependencies")?;
-    let dependencies: BTreeMap<String, BTreeSet<String>> = resolve
-        .nodes
+    let dependencies: BTreeMap<String, BTreeSet<String>> = linked
         .iter()
-        .filter_map(|node| {
-            let normal = node.deps.iter().filter(|dependency| {
-                let mut kinds = dependency.dep_kinds.iter();
-                kinds.any(|kind| kind.kind == DependencyKind::Normal)
-            });
-            let on = normal.filter_map(|dependency| Some(reference(linked.get(&dependency.pkg)?)));
-            Some((reference(linked.get(&node.id)?), on.collect()))
+        .map(|(id, package)| {
+            let on = normal_dependencies(metadata, id)
+                .filter_map(|dependency| Some(reference(linked.get(dependency)?)));
+            (reference(package), on.collect())
         })
         .collect();
     let dependencies = dependencies
         .into_iter()
         .map(|(of, on)| json!({ "ref": of, "dependsOn": on }));
-    let libraries = libraries
+    let libraries: Result<Vec<_>> = libraries
         .into_iter()
-        .map(|package| component(package, sums));
+        .map(|package| component(package, sums))
+        .collect();
     Ok(json!({
         "$schema": "http://cyclonedx.org/schema/bom-1.5.schema.json",
         "bomFormat": "CycloneDX",
@@ -105,19 +192,21 @@ fn bill(
         "version": 1,
         "metadata": {
             "component": main,
-            "tools": { "components": [{ "type": "application", "name": "rustc", "version": compiler }] },
+            "tools": {
+                "components": [{ "type": "application", "name": "rustc", "version": subject.compiler }],
+            },
         },
-        "components": libraries.collect::<Vec<_>>(),
+        "components": libraries?,
         "dependencies": dependencies.collect::<Vec<_>>(),
     }))
 }
 
 /// Returns the name of a package in the bill.
-fn reference(package: &Package) -> String {
+pub fn reference(package: &Package) -> String {
     format!("{}@{}", package.name, package.version)
 }
 
-fn component(package: &Package, sums: &BTreeMap<(String, String), String>) -> Value {
+fn component(package: &Package, sums: &BTreeMap<(String, String), String>) -> Result<Value> {
     let mut component = json!({
         "type": "library",
         "bom-ref": reference(package),
@@ -134,28 +223,23 @@ fn component(package: &Package, sums: &BTreeMap<(String, String), String>) -> Va
         let version = package.version.to_string().replace('+', "%2B");
         component["purl"] = json!(format!("pkg:cargo/{}@{version}", package.name));
     }
-    if let Some(license) = &package.license {
-        // Older packages have a slash instead of the OR of SPDX.
-        let license = license.replace(" / ", " OR ").replace('/', " OR ");
-        component["licenses"] = json!([{ "expression": license }]);
-    }
+    let license = notices::expression(package)?.to_string();
+    component["licenses"] = json!([{ "expression": license }]);
     if let Some(sum) = sums.get(&(package.name.to_string(), package.version.to_string())) {
         component["hashes"] = json!([{ "alg": "SHA-256", "content": sum }]);
     }
     if let Some(url) = &package.repository {
         component["externalReferences"] = json!([{ "type": "vcs", "url": url }]);
     }
-    component
+    Ok(component)
 }
 
 #[cfg(test)]
 mod tests {
-    use register_map::board::MODIO_02;
-
     use super::*;
 
-    /// The metadata of three packages: `firmware` depends on `crc` and on a macro, and `crc` on `firmware` for its
-    /// tests.
+    /// The metadata of four packages: `firmware` depends on `crc` and on a macro, `crc` on `firmware` for its tests, and
+    /// `other` on nothing.
     fn metadata() -> Metadata {
         let registry = "registry+https://github.com/rust-lang/crates.io-index";
         let package = |id: &str, name: &str, version: &str, source: Option<&str>| {
@@ -172,11 +256,13 @@ mod tests {
                 package("f", "firmware", "0.1.0", None),
                 package("c", "crc", "3.4.0+1", Some(registry)),
                 package("m", "a-macro", "1.0.0", Some(registry)),
+                package("o", "other", "0.1.0", None),
             ],
             "resolve": { "root": null, "nodes": [
                 node("f", vec![dependency("c", Value::Null), dependency("m", Value::Null)]),
                 node("c", vec![dependency("f", json!("dev"))]),
                 node("m", vec![]),
+                node("o", vec![]),
             ] },
             "workspace_members": ["f"], "workspace_root": "/x", "target_directory": "/x/target", "version": 1,
         });
@@ -186,10 +272,20 @@ mod tests {
     #[test]
     fn bill_has_the_linked_packages_with_their_origin_and_dependencies() {
         let sums = BTreeMap::from([(("crc".to_owned(), "3.4.0+1".to_owned()), "abcd".to_owned())]);
-        let linked = ["f", "c"].map(|id| PackageId {
+        // The other program's package was compiled in the same build.
+        let compiled = ["f", "c", "o"].map(|id| PackageId {
             repr: id.to_owned(),
         });
-        let bill = bill(&MODIO_02, &linked, &metadata(), &sums, "1.95.0", "ef").unwrap();
+        let subject = Subject {
+            name: "modio-02",
+            kind: "firmware",
+            package: "firmware",
+            compiler: "1.95.0",
+            sha256: "ef",
+        };
+        let metadata = metadata();
+        let linked = linked(&metadata, "firmware", &compiled).unwrap();
+        let bill = bill(&subject, &linked, &metadata, &sums).unwrap();
         let [crc] = bill["components"].as_array().unwrap().as_slice() else {
             panic!("{bill:#}");
         };

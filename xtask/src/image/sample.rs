@@ -1,7 +1,6 @@
 //! Small images for tests.
 
-use object::build::elf::{Builder, SectionData};
-use object::{Endianness, elf};
+use object::elf;
 
 /// A load segment, which is a section at the same time: load address, run address, data, size in memory.
 pub type Segment<'a> = (u32, u32, &'a [u8], u32);
@@ -14,86 +13,61 @@ pub fn code(address: u32, data: &[u8]) -> Segment<'_> {
     (address, address, data, data.len() as u32)
 }
 
-/// Returns an ELF file for an Arm core with these contents.
+/// Returns an ELF file for an Arm core with these contents: header, program headers, data, section headers.
 pub fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
-    let mut builder = Builder::new(Endianness::Little, false);
-    builder.header.e_type = elf::ET_EXEC;
-    builder.header.e_machine = elf::EM_ARM;
-    builder.header.e_phoff = 0x34;
-    let mut sections = Vec::new();
-    for &(load, run, data, size) in segments {
-        let section = builder.sections.add();
-        section.name = match (data.is_empty(), load == run) {
-            (true, _) => b".bss"[..].into(),
-            (false, true) => b".text"[..].into(),
-            (false, false) => b".data"[..].into(),
+    let count = segments.len() as u32;
+    let start = 52 + 32 * count;
+    let mut data: Vec<u8> = Vec::new();
+    let mut put = |bytes: &[u8]| {
+        let at = start + data.len() as u32;
+        data.extend(bytes);
+        data.resize(data.len().next_multiple_of(4), 0);
+        at
+    };
+    let (mut programs, mut sections) = (Vec::new(), vec![0; 10]);
+    for &(load, run, bytes, size) in segments {
+        let at = put(bytes);
+        // Offsets of names in `.shstrtab`.
+        let (name, kind) = match (bytes.is_empty(), load == run) {
+            (true, _) => (1, elf::SHT_NOBITS),
+            (false, true) => (6, elf::SHT_PROGBITS),
+            (false, false) => (12, elf::SHT_PROGBITS),
         };
-        section.sh_flags = elf::SHF_ALLOC.into();
-        section.sh_addr = run.into();
-        section.sh_addralign = 1;
-        section.sh_size = size.into();
-        if data.is_empty() {
-            section.sh_type = elf::SHT_NOBITS;
-            section.data = SectionData::UninitializedData(size.into());
-        } else {
-            section.sh_type = elf::SHT_PROGBITS;
-            section.data = SectionData::Data(data.into());
-        }
-        sections.push((section.id(), run..run.saturating_add(size)));
+        programs.extend([elf::PT_LOAD, at, run, load, bytes.len() as u32, size, 0, 1]);
+        sections.extend([name, kind, elf::SHF_ALLOC, run, at, size, 0, 0, 1, 0]);
     }
+    let (mut table, mut names) = (vec![0; 4], vec![0]);
     for &(name, address, size) in symbols {
-        let home = sections.iter().find(|(_, range)| range.contains(&address));
-        let symbol = builder.symbols.add();
-        symbol.name = name.as_bytes().into();
-        symbol.section = Some(home.expect("a symbol in a segment").0);
-        symbol.set_st_info(
-            elf::STB_GLOBAL,
-            if address & 1 == 1 {
-                elf::STT_FUNC
-            } else {
-                elf::STT_OBJECT
-            },
-        );
-        symbol.st_value = address.into();
-        symbol.st_size = size.into();
-    }
-    for (name, kind) in [
-        (".symtab", SectionData::Symbol),
-        (".strtab", SectionData::String),
-        (".shstrtab", SectionData::SectionString),
-    ] {
-        let section = builder.sections.add();
-        section.name = name.as_bytes().into();
-        section.sh_type = if name == ".symtab" {
-            elf::SHT_SYMTAB
+        let inside = |&(_, run, _, size): &Segment| address.wrapping_sub(run) < size;
+        let segment = segments.iter().position(inside).expect("a segment");
+        let function = address & 1 == 1;
+        let kind = if function {
+            elf::STT_FUNC
         } else {
-            elf::SHT_STRTAB
+            elf::STT_OBJECT
         };
-        section.sh_addralign = 1;
-        section.data = kind;
+        let info = u32::from(elf::STB_GLOBAL << 4 | kind) | (segment as u32 + 1) << 16;
+        table.extend([names.len() as u32, address, size, info]);
+        names.extend(name.bytes().chain([0]));
     }
-    for _ in segments {
-        builder.segments.add().p_type = elf::PT_LOAD;
+    let shared = b"\0.bss\0.text\0.data\0.symtab\0.strtab\0.shstrtab\0";
+    for (name, kind, bytes, link, entry) in [
+        (18, elf::SHT_SYMTAB, words(&table), count + 2, 16),
+        (26, elf::SHT_STRTAB, names, 0, 0),
+        (34, elf::SHT_STRTAB, shared.to_vec(), 0, 0),
+    ] {
+        let at = put(&bytes);
+        sections.extend([name, kind, 0, 0, at, bytes.len() as u32, link, 1, 1, entry]);
     }
-    builder.set_section_sizes();
-    // After the file header and the program headers.
-    let mut offset = 0x34 + 0x20 * segments.len() as u64;
-    for ((section, _), &(_, _, data, _)) in sections.iter().zip(segments) {
-        builder.sections.get_mut(*section).sh_offset = offset;
-        offset += data.len() as u64;
-    }
-    for (segment, &(load, run, data, size)) in builder.segments.iter_mut().zip(segments) {
-        segment.p_paddr = load.into();
-        segment.p_vaddr = run.into();
-        segment.p_filesz = data.len() as u64;
-        segment.p_memsz = size.into();
-        segment.p_align = 1;
-    }
-    for ((section, _), segment) in sections.iter().zip(&mut builder.segments) {
-        segment.p_offset = builder.sections.get(*section).sh_offset;
-        segment.sections.push(*section);
-    }
-    let mut bytes = Vec::new();
-    builder.write(&mut bytes).unwrap();
-    bytes
+    let place = put(&[]);
+    // 32 bits, little-endian; an executable for Arm; then places, sizes and numbers of the headers.
+    let (arm, programs_of, sections_of) = (40 << 16 | 2, 32 << 16 | 52, 40 << 16 | count);
+    let end = (count + 3) << 16 | (count + 4);
+    let mut file = words(&[0x464C457F, 0x00010101, 0, 0, arm, 1, 0, 52, place, 0]);
+    file.extend(words(&[programs_of, sections_of, end]));
+    [file, words(&programs), data, words(&sections)].concat()
+}
+
+fn words(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }

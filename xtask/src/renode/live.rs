@@ -1,11 +1,10 @@
 //! The board in Renode: in virtual time for the conformance suite, or with its line on a TCP socket for a
 //! person.
 
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::Write as _;
 use std::net::{Ipv4Addr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
@@ -17,25 +16,29 @@ use crate::command;
 use crate::debug::free_port;
 use crate::group::Group;
 
-/// A script of a board has the board's name and one of these ends. `EXACT` serves the line by the exact-line protocol,
-/// `SOCKET` offers the line to a person.
-const EXACT: &str = "-exact.resc";
-const SOCKET: &str = ".resc";
-
 /// Time for Renode to load the platform, start the board and open the socket.
 const START: Duration = Duration::from_secs(180);
 
-/// Time for a server of the line to answer.
-const ANSWER: Duration = Duration::from_secs(5);
+/// Time for Renode to end when it is asked to.
+const END: Duration = Duration::from_secs(10);
 
 /// Runs the conformance suite against the board in Renode with this module. The results are in `conformance-MODULE.*`
 /// in the output directory.
 pub fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
     let (port, monitor) = (free_port()?, free_port()?);
-    let script = write_script(bench, EXACT, module, 1, port)?;
+    let script = write_script(bench, "-exact", module, 1, port)?;
     let log = bench.output.join(format!("renode-{module}.log"));
     let mut renode = start(bench, &script, monitor, &log)?;
-    await_line(&mut renode, port, &log)?;
+    let end = Instant::now() + START;
+    while TcpStream::connect((Ipv4Addr::LOCALHOST, port)).is_err() {
+        let ended = renode.wait(Duration::from_millis(100))?.is_some();
+        ensure!(!ended, "Renode does not start the board: {}", reason(&log));
+        let shown = log.display();
+        ensure!(
+            Instant::now() < end,
+            "Renode takes too long to start the board, see {shown}"
+        );
+    }
     let mut command = Command::new(suite);
     command.args(["--exact-line", &format!("127.0.0.1:{port}")]);
     command.args(["--unit", "1", "--allow-config"]);
@@ -43,27 +46,31 @@ pub fn conformance(bench: &Bench, module: Module, suite: &Path) -> Result<()> {
         let name = format!("conformance-{module}.{extension}");
         command.arg(option).arg(bench.output.join(name));
     }
-    let status = Group::start(command)?.wait()?;
-    let died = renode.has_ended()?;
-    quit(monitor);
-    drop(renode);
+    let status = Group::start(command)?.wait(Duration::MAX)?;
+    let died = renode.ended()?.is_some();
+    // In a separate line, because the first bytes after the connection may be lost. A Renode that does not answer is
+    // ended with its group.
+    if let Ok(mut socket) = TcpStream::connect((Ipv4Addr::LOCALHOST, monitor)) {
+        let _ = socket.write_all(b"\r\nquit\r\n");
+    }
+    renode.wait(END)?;
     ensure!(
         !died,
         "Renode ended before the conformance suite did: {}",
-        last_line(&log)
+        reason(&log)
     );
-    match status.code() {
+    match status.and_then(|status| status.code()) {
         Some(0) => Ok(()),
         Some(1) => bail!("cases failed"),
         Some(2) => bail!("nothing could be tested"),
-        _ => bail!("the conformance suite was ended ({status})"),
+        _ => bail!("the conformance suite was ended"),
     }
 }
 
 /// Starts the board for a person, with Renode's monitor on the terminal.
 pub fn interact(bench: &Bench, module: Module, dip: u8, port: u16) -> Result<()> {
     fs::create_dir_all(&bench.output)?;
-    let script = write_script(bench, SOCKET, module, dip, port)?;
+    let script = write_script(bench, "", module, dip, port)?;
     say!("the line: 127.0.0.1:{port}, raw bytes; unit {dip}, {module} in the first slot");
     say!("in the monitor: modio_log shows the firmware's log, quit ends Renode");
     let mut renode = Command::new(&bench.renode.program);
@@ -80,76 +87,29 @@ fn start(bench: &Bench, script: &Path, monitor: u16, log: &Path) -> Result<Group
     Group::start(renode)
 }
 
-/// Requests Renode to end. A Renode that does not answer is ended with its group.
-fn quit(monitor: u16) {
-    if let Ok(mut socket) = TcpStream::connect((Ipv4Addr::LOCALHOST, monitor)) {
-        // In a separate line, because the first bytes after the connection may be lost.
-        let _ = socket.write_all(b"\r\nquit\r\n");
-    }
-}
-
-/// Waits until the server of the line answers.
-fn await_line(renode: &mut Group, port: u16, log: &Path) -> Result<()> {
-    let end = Instant::now() + START;
-    while !greets(port) {
-        ensure!(
-            !renode.has_ended()?,
-            "Renode does not start the board: {}",
-            last_line(log)
-        );
-        ensure!(
-            Instant::now() < end,
-            "the line did not answer after {} s, see {}",
-            START.as_secs(),
-            log.display()
-        );
-        thread::sleep(Duration::from_millis(100));
-    }
-    Ok(())
-}
-
-/// Returns whether a server of the exact-line protocol answers at this port.
-fn greets(port: u16) -> bool {
-    let Ok(mut socket) = TcpStream::connect((Ipv4Addr::LOCALHOST, port)) else {
-        return false;
-    };
-    let mut reply = String::new();
-    let asked = socket
-        .set_read_timeout(Some(ANSWER))
-        .and_then(|()| socket.write_all(b"hello 1\n"))
-        .and_then(|()| BufReader::new(socket).read_line(&mut reply));
-    asked.is_ok() && reply.starts_with("ok ")
-}
-
-/// Returns the last error in a log, or its last line.
-fn last_line(log: &Path) -> String {
+/// Returns the error in a log, or its last line.
+fn reason(log: &Path) -> String {
     let text = fs::read(log).unwrap_or_default();
-    let text = String::from_utf8_lossy(&text);
-    let is_error = |line: &&str| line.to_lowercase().contains("error");
-    let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let line = lines().rfind(is_error).or_else(|| lines().next_back());
-    line.unwrap_or("its log is empty").to_owned()
+    let reason = command::reason(&String::from_utf8_lossy(&text));
+    reason.unwrap_or_else(|| "its log is empty".to_owned())
 }
 
-/// Writes the script that sets image and board, and then includes another script.
-fn write_script(bench: &Bench, kind: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
+/// Writes the script that sets image and board, and then includes the script of the board with this kind of line:
+/// `-exact` for the exact-line protocol, or nothing for the socket of a person.
+fn write_script(bench: &Bench, line: &str, module: Module, dip: u8, port: u16) -> Result<PathBuf> {
     let script = bench.output.join("run.resc");
     let text = format!(
         "$elf={}\n$dip={dip}\n$module=\"{module}\"\n$port={port}\ninclude {}\n",
         token(&bench.elf),
-        token(&bench.directory.join(format!("{}{kind}", bench.board))),
+        token(&bench.directory.join(format!("{}{line}.resc", bench.board))),
     );
     fs::write(&script, text)?;
     Ok(script)
 }
 
 /// Returns a path in the form that Renode's monitor accepts on every system.
-pub fn token(path: &Path) -> String {
+fn token(path: &Path) -> String {
     let text = path.to_string_lossy();
-    let text = if cfg!(windows) {
-        text.replace('\\', "/")
-    } else {
-        text.into_owned()
-    };
-    format!("@{}", text.replace(' ', "\\ "))
+    let separator = std::path::MAIN_SEPARATOR;
+    format!("@{}", text.replace(separator, "/").replace(' ', "\\ "))
 }

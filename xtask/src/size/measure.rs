@@ -7,31 +7,24 @@ use object::elf::{SHF_ALLOC, SHF_EXECINSTR, SHT_NOBITS};
 use object::read::elf::SectionHeader as _;
 use object::{Object as _, ObjectSection as _};
 
-use super::owner;
 use super::source::Source;
 use crate::image::{self, RAM_BASE};
 
 /// Bytes of a section that no symbol covers: constants without a name, and padding.
 const UNNAMED: &str = "(unnamed constants, padding)";
 
+/// Start-up code, exception vectors and interrupt handlers, which have the names of the linker script or of the
+/// hardware.
+const NAMED: &str = "(vectors, handlers, start-up)";
+
+/// Starts of the names of the functions that the compiler calls, in crate `compiler_builtins`.
+const BUILTINS: [&str; 4] = ["__aeabi_", "mem", "__rust_", "bcmp"];
+
 /// More bytes than any microcontroller has of a memory.
 const LARGEST: u32 = 16 * 1024 * 1024;
 
-/// Bytes of each memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Bytes {
-    /// Bytes of flash, including initial values of variables.
-    pub flash: u32,
-    /// Bytes of RAM, without the stack.
-    pub ram: u32,
-}
-
-impl std::ops::AddAssign for Bytes {
-    fn add_assign(&mut self, other: Self) {
-        self.flash += other.flash;
-        self.ram += other.ram;
-    }
-}
+/// Bytes of flash, including initial values of variables, and bytes of RAM, without the stack.
+pub type Bytes = [u32; 2];
 
 /// The sizes of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,8 +33,13 @@ pub struct Sizes {
     pub sections: Vec<(String, Bytes)>,
     /// Sizes by crate, those with most flash first.
     pub crates: Vec<(String, Bytes)>,
-    /// Sizes of the whole image.
-    pub total: Bytes,
+}
+
+impl Sizes {
+    /// Returns the sizes of the whole image.
+    pub fn total(&self) -> Bytes {
+        [0, 1].map(|memory| self.sections.iter().map(|row| row.1[memory]).sum())
+    }
 }
 
 /// Measures an ELF image.
@@ -50,7 +48,7 @@ pub fn measure(bytes: &[u8]) -> Result<Sizes> {
     let endian = elf.endian();
     let source = Source::new(&elf)?;
     let symbols = image::symbols(&elf)?;
-    let mut sizes = Sizes::default();
+    let mut sections = Vec::new();
     let mut crates = BTreeMap::<String, Bytes>::new();
     for section in elf.sections() {
         let header = section.elf_section_header();
@@ -59,18 +57,13 @@ pub fn measure(bytes: &[u8]) -> Result<Sizes> {
         if flags & SHF_ALLOC == 0 || size == 0 {
             continue;
         }
-        let end = start
-            .checked_add(size)
-            .filter(|_| size <= LARGEST)
-            .with_context(|| format!("the image is broken: a section of {size} bytes"))?;
-        let in_file = header.sh_type(endian) != SHT_NOBITS;
-        let taken = |size: u32| Bytes {
-            flash: if in_file { size } else { 0 },
-            ram: if start >= RAM_BASE { size } else { 0 },
-        };
+        let end = start.checked_add(size).filter(|_| size <= LARGEST);
+        let end = end.with_context(|| format!("the image is broken: a section of {size} bytes"))?;
+        let in_file = u32::from(header.sh_type(endian) != SHT_NOBITS);
+        let in_ram = u32::from(start >= RAM_BASE);
+        let taken = |size: u32| [in_file * size, in_ram * size];
         let name = section.name().context("the image is broken")?;
-        sizes.sections.push((name.to_owned(), taken(size)));
-        sizes.total += taken(size);
+        sections.push((name.to_owned(), taken(size)));
 
         // Code belongs to the crate of its source. The rest, and code without debug information, belongs to the crate
         // of its symbol.
@@ -78,19 +71,17 @@ pub fn measure(bytes: &[u8]) -> Result<Sizes> {
         if flags & SHF_EXECINSTR != 0 {
             owned = source.owners(start, end);
         }
-        let here = symbols
-            .iter()
-            .filter(|symbol| (start..end).contains(&symbol.address));
-        owned.extend(here.map(|symbol| (symbol.address, symbol.size, owner::of(&symbol.name))));
+        let here = |symbol: &&image::Symbol| (start..end).contains(&symbol.address);
+        let here = symbols.iter().filter(here);
+        owned.extend(here.map(|symbol| (symbol.address, symbol.size, owner(&symbol.name))));
         for (owner, bytes) in share(start, size, owned) {
-            *crates.entry(owner).or_default() += taken(bytes);
+            let sum = crates.entry(owner).or_default();
+            *sum = [sum[0] + taken(bytes)[0], sum[1] + taken(bytes)[1]];
         }
     }
-    sizes.crates = crates.into_iter().collect();
-    sizes
-        .crates
-        .sort_by_key(|(_, taken)| std::cmp::Reverse((taken.flash, taken.ram)));
-    Ok(sizes)
+    let mut crates: Vec<_> = crates.into_iter().collect();
+    crates.sort_by_key(|(_, taken)| std::cmp::Reverse(*taken));
+    Ok(Sizes { sections, crates })
 }
 
 /// Distributes `size` bytes from address `start`. Owners overlap because symbols have aliases: each byte belongs to the
@@ -111,6 +102,25 @@ fn share(start: u32, size: u32, owned: Vec<(u32, u32, String)>) -> BTreeMap<Stri
     shares
 }
 
+/// Returns the crate of a symbol, from its name: the first crate in the path. For `<type as trait>` it is that of the
+/// type, or where the type has no crate (`&str`, `u32`, `[T]`) that of the trait.
+fn owner(symbol: &str) -> String {
+    let Ok(path) = rustc_demangle::try_demangle(symbol) else {
+        let builtin = BUILTINS.iter().any(|prefix| symbol.starts_with(prefix));
+        return if builtin { "compiler_builtins" } else { NAMED }.to_owned();
+    };
+    // Leave out the hash, or the crate's disambiguator.
+    let path = format!("{path:#}");
+    let outside = |c: char| !c.is_alphanumeric() && c != '_';
+    let first = path
+        .split_once("::")
+        .and_then(|(first, _)| first.rsplit(outside).next());
+    first
+        .filter(|name| !name.is_empty())
+        .unwrap_or(NAMED)
+        .to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,10 +132,6 @@ mod tests {
     const VARIABLE: &str = "_ZN8firmware5STATE17h0123456789abcdefE";
     const ZEROED: &str = "_ZN8firmware6BUFFER17h0123456789abcdefE";
 
-    fn bytes(flash: u32, ram: u32) -> Bytes {
-        Bytes { flash, ram }
-    }
-
     #[test]
     fn every_byte_is_counted_once_for_its_section_and_its_crate() {
         let segments = [
@@ -136,42 +142,22 @@ mod tests {
         let symbols = [
             ("Reset", FLASH_BASE, 10),
             (FUNCTION, FLASH_BASE + 10, 40),
-            (ALIAS, FLASH_BASE + 10, 40),
+            (ALIAS, FLASH_BASE + 10, 50),
             (VARIABLE, RAM_BASE, 8),
             (ZEROED, RAM_BASE + 8, 200),
         ];
         let sizes = measure(&elf(&segments, &symbols)).unwrap();
-        let named = |name: &str, flash, ram| (name.to_owned(), bytes(flash, ram));
-        assert_eq!(
-            sizes.sections,
-            [
-                named(".text", 100, 0),
-                named(".data", 8, 8),
-                named(".bss", 0, 256)
-            ]
-        );
-        assert_eq!(
-            sizes.crates,
-            [
-                named(UNNAMED, 50, 56),
-                named("modbus_server", 40, 0),
-                named(owner::NAMED, 10, 0),
-                named("firmware", 8, 208),
-            ]
-        );
-        assert_eq!(sizes.total, bytes(108, 264));
-    }
-
-    #[test]
-    fn overlapping_claims_belong_to_the_first_owner() {
-        let owned = [(8, 8, "a"), (12, 8, "b"), (0, 4, "c"), (30, 90, "d")];
-        let owned = owned.map(|(at, length, name)| (at, length, name.to_owned()));
-        let shares = share(8, 24, owned.to_vec());
-        let expected = [("a", 8), ("b", 4), ("d", 2), (UNNAMED, 10)];
-        assert_eq!(
-            shares,
-            BTreeMap::from(expected.map(|(name, bytes)| (name.to_owned(), bytes)))
-        );
+        let named = |(name, flash, ram): (&str, u32, u32)| (name.to_owned(), [flash, ram]);
+        let sections = [(".text", 100, 0), (".data", 8, 8), (".bss", 0, 256)];
+        assert_eq!(sizes.sections, sections.map(named));
+        let crates = [
+            ("modbus_server", 50, 0),
+            (UNNAMED, 40, 56),
+            (NAMED, 10, 0),
+            ("firmware", 8, 208),
+        ];
+        assert_eq!(sizes.crates, crates.map(named));
+        assert_eq!(sizes.total(), [108, 264]);
     }
 
     #[test]
@@ -179,5 +165,25 @@ mod tests {
         let bss = (RAM_BASE, RAM_BASE, &[][..], LARGEST + 1);
         assert!(measure(&elf(&[bss], &[])).is_err());
         assert!(measure(b"\x7fELF").is_err());
+    }
+
+    #[test]
+    fn owner_is_the_first_crate_in_the_name() {
+        for (symbol, name) in [
+            (FUNCTION, "modbus_server"),
+            ("_RNvCskwGfYPst2Cb_3foo16example_function", "foo"),
+            (
+                "_ZN50_$LT$firmware..App$u20$as$u20$core..fmt..Debug$GT$3fmt17h0123456789abcdefE",
+                "firmware",
+            ),
+            (
+                "_ZN40_$LT$u32$u20$as$u20$core..fmt..Debug$GT$3fmt17h0123456789abcdefE",
+                "core",
+            ),
+            ("__aeabi_memcpy4", "compiler_builtins"),
+            ("USART1", NAMED),
+        ] {
+            assert_eq!(owner(symbol), name);
+        }
     }
 }

@@ -1,0 +1,186 @@
+//! The licences of the crates of others that are in the files of a release.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context as _, Result};
+use cargo_metadata::Package;
+use fs_err as fs;
+use spdx::{AdditionItem, Expression, ParseMode};
+
+use super::sbom::reference;
+use crate::command;
+
+/// Starts of the names of files with licences, in small letters.
+const FILES: [&str; 6] = [
+    "copying",
+    "copyright",
+    "licence",
+    "license",
+    "notice",
+    "unlicense",
+];
+
+/// The licence of musl's libc, which programs for Linux contain.
+const MUSL: &str = include_str!("musl.txt");
+
+/// Packages of others by name and version, each with a line about it and with its licence texts.
+#[derive(Debug, Default)]
+pub struct Notices(BTreeMap<String, Package>);
+
+impl Notices {
+    /// Adds packages. Those of this project are left out.
+    pub fn note<'a>(&mut self, packages: impl Iterator<Item = &'a Package>) {
+        let others = packages.filter(|package| package.source.is_some());
+        self.0
+            .extend(others.map(|package| (reference(package), package.clone())));
+    }
+
+    /// Writes the licences of these packages, and those of Rust's standard library, which programs for a target contain
+    /// too.
+    pub fn write(&self, target: &str, out: &Path) -> Result<()> {
+        let mut text = self.text()?;
+        if target.ends_with("-musl") {
+            text += MUSL;
+        }
+        fs::write(out.join(format!("THIRD-PARTY-{target}.txt")), text)?;
+        let sysroot = command::read(Command::new("rustc").args(["--print", "sysroot"]))?;
+        let library = Path::new(sysroot.trim()).join("share/doc/rust/COPYRIGHT-library.html");
+        fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
+        Ok(())
+    }
+
+    /// Returns the list of packages, and each distinct text once, with the packages that it is for.
+    fn text(&self) -> Result<String> {
+        let mut list = String::new();
+        let mut texts = BTreeMap::<String, BTreeSet<&str>>::new();
+        for (name, package) in &self.0 {
+            let from = package.repository.as_deref().unwrap_or("crates.io");
+            list += &format!("{name}  {}  {from}\n", expression(package)?);
+            for text in texts_of(package)? {
+                texts.entry(text).or_default().insert(name);
+            }
+        }
+        let mut sections: Vec<(Vec<&str>, String)> = texts
+            .into_iter()
+            .map(|(text, names)| (names.into_iter().collect(), text))
+            .collect();
+        sections.sort();
+        let rule = "-".repeat(80);
+        let mut all = format!(
+            "Software of others in the files of this release, with its licences. Its sources are on crates.io.\n\
+             The licences of Rust's standard library are in THIRD-PARTY-rust-std.html.\n\n{list}"
+        );
+        for (names, text) in sections {
+            all += &format!("\n{rule}\n{}\n{rule}\n\n{text}\n", names.join(", "));
+        }
+        Ok(all)
+    }
+}
+
+/// Returns the licence of a package.
+pub fn expression(package: &Package) -> Result<Expression> {
+    let name = reference(package);
+    let license = package.license.as_deref();
+    let license = license.with_context(|| format!("{name} names no licence"))?;
+    let canonical = Expression::canonicalize(license)
+        .with_context(|| format!("the licence {license:?} of {name} is not in SPDX's form"))?;
+    Ok(Expression::parse_mode(
+        canonical.as_deref().unwrap_or(license),
+        ParseMode::LAX,
+    )?)
+}
+
+/// Returns the licence texts in a package, or those of SPDX when the package has none.
+fn texts_of(package: &Package) -> Result<Vec<String>> {
+    let directory = package
+        .manifest_path
+        .parent()
+        .context("a package has a directory")?;
+    let mut found = Vec::new();
+    for file in fs::read_dir(directory)? {
+        let file = file?;
+        let name = file.file_name().to_string_lossy().to_lowercase();
+        if FILES.iter().any(|start| name.starts_with(start)) && file.file_type()?.is_file() {
+            let text = fs::read_to_string(file.path())?;
+            found.push(text.replace("\r\n", "\n").trim().to_owned());
+        }
+    }
+    if found.is_empty() {
+        for required in expression(package)?.requirements() {
+            let license = required.req.license.id();
+            let license = license
+                .with_context(|| format!("SPDX has no text for {}", required.req.license))?;
+            let mut text = license.text().trim().to_owned();
+            if let Some(AdditionItem::Spdx(exception)) = &required.req.addition {
+                text += &format!("\n\n{}", exception.text().trim());
+            }
+            found.push(text);
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a package in a directory with these files.
+    fn package(name: &str, license: &str, files: &[(&str, &str)]) -> (tempfile::TempDir, Package) {
+        let directory = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            fs::write(directory.path().join(name), text).unwrap();
+        }
+        let package = serde_json::json!({
+            "id": name, "name": name, "version": "1.0.0", "license": license, "dependencies": [], "targets": [],
+            "features": {}, "manifest_path": directory.path().join("Cargo.toml"),
+            "source": "registry+https://github.com/rust-lang/crates.io-index",
+        });
+        (directory, serde_json::from_value(package).unwrap())
+    }
+
+    #[test]
+    fn texts_are_those_of_the_package_or_of_spdx() {
+        let files = [
+            ("LICENSE-MIT", "of a\r\n"),
+            ("licence.txt", "more"),
+            ("README", "no"),
+        ];
+        let (_a, a) = package("a", "MIT/Apache-2.0", &files);
+        let mut texts = texts_of(&a).unwrap();
+        texts.sort();
+        assert_eq!(texts, ["more", "of a"]);
+        let (_b, b) = package("b", "Apache-2.0 WITH LLVM-exception", &[("Cargo.toml", "")]);
+        let [text] = texts_of(&b).unwrap().try_into().unwrap();
+        assert!(text.contains("Apache License") && text.contains("LLVM Exceptions"));
+    }
+
+    #[test]
+    fn equal_texts_appear_once_and_name_their_packages() {
+        let (_a, a) = package("a", "MIT/Apache-2.0", &[("LICENSE", "the text")]);
+        let (_b, b) = package("b", "MIT", &[("LICENSE", "the text")]);
+        let (_own, mut own) = package("own", "MIT", &[]);
+        own.source = None;
+        let mut notices = Notices::default();
+        notices.note([&b, &a, &own].into_iter());
+        let text = notices.text().unwrap();
+        assert_eq!(text.matches("the text").count(), 1, "{text}");
+        assert!(text.contains("\na@1.0.0, b@1.0.0\n"), "{text}");
+        assert!(
+            text.contains("\na@1.0.0  MIT OR Apache-2.0  crates.io\n"),
+            "{text}"
+        );
+        assert!(!text.contains("own"), "{text}");
+    }
+
+    #[test]
+    fn package_without_a_known_licence_is_refused() {
+        let (_a, a) = package("a", "Foo", &[]);
+        let error = expression(&a).unwrap_err().to_string();
+        assert!(
+            error.contains("a@1.0.0") && error.contains("Foo"),
+            "{error}"
+        );
+    }
+}

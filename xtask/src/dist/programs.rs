@@ -1,0 +1,180 @@
+//! The programs of a release. They run without Rust and without this repository; the simulator contains the images of
+//! all boards.
+//!
+//! On Linux they are linked with musl, so that they need no library of the system and run on every distribution.
+
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context as _, Result, ensure};
+use fs_err as fs;
+use object::build::elf::Builder;
+use register_map::Board;
+
+use super::notices::Notices;
+use super::{oci, sbom, sha256};
+use crate::workspace::{self, MESSAGES, Workspace};
+use crate::{command, image, toolchain};
+
+/// Packages, and their programs.
+const PROGRAMS: [(&str, &str); 4] = [
+    ("modioctl", "modioctl"),
+    ("sim", SIMULATOR),
+    ("conformance", "modio-conformance"),
+    ("conformance", "modio-hil"),
+];
+
+const SIMULATOR: &str = "modio-sim";
+
+/// Builds the programs for a target, the simulator with the images `BOARD.elf` of a directory in it, and writes them and
+/// their bills of materials.
+pub fn files(
+    workspace: &Workspace,
+    target: &str,
+    images: &Path,
+    out: &Path,
+    notices: &mut Notices,
+) -> Result<()> {
+    let inside = workspace.target().join("images");
+    // Images of an earlier build would be included as well.
+    let _ = fs::remove_dir_all(&inside);
+    fs::create_dir_all(&inside)?;
+    for board in Board::ALL {
+        let name = format!("{board}.elf");
+        let elf = stripped(&image::read(&images.join(&name))?)?;
+        fs::write(inside.join(name), elf)?;
+    }
+    toolchain::add(workspace.root(), target)?;
+    let mut cargo = workspace.cargo("build");
+    cargo.args(["--ignore-rust-version", "--profile", "tool", MESSAGES]);
+    cargo.args(["--target", target, "--target-dir"]);
+    cargo.arg(workspace.target());
+    for (package, program) in PROGRAMS {
+        cargo.args(["--package", package, "--bin", program]);
+    }
+    // The variable that tools/sim/build.rs reads.
+    cargo.env("MODIO_SIM_IMAGES", &inside);
+    let artifacts = workspace::artifacts(&mut cargo)?;
+    let compiled = workspace::packages(&artifacts, &workspace.target().join(target));
+    for (package, program) in PROGRAMS {
+        let content = fs::read(workspace::executable(&artifacts, program)?)?;
+        let name = format!("{program}-{target}");
+        let bill = sbom::of_program(
+            workspace,
+            target,
+            (package, program),
+            &compiled,
+            &sha256(&content),
+            notices,
+        )?;
+        fs::write(out.join(format!("{name}.cdx.json")), format!("{bill:#}\n"))?;
+        if let Some((processor, _)) = target.split_once("-unknown-linux-")
+            && program == SIMULATOR
+        {
+            let archive = oci::archive(&content, processor)?;
+            fs::write(out.join("modio-sim-oci.tar"), archive)?;
+        }
+        let file = out.join(name + std::env::consts::EXE_SUFFIX);
+        fs::write(&file, content)?;
+        executable(&file)?;
+    }
+    Ok(())
+}
+
+/// Makes a file executable.
+#[cfg(unix)]
+fn executable(file: &Path) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    Ok(fs::set_permissions(
+        file,
+        std::fs::Permissions::from_mode(0o755),
+    )?)
+}
+
+#[cfg(not(unix))]
+fn executable(_: &Path) -> Result<()> {
+    Ok(())
+}
+
+/// Returns the target of this machine.
+pub fn host() -> Result<String> {
+    let version = command::read(Command::new("rustc").arg("-vV"))?;
+    let host = version.lines().find_map(|line| line.strip_prefix("host: "));
+    Ok(host
+        .context("rustc does not report the target of this machine")?
+        .to_owned())
+}
+
+/// Returns the target for which programs for machines like this one are built.
+pub fn target() -> Result<String> {
+    Ok(target_of(&host()?))
+}
+
+fn target_of(host: &str) -> String {
+    match host.split_once("-unknown-linux-") {
+        Some((processor, _)) => format!("{processor}-unknown-linux-musl"),
+        None => host.to_owned(),
+    }
+}
+
+/// Returns an image without debug information. Its symbols remain, because the simulator uses them to find the log.
+fn stripped(elf: &[u8]) -> Result<Vec<u8>> {
+    let mut builder = Builder::<'_>::read32(elf).context("cannot strip the image")?;
+    for section in &mut builder.sections {
+        section.delete = section.name.starts_with(b".debug_");
+    }
+    let mut stripped = Vec::new();
+    builder
+        .write(&mut stripped)
+        .context("cannot strip the image")?;
+    let symbols = |elf| Ok::<_, anyhow::Error>(image::symbols(&image::parse(elf)?)?.len());
+    ensure!(
+        image::flat(&stripped, u32::MAX)? == image::flat(elf, u32::MAX)?
+            && symbols(&stripped)? == symbols(elf)?,
+        "stripping has changed the image"
+    );
+    Ok(stripped)
+}
+
+#[cfg(test)]
+mod tests {
+    use object::{Object as _, ObjectSection as _};
+
+    use super::*;
+
+    #[test]
+    fn program_for_linux_needs_no_library_of_the_system() {
+        for (host, target) in [
+            ("aarch64-unknown-linux-gnu", "aarch64-unknown-linux-musl"),
+            ("x86_64-pc-windows-msvc", "x86_64-pc-windows-msvc"),
+            ("aarch64-apple-darwin", "aarch64-apple-darwin"),
+        ] {
+            assert_eq!(target_of(host), target);
+        }
+    }
+
+    #[test]
+    fn stripped_image_loses_its_debug_information_only() {
+        let elf = image::sample::elf(
+            &[image::sample::code(image::FLASH_BASE, &[1, 2, 3, 4])],
+            &[],
+        );
+        let mut builder = Builder::read32(&*elf).unwrap();
+        let debug = builder.sections.add();
+        debug.name = b".debug_info"[..].into();
+        debug.sh_type = object::elf::SHT_PROGBITS;
+        debug.sh_addralign = 1;
+        debug.data = object::build::elf::SectionData::Data(vec![7; 5000].into());
+        builder.set_section_sizes();
+        let mut with_debug = Vec::new();
+        builder.write(&mut with_debug).unwrap();
+        let has_debug = |elf: &[u8]| {
+            let elf = image::parse(elf).unwrap();
+            let mut sections = elf.sections();
+            sections.any(|section| section.name() == Ok(".debug_info") && section.size() > 0)
+        };
+        assert!(has_debug(&with_debug));
+        let stripped = stripped(&with_debug).unwrap();
+        assert!(!has_debug(&stripped) && stripped.len() < with_debug.len() - 5000);
+    }
+}
