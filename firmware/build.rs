@@ -1,29 +1,15 @@
-//! Gives the code the commit that it is built from and the self-description of each board. For the image, also
-//! gives the linker the memory layout and the linker script of cortex-m-rt.
+//! Gives the code the self-description of each board. For the image, also gives the linker the memory layout and the
+//! linker script of cortex-m-rt.
 
 use std::{
     env, fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use modio_description::{FILE, HEAD, PORT_BYTES, checksum};
 use register_map::{Board, Module};
 
-/// Everything that the image is built from. When any of it differs from the commit, the commit does not identify
-/// the image.
-const SOURCES: [&str; 7] = [
-    "../firmware",
-    "../board-support",
-    "../modio-drivers",
-    "../modbus-server",
-    "../register-map",
-    "../tools/description",
-    "../Cargo.lock",
-];
-
 fn main() {
-    set_commit();
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     fs::write(out.join("self_description.rs"), self_descriptions()).expect("OUT_DIR is writable");
     println!("cargo::rerun-if-changed=memory");
@@ -37,6 +23,10 @@ fn main() {
     println!("cargo::rustc-link-search={}", out.display());
     println!("cargo::rustc-link-arg-bins=--nmagic");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    println!("cargo::rerun-if-env-changed=MODIO_MAP");
+    if let Some(map) = env::var_os("MODIO_MAP") {
+        println!("cargo::rustc-link-arg-bins=-Map={}", map.display());
+    }
 }
 
 /// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which
@@ -81,34 +71,4 @@ fn layout() -> Option<String> {
         })?;
     let read = |path: &Path| fs::read_to_string(path).expect("the linker script is readable");
     Some(read(&chosen) + &read(Path::new("memory/sections.x")))
-}
-
-/// Sets MODIO_COMMIT to the first eight digits of the commit, and MODIO_CHANGED when the sources differ from the
-/// commit. Sets neither without git or outside a repository.
-fn set_commit() {
-    for source in SOURCES {
-        println!("cargo::rerun-if-changed={source}");
-    }
-    // HEAD names the branch, and git appends a line to the log of HEAD with every commit and checkout.
-    for name in ["HEAD", "logs/HEAD"] {
-        if let Some(path) = git(&["rev-parse", "--git-path", name]) {
-            println!("cargo::rerun-if-changed={path}");
-        }
-    }
-    if let Some(commit) =
-        git(&["rev-parse", "HEAD"]).and_then(|head| Some(head.get(..8)?.to_owned()))
-    {
-        println!("cargo::rustc-env=MODIO_COMMIT={commit}");
-        let status = [&["status", "--porcelain", "--"], &SOURCES[..]].concat();
-        if git(&status).is_none_or(|changes| !changes.is_empty()) {
-            println!("cargo::rustc-env=MODIO_CHANGED=1");
-        }
-    }
-}
-
-/// Returns what git prints, without the trailing line break, or `None` when git fails or is missing.
-fn git(arguments: &[&str]) -> Option<String> {
-    let output = Command::new("git").args(arguments).output().ok()?;
-    let text = output.status.success().then_some(output.stdout)?;
-    Some(String::from_utf8(text).ok()?.trim_end().to_owned())
 }

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Keys for the register KR (RM0008 19.4.1).
-const FEED: u16 = 0xAAAA;
+const RELOAD: u16 = 0xAAAA;
 const OPEN: u16 = 0x5555;
 const START: u16 = 0xCCCC;
 
@@ -54,12 +54,12 @@ impl Watchdog {
             let busy = self.iwdg.sr().read();
             busy.pvu().bit_is_clear() && busy.rvu().bit_is_clear()
         });
-        self.feed();
+        self.refresh();
     }
 
     /// Refreshes the watchdog.
-    pub fn feed(&mut self) {
-        self.write_key(FEED);
+    pub fn refresh(&mut self) {
+        self.write_key(RELOAD);
     }
 
     fn write_key(&mut self, key: u16) {

@@ -1,18 +1,20 @@
-//! The commit that the firmware was built from. The build script reads it from git.
+//! The commit that the firmware was built from.
+
+/// Eight digits, and `-dirty` when the sources had other changes; `unknown` outside a git repository.
+const TEXT: &str = commit::commit!();
 
 /// First 32 bits of the commit; 0 when it is not known.
-pub const COMMIT: u32 = match option_env!("MODIO_COMMIT") {
-    Some(digits) => number(digits),
+pub const COMMIT: u32 = match TEXT.split_at_checked(8) {
+    Some((digits, _)) => number(digits),
     None => 0,
 };
 
 /// Value of the register BUILD: bit 0 means that the sources had changes that are not in the commit, bit 2 that the
 /// image is not signed.
 pub const FLAGS: u16 = NOT_SIGNED
-    | if option_env!("MODIO_CHANGED").is_some() {
-        CHANGED
-    } else {
-        0
+    | match TEXT.as_bytes() {
+        [.., b'-', b'd', b'i', b'r', b't', b'y'] => CHANGED,
+        _ => 0,
     };
 
 const CHANGED: u16 = 1 << 0;

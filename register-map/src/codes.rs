@@ -50,6 +50,15 @@ macro_rules! codes {
                 self as u16
             }
 
+            /// Returns the name, for people.
+            #[inline]
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)+
+                }
+            }
+
             /// Returns the value with this code, if there is one.
             #[inline]
             #[must_use]
@@ -216,6 +225,13 @@ mod tests {
         assert_eq!(Command::from_code(0xB007), Some(Command::EnterLoader));
         assert_eq!(Command::from_code(0), None);
         assert_eq!(Format::from_code(7), None);
+    }
+
+    #[test]
+    fn name_of_a_value_is_the_name_of_its_code() {
+        for (fault, name) in FaultKind::ALL.iter().zip(FaultKind::NAMES) {
+            assert_eq!((fault.code(), fault.name()), *name);
+        }
     }
 
     #[test]

@@ -1,17 +1,18 @@
 //! The log: lines on RTT channel 0, for a debug probe or the simulator. When the buffer is full because nobody
-//! reads it, further lines are dropped; the firmware never waits.
+//! reads it, further lines are dropped; the firmware never waits. docs/architecture.md describes the lines, and says
+//! why they are text.
 
 use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault, tolerance, uart};
 use firmware::{config, start_up::Address};
-use heapless::Vec;
+use heapless::String;
 use modio_drivers::ModuleError;
 use register_map::{
     Module,
-    codes::{FaultKind, Format, Mode},
+    codes::{FaultKind, Mode},
 };
-use rtt_target::UpChannel;
+use rtt_target::{ChannelMode, UpChannel};
 
-use crate::{board::BOARD, rtt};
+use crate::{board::BOARD, clock, fault_record, rtt};
 
 /// Events that are logged while the device runs.
 #[derive(Clone, Copy)]
@@ -57,24 +58,30 @@ const CAUSES: [&str; 6] = [
     "pin",
 ];
 
-/// Bytes of the longest line, including its end. Longer lines are cut.
-const LONGEST: usize = 80;
+/// Bytes that a line may have, including its end. Text that does not fit is dropped.
+const LONGEST: usize = 96;
 
-/// A line being composed. It does not use `core::fmt`, which is large and can panic. The usual small replacements
-/// for `core::fmt` expand into more code at every log line.
-struct Text(Vec<u8, LONGEST>);
+/// A line being composed. It does not use `core::fmt`, `ufmt` or `itoa`, with which the image is larger; `itoa` can
+/// also panic.
+struct Line(String<LONGEST>);
 
-impl Text {
+impl Line {
     fn of(text: &str) -> Self {
-        let mut line = Self(Vec::new());
+        let mut line = Self(String::new());
         line.text(text);
         line
     }
 
+    /// Returns a line that begins with the time since the start in seconds, as in `[12.345] `.
+    fn at(millis: u32) -> Self {
+        let mut line = Self::of("[");
+        line.number(millis / 1000).text(".");
+        line.digits(millis % 1000, 100).text("] ");
+        line
+    }
+
     fn text(&mut self, text: &str) -> &mut Self {
-        for byte in text.bytes() {
-            self.byte(byte);
-        }
+        let _ = self.0.push_str(text);
         self
     }
 
@@ -84,24 +91,23 @@ impl Text {
         while place <= number / 10 {
             place *= 10;
         }
+        self.digits(number, place)
+    }
+
+    /// Appends the decimal digits of a number, from the digit with this place value on.
+    fn digits(&mut self, number: u32, mut place: u32) -> &mut Self {
         // The place value of the last digit is 1; dividing it by ten gives 0, which ends the loop.
         while let Some(leading) = number.checked_div(place) {
-            self.byte(b'0' + (leading % 10) as u8);
+            let _ = self.0.push(char::from(b'0' + (leading % 10) as u8));
             place /= 10;
         }
         self
     }
 
-    fn byte(&mut self, byte: u8) {
-        let _ = self.0.push(byte);
+    /// Appends the slot of a port.
+    fn slot(&mut self, port: u16) -> &mut Self {
+        self.text("slot ").number(port.into()).text(": ")
     }
-}
-
-/// Begins a line about the slot of a port.
-fn slot(port: u16) -> Text {
-    let mut line = Text::of("slot ");
-    line.number(port.into()).text(": ");
-    line
 }
 
 /// The log's writer.
@@ -115,141 +121,88 @@ impl Log {
 
     /// Logs how the device starts.
     pub fn start(&mut self, start: &Start) {
-        let format = match start.line.format {
-            Format::F8N2 => "8N2",
-            Format::F8E1 => "8E1",
-            Format::F8O1 => "8O1",
-            Format::F8N1 => "8N1",
-            Format::F7E1 => "7E1",
-            Format::F7O1 => "7O1",
-            Format::F7N2 => "7N2",
-        };
+        let format = start.line.format.name();
         let baud = start.line.baud.bits_per_second();
         let mode = match start.line.mode {
             Mode::Rtu => "",
             Mode::Ascii => " ASCII",
         };
-        let mut line = Text::of(concat!("modio ", env!("CARGO_PKG_VERSION"), " on "));
+        let mut line = Line::of(concat!("modio ", env!("CARGO_PKG_VERSION"), " on "));
         line.text(BOARD.name).text(", ");
         self.write(line.number(baud).text(" ").text(format).text(mode));
         for (bit, cause) in CAUSES.iter().enumerate() {
             if start.reset_cause & (1 << bit) != 0 {
-                self.write(Text::of("reset: ").text(cause));
+                self.write(Line::of("reset: ").text(cause));
             }
         }
-        let fault = match start.faults.fault.kind {
-            fault::Kind::None => None,
-            fault::Kind::Panic => Some("panic"),
-            fault::Kind::HardFault => Some("hard fault"),
-            fault::Kind::Watchdog => Some("watchdog bite"),
-            fault::Kind::Crystal => Some("crystal failure"),
-            fault::Kind::StackOverflow => Some("stack overflow"),
-        };
-        if let Some(fault) = fault {
-            let mut line = Text::of("last fault: ");
-            self.write(line.text(fault));
+        let fault = fault_record::kind(start.faults.fault.kind);
+        if fault != FaultKind::None {
+            self.write(Line::of("WARN last fault: ").text(fault.name()));
         }
         if start.clock == ClockSource::Internal {
             let text = if start.faults.crystal_faults < CRYSTAL_FAULTS {
-                "the crystal did not start: internal oscillator"
+                "WARN the crystal did not start: internal oscillator"
             } else {
-                "the crystal failed twice: internal oscillator until power-on"
+                "WARN the crystal failed twice: internal oscillator until power-on"
             };
-            self.write(&mut Text::of(text));
+            self.write(&mut Line::of(text));
             if !tolerance::internal_oscillator_serves(start.on_wire) {
-                let text = "warning: too fast for the internal oscillator at all temperatures";
-                self.write(&mut Text::of(text));
+                let text = "WARN too fast for the internal oscillator at all temperatures";
+                self.write(&mut Line::of(text));
             }
         }
         match start.address {
-            Address::Unit(unit) => self.write(Text::of("unit address ").number(unit.into())),
-            Address::Loader => self.write(&mut Text::of("unit address 255 (loader mode)")),
+            Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
+            Address::Loader => self.write(&mut Line::of("unit address 255 (loader mode)")),
             Address::Invalid => {
                 let text = ", which is no unit address: the line stays silent";
-                self.write(Text::of("SW01 shows ").number(start.dip.into()).text(text));
+                self.write(
+                    Line::of("WARN SW01 shows ")
+                        .number(start.dip.into())
+                        .text(text),
+                );
             }
         }
         if start.config_invalid {
-            let text = "configuration: what was stored is damaged, defaults are in force";
-            self.write(&mut Text::of(text));
+            let text = "WARN configuration: the stored settings are damaged, defaults are in force";
+            self.write(&mut Line::of(text));
         }
         for (port, module) in BOARD.ports().zip(start.modules) {
-            self.write(slot(port).text(module.name()));
+            self.write(Line::of("").slot(port).text(module.name()));
         }
     }
 
-    /// Logs an event.
+    /// Logs an event, with the time.
     pub fn event(&mut self, event: Event) {
-        let text = match event {
+        let mut line = Line::at(clock::millis());
+        self.write(match event {
             Event::ModuleFails(port, error) => {
-                let mut line = slot(port);
-                return self.write(match error.first_line() {
+                let line = line.text("WARN ").slot(port);
+                match error.first_line() {
                     Some(channel) => {
                         let channel = channel as u32 + 1;
                         line.text("channel ").number(channel).text(" fails")
                     }
                     None => line.text("the module does not answer"),
-                });
+                }
             }
-            Event::ModuleGood(port) => {
-                return self.write(slot(port).text("the module works again"));
+            Event::ModuleGood(port) => line.slot(port).text("the module works again"),
+            Event::CommunicationLost => line.text("WARN communication lost: outputs go to SAFE"),
+            Event::Saved => line.text("configuration saved"),
+            Event::SaveFailed => line.text("WARN configuration: the flash could not be written"),
+            Event::LineRepaired => line.text("WARN line: set up again after a disturbance"),
+            Event::LowSupply => {
+                line.text("WARN configuration: the supply is too low, the flash has to wait")
             }
-            Event::CommunicationLost => "communication lost: outputs go to SAFE",
-            Event::Saved => "configuration saved",
-            Event::SaveFailed => "configuration: the flash does not take it",
-            Event::LineRepaired => "line: set up again after a disturbance",
-            Event::LowSupply => "configuration: the supply is too low, the flash has to wait",
-        };
-        self.write(&mut Text::of(text));
+        });
     }
 
     /// Ends a line and writes it completely, or drops it when it does not fit.
-    fn write(&mut self, line: &mut Text) {
+    fn write(&mut self, line: &mut Line) {
         if let Some(channel) = &mut self.0 {
-            channel.write(&line.text("\n").0);
+            // A debugger may have changed the mode to one in which the firmware waits until the debugger has read.
+            channel.set_mode(ChannelMode::NoBlockSkip);
+            channel.write(line.text("\n").0.as_bytes());
         }
     }
-}
-
-/// Returns the code of a fault in the fault record's register.
-const fn kind_of(kind: fault::Kind) -> FaultKind {
-    match kind {
-        fault::Kind::None => FaultKind::None,
-        fault::Kind::Panic => FaultKind::Panic,
-        fault::Kind::HardFault => FaultKind::HardFault,
-        fault::Kind::Watchdog => FaultKind::Watchdog,
-        fault::Kind::Crystal => FaultKind::Crystal,
-        fault::Kind::StackOverflow => FaultKind::StackOverflow,
-    }
-}
-
-/// Returns the fault record as its registers, from 0x0260 on.
-pub fn fault_words(record: &fault::FaultRecord) -> [u16; 16] {
-    let high = |word: u32| (word >> 16) as u16;
-    let low = |word: u32| word as u16;
-    let fault::FaultRecord {
-        fault,
-        count,
-        uptime,
-        missing,
-        crystal_faults: _,
-    } = *record;
-    [
-        kind_of(fault.kind).code(),
-        count,
-        high(fault.pc),
-        low(fault.pc),
-        high(fault.lr),
-        low(fault.lr),
-        high(fault.status),
-        low(fault.status),
-        high(fault.address),
-        low(fault.address),
-        high(uptime),
-        low(uptime),
-        missing,
-        0,
-        0,
-        0,
-    ]
 }

@@ -27,6 +27,7 @@ mod board;
 mod clock;
 mod converter;
 mod every;
+mod fault_record;
 mod installed;
 mod line;
 mod log;
@@ -116,7 +117,7 @@ mod app {
     fn idle(cx: idle::Context) -> ! {
         loop {
             if alive::take_all(fault::marks()) {
-                cx.local.watchdog.feed();
+                cx.local.watchdog.refresh();
             }
             rtic::export::wfi();
         }

@@ -22,6 +22,7 @@ use register_map::codes::{Format, GapRule, Mode};
 
 use crate::{
     board::{BOARD, DESCRIPTION, Device},
+    fault_record,
     installed::{AnalogOutputs, install},
     line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
@@ -83,7 +84,7 @@ pub fn up(
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
         unique_id: board.unique_id,
-        fault: log::fault_words(&board.faults),
+        fault: fault_record::words(&board.faults),
         internal_oscillator: !board.clock.is_crystal(),
     };
     let kinds = modules.each_ref().map(IoModule::kinds);

@@ -24,7 +24,7 @@ impl CommWatchdog {
     }
 
     /// Restarts the silence: a valid request ended at `at`.
-    pub const fn feed(&mut self, at: u32) {
+    pub const fn refresh(&mut self, at: u32) {
         self.since = at;
         self.safe = false;
     }
@@ -35,7 +35,7 @@ impl CommWatchdog {
         let Some(timeout_ms) = timeout_ms else {
             // While the watchdog is off, restart the silence, so that it counts from when the watchdog is switched
             // on.
-            self.feed(now);
+            self.refresh(now);
             return false;
         };
         // When an earlier call was late, a request may have ended after `now`, so the difference can be negative.
@@ -76,7 +76,7 @@ mod tests {
         let mut watchdog = CommWatchdog::new();
         assert_eq!(trips_at(&mut watchdog, 0, 100), 100);
         assert!((101..1000).all(|now| !watchdog.look(now, Some(100))));
-        watchdog.feed(1000);
+        watchdog.refresh(1000);
         assert!(watchdog.has_tripped(), "a request does not clear the flag");
         assert_eq!(trips_at(&mut watchdog, 1000, 100), 1100);
         watchdog.clear();
@@ -87,9 +87,9 @@ mod tests {
     #[test]
     fn the_silence_counts_from_the_end_of_the_request() {
         let mut watchdog = CommWatchdog::new();
-        watchdog.feed(1000);
+        watchdog.refresh(1000);
         assert_eq!(trips_at(&mut watchdog, 1033, 100), 1100);
-        watchdog.feed(2000);
+        watchdog.refresh(2000);
         assert_eq!(
             trips_at(&mut watchdog, 2100, 10),
             2101,
@@ -100,20 +100,20 @@ mod tests {
     #[test]
     fn a_late_check_measures_exactly_the_silence() {
         let mut watchdog = CommWatchdog::new();
-        watchdog.feed(1000);
+        watchdog.refresh(1000);
         assert!(!watchdog.look(1090, Some(100)));
         // Nothing could be checked for 40 ms; a request ended in the middle of them.
-        watchdog.feed(1110);
+        watchdog.refresh(1110);
         assert!(!watchdog.look(1130, Some(100)));
         assert_eq!(trips_at(&mut watchdog, 1130, 100), 1210);
-        watchdog.feed(1300);
+        watchdog.refresh(1300);
         assert!(watchdog.look(1440, Some(100)));
     }
 
     #[test]
     fn the_time_may_wrap() {
         let mut watchdog = CommWatchdog::new();
-        watchdog.feed(u32::MAX - 9);
+        watchdog.refresh(u32::MAX - 9);
         assert!(!watchdog.look(89, Some(100)));
         assert!(watchdog.look(90, Some(100)));
     }
@@ -123,7 +123,7 @@ mod tests {
         let mut watchdog = CommWatchdog::new();
         for n in 0..100 {
             assert!((0..100).all(|ms| !watchdog.look(100 * n + ms, Some(100))));
-            watchdog.feed(100 * (n + 1));
+            watchdog.refresh(100 * (n + 1));
         }
         assert!((10_000..11_000).all(|now| !watchdog.look(now, None)));
         assert_eq!(trips_at(&mut watchdog, 10_999, 100), 11_099);

@@ -141,7 +141,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Restarts the communication watchdog: a valid request for this unit ended at `at_ms` milliseconds after the
     /// start.
     pub const fn request_seen(&mut self, at_ms: u32) {
-        self.comm_watchdog.feed(at_ms);
+        self.comm_watchdog.refresh(at_ms);
     }
 
     /// Returns whether this work reads the line's counters. The caller must then copy them into the state first.

@@ -28,7 +28,7 @@ pub struct Description {
     pub board: String,
     /// Model in the device identification.
     pub model: String,
-    /// Version of the firmware, such as `0.1.0`.
+    /// Version of the firmware, such as `0.2.0`.
     pub firmware: String,
     /// Version of the register map.
     pub map_version: u16,
