@@ -1,9 +1,10 @@
 """Implements the keywords of Renode that the suites use on the project's own simulator.
 
 A suite that passes here asks and expects the right things of the image, on a machine without Renode. Tests
-with the tag `renode-only` need Renode's models, and tests with the tag `exact-time` need gaps that are exact
-to a millisecond; both are left out here. The keywords have the names and arguments of Renode's sources, and
-a dry run checks the suites against them. What is received behaves as in Renode: see terminal_tester.py.
+with the tag `renode-only` need Renode's models and are left out here. The keywords have the names and arguments of
+Renode's sources, and a dry run checks the suites against them. What is received behaves as in Renode: see
+terminal_tester.py. Time passes only in RunFor, as in Renode: the line is the simulator's exact line, whose protocol
+docs/conformance.md describes.
 
 The variables SIMULATOR and ELF name the simulator's program and the image.
 """
@@ -53,28 +54,21 @@ class _Board:
         else:
             command += ["--module", modules]
         self.lines = LINES[board]
-        command += ["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"]
+        command += ["--exact-line", "127.0.0.1:0", "--http", "127.0.0.1:0"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.log = []
         # Renode's keyword attaches the tester later; bytes received before that are lost there, too.
         self.tester = None
-        self.lock = threading.Lock()
-        self.received = self.sent = self.last_frame = 0
         self._endpoints = {}
-        threading.Thread(target=self._read_log, daemon=True).start()
+        threading.Thread(target=self._read_output, daemon=True).start()
         self.api = self._endpoint("http").rstrip("/") + "/api/"
-        host, port = self._endpoint("tcp").rsplit(":", 1)
-        self.line = socket.create_connection((host, int(port)))
-        self.line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        threading.Thread(target=self._read_line, daemon=True).start()
+        host, port = self._endpoint("exact-line").rsplit(":", 1)
+        self._line = socket.create_connection((host, int(port))).makefile("rw", newline="\n")
+        self._now, _ = self._request("hello 1")
 
-    def _read_log(self):
+    def _read_output(self):
         for line in self.process.stdout:
-            endpoint = re.match(r"(pty|http|tcp|gdb): (.*)", line)
-            if endpoint:
+            if endpoint := re.match(r"(exact-line|http): (.*)", line):
                 self._endpoints[endpoint[1]] = endpoint[2]
-            else:
-                self.log.append(line)
 
     def _endpoint(self, name):
         """Returns the address at which the simulator listens, which it prints."""
@@ -87,21 +81,24 @@ class _Board:
             time.sleep(0.02)
         return self._endpoints[name]
 
-    def _read_line(self):
-        try:
-            while data := self.line.recv(4096):
-                with self.lock:
-                    self.received += len(data)
-                    for byte in data if self.tester else b"":
-                        self.tester.receive(byte)
-        except OSError:
-            pass
+    def _request(self, request):
+        """Sends a request of the exact-line protocol. Returns the virtual time in microseconds, and the events."""
+        self._line.write(request + "\n")
+        self._line.flush()
+        reply = self._line.readline().split()
+        if not reply or reply[0] != "ok":
+            raise AssertionError(f"{request}: {' '.join(reply) or 'the simulator has ended'}")
+        return float(reply[1]), reply[2:]
 
     def get(self, path):
         return json.load(urllib.request.urlopen(self.api + path))
 
     def state(self):
         return self.get("state")
+
+    def log(self):
+        """Returns the last 50 lines of the firmware's log."""
+        return "".join(line + "\n" for line in self.state()["log_tail"]).encode()
 
     def channels(self):
         """Returns the channels of every slot, by port."""
@@ -114,24 +111,33 @@ class _Board:
         request = urllib.request.Request(self.api + path, json.dumps(what).encode(), method="POST")
         urllib.request.urlopen(request).read()
 
-    def run_for(self, seconds):
-        end = self.state()["virtual_ms"] + seconds * 1000
-        while (left := end - self.state()["virtual_ms"]) > 0:
-            time.sleep(max(left / 1000, 0.001))
-        self._wait_for_sent_frames()
+    def run_for(self, seconds, keys, delay):
+        """Lets this time pass. The bytes `keys` are sent from its beginning; with a delay, each begins this many
+        seconds after the one before."""
+        end = self._now + seconds * 1e6
+        if keys and not delay:
+            self._pass("send " + keys.hex())
+        for at, key in enumerate(keys if delay else b""):
+            begin = end - seconds * 1e6 + at * delay * 1e6
+            self._run_until(begin)
+            self._pass(f"send {key:02x}")
+        self._run_until(end)
 
-    def _wait_for_sent_frames(self):
-        """Waits until the frames that the unit has sent were received over the socket. This takes long on a busy
-        machine."""
-        for frame in self.get(f"frames?since={self.last_frame}")["frames"]:
-            self.last_frame = frame["number"]
-            self.sent += len(frame["bytes"]) // 2 if frame["direction"] == "tx" else 0
-        deadline = time.monotonic() + 10
-        while self.received < self.sent and time.monotonic() < deadline:
-            time.sleep(0.001)
+    def _run_until(self, end):
+        if end > self._now:
+            self._pass(f"run {end - self._now:.3f}")
+
+    def _pass(self, request):
+        """Makes a request in which time passes, and hands the bytes that the unit sent to the tester."""
+        self._now, events = self._request(request)
+        for event in events:
+            # The driver's events begin with other letters than a byte.
+            if byte := re.match(r"([0-9A-F]{2})@", event):
+                if self.tester:
+                    self.tester.receive(int(byte[1], 16))
 
     def end(self):
-        self.line.close()
+        self._line.close()
         self.process.terminate()
         self.process.wait()
 
@@ -174,8 +180,7 @@ class RenodeOnSimulator:
                                defaultPauseEmulation: bool = None, defaultWaitForEcho: bool = None,
                                defaultMatchNextLine: bool = None, binaryMode: bool = False):
         assert uart == "sysbus.usart1" and binaryMode
-        with self._board.lock:
-            self._board.tester = TerminalTester()
+        self._board.tester = TerminalTester()
 
     def send_key_to_uart(self, c, testerId: int = None):
         self._keys.append(int(c, 0))
@@ -187,8 +192,7 @@ class RenodeOnSimulator:
                                treatAsRegex: bool = False, pauseEmulation: bool = None,
                                matchStart: bool = False):
         assert timeout == 0, "the suites advance the time with RunFor"
-        with self._board.lock:
-            self._board.tester.wait_for_bytes(content, treatAsRegex, matchStart)
+        self._board.tester.wait_for_bytes(content, treatAsRegex, matchStart)
 
     def execute_command(self, command, machine=None):
         for pattern, act in self._commands():
@@ -224,13 +228,10 @@ class RenodeOnSimulator:
         return ""
 
     def _run_for(self, seconds):
-        # All bytes are sent together without gaps, as in Renode while the emulation does not run.
-        step = 1 if self._delay else len(self._keys) or 1
-        for at in range(0, len(self._keys), step):
-            time.sleep(self._delay)
-            self._board.line.sendall(self._keys[at : at + step])
+        # Bytes wait while the emulation does not run, and are then sent without gaps, as in Renode.
+        keys = bytes(self._keys)
         self._keys.clear()
-        self._board.run_for(float(seconds))
+        self._board.run_for(float(seconds), keys, self._delay)
         return ""
 
     def _drive(self, port, pin, level):
@@ -261,12 +262,10 @@ class RenodeOnSimulator:
 
     def _read(self, address):
         if _BLOCK <= address < _BLOCK + 0x100:
-            length = len("".join(self._board.log).encode())
-            return {28: _BUFFER, 36: length}[address - _BLOCK]
+            return {28: _BUFFER, 36: len(self._board.log())}[address - _BLOCK]
         if _BUFFER <= address < _BUFFER + 0x1000:
             at = address - _BUFFER
-            text = "".join(self._board.log).encode()[at : at + 4]
-            return int.from_bytes(text.ljust(4, b"\0"), "little")
+            return int.from_bytes(self._board.log()[at : at + 4].ljust(4, b"\0"), "little")
         if address in OUTPUTS:
             return self._outputs(OUTPUTS[address])
         slot, output = divmod(address - 0x40005500, 0x20)

@@ -87,7 +87,7 @@ class Board:
         ports = {name: Port() for name in "ABC"}
         machine = Machine({f"sysbus.gpioPort{name}": port for name, port in ports.items()})
         machine.update({"sysbus": self, "sysbus.flash": self, "sysbus.iwdgCounter": self})
-        # Addresses as in board.resc; platform.rs compares them with the simulator's.
+        # Addresses as in board.resc.
         self.blocks = {int(address, 16): Peripheral(file, machine) for file, address in models()}
         self.blocks.update({0x40010800: ports["A"], 0x40010C00: ports["B"], 0x40011000: ports["C"]})
         for address in (0x40000000, 0x40000800, 0x40012C00, 0x40013800):

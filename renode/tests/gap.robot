@@ -8,13 +8,11 @@ Test Setup          Start Board    4do
 
 *** Test Cases ***
 A Gap Below t1.5 Is Ignored
-    [Tags]    exact-time
     Send In Two Parts    0.0010
     Wait For Bytes On Uart    ${REPLY}    timeout=0    matchStart=true
     Nothing Was Received
 
 A Gap Between t1.5 And t3.5 Is Counted And The Frame Kept
-    [Tags]    exact-time
     Send Bytes Every    0.003
     Expect    ${REPLY}
     # The counter of such gaps; this request has none.
@@ -42,7 +40,6 @@ Two Requests Without A Silence Between Them Are Lost And The Next Is Answered
     Unit Answers
 
 FRAME_GAP Changes The Silence After A Restart
-    [Tags]    exact-time
     Unlock
     # 50 ms.
     Request Is Echoed    06 0106 01F4

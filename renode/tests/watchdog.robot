@@ -11,7 +11,6 @@ A Watchdog That Is Off Never Trips
     Pin Should Be    ${ODR_A}    0    1
 
 Outputs Go To SAFE When The Line Is Silent
-    [Tags]    exact-time
     Arm
     Request Is Echoed    05 ${P}0 FF00
     # 0.1 s of silence have already passed after the request.
@@ -35,7 +34,6 @@ Requests And Broadcasts Prevent A Trip
     Pin Should Be    ${ODR_A}    0    1
 
 Requests To Another Unit Do Not Prevent A Trip
-    [Tags]    exact-time
     Arm
     Request Is Echoed    05 ${P}0 FF00
     FOR    ${_}    IN RANGE    2
