@@ -21,7 +21,7 @@ use crate::program::Files;
 /// Leaves the unit as it was. Exit status: 0 all cases passed or were skipped, 1 some failed, 2 nothing
 /// could be tested.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "modio-conformance", version)]
+#[command(name = "modio-conformance")]
 pub struct Cli {
     /// Test through this serial port or pseudo-terminal
     #[arg(long, value_name = "PORT", group = "endpoint")]

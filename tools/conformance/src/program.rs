@@ -10,9 +10,15 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Parser;
 
-/// Runs a command of this name with its arguments. `test` returns the exit status, or why nothing could be tested.
-pub fn run<Cli: Parser>(name: &str, test: impl FnOnce(&Cli) -> Result<u8>) -> ExitCode {
-    let tested = match Cli::try_parse() {
+/// Runs a command of this name and version with its arguments. `test` returns the exit status, or why nothing could be
+/// tested.
+pub fn run<Cli: Parser>(
+    name: &str,
+    version: &'static str,
+    test: impl FnOnce(&Cli) -> Result<u8>,
+) -> ExitCode {
+    let arguments = Cli::command().version(version).try_get_matches();
+    let tested = match arguments.and_then(|found| Cli::from_arg_matches(&found)) {
         Ok(cli) => test(&cli),
         Err(error) if error.use_stderr() => Err(anyhow!(one_line(&error))),
         Err(help) => help.exit(),

@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::path::Path;
-use std::process::Command;
 
 use chrono::{SecondsFormat, Utc};
 use register_map::state;
@@ -29,8 +28,8 @@ pub struct About {
     pub host: String,
     /// Version of this program.
     pub version: String,
-    /// Commit of the tree that this program was built in, if the tree still exists.
-    pub commit: Option<String>,
+    /// Commit that this program was built from.
+    pub commit: String,
     /// The USB adapter of the port, if the port has one.
     pub adapter: Option<Adapter>,
     /// The unit, after it has answered.
@@ -64,9 +63,9 @@ pub struct Unit {
 }
 
 impl About {
-    /// Describes this computer, this port and this instant. The unit is added later.
+    /// Describes this computer, this port, this instant, and the commit of this program. The unit is added later.
     #[must_use]
-    pub fn here(port: Option<&Path>) -> Self {
+    pub fn here(port: Option<&Path>, commit: &str) -> Self {
         Self {
             date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
             host: format!(
@@ -76,7 +75,7 @@ impl About {
                 std::env::consts::ARCH
             ),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            commit: commit(Path::new(env!("CARGO_MANIFEST_DIR"))),
+            commit: commit.to_owned(),
             // If the ports cannot be listed, the report names no adapter.
             adapter: port.and_then(|port| adapter(port, &serialport::available_ports().ok()?)),
             unit: None,
@@ -90,8 +89,8 @@ impl About {
             ("date", self.date.clone()),
             ("host", self.host.clone()),
             ("modio-hil", self.version.clone()),
+            ("commit", self.commit.clone()),
         ];
-        all.extend(self.commit.clone().map(|commit| ("commit", commit)));
         if let Some(adapter) = &self.adapter {
             all.push(("adapter", adapter.to_string()));
         }
@@ -189,22 +188,6 @@ fn adapter(port: &Path, ports: &[SerialPortInfo]) -> Option<Adapter> {
     })
 }
 
-/// The commit of a tree, with `-dirty` when it has changes.
-fn commit(tree: &Path) -> Option<String> {
-    let mut git = Command::new("git");
-    git.arg("-C").arg(tree);
-    git.args([
-        "describe",
-        "--always",
-        "--dirty",
-        "--abbrev=40",
-        "--exclude=*",
-    ]);
-    let output = git.output().ok().filter(|output| output.status.success())?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    Some(text.trim().to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use register_map::Module;
@@ -248,11 +231,9 @@ mod tests {
 
     #[test]
     fn run_is_described_in_json_and_in_properties() {
-        let mut about = About::here(None);
+        let mut about = About::here(None, "89abcdef");
         assert!(about.date.ends_with('Z') && !about.host.is_empty());
-        about.commit = None;
-        assert_eq!(about.json()["commit"], Value::Null);
-        assert!(about.properties().iter().all(|(name, _)| *name != "commit"));
+        assert_eq!(about.json()["commit"], "89abcdef");
         about.unit = Some(Unit {
             address: 7,
             firmware: "1.2.3".to_owned(),
@@ -266,6 +247,7 @@ mod tests {
         let modules = "1=4do 2=4do 3=4do 4=4do";
         assert_eq!(about.json()["unit"]["module"], modules);
         let properties = about.properties();
+        assert!(properties.contains(&("commit", "89abcdef".to_owned())));
         assert!(properties.contains(&("firmware commit", "0123abcd".to_owned())));
     }
 }

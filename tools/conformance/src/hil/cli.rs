@@ -15,7 +15,7 @@ use crate::program::Files;
 /// Leaves the unit as it was, also after Ctrl-C. Exit status: 0 all tests passed, 1 a test failed, 2 nothing could
 /// be tested, 130 interrupted.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "modio-hil", version)]
+#[command(name = "modio-hil")]
 pub struct Cli {
     /// The bench file: port, probe, unit, line, module, commands and wires in TOML (docs/hil.md). An option takes
     /// precedence over its key

@@ -12,6 +12,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use super::adu::{Framing, MBAP, response_length};
+use super::is_from_gateway;
 use super::master::{Lost, Master};
 
 /// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns the request
@@ -141,7 +142,8 @@ impl Master {
             got.drain(..length);
             last = Some(unit);
             // A gateway answers for a missing unit.
-            let absent = matches!(pdu[..], [code, 0x0A | 0x0B] if code == REPORT | 0x80);
+            let absent =
+                matches!(pdu[..], [f, code] if f == REPORT | 0x80 && is_from_gateway(code));
             // Two answers from one address mean two units.
             if !absent && !found.units.insert(unit) {
                 found.garbled.insert(unit);

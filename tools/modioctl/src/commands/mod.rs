@@ -38,13 +38,15 @@ pub async fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Watch(_) | Command::Monitor(_) | Command::Sniff(_)
     );
     tokio::select! {
-        result = dispatch(cli) => result.map(|()| ExitCode::SUCCESS),
+        // Ctrl-C is handled before the command begins.
+        biased;
         _ = tokio::signal::ctrl_c() => Ok(if until_stopped {
             ExitCode::SUCCESS
         } else {
             eprintln!("modioctl: stopped");
             ExitCode::from(INTERRUPTED)
         }),
+        result = dispatch(cli) => result.map(|()| ExitCode::SUCCESS),
     }
 }
 

@@ -12,7 +12,7 @@ pub use learn::{Learned, fetch, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};
-use crate::bus::{Lost, Master, Observer, decode};
+use crate::bus::{Lost, Master, Observer, decode, is_from_gateway};
 use crate::failure::Failure;
 
 /// Largest number of registers that one request can read (V1.1b3, 6.3).
@@ -181,9 +181,17 @@ impl Device {
         self.master.endpoint().place.is_serial()
     }
 
-    /// Returns the failure for an exception, with its meaning.
+    /// Returns the failure for an exception, with its meaning. An exception from a gateway means that the unit does not
+    /// answer.
     #[must_use]
     pub fn exception(&self, code: u8, about: &str) -> Failure {
+        let unit = self.unit;
+        if is_from_gateway(code) {
+            return Failure::NoAnswer(format!(
+                "{about}: unit {unit} does not answer the gateway at {} (exception {code:02X})",
+                place(self.master.endpoint())
+            ));
+        }
         let name = names::exception(code).unwrap_or("unknown exception");
         let meaning = match code {
             1 => "the unit does not have this function",
@@ -193,10 +201,8 @@ impl Device {
                 "the module in the slot does not answer: check that it is plugged in and that MODULE names it"
             }
             6 => "the configuration is locked, or a save is still under way: try again",
-            0x0A | 0x0B => "the gateway says that the unit does not answer",
             _ => "see the manual of the unit",
         };
-        let unit = self.unit;
         Failure::Refused(format!(
             "{about}: unit {unit} refuses with exception {code:02X} ({name}): {meaning}"
         ))

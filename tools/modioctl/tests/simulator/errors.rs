@@ -29,7 +29,7 @@ fn a_module_that_is_not_plugged_in_is_status_1() {
     unit.post("/api/power", r#"{"on":false}"#);
     unit.post("/api/module", r#"{"name":"4di"}"#);
     unit.post("/api/power", r#"{"on":true}"#);
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    unit.wait(500);
     let at = At::tcp(unit.tcp);
     let text = at.run("write p5.1=100").failed(1);
     assert!(
@@ -165,16 +165,11 @@ fn a_port_that_cannot_be_opened_is_status_5() {
 
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::port(unit.pty.display());
-    let mut holder = at
-        .command("watch")
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    let mut holder = at.start("watch");
+    holder.out.wait_for("p5.1");
     let text = at.run("info").failed(5);
     assert!(text.contains("is in use"), "{text}");
-    holder.kill().unwrap();
-    holder.wait().unwrap();
+    drop(holder);
     at.run("info").fine();
 }
 

@@ -2,7 +2,6 @@
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -40,39 +39,14 @@ fn tapped(line: SocketAddr) -> (SocketAddr, Receiver<Vec<u8>>) {
     (address, hear)
 }
 
-/// A process that ends with the test.
-struct Listener(Child);
-
-impl Listener {
-    fn at(at: &At, capture: &std::path::Path) -> Self {
-        let mut command = at.command("sniff --record");
-        command.arg(capture);
-        Self(command.stdout(Stdio::piped()).spawn().unwrap())
-    }
-
-    /// Returns the first lines that it prints.
-    fn lines(&mut self, count: usize) -> Vec<String> {
-        use std::io::{BufRead, BufReader};
-        let lines = BufReader::new(self.0.stdout.take().unwrap()).lines();
-        lines.take(count).map(Result::unwrap).collect()
-    }
-}
-
-impl Drop for Listener {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// A master writes and reads an output twice, and the bytes on the line are passed to the listener.
 fn both_directions_are_shown(listener: &At, mut carry: impl FnMut(&[u8])) {
     let unit = Unit::with(1, &["--module", "4do"]);
     let (line, hear) = tapped(unit.tcp);
     let folder = tempfile::tempdir().unwrap();
     let capture = folder.path().join("line.pcapng");
-    let mut listener = Listener::at(listener, &capture);
-    std::thread::sleep(Duration::from_millis(500));
+    let mut listener = listener.start(&format!("sniff --record {}", capture.display()));
+    listener.err.wait_for("listening at");
     let master = At::tcp(line);
     let text = master.run("raw 05 0010 FF00").fine();
     assert_eq!(text.lines().count(), 2);
@@ -80,14 +54,13 @@ fn both_directions_are_shown(listener: &At, mut carry: impl FnMut(&[u8])) {
     while let Ok(bytes) = hear.recv_timeout(Duration::from_millis(500)) {
         carry(&bytes);
     }
-    let lines = listener.lines(4);
-    for (line, part) in lines.iter().zip([
+    for part in [
         "write single coil 0x0010",
         "write single coil 0x0010",
         "read coils 0x0010",
         "read coils",
-    ]) {
-        assert!(line.contains(part), "{part}: {lines:#?}");
+    ] {
+        listener.out.wait_for(part);
     }
     let capture = std::fs::read(capture).unwrap();
     let section_header = [0x0A, 0x0D, 0x0D, 0x0A];

@@ -1,7 +1,9 @@
 //! Runs the program.
 
 use std::fmt::Display;
-use std::process::{Command, Output};
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 
 /// Result of a run of the program.
 #[derive(Debug)]
@@ -93,5 +95,80 @@ impl At {
     /// Runs the words of a command.
     pub fn run(&self, words: &str) -> Ran {
         Ran::of(&self.command(words).output().unwrap())
+    }
+
+    /// Starts the words of a command.
+    pub fn start(&self, words: &str) -> Running {
+        let mut child = self
+            .command(words)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Running {
+            out: Text::of(child.stdout.take().unwrap()),
+            err: Text::of(child.stderr.take().unwrap()),
+            child,
+        }
+    }
+}
+
+/// A run of the program that has not been waited for. The program ends when this value is dropped.
+pub struct Running {
+    pub child: Child,
+    pub out: Text,
+    pub err: Text,
+}
+
+impl Running {
+    /// Waits for the end of the program.
+    pub fn end(mut self) -> Ran {
+        let status = self.child.wait().unwrap().code().unwrap();
+        let [out, err] = [&mut self.out, &mut self.err].map(Text::rest);
+        Ran { status, out, err }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What a running program prints.
+pub struct Text {
+    lines: Receiver<String>,
+    seen: String,
+}
+
+impl Text {
+    fn of(stream: impl Read + Send + 'static) -> Self {
+        let (tell, lines) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(stream).lines() {
+                let _ = tell.send(line.unwrap() + "\n");
+            }
+        });
+        let seen = String::new();
+        Self { lines, seen }
+    }
+
+    /// Waits for a line that contains this.
+    #[track_caller]
+    pub fn wait_for(&mut self, part: &str) {
+        loop {
+            let line = self.lines.recv();
+            let line = line.unwrap_or_else(|_| panic!("no {part:?} in {:?}", self.seen));
+            self.seen += &line;
+            if line.contains(part) {
+                return;
+            }
+        }
+    }
+
+    fn rest(&mut self) -> String {
+        self.seen.extend(self.lines.iter());
+        std::mem::take(&mut self.seen)
     }
 }

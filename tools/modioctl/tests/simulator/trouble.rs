@@ -1,12 +1,11 @@
 //! Tests with bit errors on the line, and with units that lose their power.
 
-use std::process::Stdio;
-use std::thread;
-use std::time::Duration;
-
 use crate::bus;
 use crate::program::At;
 use crate::unit::Unit;
+
+/// `--trace` prints this with a request.
+const REQUEST: &str = " -> ";
 
 #[test]
 #[ignore = "needs the simulator: cargo xtask test"]
@@ -18,7 +17,7 @@ fn a_thousand_polls_over_a_line_with_bit_errors_show_no_wrong_value() {
     direct.run("reboot").fine();
     direct.run("write p5.1=on p5.3=on").fine();
     let at = At::tcp(bus::of(&[unit.tcp], 10_000));
-    let words = "--baud 115200 --timeout 100ms --retries 4 watch p5.1 p5.2 p5.3 p5.4 BAUD p5.1.safe product_code --every 1ms --count 1000 --csv";
+    let words = "--baud 115200 --timeout 150ms --retries 9 watch p5.1 p5.2 p5.3 p5.4 BAUD p5.1.safe product_code --every 1ms --count 1000 --csv";
     let text = at.run(words).fine();
     let mut lines = text.lines();
     assert_eq!(
@@ -43,20 +42,19 @@ fn a_thousand_polls_over_a_line_with_bit_errors_show_no_wrong_value() {
 fn a_unit_that_stops_during_a_command_gives_one_line_and_status_3() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::tcp(unit.tcp);
-    let dying = at
-        .command("--timeout 200ms --retries 1 config reset --restart")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    thread::sleep(Duration::from_millis(60));
+    let mut dying = at.start("--timeout 200ms --retries 1 --trace config reset --restart");
+    dying.err.wait_for(REQUEST);
     unit.post("/api/power", r#"{"on":false}"#);
-    let output = dying.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(3), "{output:?}");
-    let text = String::from_utf8(output.stderr).unwrap();
+    let ran = dying.end();
+    assert_eq!(ran.status, 3, "{ran:?}");
+    let told: Vec<_> = ran
+        .err
+        .lines()
+        .filter(|line| line.starts_with("modioctl: "))
+        .collect();
     assert!(
-        text.lines().count() == 1 && text.contains("does not answer"),
-        "{text}"
+        matches!(told[..], [line] if line.contains("does not answer")),
+        "{ran:?}"
     );
 }
 
@@ -64,17 +62,11 @@ fn a_unit_that_stops_during_a_command_gives_one_line_and_status_3() {
 #[ignore = "needs the simulator: cargo xtask test"]
 fn a_lost_connection_is_status_5_immediately() {
     let unit = Unit::with(1, &["--module", "4di"]);
-    let at = At::tcp(unit.tcp);
-    let cut = at
-        .command("--timeout 30s --unit 99 info")
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    thread::sleep(Duration::from_millis(300));
+    let mut cut = At::tcp(unit.tcp).start("--timeout 1h --trace --unit 99 info");
+    cut.err.wait_for(REQUEST);
     drop(unit);
-    let output = cut.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(5), "{output:?}");
+    let ran = cut.end();
+    assert_eq!(ran.status, 5, "{ran:?}");
 }
 
 #[test]
@@ -82,18 +74,14 @@ fn a_lost_connection_is_status_5_immediately() {
 fn ctrl_c_ends_a_command_that_waits_and_the_line_stays_usable() {
     let unit = Unit::with(1, &["--module", "4di"]);
     let at = At::port(unit.pty.display());
-    let mut waiting = at
-        .command("--timeout 1h --unit 99 info")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    thread::sleep(Duration::from_millis(300));
-    let id = waiting.id().to_string();
+    let mut waiting = at.start("--timeout 1h --trace --unit 99 info");
+    waiting.err.wait_for(REQUEST);
+    let id = waiting.child.id().to_string();
     std::process::Command::new("kill")
         .args(["-INT", &id])
         .status()
         .unwrap();
-    assert_eq!(waiting.wait().unwrap().code(), Some(130));
+    let ran = waiting.end();
+    assert_eq!(ran.status, 130, "{ran:?}");
     at.run("info").fine();
 }

@@ -59,23 +59,42 @@ impl Unit {
             http,
         };
         // The unit answers some milliseconds after its start; a test with a single request must not be too early.
-        std::thread::sleep(std::time::Duration::from_millis(300));
+        unit.wait(300);
         unit
     }
 
-    /// Sends a request to the simulator's HTTP interface.
+    /// Changes something with the simulator's HTTP interface.
     pub fn post(&self, path: &str, body: &str) {
+        self.request("POST", path, body);
+    }
+
+    /// Waits until this many milliseconds have passed for the unit, however slow this computer is.
+    pub fn wait(&self, milliseconds: u64) {
+        let now = || {
+            let state: serde_json::Value =
+                serde_json::from_str(&self.request("GET", "/api/state", "")).unwrap();
+            state["virtual_ms"].as_u64().unwrap()
+        };
+        let end = now() + milliseconds;
+        while now() < end {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    }
+
+    /// Sends a request and returns the body of the answer.
+    fn request(&self, method: &str, path: &str, body: &str) -> String {
         let mut stream = TcpStream::connect(self.http).unwrap();
         let length = body.len();
         write!(
             stream,
-            "POST {path} HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}",
+            "{method} {path} HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}",
             self.http
         )
         .unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
         assert!(answer.starts_with("HTTP/1.1 2"), "{answer}");
+        answer.split_once("\r\n\r\n").unwrap().1.to_owned()
     }
 }
 
