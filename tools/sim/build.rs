@@ -1,6 +1,6 @@
-//! Puts firmware images into the program, so that it runs without an image file: every `*.elf` of the directory that
-//! the variable `MODIO_SIM_IMAGES` names, under the name of its file, which is the board's. `cargo xtask dist` sets the
-//! variable; without it there are none.
+//! Puts firmware images into the program, so that it runs without an image file. The images are all files `BOARD.elf`
+//! in the directory that the variable `MODIO_SIM_IMAGES` names. `cargo xtask dist` sets the variable. Without it, the
+//! program has no images.
 
 use std::env;
 use std::fmt::Write as _;
@@ -20,26 +20,25 @@ fn main() {
             Path::new(&directory).display()
         );
         for (name, file) in images(Path::new(&directory)) {
-            // Beside the code that includes it, so that no path of this machine is in the program.
+            // Copy the image beside the code that includes it, so that the program contains no path of this computer.
             let copy = format!("{name}.elf");
-            fs::copy(&file, out.join(&copy)).expect("cargo's directory can be written to");
+            fs::copy(&file, out.join(&copy)).expect("OUT_DIR must be writable");
             writeln!(
                 rows,
                 "    ({name:?}, include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{copy}\"))),"
             )
-            .expect("a String takes everything");
+            .expect("writing to a String cannot fail");
         }
     }
-    fs::write(out.join("images.rs"), format!("&[\n{rows}]\n"))
-        .expect("cargo's directory can be written to");
+    fs::write(out.join("images.rs"), format!("&[\n{rows}]\n")).expect("OUT_DIR must be writable");
 }
 
-/// The images in a directory, by name.
+/// The images in a directory, sorted by name.
 fn images(directory: &Path) -> Vec<(String, PathBuf)> {
     let files = fs::read_dir(directory)
         .unwrap_or_else(|error| panic!("{VARIABLE}: {}: {error}", directory.display()));
     let mut found: Vec<(String, PathBuf)> = files
-        .map(|file| file.expect("a directory that can be read").path())
+        .map(|file| file.expect("the directory must be readable").path())
         .filter(|file| file.extension().is_some_and(|extension| extension == "elf"))
         .filter_map(|file| Some((file.file_stem()?.to_str()?.to_owned(), file.clone())))
         .collect();

@@ -1,7 +1,7 @@
 //! Another board with an STM32F103: a "Blue Pill" with an LED at PC13 and a terminal at USART1.
 //!
-//! Everything that the board does is printed with its virtual time. Without an argument it runs a small program that
-//! blinks and sends a line; with the path of an ELF file it runs that image.
+//! Prints everything that the board does, with the virtual time. Without an argument the board runs a small program
+//! that switches the LED and sends a line; with the path of an ELF file it runs that image.
 //!
 //! ```sh
 //! cargo run --ignore-rust-version -p sim --example blue_pill
@@ -21,9 +21,9 @@ use sim::{Chip, Error, Image, Time, chip};
 mod asm;
 use asm::{Asm, When};
 
-/// USART1's transmitter.
+/// Transmitter of USART1.
 const TX: Pin = Pin::new('A', 9);
-/// The rate and the format of the terminal.
+/// Rate and format of the terminal.
 const TERMINAL: Settings = Settings {
     baud: 115_200,
     format: Format::N1,
@@ -34,17 +34,17 @@ const GPIOA_CRH: u32 = 0x4001_0804;
 const GPIOC: u32 = 0x4001_1000;
 const USART1: u32 = 0x4001_3800;
 
-/// What is connected to the pins.
+/// The circuit of the board.
 #[derive(Default)]
 pub struct BluePill {
     led: bool,
     terminal: Terminal,
-    /// The events so far, in order.
+    /// The events so far, each with its virtual time, in order.
     pub events: Vec<(Time, String)>,
 }
 
 impl Circuit for BluePill {
-    /// The LED is on while PC13 is an output that is low.
+    /// Switches the LED, which is on while PC13 is an output and low.
     fn port_changed(&mut self, port: char, gpio: &Gpio, now: Time) -> bool {
         let led = (gpio.outputs() & !gpio.level()) >> 13 & 1 != 0;
         if port == 'C' && led != self.led {
@@ -60,7 +60,7 @@ impl Circuit for BluePill {
     }
 }
 
-/// A terminal that shows what it receives, line by line.
+/// A terminal that makes an event of each line that it receives.
 #[derive(Default)]
 struct Terminal {
     wave: Wave,
@@ -115,16 +115,16 @@ impl Wire for BluePill {
     }
 }
 
-/// A program that turns the LED on or off and sends a line, again and again.
+/// A program that switches the LED and sends a line, in an endless loop.
 #[must_use]
 pub fn blinking() -> Image {
     let mut program = Asm::new();
-    // Clocks for ports A and C and for USART1.
+    // Enable the clocks of ports A and C and of USART1.
     program.store(RCC_APB2ENR, 1 << 2 | 1 << 4 | 1 << 14);
-    // PC13 is an output, PA9 is USART1's.
+    // Make PC13 an output, and PA9 the transmitter of USART1.
     program.store(GPIOC + 0x04, 0x4424_4444);
     program.store(GPIOA_CRH, 0x4444_44B4);
-    // 8 MHz / 115200 in BRR, then UE and TE.
+    // Write 8 MHz / 115200 to BRR, then set UE and TE.
     program.store(USART1 + 0x08, 69);
     program.store(USART1 + 0x0C, 1 << 13 | 1 << 3);
     program.set(4, GPIOC);
@@ -150,7 +150,7 @@ pub fn blinking() -> Image {
 ///
 /// # Errors
 ///
-/// [`Error::Image`] when the image does not fit the part.
+/// [`Error::Image`] if the image does not fit the part.
 pub fn run(image: &Image, duration: Time) -> Result<Chip<BluePill>, Error> {
     let config = chip::Config {
         part: &STM32F103C8,

@@ -1,54 +1,67 @@
-//! Measures what virtual boards cost: the share of a core's time that they need to keep real time.
+//! Measures the load of virtual boards: the share of a host core that they need to keep real time.
 //!
 //! ```text
 //! cargo run --release --ignore-rust-version -p sim --example load -- IMAGE [BOARDS [SECONDS]]
 //! ```
 //!
-//! IMAGE is the firmware's ELF file for the modio-02. BOARDS (30) share a line in the last lines of the table, each of
-//! which takes so many SECONDS (5) of virtual time. Before that each board starts and answers two requests, so that
-//! the translation of the firmware's code is not in the figure.
+//! Before each line of the table the boards start and each answers two requests. Most of the firmware's code is then
+//! translated, so the figures contain little of the time for the translation.
 
 use std::fs;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use clap::Parser;
 use modbus_frames::adu::Framing;
 use register_map::configuration;
 use sim::board::MODIO_02;
 use sim::line::Settings;
 use sim::{Board, Bus, Config, Image, Module, Time};
 
+#[derive(clap::Parser)]
+struct Arguments {
+    /// The firmware's ELF file for the modio-02
+    image: PathBuf,
+
+    /// Number of boards on one line, in the last three lines of the table
+    #[arg(default_value_t = 30, value_parser = clap::value_parser!(u8).range(1..=247))]
+    boards: u8,
+
+    /// Virtual time of each measurement, in seconds
+    #[arg(default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    seconds: u64,
+}
+
+/// How the master polls the boards in turn.
+#[derive(Clone, Copy)]
+enum Master {
+    Silent,
+    /// Each board once a second, if the line is fast enough.
+    EverySecond,
+    /// The next request follows t3.5 after a reply.
+    NoPause,
+}
+
 fn main() -> Result<(), String> {
-    let mut arguments = std::env::args_os().skip(1);
-    let path = arguments.next().ok_or("usage: load IMAGE [BOARDS]")?;
-    let image = Image::read(path.as_ref()).map_err(|error| error.to_string())?;
-    let boards = match arguments.next() {
-        Some(number) => number
-            .to_str()
-            .and_then(|number| number.parse().ok())
-            .filter(|number| (1..=247).contains(number))
-            .ok_or("BOARDS is a number from 1 to 247")?,
-        None => 30,
-    };
-    let span = match arguments.next() {
-        Some(number) => number
-            .to_str()
-            .and_then(|number| number.parse().ok())
-            .filter(|number| (1..=3600).contains(number))
-            .ok_or("SECONDS is a number from 1 to 3600")?,
-        None => 5,
-    };
-    println!("boards  baud    master                  share of a core  wall time  replies");
-    for (boards, baud) in [(1, 9600), (1, 115_200), (boards, 19_200)] {
-        for polled in [false, true] {
-            if (boards, baud, polled) != (1, 9600, true) {
-                report(&image, boards, baud, polled, Time::from_secs(span))?;
-            }
-        }
+    let arguments = Arguments::parse();
+    let image = Image::read(&arguments.image).map_err(|error| error.to_string())?;
+    let (boards, span) = (arguments.boards, arguments.seconds);
+    println!("boards  baud    master                   share of a core  wall time  replies");
+    for (boards, baud, master) in [
+        (1, 9600, Master::Silent),
+        (1, 115_200, Master::Silent),
+        (1, 115_200, Master::NoPause),
+        (boards, 19_200, Master::Silent),
+        (boards, 19_200, Master::EverySecond),
+        (boards, 19_200, Master::NoPause),
+    ] {
+        report(&image, boards, baud, master, Time::from_secs(span))?;
     }
     Ok(())
 }
 
-fn report(image: &Image, boards: u8, baud: u32, polled: bool, span: Time) -> Result<(), String> {
+/// Measures boards on one line, and prints a line of the table.
+fn report(image: &Image, boards: u8, baud: u32, master: Master, span: Time) -> Result<(), String> {
     let mut bus = bus(image, boards, baud).map_err(|error| error.to_string())?;
     for unit in (1..=boards).chain(1..=boards) {
         if !poll(&mut bus, unit) {
@@ -57,16 +70,23 @@ fn report(image: &Image, boards: u8, baud: u32, polled: bool, span: Time) -> Res
     }
     let (wall, cpu) = (Instant::now(), cpu_time());
     let end = bus.now() + span;
+    let pause = match master {
+        Master::Silent => span,
+        Master::EverySecond => Time::from_ps(Time::from_secs(1).as_ps() / u64::from(boards)),
+        Master::NoPause => Time::ZERO,
+    };
     let mut replies = 0;
-    if polled {
-        for unit in (1..=boards).cycle() {
-            if bus.now() >= end {
-                break;
-            }
+    for unit in (1..=boards).cycle() {
+        let next = bus.now() + pause;
+        if !matches!(master, Master::Silent) {
             replies += u32::from(poll(&mut bus, unit));
         }
-    } else {
-        bus.run_until(end);
+        if bus.now() < next.min(end) {
+            bus.run_until(next.min(end));
+        }
+        if bus.now() >= end {
+            break;
+        }
     }
     let wall = wall.elapsed();
     let cpu = match (cpu, cpu_time()) {
@@ -75,11 +95,11 @@ fn report(image: &Image, boards: u8, baud: u32, polled: bool, span: Time) -> Res
     };
     let share = |time: Duration| 100.0 * time.as_secs_f64() / span.as_secs_f64();
     println!(
-        "{boards:6}  {baud:<6}  {:22}  {:13.1} %  {:7.1} %  {replies:7}",
-        if polled {
-            "polls, t3.5 between"
-        } else {
-            "silent"
+        "{boards:6}  {baud:<6}  {:23}  {:13.1} %  {:7.1} %  {replies:7}",
+        match master {
+            Master::Silent => "silent",
+            Master::EverySecond => "polls each every second",
+            Master::NoPause => "polls without pause",
         },
         share(cpu),
         share(wall),
@@ -87,7 +107,7 @@ fn report(image: &Image, boards: u8, baud: u32, polled: bool, span: Time) -> Res
     Ok(())
 }
 
-/// Boards with the addresses 1 and up, a 4DI plugged into each, started.
+/// Boards on one line with the addresses 1 and up and a 4DI each. Their firmware has started.
 fn bus(image: &Image, boards: u8, baud: u32) -> Result<Bus, sim::Error> {
     let settings: Vec<_> = configuration::modules([(MODIO_02.slots[0].port, Module::Di4)])
         .chain([(configuration::BAUD, (baud / 100) as u16)])
@@ -109,7 +129,7 @@ fn bus(image: &Image, boards: u8, baud: u32) -> Result<Bus, sim::Error> {
     Ok(bus)
 }
 
-/// Reads the unit's inputs. Whether it answers.
+/// Reads the inputs of a unit. Returns whether it answers.
 fn poll(bus: &mut Bus, unit: u8) -> bool {
     let point = register_map::points::first(MODIO_02.board.first_port);
     let [high, low] = point.to_be_bytes();
@@ -119,7 +139,7 @@ fn poll(bus: &mut Bus, unit: u8) -> bool {
     let settings = bus.line().settings();
     let patience = sent + Time::from_ms(20);
     let mut reply = Vec::new();
-    // Unit, function, count, the inputs, CRC.
+    // A reply has 6 bytes: unit, function, count, inputs, CRC.
     while reply.len() < 6 && bus.now() < patience {
         bus.run_for(settings.characters(1));
         reply.extend(
@@ -129,12 +149,12 @@ fn poll(bus: &mut Bus, unit: u8) -> bool {
                 .map(|received| received.byte),
         );
     }
-    // The last character is there before its last stop bit ends.
+    // The last character is received before its last stop bit ends. Wait for that and for t3.5.
     bus.run_for(settings.frame_silence() + settings.characters(1));
     Framing::Rtu.open(&reply).is_some()
 }
 
-/// The time that the process has spent on a core, where the system shows it.
+/// Time that all threads of this process have spent on a core; `None` if the system does not show it.
 fn cpu_time() -> Option<Duration> {
     let mut total = Duration::ZERO;
     for thread in fs::read_dir("/proc/self/task").ok()? {

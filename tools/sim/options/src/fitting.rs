@@ -1,4 +1,4 @@
-//! The boards on the line and how each is fitted, from the options or from the file of `--bus`.
+//! The boards on the line with their configurations, from the options or from the file of `--bus`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,32 +9,32 @@ use serde::Deserialize;
 
 use crate::{Options, slot};
 
-/// Most boards on a line: Modbus has so many unit addresses.
+/// Most boards on a line: the number of unit addresses in Modbus.
 const MOST: usize = 247;
 
 /// Configuration of a board before power-on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fitting {
-    /// Name in the HTTP interface.
+    /// Name of the board in the HTTP interface.
     pub name: String,
-    /// Its type.
+    /// Type of the board.
     pub board: &'static Board,
-    /// SW01.
+    /// DIP switch SW01: bit 0 = position 1.
     pub dip: u8,
     /// Module in the first slot, unless `slots` names that slot.
     pub module: Module,
-    /// Modules by port.
+    /// Modules in other slots, each with the number of its port.
     pub slots: Vec<(u8, Module)>,
-    /// File that holds the flash.
+    /// File in which the flash is kept.
     pub flash: Option<PathBuf>,
 }
 
 impl Options {
-    /// The boards on the line, at least one.
+    /// Returns the boards on the line, at least one.
     ///
     /// # Errors
     ///
-    /// The first error in the file of `--bus`, in one line.
+    /// In one line: there are too many boards, or the first error in the file of `--bus`.
     pub fn fittings(&self) -> Result<Vec<Fitting>, String> {
         if let Some(path) = &self.bus {
             return of_file(path).map_err(|what| format!("{}: {what}", path.display()));
@@ -50,7 +50,7 @@ impl Options {
             }]);
         }
         if self.units.len() > MOST {
-            return Err(format!("{MOST} boards are the most on one line"));
+            return Err(format!("a line can have at most {MOST} boards"));
         }
         let mut names = Names::default();
         let unit = |&(dip, module): &(u8, Option<Module>)| Fitting {
@@ -76,7 +76,7 @@ impl Names {
         let free = std::iter::once(name.clone())
             .chain(numbered)
             .find(|name| self.0.insert(name.clone()));
-        // The numbers do not end.
+        // A free number is always found.
         free.unwrap_or(name)
     }
 }
@@ -104,19 +104,19 @@ fn of_file(path: &Path) -> Result<Vec<Fitting>, String> {
     let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
     let file: File = toml::from_str(&text).map_err(|error| toml_error(&text, &error))?;
     if file.board.is_empty() || file.board.len() > MOST {
-        return Err(format!("1 to {MOST} tables [[board]] are wanted"));
+        return Err(format!("the file must have 1 to {MOST} tables [[board]]"));
     }
     let directory = path.parent().unwrap_or(Path::new(""));
     let mut names = Names::default();
     let mut files = BTreeSet::new();
     let mut fittings = Vec::new();
     for (table, number) in file.board.into_iter().zip(1..) {
-        let told = |what: String| format!("board {number}: {what}");
+        let in_table = |what: String| format!("board {number}: {what}");
         let name = match table.name {
             Some(name) => {
-                check_name(&name).map_err(told)?;
+                check_name(&name).map_err(in_table)?;
                 if !names.0.insert(name.clone()) {
-                    return Err(told(format!("another board is called '{name}' too")));
+                    return Err(in_table(format!("another board has the name '{name}'")));
                 }
                 name
             }
@@ -125,13 +125,13 @@ fn of_file(path: &Path) -> Result<Vec<Fitting>, String> {
         let board = match table.board {
             Some(board) => board
                 .parse()
-                .map_err(|why| told(format!("'{board}' is {why}")))?,
+                .map_err(|why| in_table(format!("'{board}' is {why}")))?,
             None => &MODIO_02,
         };
         let module = match table.module {
             Some(module) => module
                 .parse()
-                .map_err(|why| told(format!("'{module}' is {why}")))?,
+                .map_err(|why| in_table(format!("'{module}' is {why}")))?,
             None => Module::Di4,
         };
         let slots = table.slots.iter();
@@ -142,8 +142,8 @@ fn of_file(path: &Path) -> Result<Vec<Fitting>, String> {
         if let Some(flash) = &flash
             && !files.insert(flash.clone())
         {
-            return Err(told(format!(
-                "{} is another board's flash already",
+            return Err(in_table(format!(
+                "another board has the flash file {}",
                 flash.display()
             )));
         }
@@ -152,7 +152,7 @@ fn of_file(path: &Path) -> Result<Vec<Fitting>, String> {
             board,
             dip: table.dip,
             module,
-            slots: slots.map_err(told)?,
+            slots: slots.map_err(in_table)?,
             flash,
         });
     }
@@ -164,7 +164,7 @@ fn check_name(name: &str) -> Result<(), String> {
     let good = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || !name.chars().all(good) {
         return Err(format!(
-            "the name {name:?} is not of letters, digits, '-' and '_' only"
+            "the name {name:?} must consist of letters, digits, '-' and '_'"
         ));
     }
     Ok(())
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn bus_file_has_a_table_for_each_board() {
+    fn each_table_of_the_bus_file_is_a_board() {
         let boards = read(
             r#"
             [[board]]
@@ -220,7 +220,7 @@ mod tests {
         assert_eq!(first.slots, [(2, Module::Ai4), (4, Module::None)]);
         assert!(
             first.flash.as_ref().unwrap().is_absolute(),
-            "beside the file"
+            "the flash file is in the directory of the bus file"
         );
         let names: Vec<_> = boards[1..].iter().map(|board| &board.name).collect();
         assert_eq!(names, ["unit-7", "unit-7-2"]);
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn bus_file_errors_name_line_or_board_in_one_line() {
+    fn bus_file_error_is_one_line_that_names_the_line_or_the_board() {
         for (text, part) in [
             ("", "1 to 247 tables [[board]]"),
             ("[[board]]", "line 1: missing field `dip`"),
@@ -253,7 +253,7 @@ mod tests {
             ),
             (
                 "[[board]]\ndip = 1\nflash = 'a'\n[[board]]\ndip = 2\nflash = 'a'",
-                "board 2: ",
+                "board 2: another board has the flash file",
             ),
             ("[board", "line 1"),
         ] {

@@ -1,17 +1,22 @@
-//! The options of the virtual boards, a package of their own so that `cargo xtask sim` can refuse a
-//! wrong one at once, before it builds the image and the simulator, without depending on either.
+//! The command-line options of the simulator.
+//!
+//! They are a package of their own, so that `cargo xtask sim` can refuse a wrong option before it builds the image and
+//! the simulator.
 
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use register_map::{Board, Module, board::MODIO_02, codes::Format};
+use register_map::{Board, Module, board::MODIO_02};
 
 mod fitting;
+mod values;
 
 pub use fitting::{Fitting, toml_error};
+pub use values::slot;
+use values::{address, elf, line, unit};
 
-/// Whether the simulator has pseudo-terminals on this system. macOS has them too, but nobody has tried them there.
+/// Whether the simulator has pseudo-terminals on this system. macOS has them, too, but they were never tested there.
 pub const PTY: bool = cfg!(all(unix, not(target_os = "macos")));
 
 /// The options of the simulator's command line.
@@ -22,43 +27,43 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub dip: u8,
 
-    /// Which board to simulate: modio-02 or modio-08
+    /// Type of the board: modio-02 or modio-08
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
     pub board: &'static Board,
 
-    /// What is plugged into the board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// Module in the board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
     #[arg(long, value_name = "NAME", default_value = "4di")]
     pub module: Module,
 
-    /// What is plugged into the slot at a port, such as 3=4do; may be repeated, and overrides --module for the first
-    /// slot
+    /// Module in the slot at a port, such as 3=4do; may be repeated, and overrides --module for the first slot
     #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = slot)]
     pub slots: Vec<(u8, Module)>,
 
-    /// Several boards on one RS-485 line, repeated: the unit address and what is plugged into the first slot, such as
-    /// 5:4do; without a module, what --module says
+    /// Board on an RS-485 line with several boards, repeated: its unit address and the module in its first slot, such
+    /// as 5:4do; without a module, that of --module
     #[arg(long = "unit", value_name = "N[:MODULE]", value_parser = unit)]
     #[arg(conflicts_with_all = ["dip", "slots", "flash", "gdb", "exact_line"])]
     pub units: Vec<(u8, Option<Module>)>,
 
-    /// Several boards on one RS-485 line, from a TOML file with a table for each: name, board, dip, module, slots, flash
+    /// Several boards on one RS-485 line, from a TOML file with a table for each: name, board, dip, module, slots,
+    /// flash
     #[arg(long, value_name = "FILE")]
     #[arg(conflicts_with_all = ["units", "board", "dip", "module", "slots", "flash", "gdb", "exact_line"])]
     pub bus: Option<PathBuf>,
 
-    /// Corner of the part, its clocks and what its instructions cost: nominal, slow or fast
+    /// Corner of the part (its clocks, the time of its instructions, the noise of its ADC): nominal, slow or fast
     #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
     pub corner: String,
 
-    /// Write the codes of the plugged modules into the stored configuration when nothing is stored yet (default)
+    /// Store the modules of all slots in the configuration if nothing is stored yet (default)
     #[arg(long, overrides_with = "no_preset")]
     preset: bool,
 
-    /// Leave the stored configuration alone
+    /// Do not change the stored configuration
     #[arg(long)]
     no_preset: bool,
 
-    /// Keep the flash in FILE, made if it is not there: what the firmware stores survives
+    /// Keep the flash in FILE, so that stored settings survive; the file is made if it does not exist
     #[arg(long, value_name = "FILE")]
     pub flash: Option<PathBuf>,
 
@@ -66,7 +71,7 @@ pub struct Options {
     #[arg(long, value_name = "LINK")]
     pub pty: Option<PathBuf>,
 
-    /// Offer the RS-485 line as raw bytes over TCP as well, at HOST:PORT
+    /// Also offer the RS-485 line as raw bytes over TCP, at HOST:PORT
     #[arg(long, value_name = "ADDR", value_parser = address)]
     pub tcp: Option<SocketAddr>,
 
@@ -78,35 +83,34 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
 
-    /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md:
-    /// time stands still between its requests, so no endpoint that follows the clock is offered
+    /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md. Time
+    /// stands still between its requests, so the endpoints that follow the wall clock are not offered
     #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb"])]
     pub exact_line: Option<SocketAddr>,
 
-    /// Rate and format of the line's client, such as 9600,7N2: it keeps them whatever the unit does. Without the
-    /// option the client follows the unit, which is not possible with 7N2, because the unit's UART is set to 8N1 then
+    /// Rate and format of the line's client, such as 9600,7N2, whatever the unit does. Without this option the client
+    /// has the rate and format of the unit, except 7N2: the unit's UART is set to 8N1 then
     #[arg(long, value_name = "RATE,FORMAT", value_parser = line)]
     pub line: Option<(u32, String)>,
 
-    /// The line's client keeps its own rate and format, as on a real bus, instead of following the unit: the rate that
-    /// the master sets on the pseudo-terminal, and the format that the unit has at the start
+    /// Let the line's client keep its own rate and format, as on a real bus: the rate that the master sets on the
+    /// pseudo-terminal, and the format that the unit has at the start
     #[arg(long, conflicts_with = "line")]
     pub fixed_line: bool,
 
-    /// What the outside world does when, from a TOML file with a table for each step
+    /// Change inputs, power and faults at given times, by a TOML file with a table for each step
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
 
-    /// Where the HTTP interface listens, HOST:PORT; port 0 takes a free one
+    /// Address of the HTTP interface, HOST:PORT; with port 0 the system chooses a free port
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8502", value_parser = address)]
     pub http: SocketAddr,
 
-    /// Let a GDB connect to the core, at HOST:PORT
+    /// Serve GDB on the core, at HOST:PORT
     #[arg(long, value_name = "ADDR", value_parser = address)]
     pub gdb: Option<SocketAddr>,
 
-    /// Run this image instead of building one; with BOARD= it is for the boards of that type only, and the option may
-    /// be repeated
+    /// Run this image instead of building one; with BOARD= only on boards of that type; may be repeated
     #[arg(long, value_name = "[BOARD=]FILE", value_parser = elf)]
     pub elf: Vec<(Option<&'static Board>, PathBuf)>,
 
@@ -116,17 +120,17 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether to write the codes of the plugged modules into a configuration that holds nothing yet.
+    /// Whether to store the modules of all slots in the configuration if nothing is stored yet.
     #[must_use]
     pub fn preset(&self) -> bool {
         !self.no_preset
     }
 
-    /// Whether a master can reach the line on this system.
+    /// Checks that a master can reach the line on this system.
     ///
     /// # Errors
     ///
-    /// Which option to give on a system without pseudo-terminals.
+    /// In one line: the options to use on a system without pseudo-terminals.
     pub fn check_line(&self) -> Result<(), String> {
         if PTY {
             Ok(())
@@ -150,7 +154,7 @@ impl Options {
 }
 
 impl Options {
-    /// The image for a board: the last one given for its type, or else the last one given for all boards.
+    /// Returns the image for a board: the last one for its type, or else the last one for all boards.
     #[must_use]
     pub fn elf_of(&self, board: &Board) -> Option<&Path> {
         let last = |wanted: Option<&Board>| {
@@ -162,77 +166,7 @@ impl Options {
     }
 }
 
-/// `FILE`, or `BOARD=FILE` where that names a board.
-fn elf(text: &str) -> Result<(Option<&'static Board>, PathBuf), String> {
-    let named = text.split_once('=').and_then(|(name, file)| {
-        let board: &'static Board = name.parse().ok()?;
-        Some((Some(board), PathBuf::from(file)))
-    });
-    match named.unwrap_or_else(|| (None, PathBuf::from(text))) {
-        (_, path) if path.as_os_str().is_empty() => Err("the name of a file is missing".to_owned()),
-        named => Ok(named),
-    }
-}
-
-/// `N` or `N:MODULE` as a unit address and a module.
-fn unit(text: &str) -> Result<(u8, Option<Module>), String> {
-    let (number, module) = match text.split_once(':') {
-        Some((number, module)) => (number, Some(module)),
-        None => (text, None),
-    };
-    let number = number
-        .parse()
-        .map_err(|_| format!("{text:?} is no unit address and module such as 5:4do"))?;
-    let module = module.map(|name| {
-        let module = name.parse::<Module>();
-        module.map_err(|why| format!("'{name}' is {why}"))
-    });
-    Ok((number, module.transpose()?))
-}
-
-/// `PORT=MODULE` as the number of a port and a module.
-///
-/// # Errors
-///
-/// What is wrong with it, in words for the user.
-pub fn slot(text: &str) -> Result<(u8, Module), String> {
-    let wrong = || format!("{text:?} is no port and module such as 3=4do");
-    let (port, module) = text.split_once('=').ok_or_else(wrong)?;
-    let port = port.parse().map_err(|_| wrong())?;
-    let module = module
-        .parse()
-        .map_err(|why| format!("'{module}' is {why}"))?;
-    Ok((port, module))
-}
-
-/// `RATE,FORMAT` as a rate and the name of a format.
-fn line(text: &str) -> Result<(u32, String), String> {
-    let wrong = || format!("{text:?} is no rate and format such as 9600,7N2");
-    let (rate, name) = text.split_once(',').ok_or_else(wrong)?;
-    let known = |(_, format): &&(u16, &str)| format.eq_ignore_ascii_case(name);
-    let (_, format) = Format::NAMES.iter().find(known).ok_or_else(wrong)?;
-    let rate = rate.parse().map_err(|_| wrong())?;
-    let possible = (300..=4_000_000).contains(&rate);
-    possible
-        .then(|| (rate, (*format).to_owned()))
-        .ok_or_else(wrong)
-}
-
-/// `HOST:PORT` as an address; of a name with several, the first IPv4 one, as clients try that too.
-fn address(text: &str) -> Result<SocketAddr, String> {
-    let found: Vec<SocketAddr> = text
-        .to_socket_addrs()
-        .map_err(|error| format!("not an address such as 127.0.0.1:8502: {error}"))?
-        .collect();
-    found
-        .iter()
-        .find(|address| address.is_ipv4())
-        .or(found.first())
-        .copied()
-        .ok_or_else(|| "the name has no address".to_owned())
-}
-
-/// What is wrong with a command line in one line, without clap's hints and usage text below it.
+/// Returns the error of a command line as one line, without clap's hints and usage text.
 #[must_use]
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
@@ -249,7 +183,7 @@ pub fn one_line(error: &clap::Error) -> String {
 mod tests {
     use super::*;
     use clap::Parser;
-    use register_map::board::MODIO_08;
+    use register_map::{board::MODIO_08, codes::Format};
 
     #[derive(Parser)]
     struct Cli {
@@ -264,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn without_options_it_is_unit_1_with_four_inputs_and_a_preset() {
+    fn default_is_unit_1_with_a_4di_and_a_preset() {
         let options = parse(&[]).unwrap();
         assert_eq!((options.dip, options.module), (1, Module::Di4));
         assert_eq!(options.corner, "nominal");
@@ -281,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn every_module_and_every_switch_position_is_taken() {
+    fn every_module_and_every_dip_value_is_accepted() {
         for module in Module::ALL {
             assert_eq!(parse(&["--module", module.name()]).unwrap().module, module);
         }
@@ -291,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn without_pseudo_terminals_the_line_needs_another_way() {
+    fn without_pseudo_terminals_one_of_the_tcp_options_is_needed() {
         let check = |arguments: &[&str]| parse(arguments).unwrap().reached_without_pty();
         assert_eq!(check(&["--tcp", "127.0.0.1:0"]), Ok(()));
         assert_eq!(check(&["--modbus-tcp", "127.0.0.1:0"]), Ok(()));
@@ -307,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn slots_are_named_by_their_ports() {
+    fn slot_option_names_port_and_module() {
         assert_eq!(parse(&[]).unwrap().board.name, "modio-02");
         let arguments = ["--board", "modio-08", "--slot", "1=4do", "--slot", "4=none"];
         let options = parse(&arguments).unwrap();
@@ -316,13 +250,13 @@ mod tests {
     }
 
     #[test]
-    fn units_have_an_address_and_may_name_their_module() {
+    fn unit_option_names_an_address_and_optionally_a_module() {
         let units = parse(&["--unit", "5:4do", "--unit", "6"]).unwrap().units;
         assert_eq!(units, [(5, Some(Module::Do4)), (6, None)]);
     }
 
     #[test]
-    fn an_image_may_be_for_boards_of_one_type() {
+    fn elf_option_can_name_a_type_of_board() {
         let arguments = ["--elf", "a", "--elf", "modio-08=b", "--elf", "x=c"];
         let options = parse(&arguments).unwrap();
         assert_eq!(options.elf_of(&MODIO_08), Some(Path::new("b")));
@@ -332,14 +266,14 @@ mod tests {
     }
 
     #[test]
-    fn the_later_of_preset_and_no_preset_counts() {
+    fn last_one_of_preset_and_no_preset_counts() {
         assert!(!parse(&["--no-preset"]).unwrap().preset());
         assert!(parse(&["--no-preset", "--preset"]).unwrap().preset());
         assert!(!parse(&["--preset", "--no-preset"]).unwrap().preset());
     }
 
     #[test]
-    fn line_takes_every_format_of_the_register_map() {
+    fn line_option_accepts_every_format_of_the_register_map() {
         for (_, name) in Format::NAMES {
             let text = format!("19200,{}", name.to_lowercase());
             let line = parse(&["--line", &text]).unwrap().line;
@@ -348,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_written_as_people_write_them() {
+    fn for_option_accepts_a_duration_with_units() {
         let run_for = |text| parse(&["--for", text]).map(|options| options.run_for);
         assert_eq!(run_for("10s"), Ok(Some(Duration::from_secs(10))));
         assert_eq!(run_for("1m 500ms"), Ok(Some(Duration::from_millis(60_500))));
@@ -356,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_value_is_named_in_one_line() {
+    fn wrong_value_is_reported_in_one_line() {
         for (arguments, part) in [
             (&["--dip", "256"][..], "256 is not in 0..=255"),
             (&["--module", "8di"][..], "one of none, 4di"),

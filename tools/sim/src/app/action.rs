@@ -7,11 +7,11 @@ use super::faults::Faults;
 /// An action on a board.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    /// Changes the outside world of a channel.
+    /// Changes what is connected to a channel.
     Channel {
-        /// The port of its slot; the first slot without it.
+        /// Port of the slot; `None` means the first slot.
         port: Option<u8>,
-        /// Its number, 1 to 4.
+        /// Number of the channel, 1 to 4.
         channel: usize,
         /// The change.
         change: Change,
@@ -24,7 +24,7 @@ pub enum Action {
     PowerOff,
     /// Plugs in a module; the power must be off.
     Module {
-        /// The port of its slot; the first slot without it.
+        /// Port of the slot; `None` means the first slot.
         port: Option<u8>,
         /// The module.
         module: Module,
@@ -33,12 +33,12 @@ pub enum Action {
     Faults(Faults),
 }
 
-/// A change of the outside world of a channel.
+/// A change of what is connected to a channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// Energises a digital input or not.
+    /// Applies a voltage to a digital input, or removes it.
     Energised(bool),
-    /// Sets the jumper of a relay to manual or not.
+    /// Sets the jumper of a relay to manual or to automatic.
     Manual(bool),
     /// Sets the voltage at the pin of an analog input, 0 to 3300 mV.
     Millivolts(u16),

@@ -1,21 +1,22 @@
 //! The HTTP interface, as a function of a request and the board: no socket, no thread.
 //!
-//! | request | what |
+//! | request | effect |
 //! |---|---|
-//! | `GET /api/state` | everything that can be seen of the board |
-//! | `GET /api/frames?since=K` | the last frames on the line, those numbered above K |
+//! | `GET /api/state` | everything that is visible of the board |
+//! | `GET /api/frames?since=K` | those of the last frames on the line that have a number above K |
 //! | `GET /api/boards` | the boards: name, board, switch |
-//! | `GET /api/findings` | what the chip model objects to |
-//! | `GET /api/openapi.json` | this interface, described |
+//! | `GET /api/findings` | the findings of the chip model |
+//! | `GET /api/openapi.json` | the OpenAPI description of this interface |
 //! | `POST /api/channels/N` | `{"energised":bool}`, `{"manual":bool}` or `{"millivolts":n}` outside channel N |
 //! | `POST /api/dip` | `{"value":n}`: moves the switch |
 //! | `POST /api/power` | `{"on":bool}` or `{"cycle":true}` |
 //! | `POST /api/module` | `{"name":...}`: plugs a module, with the power off |
-//! | `GET /api/faults` | the faults made on purpose |
-//! | `POST /api/faults` | makes faults or ends them: any of `bit_error_rate`, `drop_rate`, `noise_hz`, `i2c_absent`, `hse_failed`, `hsi_percent`, `lsi_khz` |
+//! | `GET /api/faults` | the faults in force |
+//! | `POST /api/faults` | causes or clears faults: any of `bit_error_rate`, `drop_rate`, `noise_hz`, `i2c_absent`, `hse_failed`, `hsi_percent`, `lsi_khz` |
 //! | `POST /api/slots/PORT/...` | `channels/N` or `module` of the slot at PORT; without it, of the first slot |
 //!
-//! Every path also exists as `/api/boards/NAME/...`; without it the first board is meant. A POST is answered with the state after it, anything else with 4xx and `{"error": "..."}`.
+//! Every path also exists as `/api/boards/NAME/...`; without `boards/NAME` it means the first board. The reply to a
+//! POST is the new state, or the new faults. The reply to a wrong request is a 4xx status and `{"error": "..."}`.
 
 use serde_json::{Map, Value, json};
 
@@ -27,18 +28,18 @@ use super::bench::Bench;
 use super::faults::Faults;
 use super::{frames, state};
 
-/// A request as it came.
+/// A request as it was received.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// `GET`, `POST`, ...
     pub method: String,
     /// Path and query.
     pub target: String,
-    /// The body, empty when there is none.
+    /// The body; empty if the request has none.
     pub body: Vec<u8>,
 }
 
-/// The answer to a request.
+/// The reply to a request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reply {
     /// The HTTP status.
@@ -48,7 +49,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// A refusal.
+    /// Returns a refusal with an HTTP status and its reason.
     pub fn error(status: u16, what: impl Into<String>) -> Self {
         Self {
             status,
@@ -71,7 +72,7 @@ impl From<Error> for Reply {
 type Outcome = Result<(), Reply>;
 type Body = Map<String, Value>;
 
-/// Does what a request asks for.
+/// Carries out a request.
 pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
     let (path, query) = request
         .target
@@ -87,7 +88,7 @@ pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
     match answered {
         Some(Ok(body)) => Reply { status: 200, body },
         Some(Err(refusal)) => refusal,
-        None => Reply::error(404, format!("there is no {path}")),
+        None => Reply::error(404, format!("there is no path {path}")),
     }
 }
 
@@ -98,7 +99,7 @@ fn of_board<'a>(bench: &Bench, path: &'a str) -> Option<(usize, &'a str)> {
     Some((units.position(|unit| unit.name == name)?, rest))
 }
 
-/// Does what a request for board `n` asks for; `None` when there is no such path.
+/// Carries out a request for board `n`. Returns `None` if there is no such path.
 fn of_path(
     bench: &mut Bench,
     n: usize,
@@ -133,7 +134,8 @@ fn boards(bench: &Bench) -> Value {
     each.collect()
 }
 
-/// What concerns a slot, the first one unless `path` names a port; `None` when `path` is none of these.
+/// Carries out a request for a slot: the one at the port in `path`, or the first one. Returns `None` if there is no
+/// such path.
 fn of_slot(
     bench: &mut Bench,
     n: usize,
@@ -182,18 +184,18 @@ fn findings(bench: &Bench, n: usize) -> Value {
 /// The body of `GET /api/openapi.json`.
 fn openapi() -> Value {
     const TEXT: &str = include_str!("openapi.json");
-    // A test reads it.
+    // Cannot fail: a test parses the same text.
     serde_json::from_str(TEXT).unwrap_or_default()
 }
 
 fn reading(request: &Request) -> Outcome {
     match request.method.as_str() {
         "GET" => Ok(()),
-        _ => Err(Reply::error(405, "only GET here")),
+        _ => Err(Reply::error(405, "this path accepts GET only")),
     }
 }
 
-/// Does `change` with the body's JSON object, and answers with the state of board `n` after it.
+/// Calls `change` with the body's JSON object, and returns the new state of board `n`.
 fn changing(
     bench: &mut Bench,
     n: usize,
@@ -204,10 +206,10 @@ fn changing(
     Ok(state::json(bench, n))
 }
 
-/// The JSON object that a POST brings.
+/// The JSON object in the body of a POST.
 fn body(request: &Request) -> Result<Body, Reply> {
     if request.method != "POST" {
-        return Err(Reply::error(405, "only POST here"));
+        return Err(Reply::error(405, "this path accepts POST only"));
     }
     let body: Value = serde_json::from_slice(&request.body)
         .map_err(|error| Reply::error(400, format!("the body is not JSON: {error}")))?;
@@ -217,19 +219,19 @@ fn body(request: &Request) -> Result<Body, Reply> {
     }
 }
 
-/// The only entry of an object that may have no other, as what was asked for may not be half done.
+/// Returns the only entry of an object. A second entry is an error, because a request must not be carried out in part.
 fn only(body: &Body) -> Result<(&str, &Value), Reply> {
     let mut entries = body.iter();
     match (entries.next(), entries.next()) {
         (Some((key, value)), None) => Ok((key, value)),
-        _ => Err(Reply::error(400, "one entry is wanted in the object")),
+        _ => Err(Reply::error(400, "the object must have exactly one entry")),
     }
 }
 
 fn boolean(key: &str, value: &Value) -> Result<bool, Reply> {
     value
         .as_bool()
-        .ok_or_else(|| Reply::error(400, format!("`{key}` is true or false")))
+        .ok_or_else(|| Reply::error(400, format!("`{key}` must be true or false")))
 }
 
 fn number(key: &str, value: &Value, largest: u16) -> Result<u16, Reply> {
@@ -240,16 +242,13 @@ fn number(key: &str, value: &Value, largest: u16) -> Result<u16, Reply> {
         .ok_or_else(|| {
             Reply::error(
                 400,
-                format!("`{key}` is a whole number from 0 to {largest}"),
+                format!("`{key}` must be a whole number from 0 to {largest}"),
             )
         })
 }
 
-fn unknown(key: &str, wanted: &str) -> Reply {
-    Reply::error(
-        400,
-        format!("`{key}` means nothing here: {wanted} is wanted"),
-    )
+fn unknown(key: &str, known: &str) -> Reply {
+    Reply::error(400, format!("`{key}` is unknown here; use {known}"))
 }
 
 fn channel_number(text: &str) -> Option<usize> {
@@ -272,7 +271,7 @@ fn change(body: &Body) -> Result<Change, Reply> {
 fn set_dip(bench: &mut Bench, n: usize, body: &Body) -> Outcome {
     match only(body)? {
         (key @ "value", value) => {
-            // 255 fits in eight switches.
+            // The limit of 255 makes it fit in one byte.
             let dip = number(key, value, 255)?.to_le_bytes()[0];
             Ok(bench.apply(n, &Action::Dip(dip))?)
         }
@@ -290,7 +289,7 @@ fn set_power(bench: &mut Bench, n: usize, body: &Body) -> Outcome {
             bench.cycle(n);
             return Ok(());
         }
-        ("cycle", _) => return Err(Reply::error(400, "`cycle` is true")),
+        ("cycle", _) => return Err(Reply::error(400, "`cycle` must be true")),
         (key, _) => return Err(unknown(key, "`on` or `cycle`")),
     };
     Ok(bench.apply(n, &action)?)
@@ -304,7 +303,7 @@ fn set_module(bench: &mut Bench, n: usize, port: Option<u8>, body: &Body) -> Out
                 .map_err(|why| Reply::error(400, format!("`{name}` is {why}")))?;
             Ok(bench.apply(n, &Action::Module { port, module })?)
         }
-        ("name", _) => Err(Reply::error(400, "`name` is a string")),
+        ("name", _) => Err(Reply::error(400, "`name` must be a string")),
         (key, _) => Err(unknown(key, "`name`")),
     }
 }
@@ -319,7 +318,7 @@ fn set_faults(bench: &mut Bench, n: usize, body: Body) -> Outcome {
     Ok(bench.apply(n, &Action::Faults(faults))?)
 }
 
-/// The K of `since=K`; 0, which is before all frames, without a query.
+/// The K of `since=K`; 0 without a query, because frames are numbered from 1.
 fn since(query: &str) -> Result<u64, Reply> {
     if query.is_empty() {
         return Ok(0);
@@ -327,7 +326,7 @@ fn since(query: &str) -> Result<u64, Reply> {
     query
         .strip_prefix("since=")
         .and_then(|number| number.parse().ok())
-        .ok_or_else(|| Reply::error(400, "only `since=K` is understood here, K a whole number"))
+        .ok_or_else(|| Reply::error(400, "the query must be `since=K`, with K a whole number"))
 }
 
 #[cfg(test)]

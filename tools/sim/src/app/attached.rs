@@ -1,4 +1,4 @@
-//! What is attached to the line besides the endpoints for bytes: the Modbus TCP gateway and the capture file.
+//! The Modbus TCP gateway and the capture file. Both are attached to the line, besides the endpoints for bytes.
 
 use std::sync::mpsc::Sender;
 
@@ -9,7 +9,7 @@ use super::bench::Bench;
 use super::capture::Capture;
 use super::gateway::Gateway;
 
-/// The gateway and the capture file, if they are wanted.
+/// The gateway and the capture file, each if an option asks for it.
 pub struct Attached {
     /// `--modbus-tcp`.
     pub gateway: Option<Gateway>,
@@ -22,7 +22,7 @@ impl Attached {
     ///
     /// # Errors
     ///
-    /// In one line: an address that cannot be listened at, a file that cannot be written.
+    /// In one line: the simulator cannot listen at an address, or cannot write a file.
     pub fn new(options: &Options, events: Sender<Event>) -> Result<Self, String> {
         Ok(Self {
             gateway: options
@@ -33,7 +33,7 @@ impl Attached {
         })
     }
 
-    /// Brings both up to date with the line. While a debugger has `halted` the core, time stands still.
+    /// Passes new frames on to both. `halted` says that a debugger has halted the core, so that time stands still.
     pub fn update(&mut self, bench: &mut Bench, halted: bool) {
         if let Some(capture) = &mut self.capture {
             capture.update(bench.bus.line());

@@ -1,4 +1,4 @@
-//! The boards on one line, with everything the command knows about them: disturbances, the scenario, logs and flash files.
+//! The boards on one line, with their disturbances, the scenario, logs and flash files.
 
 use std::io::Write;
 
@@ -25,7 +25,7 @@ pub struct Bench {
     pub debug: Debug,
     /// Random disturbances of the line.
     pub disturbance: Disturbance,
-    /// Scheduled events of the outside world.
+    /// Scheduled changes of the boards' surroundings.
     pub scenario: Scenario,
 }
 
@@ -34,7 +34,7 @@ impl Bench {
     pub fn new(boards: Vec<(Board, Unit)>) -> Self {
         let (boards, units) = boards.into_iter().unzip();
         let mut bus = Bus::new(boards);
-        // A pty or socket carries no rate: a master behind it speaks at the unit's.
+        // A pty or socket carries no rate, so the client of the line has the unit's rate.
         bus.line().set_follow(true);
         Self {
             bus,
@@ -45,7 +45,7 @@ impl Bench {
         }
     }
 
-    /// The first board, which requests without a board's name mean.
+    /// The first board. Requests without the name of a board mean this one.
     pub fn first(&mut self) -> &mut Board {
         self.bus.board_mut(0)
     }
@@ -63,13 +63,13 @@ impl Bench {
         });
     }
 
-    /// Runs the only board as a debugger does, to a breakpoint or until `t`; returns whether it has come to one.
+    /// Runs the only board to a breakpoint or until `t`. Returns whether it has reached a breakpoint.
     pub fn run_debugged(&mut self, t: Time) -> bool {
         self.pass(t, |bus, until| bus.board_mut(0).run_debugged(until))
     }
 
-    /// Runs up to `t` in slices that end at the instants of the scenario. Queues the disturbances of each slice first. `run`
-    /// runs one slice and returns whether to stop there.
+    /// Runs up to `t` in slices that end at the instants of the scenario, and queues the disturbances of each slice
+    /// first. `run` runs one slice and returns whether to stop there.
     fn pass(&mut self, t: Time, mut run: impl FnMut(&mut Bus, Time) -> bool) -> bool {
         loop {
             let now = self.now();
@@ -113,7 +113,7 @@ impl Bench {
     ///
     /// # Errors
     ///
-    /// Why the board refuses it; then nothing has changed.
+    /// The reason why the board refuses the action. Nothing has changed then.
     pub fn apply(&mut self, n: usize, action: &Action) -> Result<(), Error> {
         let board = self.bus.board_mut(n);
         let first = board.layout().slots[0].port;
@@ -140,7 +140,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Applies faults: those of the line, and those of the part on board `n`. The values must have passed [`Faults::check`].
+    /// Applies faults: those of the line, and those of the part on board `n`. The values must have passed
+    /// [`Faults::check`].
     fn make(&mut self, faults: &Faults, n: usize) -> Result<(), Error> {
         self.disturbance
             .change(faults.bit_error_rate, faults.noise_hz, faults.drop_rate);
@@ -150,7 +151,7 @@ impl Bench {
                 true => BusFault::Absent,
                 false => BusFault::None,
             };
-            // All its DACs are on one I2C bus.
+            // All DACs of a board are on one I2C bus.
             let ports: Vec<u8> = board.slots().map(|(port, _)| port).collect();
             for port in ports {
                 board.change_slot(port, |slot| slot.set_bus_fault(fault))?;
@@ -171,7 +172,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Power off, 100 ms, power on.
+    /// Switches the power of board `n` off, waits 100 ms of virtual time, and switches it on.
     pub fn cycle(&mut self, n: usize) {
         self.bus.board_mut(n).power_off();
         self.run_until(self.now() + CYCLE);
@@ -184,30 +185,30 @@ impl Bench {
         self.bus.line().set_settings(settings);
     }
 
-    /// Sets the rate of the line's client, which keeps its format.
+    /// Sets the rate of the line's client in bit/s. The format stays the same.
     pub fn set_client_rate(&mut self, baud: u32) {
         let line = self.bus.line();
         let settings = line.settings();
         line.set_settings(Settings { baud, ..settings });
     }
 
-    /// Sends bytes on the line now, or right behind those still on their way.
+    /// Sends bytes on the line now, or directly after the bytes that are still being sent.
     pub fn send(&mut self, bytes: &[u8]) {
         let now = self.now();
         let bytes = self.disturbance.not_dropped(bytes.iter().copied());
         self.bus.line().send(now, &bytes);
     }
 
-    /// The bytes that the master has received since the last call.
-    pub fn heard(&mut self) -> Vec<u8> {
-        let heard = self.bus.line().take_received();
-        let bytes = heard.iter().map(|character| character.byte);
+    /// Returns the bytes that the master has received since the last call.
+    pub fn take_received(&mut self) -> Vec<u8> {
+        let received = self.bus.line().take_received();
+        let bytes = received.iter().map(|character| character.byte);
         self.disturbance.not_dropped(bytes)
     }
 
-    /// Prints new log lines on stdout and new findings on stderr. With several boards, each line starts with the board's
-    /// name.
-    pub fn tell(&mut self) {
+    /// Prints new log lines on stdout and new findings on stderr. With several boards, each line starts with the
+    /// board's name.
+    pub fn print_news(&mut self) {
         let several = self.units.len() > 1;
         for (n, unit) in self.units.iter_mut().enumerate() {
             let prefix = match several {
@@ -228,7 +229,7 @@ impl Bench {
     pub fn keep_flash(&mut self) {
         for (n, unit) in self.units.iter_mut().enumerate() {
             if let Some(file) = &mut unit.flash {
-                file.keep_or_tell(self.bus.board(n));
+                file.keep_or_report(self.bus.board(n));
             }
         }
     }

@@ -12,11 +12,12 @@ use super::flash_file::FlashFile;
 use super::inside;
 use super::unit::Unit;
 
-/// Makes the boards. A board with a flash file starts with the contents of the file; the image overwrites its own pages.
+/// Makes the boards. A board with a flash file starts with the contents of the file; the image overwrites its own
+/// pages.
 ///
 /// # Errors
 ///
-/// In one line: an image or a file that is missing or of no use, a slot that a board does not have.
+/// In one line: an image or a file is missing or invalid, or a board does not have a slot that is named.
 pub fn fitted(options: &Options) -> Result<Vec<(Board, Unit)>, String> {
     let fittings = options.fittings()?;
     let mut images = BTreeMap::new();
@@ -87,10 +88,10 @@ fn image(elf: &Path) -> Result<Image, String> {
     Image::read(elf).map_err(|error| format!("cannot run the image {error}"))
 }
 
-/// Stores a configuration that knows which modules are plugged, when nothing is stored.
+/// Stores the modules of all slots in the configuration, if nothing is stored yet.
 fn write_preset(config: &Config, flash: &mut [u8]) {
     if config.layout.stores_nothing(flash) {
-        // One setting for each port: they fit.
+        // One setting for each port: a page has room for all of them.
         let settings: Vec<_> = configuration::modules(config.plugged()).collect();
         config.layout.store(flash, &settings);
     }
@@ -104,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_preset_names_every_plugged_module_and_is_stored_only_where_nothing_is() {
+    fn preset_stores_every_module_and_is_not_written_over_stored_data() {
         for layout in Layout::ALL {
             let fitted = |module| Config {
                 layout,
@@ -124,14 +125,14 @@ mod tests {
             assert!(record.pairs().eq(modules), "{}", layout.board);
             let before = flash.clone();
             write_preset(&fitted(Module::Di4), &mut flash);
-            assert_eq!(flash, before, "what is stored stays");
+            assert_eq!(flash, before, "a stored record is not replaced");
 
             let mut flash = vec![0xFF; layout.part.flash_size];
             let [_, second] = layout.board.store.addresses();
             flash[(second - FLASH_BASE) as usize + 500] = 0;
             let before = flash.clone();
             write_preset(&fitted(Module::Di4), &mut flash);
-            assert_eq!(flash, before, "even what is damaged");
+            assert_eq!(flash, before, "damaged data is not replaced either");
         }
     }
 

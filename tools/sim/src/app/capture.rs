@@ -1,4 +1,4 @@
-//! The frames on the line in a capture file: `--record`.
+//! Writes the frames on the line to a capture file: `--record`.
 
 use std::fs::File;
 use std::io::{self, Seek, Write};
@@ -16,7 +16,7 @@ pub struct Capture {
     path: PathBuf,
     /// The same open file as in `recorder`.
     file: File,
-    /// `None` after the file could not be written.
+    /// `None` after a write has failed.
     recorder: Option<Recorder<File>>,
     /// Number of the last frame in the file.
     last: u64,
@@ -27,7 +27,7 @@ impl Capture {
     ///
     /// # Errors
     ///
-    /// In one line, what keeps it from being written.
+    /// In one line, why the file cannot be written.
     pub fn create(path: &Path) -> Result<Self, String> {
         let program = concat!("modio-sim ", env!("CARGO_PKG_VERSION"));
         let started = || -> io::Result<Self> {
@@ -50,22 +50,23 @@ impl Capture {
             let Some(recorder) = &mut self.recorder else {
                 return;
             };
-            // A pipe has no position.
+            // The position after the last whole packet. A pipe has none.
             let whole = self.file.stream_position();
             if let Err(error) = write(recorder, frame) {
-                // Its buffer writes what it can when it is dropped. The file is cut off after the last whole packet.
+                // Dropping the recorder flushes its buffer, which may write a part of a packet. So cut the file off
+                // after the last whole packet.
                 self.recorder = None;
                 if let Ok(whole) = whole {
                     let _ = self.file.set_len(whole);
                 }
                 let what = cannot(&self.path, &error);
-                // The simulator goes on when nobody reads stderr.
+                // A closed stderr does not stop the simulator.
                 let _ = writeln!(io::stderr(), "modio-sim: {what}; the recording ends");
             }
         }
     }
 
-    /// Whether the file could not be written.
+    /// Whether a write has failed, which has ended the recording.
     pub fn failed(&self) -> bool {
         self.recorder.is_none()
     }
@@ -125,7 +126,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn reader_of_a_pipe_that_leaves_ends_the_recording() {
+    fn closing_the_reading_end_of_a_pipe_ends_the_recording() {
         let mut bench = bench(Module::Di4);
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("pipe");

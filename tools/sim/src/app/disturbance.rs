@@ -5,7 +5,7 @@ use fastrand::Rng;
 use sim::Time;
 use sim::line::Line;
 
-/// The width of a short pulse.
+/// Width of a noise pulse.
 const PULSE: Time = Time::from_us(5);
 const PS_PER_S: f64 = 1e12;
 
@@ -157,7 +157,11 @@ mod tests {
         assert!((870..=1050).contains(&count), "{count} of 960");
 
         noisy.change(None, Some(0.0), None);
-        assert_eq!(edges(&mut noisy, 10), 0, "switched off again");
+        assert_eq!(
+            edges(&mut noisy, 10),
+            0,
+            "no pulses after the rate was set to 0"
+        );
     }
 
     #[test]

@@ -14,14 +14,14 @@ use sim::exact_line::{Session, begin};
 use super::Event;
 use super::bench::Bench;
 
-/// Where the answer to a request goes: a reply, or why the request cannot be carried out.
+/// Takes the answer to a request: a reply, or the reason why the request cannot be carried out.
 pub type Answers = Sender<Result<Reply, String>>;
 
-/// Listens at `address` from now on, and returns where: with port 0 the system chooses one.
+/// Starts to listen at `address`, and returns the address: with port 0 the system chooses the port.
 ///
 /// # Errors
 ///
-/// When the address cannot be listened at, in one line.
+/// In one line, why the simulator cannot listen there.
 pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, String> {
     let cannot = |error| format!("cannot serve the exact line at {address}: {error}");
     let listener = TcpListener::bind(address).map_err(cannot)?;
@@ -47,7 +47,7 @@ pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, 
 
 /// Serves a client until it disconnects.
 fn serve(stream: &TcpStream, events: &Sender<Event>) -> std::io::Result<()> {
-    // Requests and replies are short and alternate: waiting for more bytes would only delay them.
+    // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them.
     stream.set_nodelay(true)?;
     let mut reader = BufReader::new(stream);
     let mut writer = stream;
@@ -92,7 +92,7 @@ fn answer(line: &[u8], events: &Sender<Event>) -> Result<Reply, String> {
 #[derive(Default)]
 pub struct Requests {
     session: Session,
-    /// The request under way, when its time is over, and where its reply goes.
+    /// The request under way, the virtual time at which it ends, and the receiver of its reply.
     under_way: Option<(Request, Time, Answers)>,
 }
 
@@ -101,7 +101,7 @@ impl Requests {
     pub fn begin(&mut self, bench: &mut Bench, request: Request, answers: Answers) {
         match begin(bench.first(), &request) {
             Ok(until) => self.under_way = Some((request, until, answers)),
-            // A client that has disconnected needs no answer, here and below.
+            // A client that has disconnected needs no answer. The same holds below.
             Err(reason) => drop(answers.send(Err(reason))),
         }
     }
@@ -111,7 +111,7 @@ impl Requests {
         self.under_way.is_some()
     }
 
-    /// Lets at most `slice` pass for the request under way, and replies when its time is over.
+    /// Lets at most `slice` of virtual time pass for the request under way, and replies when its time is over.
     pub fn run(&mut self, bench: &mut Bench, slice: Time) {
         let Some((request, until, answers)) = self.under_way.take() else {
             return;

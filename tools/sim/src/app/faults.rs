@@ -35,7 +35,7 @@ impl Faults {
     ///
     /// # Errors
     ///
-    /// Names the first value out of range and its range.
+    /// Names the first value that is out of its range, and the range.
     pub fn check(&self) -> Result<(), String> {
         for (name, value, least, most) in [
             ("bit_error_rate", self.bit_error_rate, 0.0, 0.5),
@@ -45,7 +45,7 @@ impl Faults {
             ("lsi_khz", self.lsi_khz, 15.0, 90.0),
         ] {
             if value.is_some_and(|value| !(least..=most).contains(&value)) {
-                return Err(format!("`{name}` is a number from {least} to {most}"));
+                return Err(format!("`{name}` must be a number from {least} to {most}"));
             }
         }
         Ok(())

@@ -1,8 +1,8 @@
-//! The flash in a file (`--flash`): read at the start, and kept up to date while the unit runs.
+//! Keeps the flash in a file (`--flash`): read at the start, and kept up to date while the unit runs.
 //!
-//! The file has the bytes of the flash. It is never written in place: the new contents go into a file beside it, which
-//! is then renamed. So the file always has the complete old or the complete new contents, also when the simulator is
-//! killed.
+//! The file has the bytes of the flash. It is never written in place: the simulator writes the new contents into a file
+//! beside it and renames that file. So the file always has the complete old or the complete new contents, also when the
+//! simulator is killed.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
@@ -10,46 +10,46 @@ use std::path::{Path, PathBuf};
 
 use sim::Board;
 
-/// The file and what it holds.
+/// The file, and which state of the flash it has.
 #[derive(Debug)]
 pub struct FlashFile {
-    /// Where the contents are, with links followed, so that a link stays one.
+    /// Path of the file itself, with symlinks followed, so that a symlink is not replaced.
     path: PathBuf,
-    /// [`Board::flash_changes`] of what it holds; `None` when it has not been written yet, or the last
-    /// attempt has failed.
+    /// [`Board::flash_changes`] of the contents; `None` if the file has not been written yet, or if the last attempt
+    /// has failed.
     holds: Option<u64>,
-    /// The reason why it could not be written, which has been reported already.
-    told: Option<String>,
+    /// The last write error that was reported.
+    reported: Option<String>,
 }
 
 impl FlashFile {
-    /// The file at `path` of a flash of `size` bytes, and its contents when there is one.
+    /// Returns the flash file at `path`, and its contents if it exists. `size` is the size of the flash in bytes.
     ///
     /// # Errors
     ///
-    /// In one line: it cannot be read or written, or holds no flash of this part.
+    /// In one line: the file cannot be read or written, or has another size.
     pub fn open(path: &Path, size: usize) -> Result<(Self, Option<Vec<u8>>), String> {
-        let told = |error: &dyn std::fmt::Display| cannot(path, error);
+        let failed = |error: &dyn std::fmt::Display| cannot(path, error);
         let (path_to, contents) = match path.metadata() {
             Err(error) if error.kind() == io::ErrorKind::NotFound => (path.to_owned(), None),
-            Err(error) => return Err(told(&error)),
-            // A pipe or a device would block, or be replaced by a file.
-            Ok(metadata) if !metadata.is_file() => return Err(told(&"it is not a file")),
+            Err(error) => return Err(failed(&error)),
+            // Reading a pipe or a device could block, and renaming would replace it by a file.
+            Ok(metadata) if !metadata.is_file() => return Err(failed(&"it is not a file")),
             Ok(metadata) if metadata.len() != size as u64 => {
-                return Err(told(&format_args!(
-                    "it has {} bytes, the flash {size}",
+                return Err(failed(&format_args!(
+                    "it has {} bytes, but the flash has {size}",
                     metadata.len()
                 )));
             }
             Ok(_) => {
-                // Replacing it would get round a write protection that is meant.
+                // Respect a write protection of the file: renaming would ignore it.
                 OpenOptions::new()
                     .write(true)
                     .open(path)
-                    .map_err(|error| told(&error))?;
-                let contents = fs::read(path).map_err(|error| told(&error))?;
+                    .map_err(|error| failed(&error))?;
+                let contents = fs::read(path).map_err(|error| failed(&error))?;
                 (
-                    path.canonicalize().map_err(|error| told(&error))?,
+                    path.canonicalize().map_err(|error| failed(&error))?,
                     Some(contents),
                 )
             }
@@ -57,16 +57,16 @@ impl FlashFile {
         let file = Self {
             path: path_to,
             holds: None,
-            told: None,
+            reported: None,
         };
         Ok((file, contents))
     }
 
-    /// Brings the file up to date when the flash has changed since the last time.
+    /// Writes the file if the flash has changed since the last call.
     ///
     /// # Errors
     ///
-    /// In one line, what keeps it from being written. The next call tries again.
+    /// In one line, why the file cannot be written. The next call tries again.
     pub fn keep(&mut self, board: &Board) -> Result<(), String> {
         let changes = board.flash_changes();
         if self.holds == Some(changes) {
@@ -76,24 +76,24 @@ impl FlashFile {
         self.replace(board.flash())
             .map_err(|error| cannot(&self.path, &error))?;
         self.holds = Some(changes);
-        self.told = None;
+        self.reported = None;
         Ok(())
     }
 
-    /// The same while the unit runs: a failure is reported on stderr, once as long as it stays the same.
-    pub fn keep_or_tell(&mut self, board: &Board) {
+    /// As [`keep`](Self::keep), but reports an error on stderr. The same error is not reported again and again.
+    pub fn keep_or_report(&mut self, board: &Board) {
         if let Err(what) = self.keep(board)
-            && self.told.as_ref() != Some(&what)
+            && self.reported.as_ref() != Some(&what)
         {
-            // That nobody reads it is no reason to stop.
+            // A closed stderr does not stop the simulator.
             let _ = writeln!(io::stderr(), "modio-sim: {what}");
-            self.told = Some(what);
+            self.reported = Some(what);
         }
     }
 
     fn replace(&self, contents: &[u8]) -> io::Result<()> {
         let mut name = self.path.file_name().unwrap_or_default().to_owned();
-        // Two simulators on one file take turns, each with a whole one.
+        // The process number keeps two simulators with the same flash file from writing into the same new file.
         name.push(format!(".{}.tmp", std::process::id()));
         let beside = self.path.with_file_name(name);
         let written = fs::write(&beside, contents)
@@ -103,7 +103,7 @@ impl FlashFile {
             })
             .and_then(|()| fs::rename(&beside, &self.path));
         if written.is_err() {
-            // It is of no use half written; when it cannot be removed either, it was not made.
+            // Remove what was written. This fails if the file could not be made at all, which does not matter.
             let _ = fs::remove_file(&beside);
         }
         written
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_written_when_the_flash_has_changed_and_only_then() {
+    fn file_is_written_only_when_the_flash_has_changed() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("flash");
         let mut board = testing::board(Module::Di4);
@@ -138,18 +138,22 @@ mod tests {
 
         fs::write(&path, b"ours").unwrap();
         file.keep(&board).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"ours", "nothing has changed");
+        assert_eq!(
+            fs::read(&path).unwrap(),
+            b"ours",
+            "the flash has not changed"
+        );
 
         board.patch_code(0x0800_8000, b"news").unwrap();
         file.keep(&board).unwrap();
         assert_eq!(fs::read(&path).unwrap(), board.flash());
-        assert_eq!(entries(directory.path()), 1, "nothing is left beside it");
+        assert_eq!(entries(directory.path()), 1, "no temporary file is left");
         let (_, contents) = FlashFile::open(&path, FLASH_SIZE).unwrap();
         assert_eq!(contents.as_deref(), Some(board.flash()));
     }
 
     #[test]
-    fn what_is_no_flash_is_refused_in_one_line() {
+    fn file_that_is_not_a_flash_is_refused_in_one_line() {
         let directory = tempfile::tempdir().unwrap();
         let refused = |path: &Path, part: &str| {
             let text = FlashFile::open(path, FLASH_SIZE).unwrap_err();
@@ -169,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_takes_no_file_is_reported_and_tried_again() {
+    fn missing_directory_is_reported_and_the_write_is_tried_again() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("missing").join("flash");
         let board = testing::board(Module::Di4);
@@ -186,7 +190,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_stays_a_link_and_permissions_stay() {
+    fn replacing_the_file_keeps_a_symlink_and_the_permissions() {
         use std::os::unix::fs::{PermissionsExt, symlink};
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("flash");

@@ -7,17 +7,17 @@ use serde_json::{Value, json};
 use sim::Time;
 use sim::line::{Direction, Frame, Line};
 
-/// The body of `GET /api/frames`: the frames kept whose numbers are above `since`, oldest first.
+/// The body of `GET /api/frames`: the recorded frames with numbers above `since`, oldest first.
 pub fn json(line: &Line, since: u64) -> Value {
     json!({ "frames": line.frames_since(since).map(frame).collect::<Vec<_>>() })
 }
 
-/// A frame.
+/// A frame as JSON.
 pub fn frame(frame: &Frame) -> Value {
     let to_unit = frame.direction == Direction::FromMaster;
     json!({
         "number": frame.number,
-        // As the unit sees it, and as `rx_frames` and `tx_frames` count it.
+        // From the view of the unit, as in `rx_frames` and `tx_frames`.
         "direction": if to_unit { "rx" } else { "tx" },
         "start_us": frame.start.as_us(),
         "end_us": frame.end.as_us(),
@@ -30,12 +30,12 @@ pub fn frame(frame: &Frame) -> Value {
     })
 }
 
-/// What a frame says.
+/// The meaning of a frame as text.
 pub fn summary(frame: &Frame) -> String {
     sentence::frame(way(frame.direction), &frame.bytes)
 }
 
-/// Which way a frame went, in the terms of the standard.
+/// The direction of a frame, in the terms of the standard.
 pub fn way(direction: Direction) -> modbus_frames::Direction {
     match direction {
         Direction::FromMaster => modbus_frames::Direction::Request,
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_has_its_times_and_its_meaning() {
+    fn frame_as_json_has_times_and_meaning() {
         let seen = Frame {
             number: 7,
             direction: Direction::FromMaster,

@@ -1,20 +1,20 @@
-//! The firmware images inside the program, one for each board; none unless `cargo xtask dist` has built it.
+//! The firmware images inside the program: one for each board if `cargo xtask dist` has built the program, else none.
 
 use register_map::Board;
 use sim::board::Layout;
 use sim::{Config, Image, Time};
 
-/// Boards by name, and their images as ELF files.
+/// Names of boards, each with its image as an ELF file.
 const IMAGES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/images.rs"));
 
-/// Time after the start by which the firmware has logged its version.
+/// Virtual time from power-on until the firmware has certainly logged its version.
 const LOGGED: Time = Time::from_ms(100);
 
-/// The image of a board.
+/// Returns the image of a board.
 ///
 /// # Errors
 ///
-/// When none is inside: what to do, in one line.
+/// If the program contains no image: what to do, in one line.
 pub fn image(board: &Board) -> Result<Image, String> {
     let elf = elf(board).ok_or(
         "no image to run: give one with --elf FILE, or use `cargo xtask sim`, which builds one",
@@ -22,16 +22,16 @@ pub fn image(board: &Board) -> Result<Image, String> {
     Image::from_elf(&elf).map_err(|error| format!("cannot run the image inside: {error}"))
 }
 
-/// The image of a board as an ELF file, if it is inside. It is a copy, because the bytes in the program are not aligned
-/// as their reader needs.
+/// Returns the image of a board as an ELF file, if the program contains it. It is a copy, because the bytes in the
+/// program do not have the alignment that the ELF reader needs.
 fn elf(board: &Board) -> Option<Vec<u8>> {
     let inside = IMAGES.iter().find(|(name, _)| *name == board.name);
     inside.map(|(_, elf)| elf.to_vec())
 }
 
-/// The version of the program, and on a line for each image inside the version of that firmware.
+/// The version of the program, and on a line for each image inside it the version of that firmware.
 pub fn version() -> String {
-    let mut text = format!("modio-sim {}\n", env!("CARGO_PKG_VERSION"));
+    let mut text = format!("modio-sim {}\n", commit::version!());
     for layout in Layout::ALL {
         if let Some(elf) = elf(layout.board) {
             let version = firmware(layout, &elf).unwrap_or_else(|| "of unknown version".to_owned());
@@ -41,7 +41,7 @@ pub fn version() -> String {
     text
 }
 
-/// What the image itself says: the first line of its log is `modio VERSION on BOARD, ...`.
+/// Runs an image and returns the version in the first line of its log: `modio VERSION on BOARD, ...`.
 fn firmware(layout: &'static Layout, elf: &[u8]) -> Option<String> {
     let config = Config {
         layout,
@@ -61,10 +61,7 @@ mod tests {
     #[test]
     fn every_image_inside_is_for_a_board_and_reports_its_version() {
         let mut lines = version().lines().map(str::to_owned).collect::<Vec<_>>();
-        assert_eq!(
-            lines.remove(0),
-            concat!("modio-sim ", env!("CARGO_PKG_VERSION"))
-        );
+        assert_eq!(lines.remove(0), format!("modio-sim {}", commit::version!()));
         assert_eq!(lines.len(), IMAGES.len(), "{lines:?}");
         for line in lines {
             assert!(!line.contains("unknown"), "{line}");

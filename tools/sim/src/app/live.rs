@@ -1,4 +1,5 @@
-//! What `/api/events` streams: the state when it has changed, at most ten times a second, and every frame as it ends.
+//! The events that `/api/events` streams: the state when it has changed, at most ten times a second, and every frame
+//! when it has ended.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -11,17 +12,17 @@ use super::{frames, state};
 
 /// Shortest time between two states.
 const STATE_EVERY: Duration = Duration::from_millis(100);
-/// Notes that may wait for a client that does not read: some seconds' worth. Beyond, it loses the oldest.
+/// Events that may wait for a client that does not read. Further events replace the oldest.
 const WAITING: usize = 1024;
 
-/// One event.
+/// An event for the clients.
 #[derive(Clone, Debug)]
 pub struct Note {
-    /// The board that it is about; frames are the line's.
+    /// Number of the board that the event is about; `None` for a frame, which is about the whole line.
     pub board: Option<usize>,
     /// `state` or `frame`.
     pub name: &'static str,
-    /// JSON.
+    /// The data of the event, as JSON.
     pub data: Arc<str>,
 }
 
@@ -35,14 +36,15 @@ impl Note {
     }
 }
 
-/// Sends the events to all listeners.
+/// Sends the events to all clients that listen.
 #[derive(Debug)]
 pub struct Live {
     listeners: broadcast::Sender<Note>,
     /// The number of the last frame that was sent.
     frame: u64,
-    /// The state of each board that was sent last, without its time.
+    /// The last state of each board that was sent, without its time.
     states: Vec<Value>,
+    /// Time at which a state was sent last.
     sent: Option<Instant>,
 }
 
@@ -58,12 +60,13 @@ impl Default for Live {
 }
 
 impl Live {
-    /// For those who want to listen.
+    /// The channel of the events, for the server to subscribe its clients to.
     pub fn listeners(&self) -> broadcast::Sender<Note> {
         self.listeners.clone()
     }
 
-    /// Sends the changes since the last call. `now` is the time of the wall clock. Without listeners it costs little.
+    /// Sends the changes since the last call. `now` is the time of the wall clock. Without listeners this makes no
+    /// JSON.
     pub fn send(&mut self, bench: &mut Bench, now: Instant) {
         if self.listeners.receiver_count() == 0 {
             let last = bench.bus.line().frames().next_back();
@@ -119,7 +122,11 @@ mod tests {
         let mut notes = live.listeners().subscribe();
         live.send(&mut bench, begin);
         let first = taken(&mut notes);
-        assert_eq!(first.len(), 1, "what was before is in the state: {first:?}");
+        assert_eq!(
+            first.len(),
+            1,
+            "earlier frames are not sent again: {first:?}"
+        );
         assert_eq!(first[0].0, "state");
         assert_eq!(first[0].1["line"]["rx_frames"], 1);
 
@@ -142,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_state_is_sent_ten_times_a_second_at_most_and_the_last_one_in_the_end() {
+    fn state_is_sent_at_most_ten_times_a_second_and_ends_with_the_last_one() {
         let mut bench = bench(Module::Di4);
         let mut live = Live::default();
         let mut notes = live.listeners().subscribe();
@@ -152,9 +159,9 @@ mod tests {
             live.send(&mut bench, begin + Duration::from_millis(ms));
         }
         live.send(&mut bench, begin + Duration::from_millis(1100));
-        let told = taken(&mut notes);
-        assert!((9..=12).contains(&told.len()), "{}", told.len());
-        let last = &told.last().unwrap().1;
+        let sent = taken(&mut notes);
+        assert!((9..=12).contains(&sent.len()), "{}", sent.len());
+        let last = &sent.last().unwrap().1;
         assert_eq!(last["channels"][0]["energised"], false);
     }
 }

@@ -1,18 +1,18 @@
-//! The command `modio-sim`: the boards between its endpoints, in step with the wall clock, or with
-//! `--exact-line` in virtual time.
+//! The command `modio-sim`: runs the boards and connects them to its endpoints. Virtual time follows the wall clock, or
+//! with `--exact-line` the requests of a client.
 //!
 //! ```text
 //! pty, TCP ──bytes──┐                     ┌──> bytes to pty and TCP
 //! exact line ───────┤                     ├──> bytes and times to the exact line
-//! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP, events to those who listen
+//! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP, events to its listeners
 //! Modbus TCP ───────┤                     ├──> responses to Modbus TCP
 //! GDB ─────bytes────┤                     ├──> bytes to GDB, frames to the capture file
 //! Ctrl-C, SIGTERM ──┘    the boards'    ├──> log on stdout
 //!                        only thread      └──> findings on stderr
 //! ```
 //!
-//! One thread owns the boards; the others wait for input and put it into the queue, which wakes that
-//! thread, so that nothing is locked and a request waits for no tick of a clock.
+//! One thread owns the boards. The other threads wait for input and put it into the queue, which wakes the first
+//! thread. So the boards need no lock, and a request does not wait for a tick of a clock.
 
 use std::sync::mpsc;
 
@@ -51,23 +51,23 @@ mod unit;
 use bench::Bench;
 pub use inside::version;
 
-/// So long the board has been on when the endpoints are announced: its start-up and the first silence on
-/// the line are over then, and it answers.
+/// Virtual time from power-on until the endpoints are printed. The unit has started by then, and the first silence on
+/// the line is over, so the unit answers.
 const START_UP: Time = Time::from_ms(100);
 
-/// What wakes the thread that has the board.
+/// An event that wakes the thread of the boards.
 enum Event {
-    /// Bytes from a master, to go out on the line.
+    /// Bytes from a master, to be sent on the line.
     Bytes(Vec<u8>),
-    /// A request to the HTTP interface, and where its reply goes.
+    /// A request to the HTTP interface, and the receiver of its reply.
     Request(api::Request, tokio::sync::oneshot::Sender<api::Reply>),
     /// From the debugger.
     Gdb(gdb::Message),
     /// From a client of the Modbus TCP gateway.
     Gateway(gateway::Message),
-    /// From the client of the exact line, and where the answer goes.
+    /// From the client of the exact line, with the receiver of the answer.
     Exact(Request, exact_line::Answers),
-    /// Time to end.
+    /// The simulator has to end.
     Stop,
 }
 
@@ -75,7 +75,7 @@ enum Event {
 ///
 /// # Errors
 ///
-/// In one line: what keeps it from starting, or the flash's file from being written at the end.
+/// In one line: why the simulator cannot start, or why it cannot write the flash file at the end.
 pub fn run(options: &Options) -> Result<(), String> {
     options.check_line()?;
     let mut bench = Bench::new(boards::fitted(options)?);
@@ -92,7 +92,7 @@ pub fn run(options: &Options) -> Result<(), String> {
     let (events, queue) = mpsc::channel();
 
     let stop = events.clone();
-    // The receiver is gone only when the end has come already.
+    // Sending fails only after the receiver was dropped, when the simulator is ending anyway.
     ctrlc::set_handler(move || drop(stop.send(Event::Stop)))
         .map_err(|error| format!("cannot catch Ctrl-C: {error}"))?;
 
@@ -120,7 +120,7 @@ pub fn run(options: &Options) -> Result<(), String> {
     bench.run_until(START_UP);
     match &mut endpoints {
         run::Endpoints::Exact(address) => {
-            // The unit has set its UART up by now. From here on the client says what its own end has.
+            // The line has taken over the unit's rate and format by now. From here on only the client changes them.
             bench.bus.line().set_follow(false);
             bench::say(&format!("exact-line: {address}"));
         }

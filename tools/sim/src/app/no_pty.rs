@@ -1,44 +1,47 @@
-//! In place of the pseudo-terminal, on systems where the simulator has none: `sim_options::PTY`.
+//! Replaces the pseudo-terminal on systems where the simulator has none (`sim_options::PTY`). Nothing is ever received.
 
 use std::path::Path;
 use std::sync::mpsc::Sender;
 
 use super::Event;
 
-/// The terminal that there is not.
+/// A missing pseudo-terminal, with the methods of the real one.
 pub struct Pty;
 
 impl Pty {
-    /// Makes none. That a link was asked for has been refused before.
+    /// Opens nothing. The options have refused `--pty` before.
     ///
     /// # Errors
     ///
     /// Never.
-    #[allow(clippy::unnecessary_wraps, reason = "a terminal may not be made")]
+    #[allow(clippy::unnecessary_wraps, reason = "opening a real terminal may fail")]
     pub fn open(_: Option<&Path>, _: Sender<Event>) -> Result<Self, String> {
         Ok(Self)
     }
 
-    /// There is none.
+    /// Returns `None`: there is no terminal.
     pub fn path(&self) -> Option<&Path> {
         None
     }
 
-    /// There is no rate.
+    /// Does nothing: no master can set a rate.
     ///
     /// # Errors
     ///
     /// Never.
-    #[allow(clippy::unnecessary_wraps, reason = "a terminal may not take a rate")]
+    #[allow(
+        clippy::unnecessary_wraps,
+        reason = "a real terminal may refuse a rate"
+    )]
     pub fn keep_own_rate(&mut self, _: u32) -> Result<(), String> {
         Ok(())
     }
 
-    /// Nobody sets a rate.
+    /// Returns `None`: no master can set a rate.
     pub fn take_rate(&mut self) -> Option<u32> {
         None
     }
 
-    /// Nobody reads it.
+    /// Drops the bytes.
     pub fn write(&self, _: &[u8]) {}
 }

@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use sim::Time;
 
-/// So far may virtual time fall behind before it stops trying to catch up: after the machine slept, or
-/// was too slow, a master gets its answers late, but not after a burst of seconds gone by.
+/// Most time that virtual time tries to catch up. If it is further behind, because the computer slept or was too slow,
+/// the rest of the time is skipped, so that the boards do not run through it in a burst.
 const CATCH_UP: Duration = Duration::from_millis(200);
 
-/// A pair of instants at which both clocks stood together.
+/// An instant of the wall clock and the virtual time at this instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     wall: Instant,
@@ -16,12 +16,12 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Both clocks stand together now.
+    /// Pairs an instant of the wall clock with a virtual time.
     pub fn new(wall: Instant, virtual_time: Time) -> Self {
         Self { wall, virtual_time }
     }
 
-    /// Where virtual time, standing at `at`, should be by the wall clock.
+    /// Returns the virtual time that belongs to `wall`. Virtual time is at `at` now.
     pub fn target(&mut self, wall: Instant, at: Time) -> Time {
         let target = self.virtual_time + span(wall.saturating_duration_since(self.wall));
         let limit = at + span(CATCH_UP);
@@ -54,12 +54,12 @@ mod tests {
     }
 
     #[test]
-    fn a_long_sleep_is_not_made_up_for() {
+    fn time_lost_in_a_long_sleep_is_skipped() {
         let begin = Instant::now();
         let mut pace = Pace::new(begin, Time::ZERO);
         let awake = begin + Duration::from_secs(3600);
         assert_eq!(pace.target(awake, Time::from_ms(5)), Time::from_ms(205));
-        // From there on in step again.
+        // Virtual time then follows the wall clock again.
         let next = awake + Duration::from_millis(10);
         assert_eq!(pace.target(next, Time::from_ms(205)), Time::from_ms(215));
     }

@@ -1,9 +1,9 @@
 //! The RS-485 line on a pseudo-terminal, which a Modbus master opens like a serial port.
 //!
-//! Its settings are raw. Bytes cross the line at the rate of the unit, unless the client of the line has a fixed rate:
-//! then the rate is the one that the master sets. A pseudo-terminal stores neither parity nor length of characters, so
-//! the format never comes from there. As on a serial port, bytes that arrive while no program has it open are lost: a
-//! master never finds replies to requests that it did not send.
+//! The terminal is raw. Bytes are sent on the line at the unit's rate, or with `--fixed-line` at the rate that the
+//! master sets. A pseudo-terminal stores neither the parity nor the length of characters, so the master cannot set the
+//! format. As on a serial port, bytes that arrive while no program has the terminal open are lost: a master never
+//! receives replies to requests that it did not send.
 
 use std::fs;
 use std::os::fd::OwnedFd;
@@ -21,31 +21,34 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use super::Event;
 
-/// How often the simulator checks whether somebody has opened the terminal.
+/// Interval at which the simulator checks whether a program has opened the terminal.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// The terminal, and the link to it.
+/// The terminal, and the symlink to it.
 pub struct Pty {
     master: Arc<OwnedFd>,
     path: PathBuf,
     link: Option<PathBuf>,
-    /// The rate that the master has set, where that counts.
+    /// The rate of the terminal in bit/s; `None` while the master's rate is ignored.
     rate: Option<u32>,
 }
 
 impl Pty {
-    /// Makes a terminal, and `link` a symlink to it. What is written to it comes as events.
+    /// Makes a terminal, and `link` a symlink to it. The bytes that a master writes are sent as events.
     ///
     /// # Errors
     ///
-    /// When the system has none, or there is something else at `link`: in one line.
+    /// In one line: the system cannot make a terminal, or another file exists at `link`.
     pub fn open(link: Option<&Path>, events: Sender<Event>) -> Result<Self, String> {
         let (master, path) =
             raw_terminal().map_err(|error| format!("cannot make a pseudo-terminal: {error}"))?;
         let master = Arc::new(master);
         if let Some(link) = link {
             symlink(&path, link).map_err(|why| {
-                format!("cannot make {} a link to the pty: {why}", link.display())
+                format!(
+                    "cannot make {} a symlink to the pseudo-terminal: {why}",
+                    link.display()
+                )
             })?;
         }
         let listening = Arc::clone(&master);
@@ -64,26 +67,28 @@ impl Pty {
         Some(&self.path)
     }
 
-    /// From now on the rate that a master sets counts; until one does, it is `baud`.
+    /// From now on [`take_rate`](Self::take_rate) returns the rates that a master sets. The rate until then is `baud`,
+    /// in bit/s.
     ///
     /// # Errors
     ///
-    /// When the terminal cannot have this rate, in one line.
+    /// In one line, why the terminal cannot have this rate.
     pub fn keep_own_rate(&mut self, baud: u32) -> Result<(), String> {
         let set = || {
             let mut settings = tcgetattr(&self.master)?;
             settings.set_speed(baud)?;
             tcsetattr(&self.master, OptionalActions::Now, &settings)
         };
-        set().map_err(|error| format!("the pseudo-terminal cannot have {baud} baud: {error}"))?;
+        set().map_err(|error| format!("the pseudo-terminal cannot have {baud} bit/s: {error}"))?;
         self.rate = Some(baud);
         Ok(())
     }
 
-    /// The rate that the master has set since the last call, where that counts and it is another one.
+    /// Returns the rate in bit/s if the master has changed it since the last call. Always `None` before
+    /// [`keep_own_rate`](Self::keep_own_rate).
     pub fn take_rate(&mut self) -> Option<u32> {
         let before = self.rate?;
-        // Rates that no UART has, such as 0, which hangs up, are none.
+        // Ignore rates that no UART has. A rate of 0 means that the master hangs up.
         let now = tcgetattr(&self.master).ok()?.output_speed();
         let changed = now != before && (300..=4_000_000).contains(&now);
         self.rate = Some(if changed { now } else { before });
@@ -94,7 +99,7 @@ impl Pty {
     pub fn write(&self, bytes: &[u8]) {
         let state = state(&self.master, PollFlags::OUT, Some(Duration::ZERO));
         if !state.contains(PollFlags::HUP) {
-            // Does not wait, for the terminal is non-blocking.
+            // Does not wait, because the terminal is non-blocking.
             let _ = rustix::io::write(&*self.master, bytes);
         }
     }
@@ -103,7 +108,7 @@ impl Pty {
 impl Drop for Pty {
     fn drop(&mut self) {
         if let Some(link) = &self.link {
-            // Another simulator may have put its own there since.
+            // Keep the symlink if another simulator has replaced it by its own.
             if fs::read_link(link).is_ok_and(|to| to == self.path) {
                 let _ = fs::remove_file(link);
             }
@@ -111,15 +116,15 @@ impl Drop for Pty {
     }
 }
 
-/// A new terminal: our side of it, and the name of the other.
+/// Makes a raw terminal. Returns the simulator's side of it, and the path of the master's side.
 fn raw_terminal() -> rustix::io::Result<(OwnedFd, PathBuf)> {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     grantpt(&master)?;
     unlockpt(&master)?;
     let name = ptsname(&master, Vec::new())?;
     let path = PathBuf::from(std::ffi::OsStr::from_bytes(name.as_bytes()));
-    // The settings last as long as our side is open. The other side is opened once and closed here: only after that
-    // does poll show whether a program has opened it.
+    // The settings last as long as the simulator's side is open. The other side is opened once and closed here: only
+    // after that does `poll` show whether a program has opened it.
     let other = rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())?;
     let mut settings = tcgetattr(&other)?;
     settings.make_raw();
@@ -128,24 +133,25 @@ fn raw_terminal() -> rustix::io::Result<(OwnedFd, PathBuf)> {
     Ok((master, path))
 }
 
-/// Makes a link where nothing is, or where a simulator that was killed has left one.
+/// Makes a symlink at `link`. Replaces a symlink that leads to a pseudo-terminal or nowhere, but no other file.
 fn symlink(path: &Path, link: &Path) -> Result<(), String> {
     if let Ok(old) = fs::read_link(link) {
         if !old.starts_with("/dev/pts") && old.exists() {
-            return Err(format!("it is a link to {} already", old.display()));
+            return Err(format!("it is already a symlink to {}", old.display()));
         }
         fs::remove_file(link).map_err(|error| error.to_string())?;
     }
     std::os::unix::fs::symlink(path, link).map_err(|error| error.to_string())
 }
 
-/// What of `wanted` the terminal is ready for now or within `wait`; HUP while nobody has it open.
+/// Waits until the terminal is ready for one of `wanted`, or until `wait` is over. Returns what it is ready for, and
+/// HUP while no program has it open.
 fn state(terminal: &OwnedFd, wanted: PollFlags, wait: Option<Duration>) -> PollFlags {
     let mut polled = [PollFd::new(terminal, wanted)];
     let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
     match poll(&mut polled, wait.as_ref()) {
         Ok(_) => polled[0].revents(),
-        // Interrupted by a signal: nothing is known.
+        // Interrupted by a signal: the state is unknown.
         Err(_) => PollFlags::empty(),
     }
 }
@@ -163,7 +169,7 @@ fn listen(terminal: &OwnedFd, events: &Sender<Event>) {
                 {
                     return;
                 }
-                // Errors are those of a terminal just closed: it may be opened again.
+                // Reading fails when the master has just closed the terminal. It may open the terminal again.
                 Ok(_) | Err(_) => {}
             }
         } else if !state.is_empty() {

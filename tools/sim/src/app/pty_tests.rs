@@ -1,4 +1,4 @@
-//! The terminal as a master sees it.
+//! Tests of the terminal from the side of a master.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
@@ -15,13 +15,13 @@ fn open(path: &Path) -> File {
         .unwrap()
 }
 
-/// Bytes as they came to the line, as many as are wanted.
-fn came(queue: &Receiver<Event>, wanted: usize) -> Vec<u8> {
+/// Receives bytes for the line, at least `wanted`.
+fn received(queue: &Receiver<Event>, wanted: usize) -> Vec<u8> {
     let mut all = Vec::new();
     while all.len() < wanted {
         match queue.recv_timeout(Duration::from_secs(20)) {
             Ok(Event::Bytes(bytes)) => all.extend(bytes),
-            _ => panic!("only {all:?} came"),
+            _ => panic!("only {all:?} was received, {wanted} bytes expected"),
         }
     }
     all
@@ -40,39 +40,39 @@ fn is_open(pty: &Pty) -> bool {
 }
 
 #[test]
-fn every_byte_passes_both_ways_as_it_is() {
+fn every_byte_value_passes_unchanged_in_both_directions() {
     let (events, queue) = mpsc::channel();
     let pty = Pty::open(None, events).unwrap();
     let mut master = open(pty.path().unwrap());
     let all: Vec<u8> = (0..=255).collect();
     master.write_all(&all).unwrap();
-    assert_eq!(came(&queue, 256), all);
+    assert_eq!(received(&queue, 256), all);
     pty.write(&all);
-    let mut heard = vec![0; 256];
-    master.read_exact(&mut heard).unwrap();
-    assert_eq!(heard, all, "no byte is echoed, swallowed or translated");
+    let mut read = vec![0; 256];
+    master.read_exact(&mut read).unwrap();
+    assert_eq!(read, all, "no byte is echoed, lost or translated");
 }
 
 #[test]
-fn it_outlives_its_masters_and_keeps_nothing_for_the_next() {
+fn next_master_can_open_the_terminal_and_receives_no_old_bytes() {
     let (events, queue) = mpsc::channel();
     let pty = Pty::open(None, events).unwrap();
     for round in 0..3_u8 {
         let mut master = open(pty.path().unwrap());
         master.write_all(&[round, 0x0A, 0x0D, 0x03]).unwrap();
-        assert_eq!(came(&queue, 4), [round, 0x0A, 0x0D, 0x03]);
+        assert_eq!(received(&queue, 4), [round, 0x0A, 0x0D, 0x03]);
         pty.write(&[round]);
-        let mut heard = [0];
-        master.read_exact(&mut heard).unwrap();
-        assert_eq!(heard, [round]);
+        let mut read = [0];
+        master.read_exact(&mut read).unwrap();
+        assert_eq!(read, [round]);
         drop(master);
-        eventually("closed", || !is_open(&pty));
+        eventually("the terminal is not closed", || !is_open(&pty));
         pty.write(&[0xEE; 10]);
     }
 }
 
 #[test]
-fn a_master_that_does_not_read_stops_nothing() {
+fn writing_does_not_wait_for_a_master_that_does_not_read() {
     let (events, _queue) = mpsc::channel();
     let pty = Pty::open(None, events).unwrap();
     let _master = open(pty.path().unwrap());
@@ -82,7 +82,7 @@ fn a_master_that_does_not_read_stops_nothing() {
 }
 
 #[test]
-fn the_link_is_there_while_it_is() {
+fn symlink_exists_as_long_as_its_terminal() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("line");
     let pty = Pty::open(Some(&link), mpsc::channel().0).unwrap();
@@ -92,14 +92,14 @@ fn the_link_is_there_while_it_is() {
     assert_eq!(
         fs::read_link(&link).unwrap(),
         newer.path().unwrap(),
-        "a newer one's link stays"
+        "the symlink of a newer terminal is not removed"
     );
     drop(newer);
     assert!(fs::symlink_metadata(&link).is_err());
 }
 
 #[test]
-fn a_file_in_the_links_place_is_not_touched() {
+fn file_or_foreign_symlink_at_the_path_is_not_replaced() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("line");
     fs::write(&file, "precious").unwrap();
@@ -114,7 +114,7 @@ fn a_file_in_the_links_place_is_not_touched() {
 }
 
 #[test]
-fn the_rate_that_a_master_sets_counts_only_where_it_is_to() {
+fn rate_of_the_master_is_returned_only_after_keep_own_rate() {
     let mut pty = Pty::open(None, mpsc::channel().0).unwrap();
     let master = open(pty.path().unwrap());
     let set = |baud| {
@@ -129,5 +129,5 @@ fn the_rate_that_a_master_sets_counts_only_where_it_is_to() {
     assert_eq!(pty.take_rate(), None);
     set(115_200);
     assert_eq!(pty.take_rate(), Some(115_200));
-    assert_eq!(pty.take_rate(), None, "told once");
+    assert_eq!(pty.take_rate(), None, "a change is returned once");
 }

@@ -1,4 +1,5 @@
-//! Runs the boards in step with the wall clock, or on request, and passes on input and output.
+//! Runs the boards in step with the wall clock or on request, and passes input and output between them and the
+//! endpoints.
 
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -14,29 +15,30 @@ use super::live::Live;
 use super::pace::{Pace, span};
 use super::{Event, api, pty, tcp};
 
-/// The board is brought up to date at least so often: no byte waits longer to be passed on.
+/// Longest time between two updates of the boards: no byte waits longer to be passed on.
 const SLICE: Duration = Duration::from_millis(1);
 
-/// No longer than this in one go, so that Ctrl-C works on a machine too slow to keep up.
+/// Most virtual time that passes between two looks at the queue, so that Ctrl-C works on a computer that is too slow to
+/// keep up.
 const AT_ONCE: Duration = Duration::from_millis(20);
 
-/// How long the loop waits for an event when nothing else is to be done.
+/// Longest time that the loop waits for an event.
 const IDLE: Duration = Duration::from_secs(1);
 
-/// What carries the line's bytes.
+/// The endpoints that carry the line's bytes.
 pub enum Endpoints {
-    /// Endpoints at which time follows the wall clock.
+    /// Virtual time follows the wall clock.
     Clock {
         /// The pseudo-terminal.
         pty: pty::Pty,
-        /// The TCP socket, if there is one.
+        /// The TCP socket, with `--tcp`.
         tcp: Option<tcp::Tcp>,
     },
-    /// The exact line, which listens at this address: time passes when its client asks for it.
+    /// The exact line at this address: virtual time passes when its client asks for it.
     Exact(SocketAddr),
 }
 
-/// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the files of the flashes up to date.
+/// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the flash files up to date.
 pub fn until_stopped(
     bench: &mut Bench,
     queue: &Receiver<Event>,
@@ -58,7 +60,7 @@ pub fn until_stopped(
         let wall = Instant::now();
         clock.catch_up(bench);
         requests.run(bench, span(AT_ONCE));
-        bench.tell();
+        bench.print_news();
         live.send(bench, wall);
         attached.update(bench, clock.debugger.halted());
         bench.keep_flash();
@@ -71,7 +73,7 @@ pub fn until_stopped(
             if let Some(baud) = pty.take_rate() {
                 bench.set_client_rate(baud);
             }
-            let bytes = bench.heard();
+            let bytes = bench.take_received();
             if !bytes.is_empty() {
                 pty.write(&bytes);
                 tcp.iter().for_each(|tcp| tcp.write(&bytes));
@@ -99,10 +101,10 @@ pub fn until_stopped(
             Ok(Event::Request(request, reply)) => {
                 clock.catch_up(bench);
                 let before = bench.now();
-                // That the client has gone does not matter.
+                // A client that has disconnected needs no reply.
                 let _ = reply.send(api::answer(bench, &request));
                 if bench.now() > before {
-                    // A power cycle takes virtual time at once: from here on in step again.
+                    // A power cycle has let virtual time pass, so it is ahead of the wall clock. Start from here.
                     clock.restart(bench.now());
                 }
             }
@@ -111,14 +113,14 @@ pub fn until_stopped(
                 clock.debugger.take(message, bench);
             }
             Ok(Event::Stop) => return,
-            // Without the senders there is only time left to pass.
+            // No sender is left, so no event can arrive: only let time pass.
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(wait),
             Err(RecvTimeoutError::Timeout) => {}
         }
     }
 }
 
-/// What lets virtual time pass without being asked.
+/// Lets virtual time pass with the wall clock, or as a debugger wants.
 struct Clock {
     /// The wall clock; `None` when time passes on request only.
     pace: Option<Pace>,
@@ -126,15 +128,15 @@ struct Clock {
 }
 
 impl Clock {
-    /// Both clocks stand together now.
+    /// Pairs the present of the wall clock with the virtual time `at`.
     fn restart(&mut self, at: Time) {
         if let Some(pace) = &mut self.pace {
             *pace = Pace::new(Instant::now(), at);
         }
     }
 
-    /// Brings virtual time to where the wall clock is, or a good way towards it; while a debugger has the
-    /// core halted it stands still.
+    /// Lets virtual time catch up with the wall clock, by at most [`AT_ONCE`]. It stands still while a debugger has
+    /// halted the core.
     fn catch_up(&mut self, bench: &mut Bench) {
         let at = bench.now();
         if self.debugger.halted() {

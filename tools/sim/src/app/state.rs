@@ -1,4 +1,4 @@
-//! What can be seen of the board, as JSON: LEDs, channels, line, log.
+//! The visible state of a board as JSON: LEDs, channels, line, log.
 
 use serde_json::{Value, json};
 use sim::Channel;
@@ -40,12 +40,12 @@ pub fn json(bench: &mut Bench, n: usize) -> Value {
     state
 }
 
-/// The body of `GET /api/faults`: what is in force on the line and on board `n`.
+/// The body of `GET /api/faults`: the faults in force on the line and on board `n`.
 pub fn faults(bench: &Bench, n: usize) -> Value {
     let line = &bench.disturbance;
     let board = bench.bus.board(n);
     let (hsi, lsi) = board.rc_oscillators();
-    // The rates are whole hertz.
+    // Round, because the oscillators are set in whole hertz.
     let rounded = |value: f64| (value * 1000.0).round() / 1000.0;
     json!({
         "bit_error_rate": line.bit_error_rate(),
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_of_channel_has_its_form() {
+    fn every_kind_of_channel_has_its_json_form() {
         for (seen, expected) in [
             (Channel::None, r#"{"kind":"none"}"#),
             (

@@ -1,5 +1,5 @@
-//! The RS-485 line as raw bytes on a TCP socket: every client receives what the unit sends, and the
-//! bytes of all clients go out on the line.
+//! The RS-485 line as raw bytes on a TCP socket: every client receives the bytes that the units send, and the bytes of
+//! all clients are sent on the line.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -9,24 +9,23 @@ use std::thread;
 
 use super::Event;
 
-/// Pieces of the line's traffic that may wait for a client that does not read: some seconds' worth.
-/// Beyond, it misses them, as anyone does who does not listen.
+/// Pieces of received bytes that may wait for a client that does not read. The client misses further pieces.
 const WAITING: usize = 1024;
 
 type Clients = Arc<Mutex<Vec<SyncSender<Vec<u8>>>>>;
 
-/// The listening socket, and who has connected.
+/// The listening socket and its clients.
 pub struct Tcp {
     address: SocketAddr,
     clients: Clients,
 }
 
 impl Tcp {
-    /// Listens at `address` from now on.
+    /// Starts to listen at `address`.
     ///
     /// # Errors
     ///
-    /// When nothing can listen there, in one line.
+    /// In one line, why the simulator cannot listen there.
     pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<Self, String> {
         let cannot = |error| format!("cannot offer the line over TCP at {address}: {error}");
         let listener = TcpListener::bind(address).map_err(cannot)?;
@@ -36,7 +35,7 @@ impl Tcp {
         thread::spawn(move || {
             for stream in listener.incoming().flatten() {
                 let (sender, receiver) = mpsc::sync_channel(WAITING);
-                if attend(stream, events.clone(), receiver).is_ok() {
+                if serve(stream, events.clone(), receiver).is_ok() {
                     joined
                         .lock()
                         .unwrap_or_else(PoisonError::into_inner)
@@ -47,12 +46,12 @@ impl Tcp {
         Ok(Self { address, clients })
     }
 
-    /// Where it listens: with port 0 the system has chosen one.
+    /// The address of the socket: with port 0 the system has chosen the port.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Lets every client hear these bytes; never waits.
+    /// Sends these bytes to every client; never waits.
     pub fn write(&self, bytes: &[u8]) {
         let mut clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
         clients.retain(|client| {
@@ -64,13 +63,13 @@ impl Tcp {
     }
 }
 
-/// Two threads for a client: one for each direction, until it goes.
-fn attend(
+/// Starts two threads for a client, one for each direction. They end when the client disconnects.
+fn serve(
     stream: TcpStream,
     events: Sender<Event>,
     to_client: Receiver<Vec<u8>>,
 ) -> std::io::Result<()> {
-    // A request and its response are short and follow one another: waiting for more would only delay.
+    // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them.
     stream.set_nodelay(true)?;
     let (mut from, mut to) = (stream.try_clone()?, stream);
     thread::spawn(move || {
@@ -90,7 +89,7 @@ fn attend(
                 return;
             }
         }
-        // The writing thread then ends at its next bytes.
+        // The writing thread ends when it next writes.
         let _ = from.shutdown(std::net::Shutdown::Both);
     });
     Ok(())
@@ -110,12 +109,12 @@ mod tests {
     }
 
     #[test]
-    fn clients_speak_and_all_hear() {
+    fn bytes_of_a_client_are_an_event_and_all_clients_receive_written_bytes() {
         let (events, queue) = mpsc::channel();
         let tcp = Tcp::listen("127.0.0.1:0".parse().unwrap(), events).unwrap();
         let mut first = TcpStream::connect(tcp.address()).unwrap();
         let mut second = TcpStream::connect(tcp.address()).unwrap();
-        eventually("both have joined", || {
+        eventually("two clients are not connected", || {
             tcp.clients.lock().unwrap().len() == 2
         });
 
@@ -125,20 +124,20 @@ mod tests {
 
         tcp.write(&[4, 5]);
         for client in [&mut first, &mut second] {
-            let mut heard = [0; 2];
-            client.read_exact(&mut heard).unwrap();
-            assert_eq!(heard, [4, 5]);
+            let mut received = [0; 2];
+            client.read_exact(&mut received).unwrap();
+            assert_eq!(received, [4, 5]);
         }
 
         drop(first);
-        eventually("the client that left is dropped", || {
+        eventually("the disconnected client is not removed", || {
             tcp.write(&[6]);
             tcp.clients.lock().unwrap().len() == 1
         });
     }
 
     #[test]
-    fn a_port_in_use_is_an_error() {
+    fn port_in_use_is_an_error() {
         let taken = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = taken.local_addr().unwrap();
         let text = Tcp::listen(address, mpsc::channel().0).err().unwrap();

@@ -1,4 +1,4 @@
-//! A board for tests of the command: its core runs an endless loop, its world is real.
+//! Boards for tests of the command. The core runs an endless loop; the rest of the board works as usual.
 
 use register_map::Module;
 use sim::{Board, Config, Image};
@@ -6,23 +6,23 @@ use sim::{Board, Config, Image};
 use super::bench::Bench;
 use super::unit::Unit;
 
-/// What the system says about an address that is bound already.
+/// Part of the operating system's message about an address in use.
 pub const IN_USE: &str = if cfg!(windows) {
     "Only one usage"
 } else {
     "in use"
 };
-/// What it says about a directory that is not there.
+/// Part of the operating system's message about a missing directory.
 pub const NOT_THERE: &str = if cfg!(windows) {
     "cannot find"
 } else {
     "No such file"
 };
 
-/// The vector table (stack, reset) and `b .` after it.
+/// Machine code: the vector table (stack, reset), and `b .` after it.
 const LOOP: [u8; 10] = [0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0xFE, 0xE7];
 
-/// A board with this module plugged, and its power on.
+/// A board with this module, and its power on.
 pub fn board(module: Module) -> Board {
     board_of(Config {
         module,
@@ -31,11 +31,11 @@ pub fn board(module: Module) -> Board {
 }
 
 fn board_of(config: Config) -> Board {
-    let image = Image::from_bytes(&LOOP).expect("a vector table and an instruction");
-    Board::new(&image, config).expect("it fits")
+    let image = Image::from_bytes(&LOOP).expect("the code is a valid image");
+    Board::new(&image, config).expect("the image fits into the flash")
 }
 
-/// A bench whose board has this module plugged, and its power on.
+/// A bench with one board that has this module, and its power on.
 pub fn bench(module: Module) -> Bench {
     bench_of(Config {
         module,
@@ -43,7 +43,7 @@ pub fn bench(module: Module) -> Bench {
     })
 }
 
-/// A bench with a board like this.
+/// A bench with one board of this configuration.
 pub fn bench_of(config: Config) -> Bench {
     bench_of_boards([("modio-02", config)])
 }

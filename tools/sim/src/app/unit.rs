@@ -12,20 +12,21 @@ const TAIL: usize = 50;
 /// Name, log and flash file of a board.
 #[derive(Debug)]
 pub struct Unit {
-    /// What the HTTP interface calls it.
+    /// Name of the board in the HTTP interface.
     pub name: String,
-    /// The file that its flash is kept in.
+    /// The flash file, with `--flash`.
     pub flash: Option<FlashFile>,
-    /// Whether its DACs were taken off the I2C bus on purpose.
+    /// Whether the fault `i2c_absent` is in force: the DACs do not answer.
     pub i2c_absent: bool,
     log: VecDeque<String>,
     /// A line of the log that has not ended yet.
     unfinished: String,
+    /// Number of findings that were returned.
     findings: usize,
 }
 
 impl Unit {
-    /// An entry for a board without any log yet.
+    /// A unit without any log yet.
     pub fn new(name: String, flash: Option<FlashFile>) -> Self {
         Self {
             name,

@@ -1,4 +1,4 @@
-//! What is connected to the pins of the part on a modio board.
+//! The circuit of a modio board: everything that is connected to the pins of the part.
 
 use crate::line::Line;
 use crate::periph::gpio::{Drive, Gpio};
@@ -10,31 +10,31 @@ use crate::time::Time;
 
 use super::{Config, Layout};
 
-/// The driver enable of the RS-485 line.
+/// Driver enable of the RS-485 line.
 const DRIVER_ENABLE: Pin = Pin::new('A', 8);
-/// The line's transmitter.
+/// Transmitter of the RS-485 line.
 const TX: Pin = Pin::new('A', 9);
-/// The bus of the modules' DACs.
+/// I2C bus of the modules' DACs.
 const SCL: Pin = Pin::new('B', 6);
 const SDA: Pin = Pin::new('B', 7);
 
 /// A modio board without its part.
 #[derive(Debug)]
 pub struct Modio {
-    /// Which board it is.
+    /// Type of the board.
     pub layout: &'static Layout,
-    /// The RS-485 bus.
+    /// The RS-485 line.
     pub line: Line,
-    /// The slots and what is plugged into them, in the order of [`Layout::slots`].
+    /// The slots with their modules, in the order of [`Layout::slots`].
     pub slots: Vec<Slot>,
-    /// SW01: bit 0 = position 1, a set bit = ON = connected to ground.
+    /// DIP switch SW01: bit 0 = position 1, a set bit = ON = connected to ground.
     pub dip: u8,
-    /// The slot whose DAC has acknowledged its address.
+    /// Number of the slot whose DAC has acknowledged its address.
     addressed: Option<usize>,
 }
 
 impl Modio {
-    /// A board fitted as `config` says.
+    /// A board with this configuration.
     #[must_use]
     pub fn new(config: &Config) -> Self {
         let slots = config.layout.slots.iter().zip(config.plugged());
@@ -112,7 +112,7 @@ impl Circuit for Modio {
 }
 
 impl Modio {
-    /// What the modules do to the I2C wires: each of them can hold one low.
+    /// Levels of the I2C wires as the modules hold them. Each module can hold a wire low.
     fn held(&self) -> Wires {
         all(self.slots.iter().map(Slot::held))
     }
@@ -127,7 +127,7 @@ impl Bus for Modio {
     fn address(&mut self, byte: u8, now: Time) -> bool {
         self.addressed = None;
         for (n, slot) in self.slots.iter_mut().enumerate() {
-            // Every DAC sees the address, so that the others ignore what follows.
+            // Pass the address to every DAC, so that those with another address ignore the following bytes.
             if slot.address(byte, now) {
                 self.addressed = Some(n);
             }
@@ -154,7 +154,7 @@ impl Bus for Modio {
     }
 }
 
-/// Wires that are high only where all of these are.
+/// The wired AND: each wire is high only if it is high in all of `wires`.
 fn all(wires: impl Iterator<Item = Wires>) -> Wires {
     wires.fold(Wires::FREE, |a, b| Wires {
         scl: a.scl && b.scl,

@@ -1,4 +1,4 @@
-//! How a modio board is fitted.
+//! The configuration of a modio board.
 
 use register_map::Module;
 
@@ -7,34 +7,34 @@ use crate::chip::{self, Error};
 use crate::corner::Corner;
 use crate::slot;
 
-/// How the board is fitted before power first comes on.
+/// Configuration of a board before its first power-on.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// SW01, bit 0 = position 1, a set bit = ON.
+    /// DIP switch SW01: bit 0 = position 1, a set bit = ON.
     pub dip: u8,
-    /// Which board it is.
+    /// Type of the board.
     pub layout: &'static Layout,
-    /// What is plugged into the first slot, unless `slots` names it.
+    /// Module in the first slot, unless `slots` names this slot.
     pub module: Module,
-    /// What is plugged into other slots, by the numbers of their ports. A slot that is not named is empty.
+    /// Modules in other slots, each with the number of its port. A slot that is not named is empty.
     pub slots: Vec<(u8, Module)>,
-    /// The corner that the part is at.
+    /// Corner of the part.
     pub corner: Corner,
-    /// Whether the 8 MHz crystal works. Without it HSERDY never comes. It can die later as well
+    /// Whether the 8 MHz crystal works. Without it HSERDY is never set. The crystal can also fail later
     /// ([`crate::Board::set_crystal`]).
     pub crystal: bool,
-    /// The flash's contents before the image is written into it, which erases the pages that it needs;
-    /// erased when `None`.
+    /// Contents of the flash before the image is written; erased if `None`. Writing the image erases the pages that it
+    /// needs.
     pub flash: Option<Vec<u8>>,
-    /// The 96-bit unique identity, as its bytes stand at 0x1FFF_F7E8 (RM0008 30.2).
+    /// Unique identity of 96 bits, in the byte order of address 0x1FFF_F7E8 (RM0008 30.2).
     pub unique_id: [u8; 12],
-    /// FLASH_WRPR (PM0075 3.9): bit n clear protects pages 4n to 4n + 3.
+    /// FLASH_WRPR (PM0075 3.9): a clear bit `n` protects the `n`th 4 KiB, a clear bit 31 also all following pages.
     pub write_protection: u32,
-    /// Decides what chance decides in the part: which cells an interrupted flash operation leaves unsteady,
-    /// and how they read. Runs with the same seed are the same.
+    /// Seed of everything that is random in the part: which cells an interrupted flash operation leaves unsteady, and
+    /// how they are read. Runs with the same seed are the same.
     pub seed: u64,
-    /// Has the core translate everything anew, instead of going on with what the core of an earlier board of this
-    /// process has translated. The run is the same, it only takes longer.
+    /// Whether the core translates all code again, instead of using the code that the core of an earlier board of this
+    /// process has translated. The result is the same, but the run takes longer.
     pub new_core: bool,
 }
 
@@ -68,7 +68,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// What is plugged into every slot of the board, with the numbers of the ports.
+    /// Port number and module of every slot of the board.
     #[must_use]
     pub fn plugged(&self) -> Vec<(u8, Module)> {
         let ports = self.layout.slots.iter().map(|slot| slot.port);
@@ -80,7 +80,7 @@ impl Config {
         slots.collect()
     }
 
-    /// What of it concerns the part.
+    /// The configuration of the part.
     pub(super) fn chip(self) -> chip::Config {
         chip::Config {
             part: &self.layout.part,

@@ -1,4 +1,4 @@
-//! The boards, as data.
+//! The types of boards: their parts, slots and pins.
 
 use register_map::{Board, board};
 
@@ -9,24 +9,24 @@ use crate::soc::Pin;
 /// A slot of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct SlotPins {
-    /// The number of its port.
+    /// Number of the port.
     pub port: u8,
-    /// Its lines 1 to 4.
+    /// Pins of lines 1 to 4.
     pub lines: [Pin; 4],
-    /// The I2C address of the DAC of a module in it.
+    /// I2C address (7 bits) of the DAC of a module in this slot.
     pub dac_address: u8,
 }
 
-/// A board. The RS-485 line (PA8 to PA10), I2C1 (PB6, PB7) and the LEDs (PB8, PB9, PC13) are the same on all.
+/// A type of board. The RS-485 line (PA8 to PA10), I2C1 (PB6, PB7) and the LEDs (PB8, PB9, PC13) are the same on all.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
-    /// Its row of the register map: name, ports and where the configuration is stored.
+    /// The board in the register map: its name, its ports, and the pages in which the configuration is stored.
     pub board: &'static Board,
-    /// Its part.
+    /// The microcontroller.
     pub part: Part,
-    /// Its slots. The first one is meant where no port is named.
+    /// The slots. Methods without a port number mean the first one.
     pub slots: &'static [SlotPins],
-    /// SW01, position 1 first. ON = low.
+    /// Pins of DIP switch SW01, position 1 first. ON = low.
     pub switch: [Pin; 8],
 }
 
@@ -90,10 +90,10 @@ pub const MODIO_08: Layout = Layout {
 };
 
 impl Layout {
-    /// All boards.
+    /// All types of boards.
     pub const ALL: [&'static Self; 2] = [&MODIO_02, &MODIO_08];
 
-    /// The layout of a board.
+    /// The layout of a board of the register map.
     #[must_use]
     pub fn of(board: &Board) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|layout| layout.board == board)
@@ -116,7 +116,7 @@ mod tests {
     use crate::machine::memory::FLASH_BASE;
 
     #[test]
-    fn every_board_of_the_register_map_has_a_layout_with_its_slots_and_its_pages() {
+    fn every_board_of_the_register_map_has_a_layout_that_matches() {
         for board in Board::ALL {
             let layout = Layout::of(board).unwrap();
             let ports = layout.slots.iter().map(|slot| u16::from(slot.port));

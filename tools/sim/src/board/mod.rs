@@ -1,5 +1,5 @@
-//! The modio boards: an STM32F103 with an RS-485 line, slots, a switch and LEDs. Which pins a board uses is in
-//! [`layout`], what is connected to them in [`circuit`], what a person or a test does to the board in [`outside`].
+//! The modio boards: an STM32F103 with an RS-485 line, slots, a DIP switch and LEDs. [`layout`] has the pins of each
+//! board, [`circuit`] what is connected to them, and [`outside`] the methods that operate and read a board.
 
 mod circuit;
 mod config;
@@ -23,8 +23,8 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// [`Error::Image`] when the image does not fit the flash or `config.flash` has another size, [`Error::Slot`]
-    /// when `config.slots` names a slot that the board does not have.
+    /// [`Error::Image`] if the image does not fit into the flash or `config.flash` has another size, [`Error::Slot`] if
+    /// `config.slots` names a slot that the board does not have.
     pub fn new(image: &Image, config: Config) -> Result<Self, Error> {
         let ports = config.layout.slots.iter().map(|slot| slot.port);
         let mut named = config.slots.iter().map(|&(port, _)| port);

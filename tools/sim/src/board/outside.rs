@@ -1,4 +1,4 @@
-//! What surrounds the part on a modio board: the switch, the slots, the LEDs and the line.
+//! Operates and reads a modio board: its DIP switch, slots, LEDs and line.
 
 use register_map::Module;
 
@@ -6,7 +6,7 @@ use super::{Board, Error, Layout};
 use crate::line::Line;
 use crate::slot::{BusFault, Channel, Slot};
 
-/// The three LEDs, as a person sees them.
+/// The three LEDs; `true` = lit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Leds {
     /// Line activity: PB8, high = on.
@@ -29,19 +29,19 @@ impl Board {
         self.change(|circuit| circuit.dip = dip);
     }
 
-    /// Which board it is.
+    /// Type of the board.
     #[must_use]
     pub fn layout(&self) -> &'static Layout {
         self.circuit().layout
     }
 
-    /// What is plugged into the first slot.
+    /// The module in the first slot.
     #[must_use]
     pub fn module(&self) -> Module {
         self.slot().module()
     }
 
-    /// Plugs another module, a new one, into the first slot.
+    /// Plugs a new module into the first slot.
     ///
     /// # Errors
     ///
@@ -50,11 +50,11 @@ impl Board {
         self.set_module_at(self.layout().slots[0].port, module)
     }
 
-    /// Plugs another module, a new one, into the slot at `port`.
+    /// Plugs a new module into the slot at `port`.
     ///
     /// # Errors
     ///
-    /// [`Error::Powered`] while the power is on, [`Error::Slot`] when the board has no such slot.
+    /// [`Error::Powered`] while the power is on, [`Error::Slot`] if the board has no such slot.
     pub fn set_module_at(&mut self, port: u8, module: Module) -> Result<(), Error> {
         if self.powered() {
             return Err(Error::Powered);
@@ -62,70 +62,70 @@ impl Board {
         self.change_slot(port, |slot| slot.set_module(module))
     }
 
-    /// Energises the digital input on channel `ch` (1 to 4) or takes the voltage away.
+    /// Energises the digital input of channel `ch` (1 to 4) of the first slot, or removes the voltage.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no digital input.
+    /// [`Error::Channel`] if this channel is not a digital input.
     pub fn set_energised(&mut self, ch: usize, energised: bool) -> Result<(), Error> {
         Ok(self.with_slot(|slot| slot.set_energised(ch, energised))?)
     }
 
-    /// Sets the jumper of relay `ch` (1 or 2) to manual or back.
+    /// Sets the jumper of relay `ch` (1 or 2) of the first slot to manual or to automatic.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no relay.
+    /// [`Error::Channel`] if this channel is not a relay.
     pub fn set_manual(&mut self, ch: usize, manual: bool) -> Result<(), Error> {
         Ok(self.with_slot(|slot| slot.set_manual(ch, manual))?)
     }
 
-    /// Puts a voltage on the analog input of channel `ch` (1 to 4), 0 to 3300 mV at the pin.
+    /// Sets the voltage at the pin of the analog input of channel `ch` (1 to 4) of the first slot, 0 to 3300 mV.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no analog input, [`Error::Range`] above 3300.
+    /// [`Error::Channel`] if this channel is not an analog input, [`Error::Range`] above 3300 mV.
     pub fn set_millivolts(&mut self, ch: usize, millivolts: u16) -> Result<(), Error> {
         Ok(self.with_slot(|slot| slot.set_millivolts(ch, millivolts))?)
     }
 
-    /// Sets the source impedance of the analog input of channel `ch` (1 to 4), in ohms.
+    /// Sets the source impedance of the analog input of channel `ch` (1 to 4) of the first slot, in ohms.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no analog input.
+    /// [`Error::Channel`] if this channel is not an analog input.
     pub fn set_source_ohms(&mut self, ch: usize, ohms: u32) -> Result<(), Error> {
         Ok(self.with_slot(|slot| slot.set_source_ohms(ch, ohms))?)
     }
 
-    /// Breaks the DAC or its wires, or repairs them.
+    /// Causes or clears a fault of the I2C bus in the first slot.
     pub fn set_bus_fault(&mut self, fault: BusFault) {
         self.with_slot(|slot| slot.set_bus_fault(fault));
     }
 
-    /// Channel `ch` (1 to 4) of the module in the first slot; [`Channel::None`] for any other number.
+    /// State of channel `ch` (1 to 4) of the first slot; [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
         self.slot().channel(ch)
     }
 
-    /// The first slot, to look at.
+    /// The first slot, for reading.
     #[must_use]
     pub fn slot(&self) -> &Slot {
         &self.circuit().slots[0]
     }
 
-    /// The slots with the numbers of their ports, the first one first.
+    /// The slots with the numbers of their ports, in order.
     pub fn slots(&self) -> impl Iterator<Item = (u8, &Slot)> {
         let ports = self.layout().slots.iter().map(|pins| pins.port);
         ports.zip(&self.circuit().slots)
     }
 
-    /// Does something to the slot at `port` at this instant; the part sees it immediately.
+    /// Changes the slot at `port` at this instant. The part sees the change immediately.
     ///
     /// # Errors
     ///
-    /// [`Error::Slot`] when the board has no such slot.
+    /// [`Error::Slot`] if the board has no such slot.
     pub fn change_slot<T>(
         &mut self,
         port: u8,
@@ -146,7 +146,7 @@ impl Board {
     /// The LEDs.
     #[must_use]
     pub fn leds(&self) -> Leds {
-        // Without power nothing shines, though PC13 is as low as with the LED on.
+        // Without power PC13 is low, as with the LED on, but the LED is off.
         Leds {
             activity: self.pin('B', 8),
             fault: self.pin('B', 9),
@@ -160,13 +160,13 @@ impl Board {
         self.pin('A', 8)
     }
 
-    /// Writes to USART1's data register since the last reset: one for each byte the firmware sends.
+    /// Number of writes to USART1's data register since the last reset: one for each byte that the firmware sends.
     #[must_use]
     pub fn line_bytes_written(&self) -> u64 {
         self.machine.bus.soc.usart1().data_writes()
     }
 
-    /// The RS-485 line, to send on and to read what was sent.
+    /// The RS-485 line, for sending and for reading the record.
     pub fn line(&mut self) -> &mut Line {
         self.sync();
         &mut self.machine.bus.soc.circuit.line

@@ -1,4 +1,4 @@
-//! The configuration that stands in a board's flash before the firmware runs.
+//! The configuration in a board's flash, read and written from outside the firmware.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::Layout;
 use crate::machine::memory::FLASH_BASE;
 
 impl Layout {
-    /// The pages of the configuration, as ranges of the flash.
+    /// The two pages of the configuration, as ranges of the flash.
     fn pages(&self) -> [Range<usize>; 2] {
         let store = &self.board.store;
         store.addresses().map(|address| {
@@ -17,15 +17,15 @@ impl Layout {
         })
     }
 
-    /// Whether no configuration was ever stored in this flash.
+    /// Whether both pages of the configuration are empty in this flash.
     #[must_use]
     pub fn stores_nothing(&self, flash: &[u8]) -> bool {
         let vacant = |page: &Range<usize>| flash.get(page.clone()).is_some_and(record::is_vacant);
         self.pages().iter().all(vacant)
     }
 
-    /// Returns the setting at `address` in the newest configuration in this flash; `None` when no setting is stored
-    /// there, which means its default.
+    /// Returns the setting of the register at `address` in the newest configuration in this flash. `None` if the
+    /// configuration does not have this register, so that its default is in force.
     #[must_use]
     pub fn stored(&self, flash: &[u8], address: u16) -> Option<u16> {
         let pages = self.pages();
@@ -45,8 +45,8 @@ impl Layout {
         pairs.find(|(at, _)| *at == address).map(|(_, value)| value)
     }
 
-    /// Stores these settings, address and value, in a flash whose pages of the configuration hold nothing. Returns
-    /// whether they fit.
+    /// Stores these settings (address and value of a register) in a flash without a configuration. Returns whether they
+    /// fit into a page.
     pub fn store(&self, flash: &mut [u8], settings: &[(u16, u16)]) -> bool {
         let [first, _] = self.pages();
         let Some(page) = flash.get_mut(first) else {
@@ -56,7 +56,8 @@ impl Layout {
         record::encode_page(0, settings, page).is_some()
     }
 
-    /// A flash in which nothing stands but these settings; `None` when they do not fit.
+    /// An erased flash with these settings (address and value of a register) as its configuration; `None` if they do
+    /// not fit into a page.
     #[must_use]
     pub fn flash_with(&self, settings: &[(u16, u16)]) -> Option<Vec<u8>> {
         let mut flash = vec![0xFF; self.part.flash_size];
@@ -70,7 +71,7 @@ mod tests {
     use crate::board::MODIO_08;
 
     #[test]
-    fn modules_are_stored_where_the_board_looks_for_them() {
+    fn settings_are_stored_in_the_first_page_of_the_board() {
         let settings = [(0x0110, 1), (0x0113, 5)];
         let mut flash = MODIO_08.flash_with(&settings).unwrap();
         assert!(!MODIO_08.stores_nothing(&flash));
@@ -80,7 +81,10 @@ mod tests {
         flash[0x3_F000..0x3_F800].fill(0xFF);
         assert!(MODIO_08.stores_nothing(&flash));
         flash[0x3_FFFE] = 0;
-        assert!(!MODIO_08.stores_nothing(&flash), "the second page");
+        assert!(
+            !MODIO_08.stores_nothing(&flash),
+            "the second page is not empty"
+        );
     }
 
     #[test]
@@ -90,7 +94,11 @@ mod tests {
         assert_eq!(MODIO_08.stored(&flash, 0x0104), None);
         let second = &mut flash[0x3_F800..0x4_0000];
         record::encode_page(7, &[(0x0110, 2)], second).unwrap();
-        assert_eq!(MODIO_08.stored(&flash, 0x0103), None, "the default again");
+        assert_eq!(
+            MODIO_08.stored(&flash, 0x0103),
+            None,
+            "the newer record does not have this setting"
+        );
         assert_eq!(MODIO_08.stored(&flash, 0x0110), Some(2));
         assert_eq!(MODIO_08.stored(&[0xFF; 0x4_0000], 0x0110), None);
     }

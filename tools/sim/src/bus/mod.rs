@@ -1,67 +1,67 @@
 //! Several boards on one RS-485 line.
 //!
-//! Each board has its clock and its end of the line. The edges of the master are known beforehand, and those of a unit
-//! reach the record of the bus afterwards. This leaves the units that receive each other: none of them may pass an
-//! instant at which another one could still pull the line low.
+//! Each board has its own clock and its own end of the line. The edges of the master are known beforehand, and the
+//! edges of a unit are added to the record of the bus afterwards. But the units also receive each other: a unit must
+//! not pass an instant at which another unit could still pull the line low.
 //!
-//! A unit can do that only when its transmitter begins a character: at the end of the one under way, or at a tick of
-//! its baud generator while its core executes instructions. So each board goes on up to the earliest such instant of
-//! the others, all of them at the same time on as many threads as the host has cores; then they receive what the others
-//! have sent, and go on. What a board does is the same whatever the number of threads. A core that sleeps does nothing
-//! until its next event, and its board stays behind until then, or until the run ends. All edges of a character are
-//! known when it begins.
+//! A unit can do that only when its transmitter begins a character: at the end of the character before, or at a tick of
+//! its baud generator while its core executes instructions. So each board runs up to the earliest such instant of the
+//! other boards. All boards run at the same time, on as many threads as the host has cores. Then each board gets the
+//! characters of the others, and the next round begins. The result does not depend on the number of threads. A core
+//! that sleeps does nothing until its next event, so its board stays behind until then, or until the run ends. All
+//! edges of a character are known when it begins.
 //!
 //! This is exact, with two exceptions:
 //!
-//! - To stop a core in the middle of its work costs much more than to let it go on until it sleeps. So a board may be
-//!   past the beginning of a character when it receives the edge: by half a bit, [`LATEST`] at most, and the end of an
-//!   instruction. The edge still counts from its true instant ([`crate::line`]): the character is sampled at its true
-//!   bits, and arrives at its true time. Only what shows the edge itself, such as the capture of a timer or the level
-//!   at the pin, is late for the firmware by that much.
-//! - A unit can break off a character by its driver, its pin or its supply, or pull the line low by a plain output. It
-//!   does so between two ticks. The others may then be past it by up to one bit of that unit, or by [`FARTHEST`] while
-//!   its transmitter is off, and receive the edge late.
+//! - Stopping a core in the middle of its work costs much more than letting it run until it sleeps. So a board may
+//!   already be past the start of a character when it gets the edge: by half a bit and at most [`LATEST`], plus the
+//!   rest of an instruction. The edge still counts from its true instant ([`crate::line`]): the board samples the true
+//!   bits of the character, and receives it at its true time. Only the edge itself is late for the firmware by that
+//!   time, in the capture of a timer or in the level of the pin.
+//! - A unit can cut a character with its driver, its pin or its supply, or pull the line low with a GPIO output. It
+//!   does so between two ticks. Another board may then be past this instant by up to one bit of that unit, or by
+//!   [`FARTHEST`] while the transmitter of that unit is off, and gets the edge late.
 
 use rayon::prelude::*;
 
 use crate::board::Board;
 use crate::chip::CYCLE;
-use crate::line::{Line, Said, Settings};
+use crate::line::{Line, Output, Settings};
 use crate::machine::Limit;
 use crate::time::Time;
 
-/// How far the others run ahead of a unit whose transmitter is off: it has to send an idle frame before its first
-/// character, which takes longer at every rate that a line runs at.
+/// Most time by which other boards run ahead of a unit whose transmitter is off. Such a transmitter sends an idle frame
+/// before its first character, and the idle frame takes longer at every rate of a line.
 pub const FARTHEST: Time = Time::from_us(10);
 
-/// How late a board may hear of a character that begins while its core executes instructions.
+/// Most time by which a board may get the edges of another unit's character late.
 pub const LATEST: Time = Time::from_us(20);
 
-/// The bus itself is brought up to date at least so often.
+/// Longest time between two updates of the bus itself.
 const RECORDED: Time = Time::from_ms(10);
 
-/// What a board will do, by what is known.
+/// The next actions of a board, as far as they are known.
 #[derive(Clone, Copy, Debug)]
 struct Plan {
-    /// Its core executes nothing before this instant.
+    /// The core executes nothing before this instant.
     awake: Time,
-    /// It begins no character before this instant.
+    /// The unit begins no character before this instant.
     start: Time,
-    /// The other boards may be there already: half a bit after `start`, [`LATEST`] at most.
+    /// The other boards may run up to this instant: half a bit after `start`, at most [`LATEST`] after it.
     bound: Time,
 }
 
-/// How far boards can run before they exchange what they have sent: no other board begins a character before.
+/// The instants up to which boards can run before they exchange their characters.
 #[derive(Clone, Copy, Debug)]
 struct Horizon {
-    /// The board whose bound is the least, which runs up to the next one.
+    /// The board with the least bound. It runs up to `next`, all other boards run up to `least`.
     first: usize,
     least: Time,
     next: Time,
 }
 
 impl Horizon {
-    /// `None` when all boards sleep until `t`, the end of the run.
+    /// The horizon of boards with these plans. `None` if all boards sleep until `t`, the end of the run.
     fn of(plans: &[Plan], t: Time) -> Option<Self> {
         let awake = plans.iter().map(|plan| plan.awake).min()?;
         if awake >= t {
@@ -80,13 +80,13 @@ impl Horizon {
                 horizon.next = horizon.next.min(plan.bound);
             }
         }
-        // One instruction at least.
+        // Let the first board that is awake execute at least one instruction.
         horizon.least = horizon.least.max(awake + Time::from_ps(1));
         horizon.next = horizon.next.max(horizon.least);
         Some(horizon)
     }
 
-    /// Up to where board `n` runs.
+    /// Instant up to which board `n` runs.
     fn of_board(self, n: usize) -> Time {
         if n == self.first {
             self.next
@@ -98,28 +98,28 @@ impl Horizon {
 
 /// Boards on one RS-485 line.
 ///
-/// With one board it is that board with its line. With several, [`Bus::line`] is the bus: the master is connected to
-/// it, and it has the record. The line of a board on it ([`Board::line`]) is then only the end at that board: it has the
-/// edges of the driver and the echo, but no frames.
+/// A bus with one board uses the line of that board. With several boards, [`Bus::line`] is the bus: the master is
+/// connected to it, and it has the record. The line of each board ([`Board::line`]) is then only the end at that board:
+/// it has the edges of the driver and the echo, but no frames.
 #[derive(Debug)]
 pub struct Bus {
     boards: Vec<Board>,
-    /// When each board does something next.
+    /// The next actions of each board.
     plans: Vec<Plan>,
-    /// Which boards have been lent out since the last run.
+    /// For each board, whether [`board_mut`](Self::board_mut) has returned it since the last run.
     lent: Vec<bool>,
     /// The bus itself; not used with one board.
     line: Line,
-    /// What of it the boards know of.
+    /// [`Line::version`] of the bus that the boards have taken over.
     version: u64,
 }
 
 impl Bus {
-    /// A bus with these boards on it. Boards whose time is behind the others' go on first.
+    /// A bus with these boards on it. Boards whose time is behind that of the others run first.
     ///
     /// # Panics
     ///
-    /// When there is no board.
+    /// If `boards` is empty.
     #[must_use]
     pub fn new(mut boards: Vec<Board>) -> Self {
         let now = boards.iter().map(Board::now).min();
@@ -134,14 +134,14 @@ impl Bus {
             lent: vec![true; boards.len()],
             boards,
             line: Line::of_bus(now),
-            // Not the version of the line: no board knows of a version yet.
+            // No version of the line is equal to this, so the boards take over the first one.
             version: u64::MAX,
         }
     }
 
-    /// How many boards there are, at least one.
+    /// Number of boards, at least 1.
     #[must_use]
-    #[expect(clippy::len_without_is_empty, reason = "there is always a board")]
+    #[expect(clippy::len_without_is_empty, reason = "a bus is never empty")]
     pub fn len(&self) -> usize {
         self.boards.len()
     }
@@ -152,41 +152,41 @@ impl Bus {
         &self.boards
     }
 
-    /// Board `n`, the first one is 0.
+    /// Board `n`, counted from 0.
     ///
     /// # Panics
     ///
-    /// When there is no such board, as with a slice.
+    /// If there is no board `n`.
     #[must_use]
     pub fn board(&self, n: usize) -> &Board {
         &self.boards[n]
     }
 
-    /// The same, to do something to it. What lets its time pass on its own leaves the other boards behind: they catch
-    /// up in the next run. Until then it receives nothing from them.
+    /// Board `n`, counted from 0, for changing it. A method that lets the time of this board pass leaves the other
+    /// boards behind. They catch up in the next run, and until then this board receives nothing from them.
     ///
     /// # Panics
     ///
-    /// When there is no such board, as with a slice.
+    /// If there is no board `n`.
     pub fn board_mut(&mut self, n: usize) -> &mut Board {
         self.lent[n] = true;
         &mut self.boards[n]
     }
 
-    /// The virtual time: that of the board that is farthest.
+    /// The virtual time of the board that is farthest ahead.
     #[must_use]
     pub fn now(&self) -> Time {
         let now = self.boards.iter().map(Board::now).max();
         now.unwrap_or(Time::ZERO)
     }
 
-    /// Runs all boards until the virtual time is `t`, or the end of the instruction under way then.
+    /// Runs all boards until the virtual time is `t`. A board whose core is in an instruction then finishes it.
     pub fn run_until(&mut self, t: Time) {
         if let [board] = &mut *self.boards {
             return board.run_until(t);
         }
-        self.take_up();
-        // On a thread of the pool, where to share work out is cheap.
+        self.apply_changes();
+        // Run on a thread of the pool, where distributing work is cheap.
         rayon::scope(|_| {
             while let Some(horizon) = Horizon::of(&self.plans, t) {
                 self.run_boards(|n, plan| {
@@ -200,23 +200,23 @@ impl Bus {
         self.record_until(t);
     }
 
-    /// Runs for `d`.
+    /// Runs all boards for `d` of virtual time.
     pub fn run_for(&mut self, d: Time) {
         self.run_until(self.now() + d);
     }
 
-    /// Power off on board `n`, 100 ms for all boards, power on.
+    /// Switches board `n` off, runs all boards for 100 ms, and switches board `n` on.
     ///
     /// # Panics
     ///
-    /// When there is no such board, as with a slice.
+    /// If there is no board `n`.
     pub fn cycle(&mut self, n: usize) {
         self.board_mut(n).power_off();
         self.run_for(CYCLE);
         self.board_mut(n).power_on();
     }
 
-    /// The line, to send on and to read what was sent.
+    /// The line, for sending and for reading the record.
     pub fn line(&mut self) -> &mut Line {
         let now = self.now();
         match &mut *self.boards {
@@ -228,11 +228,11 @@ impl Bus {
         }
     }
 
-    /// Takes over the changes to the boards and the line since the last run.
-    fn take_up(&mut self) {
+    /// Takes over the changes that were made to the boards and to the line since the last run.
+    fn apply_changes(&mut self) {
         for n in 0..self.boards.len() {
             if core::mem::take(&mut self.lent[n]) {
-                self.boards[n].take_up();
+                self.boards[n].apply_changes();
                 self.pass_on(n);
                 self.plans[n] = self.boards[n].plan();
             }
@@ -247,7 +247,7 @@ impl Bus {
         }
     }
 
-    /// Runs each board until the instant that `to` gives, if any, and passes on what they have sent.
+    /// Runs each board to the instant that `to` returns, or not at all with `None`, and passes on its output.
     fn run_boards(&mut self, to: impl Fn(usize, &Plan) -> Option<Time>) {
         let mut due: Vec<_> = self
             .boards
@@ -266,10 +266,11 @@ impl Bus {
         }
     }
 
-    /// Brings the bus up to where all boards are, at most to `t`, when it has not been for a while.
+    /// Updates the bus up to the instant that all boards have reached, at most to `t`, if the last update is
+    /// [`RECORDED`] ago.
     fn record(&mut self, t: Time) {
         let known = self.plans.iter().map(|plan| plan.start).min();
-        // A character may begin at that instant.
+        // Stop one picosecond before, because a character may begin at `start`.
         let known = known.map_or(Time::ZERO, |start| {
             start.saturating_sub(Time::from_ps(1)).min(t)
         });
@@ -278,20 +279,21 @@ impl Bus {
         }
     }
 
+    /// Updates the bus up to `known`.
     fn record_until(&mut self, known: Time) {
         let settings = self.boards.iter().find_map(Board::line_settings);
         self.line.pass(known, settings);
     }
 
-    /// Passes on to all others what unit `n` has sent.
+    /// Passes the output of unit `n` on to the bus and to all other boards.
     fn pass_on(&mut self, n: usize) {
-        let Some(said) = self.boards[n].take_said() else {
+        let Some(output) = self.boards[n].take_output() else {
             return;
         };
-        self.line.hear(n, &said);
+        self.line.add_output(n, &output);
         for (other, board) in self.boards.iter_mut().enumerate() {
             if other != n {
-                board.end_of_line(|end| end.hear(n, &said));
+                board.end_of_line(|end| end.add_output(n, &output));
                 self.plans[other] = board.plan();
             }
         }
@@ -299,7 +301,7 @@ impl Bus {
 }
 
 impl Board {
-    /// Does something to the board's end of the line.
+    /// Calls `action` with the board's end of the line.
     fn end_of_line<T>(&mut self, action: impl FnOnce(&mut Line) -> T) -> T {
         let soc = &mut self.machine.bus.soc;
         let answer = action(&mut soc.circuit.line);
@@ -307,24 +309,25 @@ impl Board {
         answer
     }
 
-    /// What the unit did to the bus since the last time.
-    fn take_said(&mut self) -> Option<Said> {
+    /// Returns the unit's output to the bus; `None` if it is as in the last call.
+    fn take_output(&mut self) -> Option<Output> {
         let soc = &mut self.machine.bus.soc;
         if !(soc.usart1().has_sent() || soc.circuit.line.has_changed()) {
             return None;
         }
         self.sync();
-        self.end_of_line(Line::take_said)
+        self.end_of_line(Line::take_output)
     }
 
-    /// Takes up what was done to the circuit since the last run.
-    fn take_up(&mut self) {
+    /// Takes over the changes that were made to the circuit since the last run.
+    fn apply_changes(&mut self) {
         let now = self.now();
         self.machine.bus.soc.refresh(now);
         self.sync();
     }
 
-    /// Runs until `t`, or the end of the instruction under way then. What is worked out lazily is left as it is.
+    /// Runs until `t`, or to the end of the instruction that is being executed then. Does not compute the parts that
+    /// are computed on demand.
     fn run_on_bus(&mut self, t: Time) {
         if self.now() < t {
             self.machine.run(Limit {
@@ -336,7 +339,7 @@ impl Board {
         }
     }
 
-    /// What the board does next.
+    /// The next actions of the board.
     fn plan(&self) -> Plan {
         let awake = self.machine.next_instruction();
         let usart = self.machine.bus.soc.usart1();

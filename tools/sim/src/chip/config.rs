@@ -1,4 +1,4 @@
-//! How a part is set up, and why it refuses something.
+//! The configuration of a part, and the errors of chips and boards.
 
 use core::fmt;
 
@@ -6,30 +6,30 @@ use crate::corner::Corner;
 use crate::part::{Part, STM32F103CB};
 use crate::periph::clocks::HSE_HZ;
 
-/// What may differ from one part to the next, and its crystal, before power first comes on.
+/// Configuration of a part and its crystal before the first power-on.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// Which part it is.
+    /// Type of the part.
     pub part: &'static Part,
-    /// The frequency of the crystal (HSE) in Hz, without its error.
+    /// Nominal frequency of the crystal (HSE) in Hz; the corner adds its error.
     pub crystal_hz: u32,
-    /// The corner that the part is at.
+    /// Corner of the part.
     pub corner: Corner,
-    /// Whether the crystal works. Without it HSERDY never comes. It can die later as well
+    /// Whether the crystal works. Without it HSERDY is never set. The crystal can also fail later
     /// ([`super::Chip::set_crystal`]).
     pub crystal: bool,
-    /// The flash's contents before the image is written into it, which erases the pages that it needs;
-    /// erased when `None`.
+    /// Contents of the flash before the image is written; erased if `None`. Writing the image erases the pages that it
+    /// needs.
     pub flash: Option<Vec<u8>>,
-    /// The 96-bit unique identity, as its bytes stand at 0x1FFF_F7E8 (RM0008 30.2).
+    /// Unique identity of 96 bits, in the byte order of address 0x1FFF_F7E8 (RM0008 30.2).
     pub unique_id: [u8; 12],
-    /// FLASH_WRPR (PM0075 3.9): bit n clear protects the `n`th 4 KiB, bit 31 all that follow, too.
+    /// FLASH_WRPR (PM0075 3.9): a clear bit `n` protects the `n`th 4 KiB, a clear bit 31 also all following pages.
     pub write_protection: u32,
-    /// Decides what chance decides in the part: which cells an interrupted flash operation leaves unsteady,
-    /// and how they read. Runs with the same seed are the same.
+    /// Seed of everything that is random in the part: which cells an interrupted flash operation leaves unsteady, and
+    /// how they are read. Runs with the same seed are the same.
     pub seed: u64,
-    /// Has the core translate everything anew, instead of going on with what the core of an earlier chip of this
-    /// process has translated. The run is the same, it only takes longer.
+    /// Whether the core translates all code again, instead of using the code that the core of an earlier chip of this
+    /// process has translated. The result is the same, but the run takes longer.
     pub new_core: bool,
 }
 
@@ -49,19 +49,19 @@ impl Default for Config {
     }
 }
 
-/// Why a chip or a board refuses something.
+/// Reason why a chip or a board refuses a call.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {
-    /// The image or the flash contents are not fit for this part: the reason.
+    /// The image or the contents of the flash do not fit this part, for this reason.
     Image(String),
-    /// That can only be done while the power is off.
+    /// The call is only possible while the power is off.
     Powered,
-    /// No such channel, or nothing of that kind on it.
+    /// The channel does not exist or is of another kind.
     Channel,
-    /// The board has no slot with this port.
+    /// The board has no slot at this port.
     Slot(u8),
-    /// A value out of range: what it may be.
+    /// A value is out of this range.
     Range(&'static str),
 }
 
@@ -69,8 +69,8 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Image(text) => f.write_str(text),
-            Self::Powered => f.write_str("only while the power is off"),
-            Self::Channel => f.write_str("the plugged module has no such input on that channel"),
+            Self::Powered => f.write_str("this is only possible while the power is off"),
+            Self::Channel => f.write_str("the plugged module has no such input on this channel"),
             Self::Slot(port) => write!(f, "the board has no slot at port {port}"),
             Self::Range(text) => write!(f, "out of range: {text}"),
         }

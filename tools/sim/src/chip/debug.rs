@@ -1,5 +1,5 @@
-//! The chip under a debugger: it halts, looks, changes and goes on. Time passes only in [`Chip::run_debugged`]
-//! and [`Chip::step_instruction`], as in every other run.
+//! Methods for a debugger: breakpoints, single steps, registers and memory. Virtual time passes only in
+//! [`Chip::run_debugged`] and [`Chip::step_instruction`].
 
 use super::{Chip, Error};
 use crate::machine::memory::RAM_BASE;
@@ -8,23 +8,23 @@ use crate::soc::Circuit;
 use crate::time::Time;
 
 impl<C: Circuit> Chip<C> {
-    /// [`Chip::run_debugged`] halts before the instruction at `address`. The flash is left alone, so the
-    /// firmware does not notice. As many removals as additions take it away.
+    /// Adds a breakpoint: [`Chip::run_debugged`] halts before the instruction at `address`. This does not change the
+    /// flash, so the firmware does not notice it. A breakpoint that was added several times must be removed as often.
     pub fn add_breakpoint(&mut self, address: u32) {
         self.machine.add_breakpoint(address);
     }
 
-    /// Takes back one [`Chip::add_breakpoint`].
+    /// Removes a breakpoint that [`Chip::add_breakpoint`] has added.
     pub fn remove_breakpoint(&mut self, address: u32) {
         self.machine.remove_breakpoint(address);
     }
 
-    /// The next run executes the next instruction even when there is a breakpoint on it.
+    /// Lets the next run execute its first instruction even if there is a breakpoint on it.
     pub fn pass_breakpoint(&mut self) {
         self.machine.pass_breakpoint();
     }
 
-    /// Runs as [`Chip::run_until`] does, or up to a breakpoint; returns whether it has come to one.
+    /// Runs until `t` as [`Chip::run_until`], or to a breakpoint. Returns whether it has reached a breakpoint.
     pub fn run_debugged(&mut self, t: Time) -> bool {
         self.run(Limit {
             time: t,
@@ -34,8 +34,8 @@ impl<C: Circuit> Chip<C> {
         }) == Stop::Pc
     }
 
-    /// Executes one instruction, on a breakpoint or not, without taking an interrupt. A core that sleeps, or
-    /// stalls on the flash, gets the time that it needs to get there, at most a second.
+    /// Executes one instruction, also at a breakpoint, without taking an interrupt. If the core sleeps or waits for the
+    /// flash, time passes until it executes an instruction again, at most one second.
     pub fn step_instruction(&mut self) {
         let now = self.now();
         self.machine.bus.soc.refresh(now);
@@ -47,17 +47,17 @@ impl<C: Circuit> Chip<C> {
     ///
     /// # Errors
     ///
-    /// [`Error::Range`] when there is no such register.
+    /// [`Error::Range`] if there is no such register.
     pub fn set_register(&mut self, number: usize, value: u32) -> Result<(), Error> {
         if self.machine.set_register(number, value) {
             Ok(())
         } else {
-            Err(Error::Range("a core register, 0 to 22"))
+            Err(Error::Range("core registers are numbered 0 to 22"))
         }
     }
 
-    /// Reads memory from `address` on into `bytes`: SRAM, flash (at 0 too) and the system control space, none of
-    /// which takes notice. Returns how many bytes it received.
+    /// Reads memory from `address` on into `bytes`: SRAM, flash (also at address 0) and the system control space.
+    /// Reading them has no side effect. Returns the number of bytes that were read.
     pub fn read_memory(&mut self, address: u32, bytes: &mut [u8]) -> usize {
         for (n, byte) in (0..).zip(bytes.iter_mut()) {
             let Some(read) = self.byte(address.wrapping_add(n)) else {
@@ -81,9 +81,9 @@ impl<C: Circuit> Chip<C> {
     ///
     /// # Errors
     ///
-    /// [`Error::Range`] when they do not all lie in SRAM; then nothing is written.
+    /// [`Error::Range`] if not all bytes are in SRAM. Nothing is written then.
     pub fn write_memory(&mut self, address: u32, bytes: &[u8]) -> Result<(), Error> {
-        let outside = Error::Range("an address in SRAM");
+        let outside = Error::Range("all bytes must be in SRAM");
         let at = address.checked_sub(RAM_BASE).ok_or(outside.clone())? as usize;
         self.ram_mut()
             .get_mut(at..at.saturating_add(bytes.len()))

@@ -1,4 +1,4 @@
-//! What a debug probe sees of the part: memories, registers, the log, and what went wrong.
+//! The inside of the part, as with a debug probe: memories, registers, the log and the findings.
 
 use super::{Chip, Error};
 use crate::finding::Finding;
@@ -8,18 +8,18 @@ use crate::soc::Circuit;
 use crate::soc::map::Block;
 
 impl<C: Circuit> Chip<C> {
-    /// What the firmware logged over RTT since the last call.
+    /// Returns the text that the firmware has logged over RTT since the last call.
     pub fn take_log(&mut self) -> String {
         self.machine.take_log()
     }
 
-    /// The flash.
+    /// Contents of the flash.
     #[must_use]
     pub fn flash(&self) -> &[u8] {
         self.machine.bus.soc.flash.bytes()
     }
 
-    /// The flash, to change.
+    /// Contents of the flash, for changing them.
     ///
     /// # Errors
     ///
@@ -31,12 +31,12 @@ impl<C: Circuit> Chip<C> {
         Ok(self.machine.flash_mut())
     }
 
-    /// Overwrites code in flash or SRAM while the part runs, to break the program on purpose. Not a flash
-    /// operation: nothing stalls and nothing is checked. What was there before.
+    /// Overwrites code in flash or SRAM while the part runs, to break the program on purpose. This is not a flash
+    /// operation: the core does not wait, and nothing is checked. Returns the bytes that were there before.
     ///
     /// # Errors
     ///
-    /// [`Error::Range`] when the bytes do not all lie in flash or SRAM.
+    /// [`Error::Range`] if not all bytes are in flash or in SRAM.
     pub fn patch_code(&mut self, address: u32, bytes: &[u8]) -> Result<Vec<u8>, Error> {
         let range = |base: u32| {
             let at = address.checked_sub(base)? as usize;
@@ -47,64 +47,64 @@ impl<C: Circuit> Chip<C> {
         } else {
             range(FLASH_BASE).and_then(|range| self.machine.flash_range_mut(range))
         };
-        let place = place.ok_or(Error::Range("an address in flash or SRAM"))?;
+        let place = place.ok_or(Error::Range("all bytes must be in flash or in SRAM"))?;
         let before = place.to_vec();
         place.copy_from_slice(bytes);
         Ok(before)
     }
 
-    /// Inverts bits of a block's register, as a disturbance of the part does: the register is read, and written
-    /// as a store of the core would write it. Nothing is checked.
+    /// Inverts the bits `mask` of a block's register, as a disturbance of the part. The register is read, and written
+    /// as by a store of the core, but without the checks of the bus.
     pub fn upset(&mut self, block: Block, offset: u32, mask: u32) {
         let now = self.now();
         let soc = &mut self.machine.bus.soc;
         soc.sync(now);
-        // What the model has no answer to changes nothing.
+        // A register that is not modelled stays as it is.
         if let Ok(value) = soc.read(block, offset, now) {
             let _ = soc.write(block, offset, value ^ mask, now);
         }
     }
 
-    /// Grows whenever the flash's contents may have changed: when an operation has ended or was torn, or
-    /// someone was lent them to change.
+    /// Increases whenever the contents of the flash may have changed: when an operation has ended or was interrupted,
+    /// or after [`flash_mut`](Self::flash_mut) and [`patch_code`](Self::patch_code).
     #[must_use]
     pub fn flash_changes(&self) -> u64 {
         self.machine.bus.soc.flash.changes().get()
     }
 
-    /// Flash operations started since the chip was made.
+    /// Number of flash operations that were started since the chip was made.
     #[must_use]
     pub fn flash_operations(&self) -> u64 {
         self.machine.bus.soc.flash.started()
     }
 
-    /// How long flash operations take from now on.
+    /// Sets the durations of flash operations from now on.
     pub fn set_flash_durations(&mut self, durations: Durations) {
         self.machine.bus.soc.flash.durations = durations;
     }
 
-    /// The `nth` flash operation from now (1 = the next) ends without the EOP flag.
+    /// Lets the `nth` flash operation from now (1 = the next) end without setting the flag EOP.
     pub fn end_without_eop(&mut self, nth: u64) {
         self.machine.bus.soc.flash.end_without_eop(nth);
     }
 
-    /// What a power cut in the middle of a flash operation leaves from now on.
+    /// Sets the state of cells after a power cut in the middle of a flash operation, from now on.
     pub fn set_torn(&mut self, torn: Torn) {
         self.machine.bus.soc.flash.torn = torn;
     }
 
-    /// The SRAM.
+    /// Contents of the SRAM.
     #[must_use]
     pub fn ram(&self) -> &[u8] {
         self.machine.ram()
     }
 
-    /// The SRAM, to change as a debug probe does: to break something on purpose.
+    /// Contents of the SRAM, for changing them as with a debug probe.
     pub fn ram_mut(&mut self) -> &mut [u8] {
         self.machine.ram_mut()
     }
 
-    /// The word at `address` in flash or SRAM; `None` elsewhere.
+    /// The word at `address` in flash or SRAM; `None` at any other address.
     #[must_use]
     pub fn word(&self, address: u32) -> Option<u32> {
         let read = |bytes: &[u8], base: u32| {
@@ -115,19 +115,19 @@ impl<C: Circuit> Chip<C> {
         read(self.ram(), RAM_BASE).or_else(|| read(self.flash(), FLASH_BASE))
     }
 
-    /// The address of a symbol of the image; a function's has bit 0 set (Thumb).
+    /// Address of a symbol of the image. The address of a function has bit 0 set (Thumb).
     #[must_use]
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
 
-    /// Everything the firmware did that a real part would not take well, since the chip was made.
+    /// Actions of the firmware since the chip was made that a real part does not allow or the simulator does not model.
     #[must_use]
     pub fn findings(&self) -> &[Finding] {
         self.machine.bus.findings.as_slice()
     }
 
-    /// Whether the core has locked up: only a reset gets it out.
+    /// Whether the core has locked up. Only a reset ends this state.
     #[must_use]
     pub fn locked_up(&self) -> bool {
         self.machine.locked_up()
@@ -139,20 +139,20 @@ impl<C: Circuit> Chip<C> {
         self.machine.asleep()
     }
 
-    /// The address of the next instruction.
+    /// Address of the next instruction.
     #[must_use]
     pub fn pc(&self) -> u32 {
         self.machine.pc()
     }
 
-    /// A core register: 0 to 12, 13 SP, 14 LR, 15 PC, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK, 20 BASEPRI,
-    /// 21 FAULTMASK, 22 CONTROL; `None` above.
+    /// Value of a core register: 0 to 12 are R0 to R12, 13 SP, 14 LR, 15 PC, 16 xPSR, 17 MSP, 18 PSP, 19 PRIMASK,
+    /// 20 BASEPRI, 21 FAULTMASK, 22 CONTROL; `None` for any other number.
     #[must_use]
     pub fn register(&self, number: usize) -> Option<u32> {
         self.machine.register(number)
     }
 
-    /// HCLK in Hz: the cycles that SysTick and DWT count.
+    /// Frequency of HCLK in Hz. SysTick and DWT count its cycles.
     #[must_use]
     pub fn hclk(&self) -> u32 {
         self.machine.bus.soc.rcc.clocks().hclk

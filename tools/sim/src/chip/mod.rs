@@ -1,5 +1,5 @@
-//! An STM32F103 with a circuit around it, as its user sees it: power and time here, the pins in [`pins`], its memories
-//! in [`inside`], measurements in [`measure`], a debugger's actions in [`debug`].
+//! An STM32F103 in a circuit. This module has power and time, [`pins`] the pins, the crystal and the supply, [`inside`]
+//! the memories, [`measure`] the measurements, and [`debug`] the methods for a debugger.
 
 mod config;
 mod debug;
@@ -37,14 +37,14 @@ impl<C: Circuit> Chip<C> {
     ///
     /// # Errors
     ///
-    /// [`Error::Image`] when the image does not fit the flash, or `config.flash` is not as large as the flash.
+    /// [`Error::Image`] if the image does not fit into the flash, or if `config.flash` has another size.
     pub fn in_circuit(image: &Image, config: Config, circuit: C) -> Result<Self, Error> {
         let part = config.part;
         let mut flash = Flash::new(part, config.write_protection, config.seed);
         if let Some(contents) = &config.flash {
             if contents.len() != part.flash_size {
                 return Err(Error::Image(format!(
-                    "flash contents of {} bytes, not {}",
+                    "the contents of the flash have {} bytes, but the flash has {}",
                     contents.len(),
                     part.flash_size
                 )));
@@ -68,19 +68,19 @@ impl<C: Circuit> Chip<C> {
         })
     }
 
-    /// Whether the core goes on with what it has translated for an earlier chip.
+    /// Whether the core uses code that was translated for an earlier chip.
     #[must_use]
     pub fn core_is_used(&self) -> bool {
         self.machine.core_is_used()
     }
 
-    /// The circuit, to look at.
+    /// The circuit, for reading.
     #[must_use]
     pub fn circuit(&self) -> &C {
         &self.machine.bus.soc.circuit
     }
 
-    /// Does something to the circuit at this instant; the part sees it immediately.
+    /// Changes the circuit at this instant. The part sees the change immediately.
     pub fn change<T>(&mut self, action: impl FnOnce(&mut C) -> T) -> T {
         self.sync();
         let answer = action(&mut self.machine.bus.soc.circuit);
@@ -95,8 +95,8 @@ impl<C: Circuit> Chip<C> {
         self.machine.now()
     }
 
-    /// Runs until the virtual time is `t`, or the end of the instruction under way then; at once when it is
-    /// past. Time passes with the power off too.
+    /// Runs until the virtual time is `t`, and finishes the instruction that is being executed then. Returns
+    /// immediately if `t` is in the past. Time also passes while the power is off.
     pub fn run_until(&mut self, t: Time) {
         self.run(Limit {
             time: t,
@@ -106,13 +106,13 @@ impl<C: Circuit> Chip<C> {
         });
     }
 
-    /// Runs for `d`.
+    /// Runs for `d` of virtual time.
     pub fn run_for(&mut self, d: Time) {
         self.run_until(self.now() + d);
     }
 
-    /// Runs `n` instructions. Waiting in WFI costs none. Stops early when the power is off or the core has
-    /// done nothing for a minute of virtual time.
+    /// Runs `n` instructions. Waiting in WFI is not an instruction. Stops early if the power is off, or if the core has
+    /// executed nothing for a minute of virtual time.
     pub fn step(&mut self, n: u64) {
         self.run(Limit {
             time: Time::MAX,
@@ -122,8 +122,8 @@ impl<C: Circuit> Chip<C> {
         });
     }
 
-    /// Runs until the instruction at `address` is next, or until `limit`; returns whether it got there. From
-    /// that very instruction it runs on to the next time.
+    /// Runs until the instruction at `address` is the next one, or until `limit`. Returns whether it has reached the
+    /// instruction. If the core is already there, it runs until it is there again.
     pub fn run_until_pc(&mut self, address: u32, limit: Time) -> bool {
         self.run(Limit {
             time: limit,
@@ -141,24 +141,24 @@ impl<C: Circuit> Chip<C> {
         stop
     }
 
-    /// Brings the wires up to the present.
+    /// Computes everything that is computed on demand up to the present.
     pub(crate) fn sync(&mut self) {
         let now = self.now();
         self.machine.bus.soc.sync(now);
     }
 
-    /// Turns the power on; nothing when it is on.
+    /// Switches the power on. Does nothing if it is on.
     pub fn power_on(&mut self) {
         self.machine.power_on();
     }
 
-    /// Cuts the power at this instant, between two instructions, in the middle of a flash operation if one
-    /// runs. RAM is lost.
+    /// Switches the power off at this instant, between two instructions. This may be in the middle of a flash
+    /// operation. The contents of the SRAM are lost.
     pub fn power_off(&mut self) {
         self.machine.power_off();
     }
 
-    /// Power off, 100 ms, power on.
+    /// Switches the power off, waits 100 ms of virtual time, and switches it on.
     pub fn cycle(&mut self) {
         self.power_off();
         self.run_for(CYCLE);
@@ -171,26 +171,26 @@ impl<C: Circuit> Chip<C> {
         self.machine.powered()
     }
 
-    /// Cuts the power in the middle of the `nth` flash operation (page erase, mass erase or half-word) from
-    /// now, 1 = the next, when `fraction` (0 to 1) of it is done. A power cut before then takes it back.
+    /// Cuts the power in the `nth` flash operation (page erase, mass erase or half-word) from now (1 = the next), when
+    /// `fraction` (0 to 1) of the operation is done. A power cut before that cancels this order.
     pub fn cut_in_flash_operation(&mut self, nth: u64, fraction: f64) {
         self.machine.cut_in_flash_operation(nth, fraction);
     }
 
-    /// How often the power came on.
+    /// Number of times that the power was switched on.
     #[must_use]
     pub fn power_ons(&self) -> u64 {
         self.machine.power_ons()
     }
 
-    /// Pulls the reset pin for a moment.
+    /// Resets the part through its reset pin. Does nothing while the power is off.
     pub fn reset(&mut self) {
         if self.powered() {
             self.machine.reset(Cause::Pin);
         }
     }
 
-    /// Resets since power-on, by the watchdog, by software or by the pin.
+    /// Number of resets since power-on: by the watchdog, by software or by the pin.
     #[must_use]
     pub fn resets(&self) -> u32 {
         self.machine.resets()

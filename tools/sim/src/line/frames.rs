@@ -1,4 +1,4 @@
-//! The record of the line: words gathered into frames.
+//! The record of the line. It joins received words into frames.
 
 use std::collections::VecDeque;
 
@@ -7,56 +7,57 @@ use modbus_frames::adu::Framing;
 use crate::serial::Word;
 use crate::time::Time;
 
-/// Number of frames kept, unless the record keeps all.
+/// Number of the last frames that are kept, unless the record keeps all frames.
 pub const KEPT: usize = 1000;
 
-/// Number of bytes after which a frame is cut, for a line that is never silent: sixteen times the longest RTU frame.
+/// Number of bytes after which a frame is cut, in case the line is never silent: sixteen times the longest RTU frame.
 pub const LONGEST: usize = 4096;
 
-/// Who sent.
+/// Sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// The master, or noise.
     FromMaster,
-    /// The unit on this board.
+    /// A unit.
     FromUnit,
 }
 
-/// A frame on the line, as a listener with the master's settings receives it: characters of one side with less
-/// than t3.5 of silence between them.
+/// A frame on the line, as a receiver with the master's settings receives it. A frame consists of characters of one
+/// sender with less than t3.5 of silence between them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Its number, from 1, never used again on this line.
+    /// Number of the frame on this line, from 1.
     pub number: u64,
-    /// Who sent.
+    /// Sender of the frame.
     pub direction: Direction,
-    /// The first start bit.
+    /// Start of the first start bit.
     pub start: Time,
-    /// The end of the last stop bit.
+    /// End of the last stop bit.
     pub end: Time,
-    /// The characters' data.
+    /// Data of the characters.
     pub bytes: Vec<u8>,
-    /// It is a whole RTU frame whose CRC is right, or a whole ASCII frame whose LRC is right.
+    /// Whether this is a complete RTU frame with the right CRC, or a complete ASCII frame with the right LRC.
     pub crc_ok: bool,
-    /// Some character was not as it should be: parity, framing, noise, or both sides spoke.
+    /// Whether a character had a wrong parity, a framing error or noise, or two senders were active.
     pub damaged: bool,
-    /// The longest silence between two of its characters.
+    /// Longest silence between two characters of the frame.
     pub longest_gap: Time,
-    /// The silence before it, since the end of the frame before; `None` for the first frame on the line.
+    /// Silence between the frame before and this one; `None` for the first frame on the line.
     pub gap: Option<Time>,
-    /// For the first frame of a unit after a request to that unit: the time from the end of the request to its start.
+    /// Time from the end of a request to the start of this frame, if this is the first frame of a unit after a request
+    /// to that unit.
     pub turnaround: Option<Time>,
 }
 
-/// Gathers words into frames.
+/// Joins words into frames.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     kept: VecDeque<Frame>,
     open: Option<Frame>,
     last_number: u64,
-    /// The end of the last frame.
+    /// End of the last frame.
     last_end: Option<Time>,
-    /// The unit in the last request, and the end of the request, until a unit answers.
+    /// Unit address and end of the last request, until a unit answers.
     request: Option<(u8, Time)>,
     keep_all: bool,
     from_master: u64,
@@ -64,13 +65,13 @@ pub struct Record {
 }
 
 impl Record {
-    /// Keeps every frame, not just the last [`KEPT`].
+    /// Chooses whether the record keeps every frame or only the last [`KEPT`].
     pub fn set_keep_all(&mut self, all: bool) {
         self.keep_all = all;
         self.trim();
     }
 
-    /// A word was received. A silence of `silence` ends a frame.
+    /// Adds a received word. A silence of `silence` ends a frame.
     pub fn word(&mut self, word: &Word, direction: Direction, collided: bool, silence: Time) {
         let continues = self.open.as_ref().is_some_and(|frame| {
             frame.direction == direction
@@ -100,25 +101,25 @@ impl Record {
         frame.damaged |= collided || word.parity_error || word.framing_error || word.noise;
     }
 
-    /// The line is silent up to `now`: a frame that has been followed by `silence` is complete.
+    /// Ends the frame if the silence after it has lasted for `silence`. The line is silent up to `now`.
     pub fn quiet(&mut self, now: Time, silence: Time) {
         if self.open.as_ref().is_some_and(|f| f.end + silence <= now) {
             self.close();
         }
     }
 
-    /// The complete frames kept, oldest first.
+    /// The complete frames that are kept, oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.kept.iter()
     }
 
-    /// The complete frames with numbers above `number`.
+    /// The complete frames that are kept and have numbers above `number`, oldest first.
     pub fn since(&self, number: u64) -> impl Iterator<Item = &Frame> {
         let skip = self.kept.partition_point(|frame| frame.number <= number);
         self.kept.range(skip..)
     }
 
-    /// How many frames the master, and the unit, have sent so far.
+    /// Number of frames so far: from the master, and from units.
     #[must_use]
     pub fn counts(&self) -> (u64, u64) {
         (self.from_master, self.from_unit)
@@ -181,7 +182,7 @@ mod tests {
     const SILENCE: Time = Time::from_us(350);
 
     #[test]
-    fn silence_and_direction_end_frames() {
+    fn silence_or_another_sender_ends_a_frame() {
         let mut record = Record::default();
         // Read coils of unit 17: the example of V1.1b3, with its CRC.
         let request = [0x11_u8, 0x01, 0x00, 0x13, 0x00, 0x25, 0x0E, 0x84];
@@ -212,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn old_frames_go_numbers_stay() {
+    fn only_the_last_frames_are_kept_with_their_numbers() {
         let mut record = Record::default();
         for n in 0..1200 {
             record.word(&word(n * 1000, 1), Direction::FromMaster, false, SILENCE);
@@ -234,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_never_rests_is_cut_into_frames() {
+    fn frame_without_silence_is_cut_at_the_longest_length() {
         let mut record = Record::default();
         for n in 0..10_000 {
             record.word(&word(n * 100, 7), Direction::FromMaster, false, SILENCE);
@@ -243,7 +244,7 @@ mod tests {
         assert_eq!(lengths, [LONGEST, LONGEST]);
     }
 
-    /// A record of these frames: direction, start in us, and bytes.
+    /// Records these frames: direction, start in us, and bytes.
     fn record(frames: &[(Direction, u64, Vec<u8>)]) -> Vec<Frame> {
         let mut record = Record::default();
         for (direction, start, bytes) in frames {
@@ -276,7 +277,7 @@ mod tests {
         let noise = || vec![0xFF];
         let frames = record(&[
             (FromMaster, 1000, frame(1)),
-            // A glitch between a request and its reply belongs to neither.
+            // A glitch between a request and its reply does not change the turnaround.
             (FromMaster, 2000, noise()),
             (FromUnit, 5000, frame(1)),
             (FromUnit, 6000, frame(1)),

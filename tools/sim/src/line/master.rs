@@ -1,4 +1,4 @@
-//! The master's end of the line: what it queues to send, and what it receives.
+//! The master's end of the line: its queue of characters to send, and the characters that it receives.
 
 use std::collections::VecDeque;
 
@@ -6,27 +6,27 @@ use super::{Character, Line, Span};
 use crate::serial::Wave;
 use crate::time::Time;
 
-/// A character that the master received while the unit was sending.
+/// A character that the master has received while a unit was sending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received {
-    /// Its data bits, the parity bit not among them.
+    /// Data bits without the parity bit.
     pub byte: u8,
-    /// The falling edge of its start bit.
+    /// Falling edge of the start bit.
     pub start: Time,
-    /// The end of its last stop bit, by the master's rate.
+    /// End of the last stop bit, by the master's rate.
     pub end: Time,
-    /// The parity bit was wrong.
+    /// Whether the parity bit was wrong.
     pub parity_error: bool,
-    /// The first stop bit was low.
+    /// Whether the first stop bit was low.
     pub framing_error: bool,
-    /// The samples of some bit were not of one mind.
+    /// Whether the samples of a bit had different levels.
     pub noise: bool,
-    /// The master, or another unit, was sending at the same time.
+    /// Whether the master or another unit was sending at the same time.
     pub collided: bool,
 }
 
 impl Received {
-    /// Whether the byte can be trusted.
+    /// Whether the character has no error.
     #[must_use]
     pub const fn is_good(&self) -> bool {
         !(self.parity_error || self.framing_error || self.noise || self.collided)
@@ -36,17 +36,18 @@ impl Received {
 /// The master's transmitter.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Master {
-    /// Its level, the future it has queued included.
+    /// Level of the transmitter, with the characters that are queued.
     pub(super) wave: Wave,
-    /// When it is sending, now and in the future; neighbours do not touch.
-    pub(super) talking: VecDeque<Span>,
+    /// Times in which the master sends, now and in the future. Adjoining times are joined.
+    pub(super) sending: VecDeque<Span>,
+    /// End of the last character that is queued.
     pub(super) queued_until: Time,
-    /// Grows with everything that is queued.
+    /// Increases with every character and every noise pulse that is queued.
     pub(super) version: u64,
 }
 
 impl Master {
-    /// Queues `character` where it stands in time; not before what is queued.
+    /// Queues `character` at its start time, which must not be before the end of the queue.
     fn push(&mut self, character: &Character, end: Time) {
         for bit in 0..character.bits {
             self.wave.push(
@@ -55,9 +56,9 @@ impl Master {
             );
         }
         self.wave.push(character.end(), true);
-        match self.talking.back_mut() {
+        match self.sending.back_mut() {
             Some(span) if span.end == character.start => span.end = end,
-            _ => self.talking.push_back(Span {
+            _ => self.sending.push_back(Span {
                 start: character.start,
                 end,
             }),
@@ -68,8 +69,8 @@ impl Master {
 }
 
 impl Line {
-    /// The master sends `bytes` in its own settings, without gaps, the first start bit at `at`: later when
-    /// something is still queued, now when `at` is past. Returns the end of the last stop bit.
+    /// Sends `bytes` from the master in its settings, without gaps. The first start bit begins at `at`, or now if `at`
+    /// is in the past, or after the characters that are still queued. Returns the end of the last stop bit.
     pub fn send(&mut self, at: Time, bytes: &[u8]) -> Time {
         let start = at.max(self.master_free());
         let (settings, rate) = (self.settings, self.settings.rate());
@@ -84,17 +85,17 @@ impl Line {
         from
     }
 
-    /// The master sends one character of any shape at `at`, or as soon after as what is queued is out.
-    /// Returns its end.
+    /// Sends a character of any shape from the master at `at`, or now if `at` is in the past, or after the characters
+    /// that are still queued. Returns the end of the character.
     pub fn send_character(&mut self, at: Time, character: Character) -> Time {
         let character = character.at(at.max(self.master_free()));
         self.master.push(&character, character.end());
         character.end()
     }
 
-    /// Noise inverts the bus from `at` for `width`: it is a low pulse on an idle line, or an inverted part of a
-    /// character. Bursts come in order. When one begins before the end of the last one, only its rest behind that end
-    /// counts.
+    /// Queues a noise pulse that inverts the bus from `at` for `width`: a low pulse on an idle line, or an inverted
+    /// part of a character. Pulses must be queued in time order. If a pulse begins before the end of the last one, only
+    /// the part after that end has an effect.
     pub fn noise(&mut self, at: Time, width: Time) {
         let end = at + width;
         let start = at.max(self.earliest());
@@ -109,19 +110,20 @@ impl Line {
         }
     }
 
-    /// When everything the master has queued is out; now when that is past.
+    /// Instant at which the master has sent everything that is queued; now if that is in the past.
     #[must_use]
     pub fn master_free(&self) -> Time {
         self.master.queued_until.max(self.earliest())
     }
 
-    /// What the master has received from the unit, oldest first: the last 65 536 characters unless everything
-    /// is kept. It does not hear itself.
+    /// The characters that the master has received from units, oldest first: the last 65 536, or all if everything is
+    /// kept. The master does not receive its own characters.
     pub fn received(&self) -> impl DoubleEndedIterator<Item = &Received> {
         self.received.iter()
     }
 
-    /// The same, and forgets it.
+    /// Returns the characters that the master has received since the last call, oldest first. Removes them from
+    /// [`received`](Self::received).
     pub fn take_received(&mut self) -> Vec<Received> {
         self.received.drain(..).collect()
     }

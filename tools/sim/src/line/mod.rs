@@ -1,19 +1,19 @@
 //! The RS-485 bus between the board and its master.
 //!
-//! Every talker is a level over time: the master, the unit through its driver, and noise. The bus is low
-//! when either talker pulls it low (a wired AND: what a receiver makes of two drivers at once), and noise turns
-//! it over. What a listener receives is sampled from that level at the listener's own rate, so a wrong rate, a
-//! wrong parity, a break, a cut character or a collision come out as they do on a wire.
+//! The master, the unit's driver and noise each are a level over time. The bus is low when the master or the unit pulls
+//! it low: a wired AND, as a receiver sees two drivers at the same time. Noise inverts the bus. Each receiver samples
+//! the level of the bus at its own rate. So a wrong rate, a wrong parity, a break, a cut character or a collision has
+//! the same effect as on a wire.
 //!
 //! ```text
 //! master --- wave --+
 //!                   AND -- XOR -- bus --+-- the unit's receiver (off while its driver is on)
-//! USART1 - driver --+       |           +-- the listener: received(), frames
+//! USART1 - driver --+       |           +-- the recording receiver: received(), frames
 //! other units ------+     noise
 //! ```
 //!
-//! Several boards share a bus in [`crate::bus`]: then each board has its own end of the line, and one more line is the
-//! bus, with the master and the record.
+//! Several boards share a bus in [`crate::bus`]. Each board then has its own end of the line, and one more [`Line`] is
+//! the bus, with the master and the record.
 
 mod frames;
 mod master;
@@ -33,30 +33,30 @@ use crate::time::Time;
 pub use frames::{Direction, Frame, KEPT, LONGEST, Record};
 use master::Master;
 pub use master::Received;
-pub(crate) use shared::Said;
+pub(crate) use shared::Output;
 use shared::Shared;
 
-/// How long the bus can be looked back at, [`Line::level_at`].
+/// How far back [`Line::level_at`] knows the level of the bus.
 pub const HISTORY: Time = Time::from_ms(100);
 
 /// Number of words and driver edges kept, unless the line keeps everything.
 const KEPT_EVENTS: usize = 65_536;
 
-/// A stretch of time.
+/// A span of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
-    /// Its first instant.
+    /// First instant of the span.
     pub start: Time,
-    /// The first instant after it.
+    /// First instant after the span.
     pub end: Time,
 }
 
-/// The bus, the master at its other end, and a listener that records what is said.
+/// The bus, the master at its other end, and a receiver that records the frames.
 #[derive(Clone, Debug)]
 pub struct Line {
     settings: Settings,
     master: Master,
-    /// Low where noise turns the bus over.
+    /// Low while noise inverts the bus.
     noise: Wave,
     /// The TX pin as USART1 drives it.
     usart: Wave,
@@ -65,11 +65,12 @@ pub struct Line {
     driver: bool,
     echo: bool,
     follow: bool,
-    /// What the unit's driver puts on the bus; high while it is off.
+    /// Level that the unit's driver puts on the bus; high while the driver is off.
     unit: Wave,
     bus: Wave,
-    /// The level of the unit's RX pin, and its edges that the USART has not received yet.
+    /// Level of the unit's RX pin.
     rx: bool,
+    /// Edges of the RX pin that the USART has not taken yet.
     rx_edges: Vec<(Time, bool)>,
     listener: Receiver,
     record: Record,
@@ -78,9 +79,9 @@ pub struct Line {
     collisions: VecDeque<Span>,
     findings: Vec<(Time, &'static str)>,
     keep_all: bool,
-    /// What it has to do with the other units of a bus.
+    /// The other units on a bus with several units.
     shared: Shared,
-    /// Everything up to here has happened.
+    /// The line is computed up to this instant.
     now: Time,
 }
 
@@ -115,64 +116,65 @@ impl Default for Line {
 }
 
 impl Line {
-    /// The master's settings, by which the line is recorded too.
+    /// Rate and format of the master. The record receives with them, too.
     #[must_use]
     pub const fn settings(&self) -> Settings {
         self.settings
     }
 
-    /// Sets the master's rate and format. What it has queued goes out as it was queued.
+    /// Sets the master's rate and format. Characters that are already queued keep theirs.
     pub fn set_settings(&mut self, settings: Settings) {
         self.settings = settings;
     }
 
-    /// Whether the master takes over the unit's rate and format whenever it has nothing left to
-    /// send: for a line whose master has no settings, such as a pseudo-terminal.
+    /// Chooses whether the master takes over the unit's rate and format whenever it has nothing to send. This is for a
+    /// master without settings, such as the client of a socket.
     pub fn set_follow(&mut self, follow: bool) {
         self.follow = follow;
     }
 
-    /// Keeps every frame, word, driver edge and collision from now on, for a test that reads them all.
-    /// Otherwise the last [`KEPT`] frames and 65 536 of the others stay.
+    /// Chooses whether every frame, received character, driver edge and collision is kept from now on. Otherwise the
+    /// last [`KEPT`] frames are kept, and the last 65 536 of each other list.
     pub fn set_keep_all(&mut self, all: bool) {
         self.keep_all = all;
         self.record.set_keep_all(all);
     }
 
-    /// The complete frames kept, oldest first.
+    /// The complete frames that are kept, oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.record.frames()
     }
 
-    /// The complete frames kept whose number is above `number`, oldest first.
+    /// The complete frames that are kept and have numbers above `number`, oldest first.
     pub fn frames_since(&self, number: u64) -> impl Iterator<Item = &Frame> {
         self.record.since(number)
     }
 
-    /// How many frames the master, and the unit, have sent so far.
+    /// Number of frames so far: from the master, and from units.
     #[must_use]
     pub fn frame_counts(&self) -> (u64, u64) {
         self.record.counts()
     }
 
-    /// Each switching of the unit's driver, and whether it was on after it; on a bus with several units, whether any
-    /// unit's driver was on.
+    /// Instants at which the unit's driver was switched, and whether it was on afterwards. On a bus with several units:
+    /// whether the driver of any unit was on afterwards.
     pub fn driver_edges(&self) -> impl DoubleEndedIterator<Item = (Time, bool)> + '_ {
         self.driver_edges.iter().copied()
     }
 
-    /// When the master was sending while a unit's driver was on, or the drivers of two units were on.
+    /// Spans in which the master was sending while a unit's driver was on, or in which the drivers of two units were
+    /// on.
     pub fn collisions(&self) -> impl DoubleEndedIterator<Item = Span> + '_ {
         self.collisions.iter().copied()
     }
 
-    /// The bus level at `at`, from [`HISTORY`] ago to now.
+    /// Level of the bus at `at`, which must be between [`HISTORY`] ago and now.
     #[must_use]
     pub fn level_at(&self, at: Time) -> bool {
         self.bus.level_at(at)
     }
 
-    /// The falling edges of the bus after `from` up to and including `to`, within [`HISTORY`].
+    /// Falling edges of the bus after `from`, up to and including `to`. Both must be within [`HISTORY`].
     pub fn falling_edges(&self, from: Time, to: Time) -> impl Iterator<Item = Time> + '_ {
         self.bus
             .edges(from, to)
@@ -180,22 +182,22 @@ impl Line {
             .map(|(at, _)| at)
     }
 
-    /// What the unit did that damages its own messages, since the last call: bytes lost because the
-    /// driver was off, a driver switched off too early.
+    /// Returns the actions of the unit since the last call that damage its own characters, such as a driver that is
+    /// switched off too early.
     pub fn take_findings(&mut self) -> Vec<(Time, &'static str)> {
         std::mem::take(&mut self.findings)
     }
 
-    /// The line has been followed up to this instant.
+    /// Instant up to which the line is computed.
     #[must_use]
     pub const fn now(&self) -> Time {
         self.now
     }
 }
 
-/// Appends to a list that forgets its oldest entries beyond [`KEPT_EVENTS`], unless all are wanted.
+/// Appends to a list. Unless `all` are kept, removes the oldest entry of a list with [`KEPT_EVENTS`] entries.
 fn keep<T>(list: &mut VecDeque<T>, entry: T, all: bool) {
-    // Before the push, so that a full list does not allocate twice its length.
+    // Remove before the push, so that a full list does not allocate twice its length.
     if !all && list.len() >= KEPT_EVENTS {
         list.pop_front();
     }

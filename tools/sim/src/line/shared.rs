@@ -1,12 +1,14 @@
-//! A bus with several units: what each unit puts on it, for the other units and for the line that is the bus.
+//! A bus with several units: passes the level of each unit to the other units and to the bus.
 //!
-//! Each board has its own end of the line, with its own driver and receiver; one more [`Line`] is the bus, with the
-//! master and the record. [`Line::take_said`] says what a unit did to the bus, and what its transmitter will do to it
-//! if nothing intervenes; [`Line::hear`] takes it up everywhere else. So both are as exact as a line with one unit, as
-//! long as an end knows of an edge before its time passes the edge.
+//! Each board has its own end of the line, with its own driver and receiver. One more [`Line`] is the bus, with the
+//! master and the record. [`Line::take_output`] returns the levels that a unit has put on the bus, and those that its
+//! transmitter will put on the bus if nothing intervenes. [`Line::add_output`] adds them at every other end and on the
+//! bus. The ends are as exact as a line with one unit, as long as each end gets an edge before its time passes the
+//! edge.
 //!
-//! [`crate::bus`] runs the boards in an order that ensures this, within half a bit. A late edge counts from its own
-//! instant if nothing has happened on that end of the line since, and from the end's present otherwise.
+//! [`crate::bus`] runs the boards in an order that ensures this, within half a bit. An edge that an
+//! end gets late takes effect at its true instant if nothing has happened at that end since then, and otherwise at the
+//! time of that end.
 
 use std::collections::VecDeque;
 
@@ -15,10 +17,10 @@ use crate::periph::usart::TxPin;
 use crate::serial::{Settings, Wave};
 use crate::time::Time;
 
-/// What a line is on a bus with several units.
+/// Role of a [`Line`] on a bus with several units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Role {
-    /// The whole line of a board that has it for itself.
+    /// The whole line of a single board.
     #[default]
     Alone,
     /// One unit's end of the line: its driver and receiver, without a record.
@@ -29,38 +31,40 @@ enum Role {
 
 /// A unit at another end of the line.
 #[derive(Clone, Debug)]
-struct Talker {
+struct Sender {
     unit: usize,
-    /// What its driver puts on the bus, known beyond the present while it sends.
+    /// Level that the unit's driver puts on the bus. While the unit sends, the wave reaches into the future.
     wave: Wave,
-    /// Whether its driver is on before the first of `switches`.
+    /// Whether the driver is on before the first entry of `switches`.
     on: bool,
-    /// Each switching of its driver that the line has not come to.
+    /// Switchings of the driver that the line has not reached yet.
     switches: VecDeque<(Time, bool)>,
 }
 
-/// What a line knows of the other units.
+/// The other units, as a line knows them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shared {
     role: Role,
-    /// The unit at this end has done something to the bus since [`Line::take_said`].
+    /// Whether the unit at this end has changed its output since [`Line::take_output`].
     pub(super) changed: bool,
-    said_until: Time,
+    /// Time of the last [`Line::take_output`].
+    output_until: Time,
+    /// Switchings of the driver at this end since the last [`Line::take_output`].
     switches: Vec<(Time, bool)>,
-    others: Vec<Talker>,
-    /// Nothing is queued before this instant: some unit has come that far.
+    others: Vec<Sender>,
+    /// Nothing can be queued before this instant, because a unit has already reached it.
     earliest: Time,
 }
 
-/// What a unit does to the bus.
+/// The levels that a unit puts on the bus.
 #[derive(Clone, Debug)]
-pub(crate) struct Said {
-    /// It takes the place of everything known of the unit from here on.
+pub(crate) struct Output {
+    /// Start. This output replaces everything that is known of the unit from here on.
     from: Time,
     /// Level at `from`, and the edges after `from`.
     level: bool,
     edges: Vec<(Time, bool)>,
-    /// The switchings of its driver since the last time.
+    /// Switchings of the unit's driver since its last output.
     switches: Vec<(Time, bool)>,
 }
 
@@ -73,7 +77,7 @@ impl Shared {
         self.role == Role::Bus
     }
 
-    /// The driver of the unit at this end went on or off.
+    /// The driver of the unit at this end was switched.
     pub(super) fn switched(&mut self, at: Time, on: bool) {
         if self.is_end() {
             self.changed = true;
@@ -81,38 +85,38 @@ impl Shared {
         }
     }
 
-    /// What the other units put on the bus.
+    /// The levels that the other units put on the bus.
     pub(super) fn waves(&self) -> impl Iterator<Item = &Wave> {
-        self.others.iter().map(|talker| &talker.wave)
+        self.others.iter().map(|sender| &sender.wave)
     }
 
-    /// The level that the other units leave at `at`.
+    /// Level of all other units together at `at`: low if one of them pulls the bus low.
     pub(super) fn level_at(&self, at: Time) -> bool {
         self.waves().all(|wave| wave.level_at(at))
     }
 
-    /// How many other units pulled the bus low between two instants.
-    pub(super) fn talkers(&self, from: Time, to: Time) -> usize {
+    /// Number of other units that pulled the bus low between two instants.
+    pub(super) fn senders(&self, from: Time, to: Time) -> usize {
         self.waves()
             .filter(|wave| wave.low_between(from, to))
             .count()
     }
 
-    /// Forgets what happened before `oldest`, and the units that have said nothing since.
+    /// Drops everything before `oldest`, and the units that have not driven the bus since then.
     pub(super) fn drop_before(&mut self, oldest: Time) {
-        for talker in &mut self.others {
-            talker.wave.drop_before(oldest);
+        for sender in &mut self.others {
+            sender.wave.drop_before(oldest);
         }
-        self.others.retain(|talker| {
-            let silent = talker.wave.is_empty() && talker.wave.last_level();
-            !(silent && talker.switches.is_empty() && !talker.on)
+        self.others.retain(|sender| {
+            let silent = sender.wave.is_empty() && sender.wave.last_level();
+            !(silent && sender.switches.is_empty() && !sender.on)
         });
     }
 
-    fn talker(&mut self, unit: usize) -> &mut Talker {
-        let known = self.others.iter().position(|talker| talker.unit == unit);
+    fn sender(&mut self, unit: usize) -> &mut Sender {
+        let known = self.others.iter().position(|sender| sender.unit == unit);
         let n = known.unwrap_or_else(|| {
-            self.others.push(Talker {
+            self.others.push(Sender {
                 unit,
                 wave: Wave::default(),
                 on: false,
@@ -125,7 +129,7 @@ impl Shared {
 }
 
 impl Line {
-    /// The line of a bus with several units, from `now` on.
+    /// The line that is the bus of several units, from `now` on.
     pub(crate) fn of_bus(now: Time) -> Self {
         let mut line = Self {
             now,
@@ -135,24 +139,24 @@ impl Line {
         line
     }
 
-    /// From now on this is one unit's end of a bus.
+    /// Makes this line one unit's end of a bus, from now on.
     pub(crate) fn become_end(&mut self) {
         self.shared.role = Role::End;
         self.shared.changed = true;
-        self.shared.said_until = self.now;
+        self.shared.output_until = self.now;
         if self.driver {
             self.shared.switches.push((self.now, true));
         }
     }
 
-    /// Whether the unit at this end has done something to the bus since [`Line::take_said`].
+    /// Whether the unit at this end has changed its output since [`Line::take_output`].
     pub(crate) fn has_changed(&self) -> bool {
         self.shared.changed
     }
 
-    /// Takes what the unit at this end does to the bus; `None` when that is as it said last.
-    pub(crate) fn take_said(&mut self) -> Option<Said> {
-        let from = core::mem::replace(&mut self.shared.said_until, self.now);
+    /// Returns the output of the unit at this end; `None` if it is as in the last call.
+    pub(crate) fn take_output(&mut self) -> Option<Output> {
+        let from = core::mem::replace(&mut self.shared.output_until, self.now);
         let from = from.max(self.now.saturating_sub(HISTORY));
         if !core::mem::take(&mut self.shared.changed) {
             return None;
@@ -162,7 +166,7 @@ impl Line {
         if self.driver && self.tx_pin == TxPin::Usart {
             edges.extend(self.usart.edges(self.now, Time::MAX));
         }
-        Some(Said {
+        Some(Output {
             from,
             level: self.unit.level_at(from),
             edges,
@@ -170,21 +174,21 @@ impl Line {
         })
     }
 
-    /// Unit `unit`, at another end, says this.
-    pub(crate) fn hear(&mut self, unit: usize, said: &Said) {
+    /// Adds the output of unit `unit`, which is at another end.
+    pub(crate) fn add_output(&mut self, unit: usize, output: &Output) {
         let records = self.shared.is_bus();
-        let talker = self.shared.talker(unit);
-        talker.wave.truncate(said.from);
-        talker.wave.push(said.from, said.level);
-        for &(at, level) in &said.edges {
-            talker.wave.push(at, level);
+        let sender = self.shared.sender(unit);
+        sender.wave.truncate(output.from);
+        sender.wave.push(output.from, output.level);
+        for &(at, level) in &output.edges {
+            sender.wave.push(at, level);
         }
         if records {
-            talker.switches.extend(&said.switches);
+            sender.switches.extend(&output.switches);
         }
-        // Edges in the past of this end, which arrive late.
-        let edges = said.edges.iter().map(|&(at, _)| at);
-        for at in core::iter::once(said.from).chain(edges) {
+        // Late edges, which are in the past of this end.
+        let edges = output.edges.iter().map(|&(at, _)| at);
+        for at in core::iter::once(output.from).chain(edges) {
             if at >= self.now {
                 break;
             }
@@ -203,7 +207,7 @@ impl Line {
         at > forgotten && last.is_none_or(|last| last < at)
     }
 
-    /// Takes over what the master and the noise of `bus` do from `from` on.
+    /// Takes over the levels of the master and the noise of `bus`, from `from` on.
     pub(crate) fn mirror(&mut self, bus: &Self, from: Time) {
         let waves = [
             (&mut self.master.wave, &bus.master.wave),
@@ -218,23 +222,23 @@ impl Line {
         }
     }
 
-    /// Grows with everything that the master or noise has queued.
+    /// Increases with every character and every noise pulse that is queued.
     pub(crate) fn version(&self) -> u64 {
         self.master.version
     }
 
-    /// Nothing is queued before `earliest` any more.
+    /// Sets the instant before which nothing can be queued.
     pub(crate) fn set_earliest(&mut self, earliest: Time) {
         self.shared.earliest = earliest;
     }
 
-    /// The earliest instant at which something may be queued.
+    /// The earliest instant at which something can be queued.
     pub(super) fn earliest(&self) -> Time {
         self.shared.earliest.max(self.now)
     }
 
-    /// Everything on the bus up to `to` happens; all units have come that far. `settings` are those of a unit, for a
-    /// master that follows it.
+    /// Computes the bus up to `to`. All units have reached this instant. `settings` are those of a unit, for a master
+    /// that follows it.
     pub(crate) fn pass(&mut self, to: Time, settings: Option<Settings>) {
         self.extend(to);
         self.listen();
@@ -243,22 +247,22 @@ impl Line {
         }
     }
 
-    /// Notes where the drivers of two units are on, or of one while the master is sending, from where the line is up
-    /// to `to`.
+    /// Records collisions from now to `to`: the drivers of two units are on, or the driver of one unit while the master
+    /// sends.
     pub(super) fn collide_units(&mut self, to: Time) {
         let shared = &mut self.shared;
-        let quiet = |talker: &Talker| !talker.on && talker.switches.is_empty();
+        let quiet = |sender: &Sender| !sender.on && sender.switches.is_empty();
         if shared.others.iter().all(quiet) {
             return;
         }
-        let drivers = |others: &[Talker]| others.iter().filter(|talker| talker.on).count();
+        let drivers = |others: &[Sender]| others.iter().filter(|sender| sender.on).count();
         let mut at = self.now;
         loop {
             let before = drivers(&shared.others);
-            for talker in &mut shared.others {
-                while let Some(&(_, on)) = talker.switches.front().filter(|&&(t, _)| t <= at) {
-                    talker.on = on;
-                    talker.switches.pop_front();
+            for sender in &mut shared.others {
+                while let Some(&(_, on)) = sender.switches.front().filter(|&&(t, _)| t <= at) {
+                    sender.on = on;
+                    sender.switches.pop_front();
                 }
             }
             let on = drivers(&shared.others);
@@ -271,13 +275,13 @@ impl Line {
             let switches = shared
                 .others
                 .iter()
-                .flat_map(|talker| talker.switches.front());
-            let talking = &self.master.talking;
-            let bounds = talking.iter().flat_map(|span| [span.start, span.end]);
+                .flat_map(|sender| sender.switches.front());
+            let sending = &self.master.sending;
+            let bounds = sending.iter().flat_map(|span| [span.start, span.end]);
             let changes = switches.map(|&(t, _)| t).chain(bounds);
             let end = changes.filter(|&t| t > at).fold(to, Time::min);
-            let talks = talking.iter().any(|span| span.start <= at && at < span.end);
-            if on + usize::from(talks) > 1 {
+            let sends = sending.iter().any(|span| span.start <= at && at < span.end);
+            if on + usize::from(sends) > 1 {
                 match self.collisions.back_mut() {
                     Some(last) if last.end == at => last.end = end,
                     _ => keep(&mut self.collisions, Span { start: at, end }, self.keep_all),

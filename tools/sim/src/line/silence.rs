@@ -7,9 +7,9 @@ impl Settings {
     /// The shortest silence that ends an RTU frame. Up to 19200 bit/s it is 3.5 characters of this
     /// format, above that 1750 us (Modbus over Serial Line V1.02, 2.5.1.1).
     ///
-    /// The standard counts 11-bit characters (2.5.1); in a format of 10 bits a unit may count its own.
-    /// Between the two values nothing is demanded. The modio firmware counts its own, so the
-    /// shorter value is t3.5 here: with 11 bits the record would join frames that the unit answers.
+    /// The standard counts characters of 11 bits (2.5.1). In a format with 10 bits a unit may count characters of 10
+    /// bits, and the standard demands nothing between the two values. The modio firmware counts 10 bits, so this
+    /// function does, too: with 11 bits the record would join frames that the unit answers separately.
     #[must_use]
     pub fn frame_silence(self) -> Time {
         if self.baud > 19_200 {
@@ -32,7 +32,7 @@ mod tests {
             baud,
             ..Settings::default()
         };
-        // 38.5 bits at 19200 baud: 2.005 ms.
+        // 38.5 bits at 19200 bit/s: 2.005 ms.
         assert_eq!(at(19_200).frame_silence().as_ns(), 2_005_208);
         assert_eq!(at(38_400).frame_silence(), Time::from_us(1750));
         assert_eq!(at(9600).characters(2), Time::cycles(22, 9600));

@@ -1,4 +1,4 @@
-//! How the bus is connected to the board: the TX pin through the driver, and the receiver to the RX pin.
+//! The connection of the bus to the board: the driver at the TX pin, and the receiver at the RX pin.
 
 use super::{Direction, HISTORY, Line, Received, Span, keep};
 use crate::periph::usart::{Sent, TxPin, Usart, Wire};
@@ -49,12 +49,12 @@ impl Wire for Line {
             .min()
     }
 
-    /// An edge that the driver itself has made.
+    /// Whether an edge of the RX pin waits for the USART.
     fn has_edges(&self) -> bool {
         !self.rx_edges.is_empty()
     }
 
-    /// The receiver's output, pulled high while it is off.
+    /// Level of the receiver's output; high while the receiver is off.
     fn rx_level(&self) -> bool {
         self.rx
     }
@@ -72,7 +72,7 @@ impl Wire for Line {
 }
 
 impl Line {
-    /// The unit's driver goes on or off at `now`, right after [`Usart::exchange`].
+    /// Switches the unit's driver on or off at `now`. Call this directly after [`Usart::exchange`].
     pub fn set_driver(&mut self, on: bool, now: Time) {
         if on == self.driver {
             return;
@@ -98,8 +98,8 @@ impl Line {
         self.settle(now);
     }
 
-    /// Whether the unit receives its echo: the receiver stays on while the driver is on. Off at first: DE and RE
-    /// are tied.
+    /// Chooses whether the unit receives its echo because its receiver stays on while its driver is on. Off at first,
+    /// as with DE and RE connected.
     pub fn set_echo(&mut self, echo: bool) {
         self.echo = echo;
         self.settle(self.now);
@@ -111,7 +111,7 @@ impl Line {
         self.driver
     }
 
-    /// USART1 did something to its TX pin.
+    /// Takes over the output of USART1 at its TX pin.
     fn put(&mut self, sent: Sent) {
         self.shared.changed = true;
         match sent {
@@ -146,11 +146,10 @@ impl Line {
         }
     }
 
-    /// The waves of the unit, the bus and the RX pin are worked out from where they stand up to `to`. The
-    /// driver does not change on the way.
+    /// Computes the waves of the unit, the bus and the RX pin up to `to`. The driver does not change until then.
     pub(super) fn extend(&mut self, to: Time) {
         self.collide(to);
-        // Something may have been queued or sent at this very instant.
+        // Something may have been queued or sent at the present instant.
         self.settle(self.now);
         loop {
             let next = [&self.master.wave, &self.noise, &self.usart]
@@ -167,7 +166,7 @@ impl Line {
         self.now = self.now.max(to);
     }
 
-    /// The levels at `at`, the latest instant there is.
+    /// Computes the levels at `at`. No later instant is known.
     pub(super) fn settle(&mut self, at: Time) {
         let unit = !self.driver
             || match self.tx_pin {
@@ -178,7 +177,8 @@ impl Line {
         let level = self.master.wave.level_at(at) && unit && others;
         let bus = level == self.noise.level_at(at);
         let rx = bus || (self.driver && !self.echo);
-        // The bus has no unit: the record attributes characters of every unit to `FromUnit`.
+        // On the bus, the wave of the unit is that of all units, so that the record attributes their characters to
+        // `FromUnit`. At an end of the line it is the wave of that unit only.
         let unit = if self.shared.is_end() {
             unit
         } else {
@@ -192,15 +192,15 @@ impl Line {
         }
     }
 
-    /// Notes where the master sends while the unit's driver is on, from where the line stands up to `to`.
+    /// Records collisions from now to `to`: the master sends while the unit's driver is on.
     fn collide(&mut self, to: Time) {
         while self
             .master
-            .talking
+            .sending
             .front()
             .is_some_and(|span| span.end <= self.now)
         {
-            self.master.talking.pop_front();
+            self.master.sending.pop_front();
         }
         if self.shared.is_bus() {
             self.collide_units(to);
@@ -209,7 +209,7 @@ impl Line {
         if !self.driver {
             return;
         }
-        for span in &self.master.talking {
+        for span in &self.master.sending {
             let (start, end) = (span.start.max(self.now), span.end.min(to));
             if start >= end {
                 continue;
@@ -221,7 +221,7 @@ impl Line {
         }
     }
 
-    /// The listener receives everything up to now. Edges that nobody needs any more are dropped.
+    /// Records every character that was received up to now. Drops edges that are not needed any more.
     pub(super) fn listen(&mut self) {
         let framing = Framing::of(self.settings);
         let silence = self.settings.frame_silence();
@@ -230,7 +230,7 @@ impl Line {
                 data: framing.payload(word.data),
                 ..word
             };
-            self.heard(&word, silence);
+            self.record_word(&word, silence);
         }
         let quiet_until = self.listener.start().unwrap_or(self.now);
         self.record.quiet(quiet_until, silence);
@@ -255,10 +255,11 @@ impl Line {
         self.shared.drop_before(oldest);
     }
 
-    fn heard(&mut self, word: &Word, silence: Time) {
+    /// Adds a word to the record, and to the characters that the master has received.
+    fn record_word(&mut self, word: &Word, silence: Time) {
         let unit = self.unit.low_between(word.start, word.at);
         let master = self.master.wave.low_between(word.start, word.at);
-        let collided = unit && master || self.shared.talkers(word.start, word.at) > 1;
+        let collided = unit && master || self.shared.senders(word.start, word.at) > 1;
         let unit_began = unit && (!master || self.master.wave.level_at(word.start));
         let direction = if unit_began {
             Direction::FromUnit

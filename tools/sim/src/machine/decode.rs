@@ -1,15 +1,15 @@
-//! Thumb-2 instructions by what they cost: the encodings of the ARMv7-M ARM, DDI 0403E, A5.
+//! Classifies Thumb-2 instructions by their costs. The encodings are in the ARMv7-M ARM (DDI 0403E), A5.
 
-/// The classes of instructions that differ in cost.
+/// Classes of instructions with different costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// One cycle.
+    /// An instruction of one cycle.
     Simple,
     /// A load of one register.
     Load,
-    /// A load from the code itself, by the program counter.
+    /// A load relative to the program counter, so from the code itself.
     Literal,
-    /// TBB, TBH: a load from the code, and a branch.
+    /// TBB, TBH: a load from the code and a branch.
     Table,
     /// A store of one register.
     Store,
@@ -31,20 +31,21 @@ pub enum Class {
     Refill,
 }
 
-/// How a segment of code ends.
+/// Whether and how an instruction ends a segment of code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The following instruction is executed next.
+    /// It does not: the following instruction is executed next.
     Sequential,
-    /// By a branch, which may not be taken.
+    /// It is a branch, which may be conditional.
     Branch,
-    /// By a branch that may be the return from an exception.
+    /// It is a branch that may be the return from an exception.
     Return,
-    /// By an instruction that may let an exception in, or raise one.
+    /// It may raise an exception, or enable one that is pending.
     Exception,
 }
 
-/// The size in bytes, the class and the end of the instruction `first`, with `second` the half-word after it.
+/// Returns the size in bytes, the class and the end of an instruction. `first` is its first half-word, `second` the
+/// half-word after it.
 #[must_use]
 pub fn decode(first: u16, second: u16) -> (u32, Class, End) {
     if first >> 11 > 0b11100 {
@@ -56,7 +57,7 @@ pub fn decode(first: u16, second: u16) -> (u32, Class, End) {
     }
 }
 
-/// A load or a store.
+/// A load or a store of one register.
 const fn access(load: bool) -> (Class, End) {
     let class = if load { Class::Load } else { Class::Store };
     (class, End::Sequential)
@@ -98,7 +99,7 @@ fn miscellaneous(code: u32) -> (Class, End) {
         0xD => (several, End::Return),
         0x6 => (Class::System, End::Exception),
         0xE => (Class::Simple, End::Exception),
-        // WFE and WFI; the others are hints and IT.
+        // WFE and WFI. The other encodings are hints and IT.
         0xF if matches!(code & 0xFF, 0x20 | 0x30) => (Class::Simple, End::Exception),
         _ => (Class::Simple, End::Sequential),
     }
@@ -183,7 +184,7 @@ mod tests {
     fn instructions_have_their_size_class_and_end() {
         use Class::*;
         use End::*;
-        // As an assembler encodes them.
+        // The encodings of an assembler.
         for (text, first, second, expected) in [
             ("movs r0, #1", 0x2001, 0, (2, Simple, Sequential)),
             ("muls r0, r1", 0x4348, 0, (2, Simple, Sequential)),

@@ -1,19 +1,19 @@
-//! The parts of the core's debug blocks that firmware may use without a debugger: DWT's cycle counter
-//! (ARMv7-M ARM, DDI 0403E C1.8). The core itself answers the ITM and the system control space.
+//! The cycle counter of the DWT, which firmware can use without a debugger (ARMv7-M ARM, DDI 0403E, C1.8). The emulated
+//! core itself has the ITM and the system control space.
 //!
-//! While DEMCR.TRCENA is clear, DWT is off (C1.6.5): writes are lost, reads give 0, and nothing counts. DEMCR is
-//! the core's own, which cannot be read within an access. So a write to a DWT that was off is kept until the core
-//! is between two instructions.
+//! While DEMCR.TRCENA is clear, DWT is off (C1.6.5): writes are lost, reads return 0, and nothing counts. DEMCR is a
+//! register of the emulated core, which cannot be read during an access. So a write to a DWT that was off is kept until
+//! the core is between two instructions.
 
 use crate::peripheral::Unmodelled;
 
-/// Where DWT is.
+/// Base address of DWT.
 pub const BASE: u32 = 0xE000_1000;
-/// Bytes of DWT's registers.
+/// Size of DWT's registers in bytes.
 pub const SIZE: u32 = 0x1000;
 
 const CTRL_CYCCNTENA: u32 = 1;
-/// Four comparators, as the Cortex-M3 has.
+/// Number of comparators: four, as in the Cortex-M3.
 const CTRL_NUMCOMP: u32 = 4 << 28;
 
 /// The cycle counter.
@@ -21,27 +21,29 @@ const CTRL_NUMCOMP: u32 = 4 << 28;
 pub struct Dwt {
     /// DEMCR.TRCENA.
     enabled: bool,
-    /// A write (offset, value, cycle) that counts if TRCENA is set by now.
+    /// A write (offset, value, cycle) that is lost unless TRCENA is set.
     kept: Option<(u32, u32, u64)>,
-    /// CYCCNT when it is stopped; else CYCCNT minus the cycle of HCLK.
+    /// While the counter is stopped, the value of CYCCNT; else CYCCNT minus the number of the HCLK cycle.
     count: u32,
+    /// CTRL.CYCCNTENA.
     running: bool,
 }
 
 impl Dwt {
-    /// Whether DEMCR has to be looked at after the instruction under way.
+    /// Whether [`look`](Self::look) must be called after this instruction.
     #[must_use]
     pub fn awaits_look(&self) -> bool {
         self.kept.is_some()
     }
 
-    /// Whether DEMCR means anything to it.
+    /// Whether a change of DEMCR has an effect.
     #[must_use]
     pub fn in_use(&self) -> bool {
         self.running || self.kept.is_some()
     }
 
-    /// DEMCR.TRCENA is `enabled` in HCLK cycle `cycle`. The counter stops without it, and keeps its count.
+    /// Takes over DEMCR.TRCENA as `enabled` in HCLK cycle `cycle`. While it is clear, the counter is stopped and keeps
+    /// its value.
     ///
     /// # Errors
     ///
@@ -74,7 +76,7 @@ impl Dwt {
     ///
     /// # Errors
     ///
-    /// [`Unmodelled`] for any other than CTRL and CYCCNT.
+    /// [`Unmodelled`] for any register other than CTRL and CYCCNT.
     pub fn read(&self, offset: u32, cycle: u64) -> Result<u32, Unmodelled> {
         if !self.enabled {
             return Ok(0);
@@ -83,7 +85,7 @@ impl Dwt {
             0 => Ok(CTRL_NUMCOMP | u32::from(self.running)),
             4 if self.running => Ok(self.count.wrapping_add(cycle as u32)),
             4 => Ok(self.count),
-            _ => Err(Unmodelled("DWT beyond the cycle counter")),
+            _ => Err(Unmodelled("a register of DWT other than CTRL and CYCCNT")),
         }
     }
 
@@ -91,7 +93,7 @@ impl Dwt {
     ///
     /// # Errors
     ///
-    /// [`Unmodelled`] for any other than CTRL's CYCCNTENA and CYCCNT.
+    /// [`Unmodelled`] for any register other than CYCCNT, and for any bit of CTRL other than CYCCNTENA.
     pub fn write(&mut self, offset: u32, value: u32, cycle: u64) -> Result<(), Unmodelled> {
         if !self.enabled {
             self.kept = Some((offset, value, cycle));
@@ -108,12 +110,12 @@ impl Dwt {
                 }
                 self.running = run;
                 if value & !(CTRL_CYCCNTENA | CTRL_NUMCOMP) != 0 {
-                    return Err(Unmodelled("DWT_CTRL beyond CYCCNTENA"));
+                    return Err(Unmodelled("a bit of DWT_CTRL other than CYCCNTENA"));
                 }
             }
             4 if self.running => self.count = value.wrapping_sub(cycle),
             4 => self.count = value,
-            _ => return Err(Unmodelled("DWT beyond the cycle counter")),
+            _ => return Err(Unmodelled("a register of DWT other than CTRL and CYCCNT")),
         }
         Ok(())
     }
@@ -124,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_counts_only_while_enabled() {
+    fn cyccnt_counts_only_while_cyccntena_is_set() {
         let mut dwt = Dwt::default();
         dwt.set_enabled(true, 0);
         dwt.write(4, 5, 100).unwrap();
@@ -136,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn without_trcena_it_takes_no_write_reads_0_and_does_not_count() {
+    fn without_trcena_writes_are_lost_reads_return_0_and_nothing_counts() {
         let mut dwt = Dwt::default();
         dwt.write(0, 1, 0).unwrap();
         assert!(dwt.look(false, 1).is_err());
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn write_right_after_trcena_counts_from_its_own_cycle() {
+    fn counter_started_directly_after_trcena_counts_from_the_cycle_of_the_write() {
         let mut dwt = Dwt::default();
         dwt.write(0, 1, 100).unwrap();
         assert!(dwt.awaits_look());

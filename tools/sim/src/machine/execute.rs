@@ -1,4 +1,4 @@
-//! Lets the core execute: a segment of code at a time, each with its cost.
+//! Executes code on the core, one segment at a time, and charges the cycles that the segment takes.
 
 use rigless::emulator::Exit;
 use rigless::soc::Width;
@@ -13,17 +13,17 @@ use crate::time::Time;
 /// The vector table's offset (PM0056 4.4.4).
 const VTOR: u64 = 0xE000_ED08;
 
-/// The exception being handled.
+/// The active exception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Active {
-    /// Its number, 0 for none.
+    /// Number of the exception, 0 for none.
     number: u32,
-    /// Where its handler starts.
+    /// Address of the handler.
     handler: u32,
 }
 
 impl<C: Circuit> Machine<C> {
-    /// Lets the core run until something has to happen.
+    /// Lets the core run until the next event or limit, or until the core has to be looked at.
     pub(super) fn execute(&mut self, limit: Limit) -> Exit {
         let stop = limit
             .time
@@ -31,8 +31,8 @@ impl<C: Circuit> Machine<C> {
             .min(self.poll_at);
         let most = limit.instructions - self.counted;
         self.bus.stop = (stop, most);
-        // Code in flash that runs on from the prefetch buffer beside a flash operation is looked at after every
-        // instruction: then it stalls. So is the NMI's handler, whose line is tested when it returns.
+        // Stop after every instruction of code in flash during a flash operation: such code runs on from the prefetch
+        // buffer until it stalls. Do the same in the NMI's handler, because its line is tested when it returns.
         self.stirred = false;
         let busy = self.bus.soc.flash.busy_until().is_some();
         self.bus.busy = busy;
@@ -71,7 +71,7 @@ impl<C: Circuit> Machine<C> {
                 self.unsettled = true;
                 return exit;
             }
-            // Code in SRAM that comes back to flash stalls there.
+            // Code in SRAM that returns to flash stalls there.
             let stalls = busy && self.is_flash(pc);
             if self.bus.halt || stalls || !self.bus.queued.is_empty() || count >= most {
                 return exit;
@@ -85,8 +85,8 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Lets the core enter an exception that is pending, without an instruction, so that the entry has its own
-    /// cost. `None` when there is none.
+    /// Lets the core enter a pending exception without executing an instruction, so that the entry is charged
+    /// separately. Returns `None` when no exception is entered and the core can run.
     fn enter_exception(&mut self) -> Option<Exit> {
         if !core::mem::take(&mut self.unsettled) && self.bus.queued.is_empty() {
             return None;
@@ -101,7 +101,8 @@ impl<C: Circuit> Machine<C> {
         (exit != Exit::Budget).then_some(exit)
     }
 
-    /// After the `count`th instruction the core executes the segment of code at `pc`; none outside the memories.
+    /// Selects the segment at `pc`, which the core executes after instruction number `count`. Outside the memories the
+    /// segment is empty.
     fn follow(&mut self, count: u64, pc: u32) {
         let bus = &mut self.bus;
         let flash = bus.flash_offset(pc);
@@ -119,7 +120,8 @@ impl<C: Circuit> Machine<C> {
             .follow(count, bus.segments.at(place, code, changes));
     }
 
-    /// Charges what the end of a segment costs by where it has led to, which is `pc`; `after` is the address after it.
+    /// Charges the cycles of a segment's last instruction that depend on where it has led. The next instruction is at
+    /// `pc`; `after` is the address after the segment.
     fn charge_end(&mut self, end: End, after: u32, pc: u32) {
         self.sequential = (pc == after).then_some(pc);
         let pace = *self.bus.segments.pace();
@@ -154,7 +156,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Whether a branch to `pc` was the end of the exception being handled.
+    /// Returns whether a branch to `pc` has ended the active exception.
     fn leave(&mut self, pc: u32) -> Left {
         let was = self.active;
         let number = self.exception();
@@ -173,12 +175,12 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// The number of the exception being handled.
+    /// Returns the number of the active exception.
     fn exception(&self) -> u32 {
         self.register(XPSR).unwrap_or_default() & IPSR
     }
 
-    /// Records a change of the exception being handled.
+    /// Records a change of the active exception.
     fn note_active(&mut self) {
         let number = self.exception();
         let now = VirtualNanos(self.cycles());
@@ -201,12 +203,12 @@ impl<C: Circuit> Machine<C> {
     }
 }
 
-/// Effect of a branch on the exception being handled.
+/// Effect of a branch on the active exception.
 enum Left {
     /// None: the branch stays within the handler.
     Not,
     /// The branch returned from the exception.
     Return,
-    /// Another one, or the same again, follows at once.
+    /// Another exception, or the same one again, follows immediately.
     TailChain,
 }

@@ -1,8 +1,8 @@
-//! The run loop: from event to event, in exact order.
+//! The run loop, which executes instructions and events in the order of their times.
 //!
-//! The core runs up to the next event of a block, of its SysTick, or a limit, and
-//! stops there; then the event happens, then the core goes on. While it waits (WFI), stalls on the flash or is
-//! held in reset, time jumps from event to event.
+//! The core runs up to the next event of a peripheral, of its SysTick, or up to a limit. The event is then handled
+//! and the core runs on. While the core waits (WFI), stalls on the flash or is held in reset, time jumps from event
+//! to event.
 
 use rigless::emulator::Exit;
 use rigless::soc::Width;
@@ -18,35 +18,36 @@ use crate::rtt::POLL;
 use crate::soc::Circuit;
 use crate::time::Time;
 
-/// The system control register and its bit that asks for more than sleep (PM0056 4.4.6).
+/// The system control register and its bit that selects deep sleep, stop or standby (PM0056 4.4.6).
 const SCR: u64 = 0xE000_ED10;
 const SCR_SLEEPDEEP: u64 = 1 << 2;
 
-/// The register that enables DWT, and its bit for that (ARMv7-M ARM, DDI 0403E C1.6.5).
+/// The register with the bit that enables DWT (ARMv7-M ARM, DDI 0403E C1.6.5).
 const DEMCR: u64 = 0xE000_EDFC;
 const TRCENA: u64 = 1 << 24;
 
-/// The register that pends the NMI, and its bit (PM0056 4.4.3): a debugger's way to the core's NMI line.
+/// The register with the bit that pends the NMI (PM0056 4.4.3). A debugger can reach the core's NMI only through it.
 const ICSR: u64 = 0xE000_ED04;
 const NMIPENDSET: u64 = 1 << 31;
-/// xPSR by its number, its field with the exception being handled, and the NMI's number (PM0056 2.1.3).
+/// The number of the register xPSR, its field with the number of the active exception, and the NMI's exception number
+/// (PM0056 2.1.3).
 pub(super) const XPSR: usize = 16;
 pub(super) const IPSR: u32 = 0x1FF;
 const NMI: u32 = 2;
 
-/// A run by a count of instructions ends when the core has done none for this long.
+/// A run without a limit in time ends when the core has executed no instruction for this long.
 const GIVE_UP: Time = Time::from_secs(60);
 
-/// When a run is to end, whichever comes first.
+/// Conditions that end a run; the first that occurs ends it.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit {
     /// At this instant.
     pub time: Time,
-    /// When this many instructions are done, counted since the machine was made.
+    /// After this number of instructions, counted since the machine was created.
     pub instructions: u64,
     /// Before the instruction at this address.
     pub pc: Option<u32>,
-    /// Before an instruction with a debugger's breakpoint on it.
+    /// Before an instruction at which a debugger has set a breakpoint.
     pub breakpoints: bool,
 }
 
@@ -59,17 +60,18 @@ pub enum Stop {
     Instructions,
     /// The instruction at the address is next.
     Pc,
-    /// The power is off, or the core has done nothing for a minute, in a run without an instant to end at.
+    /// The power is off, or the core has executed nothing for a minute, in a run without a limit in time.
     Stuck,
 }
 
 impl<C: Circuit> Machine<C> {
-    /// Runs to `limit`. With the power off, time passes for the circuit around the part.
+    /// Runs up to `limit`. While the power is off, time passes for the circuit around the part.
     pub fn run(&mut self, limit: Limit) -> Stop {
         let address = limit.pc.map(|pc| u64::from(pc & !1));
         if let Some(address) = address {
             self.core.add_breakpoint(address);
-            // Not when an interrupt's entry leads there first.
+            // The breakpoint is passed when the core is at the address now, but not when an interrupt comes first and
+            // returns there.
             if self.core.pc() == address {
                 self.core.pass_breakpoint(address);
             }
@@ -132,7 +134,7 @@ impl<C: Circuit> Machine<C> {
                     let (now, pc) = (self.now(), self.pc());
                     self.bus.findings.add(now, pc, What::LockedUp);
                 }
-                // No host serves semihosting: BKPT is then a fault, as on a board without a debugger.
+                // Semihosting is not modelled, so BKPT is a fault, as on a board without a debugger.
                 Exit::HostCall => self.core.answer_host_call(None),
                 _ => {}
             }
@@ -140,7 +142,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Passes on to DWT whether DEMCR.TRCENA is set.
+    /// Tells DWT whether DEMCR.TRCENA is set.
     fn look_at_trace(&mut self) {
         if self.bus.dwt.in_use() {
             let cycle = self.cycles();
@@ -155,7 +157,8 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Sleep alone is modelled: stop and standby (RM0008 4.3.4, 4.3.5) would halt the clocks too.
+    /// Reports a finding when the core enters stop or standby mode, which are not modelled: both also stop the clocks
+    /// (RM0008 4.3.4, 4.3.5).
     fn check_sleep(&mut self) {
         let now = VirtualNanos(self.bus.clock.cycle(self.core.retired()));
         let scr = self.core.debugger_access(None, SCR, Width::W32, now);
@@ -165,8 +168,9 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Lets time pass without an instruction up to `end`, or less when something happens before. False when
-    /// that is never, or when patience has run out in a run without an instant to end at.
+    /// Lets time pass without an instruction up to `end`, the next event, or the limit, whichever is first. Returns
+    /// whether time has passed: not when nothing will ever happen, or not before `patience` in a run without a limit
+    /// in time.
     fn idle(&mut self, end: Time, why: Rest, limit: Limit, patience: Time) -> bool {
         let until = end.min(self.next_event()).min(limit.time);
         if until == Time::MAX || (limit.time == Time::MAX && until > patience) {
@@ -180,7 +184,7 @@ impl<C: Circuit> Machine<C> {
         true
     }
 
-    /// The core waits: behind a WFI or WFE, or in a branch to itself, which it takes for a wait.
+    /// Returns why the core waits: after WFI or WFE, or in a branch to itself, which the emulated core treats as a wait.
     fn why_waiting(&self) -> Rest {
         const BRANCH: u16 = 0xE7FE;
         const WIDE_BRANCH: [u16; 2] = [0xF7FF, 0xBFFE];
@@ -196,7 +200,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// The half-word of code at `address`.
+    /// Returns the half-word of code at `address`.
     fn half(&self, address: u32) -> Option<u16> {
         let (bytes, at) = match self.bus.flash_offset(address) {
             Some(at) => (self.bus.soc.flash.bytes(), at),
@@ -206,12 +210,13 @@ impl<C: Circuit> Machine<C> {
         Some(u16::from_le_bytes(*half))
     }
 
-    /// Whether an instruction at `pc` is fetched from flash.
+    /// Returns whether an instruction at `pc` is fetched from flash.
     pub(super) fn is_flash(&self, pc: u32) -> bool {
         self.bus.flash_offset(pc).is_some()
     }
 
-    /// Looks at what is pending, for the measurement of waits. The core gets the state of its lines first.
+    /// Looks at the pending interrupts, to measure how long they wait. The queued changes of interrupt lines reach the
+    /// core first.
     fn look_at_waits(&mut self, now: Time) {
         if self.bus.waits.is_none() || !self.powered {
             return;
@@ -226,7 +231,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// The earliest instant at which anything but an instruction happens; [`Time::MAX`] for never.
+    /// Returns the earliest time of an event other than an instruction, or [`Time::MAX`] for never.
     pub(super) fn next_event(&self) -> Time {
         let timer = self.core.next_event().filter(|_| self.powered);
         let timer = timer.map_or(Time::MAX, |VirtualNanos(cycle)| {
@@ -239,8 +244,8 @@ impl<C: Circuit> Machine<C> {
             .min(self.cut_at.unwrap_or(Time::MAX))
     }
 
-    /// The earliest instant at which the core may execute an instruction, by what is known now; [`Time::MAX`] for
-    /// never.
+    /// Returns the earliest time at which the core may execute an instruction, unless something outside the machine
+    /// changes before; [`Time::MAX`] for never.
     pub fn next_instruction(&self) -> Time {
         let now = self.now();
         let event = self.next_event();
@@ -255,8 +260,8 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Until when the core does nothing for sure: no power, no clock, held in reset, locked up, stalled by the
-    /// flash.
+    /// Returns until when the core cannot execute an instruction, and why: no power, no clock, held in reset, locked up,
+    /// or stalled by the flash.
     fn idle_end(&self, now: Time) -> Option<(Time, Rest)> {
         if !self.powered || self.locked_up || self.bus.soc.rcc.stopped() {
             return Some((Time::MAX, Rest::Off));
@@ -279,7 +284,7 @@ impl<C: Circuit> Machine<C> {
             .map(|end| (end, Rest::Stalled))
     }
 
-    /// SysTick reaches zero in a cycle of HCLK that has come.
+    /// Delivers the events of SysTick that are due.
     fn serve_core_timer(&mut self, now: Time) {
         while let Some(VirtualNanos(cycle)) = self.core.next_event() {
             if !self.powered || self.bus.clock.time_of_cycle(cycle) > now {
@@ -294,8 +299,8 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// The NMI's line is high until CSSC is written (RM0008 7.2.7): a handler that leaves it so is entered
-    /// again. It gets even a core out that is locked up in its hard fault handler.
+    /// Enters the NMI's handler while its line is high, which it is until CSSC is written (RM0008 7.2.7). A handler that
+    /// returns without writing CSSC is entered again. The NMI also ends a lock-up in the hard fault handler.
     fn serve_nmi(&mut self) {
         if !self.bus.soc.rcc.nmi() {
             return;
@@ -310,7 +315,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Makes the reset that a block or the core asks for.
+    /// Performs a reset that a peripheral or the core has requested. Returns whether there was one.
     fn serve_resets(&mut self) -> bool {
         let asked = self.core.take_reset_request().then_some(Cause::Software);
         let cause = self.bus.soc.signals.reset.take().or(asked);
@@ -320,7 +325,7 @@ impl<C: Circuit> Machine<C> {
         cause.is_some()
     }
 
-    /// Whether the power is to go now, in the middle of a flash operation.
+    /// Returns whether a power cut in the middle of a flash operation is due now.
     fn cut_is_due(&mut self, now: Time) -> bool {
         if let Some(cut) = self.cut
             && let Some((from, until)) = self.bus.soc.flash.busy_span()

@@ -1,7 +1,7 @@
-//! A stretch of code without a branch in it, and what its instructions cost.
+//! Segments: code without a branch in it, and the cycles that its instructions take.
 //!
-//! The core runs a segment at a time: up to an instruction that may branch, change what interrupts are masked, or
-//! wait. Whether a branch was taken is seen afterwards, by where the core is.
+//! The core runs one segment at a time, up to an instruction that may branch, mask interrupts, or wait. The address of
+//! the core afterwards shows whether a branch was taken.
 
 mod made;
 
@@ -13,40 +13,41 @@ use super::costs::Pace;
 pub use super::decode::End;
 use super::decode::{Class, decode};
 
-/// The most instructions of a segment.
+/// Largest number of instructions in a segment.
 const MOST: usize = 24;
-/// Bytes that the flash reads together (PM0075), and that the core fetches from SRAM together.
+/// Number of bytes that one read of the flash returns (PM0075), and that one fetch from SRAM returns.
 const LINE: u32 = 8;
 const WORD: u32 = 4;
 
-/// Where a segment starts.
+/// Start of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Place {
-    /// The address of its first instruction.
+    /// Address of the first instruction.
     pub start: u32,
-    /// In flash, or else in SRAM.
+    /// Whether the address is in flash; otherwise it is in SRAM.
     pub in_flash: bool,
-    /// A branch has led there, whose cost contains the fetch.
+    /// Whether a branch has led there. The branch's cost contains the first fetch.
     pub branched: bool,
 }
 
-/// A segment of code with the cycles its instructions take.
+/// A segment of code, with the cycles that its instructions take.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// Where it starts, and how many bytes it was made from.
+    /// Address of the first instruction.
     start: u32,
+    /// Length in bytes.
     size: u8,
-    /// Instructions.
+    /// Number of instructions.
     length: u8,
-    /// How it ends.
+    /// How the segment ends.
     pub end: End,
-    /// Cycles when as many instructions have ended, and where the next one is, from the start.
+    /// Cycles after N instructions, and the offset of the next instruction from the start, by N.
     costs: [u16; MOST + 1],
     offsets: [u8; MOST + 1],
 }
 
 impl Segment {
-    /// No code: an instruction that is counted nevertheless takes a cycle.
+    /// A segment without code. Instructions that are executed nevertheless take one cycle each.
     pub const EMPTY: Self = Self {
         start: 0,
         size: 0,
@@ -56,7 +57,7 @@ impl Segment {
         offsets: [0; MOST + 1],
     };
 
-    /// The segment at `place`, whose bytes are `code`.
+    /// Returns the segment that starts at `place`. `code` begins with its bytes.
     #[must_use]
     pub fn new(place: Place, code: &[u8], pace: &Pace) -> Self {
         let Place {
@@ -93,7 +94,7 @@ impl Segment {
         segment
     }
 
-    /// A segment of instructions that take so many cycles each.
+    /// Returns a segment whose instructions take these numbers of cycles.
     #[cfg(test)]
     pub fn of_costs(costs: &[u16]) -> Self {
         let mut segment = Self::EMPTY;
@@ -105,28 +106,28 @@ impl Segment {
         segment
     }
 
-    /// Whether the segment has an instruction after its first `n`, and this instruction is at `pc`.
+    /// Returns whether the segment has an instruction after its first `n`, and this instruction is at `pc`.
     #[inline]
     #[must_use]
     pub fn goes_on(&self, n: u64, pc: u32) -> bool {
         n < self.length() && self.start + u32::from(self.offsets[n as usize]) == pc
     }
 
-    /// Instructions in it.
+    /// Returns the number of instructions.
     #[inline]
     #[must_use]
     pub fn length(&self) -> u64 {
         u64::from(self.length)
     }
 
-    /// The address after its last instruction.
+    /// Returns the address after the last instruction.
     #[inline]
     #[must_use]
     pub fn after(&self) -> u32 {
         self.start + u32::from(self.size)
     }
 
-    /// The cycles of its first `n` instructions; beyond its end one each.
+    /// Returns the cycles of the first `n` instructions. Instructions after the segment's end take one cycle each.
     #[inline]
     #[must_use]
     pub fn cycles(&self, n: u64) -> u64 {
@@ -134,7 +135,7 @@ impl Segment {
         u64::from(self.costs[(n - beyond) as usize]) + beyond
     }
 
-    /// The least number of its instructions that take `cycles` or more; all of them when that is not enough.
+    /// Returns the smallest number of instructions that take at least `cycles`, or all when they take less.
     #[inline]
     #[must_use]
     pub fn reaches(&self, cycles: u64) -> u64 {
@@ -147,20 +148,21 @@ impl Segment {
     }
 }
 
-/// The fetches of code in sequence.
+/// State of the fetches while code runs in sequence.
 struct Fetch {
     in_flash: bool,
-    /// The line or word fetched last, and the cycle in which its first instruction began.
+    /// Number of the line or word that was fetched last, and the cycle in which its first instruction began.
     unit: u32,
     since: i32,
-    /// The first unit of a segment that begins at the unit's start follows another one in sequence.
+    /// Whether the segment begins at the start of a line or word and follows another segment in sequence, so that its
+    /// first fetch is still to be charged.
     fresh: bool,
 }
 
 impl Fetch {
     fn new(place: Place) -> Self {
         let size = if place.in_flash { LINE } else { WORD };
-        // Of a line entered before, each half-word has taken a cycle.
+        // When the segment before has entered this line, each half-word before the start has taken a cycle.
         let before = if place.branched {
             0
         } else {
@@ -174,7 +176,7 @@ impl Fetch {
         }
     }
 
-    /// How long the core waits for an instruction of `size` bytes at `address`, in cycle `cycle`.
+    /// Returns how many cycles the core waits for an instruction of `size` bytes at `address`, in cycle `cycle`.
     fn wait(&mut self, address: u32, size: u32, cycle: u32, pace: &Pace) -> u32 {
         let unit = if self.in_flash { LINE } else { WORD };
         let last = (address + size - 1) / unit;
@@ -190,13 +192,13 @@ impl Fetch {
             return entered * pace.costs.sram_fetch;
         }
         if !pace.prefetch {
-            // Each word of a line is read on its own.
+            // Without prefetch, the core reads each word of a line separately.
             return entered * (LINE / WORD) * pace.wait_states;
         }
         let overlapped = if !pace.costs.overlapped_fetch {
             0
         } else if first {
-            // The segment before this one covered it.
+            // The wait has passed during the segment before.
             pace.wait_states
         } else {
             spent.saturating_sub(1)
@@ -207,7 +209,7 @@ impl Fetch {
     }
 }
 
-/// What an instruction costs, its fetch aside. A branch counts as not taken.
+/// Returns the cycles of an instruction, without its fetch. A branch is counted as not taken.
 fn cost(class: Class, after_access: bool, in_flash: bool, pace: &Pace) -> u32 {
     let costs = &pace.costs;
     let shared = if in_flash { 0 } else { costs.shared_bus };
@@ -216,7 +218,7 @@ fn cost(class: Class, after_access: bool, in_flash: bool, pace: &Pace) -> u32 {
     } else {
         costs.load
     };
-    // Reads of flash that the bus charges are not charged here.
+    // Do not charge reads of the flash here when the bus charges them.
     let constant = if in_flash && !costs.charges_tables {
         pace.flash_read()
     } else {
@@ -239,28 +241,28 @@ fn cost(class: Class, after_access: bool, in_flash: bool, pace: &Pace) -> u32 {
     }
 }
 
-/// The segments made so far, by where they start.
+/// A machine's segments, by start address.
 #[derive(Debug)]
 pub struct Segments {
     pace: Pace,
     kept: Vec<Kept>,
 }
 
-/// A segment, and what a lookup needs. It is small, because every machine has its table of these.
+/// A segment, and the values that a lookup compares. This type is small because every machine has a table of them.
 #[derive(Clone, Debug, Default)]
 struct Kept {
     start: u32,
     branched: bool,
-    /// The memory's count of changes when the code was last the same, if it counts them.
+    /// Value of the memory's counter of changes when the code was last compared, if the memory has such a counter.
     changes: Option<NonZero<u64>>,
     made: Option<Arc<Made>>,
 }
 
 impl Segments {
-    /// Places for segments: a power of two.
+    /// Size of the table, a power of two.
     const PLACES: usize = 1 << 14;
 
-    /// None, for a core with these costs.
+    /// Returns an empty table for a core with these costs.
     #[must_use]
     pub fn new(pace: Pace) -> Self {
         Self {
@@ -269,14 +271,14 @@ impl Segments {
         }
     }
 
-    /// What code costs now.
+    /// Returns the current costs of code.
     #[inline]
     #[must_use]
     pub fn pace(&self) -> &Pace {
         &self.pace
     }
 
-    /// FLASH_ACR holds these now.
+    /// Sets the wait states and the prefetch that FLASH_ACR selects. When they change, all segments are dropped.
     pub fn set_flash(&mut self, wait_states: u32, prefetch: bool) {
         let pace = Pace {
             wait_states,
@@ -288,7 +290,8 @@ impl Segments {
         }
     }
 
-    /// The segment at `place`, whose bytes are `code`. They are the same as long as `changes` is.
+    /// Returns the segment that starts at `place`; `code` begins with its bytes. While `changes` has the same value, the
+    /// bytes are the same.
     #[inline]
     pub fn at(&mut self, place: Place, code: &[u8], changes: Option<NonZero<u64>>) -> &Segment {
         let index = (place.start | u32::from(place.branched)) as usize % Self::PLACES;

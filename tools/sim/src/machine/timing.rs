@@ -1,12 +1,13 @@
-//! The core's clock: from a count of instructions to cycles of HCLK and to the virtual time.
+//! The core's clock: converts a number of instructions into cycles of HCLK and into virtual time.
 //!
-//! What an instruction costs is in [`costs`](super::costs); how the costs of a stretch of code add up is in
-//! [`segment`](super::segment).
+//! The costs of an instruction are in [`costs`](super::costs). [`segment`](super::segment) adds the costs of several
+//! instructions.
 
 use super::segment::Segment;
 use crate::time::Time;
 
-/// The highest SYSCLK in Hz that `wait_states` are enough for (RM0008 3.3.3), the crystal's tolerance included.
+/// Returns the highest SYSCLK in Hz that is allowed with this number of wait states (RM0008 3.3.3), with the tolerance
+/// of the crystal.
 #[must_use]
 pub const fn highest_sysclk(wait_states: u32) -> u32 {
     match wait_states {
@@ -16,27 +17,28 @@ pub const fn highest_sysclk(wait_states: u32) -> u32 {
     }
 }
 
-/// Turns a count of instructions into the virtual time and into cycles of HCLK.
+/// Converts a number of instructions into virtual time and into cycles of HCLK.
 ///
-/// Cycles are counted from an anchor, the last instant at which time jumped or the rate changed, and time is
-/// worked out from the anchor in whole numbers, so it does not drift.
+/// An anchor is the last instant at which time jumped or the rate changed. Cycles are counted from the anchor, and time
+/// is computed from the cycles in whole numbers, so rounding errors do not add up.
 #[derive(Clone, Copy, Debug)]
 pub struct InstructionClock {
     hclk: u32,
-    /// Picoseconds of a cycle.
+    /// Picoseconds in a cycle.
     hclk_cycle: Ratio,
-    /// The anchor: this instant, in this cycle.
+    /// The anchor: an instant and its cycle.
     at: (Time, u64),
-    /// This many instructions had ended in this cycle, and the code that follows them.
+    /// Number of instructions that had ended in `cycle`.
     count: u64,
     cycle: u64,
+    /// The instructions after these.
     segment: Segment,
-    /// Since when HCLK runs at this rate: an instant and its cycle.
+    /// Instant and cycle since which HCLK has the present rate.
     since: (Time, u64),
 }
 
 impl InstructionClock {
-    /// A clock that starts at `at` with no instruction done.
+    /// A clock that starts at `at`, before the first instruction.
     #[must_use]
     pub fn new(at: Time, hclk: u32) -> Self {
         let mut clock = Self {
@@ -52,7 +54,7 @@ impl InstructionClock {
         clock
     }
 
-    /// When the `count`th instruction ends.
+    /// Instant at which the `count`th instruction ends.
     #[inline]
     #[must_use]
     pub fn time(&self, count: u64) -> Time {
@@ -60,14 +62,14 @@ impl InstructionClock {
         at + Time::from_ps(self.hclk_cycle.times(self.cycle(count) - base))
     }
 
-    /// The cycle of HCLK in which the `count`th instruction ends.
+    /// Cycle of HCLK in which the `count`th instruction ends.
     #[inline]
     #[must_use]
     pub fn cycle(&self, count: u64) -> u64 {
         self.cycle + self.segment.cycles(count - self.count)
     }
 
-    /// When cycle `cycle` of HCLK begins, at the present rate.
+    /// Instant at which cycle `cycle` of HCLK begins, at the present rate.
     #[inline]
     #[must_use]
     pub fn time_of_cycle(&self, cycle: u64) -> Time {
@@ -78,7 +80,7 @@ impl InstructionClock {
         at + Time::from_ps(self.hclk_cycle.times(cycle.saturating_sub(base)))
     }
 
-    /// After the `count`th instruction the core executes `segment`.
+    /// Sets the instructions that the core executes after the `count`th.
     #[inline]
     pub fn follow(&mut self, count: u64, segment: &Segment) {
         self.cycle = self.cycle(count);
@@ -86,14 +88,14 @@ impl InstructionClock {
         self.segment = *segment;
     }
 
-    /// Whether the instruction after the `count`th belongs to the code that is followed, and is at `pc`.
+    /// Whether the instruction after the `count`th is in the present segment, at the address `pc`.
     #[inline]
     #[must_use]
     pub fn goes_on(&self, count: u64, pc: u32) -> bool {
         self.segment.goes_on(count - self.count, pc)
     }
 
-    /// The code that is followed, when it has ended with the `count`th instruction.
+    /// Returns the present segment if its last instruction is the `count`th or an earlier one.
     #[inline]
     #[must_use]
     pub fn ended(&self, count: u64) -> Option<&Segment> {
@@ -101,7 +103,7 @@ impl InstructionClock {
         (length > 0 && count - self.count >= length).then_some(&self.segment)
     }
 
-    /// The first cycle that does not end before `until`, while time does not jump and the rate stays.
+    /// The first cycle that ends at `until` or later, if time does not jump and the rate stays the same until then.
     #[must_use]
     pub fn cycle_at(&self, until: Time) -> u64 {
         let (at, base) = self.at;
@@ -110,8 +112,8 @@ impl InstructionClock {
         })
     }
 
-    /// How many instructions after the `count`th, but not beyond the code that is followed, the first one ends
-    /// in cycle `last` or later: 0 when the `count`th does.
+    /// Number of instructions after the `count`th until one ends in cycle `last` or later: 0 if the `count`th does. The
+    /// number does not reach beyond the end of the present segment.
     #[must_use]
     pub fn instructions_to(&self, count: u64, last: u64) -> u64 {
         let done = count - self.count;
@@ -119,19 +121,20 @@ impl InstructionClock {
         reached.saturating_sub(done)
     }
 
-    /// The same for the first one that ends at `until` or later.
+    /// Number of instructions after the `count`th until one ends at `until` or later, as
+    /// [`instructions_to`](Self::instructions_to).
     #[must_use]
     pub fn instructions_until(&self, count: u64, until: Time) -> u64 {
         self.instructions_to(count, self.cycle_at(until))
     }
 
-    /// The core stands still for `cycles` of HCLK, or the instruction under way takes as many more.
+    /// Adds `cycles` of HCLK: the core is stopped for them, or its present instruction takes them in addition.
     #[inline]
     pub fn charge(&mut self, cycles: u32) {
         self.cycle += u64::from(cycles);
     }
 
-    /// Nothing was executed up to `until`, after the `count`th instruction: the core waited or stalled.
+    /// Lets time jump to `until` after the `count`th instruction, because the core slept or stalled.
     pub fn jump(&mut self, count: u64, until: Time) {
         let until = until.max(self.time(count));
         let (at, base) = self.since;
@@ -142,20 +145,20 @@ impl InstructionClock {
         self.anchor(count, until, cycle);
     }
 
-    /// The core's own timer has reached `cycle`: no instruction sees an earlier one.
+    /// Lets the clock jump to `cycle`, if this is later, because the core's own timer has already reached it.
     pub fn reach_cycle(&mut self, count: u64, cycle: u64) {
         let now = self.time(count);
         self.anchor(count, now, cycle.max(self.cycle(count)));
     }
 
-    /// The core was reset: it counts its instructions from 0 again.
+    /// Restarts the count of instructions at 0 after the `count`th, because the core was reset.
     pub fn restart_count(&mut self, count: u64) {
         self.jump(count, self.time(count));
         self.count = 0;
     }
 
-    /// From the `count`th instruction on HCLK runs at `hclk` Hz. The code followed keeps its costs. At 0 Hz no
-    /// cycle comes; no instruction may be counted then.
+    /// Sets the rate of HCLK to `hclk` Hz after the `count`th instruction. The present segment keeps its costs. At 0 Hz
+    /// no cycle begins, and no instruction may be counted.
     pub fn set_rate(&mut self, count: u64, hclk: u32) {
         let (now, cycle) = (self.time(count), self.cycle(count));
         self.at = (now, cycle);
@@ -173,8 +176,8 @@ impl InstructionClock {
 
 const PS_PER_S: u64 = 1_000_000_000_000;
 
-/// Picoseconds of something that happens again and again: a reduced fraction, so that the products below fit
-/// 64 bits for days; beyond that they take 128.
+/// Duration of a period in picoseconds, as a reduced fraction. The products below fit into 64 bits for times of several
+/// days; for longer times they are computed with 128 bits.
 #[derive(Clone, Copy, Debug)]
 struct Ratio {
     num: u64,
@@ -190,7 +193,7 @@ impl Ratio {
         }
     }
 
-    /// When the `n`th has ended: floor(n * num / den).
+    /// Duration of `n` periods: floor(n * num / den).
     const fn times(self, n: u64) -> u64 {
         match n.checked_mul(self.num) {
             Some(product) => product / self.den,
@@ -198,7 +201,7 @@ impl Ratio {
         }
     }
 
-    /// The least n with `times(n) >= ps`: ceil(ps * den / num).
+    /// The smallest n with `times(n) >= ps`: ceil(ps * den / num).
     fn least(self, ps: u64) -> u64 {
         match ps.checked_mul(self.den) {
             Some(product) => product.div_ceil(self.num),
@@ -209,7 +212,7 @@ impl Ratio {
         }
     }
 
-    /// The greatest n with `times(n) <= ps`: one less than the least that is above.
+    /// The largest n with `times(n) <= ps`: one less than the smallest n above it.
     fn whole(self, ps: u64) -> u64 {
         self.least(ps.saturating_add(1)) - 1
     }
@@ -231,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn cycles_take_their_share_exactly_for_hours() {
+    fn time_of_a_cycle_is_exact_after_hours() {
         let mut clock = InstructionClock::new(Time::ZERO, 72_000_000);
         let segment = every_cycle();
         let mut count = 0;
@@ -246,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn the_number_of_instructions_until_an_instant_is_the_smallest() {
+    fn instructions_until_returns_the_smallest_number() {
         for hclk in [72_000_000, 8_000_000, 64_000_000] {
             let mut clock = InstructionClock::new(Time::from_us(7), hclk);
             clock.follow(0, &every_cycle());
@@ -261,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_charge_moves_what_follows() {
+    fn charge_delays_the_following_instructions() {
         let mut clock = InstructionClock::new(Time::ZERO, 1_000_000);
         clock.follow(0, &every_cycle());
         clock.charge(5);
@@ -270,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_moves_time_and_cycles_together() {
+    fn jump_moves_time_and_cycles_together() {
         let mut clock = InstructionClock::new(Time::ZERO, 72_000_000);
         clock.jump(10, Time::from_ms(30));
         assert_eq!(clock.time(10), Time::from_ms(30));

@@ -1,22 +1,22 @@
-//! Where the core's time goes: running, stalled, asleep or off.
+//! Accounts for the core's time: running, stalled, asleep or off.
 
 use crate::time::Time;
 
-/// How the core has spent the virtual time. All of it is in one of these.
+/// The virtual time of the core by its state. The sum of the fields is all of the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CoreTime {
-    /// Executing instructions, an endless loop on the spot included.
+    /// Time in which the core executed instructions, also a branch to itself.
     pub running: Time,
-    /// Waiting for a flash operation to end, to fetch the next instruction.
+    /// Time in which the core waited for the end of a flash operation, to fetch its next instruction.
     pub stalled: Time,
-    /// In WFI or WFE.
+    /// Time in WFI or WFE.
     pub asleep: Time,
-    /// Without power or clock, held in reset, or locked up.
+    /// Time without power or clock, in reset, or locked up.
     pub off: Time,
 }
 
 impl CoreTime {
-    /// What of it came after `earlier`, an earlier reading of the same board.
+    /// The times since `earlier`, an earlier reading of the same board.
     #[must_use]
     pub fn since(self, earlier: Self) -> Self {
         Self {
@@ -27,7 +27,8 @@ impl CoreTime {
         }
     }
 
-    /// The core's load: what part of the time that it was on it was not asleep, 0 to 1; 0 when it was not on.
+    /// Load of the core, 0 to 1: the share of its time that it was not asleep, without the time that it was off. 0 if
+    /// it was always off.
     #[must_use]
     pub fn load(self) -> f64 {
         let awake = self.running + self.stalled;
@@ -39,7 +40,7 @@ impl CoreTime {
     }
 }
 
-/// Why no instruction is executed.
+/// Reason why the core executes no instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rest {
     /// As [`CoreTime::stalled`].
@@ -48,16 +49,16 @@ pub(super) enum Rest {
     Asleep,
     /// As [`CoreTime::off`].
     Off,
-    /// It branches to itself, which the core skips over.
+    /// The core executes a branch to itself, which the simulator skips.
     Spinning,
 }
 
-/// The time so far without an instruction.
+/// Times so far in which the core has executed no instruction.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Resting(CoreTime);
 
 impl Resting {
-    /// `span` more of it.
+    /// Adds a time `span` without instructions.
     pub(super) fn add(&mut self, why: Rest, span: Time) {
         match why {
             Rest::Stalled => self.0.stalled += span,
@@ -67,7 +68,7 @@ impl Resting {
         }
     }
 
-    /// All of the time up to `now`.
+    /// The times of the core up to `now`.
     pub(super) fn of(self, now: Time) -> CoreTime {
         let CoreTime {
             stalled,
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_time_is_accounted_for_and_the_load_is_of_the_time_on() {
+    fn rest_of_the_time_is_running_and_load_ignores_the_time_off() {
         let mut resting = Resting::default();
         resting.add(Rest::Off, Time::from_ms(10));
         resting.add(Rest::Asleep, Time::from_ms(60));

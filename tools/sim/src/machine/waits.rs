@@ -1,11 +1,12 @@
-//! How long interrupts wait: from the instant one is pending and enabled to the entry of its handler.
+//! Measures how long interrupts wait: from the instant at which one is pending and enabled to the entry of its handler.
 //!
-//! What holds one up counts: PRIMASK, BASEPRI, a handler of the same or a higher priority, a flash operation.
-//! The cycles of the entry itself do not ([`super::costs`]).
+//! A wait includes all that delays the handler: PRIMASK, BASEPRI, a handler of the same or a higher priority, a flash
+//! operation. It does not include the cycles of the entry itself ([`super::costs`]).
 //!
-//! While this is on, the core comes back to the run loop after every access beside the memories, so that no
-//! change of the NVIC's registers is missed. An entry is seen by its read of the vector table, whose page is
-//! sent to the bus for that. The run is the same to the instruction as without, it only takes longer.
+//! During the measurement the core returns to the run loop after every access outside the memories, so that no change
+//! of the NVIC's registers is missed. An entry is detected by its read of the vector table: reads of the page with this
+//! table are passed to the bus. The core executes the same instructions as without the measurement, but the run takes
+//! longer.
 
 use rigless::emulator::{Processor, Queued};
 use rigless::soc::Width;
@@ -15,11 +16,11 @@ use crate::machine::memory::RAM_BASE;
 use crate::soc::map::irq;
 use crate::time::Time;
 
-/// Exceptions of the part: 16 of the core's, then its interrupt lines (RM0008 table 63).
+/// Number of exceptions of the part: 16 of the core, then the interrupt lines (RM0008 table 63).
 pub const EXCEPTIONS: usize = 16 + irq::LINES as usize;
-/// The core's exceptions that can be pending (PM0056 table 17).
+/// Number of the exception PendSV (PM0056 table 17).
 pub const PENDSV: usize = 14;
-/// SysTick's exception.
+/// Number of the exception SysTick (PM0056 table 17).
 pub const SYSTICK: usize = 15;
 
 /// Registers of the NVIC and the system control block (PM0056 4.3, 4.4).
@@ -30,26 +31,26 @@ const VTOR: u64 = 0xE000_ED08;
 const PENDSVSET: u64 = 1 << 28;
 const PENDSTSET: u64 = 1 << 26;
 
-/// How long one exception had to wait.
+/// The waits of an exception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wait {
-    /// Entries of its handler.
+    /// Number of times that the handler was entered.
     pub entries: u64,
     /// The longest wait.
     pub longest: Time,
-    /// When the handler was entered after the longest wait.
+    /// Instant at which the handler was entered after the longest wait.
     pub at: Time,
 }
 
 /// The measurement.
 #[derive(Debug)]
 pub(super) struct Waits {
-    /// Since when each exception is pending and enabled.
+    /// Instant since which each exception is pending and enabled.
     since: [Option<Time>; EXCEPTIONS],
     done: [Wait; EXCEPTIONS],
-    /// The vector table whose page is sent to the bus.
+    /// Address of the vector table. Accesses to its page are passed to the bus.
     table: Option<u32>,
-    /// Flash is sent to the bus anyhow.
+    /// Whether all accesses to the flash are passed to the bus, also without the measurement.
     flash_is_sent: bool,
 }
 
@@ -63,23 +64,23 @@ impl Waits {
         }
     }
 
-    /// What exception `number` had to wait so far.
+    /// The waits of exception `number` so far.
     pub(super) fn of(&self, number: usize) -> Wait {
         self.done.get(number).copied().unwrap_or_default()
     }
 
-    /// The vector table whose page is sent to the bus.
+    /// Address of the vector table whose page is passed to the bus.
     pub(super) fn table(&self) -> Option<u32> {
         self.table
     }
 
-    /// The core was reset: no exception waits any more, and the vector table has to be found again.
+    /// Restarts after a reset of the core: no exception waits any more, and the vector table is at another address.
     pub(super) fn reset(&mut self, core: &mut dyn Processor) {
         self.since = [None; EXCEPTIONS];
         self.leave(core);
     }
 
-    /// Sends nothing to the bus any more.
+    /// Stops passing accesses to the page of the vector table to the bus.
     pub(super) fn leave(&mut self, core: &mut dyn Processor) {
         let table = self.table.take();
         if let Some(table) = table.filter(|&table| !self.flash_is_sent || table >= RAM_BASE) {
@@ -87,7 +88,7 @@ impl Waits {
         }
     }
 
-    /// Looks at what is pending, between two instructions.
+    /// Reads which exceptions are pending and enabled, and where the vector table is. Called between two instructions.
     pub(super) fn look(&mut self, core: &mut dyn Processor, now: Time, cycle: u64) {
         let mut read = |address| {
             core.debugger_access(None, address, Width::W32, VirtualNanos(cycle))
@@ -113,7 +114,8 @@ impl Waits {
         }
     }
 
-    /// The core itself reads the word at `address` at `now`: the entry of a handler when it is a vector.
+    /// Handles a read of the word at `address` by the core itself. If the word is a vector, the core enters its
+    /// handler.
     pub(super) fn vector_read(&mut self, address: u32, now: Time) {
         let Some(offset) = self.table.and_then(|table| address.checked_sub(table)) else {
             return;

@@ -54,9 +54,9 @@ pub struct Iwdg {
     /// Instant from which the LSI runs; it may be in the future.
     lsi: Option<Time>,
     started: bool,
-    /// When it resets the part; `None` until it counts.
-    bites: Option<Time>,
-    bitten: bool,
+    /// Instant at which the counter reaches 0 and requests a reset; `None` until it counts.
+    reset_at: Option<Time>,
+    reset_requested: bool,
 }
 
 impl Default for Iwdg {
@@ -76,8 +76,8 @@ impl Iwdg {
             reload: Setting::new(0xFFF),
             lsi: None,
             started: false,
-            bites: None,
-            bitten: false,
+            reset_at: None,
+            reset_requested: false,
         }
     }
 
@@ -95,14 +95,14 @@ impl Iwdg {
     /// Sets the instant from which the LSI runs; `None` while it is off.
     pub fn set_lsi(&mut self, since: Option<Time>) {
         self.lsi = since;
-        if self.started && self.bites.is_none() && !self.bitten {
-            self.bites = since.map(|since| since + self.timeout());
+        if self.started && self.reset_at.is_none() && !self.reset_requested {
+            self.reset_at = since.map(|since| since + self.timeout());
         }
     }
 
-    /// Whether it has requested a reset since the last call.
-    pub fn take_bite(&mut self) -> bool {
-        core::mem::take(&mut self.bitten)
+    /// Whether the watchdog has requested a reset since the last call.
+    pub fn take_reset_request(&mut self) -> bool {
+        core::mem::take(&mut self.reset_requested)
     }
 
     /// Time from a reload to the reset (RM0008 table 96).
@@ -135,9 +135,11 @@ impl Peripheral for Iwdg {
                 match value & 0xFFFF {
                     KEY_START if !self.started => {
                         self.started = true;
-                        self.bites = self.lsi.map(|since| now.max(since) + self.timeout());
+                        self.reset_at = self.lsi.map(|since| now.max(since) + self.timeout());
                     }
-                    KEY_RELOAD if self.bites.is_some() => self.bites = Some(now + self.timeout()),
+                    KEY_RELOAD if self.reset_at.is_some() => {
+                        self.reset_at = Some(now + self.timeout());
+                    }
                     _ => {}
                 }
             }
@@ -158,15 +160,15 @@ impl Peripheral for Iwdg {
     }
 
     fn next_event(&self) -> Option<Time> {
-        self.bites
+        self.reset_at
     }
 
     fn advance(&mut self, now: Time) {
         self.prescaler.advance(self.lsi, self.hz, now);
         self.reload.advance(self.lsi, self.hz, now);
-        if self.bites.is_some_and(|at| at <= now) {
-            self.bites = None;
-            self.bitten = true;
+        if self.reset_at.is_some_and(|at| at <= now) {
+            self.reset_at = None;
+            self.reset_requested = true;
         }
     }
 
@@ -217,9 +219,9 @@ mod tests {
         );
         assert!(dog.write(8, 1, now).is_err(), "a reload closes the access");
         dog.advance(Time::from_ms(400));
-        assert!(!dog.take_bite());
+        assert!(!dog.take_reset_request());
         dog.advance(Time::from_ms(401));
-        assert!(dog.take_bite());
+        assert!(dog.take_reset_request());
     }
 
     #[test]

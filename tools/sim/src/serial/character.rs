@@ -1,4 +1,4 @@
-//! One character as a waveform: right, or wrong in every way a line can make it wrong.
+//! A character as a waveform, undamaged or damaged in the ways that occur on a line.
 
 use super::settings::{Rate, Settings};
 use crate::time::Time;
@@ -6,19 +6,19 @@ use crate::time::Time;
 /// A character on the wire, start and stop bits included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Character {
-    /// When the start bit begins.
+    /// Start of the start bit.
     pub start: Time,
-    /// How long one bit lasts.
+    /// Duration of one bit.
     pub bit: Time,
-    /// The level of each bit, the first (the start bit) in bit 0; 1 = mark, high.
+    /// Level of each bit, with the start bit in bit 0. A 1 is high (mark).
     pub levels: u16,
-    /// How many bits there are, at most 16.
+    /// Number of bits, at most 16.
     pub bits: u8,
 }
 
 impl Character {
-    /// `byte` in the format and at the rate of `settings`, starting at time 0. With seven data bits its
-    /// highest bit is not sent.
+    /// A character of `byte` in the format and at the rate of `settings`, starting at time 0. With seven data bits the
+    /// highest bit of `byte` is not sent.
     #[must_use]
     pub fn new(settings: Settings, byte: u8) -> Self {
         let data_bits = settings.format.data_bits();
@@ -40,7 +40,7 @@ impl Character {
         }
     }
 
-    /// A character of `data`, LSB first, its low `data_bits` bits, and `stop_bits` stop bits.
+    /// A character of the low `data_bits` bits of `data`, LSB first, with `stop_bits` stop bits and without parity.
     #[must_use]
     pub fn raw(start: Time, rate: Rate, data: u16, data_bits: u8, stop_bits: u8) -> Self {
         let bits = 1 + data_bits + stop_bits;
@@ -53,7 +53,8 @@ impl Character {
         }
     }
 
-    /// A break: low for `low_bits` bits, then one stop bit. At least 10 to 15 of them.
+    /// A break at time 0: low for `low_bits` bits, then one stop bit. A break has 10 to 15 low bits; more than 15 count
+    /// as 15.
     #[must_use]
     pub fn line_break(rate: Rate, low_bits: u8) -> Self {
         let low_bits = low_bits.min(15);
@@ -65,8 +66,8 @@ impl Character {
         }
     }
 
-    /// The same with bit `n` turned over: 0 is the start bit, 1 the lowest data bit. Nothing changes
-    /// when the character is shorter.
+    /// The same character with bit `n` inverted: 0 is the start bit, 1 the lowest data bit. Nothing changes if the
+    /// character has no bit `n`.
     #[must_use]
     pub const fn with_bit_flipped(mut self, n: u8) -> Self {
         if n < self.bits {
@@ -75,13 +76,14 @@ impl Character {
         self
     }
 
-    /// The same with its parity bit turned over, in a format that has one: the bit before the only stop bit.
+    /// The same character with an inverted parity bit, which is the bit before the only stop bit. The format must have
+    /// a parity bit.
     #[must_use]
     pub const fn with_wrong_parity(self) -> Self {
         self.with_bit_flipped(self.bits - 2)
     }
 
-    /// The same with its first stop bit low: a framing error. `settings` are those it was made with.
+    /// The same character with a low first stop bit: a framing error. `settings` must be those of the character.
     #[must_use]
     pub const fn with_bad_stop(mut self, settings: Settings) -> Self {
         let first_stop = self.bits - settings.format.stop_bits();
@@ -89,27 +91,27 @@ impl Character {
         self
     }
 
-    /// The same starting at `start`.
+    /// The same character, starting at `start`.
     #[must_use]
     pub const fn at(mut self, start: Time) -> Self {
         self.start = start;
         self
     }
 
-    /// When the last stop bit ends.
+    /// End of the last stop bit.
     #[must_use]
     pub fn end(&self) -> Time {
         self.start + self.bit * u64::from(self.bits)
     }
 
-    /// The level during bit `n`; high after the last.
+    /// Level during bit `n`; high after the last bit.
     #[must_use]
     pub const fn level(&self, n: u8) -> bool {
         n >= self.bits || self.levels >> n & 1 == 1
     }
 }
 
-/// Ones from bit `from` up to, not including, bit `to`.
+/// A mask with ones from bit `from` up to, not including, bit `to`.
 const fn ones(from: u8, to: u8) -> u16 {
     let mut mask = 0;
     let mut bit = from;
@@ -141,8 +143,8 @@ mod tests {
     }
 
     #[test]
-    fn the_bits_of_each_format() {
-        // Written LSB first from the right: stop bits, parity, data, start bit 0.
+    fn each_format_has_its_bits() {
+        // From the left: stop bits, parity bit, data bits, start bit.
         assert_eq!(made(Format::N2, 0x55).levels, 0b11_0101_0101_0);
         assert_eq!(made(Format::N1, 0xFF).levels, 0b1_1111_1111_0);
         assert_eq!(made(Format::E1, 0x07).levels, 0b1_1_0000_0111_0);
@@ -158,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_touches_only_its_bit() {
+    fn damage_changes_only_its_bit() {
         let good = made(Format::E1, 0xA5);
         assert_eq!(good.with_wrong_parity().levels, good.levels ^ 1 << 9);
         let seven = made(Format::SevenO1, 0x25);
@@ -171,12 +173,12 @@ mod tests {
         };
         let bad = Character::new(settings, 0).with_bad_stop(settings);
         assert_eq!(bad.levels, 0b10_0000_0000_0);
-        let pause = Character::line_break(settings.rate(), 11);
-        assert_eq!((pause.levels, pause.bits), (0x800, 12));
+        let line_break = Character::line_break(settings.rate(), 11);
+        assert_eq!((line_break.levels, line_break.bits), (0x800, 12));
     }
 
     #[test]
-    fn it_ends_after_its_bits() {
+    fn character_ends_after_its_bits_and_the_line_is_high_then() {
         let c = made(Format::N2, 0).at(Time::from_us(10));
         assert_eq!(c.end(), Time::from_us(10) + Time::cycles(1, 19_200) * 11);
         assert!(c.level(200));

@@ -1,7 +1,7 @@
-//! Asynchronous serial characters: how they look on a wire, and how a receiver samples them.
+//! Asynchronous serial characters: their waveform, and a receiver that samples it.
 //!
-//! A wire is a level over time ([`Wave`]). A transmitter puts [`Character`]s on it; a [`Receiver`] samples it at its
-//! own rate. The USARTs of the part and everything that is connected to their pins are built on these.
+//! A wire is a level over time ([`Wave`]). A transmitter puts [`Character`]s on the wire; a [`Receiver`] samples the
+//! wire at its own rate. The USARTs of the part and everything that is connected to their pins use these types.
 
 mod character;
 mod receiver;

@@ -1,13 +1,13 @@
-//! How characters are made up: the rate, the parity, the stop bits.
+//! Rate and format of characters.
 
 use crate::time::Time;
 
 /// Parity of a character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parity {
-    /// The number of ones, parity bit included, is even.
+    /// The number of ones, with the parity bit, is even.
     Even,
-    /// The number of ones, parity bit included, is odd.
+    /// The number of ones, with the parity bit, is odd.
     Odd,
 }
 
@@ -23,7 +23,7 @@ impl Parity {
     }
 }
 
-/// Character format: eight data bits unless the name says seven.
+/// Format of characters. They have eight data bits, except in the formats with `Seven` in their name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// 8N2: no parity, two stop bits.
@@ -61,7 +61,7 @@ impl Format {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
-    /// Data bits: 7 or 8.
+    /// Number of data bits: 7 or 8.
     #[must_use]
     pub const fn data_bits(self) -> u8 {
         match self {
@@ -70,7 +70,7 @@ impl Format {
         }
     }
 
-    /// The parity, if there is one.
+    /// The parity; `None` for a format without a parity bit.
     #[must_use]
     pub const fn parity(self) -> Option<Parity> {
         match self {
@@ -80,7 +80,7 @@ impl Format {
         }
     }
 
-    /// Stop bits: 1 or 2.
+    /// Number of stop bits: 1 or 2.
     #[must_use]
     pub const fn stop_bits(self) -> u8 {
         match self {
@@ -89,13 +89,13 @@ impl Format {
         }
     }
 
-    /// Bits of one character, start and stop bits included: 10 or 11.
+    /// Number of bits in a character, with the start and stop bits: 10 or 11.
     #[must_use]
     pub const fn bits(self) -> u8 {
         1 + self.data_bits() + self.parity().is_some() as u8 + self.stop_bits()
     }
 
-    /// The name on a panel, such as `8N2`.
+    /// The usual name, such as `8N2`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -110,7 +110,8 @@ impl Format {
     }
 }
 
-/// A bit rate as a clock and the cycles of it that one bit lasts, so that no instant is rounded twice.
+/// A bit rate. It is stored as the frequency of a clock and the number of clock cycles in a bit, so that no instant is
+/// rounded twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rate {
     cycles: u32,
@@ -118,7 +119,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// `baud` bits a second.
+    /// A rate of `baud` bits per second.
     #[must_use]
     pub const fn from_baud(baud: u32) -> Self {
         Self {
@@ -127,20 +128,20 @@ impl Rate {
         }
     }
 
-    /// One bit every `cycles` cycles of a clock of `hz` Hz: at most 268 MHz.
+    /// A rate of one bit in `cycles` cycles of a clock of `hz` Hz, at most 268 MHz.
     #[must_use]
     pub const fn from_clock(cycles: u32, hz: u32) -> Self {
         Self { cycles, hz }
     }
 
-    /// The span of `n` bits.
+    /// Duration of `n` bits.
     #[must_use]
     pub fn bits(self, n: u64) -> Time {
         Time::cycles(n * u64::from(self.cycles), self.hz)
     }
 
-    /// The first tick at `span` or later of a clock that ticks `parts` times a bit, counted from its start, and
-    /// when it comes.
+    /// Number and time of the first tick at `span` or later, of a clock that ticks `parts` times in a bit. Ticks and
+    /// time count from the start of the clock.
     #[must_use]
     pub fn ticks(self, parts: u32, span: Time) -> (u64, Time) {
         let hz = self.hz.saturating_mul(parts);
@@ -153,7 +154,7 @@ impl Rate {
         (tick, at(tick))
     }
 
-    /// The span of `n` sixteenths of a bit: the sampling clock of a receiver.
+    /// Duration of `n` sixteenths of a bit, which is the period of a receiver's sampling clock.
     #[must_use]
     pub fn sixteenths(self, n: u64) -> Time {
         Time::cycles(n * u64::from(self.cycles), self.hz.saturating_mul(16))
@@ -163,7 +164,7 @@ impl Rate {
 /// The settings of one end of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// Bits a second.
+    /// Rate in bits per second.
     pub baud: u32,
     /// Character format.
     pub format: Format,
@@ -186,7 +187,7 @@ impl Settings {
         Rate::from_baud(self.baud)
     }
 
-    /// The span of `n` characters without a gap.
+    /// Duration of `n` characters without gaps.
     #[must_use]
     pub fn characters(self, n: u64) -> Time {
         self.rate().bits(n * u64::from(self.format.bits()))
@@ -198,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bit_at_115200_from_72_mhz() {
+    fn bit_at_115200_from_72_mhz_has_the_duration_of_the_reference_manual() {
         // RM0008 table 192: 72 MHz, 115.2 kbit/s, USARTDIV = 39.0625, BRR = 39 * 16 + 1 = 0x271.
         let rate = Rate::from_clock(0x271, 72_000_000);
         assert_eq!(rate.bits(1).as_ps(), 8_680_555);
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn parity_makes_the_ones_even_or_odd() {
+    fn parity_bit_makes_the_number_of_ones_even_or_odd() {
         assert!(!Parity::Even.bit(0x03));
         assert!(Parity::Even.bit(0x07));
         assert!(Parity::Odd.bit(0x03));

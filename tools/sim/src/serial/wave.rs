@@ -1,20 +1,20 @@
-//! A wire's level over time, as the edges it made.
+//! The level of a wire over time, as a list of edges.
 
 use std::collections::VecDeque;
 
 use crate::time::Time;
 
-/// The level of a wire over a stretch of time. High before its first edge, unless older edges have
-/// been dropped.
+/// The level of a wire over time.
 #[derive(Clone, Debug)]
 pub struct Wave {
-    /// The level before the first edge kept.
+    /// Level before the first edge that is kept.
     before: bool,
-    /// Each edge and the level after it, in order; levels alternate.
+    /// Time of each edge and the level after it, in time order. The levels alternate.
     edges: VecDeque<(Time, bool)>,
 }
 
 impl Default for Wave {
+    /// A wire that has always been high.
     fn default() -> Self {
         Self::new(true)
     }
@@ -30,29 +30,29 @@ impl Wave {
         }
     }
 
-    /// The level is `level` from `at` on. Nothing happens when it already was; an edge that is taken back
-    /// at the instant it was made never happened. `at` is not before the last edge.
+    /// Sets the level from `at` on. `at` must not be before the last edge. If the last edge is at the same instant and
+    /// `level` is the level before it, that edge is removed.
     pub fn push(&mut self, at: Time, level: bool) {
         if self.last_level() == level {
             return;
         }
         match self.edges.back() {
             Some(&(last, _)) if last >= at => {
-                debug_assert_eq!(last, at, "edges come in order");
+                debug_assert_eq!(last, at, "edges must be in time order");
                 self.edges.pop_back();
             }
             _ => self.edges.push_back((at, level)),
         }
     }
 
-    /// Takes back everything from `at` on: the level then stays as it was just before `at`.
+    /// Removes the edges at and after `at`: the wire keeps the level that it had just before `at`.
     pub fn truncate(&mut self, at: Time) {
         while self.edges.back().is_some_and(|&(t, _)| t >= at) {
             self.edges.pop_back();
         }
     }
 
-    /// Forgets the edges before `at`, not the level they led to.
+    /// Drops the edges before `at`. The level at `at` and later stays the same.
     pub fn drop_before(&mut self, at: Time) {
         while let Some(&(t, level)) = self.edges.front() {
             if t >= at {
@@ -63,7 +63,7 @@ impl Wave {
         }
     }
 
-    /// The level at `at`: the one after an edge that is exactly then.
+    /// Level at `at`. At the instant of an edge this is the level after the edge.
     #[must_use]
     pub fn level_at(&self, at: Time) -> bool {
         match self.index_after(at) {
@@ -72,7 +72,7 @@ impl Wave {
         }
     }
 
-    /// The level after the last edge.
+    /// Level after the last edge.
     #[must_use]
     pub fn last_level(&self) -> bool {
         self.edges.back().map_or(self.before, |&(_, level)| level)
@@ -100,7 +100,7 @@ impl Wave {
             .map(|(t, _)| t)
     }
 
-    /// Since when the level just before the edge at `edge` had stood: `None` when longer than known.
+    /// Time of the last edge before `edge`; `None` if no such edge is kept.
     #[must_use]
     pub fn previous_edge(&self, edge: Time) -> Option<Time> {
         if let last @ Some(at) = self.last_edge()
@@ -118,26 +118,26 @@ impl Wave {
         !self.level_at(from) || self.edges(from, to).any(|(_, level)| !level)
     }
 
-    /// How many edges are kept.
+    /// Number of edges that are kept.
     #[must_use]
     pub fn len(&self) -> usize {
         self.edges.len()
     }
 
-    /// Whether no edge is kept.
+    /// Whether no edges are kept.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.edges.is_empty()
     }
 
-    /// The last edge.
+    /// Time of the last edge.
     fn last_edge(&self) -> Option<Time> {
         self.edges.back().map(|&(at, _)| at)
     }
 
-    /// The number of edges up to and including `at`.
+    /// Number of edges up to and including `at`.
     fn index_after(&self, at: Time) -> usize {
-        // Most ask about the present of a wire that has no edges in the future.
+        // The usual case: `at` is the present, and the wire has no edges in the future.
         if self.last_edge().is_none_or(|last| last <= at) {
             return self.edges.len();
         }
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_and_edges() {
+    fn levels_and_edges_are_found_by_time() {
         let wave = pulse();
         assert!(wave.level_at(us(9)));
         assert!(!wave.level_at(us(10)));
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_taken_back_at_once_never_was() {
+    fn edge_that_is_reversed_at_the_same_instant_is_removed() {
         let mut wave = pulse();
         wave.push(us(50), false);
         wave.push(us(50), true);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn dropping_keeps_the_level() {
+    fn dropping_edges_keeps_the_level_after_them() {
         let mut wave = pulse();
         wave.drop_before(us(15));
         assert_eq!(wave.len(), 3);

@@ -1,57 +1,57 @@
-//! A channel as it stands, and why the outside cannot apply something to it.
+//! The state of a channel, and the reason why a change of it is refused.
 
 use core::fmt;
 
-/// The highest voltage at an analog input's pin, mV: full scale of the module's conditioning.
+/// Highest voltage at the pin of an analog input, in mV: full scale of the module's circuit.
 pub const MAX_MILLIVOLTS: u16 = 3300;
 
-/// One channel of the plugged module, as it stands.
+/// State of a channel of the module in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// No such channel.
+    /// The module does not have this channel.
     None,
     /// A digital input.
     Di {
-        /// Whether the outside energises it.
+        /// Whether a voltage is applied to the input.
         energised: bool,
     },
     /// A digital output.
     Do {
-        /// Whether its transistor conducts.
+        /// Whether the transistor of the output conducts.
         on: bool,
     },
     /// A relay.
     Relay {
-        /// Whether its coil is energised.
+        /// Whether the coil is energised.
         energised: bool,
-        /// Whether its jumper says manual.
+        /// Whether the jumper is set to manual.
         manual: bool,
     },
     /// An analog input.
     Ai {
-        /// The voltage at the pin, 0 to 3300 mV.
+        /// Voltage at the pin, 0 to 3300 mV.
         millivolts: u16,
     },
     /// An analog output.
     Ao {
-        /// The DAC's output code, 0 to 4095.
+        /// Output code of the DAC, 0 to 4095.
         code: u16,
     },
 }
 
-/// Why the outside cannot apply that to a channel.
+/// Reason why a change of a channel is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// The plugged module has no such input on that channel.
+    /// The module has no such input on this channel.
     Channel,
-    /// More than [`MAX_MILLIVOLTS`].
+    /// The voltage is higher than [`MAX_MILLIVOLTS`].
     Millivolts,
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Channel => f.write_str("the plugged module has no such input on that channel"),
+            Self::Channel => f.write_str("the plugged module has no such input on this channel"),
             Self::Millivolts => write!(f, "an analog input takes 0 to {MAX_MILLIVOLTS} mV"),
         }
     }

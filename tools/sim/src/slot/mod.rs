@@ -1,10 +1,10 @@
-//! The slot: the module plugged into it, and the world outside on its channels.
+//! A slot: the module in it, and what is connected to the channels of the module.
 //!
-//! Four lines lead from the slot to the part's pins; the modules with analog outputs also sit on I2C1.
+//! Four lines lead from the slot to the part's pins. Modules with analog outputs are also connected to I2C1.
 //!
 //! | module | lines |
 //! |---|---|
-//! | 4DI | an energised input pulls its line low, else it lets go |
+//! | 4DI | low while the input is energised, else floating |
 //! | 4DO | line high = the transistor conducts |
 //! | 2Relay | lines 1, 2: jumper of relay 1, 2, low = manual; lines 3, 4: coil, high = energised |
 //! | 4AI | the voltage at the pin |
@@ -25,28 +25,29 @@ use crate::periph::gpio::Drive;
 use crate::periph::i2c::{Bus, Wires};
 use crate::time::Time;
 
-/// The source impedance of an analog input unless set: more than the 5 kOhm of the thermistor at 25 degrees with
-/// its pull-up, the highest of the ranges.
+/// Default source impedance of an analog input, in ohms. It is more than that of the range with the highest impedance:
+/// the thermistor at 25 degrees Celsius with its pull-up has 5 kOhm.
 const SOURCE_OHMS: u32 = 10_000;
 
-/// What is wrong with the DAC or its wires.
+/// A fault of the DAC or of the I2C wires.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BusFault {
-    /// Nothing.
+    /// No fault.
     #[default]
     None,
     /// The DAC does not answer its address.
     Absent,
-    /// Something holds the clock low.
+    /// A device holds the clock low.
     HoldsScl,
-    /// Something holds the data wire low: a slave that lost count of its clocks.
+    /// A device holds the data wire low, because it has counted the clock pulses wrongly.
     HoldsSda {
-        /// It lets go after that many clock pulses made by hand; `None` = never.
+        /// Number of clock pulses, made with the pin as a GPIO output, after which the device releases the data wire.
+        /// `None` if it never does.
         clocks: Option<u8>,
     },
 }
 
-/// The slot.
+/// A slot and the module in it.
 #[derive(Clone, Debug)]
 pub struct Slot {
     module: Module,
@@ -55,12 +56,12 @@ pub struct Slot {
     manual: [bool; 2],
     millivolts: [u16; 4],
     source_ohms: [u32; 4],
-    /// The levels the part's pins give the lines.
+    /// Level that the part drives at each line; low for a line that it does not drive.
     driven: [bool; 4],
     dac: Mcp4728,
     dac_address: u8,
     fault: BusFault,
-    /// The I2C pins as the part drives them by hand.
+    /// Levels of the I2C pins as GPIO outputs.
     pins: Wires,
 }
 
@@ -71,7 +72,7 @@ impl Default for Slot {
 }
 
 impl Slot {
-    /// A slot with `module` in it, its power on and nothing applied from outside.
+    /// A slot with `module` in it, with its power on and nothing applied to its inputs.
     #[must_use]
     pub fn new(module: Module) -> Self {
         Self {
@@ -89,7 +90,7 @@ impl Slot {
         }
     }
 
-    /// The same slot, whose modules have their DAC at `address`, 0x60 to 0x67.
+    /// The same slot, with the DAC of its modules at the I2C address `address`, 0x60 to 0x67.
     #[must_use]
     pub fn with_dac_at(self, address: u8) -> Self {
         Self {
@@ -99,13 +100,13 @@ impl Slot {
         }
     }
 
-    /// What is plugged in.
+    /// The module in the slot.
     #[must_use]
     pub const fn module(&self) -> Module {
         self.module
     }
 
-    /// Plugs another module, a new one: nothing is applied to it, and its DAC is as the factory left it.
+    /// Plugs a new module into the slot. Nothing is applied to its inputs, and its DAC is in the state of delivery.
     pub fn set_module(&mut self, module: Module) {
         *self = Self {
             powered: self.powered,
@@ -113,7 +114,7 @@ impl Slot {
         };
     }
 
-    /// The board's power comes or goes. What the outside applies stays; the DAC starts from its EEPROM.
+    /// Switches the board's power. What is applied to the inputs stays; the DAC starts with the values in its EEPROM.
     pub fn set_power(&mut self, on: bool, _now: Time) {
         if on && !self.powered {
             self.dac.power_on();
@@ -125,7 +126,7 @@ impl Slot {
         self.powered = on;
     }
 
-    /// Channel `ch` (1 to 4); [`Channel::None`] for any other number.
+    /// State of channel `ch` (1 to 4); [`Channel::None`] for any other number.
     #[must_use]
     pub fn channel(&self, ch: usize) -> Channel {
         if !(1..=4).contains(&ch) {
@@ -158,11 +159,11 @@ impl Slot {
         }
     }
 
-    /// Energises the digital input on channel `ch` (1 to 4), or takes the voltage away.
+    /// Energises the digital input of channel `ch` (1 to 4), or removes the voltage.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no digital input.
+    /// [`Error::Channel`] if this channel is not a digital input.
     pub fn set_energised(&mut self, ch: usize, energised: bool) -> Result<(), Error> {
         match self.channel(ch) {
             Channel::Di { .. } => self.energised[ch - 1] = energised,
@@ -171,11 +172,11 @@ impl Slot {
         Ok(())
     }
 
-    /// Sets the jumper of relay `ch` (1 or 2) to manual or back.
+    /// Sets the jumper of relay `ch` (1 or 2) to manual or to automatic.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no relay.
+    /// [`Error::Channel`] if this channel is not a relay.
     pub fn set_manual(&mut self, ch: usize, manual: bool) -> Result<(), Error> {
         match self.channel(ch) {
             Channel::Relay { .. } => self.manual[ch - 1] = manual,
@@ -184,11 +185,11 @@ impl Slot {
         Ok(())
     }
 
-    /// Puts a voltage on the analog input of channel `ch` (1 to 4), 0 to 3300 mV at the pin.
+    /// Sets the voltage at the pin of the analog input of channel `ch` (1 to 4), 0 to 3300 mV.
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no analog input, [`Error::Millivolts`] above 3300.
+    /// [`Error::Channel`] if this channel is not an analog input, [`Error::Millivolts`] above 3300 mV.
     pub fn set_millivolts(&mut self, ch: usize, millivolts: u16) -> Result<(), Error> {
         match self.channel(ch) {
             Channel::Ai { .. } if millivolts > MAX_MILLIVOLTS => return Err(Error::Millivolts),
@@ -202,7 +203,7 @@ impl Slot {
     ///
     /// # Errors
     ///
-    /// [`Error::Channel`] when that channel is no analog input.
+    /// [`Error::Channel`] if this channel is not an analog input.
     pub fn set_source_ohms(&mut self, ch: usize, ohms: u32) -> Result<(), Error> {
         match self.channel(ch) {
             Channel::Ai { .. } => self.source_ohms[ch - 1] = ohms,
@@ -211,14 +212,14 @@ impl Slot {
         Ok(())
     }
 
-    /// Ohms between line `line` (1 to 4) and what drives it.
+    /// Source impedance at line `line` (1 to 4), in ohms.
     #[must_use]
     pub fn source_ohms(&self, line: usize) -> u32 {
         let ohms = line.checked_sub(1).and_then(|n| self.source_ohms.get(n));
         ohms.copied().unwrap_or(SOURCE_OHMS)
     }
 
-    /// What the module does to line `line` (1 to 4).
+    /// What the module drives at line `line` (1 to 4).
     #[must_use]
     pub fn drive(&self, line: usize) -> Drive {
         let pulls = |low| if low { Drive::Low } else { Drive::Floating };
@@ -232,7 +233,7 @@ impl Slot {
         }
     }
 
-    /// The part's pin drives line `line` (1 to 4) high or not; low for a pin that drives nothing. Any
+    /// Takes over the level that the part drives at line `line` (1 to 4); low for a pin that is not an output. Any
     /// other line is ignored.
     pub fn set_line(&mut self, line: usize, high: bool) {
         if let Some(driven) = line.checked_sub(1).and_then(|n| self.driven.get_mut(n)) {
@@ -246,25 +247,25 @@ impl Slot {
         matches!(self.module, Module::Ao4 | Module::Ai2Ao2)
     }
 
-    /// The DAC's four input registers and its EEPROM, A to D.
+    /// The four input registers of the DAC, and the four settings in its EEPROM, A to D.
     #[must_use]
     pub const fn dac(&self) -> ([Setting; 4], [Setting; 4]) {
         (self.dac.registers(), self.dac.eeprom())
     }
 
-    /// Something goes wrong with the DAC or its wires, or is put right.
+    /// Causes a fault of the DAC or of the I2C wires, or clears it with [`BusFault::None`].
     pub const fn set_bus_fault(&mut self, fault: BusFault) {
         self.fault = fault;
     }
 
-    /// What is wrong with the DAC or its wires.
+    /// The fault of the DAC or of the I2C wires.
     #[must_use]
     pub const fn bus_fault(&self) -> BusFault {
         self.fault
     }
 
-    /// The I2C pins as the part drives them by hand, `true` = not pulled low; [`Wires::FREE`] while they are
-    /// the I2C block's. Clock pulses made so free a stuck data wire. Returns whether the pins have changed.
+    /// Takes over the levels of the I2C pins as GPIO outputs, `true` = not pulled low; [`Wires::FREE`] while they are
+    /// pins of the I2C block. Clock pulses on them free a stuck data wire. Returns whether the pins have changed.
     pub fn set_pins(&mut self, pins: Wires) -> bool {
         if pins == self.pins {
             return false;
@@ -284,7 +285,7 @@ impl Slot {
         true
     }
 
-    /// What the devices do to the I2C wires, whatever the part does: for the part's input pins.
+    /// Levels of the I2C wires as the devices hold them, without the part's own outputs.
     #[must_use]
     pub fn held(&self) -> Wires {
         Wires {

@@ -1,9 +1,9 @@
-//! What the outside applies, and what the part sees of it.
+//! Tests of a slot: changes of its channels, and their effect at the part's pins and on the I2C bus.
 
 use super::*;
 
 #[test]
-fn only_the_channels_there_are_take_what_fits_them() {
+fn channels_accept_only_changes_of_their_own_kind() {
     let mut slot = Slot::new(Module::Di4);
     assert_eq!(slot.set_energised(1, true), Ok(()));
     assert_eq!(slot.set_energised(0, true), Err(Error::Channel));
@@ -28,7 +28,7 @@ fn only_the_channels_there_are_take_what_fits_them() {
 }
 
 #[test]
-fn lines_of_each_module() {
+fn each_module_drives_and_reads_its_lines() {
     let mut slot = Slot::new(Module::Di4);
     slot.set_energised(3, true).expect("a digital input");
     assert_eq!([1, 3].map(|n| slot.drive(n)), [Drive::Floating, Drive::Low]);
@@ -61,7 +61,7 @@ fn lines_of_each_module() {
 }
 
 #[test]
-fn outputs_fall_with_the_power_and_the_dac_starts_from_its_eeprom() {
+fn outputs_are_off_without_power_and_the_dac_starts_from_its_eeprom() {
     let mut slot = Slot::new(Module::Do4);
     slot.set_line(1, true);
     slot.set_power(false, Time::ZERO);
@@ -83,7 +83,7 @@ fn outputs_fall_with_the_power_and_the_dac_starts_from_its_eeprom() {
 }
 
 #[test]
-fn a_stuck_data_wire_is_clocked_free() {
+fn stuck_data_wire_is_released_after_its_clock_pulses() {
     let mut slot = Slot::new(Module::Ao4);
     slot.set_bus_fault(BusFault::HoldsSda { clocks: Some(9) });
     for pulse in 0..9 {
@@ -103,7 +103,7 @@ fn a_stuck_data_wire_is_clocked_free() {
 }
 
 #[test]
-fn no_module_without_a_dac_answers_on_the_bus() {
+fn only_modules_with_a_dac_answer_on_the_i2c_bus() {
     for module in Module::ALL {
         let mut slot = Slot::new(module);
         assert_eq!(slot.address(0xC0, Time::ZERO), slot.has_dac(), "{module}");

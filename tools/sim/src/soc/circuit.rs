@@ -1,4 +1,4 @@
-//! What surrounds the part: a circuit that is connected to its pins.
+//! The circuit that is connected to the pins of the part.
 
 use crate::part::Part;
 use crate::periph::adc::Adc;
@@ -7,7 +7,7 @@ use crate::periph::i2c::Bus;
 use crate::periph::usart::Wire;
 use crate::time::Time;
 
-/// Ports that are modelled, A to D.
+/// Number of ports that are modelled: A to D.
 pub const PORTS: usize = 4;
 
 /// A pin of the part.
@@ -18,11 +18,11 @@ pub struct Pin {
 }
 
 impl Pin {
-    /// The pin `number` (0 to 15) of port `'A'` to `'D'`.
+    /// Pin `number` (0 to 15) of a port (`'A'` to `'D'`).
     ///
     /// # Panics
     ///
-    /// When there is no such pin.
+    /// If there is no such pin.
     #[must_use]
     pub const fn new(port: char, number: usize) -> Self {
         match Self::find(port, number) {
@@ -31,7 +31,7 @@ impl Pin {
         }
     }
 
-    /// The same; `None` when there is no such pin.
+    /// Pin `number` (0 to 15) of a port (`'A'` to `'D'`, or in lower case). `None` if there is no such pin.
     #[must_use]
     pub const fn find(port: char, number: usize) -> Option<Self> {
         let port = (port.to_ascii_uppercase() as usize).wrapping_sub('A' as usize);
@@ -42,24 +42,24 @@ impl Pin {
         }
     }
 
-    /// Its port, `'A'` to `'D'`.
+    /// Port of the pin, `'A'` to `'D'`.
     #[must_use]
     pub const fn port(self) -> char {
         (b'A' + self.port as u8) as char
     }
 
-    /// Its port as a number: 0 = A.
+    /// Port of the pin as a number: 0 is port A.
     pub(crate) const fn port_index(self) -> usize {
         self.port
     }
 
-    /// Its number in the port.
+    /// Number of the pin in its port, 0 to 15.
     #[must_use]
     pub const fn number(self) -> usize {
         self.number
     }
 
-    /// The input of ADC1 at this pin (DS5319 table 5).
+    /// Number of the ADC1 input at this pin (DS5319 table 5); `None` if the pin is not an analog input.
     const fn analog_input(self) -> Option<usize> {
         match (self.port, self.number) {
             (0, 0..=7) => Some(self.number),
@@ -80,14 +80,15 @@ pub struct Pins<'a> {
 }
 
 impl Pins<'_> {
-    /// The circuit does this to `pin` from now on.
+    /// Sets what the circuit drives at `pin` from now on.
     ///
     /// # Panics
     ///
-    /// When the part does not have the pin.
+    /// If the part does not have the pin.
     pub fn drive(&mut self, pin: Pin, drive: Drive) {
         let exists = self.part.ports[pin.port] >> pin.number & 1 != 0;
-        assert!(exists, "the {} has no such pin: {pin:?}", self.part.name);
+        let (part, port, number) = (self.part.name, pin.port(), pin.number);
+        assert!(exists, "the {part} has no pin P{port}{number}");
         let gpio = &mut self.gpio[pin.port];
         gpio.drive(pin.number, drive, self.now);
         if let Some(input) = pin.analog_input() {
@@ -96,8 +97,8 @@ impl Pins<'_> {
         }
     }
 
-    /// The same from a source of this impedance, in ohms, which an analog input has to charge its capacitor
-    /// through.
+    /// As [`drive`](Self::drive), from a source with an impedance of `ohms`. The capacitor of the ADC is charged
+    /// through this impedance.
     pub fn drive_from(&mut self, pin: Pin, drive: Drive, ohms: u32) {
         self.drive(pin, drive);
         if let Some(input) = pin.analog_input() {
@@ -106,31 +107,31 @@ impl Pins<'_> {
     }
 }
 
-/// A circuit around the part. Every method has a default: nothing is connected.
+/// A circuit around the part. Each method has a default that connects nothing.
 pub trait Circuit {
-    /// Says what the circuit does to the pins: all that it is connected to, but for the wires of USARTs.
+    /// Drives all pins that the circuit is connected to, except the RX pins of USARTs.
     fn drive(&self, _pins: &mut Pins) {}
 
-    /// The part has accessed `port`, so it may drive its pins in another way. Returns whether the circuit now
-    /// does something else to the pins: then [`Circuit::drive`] is called.
+    /// Called after the part has accessed `port`, because its outputs may have changed. Returns whether the circuit now
+    /// drives its pins in another way; [`Circuit::drive`] is called then.
     fn port_changed(&mut self, _port: char, _gpio: &Gpio, _now: Time) -> bool {
         false
     }
 
-    /// The supply of the circuit and the part comes or goes.
+    /// Called when the supply of the circuit and the part is switched.
     fn set_power(&mut self, _on: bool, _now: Time) {}
 
-    /// What is connected to the USART whose transmitter is at pin `tx`.
+    /// The device at the USART whose transmitter is at pin `tx`; `None` if nothing is connected.
     fn wire(&mut self, _tx: Pin) -> Option<&mut dyn Wire> {
         None
     }
 
-    /// The devices on the I2C bus whose clock is at pin `scl`.
+    /// The devices on the I2C bus whose clock is at pin `scl`; `None` if there are none.
     fn i2c(&mut self, _scl: Pin) -> Option<&mut dyn Bus> {
         None
     }
 
-    /// What the part did that is not good for the circuit, since the last call.
+    /// Returns the actions of the part since the last call that the circuit does not allow, each with its instant.
     fn take_findings(&mut self) -> Vec<(Time, &'static str)> {
         Vec::new()
     }

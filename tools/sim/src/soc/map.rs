@@ -1,4 +1,4 @@
-//! Where the register blocks are (RM0008 table 3), which clock feeds each, and how wide its accesses may be.
+//! The memory map of the register blocks (RM0008 table 3), their clocks, and the access widths that they allow.
 
 /// A register block that is modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,27 +42,28 @@ pub enum Block {
     Pwr,
 }
 
-/// How many blocks there are.
+/// Number of blocks that are modelled.
 pub const BLOCKS: usize = 18;
 
-/// What answers at an address of the peripheral region.
+/// The owner of an address in the peripheral region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A modelled block.
     Block(Block),
-    /// A block of the part that is not modelled: its name.
+    /// A block of the part that is not modelled, with its name.
     Absent(&'static str),
     /// Reserved.
     Reserved,
 }
 
-/// Where the peripherals start.
+/// Start address of the peripheral region.
 pub const BASE: u32 = 0x4000_0000;
-/// Every block starts at a multiple of 1 KiB.
+/// Every block starts at a multiple of this number of bytes.
 const GRAIN: u32 = 0x400;
+/// Number of grains up to the last block.
 const GRAINS: usize = 0x2_4000 / GRAIN as usize;
 
-/// The blocks of the part, by base address.
+/// Base address and owner of each block of the part.
 const PLACES: [(u32, Place); 34] = {
     use Block as B;
     use Place::{Absent, Reserved};
@@ -105,6 +106,7 @@ const PLACES: [(u32, Place); 34] = {
     ]
 };
 
+/// Owner of each grain.
 static TABLE: [Place; GRAINS] = {
     let mut table = [Place::Reserved; GRAINS];
     let mut n = 0;
@@ -116,7 +118,7 @@ static TABLE: [Place; GRAINS] = {
     table
 };
 
-/// What answers at `address`, and the offset into it.
+/// Returns the owner of `address`, and the offset of the address in its block.
 #[must_use]
 pub fn place(address: u32) -> (Place, u32) {
     let grain = (address.wrapping_sub(BASE) / GRAIN) as usize;
@@ -126,19 +128,19 @@ pub fn place(address: u32) -> (Place, u32) {
     }
 }
 
-/// How wide an access a block takes.
+/// Access widths that a block allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Widths {
     /// Words only.
     Word,
     /// Half-words and words.
     HalfWord,
-    /// Bytes too.
+    /// Bytes, half-words and words.
     Any,
 }
 
 impl Block {
-    /// Every block, in the order of its number.
+    /// Every block, in the order of the numbers.
     pub const ALL: [Self; BLOCKS] = [
         Self::Tim2,
         Self::Tim3,
@@ -160,7 +162,7 @@ impl Block {
         Self::Pwr,
     ];
 
-    /// The block whose clock and reset are bit `bit` of RCC's registers for APB2 (0) or APB1 (1).
+    /// Returns the block whose clock and reset are bit `bit` of RCC's registers for APB2 (`bus` 0) or APB1 (`bus` 1).
     #[must_use]
     pub fn of_bit(bus: usize, bit: u32) -> Option<Self> {
         Self::ALL
@@ -168,8 +170,8 @@ impl Block {
             .find(|block| block.clock() == Some((bus, bit)))
     }
 
-    /// Which bit enables its clock and resets it: APB2 (0) or APB1 (1), and the bit (RM0008 7.3.4 to
-    /// 7.3.8). `None`: it always has its clock.
+    /// Returns the bus, APB2 (0) or APB1 (1), and the bit in RCC's registers that enables the clock of the block and
+    /// resets it (RM0008 7.3.4 to 7.3.8). `None` if the block always has its clock.
     #[must_use]
     pub const fn clock(self) -> Option<(usize, u32)> {
         Some(match self {
@@ -191,7 +193,7 @@ impl Block {
         })
     }
 
-    /// How wide an access it takes, as the first lines of its registers' section in RM0008 say.
+    /// Access widths that the block allows. The section of its registers in RM0008 begins with them.
     #[must_use]
     pub const fn widths(self) -> Widths {
         match self {
@@ -216,7 +218,7 @@ impl Block {
         }
     }
 
-    /// Its name in RM0008.
+    /// Name of the block in RM0008.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -244,7 +246,7 @@ impl Block {
 
 /// The interrupt lines (RM0008 table 63).
 pub mod irq {
-    /// Lines of the largest parts.
+    /// Number of lines of the largest parts.
     pub const LINES: u16 = 60;
     /// FLASH.
     pub const FLASH: u16 = 4;
@@ -269,7 +271,7 @@ pub mod irq {
     /// USART3.
     pub const USART3: u16 = 39;
 
-    /// EXTI's own lines, and the pins (one bit each) that share each.
+    /// The lines of EXTI, each with a mask of the pins that share it.
     pub const EXTI: [(u16, u32); 7] = [
         (6, 1 << 0),
         (7, 1 << 1),
@@ -286,7 +288,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn addresses_lead_to_their_blocks() {
+    fn place_returns_the_block_of_an_address() {
         assert_eq!(place(0x4001_3804), (Place::Block(Block::Usart1), 4));
         assert_eq!(place(0x4000_0C00).0, Place::Reserved);
         assert_eq!(place(0x4002_3000).0, Place::Absent("CRC"));

@@ -1,9 +1,9 @@
-//! The part around its core: every register block, its clock, its interrupt lines, the wires between the
-//! blocks, and its pins, to which a [`Circuit`] is connected.
+//! The part without its core: the register blocks with their clocks and interrupt lines, the wires between the blocks,
+//! and the pins, to which a [`Circuit`] is connected.
 //!
-//! Blocks do not know each other. Their signals to each other go through [`wires`], after every access to a block and
-//! after every event of a block. Time moves from event to event: the next event of each block is known, and
-//! [`Soc::advance`] takes the events in their order.
+//! Blocks do not know each other. [`wires`] passes on their signals after every access to a block and after every event
+//! of a block. Time moves from event to event: each block knows its next event, and [`Soc::advance`] handles the events
+//! in time order.
 
 mod circuit;
 pub mod map;
@@ -41,9 +41,9 @@ pub struct Soc<C> {
     pub flash: Flash,
     /// Ports A to D.
     pub gpio: [Gpio; PORTS],
-    /// What is connected to the pins.
+    /// The circuit that is connected to the pins.
     pub circuit: C,
-    /// Power control, with the supply's voltage.
+    /// Power control, with the supply voltage.
     pub pwr: Pwr,
     afio: Afio,
     exti: Exti,
@@ -56,30 +56,35 @@ pub struct Soc<C> {
     tim4: Timer,
     adc1: Adc,
     i2c1: I2c,
-    /// What the wires last passed on: port levels, the I2C pins that are pulled low by hand, clocks, FLASH_ACR.
+    /// Levels of the ports that were passed on last.
     seen: [u16; PORTS],
+    /// Mask of the I2C pins that the firmware pulls low as GPIO outputs.
     i2c_by_hand: u16,
+    /// Clocks that were passed on last.
     clocks: Clocks,
+    /// [`Flash::access_control`] that was passed on last.
     flash_access: (u32, bool),
-    /// When each block has its next event, and the earliest of these instants.
+    /// Instant of the next event of each block.
     due: [Time; BLOCKS],
+    /// Earliest instant in `due`.
     next: Time,
-    /// The levels of the interrupt lines, one bit each, and those that changed.
+    /// Level of each interrupt line, one bit each.
     levels: u64,
+    /// Mask of the interrupt lines that have changed since they were taken.
     changed_lines: u64,
-    /// What the machine has to take up.
+    /// Requests of the blocks to the machine.
     pub signals: Signals,
     notes: Vec<(Time, What)>,
 }
 
-/// What the blocks ask of the machine.
+/// Requests of the blocks to the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Signals {
     /// HCLK or the flash's wait states have changed.
     pub rate: bool,
-    /// A block resets the part.
+    /// A block requests a reset of the part.
     pub reset: Option<Cause>,
-    /// These bytes of flash have changed: first and end.
+    /// Bytes of the flash from the first offset up to, not including, the second have changed.
     pub flash: Option<(usize, usize)>,
 }
 
@@ -90,7 +95,7 @@ impl<C: Circuit> Soc<C> {
         &self.usart1
     }
 
-    /// The part after power-on, around these flash cells, in `circuit`.
+    /// The part after power-on, with this flash, in `circuit`.
     #[must_use]
     pub fn new(config: &Config, flash: Flash, circuit: C) -> Self {
         let oscillators = config.corner.oscillators().with_crystal(config.crystal_hz);
@@ -102,7 +107,7 @@ impl<C: Circuit> Soc<C> {
             rcc,
             flash,
             flash_access,
-            // PC13 to PC15 are fed through a switch for 3 mA: 2 MHz at most (DS5319 table 5, notes).
+            // PC13 to PC15 are supplied through a switch for 3 mA, so they allow 2 MHz at most (DS5319 table 5, notes).
             gpio: [0, 0, 0xE000, 0].map(Gpio::with_slow_pins),
             circuit,
             pwr: Pwr::default(),
@@ -131,7 +136,7 @@ impl<C: Circuit> Soc<C> {
         soc
     }
 
-    /// A reset of the part.
+    /// Resets the part.
     pub fn reset(&mut self, cause: Cause, now: Time) {
         self.advance(now);
         self.rcc.note_reset(cause);
@@ -142,7 +147,7 @@ impl<C: Circuit> Soc<C> {
         self.signals.reset = None;
     }
 
-    /// The power comes or goes. Without it the part lets go of its pins, and a flash operation is torn.
+    /// Switches the power. Without power the part drives no pin, and a flash operation is interrupted.
     pub fn set_power(&mut self, on: bool, now: Time) {
         if !on {
             self.flash.power_off(now);
@@ -155,7 +160,8 @@ impl<C: Circuit> Soc<C> {
         self.refresh(now);
     }
 
-    /// Brings everything that is worked out lazily up to `now`, before someone outside looks or acts.
+    /// Computes everything up to `now` that is otherwise computed on demand. Needed before code outside the part reads
+    /// or changes something.
     pub fn sync(&mut self, now: Time) {
         self.advance(now);
         for serial in &SERIALS {
@@ -164,7 +170,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// Takes up what someone outside did to the circuit.
+    /// Takes over changes that were made to the circuit.
     pub fn refresh(&mut self, now: Time) {
         self.circuit.drive(&mut Pins {
             part: self.part,
@@ -183,7 +189,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// The circuit will do something else to an RX pin than it would have.
+    /// Takes over a change of the next edges at an RX pin.
     pub fn wires_changed(&mut self) {
         for block in [Block::Usart1, Block::Usart3, Block::Tim1] {
             self.note_due(block);
@@ -191,7 +197,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// Takes the findings that blocks and wires have had, each with its instant.
+    /// Takes the findings of blocks and wires, each with its instant.
     pub fn take_notes(&mut self) -> Vec<(Time, What)> {
         core::mem::take(&mut self.notes)
     }
@@ -202,13 +208,13 @@ impl<C: Circuit> Soc<C> {
         !self.notes.is_empty()
     }
 
-    /// The earliest instant at which a block has an event; [`Time::MAX`] for never.
+    /// Instant of the next event of any block; [`Time::MAX`] if there is none.
     #[must_use]
     pub fn next_event(&self) -> Time {
         self.next
     }
 
-    /// Everything due up to and including `now` happens, in order.
+    /// Handles all events up to and including `now`, in time order.
     pub fn advance(&mut self, now: Time) {
         while self.next <= now {
             let at = self.next;
@@ -221,16 +227,19 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// `source` does what is due at `at`.
+    /// Handles the events of block number `source` that are due at `at`.
     fn act(&mut self, source: usize, at: Time) {
         let block = Block::ALL[source];
         self.catch_up(block, at);
         self.settle(block, at);
-        debug_assert!(self.due[source] > at, "{source} did not move on at {at}");
+        debug_assert!(
+            self.due[source] > at,
+            "block {source} has an event at {at} again"
+        );
         self.due[source] = self.due[source].max(at + Time::from_ps(1));
     }
 
-    /// A read of `block`'s register at `offset` (word aligned).
+    /// Reads the register of `block` at `offset` (word aligned).
     ///
     /// # Errors
     ///
@@ -243,8 +252,7 @@ impl<C: Circuit> Soc<C> {
         answer
     }
 
-    /// A write to `block`'s register at `offset` (word aligned). It is lost while RCC holds the block in
-    /// reset.
+    /// Writes the register of `block` at `offset` (word aligned). The write is lost while RCC holds the block in reset.
     ///
     /// # Errors
     ///
@@ -280,7 +288,7 @@ impl<C: Circuit> Soc<C> {
             .is_none_or(|(bus, bit)| [apb2, apb1][bus] >> bit & 1 != 0)
     }
 
-    /// The core stores into the flash.
+    /// Handles a store of the core to the flash at `offset`. `half` says whether it is a half-word.
     pub fn program(&mut self, offset: u32, half: bool, value: u16, now: Time) {
         self.flash.advance(now);
         self.flash.program(offset, half, value, now);
@@ -288,7 +296,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// Brings a block up to `now`, with its wires.
+    /// Computes a block and its wires up to `now`.
     fn catch_up(&mut self, block: Block, now: Time) {
         match block {
             Block::Usart1 | Block::Usart3 | Block::GpioA | Block::GpioB => {
@@ -320,14 +328,14 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// Passes on what a block has done: to other blocks and the circuit, to the interrupt lines, to the
-    /// memory of what happens next.
+    /// Passes the outputs of a block on to other blocks, the circuit and the interrupt lines, and notes its next event.
     fn settle(&mut self, block: Block, now: Time) {
         self.wire(block, now);
         self.note_requests(block);
         self.note_due(block);
     }
 
+    /// Notes the next event of a block.
     fn note_due(&mut self, block: Block) {
         let next = match block {
             Block::Usart1 => self.next_exchange(&SERIALS[0]),
@@ -342,6 +350,7 @@ impl<C: Circuit> Soc<C> {
         self.due[block as usize] = next.unwrap_or(Time::MAX);
     }
 
+    /// Computes the instant of the next event of any block.
     fn find_next(&mut self) {
         self.next = self.due.iter().copied().fold(Time::MAX, Time::min);
     }

@@ -4,23 +4,24 @@ use super::map::{Block, irq};
 use super::{Circuit, Soc};
 
 impl<C: Circuit> Soc<C> {
-    /// Forgets which interrupt lines were reported: all that are high are reported again.
+    /// Marks all interrupt lines that are high as changed, so that they are reported again.
     pub fn repeat_lines(&mut self) {
         self.changed_lines = self.levels;
     }
 
-    /// Takes the interrupt lines whose level changed, one bit each, with the levels of all.
+    /// Takes the mask of the interrupt lines that have changed since the last call. Also returns the levels of all
+    /// lines, one bit each.
     pub fn take_lines(&mut self) -> (u64, u64) {
         (core::mem::take(&mut self.changed_lines), self.levels)
     }
 
-    /// Whether an interrupt line has changed since they were taken.
+    /// Whether an interrupt line has changed since [`take_lines`](Self::take_lines).
     #[must_use]
     pub fn lines_changed(&self) -> bool {
         self.changed_lines != 0
     }
 
-    /// Brings the interrupt lines of `block` to where its requests are.
+    /// Sets the interrupt lines of `block` to the levels of its requests.
     pub(super) fn note_requests(&mut self, block: Block) {
         let line = match block {
             Block::Exti => {

@@ -1,4 +1,5 @@
-//! The wires between the blocks, and from the part's pins to the circuit (default pins, DS5319 table 5).
+//! The wires between the blocks, and from the part's pins to the circuit. All blocks are on their default pins (DS5319
+//! table 5).
 
 use super::Soc;
 use super::circuit::{Circuit, PORTS, Pin};
@@ -18,18 +19,18 @@ pub(super) struct Serial {
     pub(super) usart: Block,
     pub(super) tx: Pin,
     rx: Pin,
-    /// What is wrong when it receives through a pin that is no input.
-    deaf: &'static str,
+    /// Finding when the receiver is on but the RX pin is not an input.
+    no_input: &'static str,
 }
 
 impl Serial {
-    /// The port of its pins.
+    /// Port of the USART's pins.
     pub(super) const fn port(&self) -> Block {
         GPIO[self.tx.port_index()]
     }
 }
 
-/// The ports, from A on.
+/// The blocks of the ports, from A on.
 const GPIO: [Block; PORTS] = [Block::GpioA, Block::GpioB, Block::GpioC, Block::GpioD];
 
 /// The USARTs that are modelled.
@@ -38,19 +39,19 @@ pub(super) const SERIALS: [Serial; 2] = [
         usart: Block::Usart1,
         tx: Pin::new('A', 9),
         rx: Pin::new('A', 10),
-        deaf: "USART1 receives, but its RX pin is no digital input",
+        no_input: "USART1 receives, but its RX pin is not a digital input",
     },
     Serial {
         usart: Block::Usart3,
         tx: Pin::new('B', 10),
         rx: Pin::new('B', 11),
-        deaf: "USART3 receives, but its RX pin is no digital input",
+        no_input: "USART3 receives, but its RX pin is not a digital input",
     },
 ];
 
-/// The USART whose RX pin is TIM1's channel 3 as well.
+/// The USART whose RX pin is also a channel of TIM1.
 pub(super) const CAPTURED: &Serial = &SERIALS[0];
-/// The channel of TIM1 at the pin.
+/// The channel of TIM1 at this pin.
 pub(super) const RX_CAPTURE: usize = 3;
 
 /// I2C1's pins.
@@ -58,7 +59,7 @@ const SCL: Pin = Pin::new('B', 6);
 const SDA: Pin = Pin::new('B', 7);
 
 impl<C: Circuit> Soc<C> {
-    /// Passes on what `block` has done at `now`.
+    /// Passes the outputs of `block` on at `now`.
     pub(super) fn wire(&mut self, block: Block, now: Time) {
         match block {
             Block::GpioA => self.wire_gpio(0, now),
@@ -74,7 +75,7 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// A USART with what is connected to it.
+    /// A USART and the device that is connected to it.
     fn usart(&mut self, serial: &Serial) -> (&mut Usart, Option<&mut dyn Wire>) {
         let usart = match serial.usart {
             Block::Usart3 => &mut self.usart3,
@@ -83,7 +84,7 @@ impl<C: Circuit> Soc<C> {
         (usart, self.circuit.wire(serial.tx))
     }
 
-    /// Brings a USART and its wire up to `now`.
+    /// Computes a USART and its wire up to `now`.
     pub(super) fn sync_wire(&mut self, serial: &Serial, now: Time) {
         match self.usart(serial) {
             (usart, Some(wire)) => usart.exchange(wire, now),
@@ -99,7 +100,7 @@ impl<C: Circuit> Soc<C> {
         self.note_due(serial.usart);
     }
 
-    /// When something happens next in a USART or at its RX pin.
+    /// Instant of the next event in a USART or at its RX pin.
     pub(super) fn next_exchange(&mut self, serial: &Serial) -> Option<Time> {
         match self.usart(serial) {
             (usart, Some(wire)) => usart.next_exchange(wire),
@@ -107,17 +108,17 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// A USART receives nothing through a pin that is no input.
+    /// Reports a USART whose receiver is on while its RX pin is not an input.
     fn check_receiver(&mut self, serial: &Serial, now: Time) {
         let port = &self.gpio[serial.rx.port_index()];
         let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;
         let (usart, wire) = self.usart(serial);
         if closed && wire.is_some() && usart.awaits_start() {
-            self.notes.push((now, What::Other(serial.deaf)));
+            self.notes.push((now, What::Other(serial.no_input)));
         }
     }
 
-    /// The level at the RX pin, for a firmware that reads the pin.
+    /// Drives the RX pin, for firmware that reads its level.
     pub(super) fn drive_rx(&mut self, serial: &Serial, now: Time) {
         let Some(wire) = self.circuit.wire(serial.tx) else {
             return;
@@ -131,7 +132,7 @@ impl<C: Circuit> Soc<C> {
         self.wire_port(serial.rx.port_index(), now);
     }
 
-    /// What the part does to the pins of a port: to its wires and to the circuit.
+    /// Passes the outputs of a port on to the wires and to the circuit.
     fn wire_gpio(&mut self, port: usize, now: Time) {
         let gpio = &self.gpio[port];
         for serial in SERIALS
@@ -164,13 +165,13 @@ impl<C: Circuit> Soc<C> {
         self.wire_port(port, now);
     }
 
-    /// Edges of a port to EXTI.
+    /// Passes the edges of a port on to EXTI.
     pub(super) fn wire_port(&mut self, port: usize, now: Time) {
         let level = self.gpio[port].level();
         let changed = level ^ self.seen[port];
         self.seen[port] = level;
         if self.gpio[port].take_contention() != 0 {
-            let text = "the part and the board drive a pin against each other";
+            let text = "the part and the board drive a pin to opposite levels";
             self.notes.push((now, What::Other(text)));
         }
         if changed != 0 && self.exti.listens() {
@@ -182,7 +183,8 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// PB6 and PB7: the I2C block's, or moved by hand, to free a stuck bus.
+    /// Passes on the use of PB6 and PB7: as pins of I2C1, or as GPIO outputs, with which the firmware frees a stuck
+    /// bus.
     fn wire_i2c_pins(&mut self, now: Time) {
         const PINS: u16 = 1 << SCL.number() | 1 << SDA.number();
         let port = &self.gpio[SCL.port_index()];
@@ -195,7 +197,7 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// Brings I2C1 and the devices on its bus up to `now`.
+    /// Computes I2C1 and the devices on its bus up to `now`.
     pub(super) fn exchange_i2c(&mut self, now: Time) {
         match self.circuit.i2c(SCL) {
             Some(bus) => self.i2c1.exchange(bus, now),
@@ -222,20 +224,20 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// Hands every block the frequency of its clock.
+    /// Passes the clocks on to the blocks, if one has changed.
     pub(super) fn spread_clocks(&mut self, now: Time) {
         if self.rcc.clocks() != self.clocks {
             self.set_clocks(now);
         }
     }
 
-    /// The same, whether or not any has changed.
+    /// Passes the frequency of its clock on to each block.
     pub(super) fn set_clocks(&mut self, now: Time) {
         let clocks = self.rcc.clocks();
         self.clocks = clocks;
         self.signals.rate = true;
         if clocks == Clocks::STOPPED {
-            let text = "SYSCLK's source has died with the clock security system off: the core stands still";
+            let text = "the source of SYSCLK has failed with the clock security system off: the core is stopped";
             self.notes.push((now, What::Other(text)));
         }
         if let Some(text) = clocks.over_limit() {
@@ -259,11 +261,11 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// Fetches fail when the flash has fewer wait states than SYSCLK needs (RM0008 3.3.3).
+    /// Reports a flash with fewer wait states than SYSCLK needs (RM0008 3.3.3).
     fn check_wait_states(&mut self, now: Time) {
         let (wait_states, _) = self.flash.access_control();
         if self.clocks.sysclk > crate::machine::timing::highest_sysclk(wait_states) {
-            let text = "SYSCLK is too fast for the flash's wait states";
+            let text = "SYSCLK is too fast for the wait states of the flash";
             self.notes.push((now, What::Other(text)));
         }
     }
@@ -279,7 +281,7 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// The watchdog's clock.
+    /// Passes the clock of the watchdog on to it.
     fn wire_lsi(&mut self, now: Time) {
         self.iwdg.advance(now);
         self.iwdg.set_lsi(self.rcc.lsi());
@@ -291,7 +293,7 @@ impl<C: Circuit> Soc<C> {
             self.rcc.hold_lsi(now);
             self.wire_lsi(now);
         }
-        if self.iwdg.take_bite() {
+        if self.iwdg.take_reset_request() {
             self.signals.reset = Some(Cause::Iwdg);
         }
     }
@@ -301,7 +303,7 @@ impl<C: Circuit> Soc<C> {
         self.i2c1.lock_filters(now);
     }
 
-    /// A disturbance that looks like a start condition on the I2C wires. Returns whether it was a bus error.
+    /// Disturbs the I2C wires with a pulse that looks like a start condition. Returns whether this was a bus error.
     pub fn disturb_i2c(&mut self, now: Time) -> bool {
         self.catch_up(Block::I2c1, now);
         let bus_error = self.i2c1.disturb();
@@ -310,7 +312,7 @@ impl<C: Circuit> Soc<C> {
         bus_error
     }
 
-    /// The RC oscillators have these rates in Hz from `now` on.
+    /// Sets the frequencies of the RC oscillators in Hz, from `now` on.
     pub fn set_rc_oscillators(&mut self, hsi: u32, lsi: u32, now: Time) {
         self.catch_up(Block::Rcc, now);
         self.rcc.set_rc_oscillators(hsi, lsi);
@@ -320,7 +322,7 @@ impl<C: Circuit> Soc<C> {
         self.find_next();
     }
 
-    /// The crystal works or does not from `now` on.
+    /// Sets whether the crystal works, from `now` on.
     pub fn set_crystal(&mut self, works: bool, now: Time) {
         self.catch_up(Block::Rcc, now);
         self.rcc.set_crystal(works, now);

@@ -339,7 +339,7 @@ fn flash_file_that_is_invalid_or_cannot_be_written_is_refused() {
         crate::refused(&arguments, &[flash, part]);
     };
     refused(directory.path().to_str().unwrap(), "not a file");
-    refused(elf, "bytes, the flash 131072");
+    refused(elf, "bytes, but the flash has 131072");
     refused("/nowhere/flash", NOT_THERE);
     if cfg!(target_os = "linux") {
         refused("/proc/flash", "");

@@ -63,6 +63,11 @@ fn break_at(bench: &mut Bench, what: &str, address: u32, code: u16) -> u16 {
     bench.board.patch_code(address, &was).unwrap();
     bench.started();
     assert_eq!(bench.board.resets(), before + 1, "{what}: one reset");
+    let log = bench.board.take_log();
+    assert!(
+        log.contains("WARN last fault: watchdog reset\n"),
+        "{what}: {log}"
+    );
     for pin in 0..4 {
         let edges = bench.board.pin_edges('A', pin).iter();
         let edges: Vec<_> = edges.filter(|(at, _)| *at > from).collect();

@@ -12,7 +12,7 @@
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `bus`: several boards on one line |
-//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack`, `long_run` |
+//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
 
@@ -41,6 +41,7 @@ mod hung_task;
 mod identify;
 mod in_force;
 mod lock;
+mod log;
 mod long_run;
 mod module_choice;
 mod noise;

@@ -268,7 +268,7 @@ fn a_program_too_fast_for_its_wait_states_is_reported() {
     assert_eq!(board.hclk(), 36_000_000);
     assert_eq!(
         findings(&board),
-        ["SYSCLK is too fast for the flash's wait states"]
+        ["SYSCLK is too fast for the wait states of the flash"]
     );
 }
 

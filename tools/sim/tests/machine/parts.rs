@@ -158,7 +158,7 @@ fn a_circuit_drives_the_pins_of_a_larger_package() {
 }
 
 #[test]
-#[should_panic(expected = "STM32F103CB has no such pin")]
+#[should_panic(expected = "STM32F103CB has no pin PC0")]
 fn circuit_cannot_drive_a_pin_that_the_package_does_not_have() {
     let _ = Chip::in_circuit(&copies(&[]).image(), chip::Config::default(), HighPc0);
 }

@@ -95,7 +95,7 @@ fn receiver_whose_pin_is_an_output_is_reported() {
     program.spin();
     let mut board = board(program);
     board.step(100);
-    let text = "USART1 receives, but its RX pin is no digital input";
+    let text = "USART1 receives, but its RX pin is not a digital input";
     assert!(findings(&board).contains(&text.to_owned()));
 }
 

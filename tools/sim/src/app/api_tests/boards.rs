@@ -1,9 +1,9 @@
-//! Requests to one of several boards, and to one of several slots.
+//! Tests of requests to one of several boards, and to one of several slots.
 
 use super::*;
 
 #[test]
-fn slots_of_a_larger_board_are_addressed_by_their_ports() {
+fn slots_of_the_modio_08_are_addressed_by_their_ports() {
     let mut bench = bench_of(Config {
         layout: &board::MODIO_08,
         slots: vec![(3, Module::Relay2)],
@@ -46,7 +46,7 @@ fn slots_of_a_larger_board_are_addressed_by_their_ports() {
 }
 
 #[test]
-fn a_board_with_one_slot_has_no_list_of_slots_but_a_port() {
+fn board_with_one_slot_has_no_list_of_slots_but_accepts_its_port() {
     let mut bench = bench(Module::Di4);
     assert_eq!(state(&mut bench).get("slots"), None);
     let reply = post(
@@ -58,7 +58,7 @@ fn a_board_with_one_slot_has_no_list_of_slots_but_a_port() {
 }
 
 #[test]
-fn a_board_is_also_addressed_by_its_name() {
+fn single_board_is_also_addressed_by_its_name() {
     let mut bench = bench(Module::Di4);
     let boards = get(&mut bench, "/api/boards").body;
     assert_eq!(
@@ -85,7 +85,7 @@ fn a_board_is_also_addressed_by_its_name() {
 }
 
 #[test]
-fn several_boards_are_addressed_by_their_names_and_the_first_one_without() {
+fn boards_are_addressed_by_name_and_a_path_without_name_means_the_first() {
     let config = |module| Config {
         module,
         ..Config::default()

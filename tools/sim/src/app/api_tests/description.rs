@@ -1,14 +1,14 @@
-//! The OpenAPI description against the code.
+//! Compares the OpenAPI description with the code.
 
 use super::*;
 
 #[test]
-fn the_description_names_every_path_and_no_other() {
+fn description_has_every_path_and_no_other() {
     let mut bench = bench(Module::Di4);
     let described = get(&mut bench, "/api/openapi.json");
     assert_eq!(described.status, 200);
     let paths = described.body["paths"].as_object().unwrap();
-    // The table of this module's documentation; `/api/events` is the server's own.
+    // The paths are in the table at the start of api.rs, except `/api/events`, which the HTTP server handles itself.
     let mut known: Vec<_> = include_str!("../api.rs")
         .lines()
         .filter_map(|line| line.strip_prefix("//! | `"))

@@ -1,4 +1,4 @@
-//! The HTTP interface against a real board whose firmware does nothing.
+//! Tests of the HTTP interface with a board whose firmware does nothing.
 
 mod boards;
 mod description;
@@ -33,7 +33,7 @@ fn state(bench: &mut Bench) -> Value {
 }
 
 #[test]
-fn the_state_has_everything_of_the_contract() {
+fn state_has_every_documented_entry() {
     let mut bench = bench(Module::Di4);
     bench.bus.run_for(sim::Time::from_ms(3));
     let state = state(&mut bench);
@@ -52,7 +52,7 @@ fn the_state_has_everything_of_the_contract() {
 }
 
 #[test]
-fn inputs_follow_the_world_outside() {
+fn post_to_a_channel_changes_this_channel_only() {
     let mut di = bench(Module::Di4);
     let reply = post(&mut di, "/api/channels/3", r#"{"energised":true}"#);
     assert_eq!(reply.status, 200);
@@ -73,7 +73,7 @@ fn inputs_follow_the_world_outside() {
 }
 
 #[test]
-fn what_a_channel_does_not_have_is_refused() {
+fn change_that_the_channel_does_not_have_returns_409() {
     let mut bench = bench(Module::Di4);
     for body in [r#"{"manual":true}"#, r#"{"millivolts":100}"#] {
         assert_eq!(
@@ -85,7 +85,7 @@ fn what_a_channel_does_not_have_is_refused() {
 }
 
 #[test]
-fn power_and_switch_and_module() {
+fn power_dip_and_module_change_and_the_module_only_with_the_power_off() {
     let mut bench = bench(Module::Di4);
     assert_eq!(
         post(&mut bench, "/api/module", r#"{"name":"4do"}"#).status,
@@ -117,7 +117,7 @@ fn power_and_switch_and_module() {
 }
 
 #[test]
-fn frames_are_listed_from_a_number_on() {
+fn frames_since_a_number_are_the_later_ones() {
     let mut bench = bench(Module::Di4);
     for _ in 0..2 {
         bench.bus.run_for(sim::Time::from_ms(1));
@@ -135,7 +135,7 @@ fn frames_are_listed_from_a_number_on() {
 }
 
 #[test]
-fn anything_ill_formed_is_refused_and_changes_nothing() {
+fn malformed_request_is_refused_and_changes_nothing() {
     let mut bench = bench(Module::Di4);
     let before = state(&mut bench);
     for (method, target, body, status) in [
@@ -195,9 +195,9 @@ fn anything_ill_formed_is_refused_and_changes_nothing() {
 }
 
 #[test]
-fn findings_have_an_address_and_a_time() {
+fn finding_has_address_time_and_count() {
     use sim::Image;
-    // ldr r0, [pc, #4]; ldr r0, [r0]; b .; and the address of GPIOC, whose clock is off.
+    // ldr r0, [pc, #4]; ldr r0, [r0]; b .; and the address of GPIOC. Its clock is off.
     let image = [
         0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08, 0x01, 0x48, 0x00, 0x68, 0xFE, 0xE7, 0x00,
         0xBF, 0x00, 0x10, 0x01, 0x40,
@@ -217,7 +217,7 @@ fn findings_have_an_address_and_a_time() {
 }
 
 #[test]
-fn faults_are_made_shown_and_ended() {
+fn faults_are_caused_reported_and_cleared() {
     let mut bench = bench(Module::Ao4);
     let none = json!({
         "bit_error_rate": 0.0, "drop_rate": 0.0, "noise_hz": 0.0,
@@ -230,7 +230,7 @@ fn faults_are_made_shown_and_ended() {
     });
     let made = post(&mut bench, "/api/faults", &all.to_string());
     assert_eq!((made.status, &made.body), (200, &all));
-    // 8 MHz less 1.5 %: the program here runs from the HSI.
+    // 8 MHz minus 1.5 %, because the core runs from the HSI.
     assert_eq!(bench.first().hclk(), 7_880_000);
     assert!(!bench.first().crystal());
     let one = post(&mut bench, "/api/faults", r#"{"i2c_absent":false}"#).body;
@@ -261,7 +261,7 @@ fn faults_are_made_shown_and_ended() {
     assert_eq!(
         get(&mut bench, "/api/faults").body,
         none,
-        "nothing half done"
+        "a refused request changes nothing"
     );
     assert_eq!(ask(&mut bench, "DELETE", "/api/faults", "").status, 405);
 }

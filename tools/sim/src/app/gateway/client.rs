@@ -11,39 +11,39 @@ use super::Message;
 use super::mbap::{self, Request};
 use crate::app::Event;
 
-/// Clients that are served at the same time. The connection of another one is closed.
+/// Most clients that are served at the same time. The connection of a further client is closed.
 pub const CLIENTS: usize = 32;
 
-/// Requests of a client that wait for the line. Further requests stay in the connection until there is room.
+/// Most requests of a client that wait in the gateway. Further requests wait in the connection.
 const WAITING: usize = 16;
 
-/// Responses that wait for a client to read them. Beyond, the client is given up.
+/// Most responses that wait for a client to read them. With more, the client is disconnected.
 const UNREAD: usize = 64;
 
-/// So long may a client not read before it is given up.
+/// A client that does not read for this long is disconnected.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// A client, as the thread of the line sees it.
 pub struct Client {
     requests: Receiver<Request>,
-    /// Where its responses go.
+    /// Takes the responses for the client.
     pub responses: Responses,
-    /// Counts the clients.
+    /// The number of these references is the number of clients.
     _place: Arc<()>,
 }
 
 impl Client {
-    /// The oldest request that waits.
+    /// Returns the oldest request that waits.
     ///
     /// # Errors
     ///
-    /// There is none now, or there will be none any more.
+    /// No request waits now, or the client has disconnected.
     pub fn next(&self) -> Result<Request, TryRecvError> {
         self.requests.try_recv()
     }
 }
 
-/// Sends responses to a client. Its connection is closed when all of these are gone.
+/// Sends responses to a client. The connection is closed when all clones of this are dropped.
 #[derive(Clone)]
 pub struct Responses {
     frames: SyncSender<Vec<u8>>,
@@ -51,7 +51,7 @@ pub struct Responses {
 }
 
 impl Responses {
-    /// Sends a frame; never waits. A client that does not read is given up.
+    /// Sends a frame; never waits. A client with too many unread responses is disconnected.
     pub fn send(&self, frame: Vec<u8>) {
         if self.frames.try_send(frame).is_err() {
             let _ = self.stream.shutdown(Shutdown::Both);
@@ -59,11 +59,11 @@ impl Responses {
     }
 }
 
-/// Listens at `address` from now on, and returns where: with port 0 the system chooses one.
+/// Starts to listen at `address`, and returns the address: with port 0 the system chooses the port.
 ///
 /// # Errors
 ///
-/// When the address cannot be listened at, in one line.
+/// In one line, why the simulator cannot listen there.
 pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, String> {
     let cannot = |error| format!("cannot serve Modbus TCP at {address}: {error}");
     let listener = TcpListener::bind(address).map_err(cannot)?;
@@ -72,19 +72,20 @@ pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, 
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let place = Arc::clone(&places);
-            // The listener has one, and this client.
+            // This thread has one reference, and each client, also this one, has one.
             if Arc::strong_count(&places) > CLIENTS + 1 {
                 continue;
             }
-            // A client that is gone already is none.
-            let _ = attend(stream, place, events.clone());
+            // An error means that the client has already disconnected.
+            let _ = serve(stream, place, events.clone());
         }
     });
     Ok(address)
 }
 
-fn attend(stream: TcpStream, place: Arc<()>, events: Sender<Event>) -> std::io::Result<()> {
-    // A request and its response are short and follow one another: waiting for more would only delay.
+/// Starts the two threads of a client.
+fn serve(stream: TcpStream, place: Arc<()>, events: Sender<Event>) -> std::io::Result<()> {
+    // Requests and responses are short and alternate. Collecting more bytes before sending would only delay them.
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let (mut from, mut to) = (stream.try_clone()?, stream.try_clone()?);
@@ -98,9 +99,9 @@ fn attend(stream: TcpStream, place: Arc<()>, events: Sender<Event>) -> std::io::
         },
         _place: place,
     };
-    // When the events have no receiver any more, the simulator ends.
-    let tell = move |message| drop(events.send(Event::Gateway(message)));
-    tell(Message::Joined(client));
+    // Sending fails only while the simulator is ending.
+    let notify = move |message| drop(events.send(Event::Gateway(message)));
+    notify(Message::Joined(client));
     thread::spawn(move || {
         for frame in to_send {
             if to.write_all(&frame).is_err() {
@@ -110,15 +111,15 @@ fn attend(stream: TcpStream, place: Arc<()>, events: Sender<Event>) -> std::io::
         let _ = to.shutdown(Shutdown::Both);
     });
     thread::spawn(move || {
-        // The connection ends, or what it carries is not Modbus.
+        // The loop ends when the connection ends or carries something other than Modbus.
         while let Ok(Some(request)) = mbap::read(&mut from) {
             if send_request.send(request).is_err() {
                 break;
             }
-            tell(Message::Ready);
+            notify(Message::Ready);
         }
         drop(send_request);
-        tell(Message::Ready);
+        notify(Message::Ready);
     });
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! A request on the line, until its reply has been received or can no longer be.
+//! A request on the line, until its reply was received or the time for it is over.
 
 use modbus_frames::adu::{ASCII_MOST, Framing, RTU_MOST};
 use sim::Time;
@@ -7,10 +7,10 @@ use sim::line::{Direction, Frame, Line, Settings};
 use super::mbap::Request;
 use crate::app::bench::Bench;
 
-/// A unit begins its reply within this time after the request.
+/// Time after the request within which a unit must begin its reply.
 const BEGINS: Time = Time::from_ms(200);
 
-/// The pause after a broadcast, in which every unit carries it out (V1.02, 2.4.1: 100 to 200 ms).
+/// Pause after a broadcast, in which every unit carries out the request (V1.02, 2.4.1: 100 to 200 ms).
 const TURNAROUND: Time = Time::from_ms(100);
 
 /// The outcome of a request.
@@ -26,21 +26,21 @@ pub enum Outcome {
     Sent,
 }
 
-/// A request that is on the line, or was.
+/// A request that is on the line, or has been sent and waits for its reply.
 pub struct Exchange {
     framing: Framing,
     unit: u8,
     function: u8,
-    /// The number of the last frame before it.
+    /// Number of the last frame before the request.
     after: u64,
-    /// The end of the request.
+    /// End of the request.
     end: Time,
-    /// When waiting is over.
+    /// Virtual time at which the gateway stops waiting.
     until: Time,
 }
 
 impl Exchange {
-    /// Sends a request: now, or when the bytes that other masters have sent are out.
+    /// Sends a request: now, or directly after the bytes that other masters are still sending.
     pub fn begin(bench: &mut Bench, framing: Framing, request: &Request) -> Self {
         let now = bench.now();
         let line = bench.bus.line();
@@ -77,7 +77,7 @@ impl Exchange {
         }
     }
 
-    /// The PDU of this frame, if the frame is the reply.
+    /// Returns the PDU of this frame if the frame is the reply.
     fn reply(&self, frame: &Frame) -> Option<Vec<u8>> {
         let good = frame.direction == Direction::FromUnit && !frame.damaged;
         if !good || frame.start < self.end {
@@ -88,8 +88,8 @@ impl Exchange {
     }
 }
 
-/// How long after a request its reply has been received in full at the latest: when it begins in time, is as long as
-/// frames can be, and has been followed by the silence that ends a frame.
+/// Time after a request within which its reply must have been received. It consists of the time until the reply begins,
+/// the longest frame, and the silence that ends a frame.
 pub fn patience(framing: Framing, settings: Settings) -> Time {
     let longest = match framing {
         Framing::Ascii => ASCII_MOST,
@@ -136,7 +136,7 @@ mod tests {
         };
         let refusal = |frame: &mut Frame| frame.bytes = Framing::Rtu.frame(0, 7, &[0x83, 2]);
         assert_eq!(with(&refusal), Some(vec![0x83, 2]));
-        assert_eq!(with(&|frame| frame.bytes[4] ^= 1), None, "the CRC");
+        assert_eq!(with(&|frame| frame.bytes[4] ^= 1), None, "wrong CRC");
         assert_eq!(with(&|frame| frame.damaged = true), None);
         assert_eq!(with(&|frame| frame.direction = Direction::FromMaster), None);
         assert_eq!(with(&|frame| frame.start = Time::from_ms(9)), None);
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn patience_follows_the_rate() {
+    fn patience_depends_on_rate_and_framing() {
         let at = |baud, format| Settings { baud, format };
         let ms = |framing, settings| patience(framing, settings).as_ms();
         // 256 + 3.5 + 1 characters of 11 bits.

@@ -4,26 +4,26 @@ use std::io::{self, Read};
 
 use modbus_frames::adu::MBAP;
 
-/// The most that the length in a header can be: the unit identifier and the longest PDU.
+/// Largest length in a header: the unit identifier and the longest PDU, in bytes.
 const MOST: usize = 254;
 
 /// A request as it was received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// Chosen by the client, and repeated in the response.
+    /// Transaction identifier: the client chooses it, and the response repeats it.
     pub transaction: u16,
     /// The unit identifier: the address of the unit on the line.
     pub unit: u8,
-    /// Function and data.
+    /// Function code and data.
     pub pdu: Vec<u8>,
 }
 
-/// Reads the next request; `None` when the client has closed the connection.
+/// Reads the next request. Returns `None` when the client has closed the connection.
 ///
 /// # Errors
 ///
-/// The connection is lost, or the header is not that of a Modbus request: then the beginning of the next request is
-/// unknown.
+/// The connection is lost, or the header is not that of a Modbus request. In both cases the connection is of no further
+/// use, because the start of the next request is unknown.
 pub fn read(stream: &mut impl Read) -> io::Result<Option<Request>> {
     let mut header = [0; MBAP];
     if stream.read(&mut header[..1])? == 0 {
@@ -33,7 +33,9 @@ pub fn read(stream: &mut impl Read) -> io::Result<Option<Request>> {
     let word = |at: usize| u16::from_be_bytes([header[at], header[at + 1]]);
     let length = usize::from(word(4));
     if word(2) != 0 || !(2..=MOST).contains(&length) {
-        return Err(io::Error::other("no Modbus header"));
+        return Err(io::Error::other(
+            "the header is not that of a Modbus request",
+        ));
     }
     let mut pdu = vec![0; length - 1];
     stream.read_exact(&mut pdu)?;
@@ -78,7 +80,7 @@ mod tests {
             frame.resize(400, 0);
             frame
         };
-        // The protocol, a length of 0, 1, 255 and more than 256.
+        // Two wrong protocols, and lengths of 0, 1, 255 and more than 256.
         for bytes in [
             with(3, 1),
             with(2, 1),

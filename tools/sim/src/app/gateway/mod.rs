@@ -6,10 +6,9 @@
 //! client --- thread --- requests --+
 //! ```
 //!
-//! The gateway is one more master on the line. It sends the request of one client, waits for the reply of the unit that
-//! the request is for, and passes the reply on. A frame with a wrong check, a damaged one or one of another unit is no
-//! reply. It does not listen before it sends, as a gateway on a real line does not either: when another master is
-//! active at the same time, they collide.
+//! The gateway is one more master on the line. It sends the request of one client, waits for the reply of the addressed
+//! unit, and passes the reply on. A frame with a wrong check, a damaged frame and a frame of another unit are no reply.
+//! Like a gateway on a real line, it does not wait for a free line: the frames of two masters at the same time collide.
 
 mod client;
 mod exchange;
@@ -34,33 +33,32 @@ const NO_PATH: u8 = 0x0A;
 /// Exception 0B: no unit has answered.
 const NO_ANSWER: u8 = 0x0B;
 
-/// Requests that are answered in one go, so that clients whose requests need no line cannot keep the thread of the line
-/// busy.
+/// Most requests that are answered in one call, so that requests that need no line cannot keep the boards' thread busy.
 const AT_ONCE: usize = 64;
 
-/// Messages from the clients' threads to the thread that has the line.
+/// Messages from the clients' threads to the boards' thread.
 pub enum Message {
     /// A client has connected.
     Joined(Client),
-    /// A client has sent a request, or is gone.
+    /// A client has sent a request, or has disconnected.
     Ready,
 }
 
-/// The gateway, on the side of the line.
+/// The part of the gateway that runs on the boards' thread.
 pub struct Gateway {
     address: SocketAddr,
-    /// Whose turn it is stands first.
+    /// The clients; the first one has the next turn.
     clients: VecDeque<Client>,
     under_way: Option<(Exchange, Request, Responses)>,
     mode: Mode,
 }
 
 impl Gateway {
-    /// Listens at `address` from now on.
+    /// Starts to listen at `address`.
     ///
     /// # Errors
     ///
-    /// When nothing can listen there, in one line.
+    /// In one line, why the simulator cannot listen there.
     pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<Self, String> {
         Ok(Self {
             address: client::listen(address, events)?,
@@ -70,7 +68,7 @@ impl Gateway {
         })
     }
 
-    /// Where it listens: with port 0 the system has chosen one.
+    /// The address of the gateway: with port 0 the system has chosen the port.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -83,8 +81,8 @@ impl Gateway {
         }
     }
 
-    /// Passes on a reply that has been received by now, and sends the next request. While a debugger has `halted` the
-    /// core, no time passes on the line, so nothing can be sent.
+    /// Passes on a reply that was received, and sends the next request. `halted` says that a debugger has halted the
+    /// core: no time passes on the line then, so nothing can be sent.
     pub fn update(&mut self, bench: &mut Bench, halted: bool) {
         self.mode.update(bench.bus.board(0));
         for _ in 0..AT_ONCE {
@@ -113,7 +111,7 @@ impl Gateway {
         }
     }
 
-    /// The next request of the next client that has one. Clients that are gone are forgotten.
+    /// Returns the next request of the next client that has one. Removes clients that have disconnected.
     fn next(&mut self) -> Option<(Request, Responses)> {
         for _ in 0..self.clients.len() {
             let client = self.clients.pop_front()?;
@@ -135,7 +133,7 @@ fn respond(responses: &Responses, request: &Request, pdu: &[u8]) {
     responses.send(Framing::Mbap.frame(request.transaction, request.unit, pdu));
 }
 
-/// Answers with an exception; a broadcast has no response, whatever becomes of it.
+/// Answers with an exception. A broadcast never has a response, so it is dropped.
 fn refuse(responses: &Responses, request: &Request, exception: u8) {
     if request.unit != 0 {
         respond(responses, request, &[request.pdu[0] | 0x80, exception]);

@@ -1,25 +1,26 @@
-//! The mode of the line, which the gateway has to speak: RTU or ASCII.
+//! The mode of the line, RTU or ASCII, in which the gateway sends.
 
 use modbus_frames::adu::Framing;
 use register_map::{codes, configuration};
 use sim::Board;
 use sim::line::{Format, Settings};
 
-/// The DIP switch's loader mode: the line in RTU, whatever is stored.
+/// Value of the DIP switch for the loader mode: the line is in RTU mode, whatever is stored.
 const LOADER: u8 = 255;
 
-/// The mode that the unit has set its line to: the stored one as it was when the unit started.
+/// The mode of the unit's line, which the unit read from its settings when it started.
 #[derive(Debug, Default)]
 pub struct Mode {
-    /// Power-ons, and resets since: they identify a start.
+    /// Number of power-ons, and of resets since the last one: they identify a start.
     start: Option<(u64, u32)>,
-    /// The switch at power-on.
+    /// The DIP switch at power-on.
     dip: u8,
+    /// The register MODE at the start.
     stored: u16,
 }
 
 impl Mode {
-    /// Looks whether the unit has started again.
+    /// Reads switch and mode again if the unit has started again.
     pub fn update(&mut self, board: &Board) {
         let start = (board.power_ons(), board.resets());
         if self.start == Some(start) {
@@ -33,7 +34,7 @@ impl Mode {
         self.stored = mode.unwrap_or_default();
     }
 
-    /// How frames are marked off. RTU cannot be with 7 data bits (V1.02, 2.5.1).
+    /// The framing of the line. A line with 7 data bits is in ASCII mode, because RTU needs 8 (V1.02, 2.5.1).
     pub fn framing(&self, settings: Settings) -> Framing {
         let seven = match settings.format {
             Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => true,
@@ -64,7 +65,7 @@ mod tests {
         });
         let mut mode = Mode::default();
         mode.update(bench.bus.board(0));
-        // The switch counts at power-on.
+        // The firmware reads the switch at power-on only.
         bench.first().set_dip(1);
         mode.update(bench.bus.board(0));
         let baud = 9600;
@@ -72,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn mode_is_the_stored_one_but_for_loader_mode_and_seven_bits() {
+    fn mode_is_the_stored_one_except_in_loader_mode_and_with_seven_bits() {
         assert_eq!(framing(1, 0, Format::N2), Framing::Rtu);
         assert_eq!(framing(1, 1, Format::N2), Framing::Ascii);
         assert_eq!(framing(255, 1, Format::N2), Framing::Rtu);
@@ -80,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn stored_mode_counts_from_the_next_start() {
+    fn stored_mode_is_in_force_from_the_next_start() {
         let mut bench = bench_of(Config::default());
         let mut mode = Mode::default();
         mode.update(bench.bus.board(0));

@@ -1,8 +1,8 @@
 //! The GDB server on the core (`--gdb`): one debugger at a time.
 //!
-//! A thread waits for it and passes its bytes on; the protocol itself (crate gdbstub) runs on the board's own
-//! thread, in [`session`], and sees the board through [`target`]. While the debugger has the core halted, no
-//! virtual time passes.
+//! A thread waits for a debugger and passes its bytes on. The protocol (crate gdbstub) runs on the boards' thread: the
+//! session with the debugger in [`session`], its access to the board in [`target`]. While the debugger has halted the
+//! core, no virtual time passes.
 
 use std::io::Read;
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -20,27 +20,27 @@ pub use target::Debug;
 
 /// Events from the debugger.
 pub enum Message {
-    /// It has connected; this end is for writing.
+    /// A debugger has connected; packets for it are written to this stream.
     Connected(TcpStream),
-    /// Bytes of the protocol.
+    /// Bytes from the debugger.
     Bytes(Vec<u8>),
-    /// It has gone.
+    /// The debugger has disconnected.
     Gone,
 }
 
-/// Waits for a debugger at `address`; returns where it listens, as with port 0 the system chooses one.
+/// Starts to listen at `address` for a debugger, and returns the address: with port 0 the system chooses the port.
 ///
 /// # Errors
 ///
-/// When nothing can listen there, in one line.
+/// In one line, why the simulator cannot listen there.
 pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, String> {
     let cannot = |error| format!("cannot offer a GDB server at {address}: {error}");
     let listener = TcpListener::bind(address).map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {
-            // The next one waits until this one has gone.
-            if attend(stream, &events).is_none() {
+            // A second debugger waits until the first one has disconnected.
+            if serve(stream, &events).is_none() {
                 return;
             }
         }
@@ -48,8 +48,8 @@ pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, 
     Ok(address)
 }
 
-/// Passes on what one debugger sends, until it goes; `None` when nobody takes it any more.
-fn attend(mut stream: TcpStream, events: &Sender<Event>) -> Option<()> {
+/// Passes on the bytes of a debugger until it disconnects. Returns `None` when the simulator is stopping.
+fn serve(mut stream: TcpStream, events: &Sender<Event>) -> Option<()> {
     let pass_on = |message| events.send(Event::Gdb(message)).ok();
     let Ok(writing) = stream.try_clone() else {
         return Some(());
@@ -59,7 +59,7 @@ fn attend(mut stream: TcpStream, events: &Sender<Event>) -> Option<()> {
     while let Ok(length @ 1..) = stream.read(&mut buffer) {
         pass_on(Message::Bytes(buffer[..length].to_vec()))?;
     }
-    // That it is closed already does not matter.
+    // An error means that the connection is already closed.
     let _ = stream.shutdown(Shutdown::Both);
     pass_on(Message::Gone)
 }

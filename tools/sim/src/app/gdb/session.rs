@@ -1,4 +1,4 @@
-//! A debugger's session: from its connection, which halts the core, until it goes and the core runs on.
+//! The session with a debugger. Connecting halts the core. When the debugger detaches or disconnects, the core runs on.
 
 use std::net::TcpStream;
 
@@ -13,19 +13,19 @@ use super::wire::Wire;
 
 type Machine = GdbStubStateMachine<'static, Bench, Wire>;
 
-/// The debugger, if one is there.
+/// The session with the debugger, if one is connected.
 #[derive(Default)]
 pub struct Session {
     machine: Option<Machine>,
 }
 
 impl Session {
-    /// Whether the debugger has the core halted: then time stands still.
+    /// Whether the debugger has halted the core. Virtual time stands still then.
     pub fn halted(&self) -> bool {
         !matches!(self.machine, None | Some(GdbStubStateMachine::Running(_)))
     }
 
-    /// Takes up what came from the debugger.
+    /// Handles a message from the debugger's thread.
     pub fn take(&mut self, message: Message, bench: &mut Bench) {
         match message {
             Message::Connected(stream) => self.start(stream, bench),
@@ -38,11 +38,11 @@ impl Session {
             Message::Gone => self.machine = None,
         }
         if self.machine.is_none() {
-            bench.forget_breakpoints();
+            bench.remove_breakpoints();
         }
     }
 
-    /// Runs the board to `until`, or to a breakpoint; not at all while it is halted.
+    /// Runs the board until `until` or to a breakpoint. Does nothing while the core is halted.
     pub fn run_until(&mut self, until: Time, bench: &mut Bench) {
         if self.machine.is_none() {
             bench.run_until(until);
@@ -52,7 +52,7 @@ impl Session {
     }
 
     fn start(&mut self, stream: TcpStream, bench: &mut Bench) {
-        // A debugger that has gone already gets no session, nor does one that cannot be answered.
+        // A debugger that has already disconnected, or that cannot be answered, gets no session.
         self.machine = Wire::new(stream)
             .ok()
             .and_then(|wire| GdbStub::new(wire).run_state_machine(bench).ok());
@@ -74,7 +74,7 @@ impl Session {
         });
     }
 
-    /// Moves the protocol on. A debugger that cannot be understood or answered has gone.
+    /// Carries out a step of the protocol. Ends the session if the protocol has failed.
     fn drive(
         &mut self,
         bench: &mut Bench,
@@ -84,7 +84,7 @@ impl Session {
     }
 }
 
-/// One byte from the debugger.
+/// Passes a byte from the debugger to the protocol. Returns `None` when the session has ended.
 fn incoming(machine: Machine, byte: u8, bench: &mut Bench) -> Option<Machine> {
     let next = match machine {
         GdbStubStateMachine::Idle(idle) => idle.incoming_data(bench, byte),
@@ -96,7 +96,7 @@ fn incoming(machine: Machine, byte: u8, bench: &mut Bench) -> Option<Machine> {
             let reason = SingleThreadStopReason::Signal(Signal::SIGINT);
             interrupt.interrupt_handled(bench, Some(reason)).ok()
         }
-        // It detaches, or would kill the program, which a unit does not let happen.
+        // The debugger detaches or wants to kill the program. Either ends the session, and the unit runs on.
         GdbStubStateMachine::Disconnected(_) => None,
         other => Some(other),
     }

@@ -1,4 +1,4 @@
-//! The board as gdbstub sees it: a core with registers, memory and breakpoints.
+//! The board as a target of gdbstub: a core with registers, memory and breakpoints.
 
 use core::convert::Infallible;
 
@@ -18,20 +18,22 @@ use gdbstub::target::{Target, TargetError, TargetResult};
 
 use super::super::bench::Bench;
 
-/// Registers that GDB gets, in the order of [`CortexM::target_description_xml`] and of [`sim::Board::register`].
+/// Number of registers that GDB gets, in the order of [`CortexM::target_description_xml`] and of
+/// [`sim::Board::register`].
 const REGISTERS: usize = 23;
+/// Number of the program counter.
 const PC: usize = 15;
 
-/// What the debugger wants the core to do, and what it has set up.
+/// The orders of the debugger.
 #[derive(Debug, Default)]
 pub struct Debug {
-    /// One instruction is wanted, not a run.
+    /// Whether the core must execute one instruction and halt.
     pub step: bool,
-    /// Every breakpoint added and not removed.
+    /// Addresses of the breakpoints in force.
     breakpoints: Vec<u32>,
 }
 
-/// The Cortex-M3; gdbstub's own list of architectures has no M profile.
+/// The architecture of the Cortex-M3. The crate gdbstub_arch has none with an M profile.
 #[derive(Debug)]
 pub enum CortexM {}
 
@@ -59,7 +61,7 @@ impl Arch for CortexM {
     }
 }
 
-/// The core's registers.
+/// The values of the core's registers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CoreRegisters([u32; REGISTERS]);
 
@@ -89,8 +91,8 @@ impl Registers for CoreRegisters {
 }
 
 impl Bench {
-    /// Takes away every breakpoint: the debugger has gone.
-    pub fn forget_breakpoints(&mut self) {
+    /// Removes every breakpoint.
+    pub fn remove_breakpoints(&mut self) {
         for address in core::mem::take(&mut self.debug.breakpoints) {
             self.first().remove_breakpoint(address);
         }
@@ -144,7 +146,7 @@ impl SingleThreadBase for Bench {
 
     fn write_registers(&mut self, registers: &CoreRegisters) -> TargetResult<(), Self> {
         for (number, value) in registers.0.into_iter().enumerate() {
-            // Only what changes: SP is MSP or PSP under another name.
+            // Write only registers that change: SP is another name of MSP or PSP, and would overwrite a change of it.
             if self.bus.board(0).register(number) != Some(value) {
                 self.first()
                     .set_register(number, value)

@@ -1,4 +1,4 @@
-//! The way back to the debugger.
+//! The connection to the debugger, for writing.
 
 use std::io::{self, Write};
 use std::net::{Shutdown, TcpStream};
@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use gdbstub::conn::Connection;
 
-/// A debugger that does not read for this long is given up: the board's thread waits for it.
+/// A debugger that does not read for this long is disconnected, because the boards' thread waits for it.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// The way to the debugger, which sends whole packets. The connection is closed when it is dropped.
+/// Sends whole packets to the debugger. Dropping this closes the connection.
 #[derive(Debug)]
 pub struct Wire {
     stream: TcpStream,
@@ -17,11 +17,11 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// The way to the debugger at the other end of `stream`.
+    /// Prepares `stream` for sending packets to the debugger.
     ///
     /// # Errors
     ///
-    /// When it has gone already.
+    /// The debugger has already disconnected.
     pub fn new(stream: TcpStream) -> io::Result<Self> {
         stream.set_write_timeout(Some(PATIENCE))?;
         stream.set_nodelay(true)?;
@@ -49,7 +49,7 @@ impl Connection for Wire {
 
 impl Drop for Wire {
     fn drop(&mut self) {
-        // The reading thread then ends, too; that it is closed already does not matter.
+        // This also ends the reading thread. An error means that the connection is already closed.
         let _ = self.stream.shutdown(Shutdown::Both);
     }
 }

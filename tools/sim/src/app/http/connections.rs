@@ -1,4 +1,4 @@
-//! How many clients there may be at once.
+//! Limits the number of connections to the HTTP server.
 
 use std::io;
 use std::net::SocketAddr;
@@ -13,14 +13,14 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
-/// Most connections at once.
+/// Most connections that are served at the same time.
 pub const MOST: usize = 64;
-/// Most connections that are being refused at once. Beyond, they are closed without a word.
+/// Most connections that are being refused at the same time. Further connections are closed without a reply.
 const MOST_REFUSED: usize = 64;
-/// How long a client that is refused has to take its answer.
+/// Time in which a refused client must read the reply.
 const FAREWELL: Duration = Duration::from_secs(2);
 
-/// A listener with a bound on its connections.
+/// A listener with a limited number of connections.
 pub struct Bounded {
     listener: TcpListener,
     free: Arc<Semaphore>,
@@ -28,7 +28,7 @@ pub struct Bounded {
 }
 
 impl Bounded {
-    /// On top of this listener.
+    /// Limits the connections of `listener`.
     pub fn new(listener: TcpListener) -> Self {
         Self {
             listener,
@@ -69,20 +69,20 @@ impl Listener for Bounded {
 }
 
 async fn refuse(mut stream: TcpStream) -> io::Result<()> {
-    let body = format!("{{\"error\":\"there are {MOST} connections already\"}}");
+    let body = format!("{{\"error\":\"too many connections: {MOST} are open\"}}");
     let head = format!(
         "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
         body.len()
     );
     stream.write_all((head + &body).as_bytes()).await?;
     stream.shutdown().await?;
-    // Closed with its request unread, the client might never see the answer.
+    // Read the request to its end. Closing the connection earlier would reset it, and the client might lose the reply.
     let mut dropped = [0; 512];
     while stream.read(&mut dropped).await? > 0 {}
     Ok(())
 }
 
-/// A connection, which makes room for another when it ends.
+/// A connection. Dropping it makes room for another one.
 pub struct Connection {
     stream: TcpStream,
     _permit: OwnedSemaphorePermit,

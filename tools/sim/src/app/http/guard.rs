@@ -1,37 +1,39 @@
-//! Who may change something. A page from anywhere can have a browser on this computer send requests to the simulator,
-//! even under a domain name of that page, which its owner lets point to this computer. Both show in the headers `Host` and `Origin`.
+//! Refuses changes by foreign web pages.
+//!
+//! Any web page in a browser on this computer can send requests to the simulator. The page's owner can also let a
+//! domain name of the page point to this computer. The headers `Host` and `Origin` show both.
 
 use std::net::{IpAddr, SocketAddr};
 
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, Uri, header};
 
-/// What the headers of a request that changes something must say.
+/// Checks the headers of requests that change something.
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
     bound: IpAddr,
 }
 
 impl Guard {
-    /// For a server at this address.
+    /// The guard of a server at this address.
     pub const fn new(address: SocketAddr) -> Self {
         Self {
             bound: address.ip(),
         }
     }
 
-    /// Whether a request with these headers may change something.
+    /// Checks that a request with these headers may change something.
     ///
     /// # Errors
     ///
-    /// Why it may not.
+    /// The reason why the request must be refused.
     pub fn check(&self, headers: &HeaderMap) -> Result<(), &'static str> {
         let host: Authority = headers
             .get(header::HOST)
             .and_then(|host| host.to_str().ok()?.parse().ok())
-            .ok_or("the request has no good `Host`")?;
+            .ok_or("the header `Host` is missing or invalid")?;
         if !self.is_here(host.host()) {
-            return Err("`Host` is neither a loopback name nor the simulator's address");
+            return Err("the header `Host` is neither a loopback name nor the simulator's address");
         }
         let same = |origin: &Uri| origin.authority() == Some(&host);
         match headers.get(header::ORIGIN) {
@@ -42,7 +44,9 @@ impl Guard {
                 .and_then(|origin| origin.parse().ok())
                 .filter(same)
                 .map(|_| ())
-                .ok_or("`Origin` is not the simulator: another page may not change anything"),
+                .ok_or(
+                    "the header `Origin` is not the simulator: other pages may not change anything",
+                ),
         }
     }
 
@@ -54,7 +58,8 @@ impl Guard {
         else {
             return host.eq_ignore_ascii_case("localhost");
         };
-        // Bound to all addresses of the computer, it cannot know them; a name that somebody lets point here is none.
+        // A server that is bound to all addresses does not know them, so it accepts every IP address. A domain name is
+        // refused above.
         address.is_loopback() || address == self.bound || self.bound.is_unspecified()
     }
 }
@@ -73,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn only_loopback_names_and_the_bound_address_are_good_hosts() {
+    fn host_must_be_a_loopback_name_or_the_bound_address() {
         let loopback = "127.0.0.1:8502";
         for host in [
             "127.0.0.1:8502",
@@ -103,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn an_origin_must_be_the_host() {
+    fn origin_must_be_the_host() {
         let may = |origin| may("127.0.0.1:8502", "localhost:8502", Some(origin));
         assert!(may("http://localhost:8502"));
         for origin in [

@@ -1,4 +1,4 @@
-//! The HTTP server: sends the page, takes requests off the network, hands them to the board's thread, sends the replies.
+//! The HTTP server: sends the page, passes requests to the boards' thread, and sends the replies.
 
 mod connections;
 mod guard;
@@ -29,26 +29,27 @@ use super::{Event, api};
 use connections::Bounded;
 use guard::Guard;
 
-/// Longest body taken, in bytes; the longest that means something has under a hundred.
+/// Longest body that is accepted, in bytes. A valid body is much shorter.
 const LONGEST_BODY: usize = 64 * 1024;
-/// How much of a body that is too long is still read, in bytes, for a client that sends it all before it listens.
+/// Longest body that is read to its end before it is refused, in bytes. Some clients read the reply only after they
+/// have sent the whole body.
 const MOST_TO_DROP: usize = 64 * 1024 * 1024;
-/// A client that sends nothing of its body for so long gets no answer.
+/// A client that sends nothing of its body for this long is refused.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Serves at `address` from now on, and returns the address: with port 0 the system chooses the port. `live` carries
-/// the events that `/api/events` streams.
+/// Starts to serve at `address`, and returns the address: with port 0 the system chooses the port. `live` carries the
+/// events that `/api/events` streams.
 ///
 /// # Errors
 ///
-/// When nothing can listen there, in one line.
+/// In one line, why the simulator cannot listen there.
 pub fn listen(
     address: SocketAddr,
     events: Sender<Event>,
     live: broadcast::Sender<Note>,
 ) -> Result<SocketAddr, String> {
     let cannot = |error: std::io::Error| {
-        format!("cannot serve HTTP at {address}: {error} (choose another with --http ADDR)")
+        format!("cannot serve HTTP at {address}: {error} (choose another address with --http ADDR)")
     };
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -76,13 +77,13 @@ pub fn listen(
         .fallback(ask)
         .with_state(server);
     thread::spawn(move || {
-        // It ends with the program.
+        // The server ends with the program.
         let _ = runtime.block_on(async { axum::serve(Bounded::new(listener), app).await });
     });
     Ok(bound)
 }
 
-/// What a request is answered with.
+/// The state that every request handler gets.
 #[derive(Clone)]
 struct Server {
     events: Sender<Event>,
@@ -91,14 +92,14 @@ struct Server {
 }
 
 impl Server {
-    /// Has the board's thread answer.
+    /// Sends a request to the boards' thread and returns its reply.
     async fn board(&self, request: api::Request) -> api::Reply {
         let (reply, answer) = oneshot::channel();
-        let ending = || api::Reply::error(503, "the simulator is ending");
+        let stopping = || api::Reply::error(503, "the simulator is stopping");
         if self.events.send(Event::Request(request, reply)).is_err() {
-            return ending();
+            return stopping();
         }
-        answer.await.unwrap_or_else(|_| ending())
+        answer.await.unwrap_or_else(|_| stopping())
     }
 
     /// The reply to `GET target`.
@@ -137,13 +138,13 @@ async fn ask(State(server): State<Server>, request: axum::extract::Request) -> a
     }
 }
 
-/// Path and query.
+/// Path and query of a request.
 fn target(uri: &Uri) -> String {
     uri.path_and_query()
         .map_or_else(|| uri.path().to_owned(), ToString::to_string)
 }
 
-/// The body of a request whose head says that it has `announced` bytes.
+/// Reads the body of a request. `announced` is the length in its header `Content-Length`, in bytes.
 async fn whole(body: Body, announced: u64) -> Result<Vec<u8>, api::Reply> {
     let too_long = || api::Reply::error(413, "the body is longer than 64 KiB");
     if announced > MOST_TO_DROP as u64 {
@@ -154,9 +155,9 @@ async fn whole(body: Body, announced: u64) -> Result<Vec<u8>, api::Reply> {
     let mut pieces = body.into_data_stream();
     while let Some(piece) = tokio::time::timeout(PATIENCE, pieces.next())
         .await
-        .unwrap_or_else(|_| Some(Err(axum::Error::new("the client is silent"))))
+        .unwrap_or_else(|_| Some(Err(axum::Error::new("the client sends nothing"))))
     {
-        let piece = piece.map_err(|_| api::Reply::error(400, "the body was cut short"))?;
+        let piece = piece.map_err(|_| api::Reply::error(400, "the body is not complete"))?;
         length = length.saturating_add(piece.len());
         if length > MOST_TO_DROP {
             break;
@@ -172,7 +173,7 @@ async fn whole(body: Body, announced: u64) -> Result<Vec<u8>, api::Reply> {
 }
 
 async fn not_get() -> api::Reply {
-    api::Reply::error(405, "only GET here")
+    api::Reply::error(405, "this path accepts GET only")
 }
 
 async fn stream_of_first(State(server): State<Server>) -> Result<Response, api::Reply> {
@@ -191,9 +192,9 @@ async fn stream_of(
     }
 }
 
-/// Server-sent events: the state of a board, and from then on what changes on it and on the line.
+/// Streams server-sent events: the state of a board, and then its changes and the frames on the line.
 async fn stream(server: Server, board: usize, state: &str) -> Result<Response, api::Reply> {
-    // First the ear, then the state: nothing is missed in between.
+    // Subscribe before reading the state, so that no event between the two is missed.
     let notes = BroadcastStream::new(server.live.subscribe());
     let state = server.get(state).await;
     if state.status != 200 {
@@ -203,7 +204,7 @@ async fn stream(server: Server, board: usize, state: &str) -> Result<Response, a
     let then = notes.filter_map(move |note| match note {
         Ok(note) if note.board.is_some_and(|about| about != board) => None,
         Ok(note) => Some(event(note.name, note.data.as_ref())),
-        // A client that reads too slowly can ask for the state and the frames.
+        // A client that reads too slowly can read the state and the frames again.
         Err(Lagged(count)) => Some(event("lost", count.to_string())),
     });
     let all = tokio_stream::once(first)

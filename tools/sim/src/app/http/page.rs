@@ -1,4 +1,4 @@
-//! The front panel: files that are part of the program.
+//! The files of the page, which are part of the program.
 
 use axum::Router;
 use axum::http::header;
@@ -25,7 +25,7 @@ pub const FILES: [(&str, &str, &str); 12] = [
     ("/ui.js", SCRIPT, include_str!("../page/ui.js")),
 ];
 
-/// The page needs nothing from elsewhere and no script in its text.
+/// Content security policy: the page loads nothing from other servers and has no script in its HTML.
 const POLICY: &str = "default-src 'self'; img-src data:; frame-ancestors 'none'";
 
 /// The routes of the page.
@@ -42,7 +42,7 @@ fn file(kind: &'static str, text: &'static str) -> impl IntoResponse {
     let headers = [
         (header::CONTENT_TYPE, kind),
         (header::CONTENT_SECURITY_POLICY, POLICY),
-        // A newer simulator at the same address has a newer page.
+        // A newer simulator at the same address may have a newer page.
         (header::CACHE_CONTROL, "no-cache"),
     ];
     (headers, text)

@@ -1,7 +1,7 @@
-//! The file of a scenario.
+//! Reads the file of a scenario.
 //!
 //! ```toml
-//! repeat = "20s"              # optional: begins again so often
+//! repeat = "20s"              # optional: begin again after this time
 //!
 //! [[step]]
 //! at = "1.5s"                 # from the start of the round, in virtual time
@@ -28,17 +28,17 @@ use super::super::faults::Faults;
 use super::super::pace::span;
 use super::step::{Deed, Input, Ramp, Step};
 
-/// No time in a scenario is longer; virtual time itself ends after 213 days.
+/// Longest time in a scenario. The type [`Time`] ends at 213 days.
 const LONGEST: Duration = Duration::from_secs(100 * 24 * 3600);
-/// A round takes at least so long.
+/// Shortest time after which a scenario can begin again.
 const SHORTEST_ROUND: Time = Time::from_ms(10);
 
-/// A board that a scenario may name.
+/// A board that a scenario can name.
 #[derive(Clone, Debug)]
 pub struct Known {
-    /// Its name.
+    /// Name of the board.
     pub name: String,
-    /// The ports of its slots.
+    /// Ports of the board's slots.
     pub ports: Vec<u8>,
 }
 
@@ -78,26 +78,28 @@ enum Power {
     Cycle,
 }
 
-/// A span of time as people write it: `1.5s`, `2m`.
+/// Parses a duration such as `1.5s` or `2m`.
 fn duration<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Duration>, D::Error> {
     let text = String::deserialize(deserializer)?;
     let parsed = humantime::parse_duration(&text);
     let parsed = parsed.map_err(|error| serde::de::Error::custom(format!("{text:?}: {error}")))?;
     if parsed > LONGEST {
-        return Err(serde::de::Error::custom("100 days are the longest time"));
+        return Err(serde::de::Error::custom(format!(
+            "{text:?}: the longest time is 100 days"
+        )));
     }
     Ok(Some(parsed))
 }
 
-/// The steps of a file, and after how long they begin again.
+/// Returns the steps in a file, and the time after which they begin again.
 ///
 /// # Errors
 ///
-/// In one line, what is wrong, and where.
+/// In one line, the first error and its place.
 pub fn parse(text: &str, boards: &[Known]) -> Result<(Vec<Step>, Option<Time>), String> {
     let file: File = toml::from_str(text).map_err(|error| toml_error(text, &error))?;
     if file.step.is_empty() {
-        return Err("there is no [[step]] in it".to_owned());
+        return Err("the file has no [[step]]".to_owned());
     }
     let mut steps: Vec<Step> = Vec::new();
     let mut end = Time::ZERO;
@@ -109,9 +111,9 @@ pub fn parse(text: &str, boards: &[Known]) -> Result<(Vec<Step>, Option<Time>), 
     }
     let repeat = file.repeat.map(span);
     let shortest = SHORTEST_ROUND.max(end);
-    if repeat.is_some_and(|repeat| repeat < shortest) {
+    if let Some(repeat) = repeat.filter(|repeat| *repeat < shortest) {
         return Err(format!(
-            "`repeat` is shorter than {shortest}, which a round takes"
+            "`repeat` is {repeat}, but a round takes {shortest}"
         ));
     }
     Ok((steps, repeat))
@@ -124,7 +126,7 @@ fn step(table: Table, boards: &[Known]) -> Result<Step, String> {
             let mut boards = boards.iter();
             boards
                 .position(|board| board.name == *name)
-                .ok_or_else(|| format!("there is no board '{name}'"))?
+                .ok_or_else(|| format!("no board has the name '{name}'"))?
         }
     };
     let ports = &boards[board].ports;
@@ -136,7 +138,7 @@ fn step(table: Table, boards: &[Known]) -> Result<Step, String> {
     Ok(Step { at, board, deed })
 }
 
-/// The one thing that a step does.
+/// Returns the only thing that a step does.
 fn deed(table: Table) -> Result<Deed, String> {
     let changes = [
         table.energised.map(Change::Energised),
@@ -153,26 +155,28 @@ fn deed(table: Table) -> Result<Deed, String> {
     let things = changes.len() + rest.iter().filter(|named| **named).count();
     if things != 1 {
         return Err(
-            "one of energised, manual, millivolts, dip, power, module and faults is wanted"
+            "a step needs exactly one of energised, manual, millivolts, dip, power, module and faults"
                 .to_owned(),
         );
     }
     let port = table.slot;
     if port.is_some() && changes.is_empty() && table.module.is_none() {
-        return Err("`slot` belongs to a channel or a module".to_owned());
+        return Err("`slot` can stand only with `channel` or `module`".to_owned());
     }
     if table.channel.is_some() == changes.is_empty() {
-        return Err("`channel` is wanted with energised, manual and millivolts only".to_owned());
+        return Err(
+            "`channel` is needed with energised, manual and millivolts, and only there".to_owned(),
+        );
     }
     if table.over.is_some() && table.millivolts.is_none() {
-        return Err("`over` belongs to millivolts".to_owned());
+        return Err("`over` can stand only with `millivolts`".to_owned());
     }
     if let (Some(channel), &[change]) = (table.channel, &changes[..]) {
         if !(1..=4).contains(&channel) {
             return Err("channels are numbered 1 to 4".to_owned());
         }
         return match (change, table.over) {
-            (Change::Millivolts(3301..), _) => Err("`millivolts` is 0 to 3300".to_owned()),
+            (Change::Millivolts(3301..), _) => Err("`millivolts` must be 0 to 3300".to_owned()),
             (Change::Millivolts(to), Some(over)) => Ok(Deed::Ramp(Ramp {
                 input: Input { port, channel },
                 to,
@@ -198,7 +202,7 @@ fn deed(table: Table) -> Result<Deed, String> {
         _ => {
             let faults = table.faults.unwrap_or_default();
             if faults.is_empty() {
-                return Err("`faults` names none".to_owned());
+                return Err("`faults` names no fault".to_owned());
             }
             faults.check()?;
             Action::Faults(faults)

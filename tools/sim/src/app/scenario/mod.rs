@@ -1,4 +1,4 @@
-//! Scenarios (`--scenario`): events of the outside world, read from a TOML file, at exact instants of virtual time.
+//! Scenarios (`--scenario`): changes of the boards' surroundings at exact instants of virtual time, from a TOML file.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,8 +24,9 @@ const RAMP_STEP: Time = Time::from_ms(10);
 pub struct Scenario {
     steps: Vec<Step>,
     repeat: Option<Time>,
-    /// Pending steps by time; the number keeps the order of steps at the same time.
+    /// Pending steps with the number of their board, by time and order of queueing.
     due: BTreeMap<(Time, u64), (usize, Deed)>,
+    /// Number of steps that were queued so far.
     queued: u64,
     /// Start of the next round.
     round: Option<Time>,
@@ -38,9 +39,9 @@ impl Scenario {
     ///
     /// The first error in the file and its place, in one line.
     pub fn read(path: &Path, boards: &[Known]) -> Result<Self, String> {
-        let told = |what: String| format!("{}: {what}", path.display());
-        let text = std::fs::read_to_string(path).map_err(|error| told(error.to_string()))?;
-        Self::parse(&text, boards).map_err(told)
+        let in_file = |what: String| format!("{}: {what}", path.display());
+        let text = std::fs::read_to_string(path).map_err(|error| in_file(error.to_string()))?;
+        Self::parse(&text, boards).map_err(in_file)
     }
 
     fn parse(text: &str, boards: &[Known]) -> Result<Self, String> {
@@ -59,8 +60,8 @@ impl Scenario {
         due.into_iter().chain(self.round).min()
     }
 
-    /// Returns the next action that is due at `now`, and the number of its board. `millivolts` returns the voltage at the
-    /// pin of an input, where a ramp starts.
+    /// Returns the next action that is due at `now`, and the number of its board. `millivolts` returns the voltage at
+    /// the pin of an analog input in mV, at which a ramp starts.
     pub fn take(
         &mut self,
         now: Time,

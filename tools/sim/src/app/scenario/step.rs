@@ -4,7 +4,7 @@ use sim::Time;
 
 use super::super::action::Action;
 
-/// A step, which happens once in every round.
+/// A step of a scenario. It is carried out once in every round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// Time from the start of the round.
@@ -22,29 +22,29 @@ pub enum Deed {
     Act(Action),
     /// Switches the power off, and on again 100 ms later.
     Cycle,
-    /// Moves an analog input evenly to another voltage.
+    /// Moves the voltage at an analog input linearly to another value.
     Ramp(Ramp),
 }
 
 /// A ramp of an analog input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramp {
-    /// The input.
+    /// The analog input.
     pub input: Input,
     /// Final voltage at the pin, in mV.
     pub to: u16,
-    /// Duration.
+    /// Duration of the ramp.
     pub over: Time,
     /// Start time and start voltage in mV, once the ramp has begun.
     pub begun: Option<(Time, u16)>,
 }
 
-/// A channel of a board.
+/// An analog input of a board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
-    /// The port of its slot; the first slot without it.
+    /// Port of the slot; `None` means the first slot.
     pub port: Option<u8>,
-    /// Its number, 1 to 4.
+    /// Number of the channel, 1 to 4.
     pub channel: usize,
 }
 
@@ -60,7 +60,7 @@ impl Ramp {
         (f64::from(from) + (f64::from(self.to) - f64::from(from)) * share).round() as u16
     }
 
-    /// Time of its end, once the ramp has begun.
+    /// Virtual time at which the ramp ends; `None` before it has begun.
     pub fn end(&self) -> Option<Time> {
         self.begun.map(|(begin, _)| begin + self.over)
     }

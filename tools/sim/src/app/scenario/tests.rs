@@ -1,4 +1,4 @@
-//! Scenarios on boards whose firmware does nothing.
+//! Tests of scenarios on boards whose firmware does nothing.
 
 use register_map::Module;
 use sim::{Channel, Config};
@@ -123,32 +123,36 @@ fn steps_with_a_board_name_change_that_board_only() {
     let on = [true, true];
     assert_eq!(seen, [on, [true, false], on, [false, true], on]);
     let modules = [0, 1].map(|n| bench.bus.board(n).module());
-    assert_eq!(modules, [Module::Di4, Module::Ai4], "refused with power on");
+    assert_eq!(
+        modules,
+        [Module::Di4, Module::Ai4],
+        "changing the module of board a is refused, because its power is on"
+    );
     assert!(bench.bus.board(0).crystal() && !bench.bus.board(1).crystal());
     assert!((bench.disturbance.noise_hz() - 5.0).abs() < 1e-9);
 }
 
 #[test]
-fn errors_name_line_or_step_in_one_line() {
+fn scenario_error_is_one_line_that_names_the_line_or_the_step() {
     let bench = bench(Module::Di4);
     for (text, part) in [
         ("", "no [[step]]"),
         ("[[step]]\nat = 5", "line 2"),
         ("[[step]]\nat = 'soon'\ndip = 1", "line 2: \"soon\""),
         ("[[step]]\nat = '1000days'\ndip = 1", "100 days"),
-        ("[[step]]\nat = '1s'", "step 1: one of energised"),
+        ("[[step]]\nat = '1s'", "step 1: a step needs exactly one of"),
         (
             "[[step]]\nat = '1s'\ndip = 1\npower = 'on'",
-            "step 1: one of",
+            "step 1: a step needs exactly one of",
         ),
         ("[[step]]\nat = '1s'\npower = 'up'", "line 3"),
         (
             "[[step]]\nat = '1s'\nenergised = true",
-            "`channel` is wanted",
+            "`channel` is needed",
         ),
         (
             "[[step]]\nat = '1s'\ndip = 1\nchannel = 1",
-            "`channel` is wanted",
+            "`channel` is needed",
         ),
         ("[[step]]\nat = '1s'\nchannel = 5\nmanual = true", "1 to 4"),
         (
@@ -159,14 +163,14 @@ fn errors_name_line_or_step_in_one_line() {
             "[[step]]\nat = '1s'\nchannel = 1\nmanual = true\nover = '1s'",
             "`over`",
         ),
-        ("[[step]]\nat = '1s'\nslot = 5\ndip = 1", "`slot` belongs"),
+        ("[[step]]\nat = '1s'\nslot = 5\ndip = 1", "`slot` can stand"),
         (
             "[[step]]\nat = '1s'\nslot = 3\nmodule = '4do'",
             "no slot at port 3",
         ),
         ("[[step]]\nat = '1s'\nmodule = '8do'", "step 1: '8do' is"),
-        ("[[step]]\nat = '1s'\nboard = 'x'\ndip = 1", "no board 'x'"),
-        ("[[step]]\nat = '1s'\nfaults = {}", "names none"),
+        ("[[step]]\nat = '1s'\nboard = 'x'\ndip = 1", "name 'x'"),
+        ("[[step]]\nat = '1s'\nfaults = {}", "names no fault"),
         (
             "[[step]]\nat = '1s'\nfaults = { drop_rate = 2.0 }",
             "from 0 to 1",

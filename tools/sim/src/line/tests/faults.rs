@@ -1,9 +1,9 @@
-//! Drivers at the wrong time, two talkers at once, damaged characters and noise.
+//! Tests of drivers that are on at the wrong time, collisions, damaged characters and noise.
 
 use super::*;
 
 #[test]
-fn what_is_sent_with_the_driver_off_is_lost() {
+fn character_sent_with_the_driver_off_is_lost_and_reported() {
     let mut bench = Bench::new();
     bench.write(DR, 0x55);
     bench.run_to(Time::from_ms(5));
@@ -15,20 +15,20 @@ fn what_is_sent_with_the_driver_off_is_lost() {
 }
 
 #[test]
-fn a_driver_switched_off_early_truncates() {
+fn driver_switched_off_early_cuts_the_character_and_is_reported() {
     let mut bench = Bench::new();
     bench.driver(true);
     bench.write(DR, 0x00);
-    // After the start bit and three data bits and a half; the rest is the idle bus: ones.
+    // Cut after the start bit and three and a half data bits. The rest is read from the idle bus as ones.
     let cut = bench.now + Time::cycles(625 * 9 / 2, HZ);
     bench.run_to(cut);
     bench.driver(false);
     bench.run_to(Time::from_ms(9));
-    let heard: Vec<_> = bench.line.received().map(|r| r.byte).collect();
-    assert_eq!(heard, [0xF8]);
+    let received: Vec<_> = bench.line.received().map(|r| r.byte).collect();
+    assert_eq!(received, [0xF8]);
     assert_eq!(bench.line.take_findings().len(), 1);
 
-    // Within the second stop bit nothing is lost, and it is too early all the same.
+    // In the second stop bit nothing is lost, but switching off is still reported as too early.
     bench.driver(true);
     bench.write(DR, 0x00);
     bench.run_to(bench.now + Time::cycles(625 * 21 / 2, HZ));
@@ -37,7 +37,7 @@ fn a_driver_switched_off_early_truncates() {
 }
 
 #[test]
-fn the_driver_on_an_idle_transmitter_makes_no_edge() {
+fn switching_the_driver_makes_no_edge_while_the_tx_pin_is_high() {
     let mut bench = Bench::new();
     for n in 0..10 {
         bench.driver(n % 2 == 0);
@@ -52,7 +52,7 @@ fn the_driver_on_an_idle_transmitter_makes_no_edge() {
             .is_none()
     );
     assert_eq!(bench.line.received().count(), 0);
-    // A low TX pin is another matter: a break.
+    // With a low TX pin the driver sends a break.
     bench.line.set_tx_pin(TxPin::Level(false), bench.now);
     bench.driver(true);
     assert!(!bench.line.level_at(bench.now));
@@ -62,43 +62,43 @@ fn the_driver_on_an_idle_transmitter_makes_no_edge() {
 }
 
 #[test]
-fn both_at_once_collide_and_the_master_receives_the_mixture() {
+fn master_and_unit_at_the_same_time_collide_and_the_master_receives_the_wired_and() {
     let mut bench = Bench::new();
     bench.line.send(bench.now, &[0xF0]);
     bench.driver(true);
     bench.write(DR, 0x3C);
     bench.run_to(Time::from_ms(5));
-    let heard: Vec<_> = bench.line.received().copied().collect();
-    assert_eq!(heard.len(), 1);
-    assert_eq!(heard[0].byte, 0xF0 & 0x3C);
-    assert!(heard[0].collided && !heard[0].is_good());
+    let received: Vec<_> = bench.line.received().copied().collect();
+    assert_eq!(received.len(), 1);
+    assert_eq!(received[0].byte, 0xF0 & 0x3C);
+    assert!(received[0].collided && !received[0].is_good());
     assert!(bench.line.frames().next().expect("recorded").damaged);
     let spans: Vec<_> = bench.line.collisions().collect();
     assert_eq!(spans.len(), 1);
     assert_eq!(spans[0].start, TICK);
     assert_eq!(spans[0].end, TICK + Time::cycles(11, 115_200));
-    // The unit was deaf: its receiver is off while it drives.
+    // The unit has received nothing, because its receiver is off while its driver is on.
     assert_eq!(bench.read(SR) & RXNE, 0);
 }
 
 #[test]
-fn a_driver_switched_off_during_the_masters_byte_receives_the_rest_of_it() {
+fn unit_receives_the_rest_of_a_byte_after_its_driver_is_switched_off() {
     let mut bench = Bench::new();
     bench.driver(true);
     let t = Time::from_ms(2);
-    // Start and eight low bits: nine bits low.
+    // The start bit and eight data bits: nine low bits.
     bench.line.send(t, &[0x00]);
     bench.run_to(t + Time::cycles(625 * 3, HZ));
     assert!(bench.line.rx_level());
     bench.driver(false);
     assert!(!bench.line.rx_level());
     assert_eq!(bench.usart.next_exchange(&bench.line), Some(bench.now));
-    // Six bits low from there: start and five zeros, then ones.
-    assert_eq!(bench.hear(Time::from_ms(3)), [0xE0]);
+    // Six low bits are left: the unit receives a start bit and five zeros, then ones.
+    assert_eq!(bench.receive(Time::from_ms(3)), [0xE0]);
 }
 
 #[test]
-fn damage_and_gaps_arrive_as_made() {
+fn damaged_characters_and_gaps_are_received_as_sent() {
     let mut bench = Bench::new();
     let settings = bench.line.settings();
     let good = Character::new(settings, 0x31);
@@ -110,10 +110,10 @@ fn damage_and_gaps_arrive_as_made() {
     ] {
         bench.line.send_character(at, c);
         at += Time::from_ms(2);
-        let before = bench.hear(at);
+        let before = bench.receive(at);
         assert_eq!(before.len(), 1);
     }
-    // The flags went with the reading of DR; the record has them.
+    // Reading DR has cleared the flags of the USART. The record has them.
     let frames: Vec<_> = bench
         .line
         .frames()
@@ -123,27 +123,27 @@ fn damage_and_gaps_arrive_as_made() {
         frames,
         [(vec![0x33], false), (vec![0x31], true), (vec![0], true)]
     );
-    // Queued behind one another unless a gap is asked for.
+    // Bytes follow each other directly unless a gap is asked for.
     let end = bench.line.send(at, &[1]);
     assert_eq!(bench.line.send(at, &[2]), end + settings.characters(1));
     let gap = Time::from_us(800);
     let next = bench.line.master_free() + gap;
     bench.line.send(next, &[3]);
-    assert_eq!(bench.hear(at + Time::from_ms(5)), [1, 2, 3]);
+    assert_eq!(bench.receive(at + Time::from_ms(5)), [1, 2, 3]);
     let last = bench.line.frames().next_back().expect("recorded");
     assert_eq!(last.bytes, [1, 2, 3]);
     assert!(last.longest_gap.as_ps().abs_diff(gap.as_ps()) < 100);
 }
 
 #[test]
-fn a_glitch_is_no_byte_but_noise_in_a_byte_is() {
+fn glitch_on_the_idle_line_is_ignored_and_noise_in_a_byte_inverts_its_bit() {
     let mut bench = Bench::new();
     let bit = bench.line.settings().rate().bits(1);
     bench.line.noise(Time::from_ms(2), Time::from_us(2));
-    assert_eq!(bench.hear(Time::from_ms(3)), []);
+    assert_eq!(bench.receive(Time::from_ms(3)), []);
     let at = Time::from_ms(4);
     bench.line.send(at, &[0x0F]);
-    // Data bit 6 turned over as a whole.
+    // Invert the whole of data bit 6.
     bench.line.noise(at + bit * 7, bit);
-    assert_eq!(bench.hear(Time::from_ms(6)), [0x4F]);
+    assert_eq!(bench.receive(Time::from_ms(6)), [0x4F]);
 }

@@ -1,4 +1,4 @@
-//! The bus with a USART on it: who receives what, and when.
+//! Tests of the bus with a USART on it: which characters each side receives, and when.
 
 mod faults;
 mod several;
@@ -9,7 +9,7 @@ use crate::periph::usart::{Usart, Wire};
 use crate::peripheral::Peripheral;
 
 const HZ: u32 = 72_000_000;
-/// 115200 baud at 72 MHz.
+/// 115200 bit/s at 72 MHz.
 const BRR: u32 = 0x271;
 const SR: u32 = 0x00;
 const DR: u32 = 0x04;
@@ -18,7 +18,7 @@ const CR1: u32 = 0x0C;
 const ON: u32 = 1 << 13 | 1 << 3 | 1 << 2;
 const RXNE: u32 = 1 << 5;
 
-/// A tick of the baud generator after the preamble.
+/// A tick of the baud generator after the idle frame that the transmitter sends first.
 const TICK: Time = Time::cycles(116 * 625, HZ);
 
 struct Bench {
@@ -28,7 +28,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Both ends at 115200 8N2, the USART past its preamble.
+    /// Both ends at 115200 8N2, after the first idle frame of the USART.
     fn new() -> Self {
         let mut bench = Self {
             line: Line::default(),
@@ -68,8 +68,8 @@ impl Bench {
         self.line.set_driver(on, self.now);
     }
 
-    /// Takes the bytes the USART receives up to `end`, each at the event that brings it.
-    fn hear(&mut self, end: Time) -> Vec<u8> {
+    /// Returns the bytes that the USART receives up to `end`. Reads each at the event of its reception.
+    fn receive(&mut self, end: Time) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some(at) = self.usart.next_exchange(&self.line).filter(|&at| at <= end) {
             self.run_to(at);
@@ -81,9 +81,9 @@ impl Bench {
         bytes
     }
 
-    /// The unit answers with `bytes`, as fast as it can, and lets go at the end of the last stop bit.
+    /// Sends `bytes` from the unit without gaps, and switches the driver off at the end of the last stop bit.
     fn answer(&mut self, bytes: &[u8]) -> Time {
-        // From a tick of the baud generator, so that the first byte begins at once.
+        // Start at a tick of the baud generator, so that the first byte begins immediately.
         let (_, tick) = Rate::from_clock(625, HZ).ticks(1, self.now);
         self.run_to(tick);
         self.driver(true);
@@ -103,13 +103,13 @@ impl Bench {
 }
 
 #[test]
-fn a_request_and_its_answer_are_received_and_recorded() {
+fn request_and_answer_are_received_and_recorded() {
     let mut bench = Bench::new();
     let request = [0x11, 0x01, 0x00, 0x13, 0x00, 0x25, 0x0E, 0x84];
     let sent = Time::from_ms(2);
     let end = bench.line.send(sent, &request);
     assert_eq!(end, sent + Time::cycles(88, 115_200));
-    assert_eq!(bench.hear(end + Time::from_us(1750)), request);
+    assert_eq!(bench.receive(end + Time::from_us(1750)), request);
     let done = bench.answer(&request[..4]);
     let began = done - Time::cycles(4 * 11 * 625, HZ);
     bench.run_to(done + Time::from_us(1751));
@@ -127,8 +127,8 @@ fn a_request_and_its_answer_are_received_and_recorded() {
     );
     assert_eq!(frames[1].bytes, request[..4]);
     assert!(!frames[1].damaged);
-    let heard: Vec<_> = bench.line.received().map(|r| r.byte).collect();
-    assert_eq!(heard, request[..4]);
+    let received: Vec<_> = bench.line.received().map(|r| r.byte).collect();
+    assert_eq!(received, request[..4]);
     assert!(bench.line.received().all(Received::is_good));
     assert_eq!(
         bench.line.driver_edges().collect::<Vec<_>>(),
@@ -139,7 +139,7 @@ fn a_request_and_its_answer_are_received_and_recorded() {
 }
 
 #[test]
-fn one_big_step_is_the_same_as_many_small_ones() {
+fn one_large_step_has_the_same_result_as_many_small_steps() {
     let run = |steps: u64| {
         let mut bench = Bench::new();
         let end = bench.line.send(Time::from_ms(2), &[1, 2, 3]);
@@ -155,14 +155,14 @@ fn one_big_step_is_the_same_as_many_small_ones() {
         )
     };
     let (sr, dr, frames) = run(0);
-    // Nobody read: the first byte stays, the others are lost.
+    // DR was not read in between: it has the first byte, and the others are lost.
     assert_eq!((sr & 0x28, dr), (0x28, 1));
     assert_eq!(frames[0].bytes, [1, 2, 3]);
     assert_eq!(run(1000), (sr, dr, frames));
 }
 
 #[test]
-fn the_unit_receives_its_echo_only_when_wired_so() {
+fn unit_receives_its_echo_only_with_set_echo() {
     for echo in [false, true] {
         let mut bench = Bench::new();
         bench.line.set_echo(echo);
@@ -175,7 +175,7 @@ fn the_unit_receives_its_echo_only_when_wired_so() {
 }
 
 #[test]
-fn tim1_captures_the_start_bits() {
+fn tim1_captures_falling_edges_of_received_characters() {
     let mut bench = Bench::new();
     let mut tim1 = Timer::new(Kind::Advanced);
     tim1.set_clock(HZ, Time::ZERO);
@@ -201,25 +201,25 @@ fn tim1_captures_the_start_bits() {
     assert_eq!(flags(&mut bench, true), 0);
     bench.run_to(Time::from_ms(2));
     assert_eq!(flags(&mut bench, true), 1 << 3);
-    // The second start bit and four more falls: captured over a capture.
+    // The second start bit and four more falling edges: capture and overcapture.
     bench.run_to(end);
     assert_eq!(flags(&mut bench, true), 1 << 3 | 1 << 11);
     bench.run_to(end + Time::from_ms(1));
     assert_eq!(flags(&mut bench, true), 0);
-    // What the unit sends itself is not on its RX pin.
+    // Characters of the unit itself are not on its RX pin.
     bench.answer(&[0x00]);
     assert_eq!(flags(&mut bench, true), 0);
 }
 
 #[test]
-fn a_master_that_follows_takes_over_the_units_settings() {
+fn following_master_takes_over_the_units_settings() {
     let mut bench = Bench::new();
     bench.line.set_settings(Settings::default());
     bench.run_to(Time::from_ms(2));
     assert_eq!(bench.line.settings(), Settings::default());
     bench.line.set_follow(true);
     let end = bench.line.send(bench.now, &[0x55]);
-    // Not before its queue is out.
+    // The master keeps its settings until it has sent its queue.
     bench.run_to(end - Time::from_ps(1));
     assert_eq!(bench.line.settings(), Settings::default());
     bench.run_to(end);
@@ -228,7 +228,7 @@ fn a_master_that_follows_takes_over_the_units_settings() {
         format: Format::N2,
     };
     assert_eq!(bench.line.settings(), settings);
-    // 921600 baud from 72 MHz is 78 cycles, 923077; even parity.
+    // 921600 bit/s from 72 MHz: 78 cycles are 923077 bit/s. With even parity.
     bench.write(0x10, 0);
     bench.write(0x08, 78);
     bench.write(CR1, ON | 1 << 12 | 1 << 10);
@@ -238,7 +238,7 @@ fn a_master_that_follows_takes_over_the_units_settings() {
         format: Format::E1,
     };
     assert_eq!(bench.line.settings(), settings);
-    // An odd rate stays what it is; formats a Modbus line does not have change nothing.
+    // An unusual rate is taken over as it is. A format that no Modbus line has changes nothing.
     bench.write(0x08, 1000);
     bench.run_to(Time::from_ms(10));
     assert_eq!(bench.line.settings().baud, 72_000);
@@ -256,7 +256,7 @@ fn a_master_that_follows_takes_over_the_units_settings() {
 }
 
 #[test]
-fn a_long_run_does_not_grow() {
+fn memory_is_bounded_in_a_long_run() {
     let mut bench = Bench::new();
     for n in 0..20_000_u64 {
         let at = Time::from_ms(2 + 3 * n);
@@ -273,6 +273,9 @@ fn a_long_run_does_not_grow() {
         &bench.line.master.wave,
         &bench.line.unit,
     ];
-    assert!(waves.iter().all(|wave| wave.len() < 2500), "100 ms at most");
-    assert!(bench.line.master.talking.len() < 3);
+    assert!(
+        waves.iter().all(|wave| wave.len() < 2500),
+        "a wave keeps more than 100 ms"
+    );
+    assert!(bench.line.master.sending.len() < 3);
 }

@@ -1,4 +1,4 @@
-//! Segments that all machines of this process share, so that the same code on many boards stays in the host's cache.
+//! Segments that all machines of this process share. The same code on many boards then stays in the host's cache.
 
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use super::{MOST, Place, Segment};
 use crate::machine::costs::Pace;
 
-/// Segments above which those that no machine uses any more are dropped.
+/// Number of segments above which those that no machine uses any more are dropped.
 const MANY: usize = 1 << 14;
 
 /// A segment and the bytes that it was made from.
@@ -29,18 +29,18 @@ impl Made {
         &self.bytes[..usize::from(self.segment.size)]
     }
 
-    /// Whether `code` begins with the code that it was made from.
+    /// Returns whether `code` begins with the bytes of this segment.
     pub fn is_of(&self, code: &[u8]) -> bool {
         self.segment.size > 0 && code.starts_with(self.bytes())
     }
 }
 
-/// Where a segment is, its bytes, and what its instructions cost.
+/// Start, bytes and costs of a segment.
 type Key = (Place, Vec<u8>, Pace);
 
 static SHARED: LazyLock<Mutex<HashMap<Key, Arc<Made>>>> = LazyLock::new(Mutex::default);
 
-/// The segment at `place`, whose bytes are `code`.
+/// Returns the shared segment that starts at `place`; `code` begins with its bytes.
 pub fn shared(place: Place, code: &[u8], pace: &Pace) -> Arc<Made> {
     let made = Made::new(place, code, pace);
     let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);

@@ -284,7 +284,7 @@ impl Adc {
             let by_software = cr2::EXTTRIG | cr2::EXTSEL;
             if value & by_software != by_software || value & cr2::ADON == 0 {
                 return Err(Unmodelled(
-                    "ADC SWSTART without ADON, EXTTRIG and EXTSEL = SWSTART: nothing starts, which",
+                    "ADC SWSTART without ADON, EXTTRIG and EXTSEL = SWSTART: no conversion starts",
                 ));
             }
             return self.start(now);

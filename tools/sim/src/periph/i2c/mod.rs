@@ -185,7 +185,7 @@ impl I2c {
             Phase::Started if self.sr1 & sr1::SB != 0 => {
                 if self.shown & sr1::SB == 0 {
                     return Err(Unmodelled(
-                        "I2C address written without reading SR1 (SB stays), which",
+                        "I2C address written without reading SR1: SB stays set",
                     ));
                 }
                 self.sr1 &= !sr1::SB;
@@ -197,14 +197,14 @@ impl I2c {
                 let overwritten = self.pending.replace(byte).is_some();
                 self.sr1 &= !sr1::TXE;
                 if overwritten {
-                    return Err(Unmodelled("I2C DR written while TXE = 0, which"));
+                    return Err(Unmodelled("I2C DR written while TXE = 0"));
                 }
             }
             Phase::SendWait => {
                 self.pending = Some(byte);
                 self.send_next(now);
             }
-            _ => return Err(Unmodelled("I2C DR written outside a transfer, which")),
+            _ => return Err(Unmodelled("I2C DR written outside a transfer")),
         }
         Ok(())
     }

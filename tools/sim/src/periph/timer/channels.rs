@@ -16,7 +16,8 @@ impl Timer {
     }
 
     /// An edge at the input pin of `channel` (1 to 4) at `at`. Edges come in order and before any access or
-    /// [`Peripheral::advance`](crate::peripheral::Peripheral::advance) to a later instant; then the captured count is exact.
+    /// [`Peripheral::advance`](crate::peripheral::Peripheral::advance) to a later instant; then the captured count is
+    /// exact.
     pub fn capture_edge(&mut self, channel: usize, at: Time, rising: bool) {
         let n = channel - 1;
         let wants_falling = self.ccer >> (4 * n + 1) & 1 == 1;
@@ -60,7 +61,7 @@ impl Timer {
                 // 15.4.7: CCxS is writable only while the channel is off.
                 value = value & !(3 << at) | old << at;
                 finding = Err(Unmodelled(
-                    "timer CCxS written while CCxE = 1: it stays, which",
+                    "timer CCxS written while CCxE = 1: the write is ignored",
                 ));
             }
         }

@@ -1,16 +1,18 @@
 //! A USART in asynchronous mode, without DMA, LIN, smartcard, IrDA or flow control (RM0008 27).
 //!
-//! What it sends is taken with [`Usart::take_sent`], what it receives is given with [`Usart::receive_edge`];
-//! [`Usart::exchange`] does both with whatever [`Wire`] is connected to its pins. Every instant comes from whole cycles of the kernel clock: one bit lasts BRR
-//! of them (27.3.4: USARTDIV = BRR / 16, sixteen samples a bit).
+//! [`Usart::take_sent`] returns the characters that the USART has sent, and [`Usart::receive_edge`] adds an edge at its
+//! RX pin. [`Usart::exchange`] does both with the [`Wire`] at its pins. All instants are whole cycles of the kernel
+//! clock: a bit lasts BRR cycles (27.3.4: USARTDIV = BRR / 16, sixteen samples in a bit).
 //!
-//! The baud generator runs from the writing of BRR on, sixteen ticks a bit (27.3.4). The receiver samples at its
-//! ticks, so it sees an edge up to a sixteenth of a bit late; the transmitter, whose clock is a sixteenth of it,
-//! begins a character up to a bit after it was written.
+//! The baud generator runs freely from the last write of BRR on, with sixteen ticks in a bit (27.3.4). The receiver
+//! samples at the ticks, so it detects an edge up to a sixteenth of a bit late. The transmitter begins a character at
+//! every sixteenth tick only, so up to a bit after the character was written.
 //!
-//! Choices where the manual is silent: the phase of the transmitter's clock is that of the writing of BRR; the
-//! clearing of UE lets the character under way out and stops the receiver at once; a new BRR holds from
-//! the next character on for the transmitter, at once for the receiver.
+//! The manual leaves three points open. In this model:
+//!
+//! - the phase of the transmitter's clock begins with the write of BRR;
+//! - clearing UE stops the receiver immediately, but the character that is being sent is sent to its end;
+//! - a new BRR is in force immediately for the receiver, and from the next character on for the transmitter.
 
 mod bits;
 mod reception;
@@ -41,10 +43,10 @@ mod offset {
     pub const GTPR: u32 = 0x18;
 }
 
-/// The errors and IDLE, which reading SR and then DR clears (27.6.1).
+/// The flags that reading SR and then DR clears: the errors and IDLE (27.6.1).
 const CLEARED_BY_READ: u32 = sr::PE | sr::FE | sr::NE | sr::ORE | sr::IDLE;
 
-/// Rates that lines run at.
+/// Usual rates of lines, in bit/s.
 const USUAL_RATES: [u32; 11] = [
     1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600,
 ];
@@ -53,7 +55,7 @@ const USUAL_RATES: [u32; 11] = [
 #[derive(Clone, Debug)]
 pub struct Usart {
     sr: u32,
-    /// The flags that the last read of SR showed: the first half of a clearing sequence.
+    /// The flags that the last read of SR has returned: the first half of a clearing sequence.
     shown: u32,
     received: u16,
     brr: u32,
@@ -64,16 +66,17 @@ pub struct Usart {
     hz: u32,
     tx: Transmitter,
     rx_pin: Wave,
-    /// The last two falling and the last two rising edges at the RX pin, until they are taken.
+    /// The last two falling and the last two rising edges at the RX pin, until
+    /// [`take_edges`](Self::take_edges).
     last_edges: [[Option<Time>; 2]; 2],
     receiver: Receiver,
-    /// IDLE may be set again (27.6.1: not before RXNE has been set).
+    /// Whether IDLE can be set again (27.6.1: only after RXNE was set).
     idle_armed: bool,
-    /// Since when nothing has been received.
+    /// End of the last received character.
     quiet_since: Time,
-    /// Writes to DR.
+    /// Number of writes to DR.
     data_writes: u64,
-    /// Since when the baud generator runs at its rate.
+    /// Start of the baud generator at its present rate.
     baud_since: Time,
 }
 
@@ -108,21 +111,21 @@ impl Usart {
         }
     }
 
-    /// Writes to the data register since the last reset, good ones or not.
+    /// Number of writes to the data register since the last reset, with those that were lost.
     #[must_use]
     pub const fn data_writes(&self) -> u64 {
         self.data_writes
     }
 
-    /// Takes what the transmitter sent since the last call, in order. A character is included as soon as its start
-    /// bit has begun.
+    /// Returns the output of the transmitter since the last call, in order. A character is included as soon as its
+    /// start bit has begun.
     pub fn take_sent(&mut self) -> Vec<Sent> {
         self.tx.take_sent()
     }
 
-    /// The rate and format it is set to, the rate rounded to a usual one within 2 %. `None` while it is off,
-    /// or in a format that is none of the line's. 7N2 reads as 8N1: the registers are the same, only the words
-    /// that are sent differ.
+    /// The rate and format of the USART. A rate within 2 % of a usual one is rounded to it. `None` while the USART is
+    /// off, or for a format that is not in [`Format`]. 7N2 is returned as 8N1, because the registers have the same
+    /// values in both; only the words that are sent differ.
     #[must_use]
     pub fn settings(&self) -> Option<Settings> {
         let format = match (self.data_bits(), self.parity(), self.stop_bits()) {
@@ -167,7 +170,7 @@ impl Usart {
         }
     }
 
-    /// How the next character is sent; `None` when the transmitter is off.
+    /// Rate and format of the next character; `None` while the transmitter is off.
     fn shape(&self) -> Option<Shape> {
         let on = cr1::UE | cr1::TE;
         (self.cr1 & on == on && self.hz > 0 && self.brr >= 16).then(|| Shape {
@@ -180,7 +183,7 @@ impl Usart {
     }
 
     /// Starts the next transmission, if one is waiting and the transmitter is on and free.
-    fn kick(&mut self, now: Time) {
+    fn start_next(&mut self, now: Time) {
         if let Some(Ended::More { took_data: true }) =
             self.shape().and_then(|shape| self.tx.start(now, shape))
         {
@@ -200,7 +203,7 @@ impl Usart {
                         self.sr |= sr::TXE;
                     }
                 }
-                // 27.3.2: TC when a frame is out and TXE is set.
+                // 27.3.2: TC is set when a frame was sent and TXE is set.
                 Ended::Complete if !self.tx.holds_data() => self.sr |= sr::TC,
                 Ended::Complete => {}
             }
@@ -221,16 +224,16 @@ impl Usart {
         self.shown &= !done;
         let overwritten = self.tx.holds_data();
         self.tx.set_data(self.with_parity(value as u16));
-        self.kick(now);
+        self.start_next(now);
         if overwritten {
             return Err(Unmodelled(
-                "USART DR written while TXE = 0: the word before it is lost, which",
+                "USART DR written while TXE = 0: the word before it is lost",
             ));
         }
         Ok(())
     }
 
-    /// Returns the word as it is sent: its highest bit is the parity bit when PCE is set (27.3.7).
+    /// Returns the word as it is sent. With PCE set, its highest bit is the parity bit (27.3.7).
     fn with_parity(&self, data: u16) -> u16 {
         let bits = self.data_bits();
         match self.parity() {
@@ -264,7 +267,7 @@ impl Usart {
             self.idle_armed = true;
             self.quiet_since = now;
         }
-        self.kick(now);
+        self.start_next(now);
         if value & cr1::RWU != 0 {
             return Err(Unmodelled("USART mute mode (CR1.RWU)"));
         }
@@ -300,7 +303,7 @@ impl Peripheral for Usart {
                 self.brr = value & 0xFFFF;
                 self.baud_since = now;
                 let busy = self.tx.is_sending() || self.receiver.start().is_some();
-                self.kick(now);
+                self.start_next(now);
                 if busy && self.cr1 & cr1::UE != 0 {
                     return Err(Unmodelled("USART BRR changed in the middle of a character"));
                 }
@@ -351,7 +354,7 @@ impl Peripheral for Usart {
         self.advance_receiver(now);
     }
 
-    /// 27.4, table 196. The error interrupt (EIE) exists with DMA only.
+    /// See 27.4, table 196. The error interrupt (EIE) needs DMA, which is not modelled.
     fn irq(&self) -> bool {
         [
             (cr1::TXEIE, sr::TXE),
@@ -382,6 +385,6 @@ impl Peripheral for Usart {
             self.baud_since = now;
         }
         self.hz = hz;
-        self.kick(now);
+        self.start_next(now);
     }
 }

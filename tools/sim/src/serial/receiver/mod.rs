@@ -1,11 +1,13 @@
-//! An asynchronous receiver: turns a level over time into words, sampling at its own bit centres.
+//! An asynchronous receiver: turns a level over time into words, by sampling at its own rate.
 //!
-//! One model serves every listener: the USART of the part, the master, and the record of the line. It
-//! samples each bit sixteen times and decides by three of them, as the STM32's USART does (RM0008
-//! 27.3.3): sample `n` of a bit is taken `n` sixteenths of a bit after the bit began, counted from the
-//! falling edge of the start bit. The part's samples go by a clock of their own ([`Framing::sampled_since`]), so
-//! there the first sample of a start bit is the first one after the edge. A start bit is a falling edge after three high samples, with at least two
-//! lows among samples 3, 5, 7 and again among 8, 9, 10; otherwise the search goes on.
+//! The USART of the part, the master, and the record of the line use the same model. It samples each bit sixteen times
+//! and decides by three of the samples, as the STM32's USART does (RM0008 27.3.3). Sample `n` of a bit is taken `n`
+//! sixteenths of a bit after the start of the bit, counted from the falling edge of the start bit. The sampling clock
+//! of the USART runs freely ([`Framing::sampled_since`]), so its first sample of a start bit is the first one after the
+//! edge.
+//!
+//! A start bit is a falling edge after three high samples, with at least two low levels among the samples 3, 5 and 7,
+//! and at least two among 8, 9 and 10. After any other falling edge, the receiver searches for the next one.
 
 #[cfg(test)]
 mod tests;
@@ -14,24 +16,24 @@ use super::settings::{Parity, Rate, Settings};
 use super::wave::Wave;
 use crate::time::Time;
 
-/// How a receiver divides what it receives into words.
+/// Settings by which a receiver divides the level of its wire into words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Framing {
-    /// The receiver's own bit rate.
+    /// Bit rate of the receiver.
     pub rate: Rate,
-    /// Data bits, the parity bit counted in: 7 to 9.
+    /// Number of data bits with the parity bit: 7 to 9.
     pub data_bits: u8,
-    /// The parity expected in the last data bit, if any.
+    /// Parity that is expected in the last data bit; `None` if the last data bit is not a parity bit.
     pub parity: Option<Parity>,
-    /// Stop bits: 1 or 2. Only the first is checked.
+    /// Number of stop bits: 1 or 2. Only the first is checked.
     pub stop_bits: u8,
-    /// Since when a sample is taken every sixteenth of a bit. `None`: the samples start with the edge of a start
-    /// bit.
+    /// Start of a sampling clock that ticks sixteen times in a bit. `None` if the samples count from the edge of each
+    /// start bit.
     pub sampled_since: Option<Time>,
 }
 
 impl Framing {
-    /// The framing of a line end with these settings.
+    /// The framing of an end of the line with these settings.
     #[must_use]
     pub const fn of(settings: Settings) -> Self {
         let parity = settings.format.parity();
@@ -51,14 +53,14 @@ impl Framing {
         data & !(u16::MAX << bits)
     }
 
-    /// Bits of a whole character, start and stop bits included.
+    /// Number of bits in a character, with the start and stop bits.
     #[must_use]
     pub const fn bits(&self) -> u8 {
         1 + self.data_bits + self.stop_bits
     }
 
-    /// Where a start bit begins by the samples when its edge comes at `edge`: a sixteenth before the first sample
-    /// that shows it.
+    /// Start of a start bit by the samples, when its edge is at `edge`: a sixteenth of a bit before the first sample
+    /// after the edge.
     fn start_of(&self, edge: Time) -> Time {
         let Some(since) = self.sampled_since.filter(|&since| since < edge) else {
             return edge;
@@ -68,14 +70,14 @@ impl Framing {
         since + first - self.rate.sixteenths(1)
     }
 
-    /// From the start bit's edge to the last sample (the tenth) of the first stop bit.
+    /// Time from the start bit's edge to the last sample (the tenth) of the first stop bit.
     fn until_stop_sample(&self) -> Time {
         self.rate
             .sixteenths(16 * (1 + u64::from(self.data_bits)) + 10)
     }
 
-    /// From the start bit's edge to the word being there: the last sample of a single stop bit, the end
-    /// of the first of two (RM0008 27.3.3, "Configurable stop bits during reception").
+    /// Time from the start bit's edge until the word is received: to the last sample of a single stop bit, or to the
+    /// end of the first of two stop bits (RM0008 27.3.3, "Configurable stop bits during reception").
     fn until_word(&self) -> Time {
         if self.stop_bits == 2 {
             self.rate.bits(2 + u64::from(self.data_bits))
@@ -85,38 +87,38 @@ impl Framing {
     }
 }
 
-/// A word received.
+/// A received word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// The falling edge of the start bit, by the samples.
+    /// Falling edge of the start bit, by the samples.
     pub start: Time,
-    /// When the receiver had it.
+    /// Instant at which the word was received.
     pub at: Time,
-    /// When its last stop bit ends, by the receiver's rate.
+    /// End of the last stop bit, by the receiver's rate.
     pub end: Time,
-    /// The data bits, the parity bit in the highest.
+    /// Data bits, with the parity bit as the highest.
     pub data: u16,
-    /// The parity bit was wrong.
+    /// Whether the parity bit was wrong.
     pub parity_error: bool,
-    /// The first stop bit was low.
+    /// Whether the first stop bit was low.
     pub framing_error: bool,
-    /// The samples of some bit were not of one mind.
+    /// Whether the samples of a bit had different levels.
     pub noise: bool,
 }
 
-/// The state of a receiver between two looks at its wire.
+/// The state of a receiver.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Receiver {
-    /// Edges up to here are of no interest any more.
+    /// The search for a start bit continues after this instant.
     search_from: Time,
-    /// The falling edge of the character under way.
+    /// Falling edge of the character that is being received.
     start: Option<Time>,
-    /// Its start bit has been sampled and stands.
+    /// Whether the samples have confirmed the start bit.
     confirmed: bool,
 }
 
 impl Receiver {
-    /// A receiver that starts to listen at `now`: it needs a falling edge after that.
+    /// A receiver that is enabled at `now`. Its first character begins with a falling edge after `now`.
     #[must_use]
     pub const fn listening_from(now: Time) -> Self {
         Self {
@@ -126,32 +128,32 @@ impl Receiver {
         }
     }
 
-    /// Whether it waits for a start bit.
+    /// Whether the receiver waits for a start bit.
     #[must_use]
     pub const fn is_idle(&self) -> bool {
         self.start.is_none()
     }
 
-    /// The falling edge of the character under way.
+    /// Falling edge of the character that is being received.
     #[must_use]
     pub const fn start(&self) -> Option<Time> {
         self.start
     }
 
-    /// When the character under way will be there, if it is one.
+    /// Instant at which the character that is being received will be complete, if it is no glitch.
     #[must_use]
     pub fn due(&self, framing: &Framing) -> Option<Time> {
         self.start.map(|start| start + framing.until_word())
     }
 
-    /// Edges before this instant are not needed any more.
+    /// Instant before which the receiver needs no edges any more.
     #[must_use]
     pub fn needs_from(&self) -> Time {
         self.start.unwrap_or(self.search_from)
     }
 
-    /// The next word that is there by `now`, or `None`. The wave must be known up to `now`; call again
-    /// until it says `None`.
+    /// Returns the next word that was received by `now`. Call this again until it returns `None`. The wave must be
+    /// known up to `now`.
     pub fn next_word(&mut self, wave: &Wave, framing: &Framing, now: Time) -> Option<Word> {
         loop {
             let start = match self.start {
@@ -159,13 +161,13 @@ impl Receiver {
                 None => self.find_start(wave, framing, now)?,
             };
             if !self.confirmed {
-                match start_bit_fails(wave, framing, start, now) {
-                    Verdict::Open => return None,
-                    Verdict::Fails(at) => {
+                match check_start_bit(wave, framing, start, now) {
+                    StartBit::Unknown => return None,
+                    StartBit::Glitch(at) => {
                         *self = Self::listening_from(at);
                         continue;
                     }
-                    Verdict::Stands => self.confirmed = true,
+                    StartBit::Confirmed => self.confirmed = true,
                 }
             }
             if now < start + framing.until_word() {
@@ -176,7 +178,7 @@ impl Receiver {
         }
     }
 
-    /// Looks for a falling edge up to `now` after a high of three samples.
+    /// Searches for a falling edge up to `now` that follows a high level of at least three samples.
     fn find_start(&mut self, wave: &Wave, framing: &Framing, now: Time) -> Option<Time> {
         let idle = framing.rate.sixteenths(3);
         let mut from = self.search_from;
@@ -196,40 +198,40 @@ impl Receiver {
     }
 }
 
-/// What the samples of a start bit say.
-enum Verdict {
-    /// Not all of them have been taken.
-    Open,
-    /// It was a glitch; the receiver knew this at the given instant.
-    Fails(Time),
+/// Result of checking the samples of a start bit.
+enum StartBit {
+    /// Not all samples have been taken.
+    Unknown,
+    /// It was a glitch. The receiver detected this at the given instant.
+    Glitch(Time),
     /// It is a start bit.
-    Stands,
+    Confirmed,
 }
 
-fn start_bit_fails(wave: &Wave, framing: &Framing, start: Time, now: Time) -> Verdict {
-    // A pulse between two samples has not been seen at all.
+fn check_start_bit(wave: &Wave, framing: &Framing, start: Time, now: Time) -> StartBit {
+    // The USART does not detect a pulse between two samples.
     let first = start + framing.rate.sixteenths(1);
     if framing.sampled_since.is_some() {
         if now < first {
-            return Verdict::Open;
+            return StartBit::Unknown;
         }
         if wave.level_at(first) {
-            return Verdict::Fails(first);
+            return StartBit::Glitch(first);
         }
     }
     for group in [[3, 5, 7], [8, 9, 10]] {
         let last = start + framing.rate.sixteenths(group[2]);
         if now < last {
-            return Verdict::Open;
+            return StartBit::Unknown;
         }
         if highs(wave, framing, start, 0, group) > 1 {
-            return Verdict::Fails(last);
+            return StartBit::Glitch(last);
         }
     }
-    Verdict::Stands
+    StartBit::Confirmed
 }
 
-/// How many of three samples of bit `bit` are high.
+/// Number of high levels among three samples of bit `bit`.
 fn highs(wave: &Wave, framing: &Framing, start: Time, bit: u8, samples: [u64; 3]) -> usize {
     samples
         .into_iter()

@@ -1,37 +1,37 @@
-//! The analog outputs' DAC: Microchip MCP4728, four channels of 12 bits with EEPROM, on I2C at 0x60
-//! (data sheet DS22187E).
+//! The DAC of the analog outputs: a Microchip MCP4728 with four channels of 12 bits and an EEPROM, on I2C at 0x60 (data
+//! sheet DS22187E).
 //!
-//! Its LDAC pin is tied low, so every input register goes to its output at once, whatever the UDAC bit
-//! says (table 4-5). Commands that need LDAC to move (the address bits) are not acknowledged beyond
-//! their first byte, as 5.6.8 has it. While the EEPROM is being written the input registers still take
-//! writes; another EEPROM write is not begun.
+//! Its LDAC pin is connected to ground, so every input register is copied to its output immediately, whatever the UDAC
+//! bit is (table 4-5). Commands that need edges at LDAC (those for the address bits) are not acknowledged after their
+//! first byte (5.6.8). While the EEPROM is being written, the input registers can still be written, but another EEPROM
+//! write is ignored.
 
 #[cfg(test)]
 mod tests;
 
 use crate::time::Time;
 
-/// Its address on the bus, 7 bits, unless the factory gave it another of the eight from here on.
+/// Default address on the bus, 7 bits. The chip can be ordered with this and the seven following addresses.
 pub const ADDRESS: u8 = 0x60;
 
-/// How long an EEPROM write takes: 25 ms typical (section 1.0, at most 50 ms).
+/// Duration of an EEPROM write: typically 25 ms, at most 50 ms (section 1.0).
 pub const EEPROM_WRITE: Time = Time::from_ms(25);
 
-/// One channel's input register.
+/// Input register of a channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Setting {
-    /// The code, 0 to 4095.
+    /// Output code, 0 to 4095.
     pub code: u16,
-    /// Internal reference of 2.048 V instead of VDD.
+    /// Whether the reference is the internal one of 2.048 V instead of VDD.
     pub internal_reference: bool,
-    /// Power-down bits: 0 = normal, else off with 1 k, 100 k or 500 k to ground.
+    /// Power-down bits: 0 = normal; 1, 2, 3 = off with 1, 100 or 500 kOhm to ground.
     pub power_down: u8,
-    /// Gain 2, with the internal reference.
+    /// Whether the gain is 2, with the internal reference.
     pub double_gain: bool,
 }
 
 impl Setting {
-    /// From the two bytes of the write commands: VREF PD1 PD0 Gx D11-D8, D7-D0.
+    /// The setting in the two bytes of the write commands: VREF PD1 PD0 Gx D11-D8, D7-D0.
     const fn from_bytes(high: u8, low: u8) -> Self {
         Self {
             code: (high as u16 & 0x0F) << 8 | low as u16,
@@ -41,7 +41,7 @@ impl Setting {
         }
     }
 
-    /// As those two bytes, in the read command.
+    /// The setting as two bytes of the read command, in the same form.
     const fn to_bytes(self) -> [u8; 2] {
         let high = (self.internal_reference as u8) << 7
             | self.power_down << 5
@@ -51,30 +51,30 @@ impl Setting {
     }
 }
 
-/// What the bytes of a write transfer mean from here on (5.6).
+/// Meaning of the next byte of a write transfer (5.6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Expect {
     /// The first byte after the address.
     Command,
     /// The command byte of a general call.
     GeneralCall,
-    /// Fast write: the high byte of that channel.
+    /// Fast write: the high byte of this channel.
     FastHigh(usize),
-    /// Its low byte.
+    /// Fast write: the low byte of this channel, after this high byte.
     FastLow(usize, u8),
-    /// Multi-write: the next channel's command byte.
+    /// Multi-write: the command byte of the next channel.
     MultiCommand,
-    /// The high byte for that channel.
+    /// The high byte of this channel.
     High(Write, usize),
-    /// Its low byte.
+    /// The low byte of this channel, after this high byte.
     Low(Write, usize, u8),
     /// The second byte of the power-down command.
     PowerDown,
-    /// Nothing more: further bytes are not acknowledged.
+    /// No byte is expected: further bytes are not acknowledged.
     Nothing,
 }
 
-/// The three commands that carry whole settings.
+/// The three commands that write a whole [`Setting`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Write {
     Multi,
@@ -82,18 +82,18 @@ enum Write {
     Single,
 }
 
-/// The chip.
+/// An MCP4728.
 #[derive(Clone, Debug)]
 pub struct Mcp4728 {
     address: u8,
     registers: [Setting; 4],
     eeprom: [Setting; 4],
-    /// The EEPROM is being written until then.
+    /// End of the EEPROM write.
     busy_until: Time,
-    /// Channels whose register goes into the EEPROM when this transfer is complete.
+    /// Channels whose registers are copied to the EEPROM at the end of this transfer.
     to_store: [bool; 4],
     expect: Expect,
-    /// The next byte to read, 0 to 23.
+    /// Number of the next byte to read, 0 to 23.
     cursor: usize,
 }
 
@@ -104,7 +104,7 @@ impl Default for Mcp4728 {
 }
 
 impl Mcp4728 {
-    /// A chip with this in its EEPROM, just powered on.
+    /// A chip with these settings in its EEPROM, directly after power-on.
     #[must_use]
     pub const fn new(eeprom: [Setting; 4]) -> Self {
         Self {
@@ -124,19 +124,19 @@ impl Mcp4728 {
         Self { address, ..self }
     }
 
-    /// The input registers, which the outputs follow.
+    /// The four input registers. The outputs follow them.
     #[must_use]
     pub const fn registers(&self) -> [Setting; 4] {
         self.registers
     }
 
-    /// The EEPROM.
+    /// The four settings in the EEPROM.
     #[must_use]
     pub const fn eeprom(&self) -> [Setting; 4] {
         self.eeprom
     }
 
-    /// The code an output stands at: 0 while the channel is powered down.
+    /// Code of an output (`channel` 0 to 3): 0 while the channel is powered down.
     #[must_use]
     pub const fn output(&self, channel: usize) -> u16 {
         let setting = self.registers[channel];
@@ -147,14 +147,15 @@ impl Mcp4728 {
         }
     }
 
-    /// Power comes back, or the general call reset: the registers are loaded from the EEPROM.
+    /// Loads the registers from the EEPROM, as after power-on or a general call reset.
     pub const fn power_on(&mut self) {
         self.registers = self.eeprom;
         self.expect = Expect::Nothing;
         self.to_store = [false; 4];
     }
 
-    /// An address byte after a start condition; returns whether it is acknowledged. The general call is.
+    /// Handles the address byte after a start condition. Returns whether it is acknowledged: the chip's own address and
+    /// the general call are.
     pub fn address(&mut self, byte: u8, now: Time) -> bool {
         self.store(now);
         self.cursor = 0;
@@ -166,7 +167,7 @@ impl Mcp4728 {
         byte == 0 || byte >> 1 == self.address
     }
 
-    /// A data byte from the master; returns whether it is acknowledged.
+    /// Handles a data byte from the master. Returns whether it is acknowledged.
     pub fn write(&mut self, byte: u8, now: Time) -> bool {
         self.expect = match self.expect {
             Expect::Nothing => return false,
@@ -186,8 +187,8 @@ impl Mcp4728 {
         true
     }
 
-    /// The next of the 24 bytes of the read command (figure 5-15): for each channel three of its register
-    /// and three of its EEPROM; after the last the first again.
+    /// Returns the next of the 24 bytes of the read command (figure 5-15): for each channel three bytes of its register
+    /// and three of its EEPROM. After the last byte, the first one follows again.
     pub fn read(&mut self, now: Time) -> u8 {
         let at = self.cursor;
         self.cursor = (at + 1) % 24;
@@ -199,19 +200,19 @@ impl Mcp4728 {
         };
         let ready = u8::from(now >= self.busy_until);
         match at % 3 {
-            // RDY/BSY, POR (powered), DAC1 DAC0, 0, A2 A1 A0.
+            // From the highest bit: RDY/BSY, POR (power is on), DAC1, DAC0, 0, A2, A1, A0.
             0 => ready << 7 | 1 << 6 | (channel as u8) << 4 | self.address & 7,
             n => setting.to_bytes()[n - 1],
         }
     }
 
-    /// A stop condition ends the transfer.
+    /// Handles a stop condition, which ends the transfer.
     pub fn stop(&mut self, now: Time) {
         self.store(now);
         self.expect = Expect::Nothing;
     }
 
-    /// The first byte after the address (table 5-1).
+    /// Handles the first byte after the address (table 5-1).
     fn command(&mut self, byte: u8) -> Expect {
         match byte >> 5 {
             0b000 | 0b001 => Expect::FastLow(0, byte),
@@ -242,18 +243,19 @@ impl Mcp4728 {
         }
     }
 
-    /// General calls (5.4).
+    /// Handles a general call (5.4).
     fn general_call(&mut self, byte: u8, _now: Time) -> Expect {
         match byte {
             0x06 => self.power_on(),
             0x09 => self.registers.iter_mut().for_each(|s| s.power_down = 0),
-            // 0x08, software update: the outputs follow the registers already.
+            // 0x08, software update, has no effect: the outputs already follow the registers.
             _ => {}
         }
         Expect::Nothing
     }
 
-    /// A complete pair of a fast write (5.6.1): code and power-down only, then the next channel.
+    /// Handles a complete pair of bytes of a fast write (5.6.1). It changes only code and power-down; the next pair is
+    /// for the next channel.
     fn fast(&mut self, channel: usize, high: u8, low: u8) -> Expect {
         let setting = &mut self.registers[channel];
         setting.code = u16::from(high & 0x0F) << 8 | u16::from(low);
@@ -261,7 +263,7 @@ impl Mcp4728 {
         Expect::FastHigh((channel + 1) % 4)
     }
 
-    /// A complete pair of the other write commands (5.6.2 to 5.6.4).
+    /// Handles a complete pair of bytes of the other write commands (5.6.2 to 5.6.4).
     fn whole(&mut self, write: Write, channel: usize, high: u8, low: u8) -> Expect {
         self.registers[channel] = Setting::from_bytes(high, low);
         match write {
@@ -280,7 +282,7 @@ impl Mcp4728 {
         }
     }
 
-    /// Writes what this transfer left for the EEPROM, unless it is still busy.
+    /// Copies the registers of this transfer to the EEPROM, unless the EEPROM is still busy.
     fn store(&mut self, now: Time) {
         let wanted = std::mem::take(&mut self.to_store);
         if wanted == [false; 4] || now < self.busy_until {
@@ -295,7 +297,7 @@ impl Mcp4728 {
     }
 }
 
-/// DAC1 DAC0 in a command byte.
+/// The number of the channel in a command byte: bits DAC1 and DAC0.
 const fn channel_of(command: u8) -> usize {
     (command >> 1 & 3) as usize
 }

@@ -1,4 +1,4 @@
-//! The command bytes of the data sheet's section 5, and what they do.
+//! Tests of the commands in section 5 of the data sheet.
 
 use super::*;
 
@@ -24,25 +24,25 @@ fn outputs(dac: &Mcp4728) -> [u16; 4] {
 }
 
 #[test]
-fn fast_write_fills_channels_in_order_and_wraps() {
+fn fast_write_sets_channels_in_order_and_leaves_the_eeprom() {
     let mut dac = Mcp4728::default();
     let bytes = [0x0F, 0xFF, 0x01, 0x23, 0x08, 0x00, 0x00, 0x01];
     assert_eq!(send(&mut dac, &bytes, Time::ZERO), 8);
     assert_eq!(outputs(&dac), [4095, 0x123, 2048, 1]);
-    // A transfer cut after the high byte changes nothing; two channels only change two.
+    // The transfer ends after the high byte of channel B, so only channel A changes.
     assert_eq!(send(&mut dac, &[0x01, 0x00, 0x02], Time::ZERO), 3);
     assert_eq!(outputs(&dac), [0x100, 0x123, 2048, 1]);
     assert_eq!(dac.eeprom(), [Setting::default(); 4]);
-    // Power-down of A by PD = 01 takes its output to ground.
+    // PD = 01 powers channel A down, so its output is 0.
     send(&mut dac, &[0x15, 0x55], Time::ZERO);
     assert_eq!(outputs(&dac)[0], 0);
     assert_eq!(dac.registers()[0].code, 0x555);
 }
 
 #[test]
-fn multi_write_picks_channels_and_keeps_the_eeprom() {
+fn multi_write_sets_the_named_channels_and_leaves_the_eeprom() {
     let mut dac = Mcp4728::default();
-    // C = 0x800 with the internal reference and gain 2, then A = 0x001; UDAC set does not matter.
+    // C = 0x800 with the internal reference and gain 2, then A = 0x001.
     let bytes = [0x45, 0x98, 0x00, 0x40, 0x00, 0x01];
     assert_eq!(send(&mut dac, &bytes, Time::ZERO), 6);
     assert_eq!(outputs(&dac), [1, 0, 0x800, 0]);
@@ -52,16 +52,16 @@ fn multi_write_picks_channels_and_keeps_the_eeprom() {
 }
 
 #[test]
-fn sequential_write_goes_to_the_eeprom_and_takes_its_time() {
+fn sequential_write_also_writes_the_eeprom_which_is_busy_then() {
     let mut dac = Mcp4728::default();
     let t = Time::from_ms(10);
-    // From channel B: three pairs; a fourth finds no channel and is refused.
+    // From channel B there are three pairs. The byte after them is not acknowledged.
     let bytes = [0x52, 0x01, 0x11, 0x02, 0x22, 0x03, 0x33, 0x04];
     assert_eq!(send(&mut dac, &bytes, t), 7);
     assert_eq!(outputs(&dac), [0, 0x111, 0x222, 0x333]);
     assert_eq!(dac.eeprom()[3].code, 0x333);
     assert_eq!(read_all(&mut dac, t)[0], 0x40, "busy");
-    // A single write during that time changes the register, not the EEPROM.
+    // While the EEPROM is busy, a single write changes the register only.
     send(&mut dac, &[0x58, 0x07, 0x77], t + Time::from_ms(1));
     assert_eq!((dac.output(0), dac.eeprom()[0].code), (0x777, 0));
     let ready = t + EEPROM_WRITE;
@@ -71,7 +71,7 @@ fn sequential_write_goes_to_the_eeprom_and_takes_its_time() {
 }
 
 #[test]
-fn read_back_is_register_and_eeprom_of_each_channel() {
+fn read_returns_register_and_eeprom_of_each_channel() {
     let mut dac = Mcp4728::default();
     send(&mut dac, &[0x5E, 0x9A, 0xBC], Time::ZERO);
     send(&mut dac, &[0x0F, 0xFE], Time::ZERO);
@@ -81,7 +81,7 @@ fn read_back_is_register_and_eeprom_of_each_channel() {
 }
 
 #[test]
-fn reference_gain_and_power_down_commands() {
+fn reference_gain_and_power_down_commands_change_their_bits() {
     let mut dac = Mcp4728::default();
     assert_eq!(send(&mut dac, &[0x8A, 0x00], Time::ZERO), 1);
     assert_eq!(send(&mut dac, &[0xC1], Time::ZERO), 1);
@@ -96,7 +96,7 @@ fn reference_gain_and_power_down_commands() {
 }
 
 #[test]
-fn general_call_reset_and_power_load_the_eeprom() {
+fn general_call_reset_loads_the_eeprom() {
     let mut dac = Mcp4728::default();
     send(&mut dac, &[0x58, 0x01, 0x00], Time::ZERO);
     send(&mut dac, &[0x0F, 0xFF, 0x0F, 0xFF], Time::ZERO);
