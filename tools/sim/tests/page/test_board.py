@@ -57,6 +57,12 @@ class Switch(OnPage):
         expect(self.page.locator("#log")).to_contain_text("unit address 18")
         self.assertEqual((self.answers(1), self.answers(18)), (False, True), "after the power cycle")
 
+    def test_clicks_faster_than_the_answers_all_count(self):
+        self.address(1)
+        rockers = [self.rocker(position).element_handle() for position in (1, 2, 5, 8, 8)]
+        self.page.evaluate("rockers => rockers.forEach((rocker) => rocker.click())", rockers)
+        self.address(18)
+
     def test_switch_and_power_work_with_the_keyboard_only(self):
         press = self.page.keyboard.press
         self.tab_to(self.rocker(1))

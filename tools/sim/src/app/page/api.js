@@ -1,31 +1,33 @@
-// Requests to the simulator. Those about a board go to the board that was chosen, or to the first one.
+// Requests to the simulator. Requests about a board are sent to the chosen board, or to the first one.
 
 import { byId, setText } from "/ui.js";
 
 let prefix = "/api/";
 let whenChanged = () => {};
-/** Paths with a request under way, and the value to send after it. */
+/** Fulfilled when the last change has been sent and its answer is shown. */
+let previous = Promise.resolve();
+/** Paths with a request under way, each with the next value to send. */
 const streams = new Map();
 
 export const path = (rest) => prefix + rest;
 
-/** From now on requests are about this board; null means the first one. */
+/** Chooses the board that later requests are about; null means the first one. */
 export function chooseBoard(name) {
   prefix = name === null ? "/api/" : `/api/boards/${encodeURIComponent(name)}/`;
 }
 
-/** Calls `listener` with the state after every request that has changed something. */
+/** Sets the function that is called with the new state after every request that has changed something. */
 export function onChange(listener) {
   whenChanged = listener;
 }
 
-/** The JSON at an address, or null when there is none. */
+/** Returns the JSON at an address, or null if the simulator refuses the request. */
 export async function get(address) {
   const answer = await fetch(address);
   return answer.ok ? answer.json() : null;
 }
 
-/** Sends JSON and returns the answer; null when it was refused, for the reason that is then shown. */
+/** Sends JSON and returns the reply. Shows the reason of a refusal, and returns null. */
 export async function send(address, body) {
   try {
     const answer = await fetch(address, {
@@ -42,18 +44,25 @@ export async function send(address, body) {
   }
 }
 
-/** Changes something on the board. */
-export async function post(rest, body) {
+/** Sends a change of the board, and shows the new state. Changes are sent one after another. A change that depends on
+ * the state is a function that returns the body: it is called when the changes before it are shown. */
+export function post(rest, body) {
   const at = prefix;
-  const state = await send(at + rest, body);
-  if (state !== null && at === prefix) whenChanged(state);
+  const sent = previous.then(async () => {
+    const dependsOnState = typeof body === "function";
+    if (dependsOnState && at !== prefix) return;
+    const state = await send(at + rest, dependsOnState ? body() : body);
+    if (state !== null && at === prefix) whenChanged(state);
+  });
+  previous = sent.catch(() => {});
+  return sent;
 }
 
-/** Sends a value that changes while it is dragged: one request at a time, and the last value in the end. */
+/** Sends a value that changes while a slider is dragged: one request at a time, and always the last value. */
 export async function stream(rest, body) {
-  const under = streams.get(rest);
-  if (under) {
-    under.next = body;
+  const running = streams.get(rest);
+  if (running) {
+    running.next = body;
     return;
   }
   const own = { next: body };
@@ -66,5 +75,5 @@ export async function stream(rest, body) {
   streams.delete(rest);
 }
 
-/** Whether values of this path are still on their way. */
+/** Whether a request to this path is under way. */
 export const isStreaming = (rest) => streams.has(rest);

@@ -7,7 +7,7 @@ import { byId, element, select, setText } from "/ui.js";
 
 let shown = null;
 
-/** The state that is shown; null before the first. */
+/** The state that is shown; null before the first one. */
 export const current = () => shown;
 
 /** The channels of all slots, each with its name and the number of its element. */
@@ -20,7 +20,7 @@ export function channels(state) {
 const idOf = (slot, at) => `c${slot}-${at + 1}`;
 const redraw = () => shown && show(shown);
 
-/** What cannot change without new elements: which modules are where. */
+/** The part of a state whose change needs new elements: board type, ports and modules. */
 const shape = (state) => JSON.stringify([state.board, slotsOf(state).map((slot) => [slot.port, slot.module])]);
 
 /** Shows a state. */
@@ -54,14 +54,14 @@ export function show(state) {
   }
 }
 
-/** Forgets the board, for another one to be shown. */
+/** Forgets the state, before another board is shown. */
 export function forget() {
   shown = null;
 }
 
-/** Connects the switch and the power. */
+/** Connects the controls of the switch and the power. */
 export function listen() {
-  byId("power").addEventListener("click", () => shown && post("power", { on: !shown.powered }));
+  byId("power").addEventListener("click", () => post("power", () => ({ on: !shown.powered })));
   byId("cycle").addEventListener("click", () => post("power", { cycle: true }));
   byId("dip-value").addEventListener("change", (event) => {
     const value = event.target.valueAsNumber;
@@ -71,18 +71,15 @@ export function listen() {
   for (let n = 0; n < 8; n += 1) byId("dip").append(rocker(n));
 }
 
-/** One of the eight switches in SW01. */
+/** Makes one of the eight positions of SW01; `n` counts from 0. */
 function rocker(n) {
-  const set = (on) => {
-    const value = on ? shown.dip | (1 << n) : shown.dip & ~(1 << n);
-    if (value !== shown.dip) post("dip", { value });
-  };
+  const set = (on) => post("dip", () => ({ value: on ? shown.dip | (1 << n) : shown.dip & ~(1 << n) }));
   return element("button", {
     type: "button", role: "switch", "aria-checked": "false", "aria-label": `SW01 position ${n + 1}, adds ${1 << n}`,
-    onclick: () => shown && set((shown.dip & (1 << n)) === 0),
+    onclick: () => post("dip", () => ({ value: shown.dip ^ (1 << n) })),
     onkeydown: (event) => {
       const { key, currentTarget } = event;
-      if (key === "ArrowUp" || key === "ArrowDown") shown && set(key === "ArrowUp");
+      if (key === "ArrowUp" || key === "ArrowDown") set(key === "ArrowUp");
       else if (key === "ArrowRight") currentTarget.nextElementSibling?.focus();
       else if (key === "ArrowLeft") currentTarget.previousElementSibling?.focus();
       else return;

@@ -1,21 +1,21 @@
-// The channels of a module: what they look like, what a person can do to them, and what they show.
+// The channels of a module: their controls and displays.
 
 import { inputs, outputs, address } from "/model.js";
 import { post, stream, isStreaming } from "/api.js";
 import { byId, element, select, setText } from "/ui.js";
 
-/** The range that was chosen for an analog channel. */
+/** The chosen range of each analog channel. */
 const rangeOf = new Map();
 const inputRange = (id) => inputs[rangeOf.get(id) ?? "volts"];
 const outputRange = (id) => outputs[rangeOf.get(id) ?? "volts"];
 
 const NAMES = { di: "DI", do: "DO", relay: "Relay", ai: "AI", ao: "AO" };
 
-/** A channel's element; `id` is unique on the page, `redraw` shows the board again. */
+/** Makes the element of a channel. `id` is unique on the page; `redraw` shows the board again. */
 export function buildChannel(slot, id, channel, number, redraw) {
   const name = NAMES[channel.kind];
   if (name === undefined) return null;
-  // The points of a relay are its jumper and, two addresses on, its coil.
+  // A relay has two points: its jumper, and its coil with an address that is two higher.
   const point = address(slot.port, channel.kind === "relay" ? number + 2 : number);
   return element("div", { class: `channel ${channel.kind}`, role: "group", "aria-label": `${name} ${number}` },
     element("div", { class: "name" }, element("span", {}, `${name} ${number}`), element("code", {}, point)),
@@ -23,10 +23,13 @@ export function buildChannel(slot, id, channel, number, redraw) {
 }
 
 function control(path, id, kind, number, redraw) {
-  const toggle = (key, label) => element("button", {
-    id, type: "button", role: "switch", "aria-checked": "false", "aria-label": label, class: "toggle",
-    onclick: (event) => post(path, { [key]: event.currentTarget.getAttribute("aria-checked") !== "true" }),
-  });
+  const toggle = (key, label) => {
+    const button = element("button", {
+      id, type: "button", role: "switch", "aria-checked": "false", "aria-label": label, class: "toggle",
+      onclick: () => post(path, () => ({ [key]: button.getAttribute("aria-checked") !== "true" })),
+    });
+    return button;
+  };
   const lamp = (label) => element("div", {
     id: `${id}-lamp`, class: "lamp", role: "switch", "aria-readonly": "true", "aria-checked": "false", "aria-label": label,
   });
@@ -55,14 +58,7 @@ function analogInput(path, id, number, redraw) {
     },
     onblur: redraw,
   });
-  const range = select({
-    id: `${id}-range`, "aria-label": `Range of analog input ${number}`,
-    onchange: (event) => {
-      rangeOf.set(id, event.target.value);
-      redraw();
-    },
-  }, Object.entries(inputs).map(([key, each]) => [key, each.unit]));
-  range.value = rangeOf.get(id) ?? "volts";
+  const range = rangeOfChannel(id, `Range of analog input ${number}`, inputs, redraw);
   const slider = element("input", {
     type: "range", id, min: 0, max: 3300, step: 1, "aria-label": `Slider of analog input ${number}`, "data-path": path,
     oninput: (event) => stream(path, { millivolts: Number(event.target.value) }).then(redraw),
@@ -70,15 +66,21 @@ function analogInput(path, id, number, redraw) {
   return [element("div", { class: "value" }, field, range), slider, element("p", { class: "pin", id: `${id}-text` })];
 }
 
-function analogOutput(id, number, redraw) {
+/** Makes the drop-down list of an analog channel's ranges. */
+function rangeOfChannel(id, label, ranges, redraw) {
   const range = select({
-    id: `${id}-range`, "aria-label": `Jumper of analog output ${number}`,
+    id: `${id}-range`, "aria-label": label,
     onchange: (event) => {
       rangeOf.set(id, event.target.value);
       redraw();
     },
-  }, Object.entries(outputs).map(([key, each]) => [key, each.unit]));
+  }, Object.entries(ranges).map(([key, each]) => [key, each.unit]));
   range.value = rangeOf.get(id) ?? "volts";
+  return range;
+}
+
+function analogOutput(id, number, redraw) {
+  const range = rangeOfChannel(id, `Jumper of analog output ${number}`, outputs, redraw);
   const meter = element("meter", { id: `${id}-meter`, min: 0, max: 4095, "aria-label": `Analog output ${number}` });
   return [
     element("div", { class: "value" }, element("span", { class: "reading", id: `${id}-value` }), range),
@@ -87,7 +89,7 @@ function analogOutput(id, number, redraw) {
   ];
 }
 
-/** Shows what a channel is now. */
+/** Shows the state of a channel. */
 export function showChannel(id, channel) {
   switch (channel.kind) {
     case "di":
@@ -121,14 +123,14 @@ function showInput(id, millivolts) {
   const { fromPin, unit } = inputRange(id);
   const slider = byId(id);
   const field = byId(`${id}-number`);
-  // What a person is typing or dragging is not taken away.
+  // Do not overwrite a value that the user is typing or dragging.
   if (document.activeElement !== field) field.value = fromPin(millivolts);
   if (!isStreaming(slider.dataset.path)) slider.value = millivolts;
   slider.setAttribute("aria-valuetext", `${fromPin(millivolts)} ${unit}, ${millivolts} mV at the pin`);
   setText(byId(`${id}-text`), `pin: ${millivolts} mV`);
 }
 
-/** An analog channel's value in its range; null for any other channel. */
+/** Returns an analog channel's value in its range, as text; null for any other channel. */
 export function reading(id, channel) {
   if (channel.kind === "ai") return `${inputRange(id).fromPin(channel.millivolts)} ${inputRange(id).unit}`;
   if (channel.kind === "ao") return `${outputRange(id).fromCode(channel.code)} ${outputRange(id).unit}`;

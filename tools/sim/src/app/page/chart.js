@@ -1,4 +1,4 @@
-// The analog points over the last minute.
+// The chart of the analog points over the last minute.
 
 import { share } from "/model.js";
 import { channels } from "/board.js";
@@ -8,16 +8,16 @@ import { byId, element } from "/ui.js";
 const SPAN_MS = 60_000;
 const WIDTH = 600;
 const HEIGHT = 150;
-/** Colours, `--line-0` and so on in the style sheet. */
+/** Number of line colours in the style sheet: `--line-0` and so on. */
 const COLORS = 4;
 let samples = [];
 
-/** Forgets what was drawn. */
+/** Clears the chart. */
 export function reset() {
   samples = [];
 }
 
-/** Takes a sample of the board and draws it with those of the last minute. */
+/** Adds a sample of the board, and draws the samples of the last minute. */
 export function sample(state) {
   const analog = channels(state).filter(({ channel }) => share(channel) !== null);
   byId("chart-section").hidden = analog.length === 0;
@@ -45,7 +45,7 @@ function line(id, n, now) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
   made.setAttribute("points", points.join(" "));
   made.style.stroke = `var(--line-${n % COLORS})`;
-  // Beyond the colours, lines are told apart by their dashes.
+  // Lines beyond the number of colours repeat a colour and are dashed.
   if (n >= COLORS) made.setAttribute("stroke-dasharray", `${2 + Math.floor(n / COLORS) * 4} 4`);
   return made;
 }

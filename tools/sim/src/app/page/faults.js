@@ -1,4 +1,4 @@
-// Faults that a person makes on the line and the chip.
+// The panel of the faults that the user causes on the line and on the board.
 
 import { get, path, send } from "/api.js";
 import { byId, element } from "/ui.js";
@@ -9,7 +9,7 @@ const LABELS = {
   noise_hz: "Noise on the line, pulses per second",
   i2c_absent: "DAC does not answer on I2C",
   hse_failed: "Crystal has failed",
-  hsi_percent: "HSI off by, percent",
+  hsi_percent: "HSI deviation from 8 MHz, percent",
   lsi_khz: "LSI, kHz",
 };
 
@@ -47,7 +47,7 @@ function show(faults) {
   }
 }
 
-/** How many changes were made: an answer that was asked for before the last one is out of date. */
+/** Number of changes so far. A reply to a request that was sent before the last change is out of date. */
 let changes = 0;
 
 async function change(wanted) {
@@ -56,7 +56,7 @@ async function change(wanted) {
   await refresh();
 }
 
-/** Shows the faults, and hides the panel where there are none to choose. */
+/** Reads and shows the faults. Hides the panel if the simulator does not offer faults. */
 export async function refresh() {
   const before = changes;
   const faults = await get(path("faults")).catch(() => null);

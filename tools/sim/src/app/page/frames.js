@@ -4,11 +4,14 @@ import { isShown, spaced } from "/model.js";
 import { get } from "/api.js";
 import { byId, element, setText } from "/ui.js";
 
+/** Number of frames that the page keeps. */
 const KEPT = 500;
 let frames = [];
-/** How many of the last frames have no row yet. */
+/** Number of the last frames that have no row yet. */
 let waiting = 0;
 let last = null;
+/** Frames that have arrived while the earlier ones are fetched. */
+let held = null;
 
 const milliseconds = (us) => (us === null ? "" : (us / 1000).toFixed(2));
 
@@ -27,13 +30,22 @@ function row(frame) {
   return made;
 }
 
-/** Takes a frame that was on the line. */
+/** Adds a frame that was on the line. */
 export function add(frame) {
+  if (held === null) {
+    append(frame);
+  } else {
+    held.push(frame);
+    if (held.length > KEPT) held.shift();
+  }
+}
+
+function append(frame) {
   if (last !== null && frame.number <= last.number) return;
   last = frame;
   frames.push(frame);
   if (frames.length > KEPT) frames.shift();
-  // A page that nobody looks at draws nothing, and keeps no more than it will draw.
+  // A hidden page gets no animation frame. It draws nothing, and at most KEPT frames wait for their rows.
   if (waiting === 0) requestAnimationFrame(draw);
   waiting = Math.min(waiting + 1, KEPT);
 }
@@ -71,23 +83,33 @@ function clear() {
   count();
 }
 
-/** Fetches what was on the line since the last frame. Returns whether the simulator is another one than before: one that
- * has started again counts from one, and knows the last frame not at all or another one by its number. */
-export async function fetchMissed() {
-  const answer = await get("/api/frames");
-  if (answer === null) return false;
-  const all = answer.frames;
-  const isOther = last !== null && !all.some((frame) => frame.number > last.number
+/** Adds those of all frames of the simulator that are missing. Returns whether the simulator has started again: its
+ * frames are then numbered from 1 again, so the last frame is missing or has another start. */
+function addMissing(all) {
+  const hasRestarted = last !== null && !all.some((frame) => frame.number > last.number
     || (frame.number === last.number && frame.start_us === last.start_us));
-  if (isOther) {
+  if (hasRestarted) {
     last = null;
     clear();
   }
-  all.slice(-KEPT).forEach(add);
-  return isOther;
+  all.slice(-KEPT).forEach(append);
+  return hasRestarted;
 }
 
-/** Connects filter and buttons. */
+/** Fetches the frames since the last one. Returns whether the simulator has started again. */
+export async function fetchMissed() {
+  held ??= [];
+  try {
+    const answer = await get("/api/frames");
+    return answer !== null && addMissing(answer.frames);
+  } finally {
+    const arrived = held ?? [];
+    held = null;
+    arrived.forEach(append);
+  }
+}
+
+/** Connects the filter and the button that clears the log. */
 export function listen() {
   byId("filter").addEventListener("input", filter);
   byId("clear").addEventListener("click", clear);

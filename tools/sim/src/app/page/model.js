@@ -1,23 +1,26 @@
-// What values mean, without the page.
+// The meaning of values, independent of the page's elements.
 
+/** Full scale at the pin of an analog input, in mV. */
 const PIN_MV = 3300;
+/** Full scale of a DAC. */
 const LARGEST_CODE = 4095;
+/** 0 degrees Celsius in kelvin. */
 const KELVIN = 273.15;
-/** The firmware's default thermistor: 10 kOhm at 25 degrees, B = 3950 K, under a pull-up of 10 kOhm. */
+/** The firmware's default thermistor: 10 kOhm at 25 degrees Celsius, B = 3950 K, with a pull-up of 10 kOhm. */
 const BETA = 3950;
 const T0 = 25 + KELVIN;
 
 const within = (millivolts) => Math.min(PIN_MV, Math.max(0, Math.round(millivolts)));
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
-/** 10 V and 20 mA are full scale at the pin (docs/wiring.md). */
+/** A range in which the value `full` is full scale at the pin: 10 V or 20 mA (docs/wiring.md). */
 const linear = (unit, full) => ({
   unit,
   fromPin: (millivolts) => rounded((millivolts * full) / PIN_MV, 3),
   toPin: (value) => within((value * PIN_MV) / full),
 });
 
-/** The ranges of an analog input: from millivolts at the pin, and to them. */
+/** The ranges of an analog input, each with its conversion from and to millivolts at the pin. */
 export const inputs = {
   volts: linear("V", 10),
   milliamps: linear("mA", 20),
@@ -35,21 +38,21 @@ export const inputs = {
   },
 };
 
-/** The ranges of an analog output, which its jumper chooses: what a code of the DAC is. */
+/** The ranges of an analog output, which its jumper chooses, each with its conversion from a code of the DAC. */
 export const outputs = {
   volts: { unit: "V", fromCode: (code) => ((code * 10) / LARGEST_CODE).toFixed(2) },
   milliamps: { unit: "mA", fromCode: (code) => ((code * 20) / LARGEST_CODE).toFixed(2) },
 };
 
-/** An analog channel as a share of full scale; null for any other channel. */
+/** Returns the value of an analog channel as a share of full scale; null for any other channel. */
 export function share(channel) {
   if (channel.kind === "ai") return channel.millivolts / PIN_MV;
   if (channel.kind === "ao") return channel.code / LARGEST_CODE;
   return null;
 }
 
-/** The modules, and the labels of their five screw terminals. */
 const FOUR = ["1", "2", "3", "4", "COM"];
+/** The modules, each with its description and the labels of its five screw terminals. */
 export const modules = {
   none: { text: "empty slot", terminals: ["", "", "", "", ""] },
   "4di": { text: "4DI, digital inputs", terminals: FOUR },
@@ -60,10 +63,10 @@ export const modules = {
   "2ai2ao": { text: "2AI2AO, analog inputs and outputs", terminals: FOUR },
 };
 
-/** The port of a board's only slot, which the state does not name: that of the modio-02. */
+/** Port of the only slot of a modio-02. The state of a board with one slot does not name the port. */
 const ONLY_PORT = 5;
 
-/** The slots of a board. The path of a board's only slot is the board's. */
+/** Returns the slots of a board, each with the first part of its paths. */
 export function slotsOf(state) {
   if (!state.slots) {
     return [{ port: ONLY_PORT, path: "", module: state.module, channels: state.channels }];
@@ -71,20 +74,20 @@ export function slotsOf(state) {
   return state.slots.map((slot) => ({ ...slot, path: `slots/${slot.port}/` }));
 }
 
-/** The Modbus address of a point (docs/points.md). */
+/** Returns the Modbus address of point `number`, from 1, of a port (docs/points.md). */
 export function address(port, number) {
   return `0x${((port - 1) * 4 + number - 1).toString(16).padStart(4, "0")}`;
 }
 
-/** The bytes of a frame, with spaces between them. */
+/** Returns the bytes of a frame, with spaces between them. */
 export const spaced = (hex) => hex.match(/../g)?.join(" ") ?? "";
 
-/** Whether a frame has all of the words in its meaning, its bytes or its direction. */
+/** Whether a frame contains all of the words: in its meaning, its bytes, its sender, or as "bad". */
 export function isShown(frame, words) {
   const from = frame.direction === "rx" ? "master" : "unit";
   const state = frame.crc_ok && !frame.damaged ? "" : "bad";
   const text = `${frame.summary} ${spaced(frame.bytes)} ${from} ${state}`.toLowerCase();
-  // Bytes may be typed without the spaces between them.
+  // A user may type bytes without the spaces between them.
   const isIn = (word) => text.includes(word) || (/^([0-9a-f]{2})+$/.test(word) && text.includes(spaced(word)));
   return words.toLowerCase().split(/\s+/).every(isIn);
 }

@@ -1,4 +1,4 @@
-// The front panel: shows the state of the board, and asks the simulator for what a person does to it.
+// The page: shows the state of the board, and sends the user's changes to the simulator.
 
 import * as api from "/api.js";
 import * as board from "/board.js";
@@ -13,15 +13,15 @@ const FINDINGS_SHOWN = 50;
 
 let events = null;
 
-/** The first state of a stream, which may come from a simulator that has started again. */
+/** Shows the first state of a stream. The simulator may have started again since the last one. */
 function begin(state) {
   board.show(state);
-  frames.fetchMissed().then((isOther) => {
-    if (isOther) chart.reset();
+  frames.fetchMissed().then((hasRestarted) => {
+    if (hasRestarted) chart.reset();
   }).catch(() => {});
 }
 
-/** A later state. One that was under way while a newer one was shown is dropped. */
+/** Shows a later state. Drops a state that is older than the one shown. */
 function take(state) {
   if (state.virtual_ms >= (board.current()?.virtual_ms ?? 0)) board.show(state);
 }
@@ -37,7 +37,7 @@ function listen() {
   });
   events.addEventListener("error", () => {
     setText(byId("connection"), "the simulator does not answer; trying again");
-    // A refusal, unlike a lost connection, is not tried again by the browser.
+    // The browser tries again after a lost connection, but not after a refusal.
     if (events.readyState === EventSource.CLOSED) setTimeout(listen, POLL_MS);
   });
   events.addEventListener("state", (event) => {
@@ -56,13 +56,13 @@ async function fetchFindings() {
   byId("findings").replaceChildren(...(items.length > 0 ? items : [element("li", {}, "none")]));
 }
 
-/** What no event tells: findings and faults. */
+/** Reads the findings and the faults, which are in no event. */
 function poll() {
   fetchFindings().catch(() => {});
   if (!byId("faults-section").hidden) faults.refresh();
 }
 
-/** Lets a person choose a board where there are several on the line. */
+/** Lets the user choose a board if there are several on the line. */
 async function offerBoards() {
   const boards = await api.get("/api/boards");
   if (boards === null || boards.length < 2) return;

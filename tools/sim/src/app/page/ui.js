@@ -1,8 +1,9 @@
-// Small helpers to make and change elements.
+// Functions that make and change elements.
 
 export const byId = (id) => document.getElementById(id);
 
-/** Makes an element. An attribute that begins with `on` is a listener; `true` stands for a bare attribute. */
+/** Makes an element. An attribute whose name begins with `on` is a listener. The value `true` makes an attribute without
+ * a value; `false` and `undefined` make none. */
 export function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -20,7 +21,7 @@ export function select(attributes, choices) {
   return element("select", attributes, ...options);
 }
 
-/** Changes a text, and leaves the document alone when the text is the same. */
+/** Sets a text. Does not touch the document if the text is the same. */
 export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
