@@ -61,7 +61,7 @@ def larger_board(browser, board, line, scheme, file):
             board.set_channel(channel + 1, port=3, millivolts=value(second, channel))
         level = value(second, 0)
         if second == SECONDS - 1:
-            while not board.state()["leds"]["run"]:
+            while not board.state().leds.run:
                 line.ask("run 20000")
         requests = ["020400080004", "020100000004", f"0206000c{level:04x}", f"0206000e{4095 - level:04x}"]
         line.request(requests[second % 4], 1000 if second < SECONDS - 1 else 40)
@@ -126,15 +126,8 @@ def reduced(picture: Image.Image) -> Image.Image:
     return made
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sim", required=True, type=pathlib.Path)
-    parser.add_argument("--elf", required=True, type=pathlib.Path)
-    parser.add_argument("--elf-08", required=True, type=pathlib.Path)
-    parser.add_argument("--to", required=True, type=pathlib.Path, help="the directory of the pictures")
-    options = parser.parse_args()
-    os.environ |= {"MODIO_SIM": str(options.sim), "MODIO_ELF": str(options.elf), "MODIO_ELF_08": str(options.elf_08)}
-    options.to.mkdir(parents=True, exist_ok=True)
+def take_all(to: pathlib.Path):
+    """Takes all pictures, into the directory `to`."""
     slots = ["--slot", "1=4di", "--slot", "2=2relay", "--slot", "3=4ai", "--slot", "4=4ao"]
     pictures = [("desktop", larger_board, {"board": "modio-08", "options": slots}),
                 ("phone", smaller_board, {"module": "2ai2ao"})]
@@ -145,11 +138,23 @@ def main():
                 running = simulator.Simulator.of(dip=2, **board | {"options": [*EXACT, *board.get("options", ())]})
                 try:
                     line = Line(running.endpoint("exact-line"))
-                    take(browser, running, line, scheme, options.to / f"panel-{name}-{scheme}.png")
+                    take(browser, running, line, scheme, to / f"panel-{name}-{scheme}.png")
                     line.file.close()
                 finally:
                     running.close()
         browser.close()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sim", required=True, type=pathlib.Path)
+    parser.add_argument("--elf", required=True, type=pathlib.Path)
+    parser.add_argument("--elf-08", required=True, type=pathlib.Path)
+    parser.add_argument("--to", required=True, type=pathlib.Path, help="the directory of the pictures")
+    options = parser.parse_args()
+    os.environ |= {"MODIO_SIM": str(options.sim), "MODIO_ELF": str(options.elf), "MODIO_ELF_08": str(options.elf_08)}
+    options.to.mkdir(parents=True, exist_ok=True)
+    take_all(options.to)
 
 
 if __name__ == "__main__":
