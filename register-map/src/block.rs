@@ -1,6 +1,6 @@
 //! Blocks of registers. Each is declared once: the numbers for the firmware and the texts for people.
 
-use crate::points;
+use crate::port;
 use crate::rule::Rule;
 use crate::value::Value;
 
@@ -54,8 +54,8 @@ impl Text {
             None => 1,
         };
         match values {
-            points::COUNT => Scope::Point,
-            points::PORTS => Scope::Port,
+            port::COUNT => Scope::Point,
+            port::PORTS => Scope::Port,
             _ => Scope::Unit,
         }
     }

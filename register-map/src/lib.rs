@@ -33,6 +33,7 @@ pub mod docs;
 pub mod fault;
 mod module;
 pub mod points;
+mod port;
 pub mod record;
 mod rule;
 pub mod state;

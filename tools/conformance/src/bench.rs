@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::time::Duration;
 
-use crate::case::{Check, Failure, Stop};
+use crate::check::{Check, Failure, Stop};
 use crate::endpoint::{Broken, Endpoint, Piece, Received};
 use crate::frame::{Reply, hex};
 use crate::target::Target;

@@ -3,9 +3,8 @@
 
 use std::fmt;
 
-use modbus_frames::adu::Framing;
+use modbus_frames::adu::{Framing, bytes};
 pub use modbus_frames::adu::{crc, lrc};
-use modbus_frames::decode::bytes;
 
 /// The form of a frame on the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

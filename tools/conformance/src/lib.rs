@@ -22,6 +22,7 @@
 pub mod bench;
 pub mod case;
 pub mod cases;
+pub mod check;
 pub mod cli;
 pub mod endpoint;
 pub mod frame;

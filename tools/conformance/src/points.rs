@@ -13,6 +13,12 @@ pub fn pdu(function: u8, address: u16, word: u16) -> Vec<u8> {
     vec![function, ah, al, wh, wl]
 }
 
+/// A request of function 08.
+#[must_use]
+pub fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
+    [&[8], &sub.to_be_bytes()[..], data].concat()
+}
+
 /// A write of several registers, 0x10.
 #[must_use]
 pub fn write_words(address: u16, values: &[u16]) -> Vec<u8> {

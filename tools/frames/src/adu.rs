@@ -3,8 +3,6 @@
 
 use crc::{CRC_16_MODBUS, Crc};
 
-use crate::decode::bytes;
-
 const CRC16: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
 /// Length of the longest RTU frame in bytes.
@@ -110,6 +108,16 @@ impl Framing {
             _ => Err("too short for an address and a function code".to_owned()),
         }
     }
+}
+
+/// Returns bytes in hexadecimal, and an ASCII frame as characters.
+#[must_use]
+pub fn bytes(framing: Framing, bytes: &[u8]) -> String {
+    if framing == Framing::Ascii && bytes.starts_with(b":") && bytes.is_ascii() {
+        return String::from_utf8_lossy(bytes).trim_end().to_owned();
+    }
+    let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    digits.join(" ")
 }
 
 /// Compares a check with the right one.

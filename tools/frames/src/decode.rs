@@ -1,6 +1,6 @@
 //! Describes requests and responses in words, for people.
 
-use crate::adu::Framing;
+use crate::adu::{Framing, bytes};
 use crate::{Direction, names};
 
 /// Describes a frame in words: the unit, and the request or response. `request` is the PDU of the preceding
@@ -25,16 +25,6 @@ pub fn frame(
             }
         }
     }
-}
-
-/// Returns bytes in hexadecimal, and an ASCII frame as characters.
-#[must_use]
-pub fn bytes(framing: Framing, bytes: &[u8]) -> String {
-    if framing == Framing::Ascii && bytes.starts_with(b":") && bytes.is_ascii() {
-        return String::from_utf8_lossy(bytes).trim_end().to_owned();
-    }
-    let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-    digits.join(" ")
 }
 
 pub(crate) fn word(bytes: &[u8], at: usize) -> Option<u16> {

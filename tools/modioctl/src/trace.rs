@@ -2,7 +2,7 @@
 
 use tokio::time::Instant;
 
-use crate::bus::adu::Framing;
+use crate::bus::adu::{self, Framing};
 use crate::bus::{Direction, Observer, Seen, decode};
 
 /// Returns an observer that prints.
@@ -40,7 +40,7 @@ pub fn frame(
     };
     format!(
         "{arrow} {}  {}",
-        decode::bytes(framing, bytes),
+        adu::bytes(framing, bytes),
         decode::frame(framing, direction, bytes, request),
     )
 }

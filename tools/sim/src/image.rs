@@ -5,7 +5,7 @@ use std::path::Path;
 
 use object::{Object, ObjectSegment, ObjectSymbol};
 
-use crate::chip::Error;
+use crate::error::Error;
 use crate::machine::memory::FLASH_BASE;
 
 /// Bytes of flash of the largest part of the family (RM0008 3.3.3).

@@ -27,6 +27,7 @@ pub mod board;
 pub mod bus;
 pub mod chip;
 pub mod corner;
+mod error;
 pub mod exact_line;
 pub mod finding;
 pub mod image;
@@ -43,8 +44,9 @@ pub mod time;
 
 pub use board::{Board, Config, Leds};
 pub use bus::Bus;
-pub use chip::{Chip, CoreTime, Error, Wait};
+pub use chip::{Chip, CoreTime, Wait};
 pub use corner::Corner;
+pub use error::Error;
 pub use finding::Finding;
 pub use image::Image;
 pub use register_map::Module;

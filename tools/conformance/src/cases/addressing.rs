@@ -2,9 +2,8 @@
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case};
-use crate::cases::diagnostics::diagnose;
 use crate::cases::line_counters::count;
-use crate::points::{pdu, write_bits, write_words};
+use crate::points::{diagnose, pdu, write_bits, write_words};
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[

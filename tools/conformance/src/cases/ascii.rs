@@ -5,10 +5,10 @@ use std::time::Duration;
 use crate::bench::{Bench, apart};
 use crate::case::{Case, Check, Need, case};
 use crate::cases::damage::one_by_one;
-use crate::cases::diagnostics::diagnose;
 use crate::endpoint::Piece;
 use crate::frame::{Reply, ascii, lrc, rtu};
 use crate::line::Parity;
+use crate::points::diagnose;
 
 const N: &[Need] = &[Need::Ascii];
 const S: &str = "V1.02 2.5.2.1";

@@ -5,6 +5,7 @@ use super::line_counters;
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
 use crate::frame::Reply;
+use crate::points::diagnose;
 
 const N: &[Need] = &[Need::Function(8)];
 
@@ -33,11 +34,6 @@ pub(super) const CASES: &[Case] = &[
     case("fc08/clear-overruns", "V1.1b3 6.8.1, 14", "14 is echoed, and the overrun counter is 0 after it", N,
         clear_overruns),
 ];
-
-/// A request of function 08.
-pub(super) fn diagnose(sub: u16, data: &[u8]) -> Vec<u8> {
-    [&[8], &sub.to_be_bytes()[..], data].concat()
-}
 
 fn echo(bench: &mut Bench<'_>) -> Check {
     let odd: &[u16] = match bench.target.modio {

@@ -4,11 +4,11 @@ use register_map::configuration::{FORMAT, KEY};
 
 use crate::bench::{Bench, damaged_at};
 use crate::case::{Case, Check, Need, case, skip};
-use crate::cases::diagnostics::{self, diagnose};
+use crate::cases::diagnostics;
 use crate::cases::line_counters;
 use crate::endpoint::Piece;
 use crate::frame::hex;
-use crate::points::pdu;
+use crate::points::{diagnose, pdu};
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[

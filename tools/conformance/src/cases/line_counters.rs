@@ -4,10 +4,9 @@ use register_map::state;
 
 use crate::bench::{Bench, damaged_at};
 use crate::case::{Case, Check, Need, Stop, case, skip};
-use crate::cases::diagnostics::diagnose;
 use crate::cases::dispatch::unknown_function;
 use crate::endpoint::Piece;
-use crate::points::pdu;
+use crate::points::{diagnose, pdu};
 
 const S: &str = "V1.02 appendix A";
 

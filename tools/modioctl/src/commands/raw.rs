@@ -1,6 +1,6 @@
 //! `modioctl raw`.
 
-use crate::bus::{Lost, decode};
+use crate::bus::{Lost, adu, decode};
 use crate::cli::Raw;
 use crate::device::Device;
 use crate::failure::Failure;
@@ -16,7 +16,7 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
     let framing = device.master.endpoint().framing;
     output::line(format_args!(
         "-> {}  {}",
-        decode::bytes(framing, &framing.frame(0, device.unit, &pdu)),
+        adu::bytes(framing, &framing.frame(0, device.unit, &pdu)),
         decode::request(&pdu)
     ))?;
     match device.master.ask(device.unit, &pdu).await {
@@ -24,7 +24,7 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
             let frame = framing.frame(0, device.unit, &answer);
             output::line(format_args!(
                 "<- {}  {}",
-                decode::bytes(framing, &frame),
+                adu::bytes(framing, &frame),
                 decode::response(&answer, Some(&pdu))
             ))?;
             match answer[..] {
@@ -37,7 +37,7 @@ pub async fn run(device: &mut Device, options: &Raw) -> Result<(), Failure> {
         Err(Lost::Garbled(bytes)) => {
             output::line(format_args!(
                 "<- {}  not an answer to this request",
-                decode::bytes(framing, &bytes)
+                adu::bytes(framing, &bytes)
             ))?;
             Err(device.lost(&Lost::Garbled(bytes)))
         }

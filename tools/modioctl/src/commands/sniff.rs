@@ -10,7 +10,7 @@ use modbus_frames::capture::{Packet, Recorder};
 use serde_json::{Value as Json, json};
 use tokio::time::{Instant, timeout};
 
-use crate::bus::adu::Framing;
+use crate::bus::adu::{self, Framing};
 use crate::bus::{Direction, Endpoint, Place, Stream, decode, is_pseudo_terminal};
 use crate::cli::Sniff;
 use crate::device::place;
@@ -175,7 +175,7 @@ fn line(framing: Framing, piece: &Piece, gap: Option<Duration>) -> String {
     let text = match &piece.kind {
         Kind::Garbled => format!(
             "?? {}  {}",
-            decode::bytes(Framing::Rtu, &piece.bytes),
+            adu::bytes(Framing::Rtu, &piece.bytes),
             words(framing, piece)
         ),
         Kind::Frame {
@@ -216,7 +216,7 @@ fn object(framing: Framing, piece: &Piece, time: DateTime<Local>, gap: Option<Du
         "unit": unit,
         "function": function,
         "turnaround_ms": piece.turnaround().map(milliseconds),
-        "bytes": decode::bytes(Framing::Rtu, &piece.bytes),
+        "bytes": adu::bytes(Framing::Rtu, &piece.bytes),
         "text": words(framing, piece),
     })
 }

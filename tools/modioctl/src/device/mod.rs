@@ -12,7 +12,7 @@ pub use learn::{Learned, fetch, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};
-use crate::bus::{Lost, Master, Observer, decode, is_from_gateway};
+use crate::bus::{Lost, Master, Observer, adu, is_from_gateway};
 use crate::failure::Failure;
 
 /// Largest number of registers that one request can read (V1.1b3, 6.3).
@@ -223,7 +223,7 @@ impl Device {
                 Failure::Garbled(format!(
                     "something answers at {place}, but garbled ({} bytes: {}{}): wrong rate or format, two units with address {unit}, or no termination",
                     bytes.len(),
-                    decode::bytes(endpoint.framing, shown),
+                    adu::bytes(endpoint.framing, shown),
                     if shown.len() < bytes.len() {
                         " ..."
                     } else {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use chrono::{DateTime, Local};
 use tokio::time::Instant;
 
-use crate::bus::{Direction, Seen, decode};
+use crate::bus::{Direction, Seen, adu, decode};
 
 /// Largest number of stored frames.
 const MOST: usize = 10_000;
@@ -91,7 +91,7 @@ impl Frames {
             at: Local::now() - age,
             direction: seen.direction,
             text,
-            bytes: decode::bytes(seen.framing, &seen.bytes),
+            bytes: adu::bytes(seen.framing, &seen.bytes),
         });
         if self.entries.len() > MOST {
             self.entries.pop_front();

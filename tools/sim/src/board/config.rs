@@ -3,8 +3,9 @@
 use register_map::Module;
 
 use super::{Layout, MODIO_02};
-use crate::chip::{self, Error};
+use crate::chip;
 use crate::corner::Corner;
+use crate::error::Error;
 use crate::slot;
 
 /// Configuration of a board before its first power-on.

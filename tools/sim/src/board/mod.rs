@@ -12,7 +12,8 @@ pub use config::Config;
 pub use layout::{Layout, MODIO_02, MODIO_08, SlotPins};
 pub use outside::Leds;
 
-use crate::chip::{Chip, Error};
+use crate::chip::Chip;
+use crate::error::Error;
 use crate::image::Image;
 
 /// A virtual modio board.

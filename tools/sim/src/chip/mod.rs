@@ -1,7 +1,6 @@
 //! An STM32F103 in a circuit. This module has power and time, [`pins`] the pins, the crystal and the supply, [`inside`]
 //! the memories, [`measure`] the measurements, and [`debug`] the methods for a debugger.
 
-mod config;
 mod debug;
 mod inside;
 mod measure;
@@ -9,10 +8,10 @@ mod pins;
 
 use std::collections::BTreeMap;
 
-pub use config::{Config, Error};
-
+pub use crate::error::Error;
 pub use crate::machine::usage::CoreTime;
 pub use crate::machine::waits::Wait;
+pub use crate::soc::Config;
 
 use crate::image::Image;
 use crate::machine::{Limit, Machine, Stop};

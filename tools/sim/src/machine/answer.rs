@@ -4,53 +4,14 @@
 use super::bus::Bus;
 use super::dwt;
 use super::memory::{FLASH_BASE, RAM_BASE};
+use super::request::{PPB, Request};
 use crate::finding::{What, Width};
 use crate::periph::ident;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::soc::Circuit;
 use crate::soc::map::{self, Block, Place, Widths};
-use crate::time::Time;
 
-/// Where the private peripheral bus starts.
-pub(super) const PPB: u32 = 0xE000_0000;
 const DBGMCU: u32 = 0xE004_2000;
-
-/// An access, in the form in which the blocks receive it.
-#[derive(Clone, Copy)]
-pub(super) struct Request {
-    pub(super) address: u32,
-    pub(super) width: Width,
-    pub(super) write: Option<u32>,
-    pub(super) now: Time,
-    pub(super) count: u64,
-    pub(super) pc: u32,
-}
-
-impl Request {
-    /// Which byte of its word the access starts at.
-    const fn lane(&self) -> u32 {
-        self.address & 3
-    }
-
-    /// The part of `word` that this access reads.
-    const fn part_of(&self, word: u32) -> u32 {
-        let part = word >> (8 * self.lane());
-        match self.width {
-            Width::Byte => part & 0xFF,
-            Width::Half => part & 0xFFFF,
-            Width::Word => word,
-        }
-    }
-
-    /// The value a store puts on the bus: a narrow one is repeated on every lane.
-    const fn on_every_lane(&self, value: u32) -> u32 {
-        match self.width {
-            Width::Byte => (value & 0xFF) * 0x0101_0101,
-            Width::Half => (value & 0xFFFF) * 0x0001_0001,
-            Width::Word => value,
-        }
-    }
-}
 
 impl<C: Circuit> Bus<C> {
     /// Answers an access; `None` is a bus fault.

@@ -12,9 +12,9 @@ use rigless::emulator::{Access, AccessKind, CoreBus, InterruptLine, Queued};
 use rigless::soc::Width as CoreWidth;
 use rigless::time::VirtualNanos;
 
-use super::answer::{PPB, Request};
 use super::dwt::Dwt;
 use super::memory::{FLASH_BASE, Memory};
+use super::request::{PPB, Request};
 use super::segment::Segments;
 use super::timing::InstructionClock;
 use super::waits::Waits;

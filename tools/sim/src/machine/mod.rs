@@ -16,6 +16,7 @@ mod flash_reads;
 mod kit;
 pub mod memory;
 mod ram_code;
+mod request;
 mod run;
 pub mod segment;
 pub mod timing;

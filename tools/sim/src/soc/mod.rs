@@ -6,11 +6,11 @@
 //! in time order.
 
 mod circuit;
+mod config;
 pub mod map;
 mod requests;
 mod wires;
 
-use crate::chip::Config;
 use crate::finding::What;
 use crate::part::Part;
 use crate::periph::adc::Adc;
@@ -28,6 +28,7 @@ use crate::periph::usart::Usart;
 use crate::peripheral::{Peripheral, Unmodelled};
 use crate::time::Time;
 pub use circuit::{Circuit, PORTS, Pin, Pins};
+pub use config::Config;
 use map::{BLOCKS, Block};
 use wires::SERIALS;
 

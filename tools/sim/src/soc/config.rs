@@ -1,6 +1,4 @@
-//! The configuration of a part, and the errors of chips and boards.
-
-use core::fmt;
+//! The configuration of a part.
 
 use crate::corner::Corner;
 use crate::part::{Part, STM32F103CB};
@@ -16,7 +14,7 @@ pub struct Config {
     /// Corner of the part.
     pub corner: Corner,
     /// Whether the crystal works. Without it HSERDY is never set. The crystal can also fail later
-    /// ([`super::Chip::set_crystal`]).
+    /// ([`crate::Chip::set_crystal`]).
     pub crystal: bool,
     /// Contents of the flash before the image is written; erased if `None`. Writing the image erases the pages that it
     /// needs.
@@ -48,33 +46,3 @@ impl Default for Config {
         }
     }
 }
-
-/// Reason why a chip or a board refuses a call.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Error {
-    /// The image or the contents of the flash do not fit this part, for this reason.
-    Image(String),
-    /// The call is only possible while the power is off.
-    Powered,
-    /// The channel does not exist or is of another kind.
-    Channel,
-    /// The board has no slot at this port.
-    Slot(u8),
-    /// A value is out of this range.
-    Range(&'static str),
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Image(text) => f.write_str(text),
-            Self::Powered => f.write_str("this is only possible while the power is off"),
-            Self::Channel => f.write_str("the plugged module has no such input on this channel"),
-            Self::Slot(port) => write!(f, "the board has no slot at port {port}"),
-            Self::Range(text) => write!(f, "out of range: {text}"),
-        }
-    }
-}
-
-impl std::error::Error for Error {}
