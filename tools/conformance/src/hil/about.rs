@@ -194,12 +194,12 @@ mod tests {
     use register_map::board::MODIO_08;
 
     use super::*;
-    use serialport::UsbPortInfo;
 
+    #[cfg(unix)]
     fn usb(port_name: &str, serial_number: Option<&str>) -> SerialPortInfo {
         SerialPortInfo {
             port_name: port_name.to_owned(),
-            port_type: SerialPortType::UsbPort(UsbPortInfo {
+            port_type: SerialPortType::UsbPort(serialport::UsbPortInfo {
                 vid: 0x0403,
                 pid: 0x6001,
                 serial_number: serial_number.map(str::to_owned),

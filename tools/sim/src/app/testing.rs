@@ -6,17 +6,17 @@ use sim::{Board, Config, Image};
 use super::bench::Bench;
 use super::unit::Unit;
 
-/// Part of the operating system's message about an address in use.
+/// Part of the message about an address in use. The text of Windows depends on its language.
 pub const IN_USE: &str = if cfg!(windows) {
-    "Only one usage"
+    "(os error 10048)"
 } else {
     "in use"
 };
-/// Part of the operating system's message about a missing directory.
-pub const NOT_THERE: &str = if cfg!(windows) {
-    "cannot find"
+/// Part of the message about a missing directory.
+pub const NO_DIRECTORY: &str = if cfg!(windows) {
+    "(os error 3)"
 } else {
-    "No such file"
+    "(os error 2)"
 };
 
 /// Machine code: the vector table (stack, reset), and `b .` after it.

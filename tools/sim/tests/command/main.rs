@@ -5,212 +5,17 @@ mod exact_line;
 mod gateway;
 mod gdb;
 mod record;
+mod running;
 mod several;
 mod unit;
 
 use std::fs;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::Write;
 use std::net::{TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// Part of the system's error message for an address that is already bound.
-const IN_USE: &str = if cfg!(windows) {
-    "Only one usage"
-} else {
-    "in use"
-};
-/// Part of the system's error message for a file or directory that does not exist.
-const NOT_THERE: &str = if cfg!(windows) {
-    "cannot find"
-} else {
-    "No such file"
-};
-
-/// Writes an ELF file whose firmware is an endless loop.
-fn endless_loop(directory: &Path) -> PathBuf {
-    elf(directory, &[0xE7FE])
-}
-
-/// Writes an ELF file with `program` after a vector table: one load segment at the start of flash.
-fn elf(directory: &Path, program: &[u16]) -> PathBuf {
-    let mut code = vec![0x00, 0x50, 0x00, 0x20, 0x09, 0x00, 0x00, 0x08];
-    code.extend(program.iter().flat_map(|half| half.to_le_bytes()));
-    let mut elf = b"\x7fELF\x01\x01\x01".to_vec();
-    elf.resize(16, 0);
-    let half = |elf: &mut Vec<u8>, value: u16| elf.extend(value.to_le_bytes());
-    let word = |elf: &mut Vec<u8>, value: u32| elf.extend(value.to_le_bytes());
-    half(&mut elf, 2); // ET_EXEC
-    half(&mut elf, 40); // EM_ARM
-    // Version, entry, program headers, section headers, flags.
-    [1, 0x0800_0009, 52, 0, 0]
-        .into_iter()
-        .for_each(|value| word(&mut elf, value));
-    // Sizes and counts: header, program headers, section headers.
-    [52, 32, 1, 40, 0, 0]
-        .into_iter()
-        .for_each(|value| half(&mut elf, value));
-    let size = code.len() as u32;
-    // PT_LOAD, offset, virtual and physical address, sizes, flags, alignment.
-    [1, 84, 0x0800_0000, 0x0800_0000, size, size, 5, 4]
-        .into_iter()
-        .for_each(|value| word(&mut elf, value));
-    elf.extend(code);
-    let path = directory.join("program.elf");
-    fs::write(&path, elf).unwrap();
-    path
-}
-
-/// Options that provide the line in addition to the pseudo-terminal.
-const LINES: [&str; 3] = ["--tcp", "--modbus-tcp", "--exact-line"];
-
-/// Returns the command with these arguments, and with `--tcp` where the simulator would not start without it.
-fn command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_modio-sim"));
-    if !sim_options::PTY && !arguments.iter().any(|name| LINES.contains(name)) {
-        command.args(["--tcp", "127.0.0.1:0"]);
-    }
-    command
-        .args(arguments)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
-/// A running simulator, which is ended with the test.
-struct Running {
-    child: Child,
-    lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
-    /// Holds the image of the endless loop if the simulator runs that.
-    _directory: Option<tempfile::TempDir>,
-}
-
-impl Running {
-    fn start(arguments: &[&str]) -> Self {
-        let mut child = command(arguments).spawn().unwrap();
-        let stdout = child.stdout.take().unwrap();
-        Self {
-            child,
-            lines: BufReader::new(stdout).lines(),
-            _directory: None,
-        }
-    }
-
-    /// Starts a simulator whose firmware is an endless loop, with HTTP on a free port.
-    fn start_loop(more: &[&str]) -> Self {
-        let directory = tempfile::tempdir().unwrap();
-        let elf = endless_loop(directory.path());
-        let first = ["--elf", elf.to_str().unwrap(), "--http", "127.0.0.1:0"];
-        let mut running = Self::start(&[&first[..], more].concat());
-        running._directory = Some(directory);
-        running
-    }
-
-    /// Returns the text after `prefix` on the next line.
-    fn endpoint(&mut self, prefix: &str) -> String {
-        let line = self.lines.next().expect("one more line of output").unwrap();
-        line.strip_prefix(prefix)
-            .unwrap_or_else(|| panic!("{line:?}"))
-            .to_owned()
-    }
-
-    /// Returns the path of the pseudo-terminal. On systems without one, returns the address of the line over TCP, which
-    /// [`command`] has added to the arguments.
-    fn line(&mut self) -> String {
-        self.endpoint(if sim_options::PTY { "pty: " } else { "tcp: " })
-    }
-
-    /// Reads the line that announces the pseudo-terminal, where there is one.
-    fn skip_pty(&mut self) {
-        if sim_options::PTY {
-            self.endpoint("pty: ");
-        }
-    }
-
-    #[cfg(unix)]
-    fn signal(&self, name: &str) {
-        let id = self.child.id().to_string();
-        assert!(
-            Command::new("kill")
-                .args([name, &id])
-                .status()
-                .unwrap()
-                .success()
-        );
-    }
-
-    /// Waits for the end. Returns the exit status and the text on stderr.
-    fn end(&mut self) -> (Option<i32>, String) {
-        let limit = Instant::now() + Duration::from_secs(60);
-        while self.child.try_wait().unwrap().is_none() {
-            assert!(Instant::now() < limit, "the simulator does not end");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let mut said = String::new();
-        self.child
-            .stderr
-            .take()
-            .unwrap()
-            .read_to_string(&mut said)
-            .unwrap();
-        (self.child.wait().unwrap().code(), said)
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // The simulator has already ended unless the test has failed.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// Connects to an address of the simulator. A read waits for 60 s at most.
-fn connect(address: &str) -> TcpStream {
-    let stream = TcpStream::connect(address).unwrap();
-    stream
-        .set_read_timeout(Some(Duration::from_secs(60)))
-        .unwrap();
-    stream
-}
-
-/// Returns the body of `GET /api/state` of the simulator at `url`, given as host, port and a slash.
-fn state(url: &str) -> serde_json::Value {
-    get(url, "/api/state")
-}
-
-/// Returns the body of a reply of the simulator at `url`.
-fn get(url: &str, path: &str) -> serde_json::Value {
-    http(url, &format!("GET {path} HTTP/1.1\r\n"), "")
-}
-
-/// Returns the body of the reply to a POST.
-fn post(url: &str, path: &str, body: &str) -> serde_json::Value {
-    let head = format!("POST {path} HTTP/1.1\r\nContent-Length: {}\r\n", body.len());
-    http(url, &head, body)
-}
-
-fn http(url: &str, head: &str, body: &str) -> serde_json::Value {
-    let mut stream = TcpStream::connect(url.trim_end_matches('/')).unwrap();
-    let request = format!("{head}Host: localhost\r\nConnection: close\r\n\r\n{body}");
-    stream.write_all(request.as_bytes()).unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap()).unwrap()
-}
-
-/// Asserts that the command reports the error in one line with all of `parts` in it, and exits with status 2.
-fn refused(arguments: &[&str], parts: &[&str]) {
-    let output = command(arguments).output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-    assert_eq!(said.lines().count(), 1, "{said}");
-    for part in parts {
-        assert!(said.contains(part), "{part}: {said}");
-    }
-    assert!(output.stdout.is_empty(), "no endpoint is announced");
-}
+use running::*;
 
 #[test]
 fn slot_that_the_board_does_not_have_is_refused() {
@@ -257,7 +62,7 @@ fn signals_end_the_simulator_with_success_and_remove_the_link() {
         let mut running = Running::start(&arguments);
         let pty = running.line();
         if sim_options::PTY {
-            assert_eq!(fs::read_link(&link).unwrap(), Path::new(&pty));
+            assert_eq!(fs::read_link(&link).unwrap(), std::path::Path::new(&pty));
         }
         running.endpoint("http: http://127.0.0.1:");
         running.signal(signal);
@@ -304,7 +109,7 @@ fn an_image_that_is_missing_or_broken_is_refused() {
     let broken = directory.path().join("modio");
     let broken = broken.to_str().unwrap();
     refused(&[], &["--elf", "cargo xtask sim"]);
-    refused(&["--elf", broken], &[broken, NOT_THERE]);
+    refused(&["--elf", broken], &[broken, NO_FILE]);
     fs::write(broken, "#!/bin/sh\n").unwrap();
     refused(&["--elf", broken], &[broken, "ELF"]);
     let whole = fs::read(endless_loop(directory.path())).unwrap();
@@ -340,7 +145,7 @@ fn flash_file_that_is_invalid_or_cannot_be_written_is_refused() {
     };
     refused(directory.path().to_str().unwrap(), "not a file");
     refused(elf, "bytes, but the flash has 131072");
-    refused("/nowhere/flash", NOT_THERE);
+    refused("/nowhere/flash", NO_DIRECTORY);
     if cfg!(target_os = "linux") {
         refused("/proc/flash", "");
     }
@@ -402,5 +207,5 @@ fn a_wrong_option_is_refused() {
     refused(&["--flash"], &["--flash"]);
     refused(&["--unit", "5:8di"], &["--unit", "2ai2ao"]);
     refused(&["--unit", "5", "--dip", "5"], &["--unit", "--dip"]);
-    refused(&["--bus", "/nowhere.toml"], &["/nowhere.toml", "No such"]);
+    refused(&["--bus", "/nowhere.toml"], &["/nowhere.toml", NO_FILE]);
 }

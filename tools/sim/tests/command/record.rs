@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use modbus_frames::adu::Framing;
 use pcap_file::pcapng::{Block, PcapNgReader};
 
-use super::{Running, endless_loop, refused};
+use super::{ENDS, Running};
 
 /// Returns time in ns and data of each packet in a file, which must be complete.
 pub fn packets(path: &Path) -> Vec<(u128, Vec<u8>)> {
@@ -24,13 +24,12 @@ pub fn packets(path: &Path) -> Vec<(u128, Vec<u8>)> {
     packets
 }
 
-#[cfg(unix)]
 #[test]
 fn capture_file_is_readable_while_the_simulator_runs_and_complete_at_its_end() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("line.pcapng");
     fs::write(&path, "an older file").unwrap();
-    for signal in ["-INT", "-TERM", "-KILL"] {
+    for (signal, status) in ENDS {
         let record = ["--record", path.to_str().unwrap()];
         let mut running = Running::start_loop(&[["--tcp", "127.0.0.1:0"], record].concat());
         running.skip_pty();
@@ -49,14 +48,13 @@ fn capture_file_is_readable_while_the_simulator_runs_and_complete_at_its_end() {
             }
         }
         running.signal(signal);
-        running.end();
+        assert_eq!(running.end().0, *status, "{signal}");
         let packets = packets(&path);
         assert_eq!(packets.len(), 3, "{signal}");
         assert!(packets.iter().all(|(_, data)| data.ends_with(&frame)));
     }
 }
 
-#[cfg(unix)]
 #[test]
 fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
     let directory = tempfile::tempdir().unwrap();
@@ -73,8 +71,9 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
             assert!(Instant::now() < limit, "the frame is not in the file");
             std::thread::sleep(Duration::from_millis(2));
         }
-        running.signal("-TERM");
-        assert_eq!(running.end().0, Some(0));
+        let (signal, status) = ENDS[0];
+        running.signal(signal);
+        assert_eq!(running.end().0, status);
         files.push(packets(&path));
     }
     assert_eq!(files[0][0].0, 101_000_000, "100 ms of start-up, and 1 ms");
@@ -85,7 +84,7 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
 #[test]
 fn capture_file_that_cannot_be_written_is_refused() {
     let directory = tempfile::tempdir().unwrap();
-    let elf = endless_loop(directory.path());
+    let elf = super::endless_loop(directory.path());
     for (path, part) in [
         ("/nowhere/line.pcapng", "No such file"),
         (directory.path().to_str().unwrap(), "directory"),
@@ -99,6 +98,6 @@ fn capture_file_that_cannot_be_written_is_refused() {
             "--record",
             path,
         ];
-        refused(&arguments, &[path, part]);
+        super::refused(&arguments, &[path, part]);
     }
 }

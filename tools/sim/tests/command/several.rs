@@ -6,14 +6,13 @@ use std::time::{Duration, Instant};
 use modbus_frames::adu::Framing;
 
 use super::unit::{BAUD, COMMAND, KEY, Unit};
-use super::{Running, endless_loop, get, post, refused, state};
+use super::{ENDS, Running, endless_loop, get, post, refused, state};
 
 /// The module of the modio-02's only port.
 const MODULE: [u8; 5] = [3, 0x01, 0x14, 0, 1];
 /// Its four digital points.
 const INPUTS: [u8; 5] = [2, 0, 0x10, 0, 4];
 
-#[cfg(unix)]
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn each_unit_answers_to_its_own_address_only() {
@@ -32,7 +31,7 @@ fn each_unit_answers_to_its_own_address_only() {
     post(&unit.http, "/api/boards/unit-5/power", r#"{"on":false}"#);
     assert_eq!(unit.try_unit(5, &MODULE, 4), None);
     assert!(unit.ask_unit(7, &MODULE, 4).is_some());
-    assert_eq!(unit.end("-TERM"), Some(0));
+    unit.end(ENDS[0]);
 }
 
 #[test]
@@ -53,7 +52,6 @@ fn replies_of_two_units_with_the_same_address_collide() {
     }
 }
 
-#[cfg(unix)]
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn bus_file_gives_each_board_a_name_and_a_flash() {
@@ -66,7 +64,7 @@ fn bus_file_gives_each_board_a_name_and_a_flash() {
     unit.save_filter(50);
     assert_eq!(get(&unit.http, "/api/boards/gate/state")["module"], "4do");
     assert_eq!(get(&unit.http, "/api/boards/unit-2/state")["dip"], 2);
-    assert_eq!(unit.end("-TERM"), Some(0));
+    unit.end(ENDS[0]);
     let mut again = Unit::start(&option);
     assert_eq!(again.read(0x0130), 50);
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use modbus_frames::adu::Framing;
 
-use super::{Running, state};
+use super::{ENDS, Running, state};
 
 /// KEY, which opens the configuration's lock with 0x5A17.
 pub const KEY: u16 = 0x0100;
@@ -100,14 +100,13 @@ impl Unit {
         state(&self.http)["line"]["baud"].as_u64().unwrap()
     }
 
-    #[cfg(unix)]
-    pub fn end(mut self, signal: &str) -> Option<i32> {
+    /// Ends the simulator by one of [`ENDS`].
+    pub fn end(mut self, (signal, status): (&str, Option<i32>)) {
         self.running.signal(signal);
-        self.running.end().0
+        assert_eq!(self.running.end().0, status, "{signal}");
     }
 }
 
-#[cfg(unix)]
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn saved_configuration_survives_every_kind_of_end_of_the_simulator() {
@@ -115,15 +114,11 @@ fn saved_configuration_survives_every_kind_of_end_of_the_simulator() {
     let flash = directory.path().join("flash");
     let option = ["--flash", flash.to_str().unwrap()];
     let mut stored = 5;
-    for (value, signal, status) in [
-        (50, "-TERM", Some(0)),
-        (60, "-INT", Some(0)),
-        (70, "-KILL", None),
-    ] {
+    for (value, end) in (50..).zip(ENDS) {
         let mut unit = Unit::start(&option);
         assert_eq!(unit.read(FILTER), stored);
         unit.save_filter(value);
-        assert_eq!(unit.end(signal), status, "{signal}");
+        unit.end(*end);
         assert_eq!(std::fs::metadata(&flash).unwrap().len(), 128 * 1024);
         stored = value;
     }
@@ -141,8 +136,8 @@ fn saved_configuration_survives_every_kind_of_end_of_the_simulator() {
     ]);
     assert_eq!(running.end().0, Some(0));
     let mut unit = Unit::start(&option);
-    assert_eq!(unit.read(FILTER), 70);
-    assert_eq!(unit.end("-TERM"), Some(0));
+    assert_eq!(unit.read(FILTER), stored);
+    unit.end(ENDS[0]);
 }
 
 #[test]
