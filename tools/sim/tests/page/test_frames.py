@@ -60,20 +60,38 @@ class Frames(OnPage):
         count = len(self.simulator.frames())
         expect(self.open().locator("#frames tr")).to_have_count(min(count, 500))
 
-    def test_frames_on_the_line_while_the_page_fetches_the_earlier_ones_are_kept(self):
-        self.good(self.master.read_coils(0x0010, count=4))
+    def open_without_earlier_frames(self):
+        """Opens another page, whose request for the earlier frames is answered by the function that is returned."""
         page, waiting = self.open(load=False), []
         page.route("**/api/frames", lambda route: waiting.append((route, route.fetch())))
         self.load(page)
         while not waiting:
             page.wait_for_timeout(5)
+
+        def answer():
+            route, response = waiting.pop()
+            route.fulfill(response=response)
+        return page, answer
+
+    def test_frames_on_the_line_while_the_page_fetches_the_earlier_ones_are_kept(self):
+        self.good(self.master.read_coils(0x0010, count=4))
+        page, answer = self.open_without_earlier_frames()
         for _ in range(2):
             self.good(self.master.read_coils(0x0010, count=4))
         # The other page has them, so this one has them too.
         expect(self.rows).to_have_count(6)
-        route, response = waiting.pop()
-        route.fulfill(response=response)
+        answer()
         expect(page.locator("#frames tr")).to_have_count(min(len(self.simulator.frames()), 500))
+
+    def test_log_that_is_cleared_while_the_page_fetches_the_earlier_frames_stays_clear(self):
+        self.good(self.master.read_coils(0x0010, count=4))
+        page, answer = self.open_without_earlier_frames()
+        page.get_by_role("button", name="Clear").click()
+        self.good(self.master.read_coils(0x0077, count=4))
+        expect(self.rows).to_have_count(4)
+        answer()
+        expect(page.locator("#frames tr")).to_have_count(2)
+        expect(page.locator("#frames tr td.meaning").last).to_contain_text("exception 02")
 
     def test_findings_of_the_chip_are_shown(self):
         expect(self.page.locator("#findings")).to_have_text("none")

@@ -12,6 +12,8 @@ let waiting = 0;
 let last = null;
 /** Frames that have arrived while the earlier ones are fetched. */
 let held = null;
+/** The log was cleared while the earlier frames are fetched, so they are not wanted any more. */
+let unwanted = false;
 
 const milliseconds = (us) => (us === null ? "" : (us / 1000).toFixed(2));
 
@@ -77,6 +79,10 @@ function filter() {
 }
 
 function clear() {
+  if (held !== null) {
+    held = [];
+    unwanted = true;
+  }
   frames = [];
   waiting = 0;
   byId("frames").replaceChildren();
@@ -101,10 +107,17 @@ export async function fetchMissed() {
   held ??= [];
   try {
     const answer = await get("/api/frames");
+    if (answer !== null && unwanted) {
+      const since = held?.[0]?.number ?? Infinity;
+      const cleared = answer.frames.filter((frame) => frame.number < since);
+      last = cleared.at(-1) ?? last;
+      return false;
+    }
     return answer !== null && addMissing(answer.frames);
   } finally {
     const arrived = held ?? [];
     held = null;
+    unwanted = false;
     arrived.forEach(append);
   }
 }
