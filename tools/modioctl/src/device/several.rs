@@ -26,19 +26,20 @@ impl Device {
         spans.dedup();
         let mut found = BTreeMap::new();
         for (table, first, count) in joined(&spans) {
-            let words = match table {
-                Table::Word => self.read_words(first, count).await?,
-                Table::Bit => {
-                    let bits = self.read_bits(first, count).await?;
-                    bits.into_iter().map(u16::from).collect()
+            let parts: Vec<_> = spans
+                .iter()
+                .filter(|(of, address, _)| *of == table && address.wrapping_sub(first) < count)
+                .collect();
+            match self.read(table, first, count).await {
+                Ok(words) => found.extend(words),
+                // A unit refuses a request over two of its blocks, and its description does not say where they end.
+                Err(Failure::Refused(_)) if parts.len() > 1 => {
+                    for (_, address, count) in parts {
+                        found.extend(self.read(table, *address, *count).await?);
+                    }
                 }
-            };
-            let addresses = (0..count).map(|n| first.wrapping_add(n));
-            found.extend(
-                addresses
-                    .zip(words)
-                    .map(|(address, word)| ((table == Table::Word, address), word)),
-            );
+                Err(failure) => return Err(failure),
+            }
         }
         let words = |item: &Item| {
             let addresses = (0..item.words).map(|n| item.address.wrapping_add(n));
@@ -48,6 +49,25 @@ impl Device {
                 .collect()
         };
         Ok(items.iter().map(words).collect())
+    }
+
+    /// Reads registers or bits. Returns each value with its place.
+    async fn read(
+        &mut self,
+        table: Table,
+        first: u16,
+        count: u16,
+    ) -> Result<impl Iterator<Item = ((bool, u16), u16)> + use<>, Failure> {
+        let words = match table {
+            Table::Word => self.read_words(first, count).await?,
+            Table::Bit => {
+                let bits = self.read_bits(first, count).await?;
+                bits.into_iter().map(u16::from).collect()
+            }
+        };
+        let is_word = table == Table::Word;
+        let places = (0..count).map(move |n| (is_word, first.wrapping_add(n)));
+        Ok(places.zip(words))
     }
 }
 
