@@ -30,7 +30,7 @@ struct Unit<'a> {
 }
 
 impl<'a> Unit<'a> {
-    fn rtu(adus: &'a mut [Adu; 2]) -> Self {
+    fn rtu(adus: &'a mut [Adu]) -> Self {
         let mut unit = Self {
             port: Port::new(Receiver::rtu(UNIT, false), adus),
             server: Server::new(Framing::Rtu),
@@ -100,6 +100,21 @@ fn a_request_is_served_and_its_reply_sent() {
     assert_eq!(unit.serve(0), None, "nothing was received");
     assert_eq!(unit.port.start(), None);
     unit.is_well();
+}
+
+#[test]
+fn port_with_one_buffer_serves_requests_but_none_before_the_end_of_a_reply() {
+    let mut adus = [Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    unit.is_well();
+    assert!(unit.receive_frame(&READ));
+    assert_eq!(unit.serve(0), Some(Outcome::Accepted));
+    assert!(!unit.receive_frame(&READ), "there is no buffer for it");
+    assert_eq!(unit.counters().no_response, 1);
+    assert_eq!(unit.sends(), REPLY);
+    unit.is_well();
+    let counters = unit.counters();
+    assert_eq!((counters.bus_messages, counters.unit_messages), (8, 8));
 }
 
 #[test]

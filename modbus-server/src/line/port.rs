@@ -52,8 +52,11 @@ enum Reply {
 }
 
 impl<'a, U: Units> Port<'a, U> {
-    /// Creates a port that receives into these buffers.
-    pub fn new(mut receiver: Receiver<'a, U>, adus: &'a mut [Adu; 2]) -> Self {
+    /// Creates a port that receives into these buffers: one to receive into, and one for the request that is being
+    /// served and its reply. A port uses no more than two. With one buffer, a request that begins before the last
+    /// reply has ended is lost, and counts as dropped.
+    #[inline(always)]
+    pub fn new(mut receiver: Receiver<'a, U>, adus: &'a mut [Adu]) -> Self {
         adus.iter_mut().for_each(|adu| receiver.give_back(adu));
         Self {
             receiver,
