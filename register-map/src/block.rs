@@ -1,5 +1,7 @@
 //! Blocks of registers. Each is declared once: the numbers for the firmware and the texts for people.
 
+use core::ops::Range;
+
 use crate::port;
 use crate::rule::Rule;
 use crate::value::Value;
@@ -76,10 +78,40 @@ pub(crate) const fn first(values: &[Value]) -> Option<Value> {
     }
 }
 
+/// Returns the number of [`spans`].
+pub(crate) const fn count_spans(rules: &[Rule]) -> usize {
+    let mut count = 0;
+    let mut i = 0;
+    while i < rules.len() {
+        if i == 0 || rules[i - 1].end() != rules[i].first {
+            count += 1;
+        }
+        i += 1;
+    }
+    count
+}
+
+/// Returns the addresses of all rules, with adjacent ones joined.
+pub(crate) const fn spans<const N: usize>(rules: &[Rule]) -> [Range<u16>; N] {
+    let mut spans = [const { 0..0 }; N];
+    let (mut count, mut i) = (0, 0);
+    while i < rules.len() {
+        if count > 0 && spans[count - 1].end == rules[i].first {
+            spans[count - 1].end = rules[i].end();
+        } else {
+            spans[count] = rules[i].first..rules[i].end();
+            count += 1;
+        }
+        i += 1;
+    }
+    spans
+}
+
 /// Declares the registers of a block. In the module that calls it, it defines
 ///
 /// - a constant for each address, documented by the register's text,
 /// - `RULES`, the numbers, which the firmware uses without the texts,
+/// - `SPANS`, the registers without gaps between them, as ranges of addresses,
 /// - `BLOCK`, numbers and texts, for tools and documentation.
 ///
 /// ```text
@@ -101,8 +133,15 @@ macro_rules! block {
     ) => {
         $($(#[doc = $about])+ pub const $constant: u16 = $address;)+
 
+        const ROWS: &[$crate::Rule] = &[$($rule.at($address, $count)),+];
+
         /// The rules of this block, in ascending order of the addresses.
-        pub static RULES: &[$crate::Rule] = &[$($rule.at($address, $count)),+];
+        pub static RULES: &[$crate::Rule] = ROWS;
+
+        /// The addresses of this block without gaps, in ascending order. The firmware needs no more to check the
+        /// access to registers that can only be read.
+        pub static SPANS: &[core::ops::Range<u16>] =
+            &$crate::block::spans::<{ $crate::block::count_spans(ROWS) }>(ROWS);
 
         /// The block with its texts.
         pub static BLOCK: $crate::Block = $crate::Block {

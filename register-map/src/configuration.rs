@@ -109,15 +109,13 @@ pub fn modules<P: Into<u16>>(
     plugged.map(|(port, module)| (module_of(port.into()), module.code()))
 }
 
-/// The settings by point: FILTER, BETA, RANGE, SCALE, SAFE and START.
-pub const BY_POINT: [u16; 6] = [FILTER, BETA, RANGE, SCALE, SAFE, START];
-
-/// Returns the point of a setting by point, 0 to 31; `None` for any other register.
+/// Returns the point of a setting by point, 0 to 31; `None` for any other register. The settings by point are FILTER,
+/// BETA, RANGE, SCALE, SAFE and START, and no other rule of this block has a register for each point.
 #[inline]
 #[must_use]
 pub fn point_of(address: u16) -> Option<u16> {
     let run = address & !(crate::points::COUNT - 1);
-    BY_POINT.contains(&run).then_some(address.wrapping_sub(run))
+    matches!(run, FILTER | BETA | RANGE | SCALE | SAFE | START).then_some(address.wrapping_sub(run))
 }
 
 #[cfg(test)]
@@ -151,10 +149,10 @@ mod tests {
     }
 
     #[test]
-    fn every_setting_by_point_exists_for_every_point() {
-        for first in BY_POINT {
-            let rule = RULES.iter().find(|rule| rule.first == first).unwrap();
-            assert_eq!(rule.count, points::COUNT);
+    fn settings_by_point_are_the_rules_with_a_register_for_each_point() {
+        for rule in RULES {
+            let by_point = point_of(rule.first).is_some();
+            assert_eq!(by_point, rule.count == points::COUNT, "{:#06x}", rule.first);
         }
     }
 

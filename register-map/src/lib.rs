@@ -34,6 +34,7 @@ pub mod fault;
 mod module;
 pub mod points;
 mod port;
+pub mod radio;
 pub mod record;
 mod rule;
 pub mod state;
@@ -48,10 +49,11 @@ pub use value::{Unit, Value};
 pub use values::Values;
 
 /// Every block, in ascending order of the addresses.
-pub static BLOCKS: [&Block; 5] = [
+pub static BLOCKS: [&Block; 6] = [
     &points::BLOCK,
     &configuration::BLOCK,
     &state::BLOCK,
     &fault::BLOCK,
+    &radio::BLOCK,
     &counters::BLOCK,
 ];

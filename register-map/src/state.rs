@@ -21,7 +21,7 @@ pub mod status {
     /// The configuration stored at the start was damaged, or a part of it was rejected: defaults are in force
     /// instead.
     pub const STORED_INVALID: u16 = 1 << 1;
-    /// A module has a fault.
+    /// A module has a fault. The radio counts as a module while it is on.
     pub const MODULE_FAULT: u16 = 1 << 2;
     /// The configuration has been changed but not saved.
     pub const UNSAVED: u16 = 1 << 3;

@@ -113,7 +113,24 @@ fn the_state_registers_are_readable_except_for_gaps() {
         );
     }
     assert!(runs(fault::RULES, 0x260, 16).is_some());
+    assert!(runs(radio::RULES, 0x270, 9).is_some() && runs(radio::RULES, 0x270, 10).is_none());
     assert!(runs(counters::RULES, 0x300, 64).is_some() && counters::of_point(16) == 0x320);
+}
+
+#[test]
+fn spans_are_the_addresses_of_the_rules_with_adjacent_ones_joined() {
+    assert_eq!(state::SPANS, [0x200..0x226, 0x230..0x239, 0x240..0x260]);
+    let blocks = [
+        (configuration::RULES, configuration::SPANS),
+        (state::RULES, state::SPANS),
+        (fault::RULES, fault::SPANS),
+        (radio::RULES, radio::SPANS),
+        (counters::RULES, counters::SPANS),
+    ];
+    for (rules, spans) in blocks {
+        let of_rules = rules.iter().flat_map(|rule| rule.addresses());
+        assert!(of_rules.eq(spans.iter().cloned().flatten()));
+    }
 }
 
 #[test]

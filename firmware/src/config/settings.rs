@@ -1,7 +1,7 @@
 //! The value of every setting.
 
 use register_map::codes::{Format, Mode};
-use register_map::configuration::{self, BY_POINT, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
+use register_map::configuration::{self, COMMAND, FORMAT, KEY, MODE, MODULE, RULES};
 use register_map::points::{self, Kind};
 use register_map::{Board, InForce, Module, Rule, rule_at};
 
@@ -163,7 +163,8 @@ impl Settings {
             return;
         }
         self.put(MODULE.wrapping_add(port.wrapping_sub(1)), code);
-        let rules = RULES.iter().filter(|rule| BY_POINT.contains(&rule.first));
+        // The settings by point, see `point_of`.
+        let rules = RULES.iter().filter(|rule| rule.count == points::COUNT);
         for rule in rules {
             let kinds = before.points().into_iter().zip(after.points());
             for (point, (before_kind, kind)) in (first..).zip(kinds) {
