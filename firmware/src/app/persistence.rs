@@ -21,8 +21,8 @@ pub struct Persistence {
     store: Store,
     pages: Pages,
     saving: Option<Saving>,
-    /// A copy of the settings being saved, so that requests do not wait while they are encoded.
-    settings: Settings,
+    /// A save was ordered and has not begun.
+    ordered: bool,
     /// The operation of the save that the flash refused because of a low supply.
     refused: Option<Operation>,
     /// The low supply has been logged.
@@ -39,7 +39,7 @@ impl Persistence {
             store,
             pages,
             saving: None,
-            settings: Settings::defaults(),
+            ordered: false,
             refused: None,
             low: false,
             erase,
@@ -47,14 +47,9 @@ impl Persistence {
         }
     }
 
-    /// Begins to save the settings that the configuration has set aside.
-    pub fn begin(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
-        device.lock(|device| self.settings.clone_from(device.config.to_save()));
-        self.saving = Saving::new(&self.store, &self.pages, &self.settings);
-        if self.saving.is_none() {
-            // These settings are already stored, so nothing is written and the flash does not wear.
-            self.end(device);
-        }
+    /// Saves the settings that the configuration has set aside, in the next [`work`](Self::work).
+    pub const fn begin(&mut self) {
+        self.ordered = true;
     }
 
     /// Restarts the device as soon as no save is under way or waiting.
@@ -65,10 +60,11 @@ impl Persistence {
     /// Continues a save until its end or until the supply is too low, one flash operation at a time with interrupts
     /// in between. Then restarts the device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
-        let event = self
-            .saving
-            .take()
-            .and_then(|saving| self.save(saving, device));
+        let event = if self.ordered || self.saving.is_some() {
+            self.save(device)
+        } else {
+            None
+        };
         if self.restart && self.saving.is_none() {
             board_support::restart();
         }
@@ -91,23 +87,25 @@ impl Persistence {
         }
     }
 
-    /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.
-    fn end(&self, device: &mut impl Mutex<T = &'static mut Device>) {
-        let started = device.lock(|device| device.config.started());
-        let changed = self.settings.needs_restart(&started);
-        device.lock(|device| device.config.end_save(changed));
-    }
-
-    fn save(
-        &mut self,
-        mut saving: Saving,
-        device: &mut impl Mutex<T = &'static mut Device>,
-    ) -> Option<Event> {
+    // Not inlined, so that the copy is on the stack during a save only.
+    #[inline(never)]
+    fn save(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
+        // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
+        // the save.
+        let settings = device.lock(|device| device.config.to_save().clone());
+        if core::mem::take(&mut self.ordered) {
+            self.saving = Saving::new(&self.store, &self.pages, &settings);
+        }
+        let Some(mut saving) = self.saving.take() else {
+            // These settings are already stored, so nothing is written and the flash does not wear.
+            Self::end(&settings, device);
+            return None;
+        };
         let mut good = true;
         if !self.pages.has_supply() {
             return self.wait(saving);
         }
-        while let Some(operation) = self.refused.take().or_else(|| saving.next(&self.settings)) {
+        while let Some(operation) = self.refused.take().or_else(|| saving.next(&settings)) {
             match operation.perform(&mut self.pages) {
                 Ok(()) => {}
                 Err(StoreError::Flash(_, FlashError::LowSupply)) => {
@@ -124,13 +122,20 @@ impl Persistence {
         good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
         self.erase = !self.store.has_spare();
         Some(if good {
-            self.end(device);
+            Self::end(&settings, device);
             Event::Saved
         } else {
             let stored = self.store.load(BOARD, &self.pages).settings;
             device.lock(|device| device.config.save_failed(stored));
             Event::SaveFailed
         })
+    }
+
+    /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.
+    fn end(settings: &Settings, device: &mut impl Mutex<T = &'static mut Device>) {
+        let started = device.lock(|device| device.config.started());
+        let changed = settings.needs_restart(&started);
+        device.lock(|device| device.config.end_save(changed));
     }
 
     /// Keeps a save until the supply has recovered. Returns the event to log, once.

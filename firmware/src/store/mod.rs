@@ -44,7 +44,7 @@ use crate::config::Settings;
 pub use flash::{Flash, Page, StoreError};
 pub use operation::Operation;
 use operation::{Readying, Writing};
-pub use saving::{Progress, Saving};
+pub use saving::Saving;
 use survey::{Found, Survey, record_at};
 
 /// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede

@@ -7,15 +7,6 @@ use super::survey::record_at;
 use super::{Flash, Page, Store, StoreError};
 use crate::config::Settings;
 
-/// Progress of a save.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
-    /// More steps are needed.
-    More,
-    /// The settings are stored.
-    Done,
-}
-
 /// A save under way. Pass the same settings to every step.
 #[derive(Clone, Debug)]
 pub struct Saving {
@@ -51,10 +42,7 @@ impl Saving {
         })
     }
 
-    /// Returns the next operation, to be performed immediately, or `None` when all are done.
-    ///
-    /// Together with [`Operation::perform`] and [`Self::finish`] this replaces [`Self::step`] for a caller that
-    /// shares the settings but does not want to lock them while the flash works.
+    /// Returns the next operation, to be performed before the next call, or `None` when all are done.
     pub fn next(&mut self, settings: &Settings) -> Option<Operation> {
         if let Some(operation) = self.readying.next() {
             return Some(operation);
@@ -84,31 +72,6 @@ impl Saving {
                 store.avoid(self.writing.page);
                 Err(StoreError::Worn(self.writing.page, self.writing.offset()))
             }
-        }
-    }
-
-    /// Performs one flash operation, or ends the save.
-    ///
-    /// # Errors
-    ///
-    /// When the flash failed. The save has ended, the previous configuration is still stored, and the next save
-    /// tries another place.
-    pub fn step<F: Flash>(
-        &mut self,
-        store: &mut Store,
-        flash: &mut F,
-        settings: &Settings,
-    ) -> Result<Progress, StoreError<F::Error>> {
-        match self.next(settings) {
-            Some(operation) => {
-                let done = operation.perform(flash);
-                if done.is_err() {
-                    // The error of the operation is more specific than the one from `finish`.
-                    let _ = self.finish(store, flash);
-                }
-                done.map(|()| Progress::More)
-            }
-            None => self.finish(store, flash).map(|()| Progress::Done),
         }
     }
 }

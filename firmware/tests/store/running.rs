@@ -1,7 +1,7 @@
 //! The steps of a device's life that concern the store.
 
 use firmware::config::Settings;
-use firmware::store::{Loaded, Progress, Saving, Store, StoreError};
+use firmware::store::{Loaded, Saving, Store, StoreError};
 use register_map::board::MODIO_02;
 use register_map::configuration::{COMMAND, KEY, RULES, module_of};
 use register_map::rule_at;
@@ -27,7 +27,7 @@ pub fn start_well(flash: &mut MockFlash) -> (Loaded, Store) {
     (loaded, store.unwrap())
 }
 
-/// Saves, with at most one operation per step. Returns `false` when there was nothing to do.
+/// Saves as the firmware's background task does. Returns `false` when there was nothing to do.
 pub fn save(
     store: &mut Store,
     flash: &mut MockFlash,
@@ -36,17 +36,15 @@ pub fn save(
     let Some(mut saving) = Saving::new(store, flash, settings) else {
         return Ok(false);
     };
-    loop {
-        let before = flash.operations();
-        let progress = saving.step(store, flash, settings)?;
-        assert!(
-            flash.operations() <= before + 1,
-            "at most one operation per step"
-        );
-        if progress == Progress::Done {
-            return Ok(true);
+    while let Some(operation) = saving.next(settings) {
+        if let Err(failure) = operation.perform(flash) {
+            // The error of the operation is more specific.
+            let _ = saving.finish(store, flash);
+            return Err(failure);
         }
     }
+    saving.finish(store, flash)?;
+    Ok(true)
 }
 
 pub fn settings(pairs: &[(u16, u16)]) -> Settings {
