@@ -19,6 +19,7 @@ use crate::{
     gap::LineTimes,
     i2c::BusPins,
     pin::Port,
+    radio::RadioOff,
     rs485,
     uart::LineSettings,
     unique_id, vectors, wait,
@@ -56,6 +57,10 @@ pub struct Board {
     pub watchdog: Watchdog,
     /// The RS-485 line, off, with its driver disabled.
     pub line: LineOff,
+    /// The LoRa radio, off, with its pins floating.
+    pub radio: RadioOff,
+    /// The reset and clock control, for the set-up of the line and the radio.
+    pub rcc: pac::RCC,
 }
 
 /// The RS-485 line before it is set up.
@@ -65,15 +70,19 @@ pub struct LineOff {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     clock: ClockSource,
-    rcc: pac::RCC,
 }
 
 impl LineOff {
     /// Sets the line up with these settings and times, and turns the receiver on. Returns `None` when the clock
     /// cannot produce the baud rate or the silences; the line then stays off.
     #[must_use]
-    pub fn start(mut self, settings: LineSettings, times: LineTimes) -> Option<(Rs485, GapTimer)> {
-        let (clock, rcc) = (self.clock, &mut self.rcc);
+    pub fn start(
+        self,
+        settings: LineSettings,
+        times: LineTimes,
+        rcc: &mut pac::RCC,
+    ) -> Option<(Rs485, GapTimer)> {
+        let clock = self.clock;
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
@@ -151,8 +160,15 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
             timer: device.TIM2,
             start_bit: device.TIM1,
             clock,
-            rcc,
         },
+        radio: RadioOff {
+            usart: device.USART3,
+            _tx: b.pb10,
+            _rx: b.pb11,
+            _cr: b.crh,
+            clock,
+        },
+        rcc,
     }
 }
 

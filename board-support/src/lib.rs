@@ -34,6 +34,10 @@ mod leds;
 #[cfg(target_os = "none")]
 mod mem;
 #[cfg(target_os = "none")]
+mod pin_io;
+#[cfg(target_os = "none")]
+mod radio;
+#[cfg(target_os = "none")]
 mod rs485;
 #[cfg(target_os = "none")]
 mod safe;
@@ -62,10 +66,12 @@ pub use {
     gap_timer::{GapEvent, GapTimer},
     i2c::{DacBus, DacBusError, Held},
     leds::Leds,
+    pin_io::{PinInput, PinOutput},
+    radio::{Damaged, RadioUart},
     rs485::{Character, Rs485, Status},
     safe::outputs_off,
     scan_timer::ScanTimer,
-    slot::{AnalogLines, Slot, SlotInput, SlotOutput},
+    slot::{AnalogLines, Slot},
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };

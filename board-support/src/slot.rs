@@ -1,11 +1,7 @@
 //! A slot: four lines that are configured for the module in it.
 
-use core::convert::Infallible;
-
-use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
-
 use crate::{
-    AnalogInputs,
+    AnalogInputs, PinInput, PinOutput,
     boards::SlotPins,
     pin::{Mode, Pin},
 };
@@ -26,25 +22,6 @@ pub enum AnalogLines {
     Four,
 }
 
-/// A slot line as an input with pull-up. The HAL's type for any pin of a port is not used: it looks the pin up in
-/// an array and panics when it does not exist.
-pub struct SlotInput(Pin);
-
-/// A slot line as a push-pull output.
-pub struct SlotOutput(Pin);
-
-fn input(line: Pin) -> SlotInput {
-    line.pull_up();
-    SlotInput(line)
-}
-
-/// Makes a line an output that is low from the start, with the slowest edges: relays and open collectors need no
-/// fast ones.
-fn output(line: Pin) -> SlotOutput {
-    line.configure(Mode::Output);
-    SlotOutput(line)
-}
-
 impl Slot {
     /// Each slot of a board must be created only once.
     pub(crate) const fn new(pins: &SlotPins) -> Self {
@@ -62,21 +39,25 @@ impl Slot {
 
     /// Makes all lines inputs with pull-ups.
     #[must_use]
-    pub fn into_inputs(self) -> [SlotInput; 4] {
-        self.lines.map(input)
+    pub fn into_inputs(self) -> [PinInput; 4] {
+        self.lines.map(PinInput::pulled_up)
     }
 
-    /// Makes all lines outputs that are low from the start.
+    /// Makes all lines outputs that are low from the start, with the slowest edges: relays and open collectors need
+    /// no fast ones.
     #[must_use]
-    pub fn into_outputs_low(self) -> [SlotOutput; 4] {
-        self.lines.map(output)
+    pub fn into_outputs_low(self) -> [PinOutput; 4] {
+        self.lines.map(PinOutput::low)
     }
 
     /// Makes lines 1 and 2 inputs with pull-ups, and lines 3 and 4 outputs that are low from the start.
     #[must_use]
-    pub fn into_relay(self) -> ([SlotInput; 2], [SlotOutput; 2]) {
+    pub fn into_relay(self) -> ([PinInput; 2], [PinOutput; 2]) {
         let [line1, line2, line3, line4] = self.lines;
-        ([line1, line2].map(input), [line3, line4].map(output))
+        (
+            [line1, line2].map(PinInput::pulled_up),
+            [line3, line4].map(PinOutput::low),
+        )
     }
 
     /// Makes the first lines analog inputs and leaves the others floating.
@@ -90,35 +71,5 @@ impl Slot {
             line.configure(Mode::Analog);
         }
         AnalogInputs::new(self.lines, count)
-    }
-}
-
-impl ErrorType for SlotInput {
-    type Error = Infallible;
-}
-
-impl InputPin for SlotInput {
-    fn is_high(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.is_high())
-    }
-
-    fn is_low(&mut self) -> Result<bool, Infallible> {
-        Ok(!self.0.is_high())
-    }
-}
-
-impl ErrorType for SlotOutput {
-    type Error = Infallible;
-}
-
-impl OutputPin for SlotOutput {
-    fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.set(true);
-        Ok(())
-    }
-
-    fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.set(false);
-        Ok(())
     }
 }

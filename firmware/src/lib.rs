@@ -6,9 +6,11 @@
 
 pub mod alive;
 mod built;
+pub mod byte_queue;
 pub mod config;
 pub mod device;
 pub mod lamps;
 pub mod line;
+pub mod radio;
 pub mod start_up;
 pub mod store;

@@ -5,9 +5,23 @@
 //! programmed. Functions that are called from here must be in RAM, too (`memory/sections.x`).
 
 use modbus_server::{
-    Answered, Decided, Request, Served, Server,
+    Answered, Decided, LineCounters, Request, Served, Server,
     line::{Faults, Next, Port},
 };
+
+/// A line as the task that serves requests sees it. The methods are the steps of a request, in this order.
+pub trait ServedLine {
+    /// Returns whether a reply is being sent or waits to be sent.
+    fn is_replying(&self) -> bool;
+    /// Takes the waiting request, if any. Its reply starts now, or after `delay_ms`.
+    fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>>;
+    /// Passes the decision on the reply to the port.
+    fn answer(&mut self, decided: Decided<'static>) -> Answered<'static>;
+    /// Ends a request whose work is done.
+    fn finish(&mut self, served: Served<'static>);
+    /// Returns the counters of the line.
+    fn counters(&self) -> LineCounters;
+}
 
 /// A UART with the driver enable of its transceiver.
 pub trait Uart {
@@ -223,32 +237,6 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         self.start();
     }
 
-    /// Returns whether a reply is being sent or waits to be sent.
-    pub fn is_replying(&self) -> bool {
-        self.port.is_replying()
-    }
-
-    /// Takes the waiting request, if any. Its reply starts now, or after `delay_ms`.
-    #[inline]
-    pub fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {
-        let request = server.take(&mut self.port, delay_ms);
-        self.start();
-        request
-    }
-
-    /// Passes the decision on the reply to the port.
-    pub fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {
-        let answered = decided.answer(&mut self.port);
-        self.resume();
-        answered
-    }
-
-    /// Ends a request whose work is done.
-    pub fn finish(&mut self, served: Served<'static>) {
-        served.finish(&mut self.port);
-        self.resume();
-    }
-
     /// Turns the driver on and sends the first byte of a reply, if one starts now.
     #[inline]
     fn start(&mut self) {
@@ -266,6 +254,34 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         if self.port.is_sending() {
             self.uart.resume_sending();
         }
+    }
+}
+
+impl<U: Uart, G: GapTimer> ServedLine for Line<U, G> {
+    fn is_replying(&self) -> bool {
+        self.port.is_replying()
+    }
+
+    #[inline]
+    fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {
+        let request = server.take(&mut self.port, delay_ms);
+        self.start();
+        request
+    }
+
+    fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {
+        let answered = decided.answer(&mut self.port);
+        self.resume();
+        answered
+    }
+
+    fn finish(&mut self, served: Served<'static>) {
+        served.finish(&mut self.port);
+        self.resume();
+    }
+
+    fn counters(&self) -> LineCounters {
+        *self.port.counters()
     }
 }
 

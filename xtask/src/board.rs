@@ -49,7 +49,7 @@ const HARDWARE: [Hardware; 2] = [
         board: &register_map::board::MODIO_08,
         part: Memory::kib("STM32F103RC", 256, 48),
         smaller: None,
-        budget: Memory::kib("budget", 47, 12),
+        budget: Memory::kib("budget", 50, 12),
     },
 ];
 

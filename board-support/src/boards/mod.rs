@@ -1,7 +1,8 @@
 //! The boards. One constant per board says what is connected to which pin.
 //!
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
-//! the RS-485 line on PA8 to PA10, the DACs' bus on PB6 and PB7, the LEDs on PB8, PB9 and PC13.
+//! the RS-485 line on PA8 to PA10, the radio's UART on PB10 and PB11, the DACs' bus on PB6 and PB7, the LEDs on PB8,
+//! PB9 and PC13.
 
 pub mod modio_02;
 pub mod modio_08;
@@ -17,6 +18,10 @@ pub struct Descriptor {
     pub slots: &'static [SlotPins],
     /// The pins of SW01, position 1 first. A position that is ON connects its pin to ground.
     pub switch: [Pin; 8],
+    /// The pins of the LoRa radio, besides its UART on PB10 and PB11.
+    pub radio: RadioPins,
+    /// Number of the part's interrupts: 43 for medium density, 60 for high density (RM0008 table 63).
+    pub interrupts: usize,
     /// Addresses of the two flash pages that keep the configuration. The linker script places no code there.
     pub store: [u32; 2],
     /// Bytes of a flash page, the smallest unit that can be erased (PM0075 2.1).
@@ -30,6 +35,15 @@ pub struct SlotPins {
     pub lines: [Pin; 4],
     /// I2C address of an analog-output module's DAC in this slot, 0x60 to 0x67. Each slot has a different address.
     pub dac_address: u8,
+}
+
+/// The pins of the LoRa radio.
+#[derive(Clone, Copy, Debug)]
+pub struct RadioPins {
+    /// M0 and M1, which select the mode.
+    pub mode: [Pin; 2],
+    /// AUX, which is low while the radio is busy.
+    pub aux: Pin,
 }
 
 impl Descriptor {
@@ -49,6 +63,7 @@ impl Descriptor {
             }
             slot += 1;
         }
+        assert!(self.interrupts <= 60);
         let [first, second] = self.store;
         assert!(first.is_multiple_of(self.page_bytes));
         assert!(

@@ -1,6 +1,6 @@
 //! The modio-02: an STM32F103CB, or a C8 on a bare "Blue Pill" with a transceiver. One slot, port 5.
 
-use super::{Descriptor, SlotPins};
+use super::{Descriptor, RadioPins, SlotPins};
 use crate::pin::Pin;
 
 /// The modio-02.
@@ -20,6 +20,11 @@ pub const BOARD: Descriptor = Descriptor {
         Pin::b(14),
         Pin::b(15),
     ],
+    radio: RadioPins {
+        mode: [Pin::b(0), Pin::b(1)],
+        aux: Pin::b(5),
+    },
+    interrupts: 43,
     // The last two pages of the smaller part, the 64 KiB one (DS5319 table 2), so that one image fits both parts.
     store: [0x0800_F800, 0x0800_FC00],
     page_bytes: 1024,

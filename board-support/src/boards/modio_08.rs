@@ -1,6 +1,6 @@
 //! The modio-08: an STM32F103RC. Four slots, ports 1 to 4.
 
-use super::{Descriptor, SlotPins};
+use super::{Descriptor, RadioPins, SlotPins};
 use crate::pin::Pin;
 
 /// The modio-08.
@@ -34,6 +34,11 @@ pub const BOARD: Descriptor = Descriptor {
         Pin::b(14),
         Pin::b(15),
     ],
+    radio: RadioPins {
+        mode: [Pin::c(10), Pin::c(11)],
+        aux: Pin::c(12),
+    },
+    interrupts: 60,
     // The last two pages of 256 KiB (DS5792 table 2; pages of 2 KiB: PM0075 2.1).
     store: [0x0803_F000, 0x0803_F800],
     page_bytes: 2048,

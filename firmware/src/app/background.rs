@@ -20,6 +20,8 @@ pub struct Background {
     pub signals: Signals,
     pub log: Log,
     pub stack: LowWater,
+    /// The state of the radio that was logged last.
+    pub radio: Option<bool>,
 }
 
 impl Background {
@@ -39,7 +41,7 @@ impl Background {
             identify,
         } = orders.lock(core::mem::take);
         if save {
-            self.persistence.begin(device);
+            self.persistence.begin();
         }
         if restart {
             self.persistence.restart_when_done();
@@ -53,10 +55,17 @@ impl Background {
             self.signals.identify();
         }
         let free = self.stack.check();
-        let (failing, millis) = device.lock(|device| {
-            device.state.stack_free = free;
-            (device.points.any_fails(), device.state.millis())
+        let (failing, millis, radio) = device.lock(|device| {
+            let state = &mut device.state;
+            state.stack_free = free;
+            let (millis, radio) = (state.millis(), state.radio_works);
+            (device.any_fails(), millis, radio)
         });
+        if let Some(works) = radio
+            && self.radio.replace(works) != radio
+        {
+            self.log.event(Event::Radio(works));
+        }
         self.signals
             .show(millis, failing, || activity.lock(core::mem::take));
         while let Some(event) = logged.dequeue() {

@@ -1,6 +1,6 @@
 //! The modules installed in the slots.
 
-use board_support::{AnalogLines, DacBus, Sampler, Slot, SlotInput, SlotOutput, boards::SLOTS};
+use board_support::{AnalogLines, DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
 use modio_drivers::{
     Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, DacError, DacLink, DacWorker,
     Di4, Do4, IoModule, Kind, ModuleError, Relay2,
@@ -16,9 +16,9 @@ static DAC_LINKS: [DacLink; SLOTS] = [const { DacLink::new() }; SLOTS];
 /// A module and the lines of its slot, configured for it.
 pub enum Installed {
     None(Absent),
-    Di4(Di4<SlotInput>),
-    Do4(Do4<SlotOutput>),
-    Relay2(Relay2<SlotInput, SlotOutput>),
+    Di4(Di4<PinInput>),
+    Do4(Do4<PinOutput>),
+    Relay2(Relay2<PinInput, PinOutput>),
     Ai4(Ai4<Converter>),
     Ao4(Ao4<'static>),
     Ai2Ao2(Ai2Ao2<'static, Converter>),

@@ -29,6 +29,8 @@ pub enum Event {
     SaveFailed,
     /// The line's registers were disturbed, or a reply did not end: the line was set up again.
     LineRepaired,
+    /// The radio is ready, or does not answer.
+    Radio(bool),
     /// The supply is too low for the flash: a save, or an erase at the start, waits until it has recovered.
     LowSupply,
 }
@@ -191,6 +193,8 @@ impl Log {
             Event::Saved => line.text("configuration saved"),
             Event::SaveFailed => line.text("WARN configuration: the flash could not be written"),
             Event::LineRepaired => line.text("WARN line: set up again after a disturbance"),
+            Event::Radio(true) => line.text("radio: ready"),
+            Event::Radio(false) => line.text("WARN radio: the module does not answer"),
             Event::LowSupply => {
                 line.text("WARN configuration: the supply is too low, the flash has to wait")
             }

@@ -2,19 +2,21 @@
 //!
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
-//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan`. If late, the clock is late |
+//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan` and `radio`. If late, the clock is late |
 //! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
+//! | `radio_uart` | USART3 | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
 //! | `limit` | TIM1_CC | 4 | aborts a reply that does not end. If late, the driver is on for longer |
-//! | `serve` | EXTI3, pended by `gap` and `uart` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
+//! | `serve` | EXTI3, pended by `gap`, `uart` and `radio` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
+//! | `radio` | EXTI4, pended by `beat` | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
 //! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
 //! | `idle` | - | - | refreshes the watchdog when all tasks above have run; sleeps |
 //!
 //! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
 //! or programmed; the others wait for up to 40 ms.
 //!
-//! `serve`, `scan` and `background` act as software tasks, but each is bound to an interrupt that nothing else
+//! `serve`, `scan`, `radio` and `background` act as software tasks, but each is bound to an interrupt that nothing else
 //! uses. An interrupt that is pended while its handler runs occurs again afterwards. A second spawn of a running
 //! software task would fail instead, and the request would not be served. With interrupts the image also contains
 //! no panic of an executor.
@@ -34,6 +36,7 @@ mod log;
 mod orders;
 mod pages;
 mod persistence;
+mod radio;
 mod rtt;
 mod scanning;
 mod serving;
@@ -45,20 +48,33 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{ScanTimer, Watchdog, fault, pac::Interrupt, stack::LowWater};
+    use board_support::{RadioUart, ScanTimer, Watchdog, fault, pac::Interrupt, stack::LowWater};
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
 
     use crate::{
-        background::Background, board::Device, clock, line::Line, log::Event, orders::Orders,
-        scanning::Scanning, serving::Serving, signals::Signals, start,
+        background::Background,
+        board::Device,
+        clock,
+        line::Line,
+        log::Event,
+        orders::Orders,
+        radio::{Polling, Radio, on_interrupt},
+        scanning::Scanning,
+        serving::{Lines, Serving},
+        signals::Signals,
+        start,
     };
 
     #[shared]
     struct Shared {
         /// `None` while SW01 is set to no unit address: the line is not served.
         line: Option<Line>,
+        /// `None` while the radio is off.
+        radio: Option<Radio>,
+        /// `None` while the radio is off.
+        radio_uart: Option<RadioUart>,
         /// Built in place, because it is too large to be moved over the stack.
         device: &'static mut Device,
         /// A request for this unit has been served since the LEDs were last updated.
@@ -70,6 +86,7 @@ mod app {
     #[local]
     struct Local {
         scan_timer: ScanTimer,
+        radio_polling: Polling,
         serving: Serving,
         scanning: Scanning,
         events: Producer<'static, Event>,
@@ -80,24 +97,34 @@ mod app {
 
     #[init(local = [
         adus: [Adu; 2] = [const { Adu::new() }; 2],
+        // The air is half duplex, so no request is received while another is being served.
+        radio_adus: [Adu; 1] = [const { Adu::new() }; 1],
         device: MaybeUninit<Device> = MaybeUninit::uninit(),
         queue: Queue<Event, 8> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let mut started = start::up(cx.device, &cx.core.SCB, cx.local.adus, cx.local.device);
+        let memory = start::Memory {
+            device: cx.local.device,
+            adus: cx.local.adus,
+            radio_adus: cx.local.radio_adus,
+        };
+        let mut started = start::up(cx.device, &cx.core.SCB, memory);
         let (events, logged) = cx.local.queue.split();
         started.scan_timer.start();
         started.watchdog.arm();
         (
             Shared {
                 line: started.line,
+                radio: started.radio,
+                radio_uart: started.radio_uart,
                 activity: false,
                 orders: Orders::default(),
                 device: started.device,
             },
             Local {
                 scan_timer: started.scan_timer,
-                serving: Serving::new(started.server, started.unit, started.frame_gap_ms),
+                radio_polling: Polling::new(),
+                serving: started.serving,
                 scanning: started.scanning,
                 events,
                 background_work: Background {
@@ -106,6 +133,7 @@ mod app {
                     signals: Signals::new(started.leds, started.trouble),
                     log: started.log,
                     stack: LowWater::new(),
+                    radio: None,
                 },
                 logged,
                 watchdog: started.watchdog,
@@ -165,16 +193,33 @@ mod app {
             .line
             .lock(|line| line.as_mut().map(Line::on_millisecond));
         rtic::pend(Interrupt::EXTI1);
+        rtic::pend(Interrupt::EXTI4);
     }
 
-    #[task(binds = EXTI3, priority = 3, local = [serving], shared = [line, device, activity, orders])]
+    #[task(binds = USART3, priority = 4, shared = [radio_uart])]
+    fn radio_uart(mut cx: radio_uart::Context) {
+        cx.shared
+            .radio_uart
+            .lock(|uart| uart.as_mut().map(on_interrupt));
+    }
+
+    #[task(
+        binds = EXTI3,
+        priority = 3,
+        local = [serving],
+        shared = [line, radio, device, activity, orders],
+    )]
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
         let mut shared = cx.shared;
+        let mut lines = Lines {
+            rs485: shared.line,
+            radio: shared.radio,
+        };
         let served = cx
             .local
             .serving
-            .run(&mut shared.line, &mut shared.device, &mut shared.orders);
+            .run(&mut lines, &mut shared.device, &mut shared.orders);
         if served {
             shared.activity.lock(|activity| *activity = true);
         }
@@ -196,6 +241,19 @@ mod app {
         } else {
             // Only a scan after a tick of the clock proves that the scan works.
             alive::put_back(fault::marks(), Task::Scan, mark);
+        }
+    }
+
+    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, radio_uart, device])]
+    fn radio(cx: radio::Context) {
+        let mut shared = cx.shared;
+        let waits = cx.local.radio_polling.run(
+            &mut shared.radio,
+            &mut shared.radio_uart,
+            &mut shared.device,
+        );
+        if waits {
+            rtic::pend(Interrupt::EXTI3);
         }
     }
 

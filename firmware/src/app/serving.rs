@@ -5,55 +5,123 @@
 //! device  .....................decide........carry out.......   <- one lock for each phase
 //! ```
 //!
-//! No lock is held between the phases. The locks of the line are kept short, because its interrupts wait for them.
+//! No lock is held between the phases. The locks of the lines are kept short, because the interrupts of the RS-485
+//! line wait for them.
 
 use board_support::pac::Interrupt;
-use firmware::start_up::LOADER_UNIT;
-use modbus_server::{Outcome, Request, Server};
+use firmware::{line::ServedLine, start_up::LOADER_UNIT};
+use modbus_server::{Outcome, Request, Server, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
-use crate::{board::Device, line::Line, orders::Orders};
+use crate::{board::Device, line::Line, orders::Orders, radio::Radio};
 
-/// The server of a line.
-pub struct Serving {
+/// A line of the unit.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    Rs485,
+    Radio,
+}
+
+/// The lines, under their locks.
+pub struct Lines<L, R> {
+    pub rs485: L,
+    pub radio: R,
+}
+
+impl<L: Mutex<T = Option<Line>>, R: Mutex<T = Option<Radio>>> Lines<L, R> {
+    /// Calls `f` with a line, if it is on.
+    #[inline(always)]
+    fn lock<T>(&mut self, which: Which, f: impl FnOnce(&mut dyn ServedLine) -> T) -> Option<T> {
+        match which {
+            Which::Rs485 => self.rs485.lock(|line| line.as_mut().map(|line| f(line))),
+            Which::Radio => self.radio.lock(|line| line.as_mut().map(|line| f(line))),
+        }
+    }
+}
+
+/// A line's part in serving.
+struct Served {
     server: Server,
-    /// Unit address.
-    unit: u8,
     /// Silence that ends a frame, in ms, rounded up.
     frame_gap_ms: u32,
+    /// The command of the last request, which is executed when its reply has been sent.
+    order: Option<Command>,
+}
+
+impl Served {
+    const fn new(framing: Framing, frame_gap_ms: u32) -> Self {
+        Self {
+            server: Server::new(framing),
+            frame_gap_ms,
+            order: None,
+        }
+    }
+}
+
+/// The servers of the lines.
+pub struct Serving {
+    rs485: Served,
+    radio: Served,
+    /// Unit address.
+    unit: u8,
 }
 
 impl Serving {
-    /// `frame_gap_ms` is the silence that ends a frame, in ms, rounded up.
-    pub const fn new(server: Server, unit: u8, frame_gap_ms: u32) -> Self {
+    /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
+    /// there, in ms, rounded up; `radio_gap_ms` is that of the radio line.
+    pub const fn new(unit: u8, rs485: (Framing, u32), radio_gap_ms: u32) -> Self {
         Self {
-            server,
+            rs485: Served::new(rs485.0, rs485.1),
+            radio: Served::new(Framing::Rtu, radio_gap_ms),
             unit,
-            frame_gap_ms,
         }
     }
 
-    /// Serves the waiting request, if any, after executing the command of the previous request. Returns whether
-    /// there was a request.
+    /// Serves the waiting request of each line, if any, after executing the command of the line's previous request.
+    /// Returns whether there was a request.
     pub fn run(
         &mut self,
-        line: &mut impl Mutex<T = Option<Line>>,
+        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
+        device: &mut impl Mutex<T = &'static mut Device>,
+        orders: &mut impl Mutex<T = Orders>,
+    ) -> bool {
+        let mut served = false;
+        for which in [Which::Rs485, Which::Radio] {
+            served |= self.run_line(which, lines, device, orders);
+        }
+        served
+    }
+
+    // Not inlined: one copy serves both lines.
+    #[inline(never)]
+    fn run_line(
+        &mut self,
+        which: Which,
+        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
         let delay_ms = self.delay_ms(device);
+        let served = self.of(which);
         // The UART sends the unit address while the code below runs.
-        let (silent, request) = line.lock(|line| {
-            line.as_mut().map_or((true, None), |line| {
-                (!line.is_replying(), line.take(&self.server, delay_ms))
-            })
-        });
-        if silent {
-            // The previous reply has been sent, or will never be sent.
-            pass_order_on(device, orders);
+        let Some((silent, request)) = lines.lock(which, |line| {
+            (!line.is_replying(), line.take(&served.server, delay_ms))
+        }) else {
+            return false;
+        };
+        // When the line is silent, the previous reply has been sent, or will never be sent.
+        if silent && let Some(order) = served.order.take() {
+            pass_order_on(order, device, orders);
         }
-        request.is_some_and(|request| self.serve(request, line, device))
+        request.is_some_and(|request| self.serve(which, request, lines, device))
+    }
+
+    const fn of(&mut self, which: Which) -> &mut Served {
+        match which {
+            Which::Rs485 => &mut self.rs485,
+            Which::Radio => &mut self.radio,
+        }
     }
 
     fn delay_ms(&self, device: &mut impl Mutex<T = &'static mut Device>) -> u16 {
@@ -67,29 +135,32 @@ impl Serving {
 
     fn serve(
         &mut self,
+        which: Which,
         request: Request<'static>,
-        line: &mut impl Mutex<T = Option<Line>>,
+        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) -> bool {
-        let server = &mut self.server;
-        let decided = device.lock(|device| request.decide(server, &**device));
-        let Some(answered) = line.lock(|line| line.as_mut().map(|line| line.answer(decided)))
-        else {
+        let served = self.of(which);
+        let decided = device.lock(|device| request.decide(&served.server, &**device));
+        let Some(answered) = lines.lock(which, |line| line.answer(decided)) else {
             return false;
         };
-        let committed = answered.commit(server);
+        let committed = answered.commit(&mut served.server);
         let decision = *committed.decision();
-        let served = device.lock(|device| {
-            if Device::shows_counters(&decision.work) {
-                device.state.counters = server.counters();
-            }
+        if Device::shows_counters(&decision.work) {
+            self.copy_counters(lines, device);
+        }
+        let served = self.of(which);
+        let done = device.lock(|device| {
             // In listen-only mode requests do not count, so that the outputs go to SAFE.
             if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
-                device.request_seen(committed.ended().wrapping_sub(self.frame_gap_ms));
+                device.request_seen(committed.ended().wrapping_sub(served.frame_gap_ms));
             }
-            committed.carry_out(server, &mut **device)
+            let done = committed.carry_out(&mut served.server, &mut **device);
+            served.order = device.take_order();
+            done
         });
-        line.lock(|line| line.as_mut().map(|line| line.finish(served)));
+        lines.lock(which, |line| line.finish(done));
         if decision.work.writes() {
             rtic::pend(Interrupt::EXTI1);
             if !decision.is_answered() {
@@ -99,18 +170,34 @@ impl Serving {
         }
         true
     }
+
+    /// Copies the counters of both lines to the device's state.
+    fn copy_counters(
+        &self,
+        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
+        device: &mut impl Mutex<T = &'static mut Device>,
+    ) {
+        let rs485 = lines.lock(Which::Rs485, |line| line.counters());
+        let radio = lines.lock(Which::Radio, |line| line.counters());
+        device.lock(|device| {
+            let state = &mut device.state;
+            if let Some(line) = rs485 {
+                state.counters = self.rs485.server.counters_at(&line);
+            }
+            if let Some(line) = radio {
+                state.radio_counters = self.radio.server.counters_at(&line);
+            }
+        });
+    }
 }
 
-/// Executes the command of the last request, or passes it on to the background task.
+/// Executes the command of a request whose reply has been sent, or passes it on to the background task.
 fn pass_order_on(
+    order: Command,
     device: &mut impl Mutex<T = &'static mut Device>,
     orders: &mut impl Mutex<T = Orders>,
 ) {
-    let left = device.lock(|device| {
-        let order = device.take_order()?;
-        device.carry_out(order)
-    });
-    if let Some(order) = left {
+    if let Some(order) = device.lock(|device| device.carry_out(order)) {
         orders.lock(|orders| match order {
             Command::Save => orders.save = true,
             Command::Restart => orders.restart = true,

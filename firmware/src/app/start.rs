@@ -3,18 +3,18 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Leds, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, pac, uart,
+    Leds, RadioUart, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, pac, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
-    config::{self, Config},
+    config::{self, Config, RadioConfig},
     device::Identity,
     lamps::Trouble,
     start_up::{self, Address},
     store::{Store, StoreError},
 };
 use modbus_server::{
-    Adu, Server,
+    Adu,
     line::{Framing, Gaps, Port, Receiver, Width},
 };
 use modio_drivers::IoModule;
@@ -28,7 +28,9 @@ use crate::{
     log::{self, Log},
     pages::Pages,
     persistence::Persistence,
+    radio::{Radio, Serial},
     scanning::Scanning,
+    serving::Serving,
 };
 
 /// The highest priority of a task whose code is in flash.
@@ -37,11 +39,9 @@ const SERVE_PRIORITY: u8 = 3;
 /// The result of the start-up.
 pub struct Started {
     pub line: Option<Line>,
-    /// Unit address.
-    pub unit: u8,
-    /// Silence that ends a frame, in ms, rounded up.
-    pub frame_gap_ms: u32,
-    pub server: Server,
+    pub radio: Option<Radio>,
+    pub radio_uart: Option<RadioUart>,
+    pub serving: Serving,
     pub device: &'static mut Device,
     pub scanning: Scanning,
     pub analog_outputs: AnalogOutputs,
@@ -53,27 +53,39 @@ pub struct Started {
     pub trouble: Trouble,
 }
 
+/// The memory for what is too large to be moved over the stack, or is shared with interrupts.
+pub struct Memory {
+    pub device: &'static mut MaybeUninit<Device>,
+    pub adus: &'static mut [Adu],
+    pub radio_adus: &'static mut [Adu],
+}
+
 /// Starts everything. The outputs come first: they are set to START as soon as the configuration is known. The line
 /// is enabled last, when everything that serves it is ready.
 pub fn up(
     device: pac::Peripherals,
     scb: &SCB,
-    adus: &'static mut [Adu; 2],
-    place: &'static mut MaybeUninit<Device>,
+    Memory {
+        device: place,
+        adus,
+        radio_adus,
+    }: Memory,
 ) -> Started {
     let mut log = Log::new();
     let masked = rtic::export::cortex_logical2hw(SERVE_PRIORITY, pac::NVIC_PRIO_BITS);
-    let board = board::setup(device, scb, masked);
+    let mut board = board::setup(device, scb, masked);
     let address = Address::from_dip(board.dip);
 
     let mut pages = Pages(board.flash);
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
+    let radio_config = RadioConfig::of(&loaded.settings);
     let config = Config::new(
         BOARD,
         loaded.settings,
         loaded.invalid || loaded.rejected > 0,
     );
+    let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
     let settings = start_up::line(address, config.line());
     let on_wire = wire_settings(settings);
@@ -139,18 +151,36 @@ pub fn up(
             t35_ns,
             limit_us,
         };
-        let (uart, gap) = board.line.start(on_wire, times)?;
+        let (uart, gap) = board.line.start(on_wire, times, &mut board.rcc)?;
         // The count may begin just before a tick.
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
         Some(Line::new(Rs485Uart(uart), Rs485Gap(gap), port, longest_ms))
     });
 
+    let radio_gap_ms = radio_config.map_or(0, |config| config.frame_gap_ms);
+    let (radio, radio_uart) = radio_config
+        .and_then(|config| {
+            let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
+            let RadioConfig {
+                module,
+                frame_gap_ms,
+            } = config;
+            let unit = identity.unit;
+            let radio = Radio::new(Serial, mode, aux, module, unit, frame_gap_ms, radio_adus);
+            Some((radio, uart))
+        })
+        .unzip();
+
     Started {
         line,
-        frame_gap_ms: t35.div_ceil(1_000_000),
-        unit: identity.unit,
-        server: Server::new(framing),
+        radio,
+        radio_uart,
+        serving: Serving::new(
+            identity.unit,
+            (framing, t35.div_ceil(1_000_000)),
+            radio_gap_ms.into(),
+        ),
         device,
         scanning,
         analog_outputs,

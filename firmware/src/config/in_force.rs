@@ -1,6 +1,6 @@
 //! The settings in force, as typed values for the rest of the device.
 
-use modio_drivers::{ChannelSettings, Scale, Signal};
+use modio_drivers::{ChannelSettings, LoraSettings, Scale, Signal};
 use register_map::Module;
 use register_map::codes::{Baud, Format, GapRule, Mode};
 use register_map::configuration as at;
@@ -42,6 +42,36 @@ impl LineConfig {
             frame_gap: Some(get(at::FRAME_GAP)).filter(|gap| *gap != 0),
             gap_rule: GapRule::from_code(get(at::STRICT_T15)).unwrap_or(Self::FACTORY.gap_rule),
         }
+    }
+}
+
+/// Settings of the radio line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RadioConfig {
+    /// Settings of the radio module.
+    pub module: LoraSettings,
+    /// Silence that ends a frame, in milliseconds, 5 to 500.
+    pub frame_gap_ms: u16,
+}
+
+impl RadioConfig {
+    /// Returns the settings of the radio line that a start with these settings puts in force, or `None` when the
+    /// radio is off.
+    #[must_use]
+    pub fn of(settings: &Settings) -> Option<Self> {
+        let get = |address| settings.get(address);
+        // The values are in the ranges of the register map, which fit a byte.
+        let byte = |address| get(address).to_le_bytes()[0];
+        let module = LoraSettings::new(
+            get(at::LORA_ADDRESS),
+            byte(at::LORA_CHANNEL),
+            byte(at::LORA_AIR_RATE),
+            byte(at::LORA_POWER),
+        )?;
+        (get(at::LORA) != 0).then_some(Self {
+            module,
+            frame_gap_ms: get(at::LORA_FRAME_GAP),
+        })
     }
 }
 

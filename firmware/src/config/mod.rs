@@ -32,7 +32,7 @@ use register_map::points::{self, CHANNELS};
 use register_map::state::status;
 use register_map::{Board, Run, runs};
 
-pub use in_force::{LineConfig, Point, PortConfig};
+pub use in_force::{LineConfig, Point, PortConfig, RadioConfig};
 use lock::Lock;
 pub use settings::RestartValues;
 pub use settings::Settings;

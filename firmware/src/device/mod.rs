@@ -24,11 +24,13 @@ mod state;
 #[cfg(test)]
 mod tests;
 
+use core::ops::Range;
+
 use modbus_server::{
     Bits, BitsOut, DataModel, Exception, Span, Table, TextOut, Words, WordsOut, Work,
 };
 use modio_drivers::{CHANNELS, Kind};
-use register_map::{codes::Command, configuration, counters, fault, state as state_map};
+use register_map::{codes::Command, configuration, counters, fault, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
@@ -62,6 +64,7 @@ enum Block {
     Config,
     State,
     Fault,
+    Radio,
     Pulses,
 }
 
@@ -74,7 +77,8 @@ impl Block {
         match span.start().to_be_bytes() {
             [1, _] => Self::Config,
             [2, 0x00..=0x5F] => Self::State,
-            [2, _] => Self::Fault,
+            [2, 0x60..=0x6F] => Self::Fault,
+            [2, _] => Self::Radio,
             [3, _] => Self::Pulses,
             _ => Self::Points,
         }
@@ -144,15 +148,26 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.comm_watchdog.refresh(at_ms);
     }
 
-    /// Returns whether this work reads the line's counters. The caller must then copy them into the state first.
+    /// Returns whether this work reads the counters of the lines. The caller must then copy them into the state
+    /// first.
     #[must_use]
     pub const fn shows_counters(work: &Work) -> bool {
         match work.reads() {
             Some((Table::HoldingRegisters | Table::InputRegisters, span)) => {
-                matches!(Block::of(span), Block::State)
+                matches!(Block::of(span), Block::State | Block::Radio)
             }
             _ => false,
         }
+    }
+
+    /// Returns whether a module or the radio does not work.
+    #[must_use]
+    pub fn any_fails(&self) -> bool {
+        self.points.any_fails() || self.radio_fails()
+    }
+
+    fn radio_fails(&self) -> bool {
+        self.state.radio_works == Some(false)
     }
 
     /// Takes the command that a request ordered.
@@ -191,7 +206,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
         let bit = |mask, set| if set { mask } else { 0 };
         self.config.status()
             | bit(status::COMM_WATCHDOG, self.comm_watchdog.has_tripped())
-            | bit(status::MODULE_FAULT, self.points.has_fault())
+            | bit(
+                status::MODULE_FAULT,
+                self.points.has_fault() || self.radio_fails(),
+            )
             | bit(
                 status::INTERNAL_OSCILLATOR,
                 self.state.on_internal_oscillator(),
@@ -208,10 +226,13 @@ impl<const SLOTS: usize> Device<SLOTS> {
 }
 
 /// Checks whether a span lies in a block of read-only registers and contains no gap.
-fn check_rules(rules: &'static [register_map::Rule], span: Span) -> Result<(), Exception> {
-    match register_map::runs(rules, span.start(), span.count()) {
-        Some(_) => Ok(()),
-        None => Err(Exception::IllegalDataAddress),
+fn check_exists(block: &[Range<u16>], span: Span) -> Result<(), Exception> {
+    let within =
+        |range: &Range<u16>| range.contains(&span.start()) && span.end() <= u32::from(range.end);
+    if block.iter().any(within) {
+        Ok(())
+    } else {
+        Err(Exception::IllegalDataAddress)
     }
 }
 
@@ -225,9 +246,10 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.check_read_words(span),
             Block::Config => self.config.check_read(span),
-            Block::State => check_rules(state_map::RULES, span),
-            Block::Fault => check_rules(fault::RULES, span),
-            Block::Pulses => check_rules(counters::RULES, span),
+            Block::State => check_exists(state_map::SPANS, span),
+            Block::Fault => check_exists(fault::SPANS, span),
+            Block::Radio => check_exists(radio::SPANS, span),
+            Block::Pulses => check_exists(counters::SPANS, span),
         }
     }
 
@@ -242,9 +264,9 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
                 self.config.check_write(span, words)?;
                 check_ready(span, words)
             }
-            Block::State | Block::Fault => Err(Exception::IllegalDataAddress),
+            Block::State | Block::Fault | Block::Radio => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
-                check_rules(counters::RULES, span)?;
+                check_exists(counters::SPANS, span)?;
                 points::check_clear(span, words)
             }
         }
@@ -258,7 +280,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         match Block::of(span) {
             Block::Points => self.points.read_words(span, out),
             Block::Config => self.config.read(span, out),
-            Block::State => span
+            Block::State | Block::Radio => span
                 .addresses()
                 .for_each(|address| out.push(self.state_word(address))),
             Block::Fault => span
@@ -283,7 +305,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             }
             Block::Pulses => self.points.clear_pulses(span),
             // `check_write_words` rejects writes to these blocks.
-            Block::State | Block::Fault => {}
+            Block::State | Block::Fault | Block::Radio => {}
         }
     }
 
@@ -327,14 +349,10 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     }
 }
 
-/// Rejects commands and values that this firmware does not support as not allowed: it has no loader and no LoRa
-/// line.
+/// Rejects the command that this firmware does not support as not allowed: it has no loader.
 fn check_ready(span: Span, words: Words<'_>) -> Result<(), Exception> {
-    let wants = |address: u16, value: u16| {
-        let index = address.wrapping_sub(span.start());
-        words.get(index) == Some(value)
-    };
-    if wants(configuration::COMMAND, Command::EnterLoader.code()) || wants(configuration::LORA, 1) {
+    let index = configuration::COMMAND.wrapping_sub(span.start());
+    if words.get(index) == Some(Command::EnterLoader.code()) {
         Err(Exception::IllegalDataValue)
     } else {
         Ok(())

@@ -1,7 +1,7 @@
 //! Identity and health: the read-only registers at 0x0200 and the fault record at 0x0260.
 
 use modbus_server::Counters;
-use register_map::{Board, Module, codes::ModuleState, fault, points::PORTS, state as at};
+use register_map::{Board, Module, codes::ModuleState, fault, points::PORTS, radio, state as at};
 
 use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
@@ -55,8 +55,12 @@ pub struct State {
     /// Milliseconds of the current second.
     part_ms: u32,
     uptime_s: u32,
-    /// The line's counters, copied from the server when they were last read.
+    /// The counters of the RS-485 line, copied from its server when they were last read.
     pub counters: Counters,
+    /// The counters of the radio line, copied in the same way. Zero while the radio is off.
+    pub radio_counters: Counters,
+    /// Whether the radio works; `None` while it is off or being set up for the first time.
+    pub radio_works: Option<bool>,
     /// The smallest amount of free stack so far, in bytes.
     pub stack_free: u16,
     /// Number of times the line was set up again since the start; stops at 65535.
@@ -75,6 +79,8 @@ impl State {
             part_ms: 0,
             uptime_s: 0,
             counters: Counters::default(),
+            radio_counters: Counters::default(),
+            radio_works: None,
             stack_free: 0,
             line_repairs: 0,
         }
@@ -172,6 +178,9 @@ impl State {
             }
             _ if address < at::BUS_MESSAGES => nth(&self.identity.unique_id, at::UNIQUE_ID),
             _ if address < at::CHANNEL_STATUS => nth(&self.counters.as_words(), at::BUS_MESSAGES),
+            _ if address >= radio::BUS_MESSAGES => {
+                nth(&self.radio_counters.as_words(), radio::BUS_MESSAGES)
+            }
             _ => points
                 .status_of(address.wrapping_sub(at::CHANNEL_STATUS))
                 .code(),

@@ -1,0 +1,138 @@
+//! Connects the radio's UART and pins to [`RadioLine`](radio::RadioLine).
+//!
+//! ```text
+//!  USART3, from RAM                      task `radio`, every millisecond        task `serve`
+//!  on_interrupt --- RECEIVED --->        RadioLine: set-up, frames, replies <-> requests
+//!              <--- TO_SEND ----
+//! ```
+//!
+//! The queues hold what passes while flash is erased, 40 ms, because a byte takes 1.04 ms.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use board_support::{Damaged, PinInput, PinOutput, RadioUart, pac::Interrupt};
+use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
+use firmware::{byte_queue::ByteQueue, radio};
+use rtic::Mutex;
+
+use crate::{board::Device, clock, every::Every};
+
+/// The radio line.
+pub type Radio = radio::RadioLine<Serial, PinOutput, PinInput>;
+
+/// Milliseconds between two checks of the UART's registers.
+const CHECK_MS: u8 = 100;
+
+static RECEIVED: ByteQueue = ByteQueue::new();
+static TO_SEND: ByteQueue = ByteQueue::new();
+/// A received byte was damaged, or lost because the queue was full.
+static DAMAGED: AtomicBool = AtomicBool::new(false);
+
+/// The UART and the queues as a serial port, for the radio line.
+pub struct Serial;
+
+/// Handles the UART's interrupt. This code runs from RAM.
+#[inline(always)]
+pub fn on_interrupt(uart: &mut RadioUart) {
+    uart.on_interrupt(
+        |byte| {
+            let kept = match byte {
+                Ok(byte) => RECEIVED.push(byte),
+                Err(Damaged) => false,
+            };
+            if !kept {
+                DAMAGED.store(true, Ordering::Relaxed);
+            }
+        },
+        || TO_SEND.pop(),
+    );
+}
+
+impl ErrorType for Serial {
+    type Error = ErrorKind;
+}
+
+impl Read<u8> for Serial {
+    fn read(&mut self) -> nb::Result<u8, ErrorKind> {
+        // Reported with the bytes that are read next; they are in the same frame.
+        if DAMAGED.load(Ordering::Relaxed) {
+            DAMAGED.store(false, Ordering::Relaxed);
+            return Err(nb::Error::Other(ErrorKind::FrameFormat));
+        }
+        RECEIVED.pop().ok_or(nb::Error::WouldBlock)
+    }
+}
+
+impl Write<u8> for Serial {
+    fn write(&mut self, byte: u8) -> nb::Result<(), ErrorKind> {
+        if !TO_SEND.push(byte) {
+            return Err(nb::Error::WouldBlock);
+        }
+        // The handler takes the byte when the UART can send it.
+        rtic::pend(Interrupt::USART3);
+        Ok(())
+    }
+
+    /// The last two bytes may still be in the UART. The module is busy until it has sent them over the air.
+    fn flush(&mut self) -> nb::Result<(), ErrorKind> {
+        if TO_SEND.is_empty() {
+            Ok(())
+        } else {
+            Err(nb::Error::WouldBlock)
+        }
+    }
+}
+
+/// The state of the task `radio`.
+pub struct Polling {
+    polled_at: u32,
+    check: Every,
+}
+
+impl Polling {
+    pub const fn new() -> Self {
+        Self {
+            polled_at: 0,
+            check: Every::new(CHECK_MS),
+        }
+    }
+
+    /// Continues what the radio line does. Returns whether a request waits to be served.
+    pub fn run(
+        &mut self,
+        radio: &mut impl Mutex<T = Option<Radio>>,
+        uart: &mut impl Mutex<T = Option<RadioUart>>,
+        device: &mut impl Mutex<T = &'static mut Device>,
+    ) -> bool {
+        let now = clock::millis();
+        let passed = now.wrapping_sub(self.polled_at);
+        self.polled_at = now;
+        let polled = radio.lock(|radio| {
+            let radio = radio.as_mut()?;
+            // At most the 40 ms for which an erase stops this task.
+            let waits = radio.poll(now, passed as u16);
+            Some((waits, radio.works()))
+        });
+        let Some((waits, works)) = polled else {
+            return false;
+        };
+        let repaired = self.check.is_due() && uart.lock(repair);
+        device.lock(|device| {
+            let state = &mut device.state;
+            state.radio_works = works;
+            if repaired {
+                state.line_repairs = state.line_repairs.saturating_add(1);
+            }
+        });
+        waits
+    }
+}
+
+/// Sets the UART up again when its registers were disturbed. Returns whether they were.
+fn repair(uart: &mut Option<RadioUart>) -> bool {
+    let Some(uart) = uart.as_mut().filter(|uart| !uart.is_sound()) else {
+        return false;
+    };
+    uart.set_up();
+    true
+}

@@ -1,0 +1,202 @@
+//! The radio line: the LoRa radio and the port that serves Modbus RTU over it.
+//!
+//! The radio is a serial port over the air with its own timing. It outputs a frame in packets of up to 58 bytes with
+//! pauses between them, so a frame ends after LORA_FRAME_GAP instead of t3.5, and pauses inside a frame do not
+//! count. Its bytes take a millisecond each, so a task that runs once a millisecond moves them.
+//!
+//! A silence is measured from the call that found the last byte. While flash is erased or programmed the task waits
+//! for up to 40 ms and the silence counts as longer, never as shorter.
+
+use embedded_hal::digital::{InputPin, OutputPin};
+use embedded_hal_nb::serial::{Read, Write};
+use modbus_server::{
+    Adu, Answered, Decided, LineCounters, Request, Served, Server,
+    line::{Faults, Next, Port, Receiver},
+};
+use modio_drivers::{Lora, LoraSettings};
+
+use crate::line::ServedLine;
+
+/// The radio line.
+pub struct RadioLine<S, M, A> {
+    radio: Lora<S, M, A>,
+    port: Port<'static>,
+    /// Silence that ends a frame, in milliseconds.
+    frame_gap_ms: u16,
+    /// Time since the last byte, in milliseconds, until the silence has ended the frame.
+    silence: Option<u16>,
+    /// A byte of the reply that the UART could not take yet.
+    unsent: Option<u8>,
+    /// Longest time of a packet on the air, and what is left of it since the radio began to send the last packet of a
+    /// reply, in milliseconds.
+    packet_ms: u16,
+    on_air_ms: u16,
+    works: Option<bool>,
+}
+
+/// Largest number of bytes that are received in one call: more than a UART can receive while flash is erased.
+const BYTES_PER_CALL: u8 = 64;
+
+impl<S, M, A> RadioLine<S, M, A>
+where
+    S: Read<u8> + Write<u8>,
+    M: OutputPin,
+    A: InputPin,
+{
+    /// Creates the line of a unit, 1 to 247. A silence of `frame_gap_ms` milliseconds ends a frame.
+    pub fn new(
+        serial: S,
+        mode: [M; 2],
+        aux: A,
+        settings: LoraSettings,
+        unit: u8,
+        frame_gap_ms: u16,
+        adus: &'static mut [Adu],
+    ) -> Self {
+        Self {
+            radio: Lora::new(serial, mode, aux, settings),
+            port: Port::new(Receiver::rtu(unit, false), adus),
+            frame_gap_ms,
+            silence: Some(0),
+            unsent: None,
+            packet_ms: settings.packet_ms(),
+            on_air_ms: 0,
+            works: None,
+        }
+    }
+
+    /// Continues everything that is under way, at `now_ms` milliseconds after the start and `passed` milliseconds
+    /// after the last call. Returns whether a request waits to be served, or a reply has just been sent.
+    pub fn poll(&mut self, now_ms: u32, passed: u16) -> bool {
+        self.radio.poll(passed);
+        if !self.radio.is_ready() {
+            if self.radio.has_failed() {
+                self.works = Some(false);
+            }
+            self.abort();
+            return false;
+        }
+        self.works = Some(true);
+        let waits = if self.port.is_sending() {
+            self.discard();
+            false
+        } else {
+            self.receive(now_ms, passed)
+        };
+        let was_on_air = self.on_air_ms > 0;
+        self.on_air_ms = self.on_air_ms.saturating_sub(passed);
+        let has_sent = was_on_air && self.on_air_ms == 0;
+        self.send();
+        waits || has_sent
+    }
+
+    /// Returns whether the radio works. `None` until the first attempt to set it up has ended.
+    #[must_use]
+    pub const fn works(&self) -> Option<bool> {
+        self.works
+    }
+
+    /// Ends a reply that can no longer be sent.
+    fn abort(&mut self) {
+        self.unsent = None;
+        if self.port.is_sending() || self.port.start().is_some() {
+            self.end_of_reply();
+        }
+    }
+
+    fn end_of_reply(&mut self) {
+        self.port.sent();
+        self.silence = None;
+    }
+
+    /// Discards what is received during a reply: the air is half duplex, so it is no request for this unit.
+    fn discard(&mut self) {
+        let _ = (0..BYTES_PER_CALL).any(|_| self.radio.read().is_err());
+    }
+
+    fn receive(&mut self, now_ms: u32, passed: u16) -> bool {
+        let mut received = false;
+        for _ in 0..BYTES_PER_CALL {
+            let (byte, faults) = match self.radio.read() {
+                Ok(byte) => (byte, Faults::NONE),
+                Err(nb::Error::Other(_)) => (0, Faults::FRAMING),
+                Err(nb::Error::WouldBlock) => break,
+            };
+            self.port.received(byte, faults);
+            received = true;
+        }
+        if received {
+            self.silence = Some(0);
+            return false;
+        }
+        let Some(silence) = &mut self.silence else {
+            return false;
+        };
+        *silence = silence.saturating_add(passed);
+        if *silence < self.frame_gap_ms {
+            return false;
+        }
+        self.silence = None;
+        self.port.long_silence(now_ms)
+    }
+
+    /// Sends as much of the reply as the UART takes. The reply begins when the radio is free, and ends when the radio
+    /// has begun to send its last packet: AUX is high from then on (manual of the E32-433T20D, 6.2).
+    fn send(&mut self) {
+        if !self.port.is_sending() {
+            if !self.port.is_replying() || !self.radio.is_free() {
+                return;
+            }
+            self.unsent = self.port.start();
+        }
+        while self.port.is_sending() {
+            let byte = match self.unsent.take() {
+                Some(byte) => byte,
+                None => match self.port.next() {
+                    Next::Byte(byte) => byte,
+                    Next::Wait => return,
+                    Next::Done => {
+                        if self.radio.flush().is_ok() && self.radio.is_free() {
+                            self.on_air_ms = self.packet_ms;
+                            self.end_of_reply();
+                        }
+                        return;
+                    }
+                },
+            };
+            if self.radio.write(byte).is_err() {
+                self.unsent = Some(byte);
+                return;
+            }
+        }
+    }
+}
+
+impl<S, M, A> ServedLine for RadioLine<S, M, A> {
+    /// Also returns true while the last packet may still be on the air, because a restart would change the radio's
+    /// mode. The next request shows that the packet has been received.
+    fn is_replying(&self) -> bool {
+        let on_air = self.on_air_ms > 0 && self.port.waiting().is_none();
+        self.port.is_replying() || on_air
+    }
+
+    /// There is no RESPONSE_DELAY, which is for masters on the RS-485 line: the air takes much longer.
+    fn take(&mut self, server: &Server, _delay_ms: u16) -> Option<Request<'static>> {
+        server.take(&mut self.port, 0)
+    }
+
+    fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {
+        decided.answer(&mut self.port)
+    }
+
+    fn finish(&mut self, served: Served<'static>) {
+        served.finish(&mut self.port);
+    }
+
+    fn counters(&self) -> LineCounters {
+        *self.port.counters()
+    }
+}
+
+#[cfg(test)]
+mod tests;
