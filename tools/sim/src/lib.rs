@@ -19,7 +19,7 @@
 //! ```text
 //! board      the modio-02 and the modio-08       line   the RS-485 bus and its frames
 //! bus        several boards on one line          slot   what is plugged in, and the world outside it
-//! exact_line the protocol by which a client
+//! exact_line the protocol by which a client      radio  the LoRa module, and the air with its gateway
 //!            lets time pass
 //! ```
 
@@ -36,6 +36,7 @@ pub mod machine;
 pub mod part;
 pub mod periph;
 pub mod peripheral;
+pub mod radio;
 pub mod rtt;
 pub mod serial;
 pub mod slot;

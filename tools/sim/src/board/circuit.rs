@@ -8,15 +8,20 @@ use crate::slot::Slot;
 use crate::soc::{Circuit, Pin, Pins};
 use crate::time::Time;
 
-use super::{Config, Layout};
+use super::{Config, Layout, Radio};
 
 /// Driver enable of the RS-485 line.
 const DRIVER_ENABLE: Pin = Pin::new('A', 8);
 /// Transmitter of the RS-485 line.
 const TX: Pin = Pin::new('A', 9);
+/// USART3's transmitter: RXD of the LoRa module.
+const RADIO_TX: Pin = Pin::new('B', 10);
 /// I2C bus of the modules' DACs.
 const SCL: Pin = Pin::new('B', 6);
 const SDA: Pin = Pin::new('B', 7);
+
+/// Finding when the LoRa module is used with bit 7 of OPTION set.
+const FIXED_TRANSMISSION: &str = "the fixed transmission of the LoRa module is not modelled";
 
 /// A modio board without its part.
 #[derive(Debug)]
@@ -29,6 +34,8 @@ pub struct Modio {
     pub slots: Vec<Slot>,
     /// DIP switch SW01: bit 0 = position 1, a set bit = ON = connected to ground.
     pub dip: u8,
+    /// The LoRa module, if it is fitted.
+    pub radio: Option<Radio>,
     /// Number of the slot whose DAC has acknowledged its address.
     addressed: Option<usize>,
 }
@@ -45,6 +52,7 @@ impl Modio {
             line: Line::default(),
             slots: slots.collect(),
             dip: config.dip,
+            radio: config.radio.map(Radio::new),
             addressed: None,
         }
     }
@@ -65,6 +73,9 @@ impl Circuit for Modio {
         for (pin, free) in [(SCL, held.scl), (SDA, held.sda)] {
             pins.drive(pin, if free { Drive::PullUp } else { Drive::Low });
         }
+        if let Some(radio) = &self.radio {
+            radio.drive(&self.layout.radio, pins);
+        }
     }
 
     fn port_changed(&mut self, port: char, gpio: &Gpio, now: Time) -> bool {
@@ -80,8 +91,11 @@ impl Circuit for Modio {
                 }
             }
         }
+        let radio = self.radio.as_mut();
+        let switched =
+            radio.is_some_and(|radio| radio.port_changed(&self.layout.radio, port, gpio, now));
         if port != SCL.port() {
-            return false;
+            return switched;
         }
         let low = gpio.pulled_low();
         let pins = Wires {
@@ -89,17 +103,28 @@ impl Circuit for Modio {
             sda: low >> SDA.number() & 1 == 0,
         };
         let slots = self.slots.iter_mut();
-        slots.fold(false, |changed, slot| slot.set_pins(pins) | changed)
+        slots.fold(switched, |changed, slot| slot.set_pins(pins) | changed)
     }
 
     fn set_power(&mut self, on: bool, now: Time) {
         for slot in &mut self.slots {
             slot.set_power(on, now);
         }
+        if let Some(radio) = &mut self.radio {
+            radio.set_power(on, now);
+        }
     }
 
     fn wire(&mut self, tx: Pin) -> Option<&mut dyn Wire> {
-        (tx == TX).then_some(&mut self.line as &mut dyn Wire)
+        match tx {
+            TX => Some(&mut self.line),
+            RADIO_TX => self.radio.as_mut().map(|radio| radio as &mut dyn Wire),
+            _ => None,
+        }
+    }
+
+    fn pins_changed(&mut self) -> bool {
+        self.radio.as_mut().is_some_and(Radio::aux_changed)
     }
 
     fn i2c(&mut self, scl: Pin) -> Option<&mut dyn Bus> {
@@ -107,7 +132,11 @@ impl Circuit for Modio {
     }
 
     fn take_findings(&mut self) -> Vec<(Time, &'static str)> {
-        self.line.take_findings()
+        let mut findings = self.line.take_findings();
+        let unmodelled = self.radio.as_mut();
+        let unmodelled = unmodelled.and_then(|radio| radio.module.take_unmodelled());
+        findings.extend(unmodelled.map(|at| (at, FIXED_TRANSMISSION)));
+        findings
     }
 }
 

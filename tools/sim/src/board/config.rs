@@ -6,6 +6,7 @@ use super::{Layout, MODIO_02};
 use crate::chip;
 use crate::corner::Corner;
 use crate::error::Error;
+use crate::radio::Parameters;
 use crate::slot;
 
 /// Configuration of a board before its first power-on.
@@ -19,6 +20,8 @@ pub struct Config {
     pub module: Module,
     /// Modules in other slots, each with the number of its port. A slot that is not named is empty.
     pub slots: Vec<(u8, Module)>,
+    /// The LoRa module, with the parameters that it keeps without power; `None` if no module is fitted.
+    pub radio: Option<Parameters>,
     /// Corner of the part.
     pub corner: Corner,
     /// Whether the 8 MHz crystal works. Without it HSERDY is never set. The crystal can also fail later
@@ -57,6 +60,7 @@ impl Default for Config {
             layout: &MODIO_02,
             module: Module::Di4,
             slots: Vec::new(),
+            radio: None,
             corner,
             crystal,
             flash,

@@ -6,6 +6,8 @@ use crate::part::{Part, STM32F103CB, STM32F103RC};
 use crate::slot::mcp4728;
 use crate::soc::Pin;
 
+use super::RadioPins;
+
 /// A slot of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct SlotPins {
@@ -17,7 +19,8 @@ pub struct SlotPins {
     pub dac_address: u8,
 }
 
-/// A type of board. The RS-485 line (PA8 to PA10), I2C1 (PB6, PB7) and the LEDs (PB8, PB9, PC13) are the same on all.
+/// A type of board. The RS-485 line (PA8 to PA10), I2C1 (PB6, PB7), the LEDs (PB8, PB9, PC13) and the UART of the LoRa
+/// module (PB10, PB11) are the same on all.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
     /// The board in the register map: its name, its ports, and the pages in which the configuration is stored.
@@ -28,6 +31,8 @@ pub struct Layout {
     pub slots: &'static [SlotPins],
     /// Pins of DIP switch SW01, position 1 first. ON = low.
     pub switch: [Pin; 8],
+    /// Pins of the LoRa module. M0 and M1 are on the same port.
+    pub radio: RadioPins,
 }
 
 /// The modio-02: one slot.
@@ -49,6 +54,11 @@ pub const MODIO_02: Layout = Layout {
         ('B', 14),
         ('B', 15),
     ]),
+    radio: RadioPins {
+        m0: Pin::new('B', 0),
+        m1: Pin::new('B', 1),
+        aux: Pin::new('B', 5),
+    },
 };
 
 /// The modio-08: four slots.
@@ -87,6 +97,11 @@ pub const MODIO_08: Layout = Layout {
         ('B', 14),
         ('B', 15),
     ]),
+    radio: RadioPins {
+        m0: Pin::new('C', 10),
+        m1: Pin::new('C', 11),
+        aux: Pin::new('C', 12),
+    },
 };
 
 impl Layout {
@@ -121,6 +136,7 @@ mod tests {
             let layout = Layout::of(board).unwrap();
             let ports = layout.slots.iter().map(|slot| u16::from(slot.port));
             assert!(ports.eq(board.ports()), "{board}");
+            assert_eq!(layout.radio.m0.port(), layout.radio.m1.port(), "{board}");
             assert_eq!(layout.part.page_size, board.store.bytes as usize, "{board}");
             for page in board.store.addresses() {
                 let end = (page + board.store.bytes - FLASH_BASE) as usize;

@@ -1,16 +1,19 @@
-//! The modio boards: an STM32F103 with an RS-485 line, slots, a DIP switch and LEDs. [`layout`] has the pins of each
-//! board, [`circuit`] what is connected to them, and [`outside`] the methods that operate and read a board.
+//! The modio boards: an STM32F103 with an RS-485 line, slots, a DIP switch, LEDs and a LoRa module. [`layout`] has the
+//! pins of each board, [`circuit`] what is connected to them, [`radio`] the LoRa module, and [`outside`] the methods that
+//! operate and read a board.
 
 mod circuit;
 mod config;
 mod layout;
 mod outside;
+mod radio;
 mod stored;
 
 pub use circuit::Modio;
 pub use config::Config;
 pub use layout::{Layout, MODIO_02, MODIO_08, SlotPins};
 pub use outside::Leds;
+pub use radio::{Radio, RadioPins};
 
 use crate::chip::Chip;
 use crate::error::Error;

@@ -121,6 +121,12 @@ pub trait Circuit {
     /// Called when the supply of the circuit and the part is switched.
     fn set_power(&mut self, _on: bool, _now: Time) {}
 
+    /// Whether the circuit drives its pins in another way than at the last call because time has passed. Called after a
+    /// device at a USART was computed; [`Circuit::drive`] is called then.
+    fn pins_changed(&mut self) -> bool {
+        false
+    }
+
     /// The device at the USART whose transmitter is at pin `tx`; `None` if nothing is connected.
     fn wire(&mut self, _tx: Pin) -> Option<&mut dyn Wire> {
         None

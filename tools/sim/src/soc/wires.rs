@@ -6,7 +6,6 @@ use super::circuit::{Circuit, PORTS, Pin};
 use super::map::Block;
 use crate::finding::What;
 use crate::periph::clocks::Clocks;
-use crate::periph::gpio::Drive;
 use crate::periph::i2c::NoDevice;
 use crate::periph::rcc::Cause;
 use crate::periph::usart::{TxPin, Usart, Wire};
@@ -69,8 +68,8 @@ impl<C: Circuit> Soc<C> {
             Block::Rcc => self.wire_rcc(now),
             Block::Flash => self.wire_flash(),
             Block::Iwdg => self.wire_watchdog(now),
-            Block::Usart1 => self.check_receiver(&SERIALS[0], now),
-            Block::Usart3 => self.check_receiver(&SERIALS[1], now),
+            Block::Usart1 => self.wire_usart(&SERIALS[0], now),
+            Block::Usart3 => self.wire_usart(&SERIALS[1], now),
             _ => {}
         }
     }
@@ -96,6 +95,9 @@ impl<C: Circuit> Soc<C> {
         for (at, text) in self.circuit.take_findings() {
             self.notes.push((at, What::Other(text)));
         }
+        if self.circuit.pins_changed() {
+            self.refresh(now);
+        }
         self.note_requests(serial.usart);
         self.note_due(serial.usart);
     }
@@ -108,12 +110,17 @@ impl<C: Circuit> Soc<C> {
         }
     }
 
-    /// Reports a USART whose receiver is on while its RX pin is not an input.
-    fn check_receiver(&mut self, serial: &Serial, now: Time) {
+    /// Passes a character that has begun on to the wire, and reports a USART whose receiver is on while its RX pin is not
+    /// an input.
+    fn wire_usart(&mut self, serial: &Serial, now: Time) {
         let port = &self.gpio[serial.rx.port_index()];
         let closed = (port.outputs() | port.analog()) >> serial.rx.number() & 1 != 0;
         let (usart, wire) = self.usart(serial);
-        if closed && wire.is_some() && usart.awaits_start() {
+        let connected = wire.is_some();
+        if let Some(wire) = wire {
+            usart.pass_sent(wire);
+        }
+        if closed && connected && usart.awaits_start() {
             self.notes.push((now, What::Other(serial.no_input)));
         }
     }
@@ -123,11 +130,7 @@ impl<C: Circuit> Soc<C> {
         let Some(wire) = self.circuit.wire(serial.tx) else {
             return;
         };
-        let drive = if wire.rx_level() {
-            Drive::High
-        } else {
-            Drive::Low
-        };
+        let drive = wire.rx_drive();
         self.gpio[serial.rx.port_index()].drive(serial.rx.number(), drive, now);
         self.wire_port(serial.rx.port_index(), now);
     }

@@ -8,6 +8,7 @@ mod debug;
 mod flash;
 mod measure;
 mod parts;
+mod radio;
 mod regs;
 mod resets;
 mod slots;

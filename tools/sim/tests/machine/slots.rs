@@ -8,7 +8,6 @@ use super::asm::{Asm, When};
 use super::regs::*;
 use super::{board_with, findings, out};
 
-const GPIOB: u32 = 0x4001_0C00;
 const I2C1: u32 = 0x4000_5400;
 
 fn modio_08(slots: &[(u8, Module)], program: Asm) -> Board {

@@ -1,6 +1,7 @@
 //! The wire at the pins of a USART, and the exchange that advances both in time together.
 
 use super::{Sent, Usart};
+use crate::periph::gpio::Drive;
 use crate::peripheral::Peripheral;
 use crate::serial::Rate;
 use crate::time::Time;
@@ -49,6 +50,20 @@ pub trait Wire {
         true
     }
 
+    /// How the device drives the RX pin.
+    fn rx_drive(&self) -> Drive {
+        match self.rx_level() {
+            true => Drive::High,
+            false => Drive::Low,
+        }
+    }
+
+    /// Instant of the next event of the device, other than an edge at the RX pin: the wire has to be advanced to it. It
+    /// is not before the last [`Wire::advance`].
+    fn next_event(&self) -> Option<Time> {
+        None
+    }
+
     /// Called when the wire and its USART have reached the same instant.
     fn caught_up(&mut self, _usart: &Usart) {}
 }
@@ -75,7 +90,8 @@ impl Usart {
         wire.caught_up(self);
     }
 
-    fn pass_sent(&mut self, wire: &mut dyn Wire) {
+    /// Passes what was sent on to the wire. Call it after each access, so that the wire knows its next event.
+    pub fn pass_sent(&mut self, wire: &mut dyn Wire) {
         for sent in self.take_sent() {
             wire.sent(sent);
         }
@@ -86,7 +102,10 @@ impl Usart {
     pub fn next_exchange(&self, wire: &dyn Wire) -> Option<Time> {
         let listens = self.awaits_start() || wire.has_edges();
         let edge = wire.next_edge().filter(|_| listens);
-        [self.next_event(), edge].into_iter().flatten().min()
+        [self.next_event(), edge, wire.next_event()]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     /// Whether the transmitter has sent something that was not passed to its wire yet.
