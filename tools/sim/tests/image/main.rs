@@ -12,6 +12,7 @@
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `bus`: several boards on one line |
+//! | the radio | `radio` |
 //! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
@@ -49,6 +50,7 @@ mod outputs_at_start;
 mod points;
 mod power_cut;
 mod pulses;
+mod radio;
 mod ranges;
 mod refusals;
 mod registers;
