@@ -41,6 +41,8 @@ mod lock;
 mod module_choice;
 #[path = "../image/power_cut.rs"]
 mod power_cut;
+#[path = "../image/radio.rs"]
+mod radio;
 #[path = "../image/registers.rs"]
 mod registers;
 #[path = "../image/saving.rs"]
