@@ -180,9 +180,8 @@ impl<S, M, A> ServedLine for RadioLine<S, M, A> {
         self.port.is_replying() || on_air
     }
 
-    /// There is no RESPONSE_DELAY, which is for masters on the RS-485 line: the air takes much longer.
-    fn take(&mut self, server: &Server, _delay_ms: u16) -> Option<Request<'static>> {
-        server.take(&mut self.port, 0)
+    fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {
+        server.take(&mut self.port, delay_ms)
     }
 
     fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {

@@ -2,14 +2,14 @@
 //!
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
-//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan` and `radio`. If late, the clock is late |
+//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan`. If late, the clock is late |
 //! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
 //! | `radio_uart` | USART3 | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
 //! | `limit` | TIM1_CC | 4 | aborts a reply that does not end. If late, the driver is on for longer |
 //! | `serve` | EXTI3, pended by `gap`, `uart` and `radio` | 3 | serves a complete frame; executes a command when its response has been sent. If late, the response is late |
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
-//! | `radio` | EXTI4, pended by `beat` | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
+//! | `radio` | EXTI4, pended by `scan` while the radio is on | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
 //! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
 //! | `idle` | - | - | refreshes the watchdog when all tasks above have run; sleeps |
 //!
@@ -89,6 +89,7 @@ mod app {
         radio_polling: Polling,
         serving: Serving,
         scanning: Scanning,
+        radio_is_on: bool,
         events: Producer<'static, Event>,
         background_work: Background,
         logged: Consumer<'static, Event>,
@@ -112,6 +113,7 @@ mod app {
         let (events, logged) = cx.local.queue.split();
         started.scan_timer.start();
         started.watchdog.arm();
+        let radio_is_on = started.radio.is_some();
         (
             Shared {
                 line: started.line,
@@ -122,6 +124,7 @@ mod app {
                 device: started.device,
             },
             Local {
+                radio_is_on,
                 scan_timer: started.scan_timer,
                 radio_polling: Polling::new(),
                 serving: started.serving,
@@ -193,7 +196,6 @@ mod app {
             .line
             .lock(|line| line.as_mut().map(Line::on_millisecond));
         rtic::pend(Interrupt::EXTI1);
-        rtic::pend(Interrupt::EXTI4);
     }
 
     #[task(binds = USART3, priority = 4, shared = [radio_uart])]
@@ -226,7 +228,7 @@ mod app {
         alive::end(fault::marks(), Task::Serve);
     }
 
-    #[task(binds = EXTI1, priority = 2, local = [scanning, events], shared = [line, device])]
+    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device])]
     fn scan(cx: scan::Context) {
         let mark = alive::look(fault::marks(), Task::Scan);
         alive::begin(fault::marks(), Task::Scan);
@@ -238,6 +240,9 @@ mod app {
             .run(&mut shared.line, &mut shared.device, cx.local.events);
         if beat {
             alive::end(fault::marks(), Task::Scan);
+            if *cx.local.radio_is_on {
+                rtic::pend(Interrupt::EXTI4);
+            }
         } else {
             // Only a scan after a tick of the clock proves that the scan works.
             alive::put_back(fault::marks(), Task::Scan, mark);

@@ -59,6 +59,28 @@ impl Served {
     }
 }
 
+/// The waiting request of a line.
+struct Taken {
+    /// The previous reply has been sent, or will never be sent.
+    silent: bool,
+    request: Option<Request<'static>>,
+}
+
+/// Takes the waiting request of a line, if the line is on and there is one. Its reply starts now, or after `delay_ms`.
+#[inline(always)]
+fn take(line: &mut Option<impl ServedLine>, server: &Server, delay_ms: u16) -> Taken {
+    let Some(line) = line else {
+        return Taken {
+            silent: false,
+            request: None,
+        };
+    };
+    Taken {
+        silent: !line.is_replying(),
+        request: line.take(server, delay_ms),
+    }
+}
+
 /// The servers of the lines.
 pub struct Serving {
     rs485: Served,
@@ -86,11 +108,15 @@ impl Serving {
         device: &mut impl Mutex<T = &'static mut Device>,
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
-        let mut served = false;
-        for which in [Which::Rs485, Which::Radio] {
-            served |= self.run_line(which, lines, device, orders);
-        }
-        served
+        let delay_ms = self.delay_ms(device);
+        // The UART sends the unit address while the code below runs.
+        let taken = lines
+            .rs485
+            .lock(|line| take(line, &self.rs485.server, delay_ms));
+        let served = self.run_line(Which::Rs485, taken, lines, device, orders);
+        // RESPONSE_DELAY is for masters on the RS-485 line; the air takes much longer.
+        let taken = lines.radio.lock(|line| take(line, &self.radio.server, 0));
+        self.run_line(Which::Radio, taken, lines, device, orders) || served
     }
 
     // Not inlined: one copy serves both lines.
@@ -98,23 +124,19 @@ impl Serving {
     fn run_line(
         &mut self,
         which: Which,
+        taken: Taken,
         lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
-        let delay_ms = self.delay_ms(device);
-        let served = self.of(which);
-        // The UART sends the unit address while the code below runs.
-        let Some((silent, request)) = lines.lock(which, |line| {
-            (!line.is_replying(), line.take(&served.server, delay_ms))
-        }) else {
-            return false;
-        };
-        // When the line is silent, the previous reply has been sent, or will never be sent.
-        if silent && let Some(order) = served.order.take() {
+        if taken.silent
+            && let Some(order) = self.of(which).order.take()
+        {
             pass_order_on(order, device, orders);
         }
-        request.is_some_and(|request| self.serve(which, request, lines, device))
+        taken
+            .request
+            .is_some_and(|request| self.serve(which, request, lines, device))
     }
 
     const fn of(&mut self, which: Which) -> &mut Served {

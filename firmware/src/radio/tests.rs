@@ -167,7 +167,7 @@ impl Bench {
             holding_registers: &mut self.registers,
             ..Tables::default()
         };
-        let request = self.line.take(&self.server, 1000)?;
+        let request = self.line.take(&self.server, 0)?;
         let decided = request.decide(&self.server, &tables);
         let committed = self.line.answer(decided).commit(&mut self.server);
         let outcome = committed.decision().outcome;

@@ -69,7 +69,7 @@ impl<'a, U: Units> Port<'a, U> {
     }
 
     /// Processes a received character and its faults.
-    #[inline]
+    #[inline(always)]
     pub fn received(&mut self, byte: u8, faults: Faults) {
         self.receiver.character(byte, faults);
     }

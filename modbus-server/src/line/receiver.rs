@@ -107,7 +107,7 @@ impl<'a, U: Units> Receiver<'a, U> {
     }
 
     /// Processes a received character.
-    #[inline]
+    #[inline(always)]
     pub fn character(&mut self, byte: u8, faults: Faults) {
         let special = self.state | u16::from(faults.bits());
         if special != 0 {

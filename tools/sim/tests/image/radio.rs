@@ -13,6 +13,7 @@ use sim::radio::{Confirmation, Fault, Mode, Packet, Parameters, Sender};
 use sim::soc::map::Block;
 use sim::{Config, Module, Time};
 
+use crate::LAYOUT;
 use crate::bench::{Bench, FIRST, MODULE, SLOT, adu, flash_with_settings, pages};
 
 /// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
@@ -141,11 +142,12 @@ fn module_gets_the_stored_settings_and_requests_over_the_air_are_answered() {
 fn module_that_has_the_settings_already_is_not_written() {
     let wanted = Parameters::FACTORY.with_address(7);
     let mut bench = starting(wanted, &[(LORA_ADDRESS, 7)]);
-    // The module still starts, so no command has been sent yet.
-    bench.board.watch_pin('B', 10);
+    let aux = LAYOUT.radio.aux;
+    let (port, number) = (aux.port(), aux.number() as u8);
+    bench.board.watch_pin(port, number);
     bench.board.run_for(SET_UP);
-    // C1 C1 C1, with four edges a byte, and no other command.
-    assert_eq!(bench.board.pin_edges('B', 10).len(), 12);
+    // The end of the module's start, the command that reads the parameters, and the change to the normal mode.
+    assert_eq!(bench.board.pin_edges(port, number).len(), 1 + 2 + 2);
     bench.assert_answers_over_the_air();
     assert_eq!(bench.module().stored(), wanted);
 }
