@@ -9,6 +9,7 @@ mod flash;
 mod measure;
 mod parts;
 mod radio;
+mod radio_bus;
 mod regs;
 mod resets;
 mod slots;

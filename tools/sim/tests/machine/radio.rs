@@ -10,7 +10,7 @@ use super::{START, board_with, findings, out};
 
 const FACTORY: [u8; 6] = [0xC0, 0x00, 0x00, 0x1A, 0x17, 0x44];
 
-fn ms(n: u64) -> Time {
+pub fn ms(n: u64) -> Time {
     Time::from_ms(n)
 }
 
@@ -24,7 +24,7 @@ fn fitted(layout: &'static Layout, program: Asm) -> Board {
 }
 
 /// Sets USART3 to 9600 8N1 from 8 MHz, with its pins, and AUX of both boards to an input with a pull-up.
-fn set_up() -> Asm {
+pub fn set_up() -> Asm {
     let mut program = Asm::new();
     program.store(RCC_APB2ENR, 0b1_1101);
     program.store(RCC_APB1ENR, 1 << 18);
@@ -41,13 +41,13 @@ fn set_up() -> Asm {
 }
 
 /// Makes M0 and M1 of both boards outputs, low.
-fn select_normal_mode(program: &mut Asm) {
+pub fn select_normal_mode(program: &mut Asm) {
     program.store(GPIOB, 0x4484_4422);
     program.store(GPIOC + 4, 0x4448_2244);
 }
 
 /// Sends each received byte back, plus one.
-fn echo(program: &mut Asm) {
+pub fn echo(program: &mut Asm) {
     program.set(4, USART3);
     let top = program.here();
     program.wait_set(USART3, 1 << 5);
