@@ -5,6 +5,7 @@ mod core;
 mod costs;
 mod crystal;
 mod debug;
+mod echo;
 mod flash;
 mod measure;
 mod parts;

@@ -5,7 +5,8 @@ use sim::radio::{Byte, Mode, Packet, Parameters, Sender, timing};
 use sim::{Board, Bus, Config, Time};
 
 use super::asm::{Asm, When};
-use super::radio::{echo, ms, select_normal_mode, set_up};
+use super::echo::{echo, select_normal_mode, set_up};
+use super::radio::ms;
 use super::regs::*;
 use super::{board_with, findings};
 
