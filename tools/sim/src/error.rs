@@ -14,6 +14,8 @@ pub enum Error {
     Channel,
     /// The board has no slot at this port.
     Slot(u8),
+    /// The board has no LoRa module.
+    NoRadio,
     /// A value is out of this range.
     Range(&'static str),
 }
@@ -25,6 +27,7 @@ impl fmt::Display for Error {
             Self::Powered => f.write_str("this is only possible while the power is off"),
             Self::Channel => f.write_str("the plugged module has no such input on this channel"),
             Self::Slot(port) => write!(f, "the board has no slot at port {port}"),
+            Self::NoRadio => f.write_str("the board has no LoRa module"),
             Self::Range(text) => write!(f, "out of range: {text}"),
         }
     }

@@ -85,8 +85,13 @@ pub struct Options {
 
     /// Offer the RS-485 line in virtual time at HOST:PORT, by the exact-line protocol of docs/conformance.md. Time
     /// stands still between its requests, so the endpoints that follow the wall clock are not offered
-    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb"])]
+    #[arg(long, value_name = "ADDR", value_parser = address, conflicts_with_all = ["pty", "tcp", "modbus_tcp", "gdb", "lora"])]
     pub exact_line: Option<SocketAddr>,
+
+    /// Fit a LoRa module to every board, and make LINK a symlink to a second pseudo-terminal: the serial side, 9600 8N1,
+    /// of a gateway radio on the same air
+    #[arg(long, value_name = "LINK")]
+    pub lora: Option<PathBuf>,
 
     /// Rate and format of the line's client, such as 9600,7N2, whatever the unit does. Without this option the client
     /// has the rate and format of the unit, except 7N2: the unit's UART is set to 8N1 then
@@ -94,7 +99,8 @@ pub struct Options {
     pub line: Option<(u32, String)>,
 
     /// Let the line's client keep its own rate and format, as on a real bus: the rate that the master sets on the
-    /// pseudo-terminal, and the format that the unit has at the start
+    /// pseudo-terminal, and the format that the unit has at the start. Also let the gateway radio of --lora keep its
+    /// factory parameters
     #[arg(long, conflicts_with = "line")]
     pub fixed_line: bool,
 
@@ -130,8 +136,11 @@ impl Options {
     ///
     /// # Errors
     ///
-    /// In one line: the options to use on a system without pseudo-terminals.
+    /// In one line: the options to use on a system without pseudo-terminals, or two pseudo-terminals with the same link.
     pub fn check_line(&self) -> Result<(), String> {
+        if self.pty.is_some() && self.pty == self.lora {
+            return Err("--pty and --lora need different links".to_owned());
+        }
         if PTY {
             Ok(())
         } else {
@@ -140,6 +149,12 @@ impl Options {
     }
 
     fn reached_without_pty(&self) -> Result<(), String> {
+        if self.lora.is_some() {
+            return Err(
+                "the simulator has no pseudo-terminals on this system, so it has no --lora"
+                    .to_owned(),
+            );
+        }
         let ways = [("--tcp", self.tcp), ("--modbus-tcp", self.modbus_tcp)];
         let names = ways.map(|(name, _)| format!("{name} ADDR")).join(" or ");
         let offered = self.exact_line.is_some() || ways.iter().any(|(_, way)| way.is_some());
@@ -211,6 +226,7 @@ mod tests {
         assert_eq!((options.flash, options.gdb), (None, None));
         assert_eq!((options.modbus_tcp, options.record), (None, None));
         assert_eq!((options.exact_line, options.line), (None, None));
+        assert_eq!(options.lora, None);
         assert_eq!(options.run_for, None);
     }
 
@@ -237,6 +253,10 @@ mod tests {
                 "{text}"
             );
         }
+        let text = check(&["--lora", "x", "--tcp", "127.0.0.1:0"]).unwrap_err();
+        assert!(text.contains("no --lora"), "{text}");
+        let same = parse(&["--pty", "x", "--lora", "x"]).unwrap().check_line();
+        assert!(same.unwrap_err().contains("different links"));
         assert_eq!(parse(&[]).unwrap().check_line().is_ok(), PTY);
     }
 
@@ -319,6 +339,11 @@ mod tests {
                 &["--exact-line", "127.0.0.1:0", "--gdb", "127.0.0.1:0"][..],
                 "cannot be used with",
             ),
+            (
+                &["--exact-line", "127.0.0.1:0", "--lora", "x"][..],
+                "cannot be used with",
+            ),
+            (&["--lora"][..], "--lora <LINK>"),
             (&["--board", "modio-04"][..], "modio-02, modio-08"),
             (&["--slot", "4do"][..], "3=4do"),
             (&["--slot", "x=4do"][..], "3=4do"),

@@ -71,6 +71,24 @@ class Slot:
 
 
 @dataclass(frozen=True)
+class Radio:
+    """The LoRa module of a board."""
+
+    mode: Optional[str]
+    """"normal", "wake-up", "power-saving" or "sleep". None without power, during the start, and with a fault."""
+    aux: bool
+    """The pin AUX is high: the module is idle."""
+    address: int
+    channel_mhz: int
+    """Frequency of the channel in MHz, 410 to 441."""
+    air_rate: int
+    """Bit rate on the air, in bit/s."""
+    power_dbm: int
+    packets_sent: int
+    packets_received: int
+
+
+@dataclass(frozen=True)
 class State:
     """The state of a board."""
 
@@ -93,6 +111,8 @@ class State:
     """The last lines of the firmware's log."""
     slots: Tuple[Slot, ...] = ()
     """All slots of a board that has several; empty for a board with one."""
+    radio: Optional[Radio] = None
+    """The LoRa module; None if it is not fitted."""
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> State:
@@ -104,6 +124,7 @@ class State:
             "channels": channels(data),
             "log_tail": tuple(data["log_tail"]),
             "slots": tuple(Slot.from_json(slot) for slot in data.get("slots", ())),
+            "radio": taken(Radio, data["radio"]) if "radio" in data else None,
         })
 
     def slot(self, port: int) -> Slot:
@@ -178,11 +199,13 @@ class Lost:
 
 
 class Faults(TypedDict, total=False):
-    """Faults of the line, the board or the chip, set on purpose. A missing member does not change its fault."""
+    """Faults of the line, the air, the board or the chip, set on purpose. A missing member does not change its fault."""
 
     bit_error_rate: float
     drop_rate: float
     noise_hz: float
+    radio_loss: float
+    """Only if LoRa modules are fitted."""
     i2c_absent: bool
     hse_failed: bool
     hsi_percent: float

@@ -13,7 +13,7 @@ from typing import IO, Dict, List, Sequence, Union
 from .errors import StartError
 
 # Lines that announce an endpoint.
-_ENDPOINT = re.compile(r"(pty|tcp|modbus-tcp|exact-line|http|gdb): (\S+)")
+_ENDPOINT = re.compile(r"(pty|tcp|modbus-tcp|exact-line|http|gdb|lora): (\S+)")
 
 Argument = Union[str, "os.PathLike[str]"]
 

@@ -25,12 +25,14 @@ class Simulator(Board):
     def __init__(self, url: str, timeout: float = PATIENCE, process: Optional[Process] = None):
         super().__init__(Http(url, timeout), "/api")
         self._process = process
+        self._has_lora = False
 
     @classmethod
     def start(
         cls, *, program: Optional[Argument] = None, elf: Optional[Argument] = None, board: Optional[str] = None,
         dip: Optional[int] = None, module: Optional[str] = None, slots: Optional[Mapping[int, str]] = None,
         flash: Optional[Argument] = None, pty: Optional[Argument] = None, tcp: Optional[str] = None,
+        lora: Optional[Argument] = None,
         http: str = "127.0.0.1:0", options: Sequence[Argument] = (), timeout: float = PATIENCE,
     ) -> Simulator:
         """Starts a simulator and waits until it is ready. StartError, with its output, when it does not start.
@@ -42,7 +44,7 @@ class Simulator(Board):
         request that gets no answer in `timeout` seconds fails."""
         command: List[Argument] = [program or os.environ.get("MODIO_SIM") or "modio-sim"]
         given = {"elf": elf, "board": board, "dip": dip, "module": module, "flash": flash, "pty": pty, "tcp": tcp,
-                 "http": http}
+                 "lora": lora, "http": http}
         for name, value in given.items():
             if value is not None:
                 command += [f"--{name}", value if isinstance(value, os.PathLike) else str(value)]
@@ -50,10 +52,12 @@ class Simulator(Board):
             command += ["--slot", f"{port}={plugged}"]
         process = Process([*command, *options])
         try:
-            return cls(process.endpoint("http", timeout), timeout, process)
+            simulator = cls(process.endpoint("http", timeout), timeout, process)
         except BaseException:
             process.end(timeout)
             raise
+        simulator._has_lora = lora is not None
+        return simulator
 
     @classmethod
     def attach(cls, url: str = "http://127.0.0.1:8502", *, timeout: float = PATIENCE) -> Simulator:
@@ -72,6 +76,12 @@ class Simulator(Board):
         """The pseudo-terminal of the line, which a Modbus master opens as a serial port. None when there is none, or
         when this simulator was attached to."""
         return self.endpoint("pty") if self._process and self._process.has("pty") else None
+
+    @property
+    def lora(self) -> Optional[str]:
+        """The pseudo-terminal of the gateway radio. None when `start` was called without
+        `lora`."""
+        return self.endpoint("lora") if self._has_lora else None
 
     def endpoint(self, name: str) -> str:
         """Returns the address of an endpoint that was requested at the start, such as "tcp" or "gdb", as

@@ -115,7 +115,7 @@ class Types(unittest.TestCase):
             members = {name for kind in kinds for name in kind["properties"]}
             fields = typing.get_type_hints(of).keys()
             self.assertEqual(members - fields, set(), f"{of.__name__} does not have these fields")
-        for name, of in (("leds", modio_sim.Leds), ("line", modio_sim.Line)):
+        for name, of in (("leds", modio_sim.Leds), ("line", modio_sim.Line), ("radio", modio_sim.Radio)):
             members = schemas["State"]["properties"][name]["properties"].keys()
             self.assertEqual(members, {field.name for field in dataclasses.fields(of)})
         self.assertGreaterEqual(seen, {"State", "Slot", "Channel", "Frame", "Finding", "Board"})
@@ -124,6 +124,7 @@ class Types(unittest.TestCase):
         state = modio_sim.State.from_json({**STATE, "temperature": 300})
         self.assertEqual(state.virtual_ms, 1)
         self.assertEqual(state.slot(1).module, "4di")
+        self.assertIsNone(state.radio)
         with self.assertRaises(KeyError):
             state.slot(5)
 

@@ -130,6 +130,23 @@ class Start(unittest.TestCase):
             with self.assertRaises(modio_sim.UnreachableError):
                 simulator.state()
 
+    def test_radio_has_its_terminal_and_its_state(self):
+        with tempfile.TemporaryDirectory() as directory:
+            link = pathlib.Path(directory, "radio")
+            with started(lora=link) as simulator:
+                self.assertTrue(os.path.samefile(link, simulator.lora))
+                radio = simulator.state().radio
+                self.assertIn(radio.channel_mhz, range(410, 442))
+                self.assertGreaterEqual(radio.air_rate, 300)
+                self.assertEqual(simulator.set_faults({"radio_loss": 0.5})["radio_loss"], 0.5)
+            self.assertFalse(link.is_symlink())
+        with started() as simulator:
+            self.assertEqual((simulator.lora, simulator.state().radio), (None, None))
+            self.assertNotIn("radio_loss", simulator.faults())
+            with self.assertRaises(modio_sim.RefusedError) as refused:
+                simulator.set_faults({"radio_loss": 0.5})
+            self.assertIn("no LoRa module", str(refused.exception))
+
     def test_start_error_has_the_message_of_the_simulator(self):
         with self.assertRaises(modio_sim.StartError) as failed:
             started(module="8di")

@@ -12,7 +12,7 @@
 //! | `POST /api/power` | `{"on":bool}` or `{"cycle":true}` |
 //! | `POST /api/module` | `{"name":...}`: plugs a module, with the power off |
 //! | `GET /api/faults` | the faults in force |
-//! | `POST /api/faults` | causes or clears faults: any of `bit_error_rate`, `drop_rate`, `noise_hz`, `i2c_absent`, `hse_failed`, `hsi_percent`, `lsi_khz` |
+//! | `POST /api/faults` | causes or clears faults: any of `bit_error_rate`, `drop_rate`, `noise_hz`, `radio_loss`, `i2c_absent`, `hse_failed`, `hsi_percent`, `lsi_khz` |
 //! | `POST /api/slots/PORT/...` | `channels/N` or `module` of the slot at PORT; without it, of the first slot |
 //!
 //! Every path also exists as `/api/boards/NAME/...`; without `boards/NAME` it means the first board. The reply to a
@@ -61,7 +61,7 @@ impl Reply {
 impl From<Error> for Reply {
     fn from(error: Error) -> Self {
         let status = match error {
-            Error::Powered | Error::Channel => 409,
+            Error::Powered | Error::Channel | Error::NoRadio => 409,
             Error::Slot(_) => 404,
             _ => 400,
         };

@@ -140,9 +140,12 @@ impl Bench {
         Ok(())
     }
 
-    /// Applies faults: those of the line, and those of the part on board `n`. The values must have passed
+    /// Applies faults: those of the line and the air, and those of the part on board `n`. The values must have passed
     /// [`Faults::check`].
     fn make(&mut self, faults: &Faults, n: usize) -> Result<(), Error> {
+        if let Some(loss) = faults.radio_loss {
+            self.bus.air().ok_or(Error::NoRadio)?.set_loss(loss);
+        }
         self.disturbance
             .change(faults.bit_error_rate, faults.noise_hz, faults.drop_rate);
         let board = self.bus.board_mut(n);

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use register_map::configuration;
 use sim::board::Layout;
+use sim::radio::Parameters;
 use sim::{Board, Config, Image};
 use sim_options::{Fitting, Options};
 
@@ -70,6 +71,7 @@ fn config(
         dip: fitting.dip,
         module: fitting.module,
         slots: fitting.slots.clone(),
+        radio: options.lora.as_ref().map(|_| Parameters::FACTORY),
         corner: options.corner.parse()?,
         ..Config::default()
     };

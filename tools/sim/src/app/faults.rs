@@ -1,4 +1,4 @@
-//! Deliberate faults of the line and of a board, as in `POST /api/faults` and in scenarios.
+//! Deliberate faults of the line, of the air and of a board, as in `POST /api/faults` and in scenarios.
 
 use serde::Deserialize;
 
@@ -15,6 +15,8 @@ pub struct Faults {
     pub drop_rate: Option<f64>,
     /// Mean number of noise pulses per second, 0 to 10,000.
     pub noise_hz: Option<f64>,
+    /// Share of packets that a LoRa radio loses, 0 to 1.
+    pub radio_loss: Option<f64>,
     /// The DACs of the plugged modules do not answer.
     pub i2c_absent: Option<bool>,
     /// The crystal does not work.
@@ -41,6 +43,7 @@ impl Faults {
             ("bit_error_rate", self.bit_error_rate, 0.0, 0.5),
             ("drop_rate", self.drop_rate, 0.0, 1.0),
             ("noise_hz", self.noise_hz, 0.0, 10_000.0),
+            ("radio_loss", self.radio_loss, 0.0, 1.0),
             ("hsi_percent", self.hsi_percent, -20.0, 20.0),
             ("lsi_khz", self.lsi_khz, 15.0, 90.0),
         ] {

@@ -2,7 +2,7 @@
 //! with `--exact-line` the requests of a client.
 //!
 //! ```text
-//! pty, TCP ──bytes──┐                     ┌──> bytes to pty and TCP
+//! ptys, TCP ─bytes──┐                     ┌──> bytes to ptys and TCP
 //! exact line ───────┤                     ├──> bytes and times to the exact line
 //! HTTP ───request───┼─> one queue ─> run ─┼──> reply to HTTP, events to its listeners
 //! Modbus TCP ───────┤                     ├──> responses to Modbus TCP
@@ -40,6 +40,7 @@ mod live;
 mod pace;
 #[cfg_attr(not(all(unix, not(target_os = "macos"))), path = "no_pty.rs")]
 mod pty;
+mod radio;
 mod run;
 mod scenario;
 mod state;
@@ -55,10 +56,16 @@ pub use inside::version;
 /// the line is over, so the unit answers.
 const START_UP: Time = Time::from_ms(100);
 
+/// Most virtual time, from power-on, that the simulator waits for the first board's LoRa module to enter normal mode,
+/// before the endpoints are printed.
+const RADIO_START_UP: Time = Time::from_secs(3);
+
 /// An event that wakes the thread of the boards.
 enum Event {
     /// Bytes from a master, to be sent on the line.
     Bytes(Vec<u8>),
+    /// Bytes from a master, for the gateway radio.
+    Radio(Vec<u8>),
     /// A request to the HTTP interface, and the receiver of its reply.
     Request(api::Request, tokio::sync::oneshot::Sender<api::Reply>),
     /// From the debugger.
@@ -86,6 +93,9 @@ pub fn run(options: &Options) -> Result<(), String> {
             format,
         });
     }
+    if options.fixed_line {
+        bench.fix_gateway();
+    }
     if let Some(path) = &options.scenario {
         bench.scenario = scenario::Scenario::read(path, &bench.known())?;
     }
@@ -99,7 +109,12 @@ pub fn run(options: &Options) -> Result<(), String> {
     let mut endpoints = match options.exact_line {
         Some(address) => run::Endpoints::Exact(exact_line::listen(address, events.clone())?),
         None => run::Endpoints::Clock {
-            pty: pty::Pty::open(options.pty.as_deref(), events.clone())?,
+            pty: pty::Pty::open(options.pty.as_deref(), events.clone(), Event::Bytes)?,
+            lora: options
+                .lora
+                .as_deref()
+                .map(|link| pty::Pty::open(Some(link), events.clone(), Event::Radio))
+                .transpose()?,
             tcp: options
                 .tcp
                 .map(|address| tcp::Tcp::listen(address, events.clone()))
@@ -118,13 +133,14 @@ pub fn run(options: &Options) -> Result<(), String> {
     let mut attached = attached::Attached::new(options, events)?;
 
     bench.run_until(START_UP);
+    bench.start_radio(RADIO_START_UP);
     match &mut endpoints {
         run::Endpoints::Exact(address) => {
             // The line has taken over the unit's rate and format by now. From here on only the client changes them.
             bench.bus.line().set_follow(false);
             bench::say(&format!("exact-line: {address}"));
         }
-        run::Endpoints::Clock { pty, tcp } => {
+        run::Endpoints::Clock { pty, tcp, .. } => {
             if options.fixed_line {
                 let settings = bench.bus.line().settings();
                 bench.fix_line(settings);
@@ -144,6 +160,9 @@ pub fn run(options: &Options) -> Result<(), String> {
     bench::say(&format!("http: http://{http}/"));
     if let Some(gdb) = gdb {
         bench::say(&format!("gdb: {gdb}"));
+    }
+    if let Some(path) = endpoints.lora() {
+        bench::say(&format!("lora: {}", path.display()));
     }
 
     run::until_stopped(

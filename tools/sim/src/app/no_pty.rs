@@ -9,13 +9,17 @@ use super::Event;
 pub struct Pty;
 
 impl Pty {
-    /// Opens nothing. The options have refused `--pty` before.
+    /// Opens nothing. The options have refused `--pty` and `--lora` before.
     ///
     /// # Errors
     ///
     /// Never.
     #[allow(clippy::unnecessary_wraps, reason = "opening a real terminal may fail")]
-    pub fn open(_: Option<&Path>, _: Sender<Event>) -> Result<Self, String> {
+    pub fn open(
+        _: Option<&Path>,
+        _: Sender<Event>,
+        _: fn(Vec<u8>) -> Event,
+    ) -> Result<Self, String> {
         Ok(Self)
     }
 

@@ -1,4 +1,4 @@
-//! The RS-485 line on a pseudo-terminal, which a Modbus master opens like a serial port.
+//! The RS-485 line, or the gateway radio, on a pseudo-terminal, which a Modbus master opens like a serial port.
 //!
 //! The terminal is raw. Bytes are sent on the line at the unit's rate, or with `--fixed-line` at the rate that the
 //! master sets. A pseudo-terminal stores neither the parity nor the length of characters, so the master cannot set the
@@ -34,12 +34,16 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// Makes a terminal, and `link` a symlink to it. The bytes that a master writes are sent as events.
+    /// Makes a terminal, and `link` a symlink to it. `event` makes an event of the bytes that a master writes.
     ///
     /// # Errors
     ///
     /// In one line: the system cannot make a terminal, or another file exists at `link`.
-    pub fn open(link: Option<&Path>, events: Sender<Event>) -> Result<Self, String> {
+    pub fn open(
+        link: Option<&Path>,
+        events: Sender<Event>,
+        event: fn(Vec<u8>) -> Event,
+    ) -> Result<Self, String> {
         let (master, path) =
             raw_terminal().map_err(|error| format!("cannot make a pseudo-terminal: {error}"))?;
         let master = Arc::new(master);
@@ -52,7 +56,7 @@ impl Pty {
             })?;
         }
         let listening = Arc::clone(&master);
-        thread::spawn(move || listen(&listening, &events));
+        thread::spawn(move || listen(&listening, &events, event));
         Ok(Self {
             master,
             path,
@@ -156,19 +160,13 @@ fn state(terminal: &OwnedFd, wanted: PollFlags, wait: Option<Duration>) -> PollF
     }
 }
 
-fn listen(terminal: &OwnedFd, events: &Sender<Event>) {
+fn listen(terminal: &OwnedFd, events: &Sender<Event>, event: fn(Vec<u8>) -> Event) {
     let mut buffer = [0; 4096];
     loop {
         let state = state(terminal, PollFlags::IN, None);
         if state.contains(PollFlags::IN) {
             match rustix::io::read(terminal, &mut buffer) {
-                Ok(length)
-                    if events
-                        .send(Event::Bytes(buffer[..length].to_vec()))
-                        .is_err() =>
-                {
-                    return;
-                }
+                Ok(length) if events.send(event(buffer[..length].to_vec())).is_err() => return,
                 // Reading fails when the master has just closed the terminal. It may open the terminal again.
                 Ok(_) | Err(_) => {}
             }

@@ -42,7 +42,7 @@ fn is_open(pty: &Pty) -> bool {
 #[test]
 fn every_byte_value_passes_unchanged_in_both_directions() {
     let (events, queue) = mpsc::channel();
-    let pty = Pty::open(None, events).unwrap();
+    let pty = Pty::open(None, events, Event::Bytes).unwrap();
     let mut master = open(pty.path().unwrap());
     let all: Vec<u8> = (0..=255).collect();
     master.write_all(&all).unwrap();
@@ -56,7 +56,7 @@ fn every_byte_value_passes_unchanged_in_both_directions() {
 #[test]
 fn next_master_can_open_the_terminal_and_receives_no_old_bytes() {
     let (events, queue) = mpsc::channel();
-    let pty = Pty::open(None, events).unwrap();
+    let pty = Pty::open(None, events, Event::Bytes).unwrap();
     for round in 0..3_u8 {
         let mut master = open(pty.path().unwrap());
         master.write_all(&[round, 0x0A, 0x0D, 0x03]).unwrap();
@@ -74,7 +74,7 @@ fn next_master_can_open_the_terminal_and_receives_no_old_bytes() {
 #[test]
 fn writing_does_not_wait_for_a_master_that_does_not_read() {
     let (events, _queue) = mpsc::channel();
-    let pty = Pty::open(None, events).unwrap();
+    let pty = Pty::open(None, events, Event::Bytes).unwrap();
     let _master = open(pty.path().unwrap());
     for _ in 0..1000 {
         pty.write(&[0x55; 256]);
@@ -85,9 +85,9 @@ fn writing_does_not_wait_for_a_master_that_does_not_read() {
 fn symlink_exists_as_long_as_its_terminal() {
     let directory = tempfile::tempdir().unwrap();
     let link = directory.path().join("line");
-    let pty = Pty::open(Some(&link), mpsc::channel().0).unwrap();
+    let pty = Pty::open(Some(&link), mpsc::channel().0, Event::Bytes).unwrap();
     assert_eq!(fs::read_link(&link).unwrap(), pty.path().unwrap());
-    let newer = Pty::open(Some(&link), mpsc::channel().0).unwrap();
+    let newer = Pty::open(Some(&link), mpsc::channel().0, Event::Bytes).unwrap();
     drop(pty);
     assert_eq!(
         fs::read_link(&link).unwrap(),
@@ -103,19 +103,21 @@ fn file_or_foreign_symlink_at_the_path_is_not_replaced() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("line");
     fs::write(&file, "precious").unwrap();
-    let text = Pty::open(Some(&file), mpsc::channel().0).err().unwrap();
+    let text = Pty::open(Some(&file), mpsc::channel().0, Event::Bytes)
+        .err()
+        .unwrap();
     assert!(text.contains("line") && !text.contains('\n'), "{text}");
     assert_eq!(fs::read_to_string(&file).unwrap(), "precious");
 
     let link = directory.path().join("link");
     std::os::unix::fs::symlink(&file, &link).unwrap();
-    assert!(Pty::open(Some(&link), mpsc::channel().0).is_err());
+    assert!(Pty::open(Some(&link), mpsc::channel().0, Event::Bytes).is_err());
     assert_eq!(fs::read_link(&link).unwrap(), file);
 }
 
 #[test]
 fn rate_of_the_master_is_returned_only_after_keep_own_rate() {
-    let mut pty = Pty::open(None, mpsc::channel().0).unwrap();
+    let mut pty = Pty::open(None, mpsc::channel().0, Event::Bytes).unwrap();
     let master = open(pty.path().unwrap());
     let set = |baud| {
         let mut settings = tcgetattr(&master).unwrap();

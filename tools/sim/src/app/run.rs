@@ -2,6 +2,7 @@
 //! endpoints.
 
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -33,9 +34,21 @@ pub enum Endpoints {
         pty: pty::Pty,
         /// The TCP socket, with `--tcp`.
         tcp: Option<tcp::Tcp>,
+        /// The pseudo-terminal of the gateway radio, with `--lora`.
+        lora: Option<pty::Pty>,
     },
     /// The exact line at this address: virtual time passes when its client asks for it.
     Exact(SocketAddr),
+}
+
+impl Endpoints {
+    /// The pseudo-terminal of the gateway radio.
+    pub fn lora(&self) -> Option<&Path> {
+        match self {
+            Self::Clock { lora, .. } => lora.as_ref()?.path(),
+            Self::Exact(_) => None,
+        }
+    }
 }
 
 /// Runs until [`Event::Stop`], or for `limit` by the wall clock, and keeps the flash files up to date.
@@ -69,7 +82,7 @@ pub fn until_stopped(
         } else {
             IDLE
         };
-        if let Endpoints::Clock { pty, tcp } = endpoints {
+        if let Endpoints::Clock { pty, tcp, lora } = endpoints {
             if let Some(baud) = pty.take_rate() {
                 bench.set_client_rate(baud);
             }
@@ -77,6 +90,12 @@ pub fn until_stopped(
             if !bytes.is_empty() {
                 pty.write(&bytes);
                 tcp.iter().for_each(|tcp| tcp.write(&bytes));
+            }
+            if let Some(lora) = lora {
+                let bytes = bench.take_received_by_radio();
+                if !bytes.is_empty() {
+                    lora.write(&bytes);
+                }
             }
             wait = SLICE.saturating_sub(wall.elapsed());
         }
@@ -91,6 +110,10 @@ pub fn until_stopped(
             Ok(Event::Bytes(bytes)) => {
                 clock.catch_up(bench);
                 bench.send(&bytes);
+            }
+            Ok(Event::Radio(bytes)) => {
+                clock.catch_up(bench);
+                bench.send_by_radio(&bytes);
             }
             Ok(Event::Gateway(message)) => {
                 if let Some(gateway) = &mut attached.gateway {

@@ -1,7 +1,8 @@
-//! The visible state of a board as JSON: LEDs, channels, line, log.
+//! The visible state of a board as JSON: LEDs, channels, line, log, radio.
 
 use serde_json::{Value, json};
 use sim::Channel;
+use sim::radio::{Mode, Module};
 use sim::slot::Slot;
 
 use super::bench::Bench;
@@ -37,17 +38,21 @@ pub fn json(bench: &mut Bench, n: usize) -> Value {
             .map(|(port, slot)| one_slot(port, slot))
             .collect();
     }
+    if let Some(module) = board.radio() {
+        state["radio"] = radio(module);
+    }
     state
 }
 
-/// The body of `GET /api/faults`: the faults in force on the line and on board `n`.
-pub fn faults(bench: &Bench, n: usize) -> Value {
+/// The body of `GET /api/faults`: the faults in force on the line, in the air, and on board `n`.
+pub fn faults(bench: &mut Bench, n: usize) -> Value {
+    let loss = bench.bus.air().map(|air| air.loss());
     let line = &bench.disturbance;
     let board = bench.bus.board(n);
     let (hsi, lsi) = board.rc_oscillators();
     // Round, because the oscillators are set in whole hertz.
     let rounded = |value: f64| (value * 1000.0).round() / 1000.0;
-    json!({
+    let mut faults = json!({
         "bit_error_rate": line.bit_error_rate(),
         "drop_rate": line.drop_rate(),
         "noise_hz": line.noise_hz(),
@@ -55,6 +60,25 @@ pub fn faults(bench: &Bench, n: usize) -> Value {
         "hse_failed": !board.crystal(),
         "hsi_percent": rounded((f64::from(hsi) / HSI_HZ - 1.0) * 100.0),
         "lsi_khz": rounded(f64::from(lsi) / 1000.0),
+    });
+    if let Some(loss) = loss {
+        faults["radio_loss"] = loss.into();
+    }
+    faults
+}
+
+/// The LoRa module of a board.
+fn radio(module: &Module) -> Value {
+    let parameters = module.parameters();
+    json!({
+        "mode": module.mode().map(Mode::name),
+        "aux": module.aux(),
+        "address": parameters.address(),
+        "channel_mhz": parameters.frequency_mhz(),
+        "air_rate": parameters.air_rate(),
+        "power_dbm": parameters.power_dbm(),
+        "packets_sent": module.packets_sent(),
+        "packets_received": module.packets_received(),
     })
 }
 

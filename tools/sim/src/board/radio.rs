@@ -43,6 +43,13 @@ impl Radio {
         }
     }
 
+    /// Makes the module that of board `n` on a bus with several boards. The air belongs to the bus from now on.
+    pub(crate) fn join(&mut self, n: u16) {
+        self.module.sender = Sender::Board(n);
+        self.air = None;
+        self.module.take_news();
+    }
+
     /// Drives the pins of the module, except RXD and TXD.
     pub(super) fn drive(&self, at: &RadioPins, pins: &mut Pins) {
         // The module has weak pull-ups at its inputs.

@@ -11,7 +11,11 @@
 //! that sleeps does nothing until its next event, so its board stays behind until then, or until the run ends. All
 //! edges of a character are known when it begins.
 //!
-//! This is exact, with two exceptions:
+//! The LoRa modules of the boards and the gateway radio share the air. A receiver checks a packet some time after its
+//! end, and by then every module has passed the end of the packet. So a board with a module may be ahead of the others by
+//! that time, and the air is exact without any exception.
+//!
+//! The line is exact, with two exceptions:
 //!
 //! - Stopping a core in the middle of its work costs much more than letting it run until it sleeps. So a board may
 //!   already be past the start of a character when it gets the edge: by half a bit and at most [`LATEST`], plus the
@@ -22,13 +26,18 @@
 //!   does so between two ticks. Another board may then be past this instant by up to one bit of that unit, or by
 //!   [`FARTHEST`] while the transmitter of that unit is off, and gets the edge late.
 
+mod air;
+mod plan;
+
 use rayon::prelude::*;
 
 use crate::board::Board;
 use crate::chip::CYCLE;
 use crate::line::{Line, Output, Settings};
 use crate::machine::Limit;
+use crate::radio::Air;
 use crate::time::Time;
+use plan::{Horizon, Plan};
 
 /// Most time by which other boards run ahead of a unit whose transmitter is off. Such a transmitter sends an idle frame
 /// before its first character, and the idle frame takes longer at every rate of a line.
@@ -39,62 +48,6 @@ pub const LATEST: Time = Time::from_us(20);
 
 /// Longest time between two updates of the bus itself.
 const RECORDED: Time = Time::from_ms(10);
-
-/// The next actions of a board, as far as they are known.
-#[derive(Clone, Copy, Debug)]
-struct Plan {
-    /// The core executes nothing before this instant.
-    awake: Time,
-    /// The unit begins no character before this instant.
-    start: Time,
-    /// The other boards may run up to this instant: half a bit after `start`, at most [`LATEST`] after it.
-    bound: Time,
-}
-
-/// The instants up to which boards can run before they exchange their characters.
-#[derive(Clone, Copy, Debug)]
-struct Horizon {
-    /// The board with the least bound. It runs up to `next`, all other boards run up to `least`.
-    first: usize,
-    least: Time,
-    next: Time,
-}
-
-impl Horizon {
-    /// The horizon of boards with these plans. `None` if all boards sleep until `t`, the end of the run.
-    fn of(plans: &[Plan], t: Time) -> Option<Self> {
-        let awake = plans.iter().map(|plan| plan.awake).min()?;
-        if awake >= t {
-            return None;
-        }
-        let mut horizon = Self {
-            first: 0,
-            least: t,
-            next: t,
-        };
-        for (n, plan) in plans.iter().enumerate() {
-            if plan.bound < horizon.least {
-                horizon.next = horizon.least;
-                (horizon.first, horizon.least) = (n, plan.bound);
-            } else {
-                horizon.next = horizon.next.min(plan.bound);
-            }
-        }
-        // Let the first board that is awake execute at least one instruction.
-        horizon.least = horizon.least.max(awake + Time::from_ps(1));
-        horizon.next = horizon.next.max(horizon.least);
-        Some(horizon)
-    }
-
-    /// Instant up to which board `n` runs.
-    fn of_board(self, n: usize) -> Time {
-        if n == self.first {
-            self.next
-        } else {
-            self.least
-        }
-    }
-}
 
 /// Boards on one RS-485 line.
 ///
@@ -112,6 +65,8 @@ pub struct Bus {
     line: Line,
     /// [`Line::version`] of the bus that the boards have taken over.
     version: u64,
+    /// The air, if a board has a LoRa module; not used with one board.
+    air: Option<Air>,
 }
 
 impl Bus {
@@ -124,10 +79,12 @@ impl Bus {
     pub fn new(mut boards: Vec<Board>) -> Self {
         let now = boards.iter().map(Board::now).min();
         let now = now.expect("a bus has at least one board");
+        let mut air = None;
         if boards.len() > 1 {
             for board in &mut boards {
                 board.line().become_end();
             }
+            air = Air::of_boards(&mut boards, now);
         }
         Self {
             plans: boards.iter().map(Board::plan).collect(),
@@ -136,6 +93,7 @@ impl Bus {
             line: Line::of_bus(now),
             // No version of the line is equal to this, so the boards take over the first one.
             version: u64::MAX,
+            air,
         }
     }
 
@@ -188,14 +146,16 @@ impl Bus {
         self.apply_changes();
         // Run on a thread of the pool, where distributing work is cheap.
         rayon::scope(|_| {
-            while let Some(horizon) = Horizon::of(&self.plans, t) {
+            while let Some(horizon) = self.horizon(t) {
                 self.run_boards(|n, plan| {
                     let to = horizon.of_board(n);
                     (plan.awake < to).then_some(to)
                 });
+                self.run_air(horizon.of_board(self.boards.len()));
                 self.record(t);
             }
             self.run_boards(|_, _| Some(t));
+            self.run_air(t);
         });
         self.record_until(t);
     }
@@ -228,7 +188,13 @@ impl Bus {
         }
     }
 
-    /// Takes over the changes that were made to the boards and to the line since the last run.
+    /// How far the boards, and the gateway after them, can run towards `t`. `None` if all of them sleep until `t`.
+    fn horizon(&self, t: Time) -> Option<Horizon> {
+        let gateway = self.air.as_ref().map(Air::plan);
+        Horizon::of(self.plans.iter().copied().chain(gateway), t)
+    }
+
+    /// Takes over the changes that were made to the boards, the line and the air since the last run.
     fn apply_changes(&mut self) {
         for n in 0..self.boards.len() {
             if core::mem::take(&mut self.lent[n]) {
@@ -245,6 +211,7 @@ impl Bus {
             }
             self.plans = self.boards.iter().map(Board::plan).collect();
         }
+        self.pass_on_air();
     }
 
     /// Runs each board to the instant that `to` returns, or not at all with `None`, and passes on its output.
@@ -285,8 +252,9 @@ impl Bus {
         self.line.pass(known, settings);
     }
 
-    /// Passes the output of unit `n` on to the bus and to all other boards.
+    /// Passes the output of unit `n` on to the bus and to all other boards, and its packets on to the air.
     fn pass_on(&mut self, n: usize) {
+        self.pass_on_news(n);
         let Some(output) = self.boards[n].take_output() else {
             return;
         };
@@ -336,25 +304,6 @@ impl Board {
                 pc: None,
                 breakpoints: false,
             });
-        }
-    }
-
-    /// The next actions of the board.
-    fn plan(&self) -> Plan {
-        let awake = self.machine.next_instruction();
-        let usart = self.machine.bus.soc.usart1();
-        let start = match usart.earliest_start(awake) {
-            _ if awake == Time::MAX => awake,
-            Some(start) => start,
-            None => awake + FARTHEST,
-        };
-        let late = usart
-            .bit()
-            .map_or(Time::ZERO, |bit| Time::from_ps(bit.as_ps() / 2).min(LATEST));
-        Plan {
-            awake,
-            start,
-            bound: start + late,
         }
     }
 

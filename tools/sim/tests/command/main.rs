@@ -4,6 +4,7 @@
 mod exact_line;
 mod gateway;
 mod gdb;
+mod radio;
 mod record;
 mod running;
 mod several;

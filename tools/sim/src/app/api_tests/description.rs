@@ -1,5 +1,7 @@
 //! Compares the OpenAPI description with the code.
 
+use sim::radio::Parameters;
+
 use super::*;
 
 #[test]
@@ -47,6 +49,7 @@ fn description_has_every_path_and_no_other() {
 fn replies_have_the_described_entries() {
     let mut bench = bench_of(Config {
         layout: &board::MODIO_08,
+        radio: Some(Parameters::FACTORY),
         ..Config::default()
     });
     let schemas = get(&mut bench, "/api/openapi.json").body["components"]["schemas"].take();

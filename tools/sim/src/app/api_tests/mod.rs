@@ -2,6 +2,7 @@
 
 mod boards;
 mod description;
+mod radio;
 
 use serde_json::{Value, json};
 

@@ -46,6 +46,8 @@ export function show(state) {
   setText(byId("line-requests"), String(state.line.rx_frames));
   setText(byId("line-replies"), String(state.line.tx_frames));
   slotsOf(state).forEach((slot, n) => showSlot(slot, n, state.powered));
+  byId("radio").hidden = !state.radio;
+  if (state.radio) showRadio(state.radio);
   const log = byId("log");
   const text = state.log_tail.join("\n");
   if (log.textContent !== text) {
@@ -102,6 +104,18 @@ function buildSlot(slot, n) {
     element("div", { class: "channels" }, ...made.filter(Boolean)),
     element("ol", { class: "terminals", "aria-label": `Screw terminals of ${title}` },
       ...module.terminals.map((label) => element("li", {}, element("span", {}, label)))));
+}
+
+/** Shows the LoRa module. */
+function showRadio(radio) {
+  setText(byId("radio-mode"), radio.mode ?? "off or starting");
+  setText(byId("radio-aux"), radio.aux ? "high, idle" : "low, busy");
+  setText(byId("radio-channel"), `${radio.channel_mhz} MHz`);
+  setText(byId("radio-address"), String(radio.address));
+  setText(byId("radio-rate"), `${radio.air_rate / 1000} kbit/s`);
+  setText(byId("radio-power"), `${radio.power_dbm} dBm`);
+  setText(byId("radio-sent"), `${radio.packets_sent} packets`);
+  setText(byId("radio-received"), `${radio.packets_received} packets`);
 }
 
 function showSlot(slot, n, powered) {

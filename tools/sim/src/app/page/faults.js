@@ -7,6 +7,7 @@ const LABELS = {
   bit_error_rate: "Bit errors, share of bits",
   drop_rate: "Lost bytes, share of bytes",
   noise_hz: "Noise on the line, pulses per second",
+  radio_loss: "Lost radio packets, share of packets",
   i2c_absent: "DAC does not answer on I2C",
   hse_failed: "Crystal has failed",
   hsi_percent: "HSI deviation from 8 MHz, percent",

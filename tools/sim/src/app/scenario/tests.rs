@@ -1,11 +1,12 @@
 //! Tests of scenarios on boards whose firmware does nothing.
 
 use register_map::Module;
+use sim::radio::Parameters;
 use sim::{Channel, Config};
 
 use super::*;
 use crate::app::bench::Bench;
-use crate::app::testing::{bench, bench_of_boards};
+use crate::app::testing::{bench, bench_of, bench_of_boards};
 
 fn play(bench: &mut Bench, text: &str) {
     bench.scenario = Scenario::parse(text, &bench.known()).unwrap();
@@ -133,6 +134,28 @@ fn steps_with_a_board_name_change_that_board_only() {
 }
 
 #[test]
+fn step_sets_the_loss_of_radio_packets() {
+    let mut bench = bench_of(Config {
+        radio: Some(Parameters::FACTORY),
+        ..Config::default()
+    });
+    play(
+        &mut bench,
+        r#"
+        [[step]]
+        at = "10ms"
+        faults = { radio_loss = 0.5 }
+        "#,
+    );
+    let mut seen = Vec::new();
+    for ms in [9, 11] {
+        bench.run_until(Time::from_ms(ms));
+        seen.extend(bench.bus.air().map(|air| air.loss()));
+    }
+    assert_eq!(seen, [0.0, 0.5]);
+}
+
+#[test]
 fn scenario_error_is_one_line_that_names_the_line_or_the_step() {
     let bench = bench(Module::Di4);
     for (text, part) in [
@@ -174,6 +197,10 @@ fn scenario_error_is_one_line_that_names_the_line_or_the_step() {
         (
             "[[step]]\nat = '1s'\nfaults = { drop_rate = 2.0 }",
             "from 0 to 1",
+        ),
+        (
+            "[[step]]\nat = '1s'\nfaults = { radio_loss = 2.0 }",
+            "`radio_loss` must be",
         ),
         ("[[step]]\nat = '1s'\nfaults = { smoke = true }", "line 3"),
         ("repeat = '1s'\n[[step]]\nat = '2s'\ndip = 1", "`repeat`"),

@@ -27,7 +27,7 @@ pub enum Fault {
 /// A module. [`Air`](super::Air) has the gateway's; a board has its own ([`Board::radio`](crate::Board::radio)).
 #[derive(Clone, Debug)]
 pub struct Module {
-    pub(super) sender: Sender,
+    pub(crate) sender: Sender,
     powered: bool,
     fault: Fault,
     /// End of the start or the reconfiguration; `None` if the module works.

@@ -1,0 +1,142 @@
+//! `--lora`: the gateway radio on a pseudo-terminal of its own.
+
+use std::fs::{self, OpenOptions};
+use std::io::{Read, Write};
+use std::path::Path;
+
+use crate::running::*;
+
+#[allow(dead_code, reason = "the tests of the core use all of the assembler")]
+#[path = "../machine/asm.rs"]
+mod asm;
+#[path = "../machine/echo.rs"]
+mod echo;
+#[allow(dead_code, reason = "the tests of the core use all of the registers")]
+#[path = "../machine/regs.rs"]
+mod regs;
+
+/// Writes an ELF file whose firmware sends each byte from the air back, plus one.
+fn echoing(directory: &Path) -> String {
+    let mut program = echo::set_up();
+    echo::select_normal_mode(&mut program);
+    echo::echo(&mut program);
+    let bytes = program.bytes();
+    let halves = bytes
+        .chunks(2)
+        .map(|half| u16::from_le_bytes([half[0], half[1]]));
+    let elf = elf(directory, &halves.collect::<Vec<_>>());
+    elf.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn lora_excludes_the_exact_line_and_needs_a_link() {
+    let exact = ["--exact-line", "127.0.0.1:0", "--lora", "radio"];
+    refused(&exact, &["--exact-line", "--lora", "cannot be used with"]);
+    refused(&["--lora"], &["--lora <LINK>"]);
+}
+
+#[test]
+fn lora_is_refused_without_pseudo_terminals() {
+    if sim_options::PTY {
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let elf = echoing(directory.path());
+    refused(&["--elf", &elf, "--lora", "radio"], &["no --lora"]);
+}
+
+#[test]
+fn file_at_the_path_of_the_link_is_not_replaced() {
+    if !sim_options::PTY {
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let elf = echoing(directory.path());
+    let arguments = ["--elf", &elf, "--http", "127.0.0.1:0", "--lora", &elf];
+    refused(&arguments, &[&elf, "symlink"]);
+}
+
+#[test]
+fn gateway_is_the_last_endpoint_and_its_link_is_removed_at_the_end() {
+    if !sim_options::PTY {
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let elf = echoing(directory.path());
+    let link = directory.path().join("radio");
+    let first = ["--elf", &elf, "--http", "127.0.0.1:0"];
+    let more = ["--gdb", "127.0.0.1:0", "--lora", link.to_str().unwrap()];
+    let mut running = Running::start(&[first, more].concat());
+    let line = running.line();
+    running.endpoint("http: http://");
+    running.endpoint("gdb: ");
+    let path = running.endpoint("lora: ");
+    assert_ne!(path, line);
+    assert_eq!(fs::read_link(&link).unwrap(), Path::new(&path));
+    running.signal("-TERM");
+    assert_eq!(running.end(), (Some(0), String::new()));
+    assert!(
+        fs::symlink_metadata(&link).is_err(),
+        "the link still exists"
+    );
+}
+
+#[test]
+fn bytes_at_the_gateway_reach_the_board_and_its_answer_comes_back() {
+    if !sim_options::PTY {
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let elf = echoing(directory.path());
+    let link = directory.path().join("radio");
+    let arguments = ["--elf", &elf, "--http", "127.0.0.1:0", "--lora"];
+    let link = link.to_str().unwrap();
+    for boards in [
+        &[][..],
+        &["--board", "modio-08"],
+        &["--unit", "1", "--unit", "2"],
+    ] {
+        let mut running = Running::start(&[&arguments[..], &[link], boards].concat());
+        running.line();
+        let http = running.endpoint("http: http://");
+        running.endpoint("lora: ");
+        let before = state(&http);
+        assert_eq!(
+            before["radio"]["mode"], "normal",
+            "it is ready when it is announced"
+        );
+        let file = OpenOptions::new().read(true).write(true).open(link);
+        let mut gateway = file.unwrap();
+        gateway.write_all(b"HAL").unwrap();
+        // The answers of two boards destroy each other.
+        let single = !boards.contains(&"--unit");
+        if single {
+            let mut answer = [0; 3];
+            gateway.read_exact(&mut answer).unwrap();
+            assert_eq!(&answer, b"IBM");
+        }
+        let end = std::time::Instant::now() + std::time::Duration::from_secs(60);
+        while state(&http)["radio"]["packets_sent"] != 1 {
+            assert!(std::time::Instant::now() < end, "no answer was sent");
+        }
+        let radio = state(&http)["radio"].take();
+        assert_eq!(radio["packets_received"], 1, "{radio}");
+        assert_eq!(
+            (&radio["channel_mhz"], &radio["air_rate"]),
+            (&433.into(), &2400.into())
+        );
+        running.signal("-TERM");
+        assert_eq!(running.end(), (Some(0), String::new()));
+    }
+}
+
+#[test]
+fn radio_is_absent_without_the_option() {
+    let mut running = Running::start_loop(&[]);
+    running.line();
+    let http = running.endpoint("http: http://");
+    assert!(state(&http)["radio"].is_null());
+    assert!(get(&http, "/api/faults").get("radio_loss").is_none());
+    let refusal = post(&http, "/api/faults", r#"{"radio_loss":0.5}"#);
+    assert_eq!(refusal["error"], "the board has no LoRa module");
+}
