@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use modio_description::Table;
+use register_map::BLOCKS;
 
 use super::Device;
 use crate::failure::Failure;
@@ -32,7 +33,8 @@ impl Device {
                 .collect();
             match self.read(table, first, count).await {
                 Ok(words) => found.extend(words),
-                // A unit refuses a request over two of its blocks, and its description does not say where they end.
+                // A unit refuses a request over two of its blocks. This map knows where its own blocks begin; those of
+                // newer firmware may be others.
                 Err(Failure::Refused(_)) if parts.len() > 1 => {
                     for (_, address, count) in parts {
                         found.extend(self.read(table, *address, *count).await?);
@@ -71,13 +73,14 @@ impl Device {
     }
 }
 
-/// Joins consecutive spans.
+/// Joins consecutive spans, but not over the start of a block of the register map.
 fn joined(spans: &[(Table, u16, u16)]) -> Vec<(Table, u16, u16)> {
     let mut joined: Vec<(Table, u16, u16)> = Vec::new();
     for (table, address, count) in spans {
         match joined.last_mut() {
             Some((before, first, length))
                 if before == table
+                    && !BLOCKS.iter().any(|block| block.first == *address)
                     && u32::from(*first) + u32::from(*length) == u32::from(*address)
                     && *length + count <= MOST =>
             {
@@ -104,10 +107,13 @@ mod tests {
             (Word, 22, 1),
         ];
         assert_eq!(joined(&spans), [(Bit, 16, 2), (Word, 18, 3), (Word, 22, 1)]);
-        let many: Vec<_> = (0..300).map(|address| (Word, address, 1)).collect();
+        let many: Vec<_> = (0..300).map(|n| (Word, 0x1000 + n, 1)).collect();
         assert_eq!(
             joined(&many),
-            [(Word, 0, 120), (Word, 120, 120), (Word, 240, 60)]
+            [(Word, 0x1000, 120), (Word, 0x1078, 120), (Word, 0x10F0, 60)]
         );
+        // The fault record and the counters of the radio are two blocks.
+        let blocks = [(Word, 0x026F, 1), (Word, 0x0270, 1), (Word, 0x0271, 1)];
+        assert_eq!(joined(&blocks), [(Word, 0x026F, 1), (Word, 0x0270, 2)]);
     }
 }
