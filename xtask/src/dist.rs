@@ -38,8 +38,6 @@ mod paths;
 mod programs;
 mod sbom;
 
-pub use programs::host;
-
 use notices::Notices;
 use paths::Paths;
 

@@ -97,7 +97,7 @@ fn executable(_: &Path) -> Result<()> {
 }
 
 /// Returns the target of this machine.
-pub fn host() -> Result<String> {
+fn host() -> Result<String> {
     let version = command::read(Command::new("rustc").arg("-vV"))?;
     let host = version.lines().find_map(|line| line.strip_prefix("host: "));
     Ok(host
