@@ -20,16 +20,19 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
-use object::Object as _;
+use object::{Object as _, ObjectSection as _};
 use register_map::Board;
 use sha2::{Digest as _, Sha256};
 
 use crate::error::usage;
+use crate::image::Elf;
+use crate::toolchain::TARGET;
 use crate::workspace::Workspace;
-use crate::{build, image};
+use crate::{build, command, image};
 
 mod hex;
 mod notices;
@@ -79,7 +82,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
         return Err(usage(format!("{} is not empty", out.display())));
     }
     let paths = Paths::of(workspace)?;
-    let target = programs::target()?;
+    let target = programs::target(&rustc(&["--print", "host-tuple"])?);
     let workspace = &mut paths.reproducible(workspace, &target);
     let mut notices = Notices::default();
     if options.images.is_none() {
@@ -128,20 +131,41 @@ fn files(
 ) -> Result<()> {
     let map = workspace.target().join(format!("{board}.map"));
     let built = build::image_with_map(workspace, board, &map)?;
-    let elf = image::read(&built.elf)?;
-    let flash = image::read(&built.bin)?;
-    let entry = image::parse(&elf)?.entry() as u32;
-    let bill = sbom::of_image(workspace, board, &built, &sha256(&flash), notices)?;
+    let (elf, flash) = (fs::read(&built.elf)?, fs::read(&built.bin)?);
+    let parsed = image::parse(&elf)?;
+    let entry = parsed.entry() as u32;
+    let bill = sbom::Subject {
+        name: board.name,
+        kind: "firmware",
+        package: "firmware",
+        target: TARGET,
+        features: format!("firmware/{board}"),
+        compiled: &built.packages,
+        compiler: &compiler(&parsed)?,
+        sha256: sha256(&flash),
+    };
+    let bill = bill.bill(workspace, notices)?;
     for (extension, content) in [
         ("map", paths.replaced(&fs::read_to_string(map)?).into()),
         ("elf", elf),
         ("hex", hex::file(&flash, entry)?.into_bytes()),
         ("bin", flash),
-        ("cdx.json", format!("{bill:#}\n").into_bytes()),
+        ("cdx.json", bill.into_bytes()),
     ] {
         fs::write(out.join(format!("{board}.{extension}")), content)?;
     }
     Ok(())
+}
+
+/// Returns the version of the rustc that has compiled an image, from a comment in the image.
+fn compiler(elf: &Elf<'_>) -> Result<String> {
+    let comment = elf.section_by_name(".comment");
+    let comment = comment.and_then(|section| section.data().ok());
+    let comment = String::from_utf8_lossy(comment.unwrap_or_default());
+    let mut texts = comment.split('\0');
+    let version = texts.find_map(|text| text.strip_prefix("rustc version "));
+    let version = version.context("the image has no comment with its compiler")?;
+    Ok(version.to_owned())
 }
 
 /// Returns the section of a version in a changelog, without its heading.
@@ -172,6 +196,12 @@ fn sums(directory: &Path) -> Result<String> {
         writeln!(text, "{sum}  {name}")?;
     }
     Ok(text)
+}
+
+/// Returns what the rustc for this machine prints.
+fn rustc(arguments: &[&str]) -> Result<String> {
+    let printed = command::read(Command::new("rustc").args(arguments))?;
+    Ok(printed.trim_end().to_owned())
 }
 
 fn sha256(content: &[u8]) -> String {

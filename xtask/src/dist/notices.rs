@@ -2,15 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use cargo_metadata::Package;
 use fs_err as fs;
 use spdx::{AdditionItem, Expression, ParseMode};
 
-use super::sbom::reference;
-use crate::command;
+use super::{rustc, sbom::reference};
 
 /// Starts of the names of files with licences, in small letters.
 const FILES: [&str; 6] = [
@@ -30,11 +28,11 @@ const MUSL: &str = include_str!("musl.txt");
 pub struct Notices(BTreeMap<String, Package>);
 
 impl Notices {
-    /// Adds packages. Those of this project are left out.
-    pub fn note<'a>(&mut self, packages: impl Iterator<Item = &'a Package>) {
-        let others = packages.filter(|package| package.source.is_some());
-        self.0
-            .extend(others.map(|package| (reference(package), package.clone())));
+    /// Adds a package, unless it is one of this project.
+    pub fn note(&mut self, package: &Package) {
+        if package.source.is_some() {
+            self.0.insert(reference(package), package.clone());
+        }
     }
 
     /// Writes the licences of these packages, and those of Rust's standard library, which programs for a target contain
@@ -45,8 +43,8 @@ impl Notices {
             text += MUSL;
         }
         fs::write(out.join(format!("THIRD-PARTY-{target}.txt")), text)?;
-        let sysroot = command::read(Command::new("rustc").args(["--print", "sysroot"]))?;
-        let library = Path::new(sysroot.trim()).join("share/doc/rust/COPYRIGHT-library.html");
+        let sysroot = rustc(&["--print", "sysroot"])?;
+        let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
         fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
         Ok(())
     }
@@ -163,7 +161,9 @@ mod tests {
         let (_own, mut own) = package("own", "MIT", &[]);
         own.source = None;
         let mut notices = Notices::default();
-        notices.note([&b, &a, &own].into_iter());
+        for package in [&b, &a, &own] {
+            notices.note(package);
+        }
         let text = notices.text().unwrap();
         assert_eq!(text.matches("the text").count(), 1, "{text}");
         assert!(text.contains("\na@1.0.0, b@1.0.0\n"), "{text}");
