@@ -73,7 +73,7 @@ fn within_limits(workspace: &Workspace, board: &Board, report: &Value) -> Result
 }
 
 fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
-    let elf = build::image(workspace, board)?.elf;
+    let elf = build::image(workspace, board)?;
     let mut build = rivals(workspace, "build")?;
     let rivals = workspace::artifacts(build.args(["--quiet", MESSAGES]))?;
     let mut program = Command::new(workspace.program("modio-bench")?);

@@ -3,7 +3,7 @@
 
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, TcpListener};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
@@ -22,7 +22,7 @@ const GDBS: [&str; 3] = ["arm-none-eabi-gdb", "gdb-multiarch", "gdb"];
 #[group(skip)]
 pub struct Options {
     #[command(flatten)]
-    build: build::Options,
+    given: build::Given,
 
     /// The part, as `probe-rs chip list` names it [default: that of the board]
     #[arg(long, value_name = "CHIP")]
@@ -31,10 +31,6 @@ pub struct Options {
     /// The debug probe, when there are several: VID:PID or VID:PID:SERIAL, as `probe-rs list` shows it
     #[arg(long, value_name = "SELECTOR")]
     probe: Option<String>,
-
-    /// Use this image instead of building one
-    #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
 }
 
 /// Additional options of `cargo xtask gdb`.
@@ -57,7 +53,7 @@ pub struct GdbOptions {
 pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
     // Check before the build, which is useless without a probe.
     check("probe-rs")?;
-    let elf = options.elf(workspace)?;
+    let elf = options.given.elf(workspace)?;
     options.write(&elf)?;
     say!("written, verified and started: {}", elf.display());
     Ok(())
@@ -66,7 +62,7 @@ pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// `cargo xtask run`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let has_probe = options.has_probe()?;
-    let elf = options.elf(workspace)?;
+    let elf = options.given.elf(workspace)?;
     if has_probe {
         return command::exec(options.probe_rs("run").arg("--verify").arg(elf));
     }
@@ -76,7 +72,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// `cargo xtask attach`.
 pub fn attach(workspace: &mut Workspace, options: &Options) -> Result<()> {
     check("probe-rs")?;
-    let elf = options.elf(workspace)?;
+    let elf = options.given.elf(workspace)?;
     command::exec(options.probe_rs("attach").arg(elf))
 }
 
@@ -92,7 +88,7 @@ pub fn gdb(workspace: &mut Workspace, options: &GdbOptions) -> Result<()> {
     )?;
     let board = &options.board;
     let has_probe = board.has_probe()?;
-    let elf = board.elf(workspace)?;
+    let elf = board.given.elf(workspace)?;
     let address = format!("127.0.0.1:{}", free_port()?);
     let mut server;
     if has_probe {
@@ -141,13 +137,9 @@ fn check(probe_rs: &str) -> Result<()> {
 }
 
 impl Options {
-    fn elf(&self, workspace: &mut Workspace) -> Result<PathBuf> {
-        build::given(workspace, self.build.board, self.elf.as_deref())
-    }
-
     /// Returns a command of probe-rs with the options for the probe.
     fn probe_rs(&self, subcommand: &str) -> Command {
-        let part = Hardware::of(self.build.board).part.name;
+        let part = Hardware::of(self.given.board()).part.name;
         let mut command = Command::new("probe-rs");
         command.args([subcommand, "--chip", self.chip.as_deref().unwrap_or(part)]);
         if let Some(probe) = &self.probe {
@@ -159,7 +151,7 @@ impl Options {
     /// Returns the simulator with the board and an image.
     fn simulator(&self, workspace: &Workspace, elf: &Path) -> Result<Command> {
         let mut simulator = Command::new(workspace.simulator()?);
-        simulator.args(["--board", self.build.board.name, "--elf"]);
+        simulator.args(["--board", self.given.board().name, "--elf"]);
         simulator.arg(elf);
         Ok(simulator)
     }

@@ -130,8 +130,8 @@ fn files(
     notices: &mut Notices,
 ) -> Result<()> {
     let map = workspace.target().join(format!("{board}.map"));
-    let built = build::image_with_map(workspace, board, &map)?;
-    let (elf, flash) = (fs::read(&built.elf)?, fs::read(&built.bin)?);
+    let (built, packages) = build::linked(workspace, board, Some(&map))?;
+    let (elf, flash) = (fs::read(&built)?, fs::read(built.with_extension("bin"))?);
     let parsed = image::parse(&elf)?;
     let entry = parsed.entry() as u32;
     let bill = sbom::Subject {
@@ -140,7 +140,7 @@ fn files(
         package: "firmware",
         target: TARGET,
         features: format!("firmware/{board}"),
-        compiled: &built.packages,
+        compiled: &packages,
         compiler: &compiler(&parsed)?,
         sha256: sha256(&flash),
     };

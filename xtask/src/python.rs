@@ -92,16 +92,11 @@ fn script(workspace: &mut Workspace, python: &Path, name: &str) -> Result<Comman
     let mut script = Command::new(python);
     // -B: do not write __pycache__ to the tree.
     script.arg("-B").arg(workspace.root().join(name));
-    let (elf, elf_08) = (
-        build::image(workspace, &MODIO_02)?,
-        build::image(workspace, &MODIO_08)?,
-    );
-    script.arg("--sim").arg(workspace.simulator()?);
+    script.arg("--elf").arg(build::image(workspace, &MODIO_02)?);
     script
-        .arg("--elf")
-        .arg(elf.elf)
         .arg("--elf-08")
-        .arg(elf_08.elf);
+        .arg(build::image(workspace, &MODIO_08)?);
+    script.arg("--sim").arg(workspace.simulator()?);
     script.current_dir(workspace.root());
     Ok(script)
 }

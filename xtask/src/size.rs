@@ -1,7 +1,7 @@
 //! `cargo xtask size`: the flash and RAM of the image, by section and by crate, and what is left of the parts and of
 //! the budget.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
@@ -24,11 +24,7 @@ const KIB: u32 = 1024;
 #[group(skip)]
 pub struct Options {
     #[command(flatten)]
-    build: build::Options,
-
-    /// Measure this image instead of building one
-    #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
+    given: build::Given,
 
     /// Print JSON instead of a table
     #[arg(long)]
@@ -37,10 +33,8 @@ pub struct Options {
 
 /// `cargo xtask size`. An image that exceeds a limit is an error.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let board = options.build.board;
-    let elf = build::given(workspace, board, options.elf.as_deref())?;
-    let sizes = of(&elf)?;
-    let hardware = Hardware::of(board);
+    let sizes = of(&options.given.elf(workspace)?)?;
+    let hardware = Hardware::of(options.given.board());
     if options.json {
         say!("{:#}", as_json(&sizes, hardware));
     } else {
@@ -51,7 +45,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 
 /// Fails when the image does not fit the parts and the budget of a board.
 pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = build::image(workspace, board)?.elf;
+    let elf = build::image(workspace, board)?;
     within_limits(of(&elf)?.total(), Hardware::of(board))
 }
 

@@ -53,7 +53,7 @@ fn one_test<const N: usize>(
     name: &str,
     variables: [(&str, String); N],
 ) -> Result<()> {
-    let elf = build::image(workspace, &MODIO_02)?.elf;
+    let elf = build::image(workspace, &MODIO_02)?;
     let mut cargo = workspace.cargo("test");
     cargo.args(ALL).args(["--quiet", "--features", test::SUITE]);
     cargo.args(["--test", test, "--"]);

@@ -297,8 +297,8 @@ fn in_simulation(workspace: &mut Workspace, targets: &str, names: &str, at: &str
         .args(targets.split(' '))
         .args(["--", "--include-ignored"]);
     cargo.args(names.split_whitespace()).env(CORNER, at);
-    cargo.env("MODIO_ELF", build::image(workspace, &MODIO_02)?.elf);
-    cargo.env("MODIO_ELF_08", build::image(workspace, &MODIO_08)?.elf);
+    cargo.env("MODIO_ELF", build::image(workspace, &MODIO_02)?);
+    cargo.env("MODIO_ELF_08", build::image(workspace, &MODIO_08)?);
     // Tests of one package do not know the path of another package's program.
     cargo.env("MODIO_SIM", workspace.simulator()?);
     command::run(&mut cargo)

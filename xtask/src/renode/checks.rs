@@ -21,7 +21,7 @@ const CHECKS: &str = "renode/checks";
 
 /// Checks the models, the image on them, and in a dry run the suites.
 pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = build::image(workspace, board)?.elf;
+    let elf = build::image(workspace, board)?;
     let python = python(workspace)?;
     let presets = presets();
     let tests: [(&str, &[&OsStr]); 6] = [
@@ -43,7 +43,7 @@ pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 
 /// Runs the suites against the image in the simulator, which takes minutes.
 pub fn suites(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = format!("ELF:{}", build::image(workspace, board)?.elf.display());
+    let elf = format!("ELF:{}", build::image(workspace, board)?.display());
     let python = python(workspace)?;
     let simulator = format!("SIMULATOR:{}", workspace.simulator()?.display());
     let excluded = ["--exclude", "renode-only"];
