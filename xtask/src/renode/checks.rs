@@ -4,7 +4,6 @@
 //!
 //! Tests of this package (`platform`) check the platform and the scripts.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -23,21 +22,12 @@ const CHECKS: &str = "renode/checks";
 pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     let elf = build::image(workspace, board)?;
     let python = python(workspace)?;
-    let presets = presets();
-    let tests: [(&str, &[&OsStr]); 6] = [
-        ("test_syntax.py", &[]),
-        ("test_models.py", &[]),
-        ("test_commands.py", &[presets.as_ref()]),
-        ("test_terminal_tester.py", &[]),
-        ("test_exact_line.py", &[]),
-        ("test_boot.py", &[board.name.as_ref(), elf.as_os_str()]),
-    ];
-    for (test, arguments) in tests {
-        let test = workspace.root().join(CHECKS).join(test);
-        // -B: do not write __pycache__ to the tree.
-        let mut python = Command::new(&python);
-        command::run(python.arg("-B").arg(test).args(arguments))?;
-    }
+    let mut tests = Command::new(&python);
+    // -B: do not write __pycache__ to the tree.
+    tests.args(["-B", "-m", "unittest", "discover", "--start-directory"]);
+    tests.arg(workspace.root().join(CHECKS));
+    tests.env("MODIO_BOARD", board.name).env("MODIO_ELF", elf);
+    command::run(tests.env("MODIO_PRESETS", presets()))?;
     robot(workspace, &python, board, &["--dryrun"])
 }
 
