@@ -136,8 +136,8 @@ class Presets(unittest.TestCase):
             run = commands(Machine({"sysbus": bus}), [])
             run.mc_modio_board(board)
             run.mc_modio_preset(modules)
-            stored = bytes(bus.ReadByte(address + n) for n in range(len(wanted) // 2))
-            self.assertEqual(stored.hex(), wanted, (board, modules))
+            stored = [bus.ReadByte(address + n) for n in range(len(wanted))]
+            self.assertEqual(stored, wanted, (board, modules))
             self.assertEqual(len(bus), len(stored))
 
 

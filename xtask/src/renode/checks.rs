@@ -33,17 +33,13 @@ pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 
 /// Runs the suites against the image in the simulator, which takes minutes.
 pub fn suites(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = format!("ELF:{}", build::image(workspace, board)?.display());
     let python = python(workspace)?;
-    let simulator = format!("SIMULATOR:{}", workspace.simulator()?.display());
-    let excluded = ["--exclude", "renode-only"];
-    let variables = ["--variable", &simulator, "--variable", &elf];
-    robot(
-        workspace,
-        &python,
-        board,
-        &[&excluded[..], &variables].concat(),
-    )
+    let elf = build::image(workspace, board)?;
+    let elf = format!("--variable=ELF:{}", elf.display());
+    let simulator = workspace.simulator()?;
+    let simulator = format!("--variable=SIMULATOR:{}", simulator.display());
+    let options = ["--exclude=renode-only", &simulator, &elf];
+    robot(workspace, &python, board, &options)
 }
 
 /// Returns the interpreter of an environment with Robot Framework and Unicorn.
@@ -58,21 +54,14 @@ fn presets() -> String {
     let mut presets = Vec::new();
     for board in Board::ALL {
         let mut add = |modules: &[(u16, Module)]| {
-            let names = modules
-                .iter()
-                .map(|(port, module)| format!("{port}={module}"));
+            let names = modules.iter().map(|(port, name)| format!("{port}={name}"));
             let names = names.collect::<Vec<_>>().join(",");
             let mut page = [0xFF; 256];
             let pairs: Vec<_> = configuration::modules(modules.iter().copied()).collect();
             // A setting for each slot must fit.
             let length = record::encode_page(0, &pairs, &mut page).unwrap_or_default();
-            let hex = page[..length].iter().map(|byte| format!("{byte:02x}"));
-            presets.push(json!([
-                board.name,
-                names,
-                board.store.first,
-                hex.collect::<String>()
-            ]));
+            let page = &page[..length];
+            presets.push(json!([board.name, names, board.store.first, page]));
         };
         for module in Module::ALL {
             board.ports().for_each(|port| add(&[(port, module)]));
@@ -87,14 +76,7 @@ fn presets() -> String {
 fn robot(workspace: &Workspace, python: &Path, board: &Board, options: &[&str]) -> Result<()> {
     let output = workspace.target().join("renode-checks");
     let mut robot = Command::new(python);
-    robot.args([
-        "-B",
-        "-m",
-        "robot",
-        "--console",
-        "quiet",
-        "--prerunmodifier",
-    ]);
+    robot.args("-B -m robot --console quiet --prerunmodifier".split(' '));
     robot.arg(workspace.root().join(CHECKS).join("AsRenodeTest.py"));
     robot.arg("--outputdir").arg(&output).args(options);
     robot.args(["--variable", &format!("BOARD_NAME:{board}")]);
