@@ -35,8 +35,8 @@ pub struct Options {
     #[command(flatten)]
     given: build::Given,
 
-    /// The program renode, or its directory [default: $RENODE, the PATH, the usual places]
-    #[arg(long, value_name = "PATH")]
+    /// The program renode, or its directory [default: the PATH, the usual places]
+    #[arg(long, value_name = "PATH", env = "RENODE", hide_env_values = true)]
     renode: Option<PathBuf>,
 
     /// Start the board in Renode, its line on a TCP socket, with Renode's monitor on the terminal
@@ -59,7 +59,7 @@ pub struct Options {
 /// `cargo xtask renode`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     // Search before the build, which is useless without Renode.
-    let renode = Renode::find_on_this_machine(options.renode.as_deref())?;
+    let renode = Renode::find(options.renode.as_deref())?;
     eprintln!("Renode {} at {}", renode.version, renode.program.display());
     let board = options.given.board();
     let bench = Bench {
