@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use cargo_metadata::{Artifact, Message, MetadataCommand, PackageId};
 
 use crate::command;
-use crate::toolchain::{self, Way};
+use crate::toolchain::{self, Machine, Way};
 
 /// The project on this machine.
 #[derive(Debug, Default)]
@@ -80,7 +80,7 @@ impl Workspace {
     pub fn target_cargo(&mut self, subcommand: &str) -> Result<Command> {
         let way = match self.way {
             Some(way) => way,
-            None => *self.way.insert(toolchain::find(&self.root, self.install)?),
+            None => *self.way.insert(Machine::default().find(self.install)?),
         };
         let mut cargo = way.cargo(subcommand);
         cargo.current_dir(&self.root).args(&self.arguments);

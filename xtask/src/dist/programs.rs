@@ -12,8 +12,9 @@ use register_map::Board;
 
 use super::notices::Notices;
 use super::{oci, rustc, sbom, sha256};
+use crate::image;
+use crate::toolchain::Machine;
 use crate::workspace::{self, MESSAGES, Workspace};
-use crate::{image, toolchain};
 
 /// Packages, and their programs.
 const PROGRAMS: [(&str, &str); 4] = [
@@ -43,7 +44,7 @@ pub fn files(
         let elf = stripped(&image::read(&images.join(&name))?)?;
         fs::write(inside.join(name), elf)?;
     }
-    toolchain::add(workspace.root(), target)?;
+    Machine::default().add(target)?;
     let mut cargo = workspace.cargo("build");
     cargo.args(["--ignore-rust-version", "--profile", "tool", MESSAGES]);
     cargo.args(["--target", target, "--target-dir"]);
