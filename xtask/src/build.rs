@@ -13,7 +13,7 @@ use crate::board::Hardware;
 use crate::error::usage;
 use crate::image;
 use crate::toolchain::TARGET;
-use crate::workspace::{self, MESSAGES, Workspace};
+use crate::workspace::{self, Workspace};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
@@ -79,7 +79,7 @@ pub fn linked(
     let target = target(workspace.target(), board);
     let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--profile", PROFILE, "--package", "firmware"]);
-    cargo.args(["--bin", "modio", "--features", board.name, MESSAGES]);
+    cargo.args(["--bin", "modio", "--features", board.name]);
     cargo.arg("--target-dir").arg(&target);
     // The variable that firmware/build.rs reads.
     cargo.envs(map.map(|map| ("MODIO_MAP", map)));

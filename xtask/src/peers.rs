@@ -9,7 +9,7 @@ use fs_err as fs;
 use serde_json::Value;
 
 use crate::group::Group;
-use crate::workspace::{self, MESSAGES, Workspace, locked};
+use crate::workspace::{self, Workspace, locked};
 use crate::{command, python};
 
 /// The servers' package, a separate workspace.
@@ -98,7 +98,7 @@ struct Programs<'a> {
 impl<'a> Programs<'a> {
     fn build(workspace: &'a Workspace) -> Result<Self> {
         let mut cargo = workspace.other("build", MANIFEST, "peers");
-        let artifacts = workspace::artifacts(cargo.args(["--quiet", MESSAGES]))?;
+        let artifacts = workspace::artifacts(cargo.arg("--quiet"))?;
         Ok(Self {
             workspace,
             line: workspace::executable(&artifacts, "peer-line")?,

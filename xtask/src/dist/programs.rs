@@ -14,7 +14,7 @@ use super::notices::Notices;
 use super::{oci, rustc, sbom, sha256};
 use crate::image;
 use crate::toolchain::Machine;
-use crate::workspace::{self, MESSAGES, Workspace};
+use crate::workspace::{self, Workspace};
 
 /// Packages, and their programs.
 const PROGRAMS: [(&str, &str); 4] = [
@@ -46,7 +46,7 @@ pub fn files(
     }
     Machine::default().add(target)?;
     let mut cargo = workspace.cargo("build");
-    cargo.args(["--ignore-rust-version", "--profile", "tool", MESSAGES]);
+    cargo.args(["--ignore-rust-version", "--profile", "tool"]);
     cargo.args(["--target", target, "--target-dir"]);
     cargo.arg(workspace.target());
     for (package, program) in PROGRAMS {
