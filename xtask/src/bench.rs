@@ -74,7 +74,7 @@ fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
     }
     let report = serde_json::from_str(&command::read(&mut program)?);
     let mut report: Value = report.context("the report of tools/bench is broken")?;
-    report["image"] = size::report(&elf, board)?;
+    report["image"] = size::report(&elf)?;
     server::add(&mut report, &image::parse(&image::read(&elf)?)?)?;
     Ok(report)
 }
