@@ -106,10 +106,8 @@ fn session(workspace: &Workspace, targets: &[String], seconds: u32) -> Result<()
 fn fuzz(workspace: &Workspace, target: &str, inputs: &[PathBuf], limit: &str) -> Result<()> {
     let mut cargo = workspace.cargo("fuzz");
     cargo.args(["run", "--sanitizer", "none", "--target-dir"]);
-    cargo
-        .arg(workspace.target().join("fuzz"))
-        .arg(target)
-        .args(inputs);
+    cargo.arg(workspace.target().join("fuzz")).arg(target);
+    cargo.args(inputs);
     cargo.args(["--", limit]).args(OPTIONS.split(' '));
     command::run(cargo.env("RUST_BACKTRACE", "1"))
 }

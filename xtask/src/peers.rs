@@ -129,9 +129,8 @@ impl<'a> Programs<'a> {
                 program = python::environment(self.workspace, name, &[python::PYMODBUS])?;
                 let version = "import pymodbus; print(pymodbus.__version__)";
                 let version = command::read(Command::new(&program).args(["-c", version]))?;
-                let mut server = Command::new(program);
-                // -B: leaves no __pycache__ in the tree.
-                server.arg("-B").arg(peers.join("pymodbus_server.py"));
+                let mut server = python::python(&program);
+                server.arg(peers.join("pymodbus_server.py"));
                 Ok((server, version))
             }
             _ => {
@@ -163,9 +162,8 @@ impl<'a> Programs<'a> {
         let json = self.line.with_file_name(format!("{name}.json"));
         let mut suite = Command::new(&self.suite);
         suite.args(["--serial", &other, "--baud", "19200", "--format", "8N2"]);
-        suite
-            .arg("--profile")
-            .arg(self.workspace.root().join(PROFILE));
+        let profile = self.workspace.root().join(PROFILE);
+        suite.arg("--profile").arg(profile);
         let output = command::output(suite.args(cases).arg("--json").arg(&json))?;
         if let Some(directory) = traces {
             fs::create_dir_all(directory)?;

@@ -53,6 +53,13 @@ fn made(workspace: &Workspace, name: &str, requirements: &[&str]) -> Result<Path
     Ok(interpreter)
 }
 
+/// Returns a call of an interpreter that does not write `__pycache__` to the tree.
+pub fn python(interpreter: &Path) -> Command {
+    let mut python = Command::new(interpreter);
+    python.arg("-B");
+    python
+}
+
 /// Runs pymodbus and mbpoll as masters of the images. Without mbpoll the script leaves out the tests with it, and the
 /// others must pass.
 pub fn masters(workspace: &mut Workspace) -> Result<()> {
@@ -88,14 +95,12 @@ fn on_page(workspace: &mut Workspace, name: &str) -> Result<Command> {
 }
 
 /// Returns the call of a script that tests the images in the simulator.
-fn script(workspace: &mut Workspace, python: &Path, name: &str) -> Result<Command> {
-    let mut script = Command::new(python);
-    // -B: do not write __pycache__ to the tree.
-    script.arg("-B").arg(workspace.root().join(name));
-    script.arg("--elf").arg(build::image(workspace, &MODIO_02)?);
-    script
-        .arg("--elf-08")
-        .arg(build::image(workspace, &MODIO_08)?);
+fn script(workspace: &mut Workspace, interpreter: &Path, name: &str) -> Result<Command> {
+    let mut script = python(interpreter);
+    script.arg(workspace.root().join(name));
+    for (option, board) in [("--elf", &MODIO_02), ("--elf-08", &MODIO_08)] {
+        script.arg(option).arg(build::image(workspace, board)?);
+    }
     script.arg("--sim").arg(workspace.simulator()?);
     script.current_dir(workspace.root());
     Ok(script)

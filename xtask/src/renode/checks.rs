@@ -5,7 +5,6 @@
 //! Tests of this package (`platform`) check the platform and the scripts.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use register_map::{Board, Module, configuration, record};
@@ -22,9 +21,8 @@ const CHECKS: &str = "renode/checks";
 pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     let elf = build::image(workspace, board)?;
     let python = python(workspace)?;
-    let mut tests = Command::new(&python);
-    // -B: do not write __pycache__ to the tree.
-    tests.args(["-B", "-m", "unittest", "discover", "--start-directory"]);
+    let mut tests = python::python(&python);
+    tests.args(["-m", "unittest", "discover", "--start-directory"]);
     tests.arg(workspace.root().join(CHECKS));
     tests.env("MODIO_BOARD", board.name).env("MODIO_ELF", elf);
     command::run(tests.env("MODIO_PRESETS", presets()))?;
@@ -75,8 +73,8 @@ fn presets() -> String {
 /// Runs Robot Framework on the suites as renode-test does, with the project's keywords instead of Renode's.
 fn robot(workspace: &Workspace, python: &Path, board: &Board, options: &[&str]) -> Result<()> {
     let output = workspace.target().join("renode-checks");
-    let mut robot = Command::new(python);
-    robot.args("-B -m robot --console quiet --prerunmodifier".split(' '));
+    let mut robot = python::python(python);
+    robot.args("-m robot --console quiet --prerunmodifier".split(' '));
     robot.arg(workspace.root().join(CHECKS).join("AsRenodeTest.py"));
     robot.arg("--outputdir").arg(&output).args(options);
     robot.args(["--variable", &format!("BOARD_NAME:{board}")]);

@@ -9,8 +9,8 @@ use fs_err as fs;
 use register_map::Board;
 
 use super::Bench;
-use crate::command;
 use crate::group::Group;
+use crate::{command, python};
 
 /// Runs all suites. The results are in `robot` in the output directory, and as JUnit XML in `robot.xml`.
 pub fn run(bench: &Bench, python: &Path) -> Result<()> {
@@ -42,8 +42,8 @@ pub fn run(bench: &Bench, python: &Path) -> Result<()> {
 
 /// Has Robot Framework convert its results in a directory to JUnit XML. Results without a test are an error.
 fn to_junit(python: &Path, results: &Path, to: &Path) -> Result<()> {
-    let mut rebot = Command::new(python);
-    rebot.args("-B -m robot.rebot --output NONE --log NONE --report NONE --xunit".split(' '));
+    let mut rebot = python::python(python);
+    rebot.args("-m robot.rebot --output NONE --log NONE --report NONE --xunit".split(' '));
     let output = command::output(rebot.arg(to).arg(results.join("robot_output.xml")))?;
     // The exit status of rebot is the number of failed tests, or above 250 an error.
     let converted = matches!(output.status.code(), Some(0..=250));

@@ -13,12 +13,8 @@ use crate::image::{self, RAM_BASE};
 /// Bytes of a section that no symbol covers: constants without a name, and padding.
 const UNNAMED: &str = "(unnamed constants, padding)";
 
-/// Start-up code, exception vectors and interrupt handlers, which have the names of the linker script or of the
-/// hardware.
+/// Start-up code, exception vectors and interrupt handlers: symbols with names that Rust has not made.
 const NAMED: &str = "(vectors, handlers, start-up)";
-
-/// Starts of the names of the functions that the compiler calls, in crate `compiler_builtins`.
-const BUILTINS: [&str; 4] = ["__aeabi_", "mem", "__rust_", "bcmp"];
 
 /// Bytes of flash, including initial values of variables, and bytes of RAM, without the stack.
 pub type Bytes = [u32; 2];
@@ -101,20 +97,13 @@ fn share(start: u32, size: u32, owned: Vec<(u32, u32, String)>) -> BTreeMap<Stri
 /// Returns the crate of a symbol, from its name: the first crate in the path. For `<type as trait>` it is that of the
 /// type, or where the type has no crate (`&str`, `u32`, `[T]`) that of the trait.
 fn owner(symbol: &str) -> String {
-    let Ok(path) = rustc_demangle::try_demangle(symbol) else {
-        let builtin = BUILTINS.iter().any(|prefix| symbol.starts_with(prefix));
-        return if builtin { "compiler_builtins" } else { NAMED }.to_owned();
-    };
-    // Leave out the hash, or the crate's disambiguator.
-    let path = format!("{path:#}");
+    // Without the hash, or the crate's disambiguator.
+    let path = format!("{:#}", rustc_demangle::demangle(symbol));
     let outside = |c: char| !c.is_alphanumeric() && c != '_';
-    let first = path
-        .split_once("::")
-        .and_then(|(first, _)| first.rsplit(outside).next());
-    first
-        .filter(|name| !name.is_empty())
-        .unwrap_or(NAMED)
-        .to_owned()
+    let first = path.split_once("::").map(|(first, _)| first);
+    let name = first.and_then(|first| first.rsplit(outside).next());
+    let name = name.filter(|name| !name.is_empty());
+    name.unwrap_or(NAMED).to_owned()
 }
 
 #[cfg(test)]
@@ -169,7 +158,6 @@ mod tests {
                 "_ZN40_$LT$u32$u20$as$u20$core..fmt..Debug$GT$3fmt17h0123456789abcdefE",
                 "core",
             ),
-            ("__aeabi_memcpy4", "compiler_builtins"),
             ("USART1", NAMED),
         ] {
             assert_eq!(owner(symbol), name);
