@@ -47,7 +47,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
         say!("{}", table::of(&report));
     }
     let baseline = format!("tools/bench/baseline-{board}.json");
-    let baseline = workspace.root().join(baseline);
+    let baseline = workspace.root.join(baseline);
     if options.bless {
         return figures::write(&baseline, &report);
     }
@@ -81,7 +81,7 @@ fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
 
 /// Returns cargo for the rivals.
 pub fn rivals(workspace: &mut Workspace, subcommand: &str) -> Result<Command> {
-    let target = workspace.target().join("rivals");
+    let target = workspace.target.join("rivals");
     let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--release", "--manifest-path", RIVALS]);
     cargo.arg("--target-dir").arg(target);

@@ -76,7 +76,7 @@ pub fn linked(
     board: &Board,
     map: Option<&Path>,
 ) -> Result<(PathBuf, Vec<PackageId>)> {
-    let target = target(workspace.target(), board);
+    let target = target(&workspace.target, board);
     let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--profile", PROFILE, "--package", "firmware"]);
     cargo.args(["--bin", "modio", "--features", board.name]);

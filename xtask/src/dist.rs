@@ -52,7 +52,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     if let Some(tag) = &options.tag {
         check_tag(tag, commit::commit!())?;
     }
-    let standard = workspace.target().join("dist");
+    let standard = workspace.target.join("dist");
     if options.out.is_none() {
         let _ = fs::remove_dir_all(&standard);
     }
@@ -69,7 +69,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
         for board in Board::ALL {
             files(workspace, board, &out, &paths, &mut notices)?;
         }
-        let root = workspace.root();
+        let root = &workspace.root;
         for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
             fs::copy(root.join(name), out.join(name))?;
         }
@@ -109,7 +109,7 @@ fn files(
     paths: &Paths,
     notices: &mut Notices,
 ) -> Result<()> {
-    let map = workspace.target().join(format!("{board}.map"));
+    let map = workspace.target.join(format!("{board}.map"));
     let (built, packages) = build::linked(workspace, board, Some(&map))?;
     let (elf, flash) = (fs::read(&built)?, fs::read(built.with_extension("bin"))?);
     let parsed = image::parse(&elf)?;

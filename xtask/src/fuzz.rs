@@ -81,7 +81,7 @@ fn targets(workspace: &Workspace) -> Result<Vec<String>> {
 fn session(workspace: &Workspace, targets: &[String], seconds: u32) -> Result<()> {
     let mut failed = Vec::new();
     for target in targets {
-        let new = workspace.target().join("fuzz/corpus").join(target);
+        let new = workspace.target.join("fuzz/corpus").join(target);
         fs::create_dir_all(&new)?;
         // libFuzzer writes new inputs to the first directory only. The second one has the seeds.
         let corpus = [new, Path::new("fuzz/corpus").join(target)];
@@ -106,7 +106,7 @@ fn session(workspace: &Workspace, targets: &[String], seconds: u32) -> Result<()
 fn fuzz(workspace: &Workspace, target: &str, inputs: &[PathBuf], limit: &str) -> Result<()> {
     let mut cargo = workspace.cargo("fuzz");
     cargo.args(["run", "--sanitizer", "none", "--target-dir"]);
-    cargo.arg(workspace.target().join("fuzz")).arg(target);
+    cargo.arg(workspace.target.join("fuzz")).arg(target);
     cargo.args(inputs);
     cargo.args(["--", limit]).args(OPTIONS.split(' '));
     command::run(cargo.env("RUST_BACKTRACE", "1"))

@@ -151,7 +151,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Docs => {
             let mut text = String::new();
             register_map::docs::write_markdown(&mut text)?;
-            let path = workspace.root().join("docs/register-map.md");
+            let path = workspace.root.join("docs/register-map.md");
             fs_err::write(&path, text)?;
             say!("wrote {}", path.display());
             Ok(())

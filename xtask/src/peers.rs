@@ -67,7 +67,7 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     table += &left_out;
     say!("{}", table.trim_end());
     if all {
-        let path = workspace.root().join(DOCUMENT);
+        let path = workspace.root.join(DOCUMENT);
         let document = replaced(&fs::read_to_string(&path)?, &table);
         let document =
             document.with_context(|| format!("{DOCUMENT} has no {BEGIN:?} with {END:?}"))?;
@@ -108,7 +108,7 @@ impl<'a> Programs<'a> {
 
     /// Prepares a server. Returns its program, to which the port is the last argument, and the version of its library.
     fn server(&self, name: &str) -> Result<(Command, String)> {
-        let peers = self.workspace.root().join("tools/peers");
+        let peers = self.workspace.root.join("tools/peers");
         // Those in Rust have been built with the line.
         let mut program = self.line.with_file_name(format!("peer-{name}"));
         match name {
@@ -162,7 +162,7 @@ impl<'a> Programs<'a> {
         let json = self.line.with_file_name(format!("{name}.json"));
         let mut suite = Command::new(&self.suite);
         suite.args(["--serial", &other, "--baud", "19200", "--format", "8N2"]);
-        let profile = self.workspace.root().join(PROFILE);
+        let profile = self.workspace.root.join(PROFILE);
         suite.arg("--profile").arg(profile);
         let output = command::output(suite.args(cases).arg("--json").arg(&json))?;
         if let Some(directory) = traces {

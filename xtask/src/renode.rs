@@ -63,8 +63,8 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     eprintln!("Renode {} at {}", renode.version, renode.program.display());
     let board = options.given.board();
     let bench = Bench {
-        directory: workspace.root().join(DIRECTORY),
-        output: workspace.target().join("renode").join(board.name),
+        directory: workspace.root.join(DIRECTORY),
+        output: workspace.target.join("renode").join(board.name),
         board,
         renode,
         elf: options.given.elf(workspace)?,

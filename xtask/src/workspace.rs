@@ -11,10 +11,12 @@ use crate::command;
 use crate::toolchain::{self, Machine, Way};
 
 /// The project on this machine.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Workspace {
-    root: PathBuf,
-    target: PathBuf,
+    /// The directory of the root Cargo.toml.
+    pub root: PathBuf,
+    /// Cargo's target directory.
+    pub target: PathBuf,
     way: Option<Way>,
     /// Further arguments of every cargo.
     arguments: Vec<String>,
@@ -42,21 +44,10 @@ impl Workspace {
     /// Returns the same project with another target directory, and with further arguments of every cargo.
     pub fn with(&self, target: PathBuf, arguments: Vec<String>) -> Self {
         Self {
-            root: self.root.clone(),
             target,
             arguments,
-            ..*self
+            ..self.clone()
         }
-    }
-
-    /// The directory of the root Cargo.toml.
-    pub fn root(&self) -> &Path {
-        &self.root
-    }
-
-    /// Cargo's target directory.
-    pub fn target(&self) -> &Path {
-        &self.target
     }
 
     /// Returns cargo for the host, run at the root.

@@ -34,7 +34,7 @@ impl Paths {
                 sysroot.join("lib/rustlib/src/rust"),
                 format!("/rustc/{}", commit.unwrap_or("unknown")),
             ),
-            (workspace.root().to_owned(), "/modio".to_owned()),
+            (workspace.root.to_owned(), "/modio".to_owned()),
             (directory(workspace), "/modio/target".to_owned()),
         ]))
     }
@@ -73,7 +73,7 @@ impl Paths {
 
 /// The target directory of the builds of a release.
 fn directory(workspace: &Workspace) -> PathBuf {
-    workspace.target().join("release-files")
+    workspace.target.join("release-files")
 }
 
 #[cfg(test)]

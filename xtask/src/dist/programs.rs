@@ -35,7 +35,7 @@ pub fn files(
     out: &Path,
     notices: &mut Notices,
 ) -> Result<()> {
-    let inside = workspace.target().join("images");
+    let inside = workspace.target.join("images");
     // Images of an earlier build would be included as well.
     let _ = fs::remove_dir_all(&inside);
     fs::create_dir_all(&inside)?;
@@ -48,14 +48,14 @@ pub fn files(
     let mut cargo = workspace.cargo("build");
     cargo.args(["--ignore-rust-version", "--profile", "tool"]);
     cargo.args(["--target", target, "--target-dir"]);
-    cargo.arg(workspace.target());
+    cargo.arg(&workspace.target);
     for (package, program) in PROGRAMS {
         cargo.args(["--package", package, "--bin", program]);
     }
     // The variable that tools/sim/build.rs reads.
     cargo.env("MODIO_SIM_IMAGES", &inside);
     let artifacts = workspace::artifacts(&mut cargo)?;
-    let compiled = workspace::packages(&artifacts, &workspace.target().join(target));
+    let compiled = workspace::packages(&artifacts, &workspace.target.join(target));
     let version = rustc(&["--version"])?;
     for (package, program) in PROGRAMS {
         let built = workspace::executable(&artifacts, program)?;

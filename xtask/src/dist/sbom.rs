@@ -37,13 +37,13 @@ impl Subject<'_> {
     /// Returns the bill, as the text of a file, and notes its packages.
     pub fn bill(&self, workspace: &Workspace, notices: &mut Notices) -> Result<String> {
         let mut metadata = MetadataCommand::new();
-        metadata.current_dir(workspace.root());
+        metadata.current_dir(&workspace.root);
         metadata.other_options([
             "--locked".to_owned(),
             format!("--filter-platform={}", self.target),
             format!("--features={}", self.features),
         ]);
-        let sums = locked(&workspace.root().join("Cargo.lock"), "checksum")?;
+        let sums = locked(&workspace.root.join("Cargo.lock"), "checksum")?;
         let bill = self.of(&metadata.exec()?, &sums, notices)?;
         Ok(format!("{bill:#}\n"))
     }

@@ -23,7 +23,7 @@ pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     let python = python(workspace)?;
     let mut tests = python::python(&python);
     tests.args(["-m", "unittest", "discover", "--start-directory"]);
-    tests.arg(workspace.root().join(CHECKS));
+    tests.arg(workspace.root.join(CHECKS));
     tests.env("MODIO_BOARD", board.name).env("MODIO_ELF", elf);
     command::run(tests.env("MODIO_PRESETS", presets()))?;
     robot(workspace, &python, board, &["--dryrun"])
@@ -72,12 +72,12 @@ fn presets() -> String {
 
 /// Runs Robot Framework on the suites as renode-test does, with the project's keywords instead of Renode's.
 fn robot(workspace: &Workspace, python: &Path, board: &Board, options: &[&str]) -> Result<()> {
-    let output = workspace.target().join("renode-checks");
+    let output = workspace.target.join("renode-checks");
     let mut robot = python::python(python);
     robot.args("-m robot --console quiet --prerunmodifier".split(' '));
-    robot.arg(workspace.root().join(CHECKS).join("AsRenodeTest.py"));
+    robot.arg(workspace.root.join(CHECKS).join("AsRenodeTest.py"));
     robot.arg("--outputdir").arg(&output).args(options);
     robot.args(["--variable", &format!("BOARD_NAME:{board}")]);
-    robot.args(all(&workspace.root().join(DIRECTORY), board)?);
+    robot.args(all(&workspace.root.join(DIRECTORY), board)?);
     command::run(&mut robot).with_context(|| format!("see {}", output.join("log.html").display()))
 }
