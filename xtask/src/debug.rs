@@ -116,11 +116,11 @@ pub fn free_port() -> Result<u16> {
 
 /// Fails when probe-rs is not installed or sees no probe.
 fn check() -> Result<()> {
-    seen(Command::new("probe-rs").arg("list").output())
+    check_list(Command::new("probe-rs").arg("list").output())
 }
 
-/// Judges the output of `probe-rs list`. When it reports an error, the next call of probe-rs reports it too.
-fn seen(list: io::Result<Output>) -> Result<()> {
+/// Checks the output of `probe-rs list`. If it is an error, the next call of probe-rs fails and reports it.
+fn check_list(list: io::Result<Output>) -> Result<()> {
     let list = list.map_err(|_| {
         anyhow!(
             "probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see \
@@ -186,7 +186,7 @@ mod tests {
         let list = |text: &str| {
             let (status, stderr) = Default::default();
             let stdout = text.into();
-            seen(Ok(Output {
+            check_list(Ok(Output {
                 status,
                 stdout,
                 stderr,
@@ -195,7 +195,7 @@ mod tests {
         assert!(list("[0]: ST-Link V2 (VID: 0483, PID: 3748)").is_ok());
         let none = list("No debug probes were found.").unwrap_err();
         assert!(none.to_string().contains("connect one"));
-        let missing = seen(Err(io::ErrorKind::NotFound.into())).unwrap_err();
+        let missing = check_list(Err(io::ErrorKind::NotFound.into())).unwrap_err();
         assert!(missing.to_string().contains("cargo install"));
     }
 }

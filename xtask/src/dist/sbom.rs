@@ -19,8 +19,9 @@ pub struct Subject<'a> {
     pub name: &'a str,
     /// Its kind in CycloneDX.
     pub kind: &'a str,
-    /// The package that it is built from, the target, and the features.
+    /// The package that it is built from.
     pub package: &'a str,
+    /// The target and the features that it is built for.
     pub target: &'a str,
     pub features: String,
     /// The packages that were compiled for the target, for this file and for others.

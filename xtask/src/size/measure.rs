@@ -13,7 +13,7 @@ use crate::image::{self, RAM_BASE};
 /// Bytes of a section that no symbol covers: constants without a name, and padding.
 const UNNAMED: &str = "(unnamed constants, padding)";
 
-/// Start-up code, exception vectors and interrupt handlers: symbols with names that Rust has not made.
+/// Start-up code, exception vectors and interrupt handlers: symbols whose names are no Rust paths.
 const NAMED: &str = "(vectors, handlers, start-up)";
 
 /// Bytes of flash, including initial values of variables, and bytes of RAM, without the stack.
