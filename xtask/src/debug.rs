@@ -128,10 +128,9 @@ fn check_list(list: io::Result<Output>) -> Result<()> {
         )
     })?;
     let text = [list.stdout, list.stderr].concat();
+    let text = String::from_utf8_lossy(&text).to_lowercase();
     ensure!(
-        !String::from_utf8_lossy(&text)
-            .to_lowercase()
-            .contains("no debug probes were found"),
+        !text.contains("no debug probes were found"),
         "no debug probe found: connect one (ST-Link, CMSIS-DAP, J-Link) to USB; on Linux it may need the udev rules of \
          https://probe.rs/docs/getting-started/probe-setup"
     );
@@ -179,13 +178,14 @@ impl Options {
 
 #[cfg(test)]
 mod tests {
+    use std::process::ExitStatus;
+
     use super::*;
 
     #[test]
     fn missing_probe_and_missing_probe_rs_are_distinguished() {
         let list = |text: &str| {
-            let (status, stderr) = Default::default();
-            let stdout = text.into();
+            let (status, stdout, stderr) = (ExitStatus::default(), text.into(), Vec::new());
             check_list(Ok(Output {
                 status,
                 stdout,

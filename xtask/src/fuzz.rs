@@ -71,35 +71,29 @@ pub fn check(workspace: &mut Workspace) -> Result<()> {
 
 /// Returns the names of all targets.
 fn targets(workspace: &Workspace) -> Result<Vec<String>> {
-    let names = command::read(workspace.cargo("fuzz").arg("list"));
-    let names = names
-        .map_err(|_| missing("cargo-fuzz is not installed: cargo install --locked cargo-fuzz"))?;
+    let Ok(names) = command::read(workspace.cargo("fuzz").arg("list")) else {
+        let advice = "cargo-fuzz is not installed: cargo install --locked cargo-fuzz";
+        return Err(missing(advice));
+    };
     Ok(names.lines().map(str::to_owned).collect())
 }
 
 /// Runs every target, even when another one has found a failure.
 fn session(workspace: &Workspace, targets: &[String], seconds: u32) -> Result<()> {
+    let limit = format!("-max_total_time={seconds}");
     let mut failed = Vec::new();
     for target in targets {
         let new = workspace.target.join("fuzz/corpus").join(target);
         fs::create_dir_all(&new)?;
         // libFuzzer writes new inputs to the first directory only. The second one has the seeds.
         let corpus = [new, Path::new("fuzz/corpus").join(target)];
-        if let Err(error) = fuzz(
-            workspace,
-            target,
-            &corpus,
-            &format!("-max_total_time={seconds}"),
-        ) {
+        if let Err(error) = fuzz(workspace, target, &corpus, &limit) {
             eprintln!("{error:#}");
             failed.push(target.as_str());
         }
     }
-    ensure!(
-        failed.is_empty(),
-        "an input of {} fails, see above",
-        failed.join(", ")
-    );
+    let names = failed.join(", ");
+    ensure!(failed.is_empty(), "failed, see above: {names}");
     Ok(())
 }
 
