@@ -3,11 +3,11 @@ Cortex-M3, with renode/peripherals at the addresses in board.resc, ports that be
 (STM32F1GPIOPort.cs), and registers that only keep written values for the timers and the UART.
 
 There are no interrupts, so the test ends where the tasks begin: clocks, switch, flash store, module and
-watchdog are set up by then. Call it with the board's name and the image's path.
+watchdog are set up by then. The variables MODIO_BOARD and MODIO_ELF have the board's name and the image's path.
 """
 
+import os
 import struct
-import sys
 import unittest
 from pathlib import Path
 
@@ -195,7 +195,7 @@ def writes(board):
 
 
 class Boot(unittest.TestCase):
-    BOARD = ELF = None
+    BOARD, ELF = os.environ["MODIO_BOARD"], Path(os.environ["MODIO_ELF"])
     _boards = {}
 
     def board(self, module="4di", dip=1, crystal=1):
@@ -269,5 +269,4 @@ class Boot(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    Boot.BOARD, Boot.ELF = sys.argv.pop(1), Path(sys.argv.pop(1))
     unittest.main()

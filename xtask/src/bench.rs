@@ -4,14 +4,13 @@
 //! `tools/bench` measures. This command builds the programs for it, shows the figures and compares them with the
 //! baseline.
 
-use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
 use serde_json::Value;
 
-use crate::workspace::{self, MESSAGES, Workspace};
+use crate::workspace::{self, Workspace};
 use crate::{build, command, image, size};
 
 mod figures;
@@ -47,35 +46,27 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     } else {
         say!("{}", table::of(&report));
     }
+    let baseline = format!("tools/bench/baseline-{board}.json");
+    let baseline = workspace.root.join(baseline);
     if options.bless {
-        return figures::write(&baseline(workspace, board), &report);
+        return figures::write(&baseline, &report);
     }
-    within_limits(workspace, board, &report)
+    let over = figures::over_budget(&report);
+    ensure!(over.is_empty(), "over budget: {}", over.join("; "));
+    figures::compare(&baseline, &report)
 }
 
 /// The step of `cargo xtask ci`.
 pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let report = measure(workspace, board)?;
-    say!("{}", table::of(&report));
-    within_limits(workspace, board, &report)
-}
-
-/// Returns the file with the baseline of a board.
-fn baseline(workspace: &Workspace, board: &Board) -> PathBuf {
-    let name = format!("tools/bench/baseline-{board}.json");
-    workspace.root().join(name)
-}
-
-fn within_limits(workspace: &Workspace, board: &Board, report: &Value) -> Result<()> {
-    let over = figures::over_budget(report);
-    ensure!(over.is_empty(), "over budget: {}", over.join("; "));
-    figures::compare(&baseline(workspace, board), report)
+    let build = build::Options { board };
+    let (json, bless) = (false, false);
+    run(workspace, &Options { build, json, bless })
 }
 
 fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
-    let elf = build::image(workspace, board)?.elf;
+    let elf = build::image(workspace, board)?;
     let mut build = rivals(workspace, "build")?;
-    let rivals = workspace::artifacts(build.args(["--quiet", MESSAGES]))?;
+    let rivals = workspace::artifacts(build.arg("--quiet"))?;
     let mut program = Command::new(workspace.program("modio-bench")?);
     program.arg(&elf).args(["--board", board.name, "--rivals"]);
     for name in RIVAL_NAMES {
@@ -83,14 +74,14 @@ fn measure(workspace: &mut Workspace, board: &Board) -> Result<Value> {
     }
     let report = serde_json::from_str(&command::read(&mut program)?);
     let mut report: Value = report.context("the report of tools/bench is broken")?;
-    report["image"] = size::report(&elf, board)?;
+    report["image"] = size::report(&elf)?;
     server::add(&mut report, &image::parse(&image::read(&elf)?)?)?;
     Ok(report)
 }
 
 /// Returns cargo for the rivals.
 pub fn rivals(workspace: &mut Workspace, subcommand: &str) -> Result<Command> {
-    let target = workspace.target().join("rivals");
+    let target = workspace.target.join("rivals");
     let mut cargo = workspace.target_cargo(subcommand)?;
     cargo.args(["--release", "--manifest-path", RIVALS]);
     cargo.arg("--target-dir").arg(target);

@@ -13,7 +13,7 @@ use crate::board::Hardware;
 use crate::error::usage;
 use crate::image;
 use crate::toolchain::TARGET;
-use crate::workspace::{self, MESSAGES, Workspace};
+use crate::workspace::{self, Workspace};
 
 /// The profile of the root Cargo.toml that the image is built with.
 pub const PROFILE: &str = "firmware";
@@ -27,66 +27,70 @@ pub struct Options {
     pub board: &'static Board,
 }
 
-/// A built image.
-#[derive(Clone, Debug)]
-pub struct Image {
-    /// With symbols and debug information.
-    pub elf: PathBuf,
-    /// The flash from 0x0800_0000 on.
-    pub bin: PathBuf,
-    /// The packages that were compiled for the target.
-    pub packages: Vec<PackageId>,
+/// The board, and an image for it.
+#[derive(clap::Args, Clone, Debug)]
+#[group(skip)]
+pub struct Given {
+    #[command(flatten)]
+    options: Options,
+
+    /// Use this image instead of building one
+    #[arg(long, value_name = "FILE")]
+    elf: Option<PathBuf>,
+}
+
+impl Given {
+    pub fn board(&self) -> &'static Board {
+        self.options.board
+    }
+
+    /// Returns the ELF file of the image, which is built unless the option names one. A file without an image is a usage
+    /// error.
+    pub fn elf(&self, workspace: &mut Workspace) -> Result<PathBuf> {
+        let Some(elf) = &self.elf else {
+            return image(workspace, self.board());
+        };
+        let flat = image::read(elf).and_then(|bytes| image::flat(&bytes, u32::MAX));
+        flat.map_err(|why| usage(format!("{}: {why:#}", elf.display())))?;
+        Ok(std::path::absolute(elf)?)
+    }
 }
 
 /// `cargo xtask build`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let image = image(workspace, options.board)?;
-    say!("{}\n{}", image.elf.display(), image.bin.display());
+    let elf = image(workspace, options.board)?;
+    say!("{}\n{}", elf.display(), elf.with_extension("bin").display());
     Ok(())
 }
 
-/// Builds the image, and checks that it cannot panic and that its code in RAM needs no flash.
-pub fn image(workspace: &mut Workspace, board: &Board) -> Result<Image> {
-    linked(workspace, board, None)
+/// Builds the image, and returns its ELF file, with symbols and debug information.
+pub fn image(workspace: &mut Workspace, board: &Board) -> Result<PathBuf> {
+    Ok(linked(workspace, board, None)?.0)
 }
 
-/// Builds the image, and writes the linker's map to a file.
-pub fn image_with_map(workspace: &mut Workspace, board: &Board, map: &Path) -> Result<Image> {
-    linked(workspace, board, Some(map))
-}
-
-/// Returns the image that an option names, or builds it. An image that does not fit the board is a usage error.
-pub fn given(workspace: &mut Workspace, board: &Board, elf: Option<&Path>) -> Result<PathBuf> {
-    let Some(elf) = elf else {
-        return Ok(image(workspace, board)?.elf);
-    };
-    let flat = image::read(elf).and_then(|bytes| image::flat(&bytes, u32::MAX));
-    flat.map_err(|why| usage(format!("{}: {why:#}", elf.display())))?;
-    Ok(std::path::absolute(elf)?)
-}
-
-fn linked(workspace: &mut Workspace, board: &Board, map: Option<&Path>) -> Result<Image> {
-    let target = target(workspace.target(), board);
+/// Builds the image, and checks that it cannot panic and that its code in RAM needs no flash. Writes the flash from
+/// 0x0800_0000 on to a .bin, and the linker's map to a file. Returns the ELF file, and the packages that were compiled
+/// for the target.
+pub fn linked(
+    workspace: &mut Workspace,
+    board: &Board,
+    map: Option<&Path>,
+) -> Result<(PathBuf, Vec<PackageId>)> {
+    let target = target(&workspace.target, board);
     let mut cargo = workspace.target_cargo("build")?;
     cargo.args(["--profile", PROFILE, "--package", "firmware"]);
-    cargo.args(["--bin", "modio", "--features", board.name, MESSAGES]);
+    cargo.args(["--bin", "modio", "--features", board.name]);
     cargo.arg("--target-dir").arg(&target);
-    if let Some(map) = map {
-        // The variable that firmware/build.rs reads.
-        cargo.env("MODIO_MAP", map);
-    }
+    // The variable that firmware/build.rs reads.
+    cargo.envs(map.map(|map| ("MODIO_MAP", map)));
     let artifacts = workspace::artifacts(&mut cargo)?;
     let elf = workspace::executable(&artifacts, "modio")?;
-    let bin = elf.with_extension("bin");
     let bytes = image::read(&elf)?;
     let flash = image::flat(&bytes, Hardware::of(board).part.flash)?;
     image::check(&bytes)?;
-    fs::write(&bin, flash)?;
-    Ok(Image {
-        packages: workspace::packages(&artifacts, &target.join(TARGET)),
-        elf,
-        bin,
-    })
+    fs::write(elf.with_extension("bin"), flash)?;
+    let packages = workspace::packages(&artifacts, &target.join(TARGET));
+    Ok((elf, packages))
 }
 
 /// Returns the target directory of a board. The images have the same name, so each board has a separate directory:

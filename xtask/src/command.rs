@@ -1,16 +1,19 @@
 //! Runs other programs. Errors name the program and the reason.
 
 use std::io::ErrorKind;
-use std::process::{Command, Output};
+use std::process::{Command, ExitStatus, Output};
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, anyhow, ensure};
 
 /// Runs a program that shows its own output.
 pub fn run(command: &mut Command) -> Result<()> {
     let status = command.status().map_err(|error| no_start(command, error))?;
-    if !status.success() {
-        bail!("`{}` failed ({status})", shown(command));
-    }
+    succeeded(command, status)
+}
+
+/// Fails when a program that shows its own output has failed.
+pub fn succeeded(command: &Command, status: ExitStatus) -> Result<()> {
+    ensure!(status.success(), "`{}` failed ({status})", shown(command));
     Ok(())
 }
 
@@ -22,9 +25,8 @@ pub fn output(command: &mut Command) -> Result<Output> {
 /// Runs a program and returns its standard output. The error has the line with the reason from its standard error.
 pub fn read(command: &mut Command) -> Result<String> {
     let output = output(command)?;
-    if !output.status.success() {
-        bail!("`{}` failed: {}", shown(command), complaint(&output));
-    }
+    let (shown, why) = (shown(command), complaint(&output));
+    ensure!(output.status.success(), "`{shown}` failed: {why}");
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
@@ -43,7 +45,7 @@ pub fn reason(text: &str) -> Option<String> {
 }
 
 /// Returns the command as typed in a shell.
-pub fn shown(command: &Command) -> String {
+fn shown(command: &Command) -> String {
     let parts = std::iter::once(command.get_program()).chain(command.get_args());
     let parts: Vec<_> = parts.map(|part| part.to_string_lossy()).collect();
     parts.join(" ")

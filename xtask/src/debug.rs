@@ -2,14 +2,14 @@
 //! probe, `run` and `gdb` use the simulator.
 
 use std::ffi::OsString;
+use std::io;
 use std::net::{Ipv4Addr, TcpListener};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
+use std::process::{Command, Output};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, ensure};
 
 use crate::board::Hardware;
-use crate::error::{Missing, missing};
 use crate::group::Group;
 use crate::workspace::Workspace;
 use crate::{build, command};
@@ -22,7 +22,7 @@ const GDBS: [&str; 3] = ["arm-none-eabi-gdb", "gdb-multiarch", "gdb"];
 #[group(skip)]
 pub struct Options {
     #[command(flatten)]
-    build: build::Options,
+    given: build::Given,
 
     /// The part, as `probe-rs chip list` names it [default: that of the board]
     #[arg(long, value_name = "CHIP")]
@@ -31,10 +31,6 @@ pub struct Options {
     /// The debug probe, when there are several: VID:PID or VID:PID:SERIAL, as `probe-rs list` shows it
     #[arg(long, value_name = "SELECTOR")]
     probe: Option<String>,
-
-    /// Use this image instead of building one
-    #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
 }
 
 /// Additional options of `cargo xtask gdb`.
@@ -56,8 +52,8 @@ pub struct GdbOptions {
 /// `cargo xtask flash`.
 pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
     // Check before the build, which is useless without a probe.
-    check("probe-rs")?;
-    let elf = options.elf(workspace)?;
+    check()?;
+    let elf = options.given.elf(workspace)?;
     options.write(&elf)?;
     say!("written, verified and started: {}", elf.display());
     Ok(())
@@ -66,7 +62,7 @@ pub fn flash(workspace: &mut Workspace, options: &Options) -> Result<()> {
 /// `cargo xtask run`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     let has_probe = options.has_probe()?;
-    let elf = options.elf(workspace)?;
+    let elf = options.given.elf(workspace)?;
     if has_probe {
         return command::exec(options.probe_rs("run").arg("--verify").arg(elf));
     }
@@ -75,8 +71,8 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
 
 /// `cargo xtask attach`.
 pub fn attach(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    check("probe-rs")?;
-    let elf = options.elf(workspace)?;
+    check()?;
+    let elf = options.given.elf(workspace)?;
     command::exec(options.probe_rs("attach").arg(elf))
 }
 
@@ -92,7 +88,7 @@ pub fn gdb(workspace: &mut Workspace, options: &GdbOptions) -> Result<()> {
     )?;
     let board = &options.board;
     let has_probe = board.has_probe()?;
-    let elf = board.elf(workspace)?;
+    let elf = board.given.elf(workspace)?;
     let address = format!("127.0.0.1:{}", free_port()?);
     let mut server;
     if has_probe {
@@ -118,36 +114,33 @@ pub fn free_port() -> Result<u16> {
     Ok(listener.local_addr()?.port())
 }
 
-/// Fails with [`Missing`] when probe-rs is not installed or sees no probe.
-fn check(probe_rs: &str) -> Result<()> {
-    let Ok(list) = Command::new(probe_rs).arg("list").output() else {
-        return Err(missing(
+/// Fails when probe-rs is not installed or sees no probe.
+fn check() -> Result<()> {
+    check_list(Command::new("probe-rs").arg("list").output())
+}
+
+/// Checks the output of `probe-rs list`. If it is an error, the next call of probe-rs fails and reports it.
+fn check_list(list: io::Result<Output>) -> Result<()> {
+    let list = list.map_err(|_| {
+        anyhow!(
             "probe-rs is not installed: `cargo install probe-rs-tools --locked`, or see \
-             https://probe.rs/docs/getting-started/installation",
-        ));
-    };
-    let text = [list.stdout.as_slice(), &list.stderr].concat();
+             https://probe.rs/docs/getting-started/installation"
+        )
+    })?;
+    let text = [list.stdout, list.stderr].concat();
     let text = String::from_utf8_lossy(&text).to_lowercase();
-    if text.contains("no debug probes were found") {
-        return Err(missing(
-            "no debug probe found: connect one (ST-Link, CMSIS-DAP, J-Link) to USB; on Linux it may need the udev \
-             rules of https://probe.rs/docs/getting-started/probe-setup",
-        ));
-    }
-    if !list.status.success() {
-        bail!("`probe-rs list` failed: {}", command::complaint(&list));
-    }
+    ensure!(
+        !text.contains("no debug probes were found"),
+        "no debug probe found: connect one (ST-Link, CMSIS-DAP, J-Link) to USB; on Linux it may need the udev rules of \
+         https://probe.rs/docs/getting-started/probe-setup"
+    );
     Ok(())
 }
 
 impl Options {
-    fn elf(&self, workspace: &mut Workspace) -> Result<PathBuf> {
-        build::given(workspace, self.build.board, self.elf.as_deref())
-    }
-
     /// Returns a command of probe-rs with the options for the probe.
     fn probe_rs(&self, subcommand: &str) -> Command {
-        let part = Hardware::of(self.build.board).part.name;
+        let part = Hardware::of(self.given.board()).part.name;
         let mut command = Command::new("probe-rs");
         command.args([subcommand, "--chip", self.chip.as_deref().unwrap_or(part)]);
         if let Some(probe) = &self.probe {
@@ -159,7 +152,7 @@ impl Options {
     /// Returns the simulator with the board and an image.
     fn simulator(&self, workspace: &Workspace, elf: &Path) -> Result<Command> {
         let mut simulator = Command::new(workspace.simulator()?);
-        simulator.args(["--board", self.build.board.name, "--elf"]);
+        simulator.args(["--board", self.given.board().name, "--elf"]);
         simulator.arg(elf);
         Ok(simulator)
     }
@@ -168,8 +161,8 @@ impl Options {
     /// error when it is missing.
     fn has_probe(&self) -> Result<bool> {
         let needed = self.probe.is_some() || self.chip.is_some();
-        match check("probe-rs") {
-            Err(error) if error.is::<Missing>() && !needed => {
+        match check() {
+            Err(error) if !needed => {
                 eprintln!("xtask: using the simulator: {error:#}");
                 Ok(false)
             }
@@ -183,24 +176,26 @@ impl Options {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
+    use std::process::ExitStatus;
+
     use super::*;
-    use crate::script::program;
 
     #[test]
-    fn missing_probe_and_missing_or_failing_probe_rs_are_distinguished() {
-        let directory = tempfile::tempdir().unwrap();
-        let error = |script| {
-            let program = program(directory.path(), "probe-rs", script);
-            let error = check(&program.to_string_lossy()).unwrap_err();
-            (error.is::<Missing>(), error.to_string())
+    fn missing_probe_and_missing_probe_rs_are_distinguished() {
+        let list = |text: &str| {
+            let (status, stdout, stderr) = (ExitStatus::default(), text.into(), Vec::new());
+            check_list(Ok(Output {
+                status,
+                stdout,
+                stderr,
+            }))
         };
-        let (is_missing, text) = error("echo 'No debug probes were found.'");
-        assert!(is_missing && text.contains("connect one"), "{text}");
-        let (is_missing, text) = error("echo 'error: libusb' >&2; exit 1");
-        assert!(!is_missing && text.contains("libusb"), "{text}");
-        let error = check("/nowhere/probe-rs").unwrap_err();
-        assert!(error.is::<Missing>() && error.to_string().contains("cargo install"));
+        assert!(list("[0]: ST-Link V2 (VID: 0483, PID: 3748)").is_ok());
+        let none = list("No debug probes were found.").unwrap_err();
+        assert!(none.to_string().contains("connect one"));
+        let missing = check_list(Err(io::ErrorKind::NotFound.into())).unwrap_err();
+        assert!(missing.to_string().contains("cargo install"));
     }
 }

@@ -1,35 +1,21 @@
-//! `cargo xtask dist`: all files of a release in one directory.
-//!
-//! | file, for each board | for |
-//! |---|---|
-//! | `modio-02.elf` | a debugger, probe-rs, the simulator |
-//! | `modio-02.bin`, `modio-02.hex` | a programmer |
-//! | `modio-02.map` | addresses and sizes of what is in the image |
-//! | `modio-02.cdx.json` | the crates in the image, as a CycloneDX bill of materials |
-//!
-//! | file, for each program in [`programs`] | for |
-//! |---|---|
-//! | `modioctl-TARGET` | machines like this one |
-//! | `modioctl-TARGET.cdx.json` | the crates in the program |
-//!
-//! `modio-sim` contains the images of all boards. `modio-sim-oci.tar`, made on Linux, is the simulator as a container
-//! image. Besides, there are the licences of this project, those of the crates in the files, the section of the
-//! changelog, and `SHA256SUMS`, which is written last and has the check sums of all other files.
+//! `cargo xtask dist`: all files of a release in one directory. docs/releasing.md lists them.
 //!
 //! On Linux the same commit and the same rustc give the same bytes in any directory and at any time: see [`paths`].
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 use fs_err as fs;
-use object::Object as _;
+use object::{Object as _, ObjectSection as _};
 use register_map::Board;
 use sha2::{Digest as _, Sha256};
 
 use crate::error::usage;
+use crate::image::Elf;
+use crate::toolchain::TARGET;
 use crate::workspace::Workspace;
-use crate::{build, image};
+use crate::{build, command, image};
 
 mod hex;
 mod notices;
@@ -37,8 +23,6 @@ mod oci;
 mod paths;
 mod programs;
 mod sbom;
-
-pub use programs::host;
 
 use notices::Notices;
 use paths::Paths;
@@ -68,27 +52,24 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
     if let Some(tag) = &options.tag {
         check_tag(tag, commit::commit!())?;
     }
-    let out = match &options.out {
-        Some(out) => std::path::absolute(out)?,
-        None => {
-            let out = workspace.target().join("dist");
-            let _ = fs::remove_dir_all(&out);
-            out
-        }
-    };
+    let standard = workspace.target.join("dist");
+    if options.out.is_none() {
+        let _ = fs::remove_dir_all(&standard);
+    }
+    let out = std::path::absolute(options.out.as_ref().unwrap_or(&standard))?;
     fs::create_dir_all(&out)?;
     if fs::read_dir(&out)?.next().is_some() {
         return Err(usage(format!("{} is not empty", out.display())));
     }
     let paths = Paths::of(workspace)?;
-    let target = programs::target()?;
+    let target = programs::target(&rustc(&["--print", "host-tuple"])?);
     let workspace = &mut paths.reproducible(workspace, &target);
     let mut notices = Notices::default();
     if options.images.is_none() {
         for board in Board::ALL {
             files(workspace, board, &out, &paths, &mut notices)?;
         }
-        let root = workspace.root();
+        let root = &workspace.root;
         for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
             fs::copy(root.join(name), out.join(name))?;
         }
@@ -128,22 +109,43 @@ fn files(
     paths: &Paths,
     notices: &mut Notices,
 ) -> Result<()> {
-    let map = workspace.target().join(format!("{board}.map"));
-    let built = build::image_with_map(workspace, board, &map)?;
-    let elf = image::read(&built.elf)?;
-    let flash = image::read(&built.bin)?;
-    let entry = image::parse(&elf)?.entry() as u32;
-    let bill = sbom::of_image(workspace, board, &built, &sha256(&flash), notices)?;
+    let map = workspace.target.join(format!("{board}.map"));
+    let (built, packages) = build::linked(workspace, board, Some(&map))?;
+    let (elf, flash) = (fs::read(&built)?, fs::read(built.with_extension("bin"))?);
+    let parsed = image::parse(&elf)?;
+    let entry = parsed.entry() as u32;
+    let bill = sbom::Subject {
+        name: board.name,
+        kind: "firmware",
+        package: "firmware",
+        target: TARGET,
+        features: format!("firmware/{board}"),
+        compiled: &packages,
+        compiler: &compiler(&parsed)?,
+        sha256: sha256(&flash),
+    };
+    let bill = bill.bill(workspace, notices)?;
     for (extension, content) in [
         ("map", paths.replaced(&fs::read_to_string(map)?).into()),
         ("elf", elf),
         ("hex", hex::file(&flash, entry)?.into_bytes()),
         ("bin", flash),
-        ("cdx.json", format!("{bill:#}\n").into_bytes()),
+        ("cdx.json", bill.into_bytes()),
     ] {
         fs::write(out.join(format!("{board}.{extension}")), content)?;
     }
     Ok(())
+}
+
+/// Returns the version of the rustc that has compiled an image, from a comment in the image.
+fn compiler(elf: &Elf<'_>) -> Result<String> {
+    let comment = elf.section_by_name(".comment");
+    let comment = comment.and_then(|section| section.data().ok());
+    let comment = String::from_utf8_lossy(comment.unwrap_or_default());
+    let mut texts = comment.split('\0');
+    let version = texts.find_map(|text| text.strip_prefix("rustc version "));
+    let version = version.context("the image has no comment with its compiler")?;
+    Ok(version.to_owned())
 }
 
 /// Returns the section of a version in a changelog, without its heading.
@@ -151,29 +153,29 @@ fn section<'a>(changes: &'a str, version: &str) -> Result<&'a str> {
     let mut sections = changes.split("\n## ");
     let found = sections.find_map(|section| {
         let (heading, text) = section.split_once('\n')?;
-        (heading.split_whitespace().next() == Some(version)).then_some(text)
+        let text = text.trim_start();
+        (heading.split_whitespace().next() == Some(version) && !text.is_empty()).then_some(text)
     });
-    let text = found.with_context(|| format!("CHANGELOG.md has no section \"## {version}\""))?;
-    ensure!(
-        !text.trim().is_empty(),
-        "the section {version} of CHANGELOG.md is empty"
-    );
-    Ok(text.trim_start())
+    found.with_context(|| format!("CHANGELOG.md has no section \"## {version}\" with a text"))
 }
 
 /// Returns the sums of all files in a directory, in the order of their names, as `sha256sum` writes them.
 fn sums(directory: &Path) -> Result<String> {
-    let names: Result<Vec<_>, _> = fs::read_dir(directory)?
-        .map(|file| file.map(|file| file.file_name().to_string_lossy().into_owned()))
-        .collect();
-    let mut names = names?;
-    names.sort_unstable();
-    let mut text = String::new();
-    for name in names {
-        let sum = sha256(&fs::read(directory.join(&name))?);
-        writeln!(text, "{sum}  {name}")?;
+    let mut sums = Vec::new();
+    for file in fs::read_dir(directory)? {
+        let file = file?;
+        let name = file.file_name().to_string_lossy().into_owned();
+        sums.push((name, sha256(&fs::read(file.path())?)));
     }
-    Ok(text)
+    sums.sort_unstable();
+    let lines = sums.iter().map(|(name, sum)| format!("{sum}  {name}\n"));
+    Ok(lines.collect())
+}
+
+/// Returns what the rustc for this machine prints.
+fn rustc(arguments: &[&str]) -> Result<String> {
+    let printed = command::read(Command::new("rustc").args(arguments))?;
+    Ok(printed.trim_end().to_owned())
 }
 
 fn sha256(content: &[u8]) -> String {
@@ -204,10 +206,6 @@ mod tests {
         for absent in ["0.2", "Unreleased"] {
             assert!(section(changes, absent).is_err(), "{absent}");
         }
-    }
-
-    #[test]
-    fn changelog_has_a_section_for_this_version() {
         let changes = include_str!("../../CHANGELOG.md");
         assert!(section(changes, env!("CARGO_PKG_VERSION")).is_ok());
     }

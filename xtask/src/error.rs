@@ -10,7 +10,7 @@ pub struct Usage(String);
 /// A tool is missing on this machine: a step of `cargo xtask test` is skipped, unless in CI.
 #[derive(Debug, Error)]
 #[error("{0}")]
-pub struct Missing(pub String);
+pub struct Missing(String);
 
 /// Returns the error of a wrong argument or option.
 pub fn usage(what: impl Into<String>) -> anyhow::Error {

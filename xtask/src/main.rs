@@ -71,7 +71,7 @@ enum Command {
     /// Run the steps of CI: formatting, lints, documentation, those of `test` and longer ones
     Ci(test::Chosen),
     /// Show flash and RAM by crate and section, and what is left of the parts and the budget
-    Size(size::Options),
+    Size(build::Given),
     /// Count the instructions of every request, the processor's load, flash and RAM
     Bench(bench::Options),
     /// Build all files of a release: ELF, .bin, .hex, map, bill of materials, check sums
@@ -151,7 +151,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Docs => {
             let mut text = String::new();
             register_map::docs::write_markdown(&mut text)?;
-            let path = workspace.root().join("docs/register-map.md");
+            let path = workspace.root.join("docs/register-map.md");
             fs_err::write(&path, text)?;
             say!("wrote {}", path.display());
             Ok(())

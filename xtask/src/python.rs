@@ -29,7 +29,7 @@ pub fn environment(workspace: &Workspace, name: &str, requirements: &[&str]) -> 
 }
 
 fn made(workspace: &Workspace, name: &str, requirements: &[&str]) -> Result<PathBuf> {
-    let directory = workspace.target().join(format!("{name}-venv"));
+    let directory = workspace.target.join(format!("{name}-venv"));
     let program = if cfg!(windows) {
         "Scripts/python.exe"
     } else {
@@ -39,7 +39,7 @@ fn made(workspace: &Workspace, name: &str, requirements: &[&str]) -> Result<Path
     let mut pip = Command::new(&interpreter);
     pip.args("-m pip install --quiet --disable-pip-version-check".split(' '));
     for file in requirements {
-        pip.arg("--requirement").arg(workspace.root().join(file));
+        pip.arg("--requirement").arg(workspace.root.join(file));
     }
     // pip needs no network when the packages are already installed. It fails when there is no environment yet, and
     // after an update of Python, which has other directories.
@@ -51,6 +51,13 @@ fn made(workspace: &Workspace, name: &str, requirements: &[&str]) -> Result<Path
         command::read(&mut pip)?;
     }
     Ok(interpreter)
+}
+
+/// Returns a call of an interpreter that does not write `__pycache__` to the tree.
+pub fn python(interpreter: &Path) -> Command {
+    let mut python = Command::new(interpreter);
+    python.arg("-B");
+    python
 }
 
 /// Runs pymodbus and mbpoll as masters of the images. Without mbpoll the script leaves out the tests with it, and the
@@ -68,13 +75,13 @@ pub fn masters(workspace: &mut Workspace) -> Result<()> {
 /// Runs the tests of the simulator's page.
 pub fn page(workspace: &mut Workspace) -> Result<()> {
     let mut script = on_page(workspace, RUN)?;
-    command::run(script.arg("--tests").arg(workspace.root().join(PAGE)))
+    command::run(script.arg("--tests").arg(workspace.root.join(PAGE)))
 }
 
 /// `cargo xtask screenshots`.
 pub fn screenshots(workspace: &mut Workspace) -> Result<()> {
     let mut script = on_page(workspace, &format!("{PAGE}/screenshots.py"))?;
-    command::run(script.arg("--to").arg(workspace.root().join("docs/images")))
+    command::run(script.arg("--to").arg(workspace.root.join("docs/images")))
 }
 
 fn on_page(workspace: &mut Workspace, name: &str) -> Result<Command> {
@@ -88,20 +95,13 @@ fn on_page(workspace: &mut Workspace, name: &str) -> Result<Command> {
 }
 
 /// Returns the call of a script that tests the images in the simulator.
-fn script(workspace: &mut Workspace, python: &Path, name: &str) -> Result<Command> {
-    let mut script = Command::new(python);
-    // -B: do not write __pycache__ to the tree.
-    script.arg("-B").arg(workspace.root().join(name));
-    let (elf, elf_08) = (
-        build::image(workspace, &MODIO_02)?,
-        build::image(workspace, &MODIO_08)?,
-    );
+fn script(workspace: &mut Workspace, interpreter: &Path, name: &str) -> Result<Command> {
+    let mut script = python(interpreter);
+    script.arg(workspace.root.join(name));
+    for (option, board) in [("--elf", &MODIO_02), ("--elf-08", &MODIO_08)] {
+        script.arg(option).arg(build::image(workspace, board)?);
+    }
     script.arg("--sim").arg(workspace.simulator()?);
-    script
-        .arg("--elf")
-        .arg(elf.elf)
-        .arg("--elf-08")
-        .arg(elf_08.elf);
-    script.current_dir(workspace.root());
+    script.current_dir(&workspace.root);
     Ok(script)
 }

@@ -33,15 +33,11 @@ const DIRECTORY: &str = "renode";
 #[group(skip)]
 pub struct Options {
     #[command(flatten)]
-    build: build::Options,
+    given: build::Given,
 
-    /// The program renode, or its directory [default: $RENODE, the PATH, the usual places]
-    #[arg(long, value_name = "PATH")]
+    /// The program renode, or its directory [default: the PATH, the usual places]
+    #[arg(long, value_name = "PATH", env = "RENODE", hide_env_values = true)]
     renode: Option<PathBuf>,
-
-    /// Run this image instead of building one
-    #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
 
     /// Start the board in Renode, its line on a TCP socket, with Renode's monitor on the terminal
     #[arg(long)]
@@ -63,15 +59,15 @@ pub struct Options {
 /// `cargo xtask renode`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     // Search before the build, which is useless without Renode.
-    let renode = Renode::find_on_this_machine(options.renode.as_deref())?;
+    let renode = Renode::find(options.renode.as_deref())?;
     eprintln!("Renode {} at {}", renode.version, renode.program.display());
-    let board = options.build.board;
+    let board = options.given.board();
     let bench = Bench {
-        directory: workspace.root().join(DIRECTORY),
-        output: workspace.target().join("renode").join(board.name),
+        directory: workspace.root.join(DIRECTORY),
+        output: workspace.target.join("renode").join(board.name),
         board,
         renode,
-        elf: build::given(workspace, board, options.elf.as_deref())?,
+        elf: options.given.elf(workspace)?,
     };
     if options.interactive {
         return live::interact(&bench, options.module, options.dip, options.port);

@@ -27,7 +27,7 @@ pub fn run(
     for board in Board::ALL {
         let wanted = fittings.iter().any(|fitting| fitting.board == board);
         if wanted && options.elf_of(board).is_none() {
-            let elf = build::image(workspace, board)?.elf;
+            let elf = build::image(workspace, board)?;
             built.push(format!("--elf={}={}", board.name, elf.display()));
         }
     }

@@ -1,7 +1,7 @@
 //! `cargo xtask size`: the flash and RAM of the image, by section and by crate, and what is left of the parts and of
 //! the budget.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use register_map::Board;
@@ -19,45 +19,30 @@ pub use source::{Source, structures};
 
 const KIB: u32 = 1024;
 
-/// What to measure and how to report it.
-#[derive(clap::Args, Clone, Debug)]
-#[group(skip)]
-pub struct Options {
-    #[command(flatten)]
-    build: build::Options,
-
-    /// Measure this image instead of building one
-    #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
-
-    /// Print JSON instead of a table
-    #[arg(long)]
-    json: bool,
-}
-
 /// `cargo xtask size`. An image that exceeds a limit is an error.
-pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let board = options.build.board;
-    let elf = build::given(workspace, board, options.elf.as_deref())?;
-    let sizes = of(&elf)?;
-    let hardware = Hardware::of(board);
-    if options.json {
-        say!("{:#}", as_json(&sizes, hardware));
-    } else {
-        say!("{}", as_table(&sizes, hardware));
-    }
+pub fn run(workspace: &mut Workspace, given: &build::Given) -> Result<()> {
+    let sizes = of(&given.elf(workspace)?)?;
+    let hardware = Hardware::of(given.board());
+    say!("{}", as_table(&sizes, hardware));
     within_limits(sizes.total(), hardware)
 }
 
 /// Fails when the image does not fit the parts and the budget of a board.
 pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = build::image(workspace, board)?.elf;
+    let elf = build::image(workspace, board)?;
     within_limits(of(&elf)?.total(), Hardware::of(board))
 }
 
-/// Returns the figures of an image for a board as JSON.
-pub fn report(elf: &Path, board: &Board) -> Result<Value> {
-    Ok(as_json(&of(elf)?, Hardware::of(board)))
+/// Returns flash and RAM of an image, and of each crate.
+pub fn report(elf: &Path) -> Result<Value> {
+    let sizes = of(elf)?;
+    let crates = sizes
+        .crates
+        .iter()
+        .map(|(name, [flash, ram])| json!({ "name": name, "flash": flash, "ram": ram }));
+    let crates: Vec<_> = crates.collect();
+    let [flash, ram] = sizes.total();
+    Ok(json!({ "flash": flash, "ram": ram, "crates": crates }))
 }
 
 fn of(elf: &Path) -> Result<Sizes> {
@@ -80,25 +65,6 @@ fn within_limits([flash, ram]: Bytes, hardware: &Hardware) -> Result<()> {
 /// Returns the rest of a limit; negative when the limit is exceeded.
 fn left(limit: u32, taken: u32) -> i64 {
     i64::from(limit) - i64::from(taken)
-}
-
-fn as_json(sizes: &Sizes, hardware: &Hardware) -> Value {
-    let row = |(name, [flash, ram]): &(String, Bytes)| json!({ "name": name, "flash": flash, "ram": ram });
-    let [flash, ram] = sizes.total();
-    let limits = hardware.limits().map(|limit| {
-        json!({
-            "name": limit.name,
-            "flash": { "size": limit.flash, "left": left(limit.flash, flash) },
-            "ram": { "size": limit.ram, "left": left(limit.ram, ram) },
-        })
-    });
-    json!({
-        "flash": flash,
-        "ram": ram,
-        "sections": sizes.sections.iter().map(row).collect::<Vec<_>>(),
-        "crates": sizes.crates.iter().map(row).collect::<Vec<_>>(),
-        "limits": limits.collect::<Vec<_>>(),
-    })
 }
 
 fn as_table(sizes: &Sizes, hardware: &Hardware) -> String {

@@ -2,10 +2,12 @@
 //! fewer frames, for seconds, and with selected cases.
 
 use anyhow::Result;
-use register_map::board::MODIO_02;
 
-use crate::workspace::{ALL, Workspace};
-use crate::{build, command, test};
+use crate::test;
+use crate::workspace::Workspace;
+
+/// The options of a test run with one test, which shows its progress.
+const ONE_TEST: &str = "--nocapture --exact";
 
 /// How long to run.
 #[derive(clap::Args, Clone, Debug)]
@@ -27,36 +29,26 @@ pub struct Options {
 
 /// `cargo xtask soak`: tests `noise` and `long_run` of `tools/sim/tests/image`.
 pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
-    let frames = ("MODIO_SOAK_FRAMES", options.frames.to_string());
-    let (name, length) = match options.hours {
+    let (name, variable, length) = match options.hours {
         Some(hours) => (
             "long_run::an_input_changes_and_is_read_every_second_for_hours",
-            ("MODIO_SOAK_HOURS", hours.to_string()),
+            "MODIO_SOAK_HOURS",
+            hours.into(),
         ),
-        None => ("noise::soak", frames),
+        None => ("noise::soak", "MODIO_SOAK_FRAMES", options.frames),
     };
-    let corner = (test::CORNER, options.corner.clone());
-    one_test(workspace, "image", name, [length, corner])
+    let name = format!("{ONE_TEST} {name}");
+    let variables = [
+        (variable, &*length.to_string()),
+        (test::CORNER, &options.corner),
+    ];
+    test::simulated(workspace, "--quiet --test=image", &name, &variables)
 }
 
 /// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, the test
 /// `matrix` of `tools/conformance/tests/suite`.
 pub fn matrix(workspace: &mut Workspace) -> Result<()> {
-    let name = "matrix::every_rate_and_format_conforms";
-    let every_case = ("MODIO_MATRIX", "every case".to_owned());
-    one_test(workspace, "suite", name, [every_case])
-}
-
-fn one_test<const N: usize>(
-    workspace: &mut Workspace,
-    test: &str,
-    name: &str,
-    variables: [(&str, String); N],
-) -> Result<()> {
-    let elf = build::image(workspace, &MODIO_02)?.elf;
-    let mut cargo = workspace.cargo("test");
-    cargo.args(ALL).args(["--quiet", "--features", test::SUITE]);
-    cargo.args(["--test", test, "--"]);
-    cargo.args(["--include-ignored", "--nocapture", "--exact", name]);
-    command::run(cargo.env("MODIO_ELF", elf).envs(variables))
+    let name = format!("{ONE_TEST} matrix::every_rate_and_format_conforms");
+    let every_case = [("MODIO_MATRIX", "every case")];
+    test::simulated(workspace, "--quiet --test=suite", &name, &every_case)
 }

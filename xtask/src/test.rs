@@ -22,7 +22,7 @@ pub const CORNER: &str = "MODIO_CORNER";
 
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
 /// built twice.
-pub const SUITE: &str = "conformance/sim";
+const SUITE: &str = "conformance/sim";
 
 /// The packages of the image.
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
@@ -264,41 +264,48 @@ fn image(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
 
 fn sim(workspace: &mut Workspace) -> Result<()> {
     let tests = "--bin=modio-sim --test=command --test=image --test=image_08";
-    in_simulation(workspace, tests, "", "nominal")
+    simulated(workspace, tests, "", &[])
 }
 
 fn suite(workspace: &mut Workspace) -> Result<()> {
     let tests = "--test=suite --test=hil --test=hil_simulator";
-    in_simulation(workspace, tests, "", "nominal")
+    simulated(workspace, tests, "", &[])
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
-    in_simulation(workspace, "--test=simulator", "", "nominal")
+    simulated(workspace, "--test=simulator", "", &[])
 }
 
 fn sim_slow(workspace: &mut Workspace) -> Result<()> {
-    in_simulation(workspace, "--test=image", "", "slow")?;
-    in_simulation(workspace, "--test=image_08", OWN_OF_08, "slow")
+    sim_at(workspace, "slow")
 }
 
 fn sim_fast(workspace: &mut Workspace) -> Result<()> {
-    in_simulation(workspace, "--test=image", "", "fast")?;
-    in_simulation(workspace, "--test=image_08", OWN_OF_08, "fast")
+    sim_at(workspace, "fast")
 }
 
-/// Runs tests that run the images in the simulator at a corner of the part: those of these targets whose names contain
-/// one of `names`, or all. Spaces separate targets and names.
-fn in_simulation(workspace: &mut Workspace, targets: &str, names: &str, at: &str) -> Result<()> {
+fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
+    let corner = [(CORNER, corner)];
+    simulated(workspace, "--test=image", "", &corner)?;
+    simulated(workspace, "--test=image_08", OWN_OF_08, &corner)
+}
+
+/// Runs tests that run the images in the simulator: those of these targets whose names contain one of `names`, or all.
+/// Spaces separate targets and names. The variables choose the corner of the part, and how long a test is.
+pub fn simulated(
+    workspace: &mut Workspace,
+    targets: &str,
+    names: &str,
+    variables: &[(&str, &str)],
+) -> Result<()> {
     let mut cargo = workspace.cargo("test");
-    cargo
-        .args(ALL)
-        .args(["--no-fail-fast", "--features", SUITE]);
-    cargo
-        .args(targets.split(' '))
-        .args(["--", "--include-ignored"]);
-    cargo.args(names.split_whitespace()).env(CORNER, at);
-    cargo.env("MODIO_ELF", build::image(workspace, &MODIO_02)?.elf);
-    cargo.env("MODIO_ELF_08", build::image(workspace, &MODIO_08)?.elf);
+    cargo.args(ALL).args(["--features", SUITE]);
+    cargo.arg("--no-fail-fast").args(targets.split(' '));
+    cargo.args(["--", "--include-ignored"]);
+    cargo.args(names.split_whitespace());
+    cargo.env(CORNER, "nominal").envs(variables.iter().copied());
+    cargo.env("MODIO_ELF", build::image(workspace, &MODIO_02)?);
+    cargo.env("MODIO_ELF_08", build::image(workspace, &MODIO_08)?);
     // Tests of one package do not know the path of another package's program.
     cargo.env("MODIO_SIM", workspace.simulator()?);
     command::run(&mut cargo)

@@ -73,26 +73,19 @@ impl Way {
     }
 }
 
-/// Finds a way to compile for the target, and prints it in one line. Debian packages are only installed with `install`.
-pub fn find(root: &Path, install: bool) -> Result<Way> {
-    Machine(PathBuf::new()).find(root, install)
-}
-
-/// Makes rustup download a target for the active toolchain, unless it is installed.
-pub fn add(root: &Path, target: &str) -> Result<()> {
-    Machine(PathBuf::new()).add(root, target)
-}
-
 /// The directory of the programs that are called. An empty path stands for the PATH.
-struct Machine(PathBuf);
+#[derive(Default)]
+pub struct Machine(PathBuf);
 
 impl Machine {
     fn program(&self, name: &str) -> Command {
         Command::new(self.0.join(name))
     }
 
-    fn find(&self, root: &Path, install: bool) -> Result<Way> {
-        let Err(rustup) = self.add(root, TARGET) else {
+    /// Finds a way to compile for the target, and prints it in one line. Debian packages are only installed with
+    /// `install`.
+    pub fn find(&self, install: bool) -> Result<Way> {
+        let Err(rustup) = self.add(TARGET) else {
             eprintln!("{TARGET}: installed in the active toolchain");
             return Ok(Way::Rustup);
         };
@@ -107,15 +100,16 @@ impl Machine {
         Ok(Way::Debian)
     }
 
-    fn add(&self, root: &Path, target: &str) -> Result<()> {
+    /// Makes rustup download a target for the active toolchain, unless it is installed.
+    pub fn add(&self, target: &str) -> Result<()> {
         let mut rustc = self.program("rustc");
-        rustc.args(["--print", "target-libdir", "--target", target]);
-        let directory = command::read(rustc.current_dir(root))?;
+        let directory = ["--print", "target-libdir", "--target", target];
+        let directory = command::read(rustc.args(directory))?;
         if Path::new(directory.trim()).is_dir() {
             return Ok(());
         }
         let mut rustup = self.program("rustup");
-        rustup.args(["target", "add", target]).current_dir(root);
+        rustup.args(["target", "add", target]);
         match Group::start(rustup)?.wait(RUSTUP_LIMIT)? {
             Some(status) if status.success() => Ok(()),
             Some(_) => bail!("`rustup target add {target}` failed"),
@@ -198,7 +192,7 @@ mod tests {
         let path = directory.path();
         let packages = |version| format!("for n in 1 2 3 4 5; do echo installed {version}; done");
         let find = |rustup, dpkg_query: &str, install| {
-            let way = machine(path, rustup, dpkg_query).find(path, install);
+            let way = machine(path, rustup, dpkg_query).find(install);
             way.map_err(|error| format!("{error:#}"))
         };
         assert_eq!(find("exit 0", "exit 1", true), Ok(Way::Rustup));

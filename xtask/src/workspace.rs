@@ -1,21 +1,22 @@
 //! The project on this machine: its directories, and how cargo is called.
 
 use std::collections::BTreeMap;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use cargo_metadata::{Artifact, Message, MetadataCommand, PackageId};
 
 use crate::command;
-use crate::toolchain::{self, Way};
+use crate::toolchain::{self, Machine, Way};
 
 /// The project on this machine.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Workspace {
-    root: PathBuf,
-    target: PathBuf,
+    /// The directory of the root Cargo.toml.
+    pub root: PathBuf,
+    /// Cargo's target directory.
+    pub target: PathBuf,
     way: Option<Way>,
     /// Further arguments of every cargo.
     arguments: Vec<String>,
@@ -43,21 +44,10 @@ impl Workspace {
     /// Returns the same project with another target directory, and with further arguments of every cargo.
     pub fn with(&self, target: PathBuf, arguments: Vec<String>) -> Self {
         Self {
-            root: self.root.clone(),
             target,
             arguments,
-            ..*self
+            ..self.clone()
         }
-    }
-
-    /// The directory of the root Cargo.toml.
-    pub fn root(&self) -> &Path {
-        &self.root
-    }
-
-    /// Cargo's target directory.
-    pub fn target(&self) -> &Path {
-        &self.target
     }
 
     /// Returns cargo for the host, run at the root.
@@ -80,7 +70,7 @@ impl Workspace {
     pub fn target_cargo(&mut self, subcommand: &str) -> Result<Command> {
         let way = match self.way {
             Some(way) => way,
-            None => *self.way.insert(toolchain::find(&self.root, self.install)?),
+            None => *self.way.insert(Machine::default().find(self.install)?),
         };
         let mut cargo = way.cargo(subcommand);
         cargo.current_dir(&self.root).args(&self.arguments);
@@ -90,7 +80,7 @@ impl Workspace {
     /// Builds a program of this workspace for the host, and returns its path.
     pub fn program(&self, program: &str) -> Result<PathBuf> {
         let mut cargo = self.cargo("build");
-        cargo.args(ALL).args(["--bin", program, MESSAGES]);
+        cargo.args(ALL).args(["--bin", program]);
         executable(&artifacts(&mut cargo)?, program)
     }
 
@@ -107,23 +97,16 @@ impl Workspace {
 /// than it needs.
 pub const ALL: [&str; 2] = ["--workspace", "--ignore-rust-version"];
 
-/// The option with which cargo reports what it builds.
-pub const MESSAGES: &str = "--message-format=json-render-diagnostics";
-
-/// Runs a build of cargo with the option [`MESSAGES`], and returns its products.
+/// Runs a build of cargo, which shows its progress, and returns its products.
 pub fn artifacts(cargo: &mut Command) -> Result<Vec<Artifact>> {
-    let child = cargo.stdout(Stdio::piped()).spawn();
-    let mut child = child.map_err(|error| command::no_start(cargo, error))?;
-    let stdout = child.stdout.take().context("cargo has no output")?;
+    cargo.arg("--message-format=json-render-diagnostics");
+    let output = command::output(cargo.stderr(Stdio::inherit()))?;
+    command::succeeded(cargo, output.status)?;
     let mut artifacts = Vec::new();
-    for message in Message::parse_stream(BufReader::new(stdout)) {
+    for message in Message::parse_stream(output.stdout.as_slice()) {
         if let Message::CompilerArtifact(artifact) = message? {
             artifacts.push(artifact);
         }
-    }
-    let status = child.wait()?;
-    if !status.success() {
-        bail!("`{}` failed ({status})", command::shown(cargo));
     }
     Ok(artifacts)
 }

@@ -2,25 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use cargo_metadata::Package;
 use fs_err as fs;
 use spdx::{AdditionItem, Expression, ParseMode};
 
-use super::sbom::reference;
-use crate::command;
+use super::{rustc, sbom::reference};
 
 /// Starts of the names of files with licences, in small letters.
-const FILES: [&str; 6] = [
-    "copying",
-    "copyright",
-    "licence",
-    "license",
-    "notice",
-    "unlicense",
-];
+const FILES: &str = "copying copyright licence license notice unlicense";
 
 /// The licence of musl's libc, which programs for Linux contain.
 const MUSL: &str = include_str!("musl.txt");
@@ -30,11 +21,11 @@ const MUSL: &str = include_str!("musl.txt");
 pub struct Notices(BTreeMap<String, Package>);
 
 impl Notices {
-    /// Adds packages. Those of this project are left out.
-    pub fn note<'a>(&mut self, packages: impl Iterator<Item = &'a Package>) {
-        let others = packages.filter(|package| package.source.is_some());
-        self.0
-            .extend(others.map(|package| (reference(package), package.clone())));
+    /// Adds a package, unless it is one of this project.
+    pub fn note(&mut self, package: &Package) {
+        if package.source.is_some() {
+            self.0.insert(reference(package), package.clone());
+        }
     }
 
     /// Writes the licences of these packages, and those of Rust's standard library, which programs for a target contain
@@ -45,8 +36,8 @@ impl Notices {
             text += MUSL;
         }
         fs::write(out.join(format!("THIRD-PARTY-{target}.txt")), text)?;
-        let sysroot = command::read(Command::new("rustc").args(["--print", "sysroot"]))?;
-        let library = Path::new(sysroot.trim()).join("share/doc/rust/COPYRIGHT-library.html");
+        let sysroot = rustc(&["--print", "sysroot"])?;
+        let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
         fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
         Ok(())
     }
@@ -62,17 +53,15 @@ impl Notices {
                 texts.entry(text).or_default().insert(name);
             }
         }
-        let mut sections: Vec<(Vec<&str>, String)> = texts
+        let sections = texts
             .into_iter()
-            .map(|(text, names)| (names.into_iter().collect(), text))
-            .collect();
-        sections.sort();
+            .map(|(text, names)| (Vec::from_iter(names), text));
         let rule = "-".repeat(80);
         let mut all = format!(
             "Software of others in the files of this release, with its licences. Its sources are on crates.io.\n\
              The licences of Rust's standard library are in THIRD-PARTY-rust-std.html.\n\n{list}"
         );
-        for (names, text) in sections {
+        for (names, text) in sections.collect::<BTreeSet<_>>() {
             all += &format!("\n{rule}\n{}\n{rule}\n\n{text}\n", names.join(", "));
         }
         Ok(all)
@@ -86,32 +75,28 @@ pub fn expression(package: &Package) -> Result<Expression> {
     let license = license.with_context(|| format!("{name} names no licence"))?;
     let canonical = Expression::canonicalize(license)
         .with_context(|| format!("the licence {license:?} of {name} is not in SPDX's form"))?;
-    Ok(Expression::parse_mode(
-        canonical.as_deref().unwrap_or(license),
-        ParseMode::LAX,
-    )?)
+    let canonical = canonical.as_deref().unwrap_or(license);
+    Ok(Expression::parse_mode(canonical, ParseMode::LAX)?)
 }
 
 /// Returns the licence texts in a package, or those of SPDX when the package has none.
 fn texts_of(package: &Package) -> Result<Vec<String>> {
-    let directory = package
-        .manifest_path
-        .parent()
-        .context("a package has a directory")?;
+    let directory = package.manifest_path.parent();
     let mut found = Vec::new();
-    for file in fs::read_dir(directory)? {
+    for file in fs::read_dir(directory.context("a package has a directory")?)? {
         let file = file?;
         let name = file.file_name().to_string_lossy().to_lowercase();
-        if FILES.iter().any(|start| name.starts_with(start)) && file.file_type()?.is_file() {
+        let named = FILES.split(' ').any(|start| name.starts_with(start));
+        if named && file.file_type()?.is_file() {
             let text = fs::read_to_string(file.path())?;
             found.push(text.replace("\r\n", "\n").trim().to_owned());
         }
     }
     if found.is_empty() {
         for required in expression(package)?.requirements() {
-            let license = required.req.license.id();
-            let license = license
-                .with_context(|| format!("SPDX has no text for {}", required.req.license))?;
+            let license = &required.req.license;
+            let unknown = || format!("SPDX has no text for {license}");
+            let license = license.id().with_context(unknown)?;
             let mut text = license.text().trim().to_owned();
             if let Some(AdditionItem::Spdx(exception)) = &required.req.addition {
                 text += &format!("\n\n{}", exception.text().trim());
@@ -141,46 +126,37 @@ mod tests {
     }
 
     #[test]
-    fn texts_are_those_of_the_package_or_of_spdx() {
-        let files = [
-            ("LICENSE-MIT", "of a\r\n"),
-            ("licence.txt", "more"),
-            ("README", "no"),
-        ];
+    fn text_has_the_licences_of_others_once_and_names_their_packages() {
+        let files = [("LICENSE-MIT", "the text\r\n"), ("README", "not this")];
         let (_a, a) = package("a", "MIT/Apache-2.0", &files);
-        let mut texts = texts_of(&a).unwrap();
-        texts.sort();
-        assert_eq!(texts, ["more", "of a"]);
-        let (_b, b) = package("b", "Apache-2.0 WITH LLVM-exception", &[("Cargo.toml", "")]);
-        let [text] = texts_of(&b).unwrap().try_into().unwrap();
-        assert!(text.contains("Apache License") && text.contains("LLVM Exceptions"));
-    }
-
-    #[test]
-    fn equal_texts_appear_once_and_name_their_packages() {
-        let (_a, a) = package("a", "MIT/Apache-2.0", &[("LICENSE", "the text")]);
-        let (_b, b) = package("b", "MIT", &[("LICENSE", "the text")]);
+        let (_b, b) = package("b", "MIT", &[("licence.txt", "the text")]);
+        let (_c, c) = package("c", "Apache-2.0 WITH LLVM-exception", &[]);
         let (_own, mut own) = package("own", "MIT", &[]);
         own.source = None;
         let mut notices = Notices::default();
-        notices.note([&b, &a, &own].into_iter());
+        for package in [&b, &a, &c, &own] {
+            notices.note(package);
+        }
         let text = notices.text().unwrap();
-        assert_eq!(text.matches("the text").count(), 1, "{text}");
-        assert!(text.contains("\na@1.0.0, b@1.0.0\n"), "{text}");
+        let rule = "-".repeat(80);
+        for part in [
+            "\na@1.0.0  MIT OR Apache-2.0  crates.io\nb@1.0.0",
+            &format!("\n{rule}\na@1.0.0, b@1.0.0\n{rule}\n\nthe text\n"),
+            &format!("\n{rule}\nc@1.0.0\n{rule}\n\nApache License"),
+            "LLVM Exceptions",
+        ] {
+            assert!(text.contains(part), "{part}\nis not in\n{text}");
+        }
         assert!(
-            text.contains("\na@1.0.0  MIT OR Apache-2.0  crates.io\n"),
+            !text.contains("own@") && !text.contains("not this"),
             "{text}"
         );
-        assert!(!text.contains("own"), "{text}");
     }
 
     #[test]
     fn package_without_a_known_licence_is_refused() {
         let (_a, a) = package("a", "Foo", &[]);
         let error = expression(&a).unwrap_err().to_string();
-        assert!(
-            error.contains("a@1.0.0") && error.contains("Foo"),
-            "{error}"
-        );
+        assert!(error.contains("\"Foo\" of a@1.0.0"), "{error}");
     }
 }

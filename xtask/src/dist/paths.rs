@@ -5,12 +5,11 @@
 //! cargo does not compile again when only these replacements change.
 
 use std::path::PathBuf;
-use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use serde_json::json;
 
-use crate::command;
+use super::rustc;
 use crate::toolchain::TARGET;
 use crate::workspace::Workspace;
 
@@ -21,8 +20,7 @@ pub struct Paths(Vec<(PathBuf, String)>);
 impl Paths {
     /// Returns the directories of the sources, the target directory, and those of cargo and of the toolchain.
     pub fn of(workspace: &Workspace) -> Result<Self> {
-        let rustc = |arguments: &[&str]| command::read(Command::new("rustc").args(arguments));
-        let sysroot = PathBuf::from(rustc(&["--print", "sysroot"])?.trim());
+        let sysroot = PathBuf::from(rustc(&["--print", "sysroot"])?);
         let version = rustc(&["-vV"])?;
         let commit = version
             .lines()
@@ -36,7 +34,7 @@ impl Paths {
                 sysroot.join("lib/rustlib/src/rust"),
                 format!("/rustc/{}", commit.unwrap_or("unknown")),
             ),
-            (workspace.root().to_owned(), "/modio".to_owned()),
+            (workspace.root.to_owned(), "/modio".to_owned()),
             (directory(workspace), "/modio/target".to_owned()),
         ]))
     }
@@ -75,7 +73,7 @@ impl Paths {
 
 /// The target directory of the builds of a release.
 fn directory(workspace: &Workspace) -> PathBuf {
-    workspace.target().join("release-files")
+    workspace.target.join("release-files")
 }
 
 #[cfg(test)]

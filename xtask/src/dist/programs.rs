@@ -4,7 +4,6 @@
 //! On Linux they are linked with musl, so that they need no library of the system and run on every distribution.
 
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Context as _, Result, ensure};
 use fs_err as fs;
@@ -12,9 +11,10 @@ use object::build::elf::Builder;
 use register_map::Board;
 
 use super::notices::Notices;
-use super::{oci, sbom, sha256};
-use crate::workspace::{self, MESSAGES, Workspace};
-use crate::{command, image, toolchain};
+use super::{oci, rustc, sbom, sha256};
+use crate::image;
+use crate::toolchain::Machine;
+use crate::workspace::{self, Workspace};
 
 /// Packages, and their programs.
 const PROGRAMS: [(&str, &str); 4] = [
@@ -35,7 +35,7 @@ pub fn files(
     out: &Path,
     notices: &mut Notices,
 ) -> Result<()> {
-    let inside = workspace.target().join("images");
+    let inside = workspace.target.join("images");
     // Images of an earlier build would be included as well.
     let _ = fs::remove_dir_all(&inside);
     fs::create_dir_all(&inside)?;
@@ -44,73 +44,48 @@ pub fn files(
         let elf = stripped(&image::read(&images.join(&name))?)?;
         fs::write(inside.join(name), elf)?;
     }
-    toolchain::add(workspace.root(), target)?;
+    Machine::default().add(target)?;
     let mut cargo = workspace.cargo("build");
-    cargo.args(["--ignore-rust-version", "--profile", "tool", MESSAGES]);
+    cargo.args(["--ignore-rust-version", "--profile", "tool"]);
     cargo.args(["--target", target, "--target-dir"]);
-    cargo.arg(workspace.target());
+    cargo.arg(&workspace.target);
     for (package, program) in PROGRAMS {
         cargo.args(["--package", package, "--bin", program]);
     }
     // The variable that tools/sim/build.rs reads.
     cargo.env("MODIO_SIM_IMAGES", &inside);
     let artifacts = workspace::artifacts(&mut cargo)?;
-    let compiled = workspace::packages(&artifacts, &workspace.target().join(target));
+    let compiled = workspace::packages(&artifacts, &workspace.target.join(target));
+    let version = rustc(&["--version"])?;
     for (package, program) in PROGRAMS {
-        let content = fs::read(workspace::executable(&artifacts, program)?)?;
+        let built = workspace::executable(&artifacts, program)?;
+        let content = fs::read(&built)?;
         let name = format!("{program}-{target}");
-        let bill = sbom::of_program(
-            workspace,
+        let subject = sbom::Subject {
+            name: program,
+            kind: "application",
+            package,
             target,
-            (package, program),
-            &compiled,
-            &sha256(&content),
-            notices,
-        )?;
-        fs::write(out.join(format!("{name}.cdx.json")), format!("{bill:#}\n"))?;
+            features: String::new(),
+            compiled: &compiled,
+            compiler: version.trim_start_matches("rustc "),
+            sha256: sha256(&content),
+        };
+        let bill = subject.bill(workspace, notices)?;
+        fs::write(out.join(format!("{name}.cdx.json")), bill)?;
         if let Some((processor, _)) = target.split_once("-unknown-linux-")
             && program == SIMULATOR
         {
             let archive = oci::archive(&content, processor)?;
             fs::write(out.join("modio-sim-oci.tar"), archive)?;
         }
-        let file = out.join(name + std::env::consts::EXE_SUFFIX);
-        fs::write(&file, content)?;
-        executable(&file)?;
+        fs::copy(built, out.join(name + std::env::consts::EXE_SUFFIX))?;
     }
     Ok(())
 }
 
-/// Makes a file executable.
-#[cfg(unix)]
-fn executable(file: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
-    Ok(fs::set_permissions(
-        file,
-        std::fs::Permissions::from_mode(0o755),
-    )?)
-}
-
-#[cfg(not(unix))]
-fn executable(_: &Path) -> Result<()> {
-    Ok(())
-}
-
-/// Returns the target of this machine.
-pub fn host() -> Result<String> {
-    let version = command::read(Command::new("rustc").arg("-vV"))?;
-    let host = version.lines().find_map(|line| line.strip_prefix("host: "));
-    Ok(host
-        .context("rustc does not report the target of this machine")?
-        .to_owned())
-}
-
-/// Returns the target for which programs for machines like this one are built.
-pub fn target() -> Result<String> {
-    Ok(target_of(&host()?))
-}
-
-fn target_of(host: &str) -> String {
+/// Returns the target for which programs for machines like `host` are built.
+pub fn target(host: &str) -> String {
     match host.split_once("-unknown-linux-") {
         Some((processor, _)) => format!("{processor}-unknown-linux-musl"),
         None => host.to_owned(),
@@ -144,37 +119,31 @@ mod tests {
 
     #[test]
     fn program_for_linux_needs_no_library_of_the_system() {
-        for (host, target) in [
+        for (host, expected) in [
             ("aarch64-unknown-linux-gnu", "aarch64-unknown-linux-musl"),
             ("x86_64-pc-windows-msvc", "x86_64-pc-windows-msvc"),
             ("aarch64-apple-darwin", "aarch64-apple-darwin"),
         ] {
-            assert_eq!(target_of(host), target);
+            assert_eq!(target(host), expected);
         }
     }
 
     #[test]
     fn stripped_image_loses_its_debug_information_only() {
-        let elf = image::sample::elf(
-            &[image::sample::code(image::FLASH_BASE, &[1, 2, 3, 4])],
-            &[],
-        );
-        let mut builder = Builder::read32(&*elf).unwrap();
-        let debug = builder.sections.add();
-        debug.name = b".debug_info"[..].into();
-        debug.sh_type = object::elf::SHT_PROGBITS;
-        debug.sh_addralign = 1;
-        debug.data = object::build::elf::SectionData::Data(vec![7; 5000].into());
-        builder.set_section_sizes();
-        let mut with_debug = Vec::new();
-        builder.write(&mut with_debug).unwrap();
-        let has_debug = |elf: &[u8]| {
+        let code = image::sample::code(image::FLASH_BASE, &[1, 2, 3, 4]);
+        let elf = image::sample::elf(&[code], &[("main", image::FLASH_BASE, 4)]);
+        let names = |elf: &[u8]| {
             let elf = image::parse(elf).unwrap();
-            let mut sections = elf.sections();
-            sections.any(|section| section.name() == Ok(".debug_info") && section.size() > 0)
+            let names = elf
+                .sections()
+                .map(|section| section.name().unwrap().to_owned());
+            names.collect::<Vec<_>>()
         };
-        assert!(has_debug(&with_debug));
-        let stripped = stripped(&with_debug).unwrap();
-        assert!(!has_debug(&stripped) && stripped.len() < with_debug.len() - 5000);
+        let (before, after) = (names(&elf), names(&stripped(&elf).unwrap()));
+        assert_eq!(
+            before,
+            [".text", ".debug_str", ".symtab", ".strtab", ".shstrtab"]
+        );
+        assert_eq!(after, [".text", ".symtab", ".strtab", ".shstrtab"]);
     }
 }

@@ -1,6 +1,7 @@
 //! Small images for tests.
 
-use object::elf;
+use object::build::elf::{Builder, SectionData};
+use object::{Endianness, elf};
 
 /// A load segment, which is a section at the same time: load address, run address, data, size in memory.
 pub type Segment<'a> = (u32, u32, &'a [u8], u32);
@@ -13,61 +14,53 @@ pub fn code(address: u32, data: &[u8]) -> Segment<'_> {
     (address, address, data, data.len() as u32)
 }
 
-/// Returns an ELF file for an Arm core with these contents: header, program headers, data, section headers.
+/// Returns an ELF file with these contents, and with a section of debug information.
 pub fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
-    let count = segments.len() as u32;
-    let start = 52 + 32 * count;
-    let mut data: Vec<u8> = Vec::new();
-    let mut put = |bytes: &[u8]| {
-        let at = start + data.len() as u32;
-        data.extend(bytes);
-        data.resize(data.len().next_multiple_of(4), 0);
-        at
-    };
-    let (mut programs, mut sections) = (Vec::new(), vec![0; 10]);
-    for &(load, run, bytes, size) in segments {
-        let at = put(bytes);
-        // Offsets of names in `.shstrtab`.
-        let (name, kind) = match (bytes.is_empty(), load == run) {
-            (true, _) => (1, elf::SHT_NOBITS),
-            (false, true) => (6, elf::SHT_PROGBITS),
-            (false, false) => (12, elf::SHT_PROGBITS),
+    let mut file = Builder::new(Endianness::Little, false);
+    file.header.e_machine = elf::EM_ARM;
+    file.header.e_phoff = file.file_header_size() as u64;
+    let mut offset = file.header.e_phoff + 32 * segments.len() as u64;
+    for &(load, run, data, size) in segments {
+        let section = file.sections.add();
+        let (name, kind) = match (data.is_empty(), load == run) {
+            (true, _) => (".bss", elf::SHT_NOBITS),
+            (false, true) => (".text", elf::SHT_PROGBITS),
+            (false, false) => (".data", elf::SHT_PROGBITS),
         };
-        programs.extend([elf::PT_LOAD, at, run, load, bytes.len() as u32, size, 0, 1]);
-        sections.extend([name, kind, elf::SHF_ALLOC, run, at, size, 0, 0, 1, 0]);
-    }
-    let (mut table, mut names) = (vec![0; 4], vec![0]);
-    for &(name, address, size) in symbols {
-        let inside = |&(_, run, _, size): &Segment| address.wrapping_sub(run) < size;
-        let segment = segments.iter().position(inside).expect("a segment");
-        let function = address & 1 == 1;
-        let kind = if function {
-            elf::STT_FUNC
-        } else {
-            elf::STT_OBJECT
+        (section.name, section.sh_type) = (name.into(), kind);
+        (section.sh_flags, section.sh_addralign) = (elf::SHF_ALLOC.into(), 1);
+        (section.sh_addr, section.sh_offset) = (run.into(), offset);
+        section.sh_size = size.into();
+        section.data = match kind {
+            elf::SHT_NOBITS => SectionData::UninitializedData(size.into()),
+            _ => SectionData::Data(data.into()),
         };
-        let info = u32::from(elf::STB_GLOBAL << 4 | kind) | (segment as u32 + 1) << 16;
-        table.extend([names.len() as u32, address, size, info]);
-        names.extend(name.bytes().chain([0]));
+        let segment = file.segments.add();
+        segment.p_type = elf::PT_LOAD;
+        segment.append_section_range(section);
+        segment.sections.push(section.id());
+        (segment.p_paddr, segment.p_filesz) = (load.into(), data.len() as u64);
+        offset += data.len() as u64;
     }
-    let shared = b"\0.bss\0.text\0.data\0.symtab\0.strtab\0.shstrtab\0";
-    for (name, kind, bytes, link, entry) in [
-        (18, elf::SHT_SYMTAB, words(&table), count + 2, 16),
-        (26, elf::SHT_STRTAB, names, 0, 0),
-        (34, elf::SHT_STRTAB, shared.to_vec(), 0, 0),
+    for (name, data) in [
+        (".debug_str", SectionData::Data(vec![7; 50].into())),
+        (".symtab", SectionData::Symbol),
+        (".strtab", SectionData::String),
+        (".shstrtab", SectionData::SectionString),
     ] {
-        let at = put(&bytes);
-        sections.extend([name, kind, 0, 0, at, bytes.len() as u32, link, 1, 1, entry]);
+        let section = file.sections.add();
+        (section.name, section.data) = (name.into(), data);
+        (section.sh_type, section.sh_addralign) = (elf::SHT_PROGBITS, 1);
     }
-    let place = put(&[]);
-    // 32 bits, little-endian; an executable for Arm; then places, sizes and numbers of the headers.
-    let (arm, programs_of, sections_of) = (40 << 16 | 2, 32 << 16 | 52, 40 << 16 | count);
-    let end = (count + 3) << 16 | (count + 4);
-    let mut file = words(&[0x464C457F, 0x00010101, 0, 0, arm, 1, 0, 52, place, 0]);
-    file.extend(words(&[programs_of, sections_of, end]));
-    [file, words(&programs), data, words(&sections)].concat()
-}
-
-fn words(words: &[u32]) -> Vec<u8> {
-    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    for &(name, address, size) in symbols {
+        let symbol = file.symbols.add();
+        let kind = [elf::STT_OBJECT, elf::STT_FUNC][address as usize & 1];
+        symbol.set_st_info(elf::STB_GLOBAL, kind);
+        (symbol.name, symbol.st_shndx) = (name.into(), elf::SHN_ABS);
+        (symbol.st_value, symbol.st_size) = (address.into(), size.into());
+    }
+    file.set_section_sizes();
+    let mut bytes = Vec::new();
+    file.write(&mut bytes).unwrap();
+    bytes
 }

@@ -4,9 +4,7 @@
 //!
 //! Tests of this package (`platform`) check the platform and the scripts.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use register_map::{Board, Module, configuration, record};
@@ -21,39 +19,25 @@ const CHECKS: &str = "renode/checks";
 
 /// Checks the models, the image on them, and in a dry run the suites.
 pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = build::image(workspace, board)?.elf;
+    let elf = build::image(workspace, board)?;
     let python = python(workspace)?;
-    let presets = presets();
-    let tests: [(&str, &[&OsStr]); 6] = [
-        ("test_syntax.py", &[]),
-        ("test_models.py", &[]),
-        ("test_commands.py", &[presets.as_ref()]),
-        ("test_terminal_tester.py", &[]),
-        ("test_exact_line.py", &[]),
-        ("test_boot.py", &[board.name.as_ref(), elf.as_os_str()]),
-    ];
-    for (test, arguments) in tests {
-        let test = workspace.root().join(CHECKS).join(test);
-        // -B: do not write __pycache__ to the tree.
-        let mut python = Command::new(&python);
-        command::run(python.arg("-B").arg(test).args(arguments))?;
-    }
+    let mut tests = python::python(&python);
+    tests.args(["-m", "unittest", "discover", "--start-directory"]);
+    tests.arg(workspace.root.join(CHECKS));
+    tests.env("MODIO_BOARD", board.name).env("MODIO_ELF", elf);
+    command::run(tests.env("MODIO_PRESETS", presets()))?;
     robot(workspace, &python, board, &["--dryrun"])
 }
 
 /// Runs the suites against the image in the simulator, which takes minutes.
 pub fn suites(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
-    let elf = format!("ELF:{}", build::image(workspace, board)?.elf.display());
     let python = python(workspace)?;
-    let simulator = format!("SIMULATOR:{}", workspace.simulator()?.display());
-    let excluded = ["--exclude", "renode-only"];
-    let variables = ["--variable", &simulator, "--variable", &elf];
-    robot(
-        workspace,
-        &python,
-        board,
-        &[&excluded[..], &variables].concat(),
-    )
+    let elf = build::image(workspace, board)?;
+    let elf = format!("--variable=ELF:{}", elf.display());
+    let simulator = workspace.simulator()?;
+    let simulator = format!("--variable=SIMULATOR:{}", simulator.display());
+    let options = ["--exclude=renode-only", &simulator, &elf];
+    robot(workspace, &python, board, &options)
 }
 
 /// Returns the interpreter of an environment with Robot Framework and Unicorn.
@@ -68,21 +52,14 @@ fn presets() -> String {
     let mut presets = Vec::new();
     for board in Board::ALL {
         let mut add = |modules: &[(u16, Module)]| {
-            let names = modules
-                .iter()
-                .map(|(port, module)| format!("{port}={module}"));
+            let names = modules.iter().map(|(port, name)| format!("{port}={name}"));
             let names = names.collect::<Vec<_>>().join(",");
             let mut page = [0xFF; 256];
             let pairs: Vec<_> = configuration::modules(modules.iter().copied()).collect();
             // A setting for each slot must fit.
             let length = record::encode_page(0, &pairs, &mut page).unwrap_or_default();
-            let hex = page[..length].iter().map(|byte| format!("{byte:02x}"));
-            presets.push(json!([
-                board.name,
-                names,
-                board.store.first,
-                hex.collect::<String>()
-            ]));
+            let page = &page[..length];
+            presets.push(json!([board.name, names, board.store.first, page]));
         };
         for module in Module::ALL {
             board.ports().for_each(|port| add(&[(port, module)]));
@@ -95,19 +72,12 @@ fn presets() -> String {
 
 /// Runs Robot Framework on the suites as renode-test does, with the project's keywords instead of Renode's.
 fn robot(workspace: &Workspace, python: &Path, board: &Board, options: &[&str]) -> Result<()> {
-    let output = workspace.target().join("renode-checks");
-    let mut robot = Command::new(python);
-    robot.args([
-        "-B",
-        "-m",
-        "robot",
-        "--console",
-        "quiet",
-        "--prerunmodifier",
-    ]);
-    robot.arg(workspace.root().join(CHECKS).join("AsRenodeTest.py"));
+    let output = workspace.target.join("renode-checks");
+    let mut robot = python::python(python);
+    robot.args("-m robot --console quiet --prerunmodifier".split(' '));
+    robot.arg(workspace.root.join(CHECKS).join("AsRenodeTest.py"));
     robot.arg("--outputdir").arg(&output).args(options);
     robot.args(["--variable", &format!("BOARD_NAME:{board}")]);
-    robot.args(all(&workspace.root().join(DIRECTORY), board)?);
+    robot.args(all(&workspace.root.join(DIRECTORY), board)?);
     command::run(&mut robot).with_context(|| format!("see {}", output.join("log.html").display()))
 }

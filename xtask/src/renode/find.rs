@@ -1,7 +1,6 @@
 //! Finds Renode on this machine and checks its version.
 
 use std::env;
-use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -39,7 +38,7 @@ pub struct Renode {
 }
 
 /// Returns the directories of the PATH, followed by the usual directories of Renode.
-fn places() -> Result<OsString> {
+fn places() -> Vec<PathBuf> {
     let path = env::var_os("PATH").unwrap_or_default();
     let mut places: Vec<PathBuf> = env::split_paths(&path).collect();
     places.extend(USUAL.map(PathBuf::from));
@@ -51,47 +50,36 @@ fn places() -> Result<OsString> {
     // The directories that Renode's manual suggests for the portable archive.
     let home = env::home_dir().into_iter();
     places.extend(home.flat_map(|home| [home.join("renode_portable"), home.join("renode")]));
-    Ok(env::join_paths(places)?)
+    places
 }
 
 /// Searches directories for a program of one of these names.
-fn search(names: &[&str], path: &OsStr) -> Option<PathBuf> {
-    let found = |name| which::which_in(name, Some(path), ".").ok();
+fn search(names: &[&str], directories: Vec<PathBuf>) -> Option<PathBuf> {
+    let path = env::join_paths(directories).ok()?;
+    let found = |name| which::which_in(name, Some(&path), ".").ok();
     names.iter().find_map(found)
 }
 
 impl Renode {
-    /// Finds Renode at the place that the user `asked` for, else by `$RENODE`, the PATH, and the usual places.
-    pub fn find_on_this_machine(asked: Option<&Path>) -> Result<Self> {
-        let variable = env::var_os("RENODE").filter(|value| !value.is_empty());
-        Self::find(asked, variable.as_ref().map(Path::new), &places()?)
-    }
-
-    pub fn find(asked: Option<&Path>, variable: Option<&Path>, path: &OsStr) -> Result<Self> {
-        let by = if asked.is_some() {
-            "--renode"
-        } else {
-            "$RENODE"
-        };
-        let program = if let Some(place) = asked.or(variable) {
-            let path = env::join_paths([place.to_owned(), place.join("Contents/MacOS")])?;
+    /// Finds Renode at the place that the user `asked` for, else on the PATH and at the usual places.
+    pub fn find(asked: Option<&Path>) -> Result<Self> {
+        let program = if let Some(place) = asked {
+            let directories = vec![place.to_owned(), place.join("Contents/MacOS")];
             let file = place.is_file().then(|| place.to_owned());
-            let wrong = || usage(format!("{by}: there is no Renode at {}", place.display()));
-            file.or_else(|| search(&NAMES, &path)).ok_or_else(wrong)?
+            file.or_else(|| search(&NAMES, directories))
+                .ok_or_else(|| usage(format!("there is no Renode at {}", place.display())))?
         } else {
-            let found = search(&NAMES, path);
-            found.with_context(|| format!("Renode is not installed: {GET_IT}"))?
+            search(&NAMES, places())
+                .with_context(|| format!("Renode is not installed: {GET_IT}"))?
         };
         let program = std::path::absolute(program)?;
         let output = command::output(Command::new(&program).arg("--version"))?;
         let text = [output.stdout.as_slice(), &output.stderr].concat();
-        let shown = program.display();
         let version = version(&String::from_utf8_lossy(&text)).with_context(|| {
-            format!(
-                "{shown} does not report its version: {}",
-                command::complaint(&output)
-            )
+            let (program, why) = (program.display(), command::complaint(&output));
+            format!("{program} does not report its version: {why}")
         })?;
+        let shown = program.display();
         ensure!(
             version >= OLDEST,
             "Renode {version} at {shown} is too old: {GET_IT}"
@@ -103,13 +91,12 @@ impl Renode {
     pub fn tester(&self) -> Result<PathBuf> {
         // A link in a directory of the PATH points to the directory that has both programs. On Windows the program may
         // be in a subdirectory of the scripts' directory.
-        let linked = self.program.canonicalize().unwrap_or_default();
-        let programs = [&self.program, &linked].into_iter();
-        let beside = programs.flat_map(|program| program.ancestors().skip(1).take(2));
-        let mut path = env::join_paths(beside.filter(|place| !place.as_os_str().is_empty()))?;
-        path.push(if cfg!(windows) { ";" } else { ":" });
-        path.push(places()?);
-        search(&["renode-test"], &path).with_context(|| {
+        let programs = [self.program.clone(), self.program.canonicalize()?];
+        let beside = programs
+            .iter()
+            .flat_map(|program| program.ancestors().skip(1).take(2));
+        let beside = beside.map(Path::to_owned).chain(places());
+        search(&["renode-test"], beside.collect()).with_context(|| {
             let program = self.program.display();
             format!("there is no renode-test beside {program}: install the whole package or archive of Renode")
         })

@@ -13,15 +13,8 @@ use crate::image::{self, RAM_BASE};
 /// Bytes of a section that no symbol covers: constants without a name, and padding.
 const UNNAMED: &str = "(unnamed constants, padding)";
 
-/// Start-up code, exception vectors and interrupt handlers, which have the names of the linker script or of the
-/// hardware.
+/// Start-up code, exception vectors and interrupt handlers: symbols whose names are no Rust paths.
 const NAMED: &str = "(vectors, handlers, start-up)";
-
-/// Starts of the names of the functions that the compiler calls, in crate `compiler_builtins`.
-const BUILTINS: [&str; 4] = ["__aeabi_", "mem", "__rust_", "bcmp"];
-
-/// More bytes than any microcontroller has of a memory.
-const LARGEST: u32 = 16 * 1024 * 1024;
 
 /// Bytes of flash, including initial values of variables, and bytes of RAM, without the stack.
 pub type Bytes = [u32; 2];
@@ -57,8 +50,7 @@ pub fn measure(bytes: &[u8]) -> Result<Sizes> {
         if flags & SHF_ALLOC == 0 || size == 0 {
             continue;
         }
-        let end = start.checked_add(size).filter(|_| size <= LARGEST);
-        let end = end.with_context(|| format!("the image is broken: a section of {size} bytes"))?;
+        let end = start.saturating_add(size);
         let in_file = u32::from(header.sh_type(endian) != SHT_NOBITS);
         let in_ram = u32::from(start >= RAM_BASE);
         let taken = |size: u32| [in_file * size, in_ram * size];
@@ -105,20 +97,13 @@ fn share(start: u32, size: u32, owned: Vec<(u32, u32, String)>) -> BTreeMap<Stri
 /// Returns the crate of a symbol, from its name: the first crate in the path. For `<type as trait>` it is that of the
 /// type, or where the type has no crate (`&str`, `u32`, `[T]`) that of the trait.
 fn owner(symbol: &str) -> String {
-    let Ok(path) = rustc_demangle::try_demangle(symbol) else {
-        let builtin = BUILTINS.iter().any(|prefix| symbol.starts_with(prefix));
-        return if builtin { "compiler_builtins" } else { NAMED }.to_owned();
-    };
-    // Leave out the hash, or the crate's disambiguator.
-    let path = format!("{path:#}");
+    // Without the hash, or the crate's disambiguator.
+    let path = format!("{:#}", rustc_demangle::demangle(symbol));
     let outside = |c: char| !c.is_alphanumeric() && c != '_';
-    let first = path
-        .split_once("::")
-        .and_then(|(first, _)| first.rsplit(outside).next());
-    first
-        .filter(|name| !name.is_empty())
-        .unwrap_or(NAMED)
-        .to_owned()
+    let first = path.split_once("::").map(|(first, _)| first);
+    let name = first.and_then(|first| first.rsplit(outside).next());
+    let name = name.filter(|name| !name.is_empty());
+    name.unwrap_or(NAMED).to_owned()
 }
 
 #[cfg(test)]
@@ -161,13 +146,6 @@ mod tests {
     }
 
     #[test]
-    fn damaged_image_is_refused() {
-        let bss = (RAM_BASE, RAM_BASE, &[][..], LARGEST + 1);
-        assert!(measure(&elf(&[bss], &[])).is_err());
-        assert!(measure(b"\x7fELF").is_err());
-    }
-
-    #[test]
     fn owner_is_the_first_crate_in_the_name() {
         for (symbol, name) in [
             (FUNCTION, "modbus_server"),
@@ -180,7 +158,6 @@ mod tests {
                 "_ZN40_$LT$u32$u20$as$u20$core..fmt..Debug$GT$3fmt17h0123456789abcdefE",
                 "core",
             ),
-            ("__aeabi_memcpy4", "compiler_builtins"),
             ("USART1", NAMED),
         ] {
             assert_eq!(owner(symbol), name);
