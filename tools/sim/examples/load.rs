@@ -1,7 +1,7 @@
 //! Measures the load of virtual boards: the share of a host core that they need to keep real time.
 //!
 //! ```text
-//! cargo run --release --ignore-rust-version -p sim --example load -- IMAGE [BOARDS [SECONDS]]
+//! cargo run --release --ignore-rust-version -p sim --example load -- IMAGE [BOARDS [SECONDS]] [--lora]
 //! ```
 //!
 //! Each line of the table has two measurements of the same boards, one after the other. The first one contains most of
@@ -16,6 +16,7 @@ use modbus_frames::adu::Framing;
 use register_map::configuration;
 use sim::board::MODIO_02;
 use sim::line::Settings;
+use sim::radio::Parameters;
 use sim::{Board, Bus, Config, Image, Module, Time};
 
 #[derive(clap::Parser)]
@@ -30,6 +31,10 @@ struct Arguments {
     /// Virtual time of each measurement, in seconds
     #[arg(default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=3600))]
     seconds: u64,
+
+    /// Fit every board with a LoRa module, which is idle
+    #[arg(long)]
+    lora: bool,
 }
 
 /// How the master polls the boards in turn.
@@ -46,6 +51,7 @@ fn main() -> Result<(), String> {
     let arguments = Arguments::parse();
     let image = Image::read(&arguments.image).map_err(|error| error.to_string())?;
     let (boards, span) = (arguments.boards, arguments.seconds);
+    let radio = arguments.lora.then_some(Parameters::FACTORY);
     println!("                                        first {span} s              next {span} s");
     println!(
         "boards  baud    master                   of a core  of time   of a core  of time  replies"
@@ -58,14 +64,20 @@ fn main() -> Result<(), String> {
         (boards, 19_200, Master::EverySecond),
         (boards, 19_200, Master::NoPause),
     ] {
-        report(&image, boards, baud, master, Time::from_secs(span))?;
+        report(&image, (boards, radio), baud, master, Time::from_secs(span))?;
     }
     Ok(())
 }
 
 /// Measures boards on one line from their start on, and prints a line of the table.
-fn report(image: &Image, boards: u8, baud: u32, master: Master, span: Time) -> Result<(), String> {
-    let mut bus = bus(image, boards, baud).map_err(|error| error.to_string())?;
+fn report(
+    image: &Image,
+    (boards, radio): (u8, Option<Parameters>),
+    baud: u32,
+    master: Master,
+    span: Time,
+) -> Result<(), String> {
+    let mut bus = bus(image, boards, radio, baud).map_err(|error| error.to_string())?;
     for unit in 1..=boards {
         if !poll(&mut bus, unit) {
             return Err(format!("unit {unit} does not answer"));
@@ -135,13 +147,14 @@ fn measure(bus: &mut Bus, boards: u8, master: Master, span: Time) -> Load {
 }
 
 /// Boards on one line with the addresses 1 and up and a 4DI each. Their firmware has started.
-fn bus(image: &Image, boards: u8, baud: u32) -> Result<Bus, sim::Error> {
+fn bus(image: &Image, boards: u8, radio: Option<Parameters>, baud: u32) -> Result<Bus, sim::Error> {
     let settings: Vec<_> = configuration::modules([(MODIO_02.slots[0].port, Module::Di4)])
         .chain([(configuration::BAUD, (baud / 100) as u16)])
         .collect();
     let boards = (1..=boards).map(|dip| {
         let config = Config {
             dip,
+            radio,
             flash: MODIO_02.flash_with(&settings),
             ..Config::default()
         };

@@ -1,9 +1,10 @@
-//! Operates and reads a modio board: its DIP switch, slots, LEDs and line.
+//! Operates and reads a modio board: its DIP switch, slots, LEDs, line and LoRa module.
 
 use register_map::Module;
 
 use super::{Board, Error, Layout};
 use crate::line::Line;
+use crate::radio::{self, Air};
 use crate::slot::{BusFault, Channel, Slot};
 
 /// The three LEDs; `true` = lit.
@@ -170,5 +171,37 @@ impl Board {
     pub fn line(&mut self) -> &mut Line {
         self.sync();
         &mut self.machine.bus.soc.circuit.line
+    }
+
+    /// The LoRa module; `None` if the board has none.
+    #[must_use]
+    pub fn radio(&self) -> Option<&radio::Module> {
+        self.circuit().radio.as_ref().map(|radio| &radio.module)
+    }
+
+    /// Changes the LoRa module at this instant. The part sees the change immediately. `None` if the board has no module.
+    pub fn change_radio<T>(&mut self, action: impl FnOnce(&mut radio::Module) -> T) -> Option<T> {
+        self.change(|circuit| {
+            circuit
+                .radio
+                .as_mut()
+                .map(|radio| action(&mut radio.module))
+        })
+    }
+
+    /// Causes or ends a fault of the LoRa module at this instant. Does nothing if the board has no module.
+    pub fn set_radio_fault(&mut self, fault: radio::Fault) {
+        self.change_radio(|module| module.set_fault(fault));
+    }
+
+    /// The air with the gateway radio. `None` if the board has no LoRa module, or is on a bus with other boards: see
+    /// [`Bus::air`](crate::Bus::air).
+    pub fn air(&mut self) -> Option<&mut Air> {
+        self.sync();
+        let now = self.now();
+        let radio = self.machine.bus.soc.circuit.radio.as_mut();
+        let air = radio.and_then(|radio| radio.air.as_mut())?;
+        air.set_earliest(now);
+        Some(air)
     }
 }

@@ -5,11 +5,9 @@
 
 use crate::periph::gpio::{Drive, Gpio};
 use crate::periph::usart::{Sent, TxPin, Wire};
-use crate::radio::{Air, Fault, Module, Parameters, Sender, tell};
+use crate::radio::{Air, Module, Parameters, Sender, tell};
 use crate::soc::{Pin, Pins};
 use crate::time::Time;
-
-use super::Board;
 
 /// Pins of the LoRa module, besides those of USART3.
 #[derive(Clone, Copy, Debug)]
@@ -171,39 +169,5 @@ impl Wire for Radio {
             (true, true) => Drive::High,
             (true, false) => Drive::Low,
         }
-    }
-}
-
-impl Board {
-    /// The LoRa module; `None` if the board has none.
-    #[must_use]
-    pub fn radio(&self) -> Option<&Module> {
-        self.circuit().radio.as_ref().map(|radio| &radio.module)
-    }
-
-    /// Changes the LoRa module at this instant. The part sees the change immediately. `None` if the board has no module.
-    pub fn change_radio<T>(&mut self, action: impl FnOnce(&mut Module) -> T) -> Option<T> {
-        self.change(|circuit| {
-            circuit
-                .radio
-                .as_mut()
-                .map(|radio| action(&mut radio.module))
-        })
-    }
-
-    /// Causes or ends a fault of the LoRa module at this instant. Does nothing if the board has no module.
-    pub fn set_radio_fault(&mut self, fault: Fault) {
-        self.change_radio(|module| module.set_fault(fault));
-    }
-
-    /// The air with the gateway radio. `None` if the board has no LoRa module, or is on a bus with other boards: see
-    /// [`Bus::air`](crate::Bus::air).
-    pub fn air(&mut self) -> Option<&mut Air> {
-        self.sync();
-        let now = self.now();
-        let radio = self.machine.bus.soc.circuit.radio.as_mut();
-        let air = radio.and_then(|radio| radio.air.as_mut())?;
-        air.set_earliest(now);
-        Some(air)
     }
 }

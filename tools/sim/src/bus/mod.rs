@@ -37,14 +37,8 @@ use crate::line::{Line, Output, Settings};
 use crate::machine::Limit;
 use crate::radio::Air;
 use crate::time::Time;
+pub use plan::{FARTHEST, LATEST};
 use plan::{Horizon, Plan};
-
-/// Most time by which other boards run ahead of a unit whose transmitter is off. Such a transmitter sends an idle frame
-/// before its first character, and the idle frame takes longer at every rate of a line.
-pub const FARTHEST: Time = Time::from_us(10);
-
-/// Most time by which a board may get the edges of another unit's character late.
-pub const LATEST: Time = Time::from_us(20);
 
 /// Longest time between two updates of the bus itself.
 const RECORDED: Time = Time::from_ms(10);

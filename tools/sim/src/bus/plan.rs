@@ -1,9 +1,15 @@
 //! How far the boards of a bus can run before they exchange their characters and packets.
 
-use super::{FARTHEST, LATEST};
 use crate::board::Board;
 use crate::radio::timing;
 use crate::time::Time;
+
+/// Most time by which other boards run ahead of a unit whose transmitter is off. Such a transmitter sends an idle frame
+/// before its first character, and the idle frame takes longer at every rate of a line.
+pub const FARTHEST: Time = Time::from_us(10);
+
+/// Most time by which a board may get the edges of another unit's character late.
+pub const LATEST: Time = Time::from_us(20);
 
 /// The next actions of a board, as far as they are known.
 #[derive(Clone, Copy, Debug)]

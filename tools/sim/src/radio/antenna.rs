@@ -132,10 +132,10 @@ impl Antenna {
             && !(*loss > 0.0 && lot(packet, receiver) < *loss)
     }
 
-    /// Receives none of the packets that were added by `now`.
+    /// Receives none of the packets that have begun by `now`.
     pub(super) fn ignore(&mut self, now: Time) {
         for signal in &mut self.signals {
-            signal.decided = true;
+            signal.decided |= signal.packet.start <= now;
         }
         self.forget(now);
     }

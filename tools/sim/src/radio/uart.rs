@@ -73,7 +73,7 @@ impl Uart {
         }
     }
 
-    /// The transmitter at RXD has done this.
+    /// Takes over what the transmitter at RXD has sent.
     pub(crate) fn put_in(&mut self, sent: Sent) {
         let driven = self.pin == TxPin::Usart;
         for wave in [Some(&mut self.host), driven.then_some(&mut self.rxd)]
@@ -202,7 +202,10 @@ impl Uart {
 
     /// Drops what is not needed after `now`.
     pub(super) fn forget(&mut self, now: Time) {
-        if self.rxd.is_empty() && self.txd.is_empty() {
+        if [&self.host, &self.rxd, &self.txd]
+            .iter()
+            .all(|wave| wave.is_empty())
+        {
             return;
         }
         let margin = Framing::of(self.settings).rate.bits(1);

@@ -203,8 +203,7 @@ fn run_does_not_depend_on_host_cores_or_spans() {
     };
     let one = with(1);
     assert!(one.0.len() > 8, "{} packets", one.0.len());
-    assert!(one == with(2));
-    assert!(one == with(5));
+    assert!(one == with(4));
     assert!(
         one == eventful_run(ms(3)),
         "nor on the spans in which time passes"

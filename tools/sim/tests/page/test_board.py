@@ -1,5 +1,8 @@
 """Switch, power, modules, LEDs, both boards, and accessibility."""
 
+import pathlib
+import tempfile
+
 from axe_playwright_python.sync_playwright import Axe
 from browser import DESKTOP, PHONE, OnPage
 from playwright.sync_api import expect
@@ -153,12 +156,16 @@ class LargerBoard(OnPage):
 class ForEverybody(OnPage):
     """axe-core finds no serious violation, and no element is wider than the window."""
 
-    # Every kind of channel, with the power on and off.
+    # Every kind of channel, with the power on and off, with and without a radio.
     SIMULATORS = (("modio-02", "4do", ()),
                   ("modio-08", "4di", ("--slot", "2=2relay", "--slot", "3=4ai", "--slot", "4=4ao")))
 
     def test_axe_finds_no_serious_violation(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        radio = ("--lora", str(pathlib.Path(directory.name, "radio")))
         for board, module, options in self.SIMULATORS:
+            options = (*options, *radio) if board == "modio-08" else options
             other = Simulator.of(board=board, module=module, options=options)
             self.addCleanup(other.close)
             master = other.master()

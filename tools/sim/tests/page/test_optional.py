@@ -1,4 +1,7 @@
-"""The faults that a user can set, and several boards on one line."""
+"""The faults that a user can set, several boards on one line, and the radio."""
+
+import pathlib
+import tempfile
 
 from browser import OnPage
 from playwright.sync_api import expect
@@ -50,8 +53,36 @@ class Faults(OnPage):
 
 
 class OneBoard(OnPage):
-    def test_chooser_is_hidden(self):
+    def test_chooser_and_radio_are_hidden(self):
         expect(self.page.locator("#chooser")).to_be_hidden()
+        expect(self.page.get_by_role("heading", name="LoRa radio")).to_be_hidden()
+        expect(self.page.get_by_label("Lost radio packets, share of packets")).to_have_count(0)
+
+
+class Radio(OnPage):
+    @classmethod
+    def setUpClass(cls):
+        directory = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(directory.cleanup)
+        cls.OPTIONS = ("--lora", str(pathlib.Path(directory.name, "radio")))
+        super().setUpClass()
+
+    def test_radio_of_the_board_is_shown(self):
+        expect(self.page.get_by_role("heading", name="LoRa radio")).to_be_visible()
+        radio = self.simulator.state().radio
+        expect(self.page.locator("#radio-channel")).to_have_text(f"{radio.channel_mhz} MHz")
+        expect(self.page.locator("#radio-rate")).to_have_text(f"{radio.air_rate / 1000:g} kbit/s")
+        expect(self.page.locator("#radio-mode")).to_have_text(radio.mode)
+        expect(self.page.locator("#radio-aux")).to_have_text("high, idle")
+        self.simulator.power_off()
+        expect(self.page.locator("#radio-mode")).to_have_text("off or starting")
+        self.simulator.power_on()
+        expect(self.page.locator("#radio-mode")).to_have_text(radio.mode)
+
+    def test_loss_of_packets_is_a_fault(self):
+        self.page.get_by_label("Lost radio packets, share of packets").fill("0.5")
+        self.page.keyboard.press("Enter")
+        self.eventually(lambda: self.simulator.faults()["radio_loss"], 0.5)
 
 
 class Boards(OnPage):

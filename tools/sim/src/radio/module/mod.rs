@@ -24,7 +24,8 @@ pub enum Fault {
     Hung,
 }
 
-/// A module. [`Air`](super::Air) has the gateway's; a board has its own ([`Board::radio`](crate::Board::radio)).
+/// A module: that of a board ([`Board::radio`](crate::Board::radio)), or that of the gateway
+/// ([`Air::gateway`](super::Air::gateway)).
 #[derive(Clone, Debug)]
 pub struct Module {
     pub(crate) sender: Sender,
@@ -54,15 +55,14 @@ pub struct Module {
     /// Number of bytes of packets that were lost because the buffer to TXD was full.
     lost: u64,
     news: Vec<News>,
-    /// The module uses fixed transmission, which was not reported yet.
+    /// Instant from which on the module uses fixed transmission; `None` if that was reported.
     unmodelled: Option<Time>,
     now: Time,
 }
 
 impl Module {
     /// A module without power, which keeps `stored`. Its pins M0 and M1 are open, which is high.
-    #[must_use]
-    pub fn new(sender: Sender, stored: Parameters) -> Self {
+    pub(crate) fn new(sender: Sender, stored: Parameters) -> Self {
         Self {
             sender,
             powered: false,
@@ -285,7 +285,7 @@ impl Module {
         &mut self.uart
     }
 
-    /// The module is computed up to this instant.
+    /// Instant up to which the module is computed.
     pub(crate) const fn now(&self) -> Time {
         self.now
     }
@@ -301,7 +301,7 @@ impl Module {
         }
     }
 
-    /// A packet of another transmitter has ended early.
+    /// Ends packet `number` of another transmitter at `at`, before its planned end.
     pub(crate) fn cut(&mut self, sender: Sender, number: u64, at: Time) {
         self.antenna.cut(sender, number, at);
     }

@@ -169,6 +169,21 @@ fn module_without_power_sends_and_receives_nothing_and_cuts_its_packet() {
 }
 
 #[test]
+fn packet_that_begins_after_a_power_cycle_is_received() {
+    let mut host = normal();
+    let later = host.now() + timing::START_UP + ms(20);
+    let end = host
+        .air()
+        .transmit(later, Parameters::FACTORY, b"later")
+        .end;
+    host.radio.module.set_power(false);
+    host.run_for(ms(10));
+    host.radio.module.set_power(true);
+    host.run_until(end + ms(100));
+    assert_eq!(bytes(&host.received()), b"later");
+}
+
+#[test]
 fn module_in_power_saving_mode_receives_only_packets_with_a_preamble() {
     let mut host = normal();
     host.set_pins(false, true);
