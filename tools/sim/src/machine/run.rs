@@ -142,7 +142,7 @@ impl<C: Circuit> Machine<C> {
         }
     }
 
-    /// Tells DWT whether DEMCR.TRCENA is set.
+    /// Passes to DWT whether DEMCR.TRCENA is set.
     fn look_at_trace(&mut self) {
         if self.bus.dwt.in_use() {
             let cycle = self.cycles();

@@ -14,7 +14,7 @@ use sim::soc::map::Block;
 use sim::{Config, Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, FIRST, MODULE, SLOT, adu, flash_with_settings, pages};
+use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings, pages};
 
 /// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
 const SET_UP: Time = Time::from_ms(1_500);
@@ -48,7 +48,7 @@ impl Bench {
         self.board.air().expect("a module is fitted")
     }
 
-    /// Sends bytes over the air and returns what comes back, up to a silence of half a second.
+    /// Sends bytes over the air and returns the bytes that the gateway receives, up to a silence of half a second.
     fn over_the_air(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.board.now();
         self.air().send(now, bytes);
@@ -290,7 +290,8 @@ fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed()
         bench.write_over_the_air(COMMAND, 1);
         bench.board.run_for(Time::from_ms(100));
         bench.write_over_the_air(COMMAND, 2);
-        bench.board.run_for(SET_UP);
+        // The unit waits for the longest time of a packet on the air, 4.8 s at 0.3 kbit/s.
+        bench.board.run_for(Time::from_ms(5_000) + SET_UP);
         assert_eq!(
             bench.register(state::RESET_CAUSE) & 0b1000,
             0b1000,
