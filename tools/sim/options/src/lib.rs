@@ -56,7 +56,8 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
     pub corner: String,
 
-    /// Store the modules of all slots in the configuration if nothing is stored yet (default)
+    /// Store the modules of all slots in the configuration, and with --lora that the radio is on, if nothing is stored yet
+    /// (default)
     #[arg(long, overrides_with = "no_preset")]
     preset: bool,
 

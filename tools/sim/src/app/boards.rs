@@ -90,11 +90,15 @@ fn image(elf: &Path) -> Result<Image, String> {
     Image::read(elf).map_err(|error| format!("cannot run the image {error}"))
 }
 
-/// Stores the modules of all slots in the configuration, if nothing is stored yet.
+/// Stores the modules of all slots in the configuration, and that the radio is on if there is one, if nothing is stored
+/// yet.
 fn write_preset(config: &Config, flash: &mut [u8]) {
     if config.layout.stores_nothing(flash) {
-        // One setting for each port: a page has room for all of them.
-        let settings: Vec<_> = configuration::modules(config.plugged()).collect();
+        let mut settings: Vec<_> = configuration::modules(config.plugged()).collect();
+        if config.radio.is_some() {
+            settings.push((configuration::LORA, 1));
+        }
+        // One setting for each port, and one more: a page has room for all of them.
         config.layout.store(flash, &settings);
     }
 }
@@ -136,6 +140,21 @@ mod tests {
             write_preset(&fitted(Module::Di4), &mut flash);
             assert_eq!(flash, before, "damaged data is not replaced either");
         }
+    }
+
+    #[test]
+    fn preset_switches_a_fitted_radio_on() {
+        let layout = Layout::ALL[0];
+        let config = Config {
+            layout,
+            radio: Some(Parameters::FACTORY),
+            ..Config::default()
+        };
+        let mut flash = vec![0xFF; layout.part.flash_size];
+        write_preset(&config, &mut flash);
+        let at = (layout.board.store.first - FLASH_BASE) as usize;
+        let (_, record) = record::records(&flash[at..]).next().unwrap();
+        assert_eq!(record.pairs().last(), Some((configuration::LORA, 1)));
     }
 
     #[test]
