@@ -41,7 +41,7 @@ mod lock;
 mod module_choice;
 #[path = "../image/power_cut.rs"]
 mod power_cut;
-#[path = "../image/radio.rs"]
+#[path = "../image/radio/mod.rs"]
 mod radio;
 #[path = "../image/registers.rs"]
 mod registers;

@@ -1,0 +1,164 @@
+//! Faults of the module, the air and the UART, and two lines that must not disturb each other.
+
+use register_map::{
+    codes::Baud,
+    configuration::{BAUD, COMMAND, FILTER, LORA_AIR_RATE, LORA_FRAME_GAP},
+    fault, radio, state,
+};
+use sim::Time;
+use sim::radio::{Fault, Parameters};
+use sim::soc::map::Block;
+
+use super::{bench, starting};
+use crate::bench::{FIRST, adu, pages};
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn silent_radio_is_reported_and_used_when_it_answers() {
+    for fault in [Fault::Absent, Fault::Hung] {
+        let mut bench = starting(Parameters::FACTORY, &[]);
+        bench.board.set_radio_fault(fault);
+        bench.board.take_log();
+        bench.board.run_for(Time::from_ms(3_000));
+        let log = bench.board.take_log();
+        assert!(
+            log.contains("WARN radio: the module does not answer"),
+            "{log}"
+        );
+        assert!(
+            bench.status(state::status::MODULE_FAULT),
+            "a module has a fault"
+        );
+        assert!(bench.board.leds().fault);
+        bench.assert_answers(1);
+        bench.board.run_for(Time::from_ms(12_000));
+        assert_eq!(bench.board.take_log(), "", "reported once");
+        bench.board.set_radio_fault(Fault::None);
+        bench.board.run_for(Time::from_ms(9_000));
+        assert!(bench.board.take_log().ends_with("radio: ready\n"));
+        assert!(!bench.status(state::status::MODULE_FAULT));
+        bench.assert_answers_over_the_air();
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn radio_that_hangs_in_service_is_reported_and_set_up_again() {
+    let mut bench = bench(&[]);
+    bench.assert_answers_over_the_air();
+    bench.board.set_radio_fault(Fault::Hung);
+    assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
+    bench.board.run_for(Time::from_ms(31_000));
+    assert!(bench.status(state::status::MODULE_FAULT));
+    bench.board.set_radio_fault(Fault::None);
+    bench.board.run_for(Time::from_ms(9_000));
+    assert!(!bench.status(state::status::MODULE_FAULT));
+    bench.assert_answers_over_the_air();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn lost_and_collided_packets_cost_their_requests_only() {
+    let mut bench = bench(&[]);
+    bench.air().set_loss(1.0);
+    assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
+    bench.air().set_loss(0.0);
+    bench.assert_answers_over_the_air();
+    // Another transmitter during the request.
+    let now = bench.board.now();
+    let parameters = bench.module().parameters();
+    bench
+        .air()
+        .transmit(now + Time::from_ms(30), parameters, &[0x55; 20]);
+    assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
+    bench.assert_answers_over_the_air();
+    // A frame of another protocol in front of a request.
+    let now = bench.board.now();
+    bench.air().transmit(now, parameters, b"hello");
+    bench.board.run_for(Time::from_ms(500));
+    bench.air().take_received();
+    bench.assert_answers_over_the_air();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn disturbed_register_of_the_uart_is_set_again() {
+    // Baud rate, receiver off, two stop bits and a reserved mode, half duplex.
+    for (offset, bits) in [
+        (0x08, 0x0400),
+        (0x0C, 0x0004),
+        (0x10, 0x2000),
+        (0x14, 0x0008),
+    ] {
+        let mut bench = bench(&[]);
+        bench.tolerant = true;
+        bench.board.upset(Block::Usart3, offset, bits);
+        bench.board.run_for(Time::from_ms(150));
+        bench.assert_answers_over_the_air();
+        assert_eq!(bench.register(fault::LINE_REPAIRS), 1, "offset {offset:#x}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn saves_do_not_disturb_requests_over_the_air() {
+    let mut bench = bench(&[(LORA_AIR_RATE, 5), (LORA_FRAME_GAP, 20)]);
+    let mut changed = false;
+    for round in 0..60 {
+        bench.configure(FILTER, &[round + 1; 30]);
+        let now = bench.board.now();
+        bench.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
+        // At a phase of the request and the reply that moves on from round to round.
+        bench.board.run_for(Time::from_ms(u64::from(round) * 3));
+        bench.write(COMMAND, &[1]).unwrap();
+        bench.board.run_for(Time::from_ms(400));
+        let reply = bench.air().take_received();
+        let reply: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        assert_eq!(reply, adu(&[1, 1, 1, 0]), "round {round}");
+        changed |= pages()
+            .iter()
+            .any(|page| bench.board.flash()[page.clone()][2..4] == [0xFF; 2]);
+    }
+    assert!(changed, "a page is erased by some of the saves");
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn rs485_line_at_921600_loses_nothing_while_the_radio_is_busy() {
+    let mut bench = bench(&[
+        (BAUD, Baud::B921600.code()),
+        (LORA_AIR_RATE, 5),
+        (LORA_FRAME_GAP, 5),
+    ]);
+    bench.settings(sim::line::Settings {
+        baud: 921_600,
+        ..sim::line::Settings::default()
+    });
+    // A reply may wait while a request over the air is served.
+    bench.patience = Time::from_ms(1);
+    let echo: Vec<u8> = [8, 0, 0].into_iter().chain(0..=249).collect();
+    let request = adu(&[&[1], &echo[..200]].concat());
+    let (mut replies, mut asked) = (0, false);
+    for _ in 0..600 {
+        if !asked {
+            let now = bench.board.now();
+            bench.air().send(now, &request);
+            asked = true;
+        }
+        assert_eq!(bench.ask(1, &echo).as_ref(), Some(&echo));
+        if bench.air().received().count() == request.len() {
+            let received = bench.air().take_received();
+            assert!(
+                received
+                    .iter()
+                    .map(|byte| byte.byte)
+                    .eq(request.iter().copied())
+            );
+            (replies, asked) = (replies + 1, false);
+        }
+    }
+    assert!(replies >= 4, "{replies} replies over the air");
+    assert_eq!(bench.registers(state::BUS_ERRORS, 1), Ok(vec![0]));
+    assert_eq!(bench.registers(state::OVERRUNS, 2), Ok(vec![0, 0]));
+    assert_eq!(bench.registers(radio::BUS_ERRORS, 1), Ok(vec![0]));
+}

@@ -1,0 +1,107 @@
+//! The radio as a second line.
+
+mod faults;
+mod requests;
+mod set_up;
+
+use register_map::configuration::LORA;
+use sim::radio::{Packet, Parameters, Sender};
+use sim::{Config, Module, Time};
+
+use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings};
+
+/// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
+const SET_UP: Time = Time::from_ms(1_500);
+/// Time after which there is no reply any more. The longest exchange of these tests takes less at 2.4 kbit/s.
+const SILENCE: Time = Time::from_ms(4_000);
+
+/// A 4DI at unit address 1 with a radio module, before its set-up is complete.
+fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
+    let all = [&[(MODULE, Module::Di4.code()), (LORA, 1)], settings].concat();
+    Bench::with(Config {
+        module: Module::Di4,
+        flash: Some(flash_with_settings(&all)),
+        radio: Some(module),
+        ..Config::default()
+    })
+}
+
+/// The same after its set-up.
+fn bench(settings: &[(u16, u16)]) -> Bench {
+    let mut bench = starting(Parameters::FACTORY, settings);
+    bench.board.run_for(SET_UP);
+    bench
+}
+
+impl Bench {
+    fn module(&self) -> &sim::radio::Module {
+        self.board.radio().expect("a module is fitted")
+    }
+
+    fn air(&mut self) -> &mut sim::radio::Air {
+        self.board.air().expect("a module is fitted")
+    }
+
+    /// Sends bytes over the air and returns the bytes that the gateway receives, up to a silence of half a second.
+    fn over_the_air(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let now = self.board.now();
+        self.air().send(now, bytes);
+        let end = now + SILENCE;
+        let mut last = None;
+        while self.board.now() < end
+            && last.is_none_or(|last| self.board.now() < last + Time::from_ms(500))
+        {
+            self.board.run_for(Time::from_ms(20));
+            last = self.air().received().next_back().map(|byte| byte.end);
+        }
+        let received = self.air().take_received();
+        received.iter().map(|byte| byte.byte).collect()
+    }
+
+    /// Sends a PDU to a unit over the air and returns the PDU of the reply, whose frame it checks.
+    fn ask_over_the_air(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
+        let reply = self.over_the_air(&adu(&[&[unit], pdu].concat()));
+        if reply.is_empty() {
+            return None;
+        }
+        let body = &reply[..reply.len() - 2];
+        assert_eq!(reply, adu(body), "the reply's CRC");
+        assert_eq!(body[0], unit);
+        Some(body[1..].to_vec())
+    }
+
+    fn read_over_the_air(&mut self, address: u16, count: u16) -> Vec<u16> {
+        let [[a, b], [c, d]] = [address, count].map(u16::to_be_bytes);
+        let reply = self.ask_over_the_air(1, &[3, a, b, c, d]).expect("a reply");
+        assert_eq!(
+            usize::from(reply[1]),
+            2 * usize::from(count),
+            "{reply:02X?}"
+        );
+        let words = reply[2..].as_chunks().0;
+        words.iter().copied().map(u16::from_be_bytes).collect()
+    }
+
+    fn write_over_the_air(&mut self, address: u16, value: u16) {
+        let [[a, b], [c, d]] = [address, value].map(u16::to_be_bytes);
+        let request = [6, a, b, c, d];
+        assert_eq!(
+            self.ask_over_the_air(1, &request).as_deref(),
+            Some(&request[..])
+        );
+    }
+
+    #[track_caller]
+    fn assert_answers_over_the_air(&mut self) {
+        let reply = self.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]);
+        assert!(matches!(reply.as_deref(), Some([1, 1, _])), "{reply:02X?}");
+    }
+
+    fn packets_of_the_unit(&mut self) -> Vec<Packet> {
+        let air = self.air();
+        let of_the_unit = air
+            .packets()
+            .filter(|packet| packet.sender == Sender::Board(0));
+        of_the_unit.cloned().collect()
+    }
+}

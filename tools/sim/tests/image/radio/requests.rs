@@ -1,0 +1,144 @@
+//! Requests over the air: counters, long frames, broadcasts, commands.
+
+use register_map::{
+    configuration::{
+        COMM_TIMEOUT, COMMAND, FILTER, KEY, LORA_AIR_RATE, LORA_FRAME_GAP, OPENING_KEY,
+    },
+    radio, state,
+};
+use sim::Time;
+
+use super::{SET_UP, bench};
+use crate::bench::{FIRST, adu};
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn each_line_has_its_own_counters_which_both_lines_show() {
+    let mut bench = bench(&[]);
+    for _ in 0..3 {
+        bench.assert_answers_over_the_air();
+    }
+    bench.ask_over_the_air(1, &[0x42]);
+    bench.ask_over_the_air(9, &[1, 0, FIRST, 0, 4]);
+    bench.over_the_air(&[1, 2, 3, 4, 5]);
+    let on_wire = bench.registers(radio::BUS_MESSAGES, 9).unwrap();
+    assert_eq!(on_wire, [5, 1, 1, 4, 0, 0, 0, 0, 0]);
+    let on_air = bench.read_over_the_air(radio::BUS_MESSAGES, 9);
+    assert_eq!(on_air[..4], [6, 1, 1, 5]);
+    let line = bench.read_over_the_air(state::BUS_MESSAGES, 4);
+    assert_eq!(line, [1, 0, 0, 1]);
+    // Function 08 answers with the counters of its own line.
+    let messages = bench.ask_over_the_air(1, &[8, 0, 0x0B, 0, 0]);
+    assert_eq!(messages, Some(vec![8, 0, 0x0B, 0, 8]));
+    assert_eq!(bench.request(&[8, 0, 0x0B, 0, 0]), Ok(vec![0, 0x0B, 0, 2]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn longest_reply_and_longest_request_pass_the_air_with_a_frame_gap_above_the_pauses() {
+    // The pause between two packets of 58 bytes is 300 - 60 ms at 2.4 kbit/s, and 75 - 60 ms at 9.6 kbit/s.
+    for (air_rate, gap) in [(2, 300), (4, 50), (5, 5)] {
+        let mut bench = bench(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, gap)]);
+        assert_eq!(bench.read_over_the_air(FILTER, 32).len(), 32);
+        let request = [&[0x10, 0x01, 0xA0, 0, 32, 64][..], &[0; 64]].concat();
+        bench.unlock();
+        let reply = bench.ask_over_the_air(1, &request);
+        assert_eq!(
+            reply,
+            Some(vec![0x10, 0x01, 0xA0, 0, 32]),
+            "air rate {air_rate}"
+        );
+        let echo: Vec<u8> = [8, 0, 0].into_iter().chain((0..=249).rev()).collect();
+        assert_eq!(
+            bench.ask_over_the_air(1, &echo).as_ref(),
+            Some(&echo),
+            "air rate {air_rate}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn request_of_several_packets_with_pauses_above_the_frame_gap_is_lost_and_the_next_one_is_answered()
+{
+    let mut bench = bench(&[(LORA_FRAME_GAP, 50)]);
+    let echo: Vec<u8> = [8, 0, 0].into_iter().chain([0x55; 100]).collect();
+    assert_eq!(bench.ask_over_the_air(1, &echo), None);
+    bench.assert_answers_over_the_air();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn broadcast_over_the_air_is_obeyed_in_silence() {
+    let mut bench = bench(&[]);
+    bench.unlock();
+    let before = bench.packets_of_the_unit().len();
+    let [a, b] = FILTER.to_be_bytes();
+    assert_eq!(bench.ask_over_the_air(0, &[6, a, b, 0, 99]), None);
+    assert_eq!(bench.packets_of_the_unit().len(), before);
+    assert_eq!(bench.register(FILTER), 99);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed() {
+    for air_rate in [0, 2, 5] {
+        let mut bench = bench(&[(LORA_AIR_RATE, air_rate)]);
+        bench.tolerant = true;
+        bench.write_over_the_air(KEY, OPENING_KEY);
+        bench.write_over_the_air(FILTER, 77);
+        bench.write_over_the_air(COMMAND, 1);
+        bench.board.run_for(Time::from_ms(100));
+        bench.write_over_the_air(COMMAND, 2);
+        // The unit waits for the longest time of a packet on the air, 4.8 s at 0.3 kbit/s.
+        bench.board.run_for(Time::from_ms(5_000) + SET_UP);
+        assert_eq!(
+            bench.register(state::RESET_CAUSE) & 0b1000,
+            0b1000,
+            "a restart"
+        );
+        assert_eq!(
+            bench.read_over_the_air(FILTER, 1),
+            [77],
+            "air rate {air_rate}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn command_of_one_line_waits_for_its_own_reply_only() {
+    let mut bench = bench(&[]);
+    bench.tolerant = true;
+    bench.unlock();
+    // A restart ordered over the air, while the other line is polled without pause.
+    let [a, b] = COMMAND.to_be_bytes();
+    let now = bench.board.now();
+    bench.air().send(now, &adu(&[1, 6, a, b, 0, 2]));
+    let mut polls = 0;
+    while bench.air().received().count() < 8 {
+        bench.assert_answers(1);
+        polls += 1;
+    }
+    assert!(polls > 5, "{polls}");
+    bench.board.run_for(SET_UP);
+    assert_eq!(
+        bench.register(state::RESET_CAUSE) & 0b1000,
+        0b1000,
+        "a restart"
+    );
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn request_over_the_air_restarts_the_communication_watchdog() {
+    let mut bench = bench(&[(COMM_TIMEOUT, 25)]);
+    bench.assert_answers(1);
+    for _ in 0..4 {
+        bench.board.run_for(Time::from_ms(100));
+        bench.assert_answers_over_the_air();
+    }
+    assert_eq!(bench.read_over_the_air(state::STATUS, 1)[0] & 1, 0);
+    bench.board.run_for(Time::from_ms(2600));
+    assert_eq!(bench.read_over_the_air(state::STATUS, 1)[0] & 1, 1);
+}

@@ -1,0 +1,111 @@
+//! The set-up of the module: its settings, when they are written, and when the radio is off.
+
+use register_map::{
+    configuration::{COMMAND, LORA, LORA_ADDRESS, LORA_AIR_RATE, LORA_CHANNEL, LORA_POWER},
+    radio, state,
+};
+use sim::radio::{Confirmation, Mode, Parameters};
+use sim::{Config, Module, Time};
+
+use super::{SET_UP, bench, starting};
+use crate::LAYOUT;
+use crate::bench::{Bench, FIRST, MODULE, flash_with_settings};
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn module_gets_the_stored_settings_and_requests_over_the_air_are_answered() {
+    let mut bench = bench(&[
+        (LORA_ADDRESS, 0x1234),
+        (LORA_CHANNEL, 31),
+        (LORA_AIR_RATE, 5),
+        (LORA_POWER, 3),
+    ]);
+    let module = bench.module();
+    assert_eq!(module.mode(), Some(Mode::Normal));
+    assert_eq!(module.parameters().bytes(), [0x12, 0x34, 0x1D, 0x1F, 0x47]);
+    assert_eq!(module.stored(), module.parameters());
+    bench.board.set_energised(2, true).unwrap();
+    bench.board.run_for(Time::from_ms(20));
+    let reply = bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]);
+    assert_eq!(reply, Some(vec![1, 1, 0b0010]));
+    assert_eq!(
+        bench.ask_over_the_air(1, &[1, 0x7F, 0, 0, 1]),
+        Some(vec![0x81, 2])
+    );
+    assert!(bench.board.take_log().ends_with("radio: ready\n"));
+    assert!(!bench.status(state::status::MODULE_FAULT));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn module_that_has_the_settings_already_is_not_written() {
+    let wanted = Parameters::FACTORY.with_address(7);
+    let mut bench = starting(wanted, &[(LORA_ADDRESS, 7)]);
+    let aux = LAYOUT.radio.aux;
+    let (port, number) = (aux.port(), aux.number() as u8);
+    bench.board.watch_pin(port, number);
+    bench.board.run_for(SET_UP);
+    // The end of the module's start, the command that reads the parameters, and the change to the normal mode.
+    assert_eq!(bench.board.pin_edges(port, number).len(), 1 + 2 + 2);
+    bench.assert_answers_over_the_air();
+    assert_eq!(bench.module().stored(), wanted);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn module_whose_reply_to_the_settings_is_a_text_is_set_up() {
+    let mut bench = starting(Parameters::FACTORY, &[(LORA_CHANNEL, 3)]);
+    bench
+        .board
+        .change_radio(|module| module.set_confirmation(Confirmation::Text));
+    bench.board.run_for(SET_UP);
+    bench.assert_answers_over_the_air();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn settings_apply_after_a_save_and_a_restart() {
+    let mut bench = bench(&[]);
+    bench.tolerant = true;
+    bench.configure(LORA_CHANNEL, &[9]);
+    bench.configure(LORA_AIR_RATE, &[5]);
+    bench.save();
+    bench.assert_answers_over_the_air();
+    bench.unlock();
+    bench.write(COMMAND, &[2]).unwrap();
+    bench.board.run_for(SET_UP);
+    assert_eq!(bench.module().parameters().bytes()[2..4], [0x1D, 9]);
+    bench.assert_answers_over_the_air();
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn radio_that_is_off_leaves_its_pins_alone() {
+    let mut bench = Bench::with(Config {
+        flash: Some(flash_with_settings(&[(MODULE, Module::Di4.code())])),
+        radio: Some(Parameters::FACTORY),
+        ..Config::default()
+    });
+    bench.board.run_for(SET_UP);
+    // The module's own pull-ups keep it in sleep.
+    assert_eq!(bench.module().mode(), Some(Mode::Sleep));
+    assert_eq!(bench.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]), None);
+    bench.assert_answers(1);
+    assert_eq!(bench.registers(radio::BUS_MESSAGES, 9), Ok(vec![0; 9]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn radio_is_off_in_loader_mode_and_without_a_unit_address() {
+    for dip in [255, 0, 248] {
+        let all = [(MODULE, Module::Di4.code()), (LORA, 1)];
+        let mut bench = Bench::with(Config {
+            dip,
+            flash: Some(flash_with_settings(&all)),
+            radio: Some(Parameters::FACTORY),
+            ..Config::default()
+        });
+        bench.board.run_for(SET_UP);
+        assert_eq!(bench.module().mode(), Some(Mode::Sleep), "DIP switch {dip}");
+    }
+}
