@@ -71,7 +71,8 @@ impl RadioOff {
             .crh()
             .modify(|_, w| w.mode10().output2().cnf10().alt_push_pull());
         Pin::b(11).pull_up();
-        let mode = BOARD.radio.mode.map(PinOutput::low);
+        let [m0, m1] = BOARD.radio.mode;
+        let mode = [PinOutput::low(m0), PinOutput::low(m1)];
         Some((uart, mode, PinInput::pulled_up(BOARD.radio.aux)))
     }
 }

@@ -99,6 +99,7 @@ where
     /// Ends a reply that can no longer be sent.
     fn abort(&mut self) {
         self.unsent = None;
+        self.on_air_ms = 0;
         if self.port.is_sending() || self.port.start().is_some() {
             self.end_of_reply();
         }

@@ -1,4 +1,5 @@
-//! The line counters of the radio, 0x0270 to 0x0278: as those of the RS-485 line from 0x0230 on, in the same order.
+//! The line counters of the radio, 0x0270 to 0x0278: as those of the RS-485 line from 0x0230 on, in the same order. Gaps
+//! are not counted, because there are pauses between the packets of a frame.
 
 use crate::block::block;
 use crate::rule::Rule;
@@ -9,7 +10,7 @@ const READ: Rule = Rule::read_only();
 block! {
     "Line counters of the radio", 0x0270..=0x0278;
 
-    /// As 0x0230; the radio's counters wrap too
+    /// As 0x0230
     BUS_MESSAGES "radio bus messages": 0x0270 x 1, Value::NUMBER, READ;
     /// As 0x0231
     BUS_ERRORS "radio communication errors": 0x0271 x 1, Value::NUMBER, READ;
@@ -25,6 +26,6 @@ block! {
     BUSY "radio busy": 0x0276 x 1, Value::NUMBER, READ;
     /// As 0x0237
     OVERRUNS "radio character overruns": 0x0277 x 1, Value::NUMBER, READ;
-    /// Always 0: packets on the air are apart
+    /// Always 0
     T15_GAPS "radio inter-character gaps": 0x0278 x 1, Value::NUMBER, READ;
 }
