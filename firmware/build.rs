@@ -9,11 +9,15 @@ use std::{
 use modio_description::{FILE, HEAD, PORT_BYTES, checksum};
 use register_map::{Board, Module};
 
+#[path = "build/pack.rs"]
+mod pack;
+
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     fs::write(out.join("self_description.rs"), self_descriptions()).expect("OUT_DIR is writable");
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=build");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
@@ -32,15 +36,29 @@ fn main() {
 /// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which
 /// the firmware adds.
 fn self_descriptions() -> String {
-    let mut rows = String::new();
+    let (mut rows, mut depths) = (String::new(), 0);
     for board in Board::ALL {
         let document =
             modio_description::describe(board, env!("CARGO_PKG_VERSION"), |_| Module::None)
                 .encode();
         let ports = usize::from(board.slots) * PORT_BYTES;
         let fixed = &document[..document.len() - ports];
-        let (code, crc) = (board.code, checksum(fixed));
-        rows += &format!("    Fixed {{ board: {code}, bytes: &{fixed:?}, crc: {crc:#06X} }},\n");
+        let (code, crc, length) = (board.code, checksum(fixed), fixed.len());
+        let pack::Packed {
+            bytes,
+            blocks,
+            pairs,
+            depth,
+        } = pack::pack(fixed);
+        rows += &format!(
+            "    Fixed {{ board: {code}, crc: {crc:#06X}, document: Packed {{
+        length: {length},
+        bytes: &{bytes:?},
+        blocks: &{blocks:?},
+        pairs: &{pairs:?},
+    }} }},\n"
+        );
+        depths = depths.max(depth);
     }
     format!(
         "/// File number.
@@ -52,8 +70,10 @@ const PORT_BYTES: usize = {PORT_BYTES};
 /// Fixed part of each board's document.
 const BOARDS: [Fixed; {}] = [
 {rows}];
+const _: () = assert!(packed::BLOCK == {} && packed::DEPTH >= {depths});
 ",
-        Board::ALL.len()
+        Board::ALL.len(),
+        pack::BLOCK,
     )
 }
 

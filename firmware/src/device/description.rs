@@ -3,7 +3,7 @@
 //! ```text
 //!  record    0         1      2 ...
 //!         +--------+-------+----------------------+---------------+
-//!         | length | CRC   | fixed part, in flash | ports, made   |
+//!         | length | CRC   | fixed part, packed   | ports, made   |
 //!         |        |       | by the build script  | when read     |
 //!         +--------+-------+----------------------+---------------+
 //! ```
@@ -17,6 +17,7 @@ use core::array;
 use modbus_server::{Exception, Span, WordsOut, crc};
 use register_map::Board;
 
+use super::packed::{self, Packed};
 use crate::config::Config;
 
 include!(concat!(env!("OUT_DIR"), "/self_description.rs"));
@@ -27,8 +28,8 @@ pub struct Fixed {
     /// The code of the board.
     board: u16,
     /// The document up to its ports.
-    bytes: &'static [u8],
-    /// CRC of `bytes`.
+    document: Packed,
+    /// CRC of `document`.
     crc: u16,
 }
 
@@ -99,30 +100,37 @@ impl Description {
     ) {
         let head = [self.length::<SLOTS>() as u16, self.crc].map(u16::to_be_bytes);
         let ports = ports(config);
-        let parts = [head.as_flattened(), self.fixed.bytes, ports.as_flattened()];
-        for record in records.addresses() {
-            let at = usize::from(record) * 2;
-            out.push(u16::from_be_bytes([byte(&parts, at), byte(&parts, at + 1)]));
+        let start = usize::from(records.start()) * 2;
+        let in_document = start.saturating_sub(head.as_flattened().len());
+        let mut document = self.fixed.document.bytes_from(in_document);
+        let mut at = start;
+        let mut next = || {
+            let position = at;
+            at = at.wrapping_add(1);
+            let outside = [head.as_flattened(), ports.as_flattened()];
+            byte(outside, position, self.fixed.document.length).or_else(|| document.next())
+        };
+        for _ in records.addresses() {
+            let word = [next(), next()].map(Option::unwrap_or_default);
+            out.push(u16::from_be_bytes(word));
         }
     }
 
     /// Returns the length of the document in bytes.
     const fn length<const SLOTS: usize>(&self) -> usize {
-        self.fixed.bytes.len() + PORT_BYTES * SLOTS
+        self.fixed.document.length + PORT_BYTES * SLOTS
     }
 }
 
-/// Returns a byte of the file made of these parts, or 0 after its end. Not inlined, because it is called for both
-/// bytes of a word.
+/// Returns a byte of the file that is in front of the packed document or after it, where the file ends with zeros, and
+/// `None` in the document. Not inlined, because it is called for both bytes of a word.
 #[inline(never)]
-fn byte(parts: &[&[u8]; 3], mut at: usize) -> u8 {
-    for part in parts {
-        if let Some(byte) = part.get(at) {
-            return *byte;
-        }
-        at = at.wrapping_sub(part.len());
-    }
-    0
+fn byte([head, ports]: [&[u8]; 2], at: usize, document: usize) -> Option<u8> {
+    let Some(after_head) = at.checked_sub(head.len()) else {
+        return head.get(at).copied();
+    };
+    let after_document = after_head.checked_sub(document)?;
+    Some(ports.get(after_document).copied().unwrap_or_default())
 }
 
 /// Returns the end of the document: number and module of each port with a slot.

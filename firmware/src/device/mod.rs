@@ -17,6 +17,7 @@
 mod comm_watchdog;
 mod description;
 mod identification;
+mod packed;
 mod points;
 mod port;
 mod state;
