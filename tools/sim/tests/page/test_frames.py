@@ -87,7 +87,7 @@ class Frames(OnPage):
         self.good(self.master.read_coils(0x0010, count=4))
         page, answer = self.open_without_earlier_frames()
         page.get_by_role("button", name="Clear").click()
-        self.good(self.master.read_coils(0x0077, count=4))
+        self.assertTrue(self.master.read_coils(0x0077, count=4).isError())
         expect(self.rows).to_have_count(4)
         answer()
         expect(page.locator("#frames tr")).to_have_count(2)
