@@ -36,7 +36,7 @@ fn main() {
 /// Returns Rust code with the fixed part of each board's self-description: the document without its ports, which
 /// the firmware adds.
 fn self_descriptions() -> String {
-    let (mut rows, mut depths) = (String::new(), 0);
+    let mut rows = String::new();
     for board in Board::ALL {
         let document =
             modio_description::describe(board, env!("CARGO_PKG_VERSION"), |_| Module::None)
@@ -47,18 +47,18 @@ fn self_descriptions() -> String {
         let pack::Packed {
             bytes,
             blocks,
-            pairs,
-            depth,
+            phrases,
+            text,
         } = pack::pack(fixed);
         rows += &format!(
             "    Fixed {{ board: {code}, crc: {crc:#06X}, document: Packed {{
         length: {length},
         bytes: &{bytes:?},
         blocks: &{blocks:?},
-        pairs: &{pairs:?},
+        phrases: &{phrases:?},
+        text: &{text:?},
     }} }},\n"
         );
-        depths = depths.max(depth);
     }
     format!(
         "/// File number.
@@ -70,7 +70,7 @@ const PORT_BYTES: usize = {PORT_BYTES};
 /// Fixed part of each board's document.
 const BOARDS: [Fixed; {}] = [
 {rows}];
-const _: () = assert!(packed::BLOCK == {} && packed::DEPTH >= {depths});
+const _: () = assert!(packed::BLOCK == {});
 ",
         Board::ALL.len(),
         pack::BLOCK,

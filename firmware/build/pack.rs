@@ -1,15 +1,15 @@
-//! Packs the self-description by byte-pair encoding, so that it takes a third less flash.
+//! Packs the self-description, so that it takes a fifth less flash.
 //!
-//! The most frequent pair of neighbours is replaced by a byte from 0x80 on that the document does not use, then the
-//! most frequent pair of the result, and so on. `src/device/packed.rs` unpacks the bytes from any position that is a
-//! multiple of [`BLOCK`], because no pair crosses such a position.
+//! The most frequent pair of neighbours is replaced by a code from 0x80 on, then the most frequent pair of the result,
+//! and so on (byte-pair encoding). Each code is then looked up as the whole phrase that it stands for, so that
+//! `src/device/packed.rs` unpacks without a stack. No code crosses a position that is a multiple of [`BLOCK`].
 
-use std::collections::BTreeMap;
+use std::{cmp::Reverse, collections::BTreeMap};
 
 /// Bytes of the document that are packed separately.
-pub const BLOCK: usize = 256;
+pub const BLOCK: usize = 32;
 
-/// First byte that can stand for a pair.
+/// First byte that is a code. A smaller byte is itself.
 const FIRST: u8 = 0x80;
 
 /// A packed document.
@@ -18,39 +18,43 @@ pub struct Packed {
     pub bytes: Vec<u8>,
     /// Offset of each block in `bytes`.
     pub blocks: Vec<u16>,
-    /// For each byte from [`FIRST`] on: the pair that it stands for, or the byte itself, twice.
-    pub pairs: Vec<[u8; 2]>,
-    /// Largest number of bytes that wait while a byte is being unpacked.
-    pub depth: usize,
+    /// For each code from [`FIRST`] on: offset and length of its phrase in `text`.
+    pub phrases: Vec<[u8; 2]>,
+    /// The phrases, which may overlap.
+    pub text: Vec<u8>,
 }
 
 /// Packs a document.
 pub fn pack(document: &[u8]) -> Packed {
     let mut blocks: Vec<Vec<u8>> = document.chunks(BLOCK).map(<[u8]>::to_vec).collect();
-    let mut pairs: Vec<[u8; 2]> = (FIRST..=u8::MAX).map(|byte| [byte; 2]).collect();
-    let mut depths = [0; 256];
-    let unused = (FIRST..=u8::MAX).filter(|byte| !document.contains(byte));
-    for code in unused {
+    // A byte of the document from `FIRST` on is the code of itself.
+    let mut phrases: Vec<Vec<u8>> = (0..=u8::MAX).map(|byte| vec![byte]).collect();
+    let codes = (FIRST..=u8::MAX).filter(|code| !document.contains(code));
+    for code in codes {
         let Some(pair) = most_frequent(&blocks) else {
             break;
         };
         for block in &mut blocks {
             *block = replaced(block, pair, code);
         }
-        pairs[usize::from(code - FIRST)] = pair;
-        let [first, second] = pair.map(usize::from);
-        depths[usize::from(code)] = depths[second].max(depths[first] + 1);
+        phrases[usize::from(code)] = pair.map(|one| phrases[usize::from(one)].clone()).concat();
     }
-    let ends = blocks.iter().scan(0, |end, block| {
+    let phrases = phrases.split_off(FIRST.into());
+    let text = text(&phrases);
+    let place = |phrase: &Vec<u8>| {
+        let offset = find(&text, phrase).expect("the text has every phrase");
+        [offset, phrase.len()].map(|n| u8::try_from(n).expect("the text is short"))
+    };
+    let starts = blocks.iter().scan(0, |end, block| {
         let start = *end;
-        *end += block.len() as u16;
-        Some(start)
+        *end += block.len();
+        Some(u16::try_from(start).expect("a document is shorter than 64 KiB"))
     });
     Packed {
-        blocks: ends.collect(),
+        blocks: starts.collect(),
         bytes: blocks.concat(),
-        pairs,
-        depth: depths.into_iter().max().unwrap_or_default(),
+        phrases: phrases.iter().map(place).collect(),
+        text,
     }
 }
 
@@ -78,4 +82,23 @@ fn replaced(block: &[u8], pair: [u8; 2], code: u8) -> Vec<u8> {
         }
     }
     made
+}
+
+/// Returns a text that contains every phrase.
+fn text(phrases: &[Vec<u8>]) -> Vec<u8> {
+    let mut longest_first: Vec<&Vec<u8>> = phrases.iter().collect();
+    longest_first.sort_by_key(|phrase| Reverse(phrase.len()));
+    longest_first
+        .into_iter()
+        .fold(Vec::new(), |mut text, phrase| {
+            if find(&text, phrase).is_none() {
+                text.extend(phrase);
+            }
+            text
+        })
+}
+
+fn find(text: &[u8], phrase: &[u8]) -> Option<usize> {
+    text.windows(phrase.len())
+        .position(|window| window == phrase)
 }

@@ -1,6 +1,6 @@
 //! Registers as they are in a PDU: 16 bits, high byte first (V1.1b3 4.2).
 
-use core::slice;
+use core::{mem, slice};
 
 /// The registers of a write request, in the order of their addresses.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +71,15 @@ impl<'a> WordsOut<'a> {
         if let Some(slot) = self.slots.next() {
             *slot = word.to_be_bytes();
         }
+    }
+
+    /// Returns the room that is left as bytes, the high byte of each register first, for a model that has its registers
+    /// as bytes. They are 0.
+    #[inline]
+    pub fn rest(&mut self) -> &'a mut [u8] {
+        let rest = mem::take(&mut self.slots).into_slice().as_flattened_mut();
+        rest.fill(0);
+        rest
     }
 
     /// Sets the registers that were not pushed to 0, so that no old data is sent.

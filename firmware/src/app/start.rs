@@ -204,7 +204,7 @@ fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     let bits = characters * line.format.bits();
     // At most 513 * 11 bits, so the product fits 32 bits.
     let us = bits * 10_000 / (line.baud / 100).max(1);
-    us + us / 50 + 500
+    us + us / 50 + 1_000
 }
 
 fn wire_settings(line: config::LineConfig) -> uart::LineSettings {

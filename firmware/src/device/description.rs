@@ -98,21 +98,21 @@ impl Description {
         records: Span,
         out: &mut WordsOut<'_>,
     ) {
+        let mut out = out.rest().iter_mut();
         let head = [self.length::<SLOTS>() as u16, self.crc].map(u16::to_be_bytes);
-        let ports = ports(config);
+        let head = head.as_flattened();
         let start = usize::from(records.start()) * 2;
-        let in_document = start.saturating_sub(head.as_flattened().len());
-        let mut document = self.fixed.document.bytes_from(in_document);
-        let mut at = start;
-        let mut next = || {
-            let position = at;
-            at = at.wrapping_add(1);
-            let outside = [head.as_flattened(), ports.as_flattened()];
-            byte(outside, position, self.fixed.document.length).or_else(|| document.next())
-        };
-        for _ in records.addresses() {
-            let word = [next(), next()].map(Option::unwrap_or_default);
-            out.push(u16::from_be_bytes(word));
+        packed::copy(head.get(start..).unwrap_or_default(), &mut out);
+        let document = &self.fixed.document;
+        let start = start.saturating_sub(head.len());
+        document.copy(start, &mut out);
+        if out.len() > 0 {
+            let ports = ports(config);
+            let start = start.saturating_sub(document.length);
+            packed::copy(
+                ports.as_flattened().get(start..).unwrap_or_default(),
+                &mut out,
+            );
         }
     }
 
@@ -120,17 +120,6 @@ impl Description {
     const fn length<const SLOTS: usize>(&self) -> usize {
         self.fixed.document.length + PORT_BYTES * SLOTS
     }
-}
-
-/// Returns a byte of the file that is in front of the packed document or after it, where the file ends with zeros, and
-/// `None` in the document. Not inlined, because it is called for both bytes of a word.
-#[inline(never)]
-fn byte([head, ports]: [&[u8]; 2], at: usize, document: usize) -> Option<u8> {
-    let Some(after_head) = at.checked_sub(head.len()) else {
-        return head.get(at).copied();
-    };
-    let after_document = after_head.checked_sub(document)?;
-    Some(ports.get(after_document).copied().unwrap_or_default())
 }
 
 /// Returns the end of the document: number and module of each port with a slot.

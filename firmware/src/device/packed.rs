@@ -1,8 +1,10 @@
 //! The packed part of the self-description, in flash.
 //!
-//! The build script replaces frequent pairs of bytes by single bytes, and pairs of these as well (byte-pair encoding,
-//! `build/pack.rs`). That saves a third of the document. Unpacking can begin at every [`BLOCK`]th byte and needs no
-//! memory but a few bytes that wait.
+//! The build script replaces frequent phrases by single bytes (`build/pack.rs`). Reading can begin at every [`BLOCK`]th
+//! byte of the document and passes over whole phrases from there, because a request with many groups of records skips
+//! to a new position for each of them while its reply is already being sent.
+
+use core::slice;
 
 /// A packed document.
 #[derive(Clone, Copy, Debug)]
@@ -12,72 +14,66 @@ pub struct Packed {
     pub(super) bytes: &'static [u8],
     /// Offset in `bytes` of each block of [`BLOCK`] bytes.
     pub(super) blocks: &'static [u16],
-    /// For each byte from 0x80 on: the pair that it stands for, or the byte itself, twice.
-    pub(super) pairs: &'static [[u8; 2]],
+    /// For each byte from 0x80 on: offset and length in `text` of the phrase that it stands for.
+    pub(super) phrases: &'static [[u8; 2]],
+    pub(super) text: &'static [u8],
 }
 
-/// Bytes of the document between two positions at which unpacking can begin.
-pub(super) const BLOCK: usize = 256;
-/// First byte that can stand for a pair.
+/// Bytes of the document between two positions at which reading can begin.
+pub(super) const BLOCK: usize = 32;
+/// First byte that stands for a phrase.
 const FIRST: u8 = 0x80;
-/// Room for the second bytes of pairs that wait while a byte is being unpacked.
-pub(super) const DEPTH: usize = 12;
 
 impl Packed {
-    /// Returns the bytes of the document from a position on.
-    pub(super) fn bytes_from(&self, at: usize) -> Unpacking {
+    /// Copies the document from a position on to `out`, as far as there is room.
+    pub(super) fn copy(&self, at: usize, out: &mut slice::IterMut<'_, u8>) {
         let start = self.blocks.get(at / BLOCK);
-        let rest = start.and_then(|start| self.bytes.get(usize::from(*start)..));
-        let mut unpacking = Unpacking {
-            rest: rest.unwrap_or_default(),
-            pairs: self.pairs,
-            waiting: [0; DEPTH],
-            depth: 0,
-        };
-        for _ in 0..at % BLOCK {
-            unpacking.next();
+        let packed = start.and_then(|start| self.bytes.get(usize::from(*start)..));
+        let mut skip = at % BLOCK;
+        for byte in packed.unwrap_or_default() {
+            if let Some(more) = skip.checked_sub(self.length(*byte)) {
+                skip = more;
+                continue;
+            }
+            if !copy(self.phrase(byte).get(skip..).unwrap_or_default(), out) {
+                return;
+            }
+            skip = 0;
         }
-        unpacking
+    }
+
+    /// Returns what a packed byte stands for.
+    #[inline]
+    fn phrase(&self, byte: &'static u8) -> &'static [u8] {
+        let Some(code) = byte.checked_sub(FIRST) else {
+            return slice::from_ref(byte);
+        };
+        let phrase = self.phrases.get(usize::from(code));
+        let phrase = phrase.and_then(|[offset, length]| {
+            self.text
+                .get(usize::from(*offset)..)?
+                .get(..usize::from(*length))
+        });
+        phrase.unwrap_or_default()
+    }
+
+    /// Returns the length of what a packed byte stands for.
+    #[inline]
+    fn length(&self, byte: u8) -> usize {
+        let code = byte.checked_sub(FIRST);
+        let phrase = code.and_then(|code| self.phrases.get(usize::from(code)));
+        phrase.map_or(1, |[_, length]| usize::from(*length))
     }
 }
 
-/// Returns the bytes of a packed document, one after another.
-pub(super) struct Unpacking {
-    rest: &'static [u8],
-    pairs: &'static [[u8; 2]],
-    /// Bytes that come after the one that is being unpacked, the next one last.
-    waiting: [u8; DEPTH],
-    depth: usize,
-}
-
-impl Iterator for Unpacking {
-    type Item = u8;
-
-    #[inline(never)]
-    fn next(&mut self) -> Option<u8> {
-        let mut byte = match self.depth.checked_sub(1) {
-            Some(depth) => {
-                self.depth = depth;
-                *self.waiting.get(depth)?
-            }
-            None => {
-                let (first, rest) = self.rest.split_first()?;
-                self.rest = rest;
-                *first
-            }
+/// Copies bytes to `out`. Returns false when there is no more room.
+#[inline(always)]
+pub(super) fn copy(bytes: &[u8], out: &mut slice::IterMut<'_, u8>) -> bool {
+    for byte in bytes {
+        let Some(slot) = out.next() else {
+            return false;
         };
-        loop {
-            let pair = byte.checked_sub(FIRST);
-            let pair = pair.and_then(|index| self.pairs.get(usize::from(index)));
-            match pair {
-                Some([first, second]) if *first != byte => {
-                    // The build script checks that there is room.
-                    *self.waiting.get_mut(self.depth)? = *second;
-                    self.depth = self.depth.wrapping_add(1);
-                    byte = *first;
-                }
-                _ => return Some(byte),
-            }
-        }
+        *slot = *byte;
     }
+    true
 }
