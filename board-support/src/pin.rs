@@ -124,11 +124,8 @@ mod registers {
     }
 
     impl Pin {
-        /// Sets the mode of the pin. An output starts low.
+        /// Sets the mode of the pin.
         pub(crate) fn configure(self, mode: Mode) {
-            if matches!(mode, Mode::Output) {
-                self.set(false);
-            }
             let registers = self.port.registers();
             let shift = u32::from(self.number % 8) * 4;
             let with = |bits: u32| bits & !(0b1111 << shift) | (mode as u32) << shift;
@@ -149,7 +146,7 @@ mod registers {
             self.configure(Mode::Pulled);
         }
 
-        /// Sets the output bit of the pin.
+        /// Sets the output bit of the pin, which also selects between pull-up and pull-down.
         #[inline]
         pub(crate) fn set(self, high: bool) {
             let bit = 1 << self.number;

@@ -7,7 +7,7 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
 use crate::pin::{Mode, Pin};
 
-/// A pin as an input with pull-up.
+/// A pin as an input with pull-up, or with pull-down.
 pub struct PinInput(Pin);
 
 /// A pin as a push-pull output.
@@ -19,12 +19,27 @@ impl PinInput {
         pin.pull_up();
         Self(pin)
     }
+
+    /// Pulls the pin up or down.
+    pub fn pull(&mut self, up: bool) {
+        self.0.set(up);
+    }
 }
 
 impl PinOutput {
     /// Makes a pin an output that is low from the start, with the slowest edges. Call this in `init`, before the
     /// first interrupt.
     pub(crate) fn low(pin: Pin) -> Self {
+        Self::starting(pin, false)
+    }
+
+    /// The same, but high from the start.
+    pub(crate) fn high(pin: Pin) -> Self {
+        Self::starting(pin, true)
+    }
+
+    fn starting(pin: Pin, high: bool) -> Self {
+        pin.set(high);
         pin.configure(Mode::Output);
         Self(pin)
     }

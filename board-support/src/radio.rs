@@ -52,7 +52,8 @@ pub struct RadioUart {
 pub struct Damaged;
 
 impl RadioOff {
-    /// Sets up the UART and the pins: M0 and M1, which are low, and AUX, which is high when no module is fitted.
+    /// Sets up the UART and the pins: M0 and M1, which are high as the module pulls them, so that it is asleep until it
+    /// has its settings, and AUX, which is pulled up.
     /// Returns `None` when the clock cannot produce the baud rate; the radio then stays off.
     #[must_use]
     pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [PinOutput; 2], PinInput)> {
@@ -72,7 +73,7 @@ impl RadioOff {
             .modify(|_, w| w.mode10().output2().cnf10().alt_push_pull());
         Pin::b(11).pull_up();
         let [m0, m1] = BOARD.radio.mode;
-        let mode = [PinOutput::low(m0), PinOutput::low(m1)];
+        let mode = [PinOutput::high(m0), PinOutput::high(m1)];
         Some((uart, mode, PinInput::pulled_up(BOARD.radio.aux)))
     }
 }
@@ -132,7 +133,14 @@ impl RadioUart {
             if let Some(byte) = byte {
                 usart.dr().write(|w| w.dr().set(byte.into()));
             }
-            usart.cr1().modify(|_, w| w.txeie().bit(byte.is_some()));
+            let bits = if byte.is_some() {
+                RECEIVING | TXEIE
+            } else {
+                RECEIVING
+            };
+            // Written as a whole, because another bit that was disturbed may raise this interrupt without end.
+            // SAFETY: as in `set_up`.
+            usart.cr1().write(|w| unsafe { w.bits(bits) });
         }
     }
 }

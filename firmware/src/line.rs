@@ -13,6 +13,10 @@ use modbus_server::{
 pub trait ServedLine {
     /// Returns whether a reply is being sent or waits to be sent.
     fn is_replying(&self) -> bool;
+    /// Returns whether the end of the last reply may still be on its way, so that a restart would lose it.
+    fn is_on_air(&self) -> bool {
+        false
+    }
     /// Takes the waiting request, if any. Its reply starts now, or after `delay_ms`.
     fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>>;
     /// Passes the decision on the reply to the port.

@@ -4,18 +4,19 @@
 //! pauses between them, so a frame ends after LORA_FRAME_GAP instead of t3.5, and pauses inside a frame do not
 //! count. Its bytes take a millisecond each, so a task that runs once a millisecond moves them.
 //!
-//! A silence is measured from the call that found the last byte. While flash is erased or programmed the task waits
-//! for up to 40 ms and the silence counts as longer, never as shorter.
+//! A silence is measured from the call that found the last byte. While flash is erased the task does not run for up to
+//! 40 ms. A silence that begins in that time counts as up to 40 ms shorter, and one that ends in it is not seen, so two
+//! frames with less than 40 ms between them become one.
 
-use embedded_hal::digital::{InputPin, OutputPin};
+use embedded_hal::digital::OutputPin;
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
     Adu, Answered, Decided, LineCounters, Request, Served, Server,
     line::{Faults, Next, Port, Receiver},
 };
-use modio_drivers::{Lora, LoraSettings};
+use modio_drivers::{AuxPin, Lora};
 
-use crate::line::ServedLine;
+use crate::{config::RadioConfig, line::ServedLine};
 
 /// The radio line.
 pub struct RadioLine<S, M, A> {
@@ -41,40 +42,46 @@ impl<S, M, A> RadioLine<S, M, A>
 where
     S: Read<u8> + Write<u8>,
     M: OutputPin,
-    A: InputPin,
+    A: AuxPin,
 {
-    /// Creates the line of a unit, 1 to 247. A silence of `frame_gap_ms` milliseconds ends a frame.
+    /// Creates the line of a unit, 1 to 247. M0 and M1 are high, AUX is pulled up. After a `power_on` the module has
+    /// just been started too; after another reset it may be sending a reply.
     pub fn new(
         serial: S,
         mode: [M; 2],
         aux: A,
-        settings: LoraSettings,
+        RadioConfig {
+            module,
+            frame_gap_ms,
+        }: RadioConfig,
         unit: u8,
-        frame_gap_ms: u16,
+        power_on: bool,
         adus: &'static mut [Adu],
     ) -> Self {
+        let packet_ms = module.packet_ms();
+        let sending = if power_on { 0 } else { packet_ms };
         Self {
-            radio: Lora::new(serial, mode, aux, settings),
+            radio: Lora::new(serial, mode, aux, module, sending),
             port: Port::new(Receiver::rtu(unit, false), adus),
             frame_gap_ms,
             silence: Some(0),
             unsent: None,
-            packet_ms: settings.packet_ms(),
+            packet_ms,
             on_air_ms: 0,
             works: None,
         }
     }
 
     /// Continues everything that is under way, at `now_ms` milliseconds after the start and `passed` milliseconds
-    /// after the last call. Returns whether a request waits to be served, or a reply has just been sent.
+    /// after the last call. Returns whether a request waits to be served, or a reply has just ended: the module has it,
+    /// or it has been sent.
     pub fn poll(&mut self, now_ms: u32, passed: u16) -> bool {
         self.radio.poll(passed);
         if !self.radio.is_ready() {
             if self.radio.has_failed() {
                 self.works = Some(false);
             }
-            self.abort();
-            return false;
+            return self.abort();
         }
         self.works = Some(true);
         let waits = if self.port.is_sending() {
@@ -86,8 +93,7 @@ where
         let was_on_air = self.on_air_ms > 0;
         self.on_air_ms = self.on_air_ms.saturating_sub(passed);
         let has_sent = was_on_air && self.on_air_ms == 0;
-        self.send();
-        waits || has_sent
+        self.send() || waits || has_sent
     }
 
     /// Returns whether the radio works. `None` until the first attempt to set it up has ended.
@@ -96,13 +102,15 @@ where
         self.works
     }
 
-    /// Ends a reply that can no longer be sent.
-    fn abort(&mut self) {
+    /// Ends a reply that can no longer be sent. Returns whether there was one.
+    fn abort(&mut self) -> bool {
         self.unsent = None;
         self.on_air_ms = 0;
-        if self.port.is_sending() || self.port.start().is_some() {
+        let replying = self.port.is_sending() || self.port.start().is_some();
+        if replying {
             self.end_of_reply();
         }
+        replying
     }
 
     fn end_of_reply(&mut self) {
@@ -142,11 +150,12 @@ where
     }
 
     /// Sends as much of the reply as the UART takes. The reply begins when the radio is free, and ends when the radio
-    /// has begun to send its last packet: AUX is high from then on (manual of the E32-433T20D, 6.2).
-    fn send(&mut self) {
+    /// has begun to send its last packet: AUX is high from then on (manual of the E32-433T20D, 6.2). Returns whether it
+    /// has just ended.
+    fn send(&mut self) -> bool {
         if !self.port.is_sending() {
             if !self.port.is_replying() || !self.radio.is_free() {
-                return;
+                return false;
             }
             self.unsent = self.port.start();
         }
@@ -155,30 +164,34 @@ where
                 Some(byte) => byte,
                 None => match self.port.next() {
                     Next::Byte(byte) => byte,
-                    Next::Wait => return,
+                    Next::Wait => return false,
                     Next::Done => {
-                        if self.radio.flush().is_ok() && self.radio.is_free() {
+                        let ended = self.radio.flush().is_ok() && self.radio.is_free();
+                        if ended {
                             self.on_air_ms = self.packet_ms;
                             self.end_of_reply();
                         }
-                        return;
+                        return ended;
                     }
                 },
             };
             if self.radio.write(byte).is_err() {
                 self.unsent = Some(byte);
-                return;
+                return false;
             }
         }
+        false
     }
 }
 
 impl<S, M, A> ServedLine for RadioLine<S, M, A> {
-    /// Also returns true while the last packet may still be on the air, because a restart would change the radio's
-    /// mode. The next request shows that the packet has been received.
+    /// The next request shows that the packet has been received.
+    fn is_on_air(&self) -> bool {
+        self.on_air_ms > 0 && self.port.waiting().is_none()
+    }
+
     fn is_replying(&self) -> bool {
-        let on_air = self.on_air_ms > 0 && self.port.waiting().is_none();
-        self.port.is_replying() || on_air
+        self.port.is_replying()
     }
 
     fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {

@@ -6,19 +6,27 @@
 //!              <--- TO_SEND ----
 //! ```
 //!
-//! The queues hold what passes while flash is erased, 40 ms, because a byte takes 1.04 ms.
+//! The task does not run while flash is erased, for up to 40 ms. A queue holds 64 bytes, which take 66 ms.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::{
+    convert::Infallible,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use board_support::{Damaged, PinInput, PinOutput, RadioUart, pac::Interrupt};
+use embedded_hal::digital::{self, InputPin, PinState};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
 use firmware::{byte_queue::ByteQueue, radio};
+use modio_drivers::AuxPin;
 use rtic::Mutex;
 
 use crate::{board::Device, clock, every::Every};
 
 /// The radio line.
-pub type Radio = radio::RadioLine<Serial, PinOutput, PinInput>;
+pub type Radio = radio::RadioLine<Serial, PinOutput, Aux>;
+
+/// The pin at AUX.
+pub struct Aux(pub PinInput);
 
 /// Milliseconds between two checks of the UART's registers.
 const CHECK_MS: u8 = 100;
@@ -48,6 +56,26 @@ pub fn on_interrupt(uart: &mut RadioUart) {
     );
 }
 
+impl digital::ErrorType for Aux {
+    type Error = Infallible;
+}
+
+impl InputPin for Aux {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        self.0.is_high()
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        self.0.is_low()
+    }
+}
+
+impl AuxPin for Aux {
+    fn pull(&mut self, level: PinState) {
+        self.0.pull(level.into());
+    }
+}
+
 impl ErrorType for Serial {
     type Error = ErrorKind;
 }
@@ -65,12 +93,15 @@ impl Read<u8> for Serial {
 
 impl Write<u8> for Serial {
     fn write(&mut self, byte: u8) -> nb::Result<(), ErrorKind> {
-        if !TO_SEND.push(byte) {
-            return Err(nb::Error::WouldBlock);
-        }
-        // The handler takes the byte when the UART can send it.
+        let pushed = TO_SEND.push(byte);
+        // The handler takes bytes when the UART can send them. Also pended when the queue is full, in case the UART's
+        // interrupt was turned off by a disturbed register.
         rtic::pend(Interrupt::USART3);
-        Ok(())
+        if pushed {
+            Ok(())
+        } else {
+            Err(nb::Error::WouldBlock)
+        }
     }
 
     /// The last two bytes may still be in the UART. The module is busy until it has sent them over the air.
@@ -78,6 +109,7 @@ impl Write<u8> for Serial {
         if TO_SEND.is_empty() {
             Ok(())
         } else {
+            rtic::pend(Interrupt::USART3);
             Err(nb::Error::WouldBlock)
         }
     }

@@ -63,6 +63,8 @@ impl Served {
 struct Taken {
     /// The previous reply has been sent, or will never be sent.
     silent: bool,
+    /// Its end may still be on its way.
+    on_air: bool,
     request: Option<Request<'static>>,
 }
 
@@ -72,11 +74,13 @@ fn take(line: &mut Option<impl ServedLine>, server: &Server, delay_ms: u16) -> T
     let Some(line) = line else {
         return Taken {
             silent: false,
+            on_air: false,
             request: None,
         };
     };
     Taken {
         silent: !line.is_replying(),
+        on_air: line.is_on_air(),
         request: line.take(server, delay_ms),
     }
 }
@@ -129,8 +133,11 @@ impl Serving {
         device: &mut impl Mutex<T = &'static mut Device>,
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
+        let order = &mut self.of(which).order;
         if taken.silent
-            && let Some(order) = self.of(which).order.take()
+            // Only a restart affects a reply that is on its way. The other commands are executed before the master can
+            // have the reply, because a command of the other line may follow it.
+            && let Some(order) = order.take_if(|order| !taken.on_air || *order != Command::Restart)
         {
             pass_order_on(order, device, orders);
         }

@@ -18,7 +18,10 @@ use modbus_server::{
     line::{Framing, Gaps, Port, Receiver, Width},
 };
 use modio_drivers::IoModule;
-use register_map::codes::{Format, GapRule, Mode};
+use register_map::{
+    codes::{Format, GapRule, Mode},
+    state::reset_cause::POWER_ON,
+};
 
 use crate::{
     board::{BOARD, DESCRIPTION, Device},
@@ -28,7 +31,7 @@ use crate::{
     log::{self, Log},
     pages::Pages,
     persistence::Persistence,
-    radio::{Radio, Serial},
+    radio::{Aux, Radio, Serial},
     scanning::Scanning,
     serving::Serving,
 };
@@ -162,12 +165,16 @@ pub fn up(
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
             let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
-            let RadioConfig {
-                module,
-                frame_gap_ms,
-            } = config;
-            let unit = identity.unit;
-            let radio = Radio::new(Serial, mode, aux, module, unit, frame_gap_ms, radio_adus);
+            let power_on = u16::from(board.reset_cause) & POWER_ON != 0;
+            let radio = Radio::new(
+                Serial,
+                mode,
+                Aux(aux),
+                config,
+                identity.unit,
+                power_on,
+                radio_adus,
+            );
             Some((radio, uart))
         })
         .unzip();
@@ -193,8 +200,8 @@ pub fn up(
     }
 }
 
-/// Returns the duration of the longest reply in microseconds: the longest frame, half a millisecond that the server
-/// takes for it, and 2 % for the difference between two clocks.
+/// Returns the duration of the longest reply in microseconds: the longest frame, a millisecond, which is more than the
+/// server takes for it, and 2 % for the difference between two clocks.
 fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {

@@ -12,6 +12,9 @@ pub struct CommWatchdog {
     tripped: bool,
 }
 
+/// Longest time after its end at which a request is reported, in ms: the largest LORA_FRAME_GAP is 500.
+const LATEST_MS: u32 = 1_000;
+
 impl CommWatchdog {
     /// Returns a watchdog that has not tripped; the silence begins at the start.
     #[must_use]
@@ -23,9 +26,12 @@ impl CommWatchdog {
         }
     }
 
-    /// Restarts the silence: a valid request ended at `at`.
+    /// Restarts the silence: a valid request ended at `at`, at most [`LATEST_MS`] ago.
     pub const fn refresh(&mut self, at: u32) {
-        self.since = at;
+        // The lines report the end of a request after different times, so a later one may have been reported before.
+        if self.since.wrapping_sub(at) > LATEST_MS {
+            self.since = at;
+        }
         self.safe = false;
     }
 
@@ -111,8 +117,23 @@ mod tests {
     }
 
     #[test]
+    fn a_request_that_is_reported_late_does_not_lengthen_the_silence() {
+        let mut watchdog = CommWatchdog::new();
+        watchdog.refresh(1_400);
+        watchdog.refresh(1_000);
+        assert_eq!(trips_at(&mut watchdog, 1_450, 100), 1_500);
+        watchdog.refresh(1_700);
+        assert_eq!(trips_at(&mut watchdog, 1_750, 100), 1_800);
+        // The difference of two times that are far apart is not taken for a late report.
+        let mut watchdog = CommWatchdog::new();
+        watchdog.refresh(3_000_000_000);
+        assert_eq!(trips_at(&mut watchdog, 3_000_000_000, 100), 3_000_000_100);
+    }
+
+    #[test]
     fn the_time_may_wrap() {
         let mut watchdog = CommWatchdog::new();
+        watchdog.refresh(u32::MAX - 2_000);
         watchdog.refresh(u32::MAX - 9);
         assert!(!watchdog.look(89, Some(100)));
         assert!(watchdog.look(90, Some(100)));

@@ -9,8 +9,10 @@ use std::rc::Rc;
 use std::vec::Vec;
 
 use embedded_hal::digital;
+use embedded_hal::digital::{InputPin, PinState};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType};
 use modbus_server::{Counters, Outcome, Tables, line::Framing};
+use modio_drivers::LoraSettings;
 
 use super::*;
 
@@ -19,6 +21,10 @@ const SETTINGS: LoraSettings = match LoraSettings::new(0, 23, 2, 0) {
     None => unreachable!(),
 };
 const GAP_MS: u16 = 50;
+const CONFIG: RadioConfig = RadioConfig {
+    module: SETTINGS,
+    frame_gap_ms: GAP_MS,
+};
 /// Unit 17 reads holding register 4, and the reply.
 const READ: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
 const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
@@ -105,6 +111,10 @@ impl InputPin for Pin {
     }
 }
 
+impl AuxPin for Pin {
+    fn pull(&mut self, _: PinState) {}
+}
+
 /// Unit 17 with ten registers of value 0x1111.
 struct Bench {
     module: Shared,
@@ -125,9 +135,9 @@ impl Bench {
             module.clone(),
             [pin(), pin()],
             pin(),
-            SETTINGS,
+            CONFIG,
             17,
-            GAP_MS,
+            true,
             adus,
         );
         Self {
@@ -196,8 +206,9 @@ impl Bench {
             assert_eq!(self.pass(GAP_MS + 1), Some(Outcome::Accepted));
             self.pass(2);
             assert_eq!(self.sent(), REPLY);
-            self.pass(SETTINGS.packet_ms());
             assert!(!self.line.is_replying());
+            self.pass(SETTINGS.packet_ms());
+            assert!(!self.line.is_on_air());
         }
     }
 }
@@ -314,11 +325,18 @@ fn reply_ends_when_the_radio_has_sent_it() {
     bench.pass(100);
     assert!(bench.line.is_replying(), "the radio sends");
     bench.module.0.borrow_mut().busy = false;
-    bench.pass(SETTINGS.packet_ms());
-    assert!(bench.line.is_replying(), "the last packet is on the air");
+    bench.now_ms += 1;
+    assert!(bench.line.poll(bench.now_ms, 1), "the module has the reply");
+    assert!(!bench.line.is_replying());
+    assert!(bench.line.is_on_air(), "the last packet");
+    for _ in 1..SETTINGS.packet_ms() {
+        bench.now_ms += 1;
+        assert!(!bench.line.poll(bench.now_ms, 1));
+        assert!(bench.line.is_on_air());
+    }
     bench.now_ms += 1;
     assert!(bench.line.poll(bench.now_ms, 1), "the reply has been sent");
-    assert!(!bench.line.is_replying());
+    assert!(!bench.line.is_on_air());
     bench.is_well();
 }
 
@@ -395,9 +413,12 @@ fn reply_is_aborted_when_the_radio_fails_and_later_requests_are_served() {
         bench.pass(2);
         assert_eq!(bench.sent().is_empty(), !begun);
         bench.module.0.borrow_mut().busy = true;
-        assert!(bench.line.is_replying());
-        bench.pass(31_000);
-        assert_eq!(bench.line.works(), Some(false));
+        while bench.line.works() == Some(true) {
+            assert!(bench.line.is_replying());
+            bench.now_ms += 1;
+            let ended = bench.line.poll(bench.now_ms, 1);
+            assert_eq!(ended, bench.line.works() == Some(false));
+        }
         assert!(!bench.line.is_replying(), "begun: {begun}");
         bench.module.0.borrow_mut().busy = false;
         bench.module.0.borrow_mut().unflushed = false;

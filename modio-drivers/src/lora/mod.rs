@@ -13,6 +13,10 @@
 //! The parameters are written only when they differ, because the module stores them in its own flash. They are read
 //! back, so the driver does not depend on the reply to C0, which differs between versions of the module.
 //!
+//! During the set-up AUX is pulled up, because a module may have an open-drain output. Afterwards the output is
+//! push-pull, and AUX is pulled down: a module that is removed, or whose AUX is open, then looks busy without end and is
+//! reported, and the set-up that follows finds a new module.
+//!
 //! Crate `ebyte-e32` 0.10 is not used: it waits in a loop for each byte and for AUX, without a limit, and panics
 //! when a pin fails.
 
@@ -46,9 +50,11 @@ const STORE_MS: u16 = 200;
 const START_MS: u16 = 2_000;
 /// Longest time until the parameters have been received, in ms: nine bytes take 10.
 const REPLY_MS: u16 = 500;
-/// Longest time that AUX may be low in the normal mode, in ms. 512 bytes, all that the module buffers, take 14 s at
-/// the lowest air rate.
-const BUSY_MS: u16 = 30_000;
+/// Number of packets of all that the module buffers, 512 bytes (6.2).
+const PACKETS: u16 = 9;
+/// Number of times that the parameters are written before the module is only asked for them. A module that does not
+/// keep them would otherwise wear out its flash.
+const STORES: u8 = 3;
 /// Largest number of bytes that are discarded at the end of a step. A UART with a larger buffer is not expected.
 const DISCARDED: u16 = 512;
 /// Time between a failure and the next attempt, in ms.
@@ -66,6 +72,12 @@ enum Step {
     Failed,
 }
 
+/// The pin at AUX.
+pub trait AuxPin: InputPin {
+    /// Pulls the pin up or down.
+    fn pull(&mut self, level: PinState);
+}
+
 /// The radio: its UART, at 9600 8N1 in both modes, and its pins.
 ///
 /// Call [`poll`](Self::poll) about once a millisecond. When the radio [is ready](Self::is_ready), bytes that are
@@ -80,8 +92,12 @@ pub struct Lora<S, M, A> {
     step: Step,
     /// Time in this step, in ms. In [`Step::Ready`] it is the time for which AUX has been low.
     elapsed: u16,
-    /// Time for which AUX has been high, in ms.
+    /// Least time for which AUX has been high, in ms.
     settled: u16,
+    /// Time for which the module may be sending although AUX is high, in ms.
+    sending: u16,
+    /// Number of times that parameters were written since the radio was last ready.
+    stores: u8,
     /// Number of bytes of the parameters that have been received, and whether they are those wanted.
     received: u8,
     equal: bool,
@@ -91,10 +107,19 @@ impl<S, M, A> Lora<S, M, A>
 where
     S: Read<u8> + Write<u8>,
     M: OutputPin,
-    A: InputPin,
+    A: AuxPin,
 {
-    /// Creates the driver. `mode` are M0 and M1; AUX needs a pull-up. The module gets these settings.
-    pub const fn new(serial: S, mode: [M; 2], aux: A, settings: LoraSettings) -> Self {
+    /// Creates the driver. `mode` are M0 and M1, both high; AUX is pulled up. The module gets these settings.
+    ///
+    /// AUX goes high when the module begins to send its last packet. `sending` is the time for which it may still be
+    /// sending in ms: [`LoraSettings::packet_ms`] after a reset that the module has not had, 0 after power-on.
+    pub const fn new(
+        serial: S,
+        mode: [M; 2],
+        aux: A,
+        settings: LoraSettings,
+        sending: u16,
+    ) -> Self {
         Self {
             serial,
             mode,
@@ -103,6 +128,8 @@ where
             step: Step::Starting,
             elapsed: 0,
             settled: 0,
+            sending,
+            stores: 0,
             received: 0,
             equal: true,
         }
@@ -113,16 +140,18 @@ where
     pub fn poll(&mut self, passed: u16) {
         let free = self.is_free();
         self.elapsed = self.elapsed.saturating_add(passed);
-        self.settled = if free {
-            self.settled.saturating_add(passed)
-        } else {
-            0
+        self.settled = match self.settled {
+            _ if !free => 0,
+            // It may have gone high just now.
+            0 => 1,
+            settled => settled.saturating_add(passed),
         };
         match self.step {
             Step::Starting | Step::Sleeping | Step::Setting | Step::Waking => self.settle(),
             Step::Asking | Step::Checking => match self.reply() {
                 Some(true) => self.set_mode(PinState::Low, Step::Waking),
-                Some(false) if self.step == Step::Asking => {
+                Some(false) if self.step == Step::Asking && self.stores < STORES => {
+                    self.stores = self.stores.saturating_add(1);
                     let [a, b, c, d, e] = *self.settings.parameters();
                     self.send(&[STORE, a, b, c, d, e], Step::Setting);
                 }
@@ -130,7 +159,10 @@ where
                 None => self.fail_after(REPLY_MS),
             },
             Step::Ready if free => self.elapsed = 0,
-            Step::Ready => self.fail_after(BUSY_MS),
+            Step::Ready => {
+                let all = self.settings.packet_ms().saturating_mul(PACKETS);
+                self.fail_after(all.saturating_add(START_MS));
+            }
             Step::Failed if self.elapsed >= RETRY_MS => self.go(Step::Starting),
             Step::Failed => {}
         }
@@ -157,18 +189,21 @@ where
     /// Goes on when the module has been free for long enough after a change.
     fn settle(&mut self) {
         let after = match self.step {
-            Step::Starting => 0,
+            Step::Starting => self.sending,
             Step::Setting => STORE_MS,
             _ => MODE_MS,
         };
         if self.elapsed < after || self.settled < SETTLED_MS {
-            return self.fail_after(START_MS);
+            return self.fail_after(after.saturating_add(START_MS));
         }
         match self.step {
             Step::Starting => self.set_mode(PinState::High, Step::Sleeping),
             Step::Sleeping => self.send(&READ, Step::Asking),
             Step::Setting => self.send(&READ, Step::Checking),
-            _ => self.go(Step::Ready),
+            _ => {
+                self.stores = 0;
+                self.go(Step::Ready);
+            }
         }
     }
 
@@ -176,8 +211,10 @@ where
         self.step = step;
         self.elapsed = 0;
         self.settled = 0;
+        self.sending = 0;
         self.received = 0;
         self.equal = true;
+        self.aux.pull((step != Step::Ready).into());
         // What was received before this step is no reply, and no data either. The number of reads is limited, because
         // a broken UART may report an error each time.
         let _ = (0..DISCARDED).any(|_| matches!(self.serial.read(), Err(nb::Error::WouldBlock)));

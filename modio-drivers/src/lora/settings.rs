@@ -35,7 +35,7 @@ impl LoraSettings {
         })
     }
 
-    /// Returns the longest time that a packet of 58 bytes is on the air, in milliseconds: at 0.3 kbit/s 4800. The manual
+    /// Returns the longest time that a packet of 58 bytes is on the air, in milliseconds: 4800 at 0.3 kbit/s. The manual
     /// gives only the air rate. This is the time of 58 bytes and 32 more for preamble and header, doubled, because the
     /// maker's time for a similar module (E220: 1.5 s for 100 bytes at 2.4 kbit/s) is about twice that of the bits.
     #[must_use]
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn time_of_a_packet_is_that_of_its_bits() {
+    fn time_of_a_packet_is_twice_that_of_its_bits() {
         let ms = |air_rate| LoraSettings::new(0, 0, air_rate, 0).unwrap().packet_ms();
         assert_eq!([0, 1, 2, 3, 4, 5].map(ms), [4800, 1200, 600, 300, 150, 75]);
     }

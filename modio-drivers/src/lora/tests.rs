@@ -26,6 +26,9 @@ struct Module {
     answers: bool,
     /// Bits that the module does not keep.
     lost: u8,
+    /// The module is there. Otherwise AUX has the level of the pull.
+    fitted: bool,
+    pull: bool,
 }
 
 #[derive(Clone)]
@@ -40,7 +43,7 @@ impl Module {
             _ => return,
         };
         self.commands.push(core::mem::take(&mut self.command));
-        if !self.answers || self.mode != [true; 2] {
+        if !self.fitted || !self.answers || self.mode != [true; 2] {
             return;
         }
         if let Some(parameters) = parameters {
@@ -117,11 +120,22 @@ impl digital::ErrorType for Aux {
 
 impl InputPin for Aux {
     fn is_high(&mut self) -> Result<bool, Infallible> {
-        Ok(self.0.0.borrow().busy == 0)
+        let module = self.0.0.borrow();
+        Ok(if module.fitted {
+            module.busy == 0
+        } else {
+            module.pull
+        })
     }
 
     fn is_low(&mut self) -> Result<bool, Infallible> {
         self.is_high().map(|high| !high)
+    }
+}
+
+impl AuxPin for Aux {
+    fn pull(&mut self, level: PinState) {
+        self.0.0.borrow_mut().pull = level.into();
     }
 }
 
@@ -131,6 +145,9 @@ const SETTINGS: LoraSettings = match LoraSettings::new(7, 23, 2, 3) {
     Some(settings) => settings,
     None => unreachable!(),
 };
+
+/// Longest time for which the module may be busy in service, in ms.
+const BUSY_MS: u16 = 9 * 600 + START_MS;
 
 /// A radio with a module in its factory state, which starts for 100 ms.
 fn radio() -> (Shared, Radio) {
@@ -145,9 +162,11 @@ fn radio() -> (Shared, Radio) {
         acknowledge: &[STORE, 0x00, 0x07, 0x1A, 0x17, 0x47],
         answers: true,
         lost: 0,
+        fitted: true,
+        pull: true,
     })));
     let pins = [0, 1].map(|pin| ModePin(module.clone(), pin));
-    let lora = Lora::new(module.clone(), pins, Aux(module.clone()), SETTINGS);
+    let lora = Lora::new(module.clone(), pins, Aux(module.clone()), SETTINGS, 0);
     (module, lora)
 }
 
@@ -218,6 +237,89 @@ fn parameters_that_the_module_does_not_keep_are_a_failure() {
     module.0.borrow_mut().lost = 0x02;
     run(&module, &mut lora);
     assert!(lora.has_failed());
+}
+
+#[test]
+fn parameters_are_written_three_times_at_most_until_the_radio_is_ready() {
+    let (module, mut lora) = radio();
+    module.0.borrow_mut().lost = 0x02;
+    let pass = |lora: &mut Radio, ms: u32| {
+        for _ in 0..ms {
+            let busy = module.0.borrow().busy.saturating_sub(1);
+            module.0.borrow_mut().busy = busy;
+            lora.poll(1);
+        }
+        let commands = commands(&module);
+        let stores = commands.iter().filter(|command| command[0] == STORE);
+        (stores.count(), commands.len())
+    };
+    let (stores, asked) = pass(&mut lora, 100_000);
+    assert_eq!(stores, 3);
+    assert!(asked > 10, "the module is still asked");
+    module.0.borrow_mut().lost = 0;
+    module.0.borrow_mut().parameters = *SETTINGS.parameters();
+    assert_eq!(pass(&mut lora, 10_000).0, 0);
+    assert!(lora.is_ready());
+    // Another module, with other parameters.
+    module.0.borrow_mut().parameters[1] = 0;
+    module.0.borrow_mut().fitted = false;
+    pass(&mut lora, BUSY_MS.into());
+    module.0.borrow_mut().fitted = true;
+    assert_eq!(pass(&mut lora, 10_000).0, 1);
+    assert!(lora.is_ready());
+}
+
+#[test]
+fn module_that_is_removed_in_service_is_a_failure() {
+    let (module, mut lora) = radio();
+    run(&module, &mut lora);
+    assert!(lora.is_ready());
+    module.0.borrow_mut().fitted = false;
+    for _ in 1..BUSY_MS {
+        lora.poll(1);
+        assert!(lora.is_ready());
+    }
+    lora.poll(1);
+    // It is asked again and again, and fails again and again.
+    for _ in 0..3 {
+        assert!(lora.has_failed());
+        for _ in 0..RETRY_MS {
+            lora.poll(1);
+        }
+        run(&module, &mut lora);
+    }
+    module.0.borrow_mut().fitted = true;
+    for _ in 0..RETRY_MS {
+        lora.poll(1);
+    }
+    run(&module, &mut lora);
+    assert!(lora.is_ready());
+}
+
+#[test]
+fn module_that_may_still_be_sending_is_left_alone() {
+    let (module, _) = radio();
+    module.0.borrow_mut().busy = 0;
+    let pins = [0, 1].map(|pin| ModePin(module.clone(), pin));
+    let mut lora = Lora::new(module.clone(), pins, Aux(module.clone()), SETTINGS, 600);
+    for _ in 1..600 {
+        lora.poll(1);
+        assert_eq!(lora.step, Step::Starting);
+    }
+    run(&module, &mut lora);
+    assert!(lora.is_ready());
+}
+
+#[test]
+fn late_call_does_not_count_as_time_for_which_aux_was_high() {
+    let (module, mut lora) = radio();
+    module.0.borrow_mut().busy = 1;
+    lora.poll(1);
+    module.0.borrow_mut().busy = 0;
+    lora.poll(40);
+    assert_eq!(lora.step, Step::Starting);
+    lora.poll(SETTLED_MS);
+    assert_eq!(lora.step, Step::Sleeping);
 }
 
 #[test]
@@ -318,7 +420,7 @@ fn uart_that_always_reports_an_error_does_not_stop_the_driver() {
     module.0.borrow_mut().busy = 0;
     module.0.borrow_mut().change = 0;
     let pins = [0, 1].map(|pin| ModePin(module.clone(), pin));
-    let mut lora = Lora::new(Broken, pins, Aux(module.clone()), SETTINGS);
+    let mut lora = Lora::new(Broken, pins, Aux(module.clone()), SETTINGS, 0);
     for _ in 0..100 {
         lora.poll(1);
     }
