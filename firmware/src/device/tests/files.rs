@@ -87,6 +87,16 @@ fn groups_of_one_request_are_read_in_their_order() {
     assert_eq!(bench.read_file(&[(1, 9, 125)]), Err(3));
 }
 
+/// Reading can begin in the middle of a packed phrase, and at the border of the packed part.
+#[test]
+fn each_record_can_be_read_alone() {
+    let mut bench = Bench::new(Module::Ai2Ao2, &[]);
+    let file = bench.self_description();
+    for (record, bytes) in (0..).zip(file.chunks(2)) {
+        assert_eq!(bench.read_file(&[(1, record, 1)]).unwrap(), bytes);
+    }
+}
+
 #[test]
 fn other_files_return_illegal_data_address() {
     let mut bench = Bench::new(Module::None, &[]);

@@ -1,11 +1,15 @@
 //! The self-description: file 1 over the line by function 14, and its CRC in register 0x020F.
 
 use modio_description::{Description, describe, records};
-use register_map::Module as Known;
-use sim::Module;
+use register_map::{Module as Known, codes::Baud, configuration};
+use sim::{Module, Time};
 
 use crate::LAYOUT;
-use crate::bench::{Bench, MODULE, PORT};
+use crate::bench::{Bench, MODULE, Most, PORT, corner};
+
+/// Longest silence in a reply. At the nominal corner it is t1.5 above 19200 bit/s (V1.02 2.5.1.1), so that a master
+/// which checks t1.5 accepts the reply. At the slow corner it is below t3.5, 1,750 us, which ends a frame.
+const SILENCE: Most = Most(Time::from_us(750), Time::from_us(1_400));
 
 /// Groups of records: file, first record and number of records.
 type Groups<'a> = &'a [(u16, u16, u16)];
@@ -87,6 +91,32 @@ fn file_1_describes_the_unit_with_any_number_of_groups() {
     bench.assert_described(Known::Ai4, &file);
     for groups in [2, 7, 35] {
         assert_eq!(bench.self_description(groups), file, "{groups} groups");
+    }
+}
+
+/// The unit reads the records while it sends. Groups cost more than records, and a group costs most near the end of a
+/// packed block of 32 bytes.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn replies_with_the_most_records_or_groups_are_sent_without_long_silences() {
+    for baud in [Baud::B19200, Baud::B115200, Baud::B921600] {
+        let mut bench = Bench::set_up(Module::Ai2Ao2, &[(configuration::BAUD, baud.code())]);
+        bench.patience = SILENCE.of(corner());
+        let file = bench.self_description(1);
+        let records = (file.len() / 2) as u16;
+        for first in (15..records - 124).step_by(16) {
+            for (groups, count) in [(1, 124), (35, 2)] {
+                let read = bench.read_file(&vec![(1, first, count); groups]).unwrap();
+                let [from, to] = [first, first + count].map(|record| usize::from(record) * 2);
+                assert_eq!(read, vec![&file[from..to]; groups]);
+                let frame = bench.board.line().frames().next_back().expect("a reply");
+                assert!(
+                    frame.longest_gap <= SILENCE.of(corner()),
+                    "{baud:?}, {groups} groups from record {first}: {:?}",
+                    frame.longest_gap
+                );
+            }
+        }
     }
 }
 

@@ -50,10 +50,10 @@ fn instants(bench: &Bench) -> [Time; 7] {
     ]
 }
 
-/// Returns the duration of the longest reply at the bench's rate, plus the half of a millisecond that the server may
-/// add, plus a tenth.
+/// Returns the duration of the longest reply at the bench's rate, plus the millisecond that the server may add, plus a
+/// tenth.
 fn bound(bench: &Bench) -> Time {
-    let longest = bench.characters(256) + Time::from_us(500);
+    let longest = bench.characters(256) + Time::from_ms(1);
     Time::from_ps(longest.as_ps() * 11 / 10)
 }
 

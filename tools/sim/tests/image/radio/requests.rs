@@ -90,8 +90,9 @@ fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed()
         bench.write_over_the_air(COMMAND, 1);
         bench.board.run_for(Time::from_ms(100));
         bench.write_over_the_air(COMMAND, 2);
-        // The unit waits for the longest time of a packet on the air, 4.8 s at 0.3 kbit/s.
-        bench.board.run_for(Time::from_ms(5_000) + SET_UP);
+        // The unit waits for the longest time of a packet on the air, 4.8 s at 0.3 kbit/s, before the restart and
+        // after it.
+        bench.board.run_for(Time::from_ms(10_000) + SET_UP);
         assert_eq!(
             bench.register(state::RESET_CAUSE) & 0b1000,
             0b1000,
