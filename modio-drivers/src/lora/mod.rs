@@ -94,7 +94,7 @@ pub struct Lora<S, M, A> {
     elapsed: u16,
     /// Least time for which AUX has been high, in ms.
     settled: u16,
-    /// Time for which the module may be sending although AUX is high, in ms.
+    /// Time for which the module may be sending after AUX has gone high, in ms. 0 after the first step.
     sending: u16,
     /// Number of times that parameters were written since the radio was last ready.
     stores: u8,
@@ -111,8 +111,8 @@ where
 {
     /// Creates the driver. `mode` are M0 and M1, both high; AUX is pulled up. The module gets these settings.
     ///
-    /// AUX goes high when the module begins to send its last packet. `sending` is the time for which it may still be
-    /// sending in ms: [`LoraSettings::packet_ms`] after a reset that the module has not had, 0 after power-on.
+    /// AUX goes high when the module begins to send its last packet. `sending` is the time in ms for which it may then
+    /// still be sending: [`LoraSettings::packet_ms`] after a reset that the module has not had, 0 after power-on.
     pub const fn new(
         serial: S,
         mode: [M; 2],
@@ -189,12 +189,13 @@ where
     /// Goes on when the module has been free for long enough after a change.
     fn settle(&mut self) {
         let after = match self.step {
-            Step::Starting => self.sending,
+            Step::Starting => 0,
             Step::Setting => STORE_MS,
             _ => MODE_MS,
         };
-        if self.elapsed < after || self.settled < SETTLED_MS {
-            return self.fail_after(after.saturating_add(START_MS));
+        if self.elapsed < after || self.settled < self.sending.max(SETTLED_MS) {
+            let sent = self.sending.saturating_mul(PACKETS + 1);
+            return self.fail_after(after.saturating_add(START_MS).saturating_add(sent));
         }
         match self.step {
             Step::Starting => self.set_mode(PinState::High, Step::Sleeping),

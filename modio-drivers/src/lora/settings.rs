@@ -36,8 +36,8 @@ impl LoraSettings {
     }
 
     /// Returns the longest time that a packet of 58 bytes is on the air, in milliseconds: 4800 at 0.3 kbit/s. The manual
-    /// gives only the air rate. This is the time of 58 bytes and 32 more for preamble and header, doubled, because the
-    /// maker's time for a similar module (E220: 1.5 s for 100 bytes at 2.4 kbit/s) is about twice that of the bits.
+    /// gives only the air rate. This is the time of 58 bytes and 32 more for preamble and header, doubled: 600 at 2.4
+    /// kbit/s. For a similar module (manual of the E220, chapter 6) the maker gives a delay of 1.5 s for 100 bytes.
     #[must_use]
     pub fn packet_ms(&self) -> u16 {
         const BITS: u32 = 2 * (58 + 32) * 8;

@@ -195,11 +195,12 @@ impl Bench {
         line.set_settings(Settings { baud, ..settings });
     }
 
-    /// Sends bytes on the line now, or directly after the bytes that are still being sent.
-    pub fn send(&mut self, bytes: &[u8]) {
+    /// Sends bytes on the line now, or directly after the bytes that are still being sent. Returns the end of the last
+    /// byte.
+    pub fn send(&mut self, bytes: &[u8]) -> Time {
         let now = self.now();
         let bytes = self.disturbance.not_dropped(bytes.iter().copied());
-        self.bus.line().send(now, &bytes);
+        self.bus.line().send(now, &bytes)
     }
 
     /// Returns the bytes that the master has received since the last call.

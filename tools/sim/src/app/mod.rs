@@ -63,9 +63,9 @@ const RADIO_START_UP: Time = Time::from_secs(3);
 /// An event that wakes the thread of the boards.
 enum Event {
     /// Bytes from a master, to be sent on the line.
-    Bytes(Vec<u8>),
+    Bytes(Vec<u8>, Hold),
     /// Bytes from a master, for the gateway radio.
-    Radio(Vec<u8>),
+    Radio(Vec<u8>, Hold),
     /// A request to the HTTP interface, and the receiver of its reply.
     Request(api::Request, tokio::sync::oneshot::Sender<api::Reply>),
     /// From the debugger.
@@ -76,6 +76,19 @@ enum Event {
     Exact(Request, exact_line::Answers),
     /// The simulator has to end.
     Stop,
+}
+
+/// While this exists, the endpoint that has sent an event reads no more bytes from its master, which then has to wait as
+/// at a serial port.
+type Hold = mpsc::Sender<()>;
+
+/// Sends an event with bytes, and waits until the boards' thread wants more. Returns false when the simulator ends.
+fn pass_on(bytes: &[u8], event: fn(Vec<u8>, Hold) -> Event, events: &mpsc::Sender<Event>) -> bool {
+    let (hold, held) = mpsc::channel();
+    let sent = events.send(event(bytes.to_vec(), hold)).is_ok();
+    // Nothing is ever sent: this returns when the hold is dropped.
+    let _ = held.recv();
+    sent
 }
 
 /// Runs the simulator until something stops it or its time is over.

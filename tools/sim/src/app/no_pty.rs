@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::mpsc::Sender;
 
-use super::Event;
+use super::{Event, Hold};
 
 /// A missing pseudo-terminal, with the methods of the real one.
 pub struct Pty;
@@ -18,7 +18,7 @@ impl Pty {
     pub fn open(
         _: Option<&Path>,
         _: Sender<Event>,
-        _: fn(Vec<u8>) -> Event,
+        _: fn(Vec<u8>, Hold) -> Event,
     ) -> Result<Self, String> {
         Ok(Self)
     }

@@ -19,7 +19,7 @@ use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use super::Event;
+use super::{Event, Hold, pass_on};
 
 /// Interval at which the simulator checks whether a program has opened the terminal.
 const LOOK: Duration = Duration::from_millis(5);
@@ -42,7 +42,7 @@ impl Pty {
     pub fn open(
         link: Option<&Path>,
         events: Sender<Event>,
-        event: fn(Vec<u8>) -> Event,
+        event: fn(Vec<u8>, Hold) -> Event,
     ) -> Result<Self, String> {
         let (master, path) =
             raw_terminal().map_err(|error| format!("cannot make a pseudo-terminal: {error}"))?;
@@ -160,13 +160,13 @@ fn state(terminal: &OwnedFd, wanted: PollFlags, wait: Option<Duration>) -> PollF
     }
 }
 
-fn listen(terminal: &OwnedFd, events: &Sender<Event>, event: fn(Vec<u8>) -> Event) {
+fn listen(terminal: &OwnedFd, events: &Sender<Event>, event: fn(Vec<u8>, Hold) -> Event) {
     let mut buffer = [0; 4096];
     loop {
         let state = state(terminal, PollFlags::IN, None);
         if state.contains(PollFlags::IN) {
             match rustix::io::read(terminal, &mut buffer) {
-                Ok(length) if events.send(event(buffer[..length].to_vec())).is_err() => return,
+                Ok(length) if !pass_on(&buffer[..length], event, events) => return,
                 // Reading fails when the master has just closed the terminal. It may open the terminal again.
                 Ok(_) | Err(_) => {}
             }

@@ -20,7 +20,7 @@ fn received(queue: &Receiver<Event>, wanted: usize) -> Vec<u8> {
     let mut all = Vec::new();
     while all.len() < wanted {
         match queue.recv_timeout(Duration::from_secs(20)) {
-            Ok(Event::Bytes(bytes)) => all.extend(bytes),
+            Ok(Event::Bytes(bytes, _)) => all.extend(bytes),
             _ => panic!("only {all:?} was received, {wanted} bytes expected"),
         }
     }
@@ -79,6 +79,22 @@ fn writing_does_not_wait_for_a_master_that_does_not_read() {
     for _ in 0..1000 {
         pty.write(&[0x55; 256]);
     }
+}
+
+#[test]
+fn no_more_bytes_are_read_while_the_last_ones_are_held() {
+    let (events, queue) = mpsc::channel();
+    let pty = Pty::open(None, events, Event::Bytes).unwrap();
+    let mut master = open(pty.path().unwrap());
+    master.write_all(&[1]).unwrap();
+    let hold = match queue.recv_timeout(Duration::from_secs(20)) {
+        Ok(Event::Bytes(_, hold)) => hold,
+        _ => panic!("no byte was received"),
+    };
+    master.write_all(&[2]).unwrap();
+    assert!(queue.recv_timeout(Duration::from_millis(50)).is_err());
+    drop(hold);
+    assert_eq!(received(&queue, 1), [2]);
 }
 
 #[test]

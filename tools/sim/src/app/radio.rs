@@ -31,12 +31,11 @@ impl Bench {
         }
     }
 
-    /// Sends bytes to the gateway now, or directly after the bytes that are still being sent.
-    pub fn send_by_radio(&mut self, bytes: &[u8]) {
+    /// Sends bytes to the gateway now, or directly after the bytes that are still being sent. Returns the end of the
+    /// last byte.
+    pub fn send_by_radio(&mut self, bytes: &[u8]) -> Time {
         let now = self.now();
-        if let Some(air) = self.bus.air() {
-            air.send(now, bytes);
-        }
+        self.bus.air().map_or(now, |air| air.send(now, bytes))
     }
 
     /// Returns the bytes that the gateway has sent to its master since the last call.

@@ -14,7 +14,7 @@ use super::exact_line::Requests;
 use super::gdb::Session;
 use super::live::Live;
 use super::pace::{Pace, span};
-use super::{Event, api, pty, tcp};
+use super::{Event, Hold, api, pty, tcp};
 
 /// Longest time between two updates of the boards: no byte waits longer to be passed on.
 const SLICE: Duration = Duration::from_millis(1);
@@ -22,6 +22,9 @@ const SLICE: Duration = Duration::from_millis(1);
 /// Most virtual time that passes between two looks at the queue, so that Ctrl-C works on a computer that is too slow to
 /// keep up.
 const AT_ONCE: Duration = Duration::from_millis(20);
+
+/// Virtual time that the bytes of a master may take to send before no more are read from it.
+const AHEAD: Time = Time::from_secs(1);
 
 /// Longest time that the loop waits for an event.
 const IDLE: Duration = Duration::from_secs(1);
@@ -69,10 +72,13 @@ pub fn until_stopped(
         debugger: Session::default(),
     };
     let mut requests = Requests::default();
+    // The ends of the bytes that masters have sent, while no more are read from them.
+    let mut holds: Vec<(Time, Hold)> = Vec::new();
     loop {
         let wall = Instant::now();
         clock.catch_up(bench);
         requests.run(bench, span(AT_ONCE));
+        holds.retain(|(end, _)| *end > bench.now() + AHEAD);
         bench.print_news();
         live.send(bench, wall);
         attached.update(bench, clock.debugger.halted());
@@ -107,13 +113,13 @@ pub fn until_stopped(
             wait = wait.min(left);
         }
         match queue.recv_timeout(wait) {
-            Ok(Event::Bytes(bytes)) => {
+            Ok(Event::Bytes(bytes, hold)) => {
                 clock.catch_up(bench);
-                bench.send(&bytes);
+                holds.push((bench.send(&bytes), hold));
             }
-            Ok(Event::Radio(bytes)) => {
+            Ok(Event::Radio(bytes, hold)) => {
                 clock.catch_up(bench);
-                bench.send_by_radio(&bytes);
+                holds.push((bench.send_by_radio(&bytes), hold));
             }
             Ok(Event::Gateway(message)) => {
                 if let Some(gateway) = &mut attached.gateway {

@@ -7,7 +7,7 @@ use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TrySendError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use super::Event;
+use super::{Event, pass_on};
 
 /// Pieces of received bytes that may wait for a client that does not read. The client misses further pieces.
 const WAITING: usize = 1024;
@@ -82,10 +82,7 @@ fn serve(
     thread::spawn(move || {
         let mut buffer = [0; 4096];
         while let Ok(length @ 1..) = from.read(&mut buffer) {
-            if events
-                .send(Event::Bytes(buffer[..length].to_vec()))
-                .is_err()
-            {
+            if !pass_on(&buffer[..length], Event::Bytes, &events) {
                 return;
             }
         }
@@ -120,7 +117,7 @@ mod tests {
 
         first.write_all(&[1, 2, 3]).unwrap();
         let event = queue.recv_timeout(Duration::from_secs(20)).unwrap();
-        assert!(matches!(event, Event::Bytes(bytes) if bytes == [1, 2, 3]));
+        assert!(matches!(event, Event::Bytes(bytes, _) if bytes == [1, 2, 3]));
 
         tcp.write(&[4, 5]);
         for client in [&mut first, &mut second] {

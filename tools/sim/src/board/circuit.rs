@@ -52,7 +52,7 @@ impl Modio {
             line: Line::default(),
             slots: slots.collect(),
             dip: config.dip,
-            radio: config.radio.map(Radio::new),
+            radio: config.radio.map(|stored| Radio::new(stored, config.corner)),
             addressed: None,
         }
     }

@@ -3,6 +3,7 @@
 //! The module of a single board has the air with the gateway beside it, and both are computed together. On a bus with
 //! several boards the air belongs to the [bus](crate::bus), which passes the packets on.
 
+use crate::corner::Corner;
 use crate::periph::gpio::{Drive, Gpio};
 use crate::periph::usart::{Sent, TxPin, Wire};
 use crate::radio::{Air, Module, Parameters, Sender, tell};
@@ -33,10 +34,10 @@ pub struct Radio {
 impl Radio {
     /// A module without power, which keeps `stored`, and the air.
     #[must_use]
-    pub fn new(stored: Parameters) -> Self {
+    pub fn new(stored: Parameters, corner: Corner) -> Self {
         Self {
-            module: Module::new(Sender::Board(0), stored),
-            air: Some(Air::new(0, Time::ZERO)),
+            module: Module::new(Sender::Board(0), stored, corner),
+            air: Some(Air::new(0, Time::ZERO, corner)),
             aux: Drive::Floating,
         }
     }

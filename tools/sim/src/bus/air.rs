@@ -15,8 +15,9 @@ impl Air {
             let Some(radio) = &mut board.machine.bus.soc.circuit.radio else {
                 continue;
             };
+            let corner = radio.module.corner;
             radio.join(n);
-            let air = air.get_or_insert_with(|| Self::new(n, now));
+            let air = air.get_or_insert_with(|| Self::new(n, now, corner));
             if radio.module.mode() == Some(Mode::Normal) {
                 air.take_of_board(n, &News::Tuned(now, radio.module.parameters()));
             }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use super::parameters::SLEEP_UART;
 use super::{Byte, Module, News, Packet, Parameters, Sender, timing};
+use crate::corner::Corner;
 use crate::periph::usart::{Sent, TxPin};
 use crate::serial::Character;
 use crate::time::Time;
@@ -40,8 +41,8 @@ pub struct Air {
 
 impl Air {
     /// Air in which nothing is sent, and a gateway with the factory parameters. It follows the board `leader`.
-    pub(crate) fn new(leader: u16, now: Time) -> Self {
-        let mut gateway = Module::new(Sender::Gateway, Parameters::FACTORY);
+    pub(crate) fn new(leader: u16, now: Time, corner: Corner) -> Self {
+        let mut gateway = Module::new(Sender::Gateway, Parameters::FACTORY, corner);
         gateway.advance(now);
         gateway.uart.set_pin(TxPin::Usart, now);
         gateway.start_in_normal_mode();
@@ -91,6 +92,7 @@ impl Air {
         let bytes = bytes[..bytes.len().min(timing::PACKET_BYTES)].to_vec();
         let start = at.max(self.now());
         let packet = Packet::new(
+            self.gateway.corner,
             Sender::Other,
             self.others,
             start,

@@ -17,8 +17,8 @@
 //! # Sources
 //!
 //! The behaviour is that of the maker's manual (E32-433T20D, 2022). The manual leaves durations open. [`timing`] lists
-//! every duration, and whether it is from the manual or an assumption. Assumptions are on the slow side, which is the
-//! worse one for the firmware. Further points that the manual leaves open, as they are modelled:
+//! every duration, and whether it is from the manual or an assumption. Further points that the manual leaves open, as
+//! they are modelled:
 //!
 //! - A command must be complete and alone: after a pause of three byte times the module drops bytes that are no command.
 //! - Bytes at the UART are lost while AUX is low because of a start or a command.

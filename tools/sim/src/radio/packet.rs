@@ -1,6 +1,7 @@
 //! A packet on the air.
 
 use super::{Parameters, timing};
+use crate::corner::Corner;
 use crate::time::Time;
 
 /// The transmitter of a packet.
@@ -45,8 +46,9 @@ pub struct Packet {
 }
 
 impl Packet {
-    /// A packet that begins at `start`.
+    /// A packet that begins at `start`, at a corner of the transmitter.
     pub(super) fn new(
+        corner: Corner,
         sender: Sender,
         number: u64,
         start: Time,
@@ -54,7 +56,7 @@ impl Packet {
         wake_up: Time,
         bytes: Vec<u8>,
     ) -> Self {
-        let end = start + wake_up + timing::packet(bytes.len(), parameters.air_rate());
+        let end = start + wake_up + timing::packet(bytes.len(), parameters.air_rate(), corner);
         Self {
             sender,
             number,

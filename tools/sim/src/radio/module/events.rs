@@ -134,7 +134,15 @@ impl Module {
             Some(Mode::WakeUp) => parameters.wake_up(),
             _ => Time::ZERO,
         };
-        let packet = Packet::new(self.sender, self.sent, now, parameters, wake_up, bytes);
+        let packet = Packet::new(
+            self.corner,
+            self.sender,
+            self.sent,
+            now,
+            parameters,
+            wake_up,
+            bytes,
+        );
         self.sending.begin(packet.end);
         self.antenna.stop();
         self.news.push(News::Begun(packet));

@@ -9,6 +9,7 @@ use super::parameters::{Mode, Parameters, SLEEP_UART};
 use super::sending::Sending;
 use super::timing;
 use super::uart::Uart;
+use crate::corner::Corner;
 use crate::periph::gpio::Drive;
 use crate::time::Time;
 
@@ -28,6 +29,7 @@ pub enum Fault {
 /// ([`Air::gateway`](super::Air::gateway)).
 #[derive(Clone, Debug)]
 pub struct Module {
+    pub(crate) corner: Corner,
     pub(crate) sender: Sender,
     powered: bool,
     fault: Fault,
@@ -62,8 +64,9 @@ pub struct Module {
 
 impl Module {
     /// A module without power, which keeps `stored`. Its pins M0 and M1 are open, which is high.
-    pub(crate) fn new(sender: Sender, stored: Parameters) -> Self {
+    pub(crate) fn new(sender: Sender, stored: Parameters, corner: Corner) -> Self {
         Self {
+            corner,
             sender,
             powered: false,
             fault: Fault::None,

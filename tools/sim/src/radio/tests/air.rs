@@ -1,6 +1,7 @@
 //! The air: which packets reach which receiver, collisions, losses, and the gateway.
 
 use super::host::{Host, bytes, ms};
+use crate::corner::Corner;
 use crate::periph::usart::Wire;
 use crate::radio::{Air, Packet, Parameters, timing};
 use crate::time::Time;
@@ -42,7 +43,7 @@ fn packets_of_other_channels_rates_and_addresses_are_not_received() {
 fn packets_that_overlap_on_a_channel_destroy_each_other_for_every_receiver() {
     let mut host = normal();
     let factory = Parameters::FACTORY;
-    let length = timing::packet(1, 2400);
+    let length = timing::packet(1, 2400, Corner::Nominal);
     // Another address or rate does not matter, only the channel.
     for other in [factory.with_address(9), factory.with_air_rate_code(4)] {
         let late = length - Time::from_us(1);

@@ -1,6 +1,7 @@
 //! A module with a host at its pins, as the part on a board is.
 
 use crate::board::Radio;
+use crate::corner::Corner;
 use crate::periph::usart::{Sent, TxPin, Wire};
 use crate::radio::{Air, Mode, Module, Parameters, timing};
 use crate::serial::{Character, Format, Framing, Receiver, Settings, Wave};
@@ -43,7 +44,7 @@ impl Host {
 
     /// A module without power.
     pub fn off(stored: Parameters) -> Self {
-        let mut radio = Radio::new(stored);
+        let mut radio = Radio::new(stored, Corner::Nominal);
         radio.set_tx_pin(TxPin::Usart, Time::ZERO);
         Self {
             radio,

@@ -1,6 +1,7 @@
 //! Packets that a module sends and receives.
 
 use super::host::{Host, bytes, ms, near};
+use crate::corner::Corner;
 use crate::periph::usart::{TxPin, Wire};
 use crate::radio::{Mode, Packet, Parameters, Sender, timing};
 use crate::time::Time;
@@ -24,7 +25,10 @@ fn packet_begins_after_three_byte_times_of_silence() {
     assert_eq!((packet.sender, packet.number), (Sender::Board(0), 1));
     assert_eq!(packet.bytes, [1, 2, 3]);
     assert!(near(packet.start, end + byte() * 3));
-    assert_eq!(packet.end - packet.start, timing::packet(3, 2400));
+    assert_eq!(
+        packet.end - packet.start,
+        timing::packet(3, 2400, Corner::Nominal)
+    );
     // AUX falls with the first byte, and rises when the last packet begins.
     let edges = host.aux_since(begin);
     assert_eq!(edges.len(), 2, "{edges:?}");
@@ -199,7 +203,15 @@ fn module_in_power_saving_mode_receives_only_packets_with_a_preamble() {
     for (number, wake_up, expected) in [(1, ms(240), &b""[..]), (2, ms(250), b"long")] {
         let bytes_sent = b"long".to_vec();
         let sender = Sender::Board(7);
-        let packet = Packet::new(sender, number, host.now(), factory, wake_up, bytes_sent);
+        let packet = Packet::new(
+            Corner::Nominal,
+            sender,
+            number,
+            host.now(),
+            factory,
+            wake_up,
+            bytes_sent,
+        );
         host.radio.module.add(&packet, 0.0);
         host.run_until(packet.end + ms(100));
         assert_eq!(bytes(&host.received()), expected);
@@ -216,7 +228,10 @@ fn packet_in_wake_up_mode_has_a_preamble() {
     other.run_for(ms(500));
     let packet = other.air().packets().next().cloned().expect("a packet");
     assert_eq!(packet.wake_up, ms(250));
-    assert_eq!(packet.end - packet.start, ms(250) + timing::packet(1, 2400));
+    assert_eq!(
+        packet.end - packet.start,
+        ms(250) + timing::packet(1, 2400, Corner::Nominal)
+    );
     assert_eq!(bytes_received(&mut other), b"x");
 }
 

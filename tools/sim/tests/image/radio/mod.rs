@@ -3,6 +3,7 @@
 mod faults;
 mod requests;
 mod set_up;
+mod two_lines;
 
 use register_map::configuration::LORA;
 use sim::radio::{Packet, Parameters, Sender};
@@ -13,7 +14,9 @@ use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings};
 /// Time for the module's start and set-up: 500 ms for its own start, the rest for commands and changes of the mode.
 const SET_UP: Time = Time::from_ms(1_500);
 /// Time after which there is no reply any more. The longest exchange of these tests takes less at 2.4 kbit/s.
-const SILENCE: Time = Time::from_ms(4_000);
+const SILENCE: Time = Time::from_ms(6_000);
+/// Silence after a reply. The longest pause between two packets of these tests is shorter.
+const PAUSE: Time = Time::from_ms(700);
 
 /// A 4DI at unit address 1 with a radio module, before its set-up is complete.
 fn starting(module: Parameters, settings: &[(u16, u16)]) -> Bench {
@@ -42,15 +45,13 @@ impl Bench {
         self.board.air().expect("a module is fitted")
     }
 
-    /// Sends bytes over the air and returns the bytes that the gateway receives, up to a silence of half a second.
+    /// Sends bytes over the air and returns the bytes that the gateway receives, up to a [`PAUSE`].
     fn over_the_air(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.board.now();
         self.air().send(now, bytes);
         let end = now + SILENCE;
         let mut last = None;
-        while self.board.now() < end
-            && last.is_none_or(|last| self.board.now() < last + Time::from_ms(500))
-        {
+        while self.board.now() < end && last.is_none_or(|last| self.board.now() < last + PAUSE) {
             self.board.run_for(Time::from_ms(20));
             last = self.air().received().next_back().map(|byte| byte.end);
         }

@@ -1,0 +1,111 @@
+//! Orders over one line, and what happens over the other one at the same time.
+
+use register_map::{
+    configuration::{COMM_TIMEOUT, COMMAND, FILTER, LORA_AIR_RATE, LORA_FRAME_GAP},
+    points, state,
+};
+use sim::Time;
+use sim::radio::Mode;
+
+use super::{SET_UP, bench};
+use crate::bench::{Bench, FIRST, adu};
+
+/// Bit of RESET_CAUSE for a reset by the firmware.
+const SOFTWARE: u16 = 0b1000;
+
+impl Bench {
+    /// Writes COMMAND over the air, and returns at the instant at which the gateway has the reply.
+    fn order_over_the_air(&mut self, command: u8) {
+        let [a, b] = COMMAND.to_be_bytes();
+        let request = adu(&[1, 6, a, b, 0, command]);
+        let now = self.board.now();
+        self.air().send(now, &request);
+        let limit = now + super::SILENCE;
+        while self.air().received().count() < request.len() {
+            assert!(self.board.now() < limit, "no reply");
+            self.board.run_for(Time::from_ms(1));
+        }
+        let reply = self.air().take_received();
+        assert!(reply.iter().map(|byte| byte.byte).eq(request));
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn save_ordered_over_the_air_is_done_before_a_restart_ordered_over_the_wire() {
+    let mut bench = bench(&[]);
+    bench.tolerant = true;
+    bench.configure(FILTER, &[77]);
+    bench.order_over_the_air(1);
+    bench.write(COMMAND, &[2]).unwrap();
+    bench.board.run_for(SET_UP);
+    assert_eq!(bench.register(state::RESET_CAUSE) & SOFTWARE, SOFTWARE);
+    assert_eq!(bench.register(FILTER), 77);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn defaults_ordered_over_the_air_do_not_replace_later_settings() {
+    let mut bench = bench(&[]);
+    bench.configure(FILTER, &[77]);
+    bench.order_over_the_air(3);
+    bench.write(FILTER, &[78]).unwrap();
+    bench.board.run_for(SET_UP);
+    assert_eq!(bench.register(FILTER), 78);
+}
+
+/// A request over the air is reported to the watchdog when LORA_FRAME_GAP has passed, which is after later requests of
+/// the wire.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn polled_wire_keeps_the_communication_watchdog_quiet_during_a_request_over_the_air() {
+    let mut bench = bench(&[(COMM_TIMEOUT, 3), (LORA_FRAME_GAP, 500)]);
+    // The watchdog has tripped in the set-up.
+    bench.command(5);
+    let now = bench.board.now();
+    bench.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
+    for _ in 0..20 {
+        bench.board.run_for(Time::from_ms(80));
+        assert_eq!(bench.register(state::STATUS) & 1, 0);
+    }
+    assert!(bench.air().received().count() > 0, "it was answered");
+}
+
+/// AUX is high while the last packet is on the air, and a reset of the part does not end it. What is sent to the module
+/// then goes over the air.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn restart_during_a_reply_over_the_air_sends_nothing_else() {
+    let [a, b] = points::first(1).to_be_bytes();
+    let long = adu(&[1, 3, a, b, 0, 4]);
+    let longest = adu(&[&[1, 8, 0, 0], &[0x55; 100][..]].concat());
+    for (air_rate, request) in [(0, &long), (2, &long), (5, &longest)] {
+        let mut bench = bench(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, 50)]);
+        bench.tolerant = true;
+        let now = bench.board.now();
+        bench.air().send(now, request);
+        while bench.packets_of_the_unit().is_empty() {
+            bench.board.run_for(Time::from_ms(5));
+        }
+        bench.board.run_for(Time::from_ms(10));
+        let before = bench.board.resets();
+        bench.command(2);
+        let mut ready = false;
+        for _ in 0..600 {
+            bench.board.run_for(Time::from_ms(20));
+            ready |= bench.board.resets() > before && bench.module().mode() == Some(Mode::Normal);
+        }
+        assert!(ready, "air rate {air_rate}");
+        let reply = bench.air().take_received();
+        let reply: Vec<u8> = reply.iter().map(|byte| byte.byte).collect();
+        let sent = bench.packets_of_the_unit();
+        let sent = sent.iter().map(|packet| &packet.bytes[..]);
+        assert_eq!(
+            sent.collect::<Vec<_>>().concat(),
+            reply,
+            "air rate {air_rate}"
+        );
+        assert!(reply == adu(&reply[..reply.len() - 2]), "{reply:02X?}");
+        bench.assert_answers_over_the_air();
+    }
+}
