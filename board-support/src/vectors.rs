@@ -27,8 +27,8 @@ unsafe extern "C" {
 /// Copies the table to RAM and makes the core use it. Interrupts must be disabled.
 pub(crate) fn move_to_ram(scb: &SCB) {
     let table = TABLE.0.get();
-    // SAFETY: the table in flash is at least as long as the one in RAM. Nothing else accesses the table in RAM, and the core does not use
-    // it until VTOR is written.
+    // SAFETY: the table in flash is at least as long as the one in RAM. Nothing else accesses the table in RAM, and the
+    // core does not use it until VTOR is written.
     unsafe { ptr::copy_nonoverlapping(&raw const __vector_table, table.cast(), 1) };
     cortex_m::asm::dsb();
     // SAFETY: the table is complete and aligned.

@@ -1,4 +1,4 @@
-//! Packs the self-description, so that it takes a fifth less flash.
+//! Packs the self-description, so that it takes a sixth less flash.
 //!
 //! The most frequent pair of neighbours is replaced by a code from 0x80 on, then the most frequent pair of the result,
 //! and so on (byte-pair encoding). Each code is then looked up as the whole phrase that it stands for, so that

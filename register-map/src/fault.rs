@@ -30,7 +30,7 @@ block! {
     UPTIME "uptime at the fault": 0x026A x 2, Value::long("s"), READ;
     /// Tasks that hung before a watchdog reset; 0 = only idle
     MISSING_TASKS "missing tasks": 0x026C x 1, Value::Bits(TASKS), READ;
-    /// Restarts of the line after lost settings or endless replies
+    /// Restarts of a line after lost settings or endless replies
     LINE_REPAIRS "line repairs": 0x026D x 1, Value::NUMBER, READ;
     /// Reads 0
     RESERVED "reserved": 0x026E x 2, Value::NUMBER, READ;
