@@ -1,4 +1,5 @@
-//! How a part may differ from another: the corners of its core and its clocks, and of its converter.
+//! How a part may differ from another: the corners of its core and its clocks, of its converter, and of its radio
+//! ([`crate::radio::timing`]).
 //!
 //! A board is created at a corner ([`crate::Config::corner`]). The nominal one has every figure as typical; the
 //! other two have all of them at one end of their range at once.
@@ -16,7 +17,7 @@ pub enum Corner {
     /// Every figure typical.
     #[default]
     Nominal,
-    /// Instructions at their most, oscillators slow, the crystal slow to start.
+    /// Instructions and radio packets at their most, oscillators slow, the crystal slow to start.
     Slow,
     /// Oscillators fast; instructions as nominal.
     Fast,

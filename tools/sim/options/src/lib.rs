@@ -52,7 +52,7 @@ pub struct Options {
     #[arg(conflicts_with_all = ["units", "board", "dip", "module", "slots", "flash", "gdb", "exact_line"])]
     pub bus: Option<PathBuf>,
 
-    /// Corner of the part (its clocks, the time of its instructions, the noise of its ADC): nominal, slow or fast
+    /// Corner of the part (its clocks, its ADC, the time of instructions and radio packets): nominal, slow or fast
     #[arg(long, value_name = "NAME", default_value = "nominal", value_parser = ["nominal", "slow", "fast"])]
     pub corner: String,
 
