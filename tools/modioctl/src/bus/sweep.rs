@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::io;
 use std::time::Duration;
 
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep_until};
 
 use super::adu::{Framing, MBAP, response_length};
 use super::is_from_gateway;
@@ -112,6 +112,8 @@ impl Master {
         got: &mut Vec<u8>,
         found: &mut Found,
     ) -> io::Result<Turn> {
+        // Other units take a request that follows an answer without t3.5 as a part of it.
+        sleep_until(self.free()).await;
         got.clear();
         let mut turn = Turn::Quiet;
         let frame = self.put(unit, &[REPORT]).await?;

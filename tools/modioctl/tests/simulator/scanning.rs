@@ -11,6 +11,7 @@ use modbus_reference::{Device, Server, framed};
 use modioctl::bus::adu::Framing;
 
 use crate::program::At;
+use crate::unit::Unit;
 
 /// The shortest time-out with which a master finds every unit when it waits for each in turn: V1.02, 2.4.1, gives
 /// 100 ms as the least time that a master should wait.
@@ -73,6 +74,32 @@ fn a_missing_unit_takes_a_third_of_the_time_of_sequential_waiting() {
     // A request of 4 bytes takes 4.6 ms at 9600 bit/s.
     let third = (SENSIBLE + Duration::from_micros(4_583)) / 3;
     assert!(waits[waits.len() / 4] < third, "{waits:?}, {third:?}");
+}
+
+/// Without t3.5 the other units of the line drop the request.
+#[test]
+fn the_next_request_follows_an_answer_after_t35() {
+    let delay = Duration::from_millis(12);
+    let (bus, requests) = bus((1..=20).collect(), delay);
+    found(&At::tcp(bus), "scan --units 1-20");
+    let requests: Vec<_> = requests.try_iter().take(20).collect();
+    // 38.5 bits at 9600 bit/s.
+    let least = delay + Duration::from_micros(4_010);
+    for two in requests.windows(2) {
+        let between = two[1].1 - two[0].1;
+        assert!(between >= least, "after unit {}: {between:?}", two[0].0);
+    }
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn units_with_neighbouring_addresses_are_found_by_every_scan() {
+    let line = Unit::several(&["1:4ai", "2:4do", "3:2relay"]);
+    for at in [At::port(line.pty.display()), At::tcp(line.tcp)] {
+        for _ in 0..3 {
+            assert_eq!(found(&at, "scan --units 1-5"), BTreeSet::from([1, 2, 3]));
+        }
+    }
 }
 
 #[test]

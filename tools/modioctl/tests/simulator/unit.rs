@@ -29,10 +29,19 @@ impl Unit {
 
     /// Starts a modio-02 with these options of the simulator.
     pub fn with(address: u8, options: &[&str]) -> Self {
+        Self::run(&[&["--dip", &address.to_string()], options].concat())
+    }
+
+    /// Starts modio-02 boards on one line, each given as `ADDRESS:MODULE`.
+    pub fn several(boards: &[&str]) -> Self {
+        let options: Vec<_> = boards.iter().flat_map(|board| ["--unit", board]).collect();
+        Self::run(&options)
+    }
+
+    fn run(options: &[&str]) -> Self {
         let mut simulator = Command::new(path("MODIO_SIM"))
             .arg("--elf")
             .arg(path("MODIO_ELF"))
-            .args(["--dip", &address.to_string()])
             .args(["--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"])
             .args(options)
             .stdout(Stdio::piped())
