@@ -25,19 +25,20 @@ fn bench() -> Bench {
     bench
 }
 
-/// Replaces the start of a handler by `code` until the device has reset itself because of it.
+/// Replaces the start of a handler by `code`, at the instant at which it is called, until the device has reset itself
+/// because of it.
 fn fault_in(bench: &mut Bench, handler: &str, code: &[u16]) -> u32 {
     bench.write_bits(SLOT, &[true; 4]).unwrap();
     let before = bench.board.resets();
     bench.board.watch_pin('A', 3);
     let address = bench.board.symbol(handler).expect("a handler") & !1;
     let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
-    let was = bench.board.patch_code(address, &bytes).unwrap();
     let from = bench.board.now();
     bench.board.line().send(from, &adu(&[1, 1, 0, FIRST, 0, 4]));
     let called = bench.board.run_until_pc(address, from + Time::from_ms(120));
     assert!(called, "{handler} did not run");
     let called = bench.board.now();
+    let was = bench.board.patch_code(address, &bytes).unwrap();
     while bench.board.resets() == before {
         bench.board.run_for(Time::from_us(20));
         assert!(!bench.board.locked_up(), "{handler}: locked up");
