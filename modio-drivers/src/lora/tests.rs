@@ -248,29 +248,27 @@ fn parameters_that_the_module_does_not_keep_are_a_failure() {
 fn parameters_are_written_three_times_at_most_until_the_radio_is_ready() {
     let (module, mut lora) = radio();
     module.0.borrow_mut().lost = 0x02;
-    let pass = |lora: &mut Radio, ms: u32| {
+    let run_for = |lora: &mut Radio, ms: u32| {
         for _ in 0..ms {
-            let busy = module.0.borrow().busy.saturating_sub(1);
-            module.0.borrow_mut().busy = busy;
-            lora.poll(1);
+            pass(&module, lora);
         }
         let commands = commands(&module);
         let stores = commands.iter().filter(|command| command[0] == STORE);
         (stores.count(), commands.len())
     };
-    let (stores, asked) = pass(&mut lora, 100_000);
+    let (stores, asked) = run_for(&mut lora, 100_000);
     assert_eq!(stores, 3);
     assert!(asked > 10, "the module is still asked");
     module.0.borrow_mut().lost = 0;
     module.0.borrow_mut().parameters = *SETTINGS.parameters();
-    assert_eq!(pass(&mut lora, 10_000).0, 0);
+    assert_eq!(run_for(&mut lora, 10_000).0, 0);
     assert!(lora.is_ready());
     // Another module, with other parameters.
     module.0.borrow_mut().parameters[1] = 0;
     module.0.borrow_mut().fitted = false;
-    pass(&mut lora, BUSY_MS.into());
+    run_for(&mut lora, BUSY_MS.into());
     module.0.borrow_mut().fitted = true;
-    assert_eq!(pass(&mut lora, 10_000).0, 1);
+    assert_eq!(run_for(&mut lora, 10_000).0, 1);
     assert!(lora.is_ready());
 }
 

@@ -5,7 +5,7 @@ mod requests;
 mod set_up;
 mod two_lines;
 
-use register_map::configuration::LORA;
+use register_map::{configuration::LORA, state};
 use sim::radio::{Packet, Parameters, Sender};
 use sim::{Config, Module, Time};
 
@@ -96,6 +96,13 @@ impl Bench {
     fn assert_answers_over_the_air(&mut self) {
         let reply = self.ask_over_the_air(1, &[1, 0, FIRST, 0, 4]);
         assert!(matches!(reply.as_deref(), Some([1, 1, _])), "{reply:02X?}");
+    }
+
+    /// Asserts that the firmware itself caused the last reset.
+    #[track_caller]
+    fn assert_restarted(&mut self) {
+        let cause = self.register(state::RESET_CAUSE);
+        assert_ne!(cause & state::reset_cause::SOFTWARE, 0, "a restart");
     }
 
     fn packets_of_the_unit(&mut self) -> Vec<Packet> {

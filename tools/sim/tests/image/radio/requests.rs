@@ -98,11 +98,7 @@ fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed()
         // The unit waits for the longest time of a packet on the air, 4.8 s at 0.3 kbit/s, before the restart and
         // after it.
         bench.board.run_for(Time::from_ms(10_000) + SET_UP);
-        assert_eq!(
-            bench.register(state::RESET_CAUSE) & 0b1000,
-            0b1000,
-            "a restart"
-        );
+        bench.assert_restarted();
         assert_eq!(
             bench.read_over_the_air(FILTER, 1),
             [77],
@@ -128,11 +124,7 @@ fn command_of_one_line_waits_for_its_own_reply_only() {
     }
     assert!(polls > 5, "{polls}");
     bench.board.run_for(SET_UP);
-    assert_eq!(
-        bench.register(state::RESET_CAUSE) & 0b1000,
-        0b1000,
-        "a restart"
-    );
+    bench.assert_restarted();
 }
 
 #[test]

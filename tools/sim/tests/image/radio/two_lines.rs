@@ -10,9 +10,6 @@ use sim::radio::Mode;
 use super::{SET_UP, bench};
 use crate::bench::{Bench, FIRST, adu};
 
-/// Bit of RESET_CAUSE for a reset by the firmware.
-const SOFTWARE: u16 = 0b1000;
-
 impl Bench {
     /// Writes COMMAND over the air, and returns at the instant at which the gateway has the reply.
     fn order_over_the_air(&mut self, command: u8) {
@@ -39,7 +36,7 @@ fn save_ordered_over_the_air_is_done_before_a_restart_ordered_over_the_wire() {
     bench.order_over_the_air(1);
     bench.write(COMMAND, &[2]).unwrap();
     bench.board.run_for(SET_UP);
-    assert_eq!(bench.register(state::RESET_CAUSE) & SOFTWARE, SOFTWARE);
+    bench.assert_restarted();
     assert_eq!(bench.register(FILTER), 77);
 }
 
