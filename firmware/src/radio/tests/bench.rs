@@ -1,0 +1,213 @@
+//! The radio line of a unit with a simulated module.
+
+extern crate std;
+use core::convert::Infallible;
+use std::boxed::Box;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::vec::Vec;
+
+use embedded_hal::digital::{self, InputPin, PinState};
+use embedded_hal_nb::serial::{ErrorKind, ErrorType};
+use modbus_server::{Counters, Outcome, Tables, line::Framing};
+use modio_drivers::LoraSettings;
+
+use super::super::*;
+
+pub(super) const SETTINGS: LoraSettings = match LoraSettings::new(0, 23, 2, 0) {
+    Some(settings) => settings,
+    None => unreachable!(),
+};
+pub(super) const GAP_MS: u16 = 50;
+pub(super) const CONFIG: RadioConfig = RadioConfig {
+    module: SETTINGS,
+    frame_gap_ms: GAP_MS,
+};
+/// Unit 17 reads holding register 4, and the reply.
+pub(super) const READ: [u8; 8] = [0x11, 0x03, 0x00, 0x04, 0x00, 0x01, 0xC7, 0x5B];
+pub(super) const REPLY: [u8; 7] = [0x11, 0x03, 0x02, 0x11, 0x11, 0xB5, 0xDB];
+
+/// A module with the right parameters, and the UART.
+#[derive(Default)]
+pub(super) struct Module {
+    pub(super) asleep: bool,
+    pub(super) busy: bool,
+    pub(super) silent: bool,
+    pub(super) to_unit: VecDeque<Option<u8>>,
+    pub(super) from_unit: Vec<u8>,
+    /// Number of bytes that the UART can take now.
+    pub(super) room: usize,
+    pub(super) unflushed: bool,
+}
+
+#[derive(Clone, Default)]
+pub(super) struct Shared(pub(super) Rc<RefCell<Module>>);
+
+pub(super) struct Pin(pub(super) Shared);
+
+impl ErrorType for Shared {
+    type Error = ErrorKind;
+}
+
+impl Read<u8> for Shared {
+    fn read(&mut self) -> nb::Result<u8, ErrorKind> {
+        match self.0.borrow_mut().to_unit.pop_front() {
+            Some(Some(byte)) => Ok(byte),
+            Some(None) => Err(nb::Error::Other(ErrorKind::FrameFormat)),
+            None => Err(nb::Error::WouldBlock),
+        }
+    }
+}
+
+impl Write<u8> for Shared {
+    fn write(&mut self, byte: u8) -> nb::Result<(), ErrorKind> {
+        let mut module = self.0.borrow_mut();
+        module.room = module.room.checked_sub(1).ok_or(nb::Error::WouldBlock)?;
+        module.from_unit.push(byte);
+        if module.asleep && module.from_unit == [0xC1; 3] {
+            module.from_unit.clear();
+            if !module.silent {
+                let reply = core::iter::once(0xC0).chain(*SETTINGS.parameters());
+                module.to_unit.extend(reply.map(Some));
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> nb::Result<(), ErrorKind> {
+        if self.0.borrow().unflushed {
+            Err(nb::Error::WouldBlock)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+impl digital::ErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.0.borrow_mut().asleep = false;
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.0.borrow_mut().asleep = true;
+        Ok(())
+    }
+}
+
+impl InputPin for Pin {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        Ok(!self.0.0.borrow().busy)
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        Ok(self.0.0.borrow().busy)
+    }
+}
+
+impl AuxPin for Pin {
+    fn pull(&mut self, _: PinState) {}
+}
+
+/// Unit 17 with ten registers of value 0x1111.
+pub(super) struct Bench {
+    pub(super) module: Shared,
+    pub(super) line: RadioLine<Shared, Pin, Pin>,
+    pub(super) server: Server,
+    pub(super) registers: [u16; 10],
+    pub(super) now_ms: u32,
+}
+
+impl Bench {
+    /// A unit whose radio is not set up yet.
+    pub(super) fn starting() -> Self {
+        let module = Shared::default();
+        module.0.borrow_mut().room = 1000;
+        let pin = || Pin(module.clone());
+        let adus = Box::leak(Box::new([Adu::new()]));
+        let line = RadioLine::new(
+            module.clone(),
+            [pin(), pin()],
+            pin(),
+            CONFIG,
+            17,
+            true,
+            adus,
+        );
+        Self {
+            module,
+            line,
+            server: Server::new(Framing::Rtu),
+            registers: [0x1111; 10],
+            now_ms: 0,
+        }
+    }
+
+    /// A unit whose radio is ready and has been silent.
+    pub(super) fn new() -> Self {
+        let mut bench = Self::starting();
+        while bench.line.works().is_none() {
+            bench.pass(1);
+        }
+        assert_eq!(bench.line.works(), Some(true));
+        bench.pass(GAP_MS);
+        bench
+    }
+
+    /// Lets milliseconds pass and serves requests as they come. Returns the outcome of the last one.
+    pub(super) fn pass(&mut self, ms: u16) -> Option<Outcome> {
+        let mut outcome = None;
+        for _ in 0..ms {
+            self.now_ms += 1;
+            if self.line.poll(self.now_ms, 1) {
+                outcome = outcome.or(self.serve());
+            }
+        }
+        outcome
+    }
+
+    pub(super) fn serve(&mut self) -> Option<Outcome> {
+        let mut tables = Tables {
+            holding_registers: &mut self.registers,
+            ..Tables::default()
+        };
+        let request = self.line.take(&self.server, 0)?;
+        let decided = request.decide(&self.server, &tables);
+        let committed = self.line.answer(decided).commit(&mut self.server);
+        let outcome = committed.decision().outcome;
+        let done = committed.carry_out(&mut self.server, &mut tables);
+        self.line.finish(done);
+        Some(outcome)
+    }
+
+    pub(super) fn receive(&mut self, bytes: &[u8]) {
+        let bytes = bytes.iter().map(|byte| Some(*byte));
+        self.module.0.borrow_mut().to_unit.extend(bytes);
+    }
+
+    pub(super) fn sent(&mut self) -> Vec<u8> {
+        core::mem::take(&mut self.module.0.borrow_mut().from_unit)
+    }
+
+    pub(super) fn counters(&self) -> Counters {
+        self.server.counters_at(&ServedLine::counters(&self.line))
+    }
+
+    #[track_caller]
+    pub(super) fn is_well(&mut self) {
+        for _ in 0..3 {
+            self.receive(&READ);
+            assert_eq!(self.pass(GAP_MS + 1), Some(Outcome::Accepted));
+            self.pass(2);
+            assert_eq!(self.sent(), REPLY);
+            assert!(!self.line.is_replying());
+            self.pass(SETTINGS.packet_ms());
+            assert!(!self.line.is_on_air());
+        }
+    }
+}
