@@ -73,6 +73,9 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<()> {
         for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
             fs::copy(root.join(name), out.join(name))?;
         }
+        let sysroot = rustc(&["--print", "sysroot"])?;
+        let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
+        fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
         let changes = fs::read_to_string(root.join("CHANGELOG.md"))?;
         let section = section(&changes, env!("CARGO_PKG_VERSION"))?;
         fs::write(out.join("RELEASE-NOTES.md"), section)?;

@@ -8,7 +8,7 @@ use cargo_metadata::Package;
 use fs_err as fs;
 use spdx::{AdditionItem, Expression, ParseMode};
 
-use super::{rustc, sbom::reference};
+use super::sbom::reference;
 
 /// Starts of the names of files with licences, in small letters.
 const FILES: &str = "copying copyright licence license notice unlicense";
@@ -28,17 +28,13 @@ impl Notices {
         }
     }
 
-    /// Writes the licences of these packages, and those of Rust's standard library, which programs for a target contain
-    /// too.
+    /// Writes the licences of these packages, and of the C library that programs for a musl target contain too.
     pub fn write(&self, target: &str, out: &Path) -> Result<()> {
         let mut text = self.text()?;
         if target.ends_with("-musl") {
             text += MUSL;
         }
         fs::write(out.join(format!("THIRD-PARTY-{target}.txt")), text)?;
-        let sysroot = rustc(&["--print", "sysroot"])?;
-        let library = Path::new(&sysroot).join("share/doc/rust/COPYRIGHT-library.html");
-        fs::copy(library, out.join("THIRD-PARTY-rust-std.html"))?;
         Ok(())
     }
 
