@@ -29,7 +29,8 @@ impl Session {
     pub fn take(&mut self, message: Message, bench: &mut Bench) {
         match message {
             Message::Connected(stream) => self.start(stream, bench),
-            Message::Bytes(bytes) => {
+            // The next bytes are read when the hold is dropped, after these are handled.
+            Message::Bytes(bytes, _hold) => {
                 for byte in bytes {
                     self.drive(bench, |machine, bench| incoming(machine, byte, bench));
                     self.step_if_wanted(bench);
