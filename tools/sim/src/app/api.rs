@@ -354,7 +354,13 @@ fn set_module(bench: &mut Bench, n: usize, port: Option<u8>, body: &Body) -> Out
 }
 
 fn set_faults(bench: &mut Bench, n: usize, body: Body) -> Outcome {
-    let faults: Faults = serde_json::from_value(Value::Object(body))
+    // An error of a single entry does not name it.
+    for (key, value) in &body {
+        let entry = json!({ key: value });
+        Faults::deserialize(entry)
+            .map_err(|error| Reply::error(400, format!("`{key}` is wrong: {error}")))?;
+    }
+    let faults = Faults::deserialize(Value::Object(body))
         .map_err(|error| Reply::error(400, error.to_string()))?;
     if faults.is_empty() {
         return Err(Reply::error(400, "the object names no fault"));

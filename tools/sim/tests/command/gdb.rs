@@ -45,6 +45,7 @@ impl Debugged {
         stream
             .set_read_timeout(Some(Duration::from_secs(60)))
             .unwrap();
+        stream.set_nodelay(true).unwrap();
         Gdb { stream }
     }
 
@@ -269,4 +270,20 @@ fn breakpoint_beyond_the_thousandth_is_refused() {
     assert!(gdb.ask(&format!("Z0,{ADD:x},2")).starts_with('E'));
     assert_eq!(gdb.ask(&format!("z0,{:x},2", START + 100)), "OK");
     assert_eq!(gdb.ask(&format!("Z0,{ADD:x},2")), "OK");
+}
+
+#[test]
+fn packet_without_end_disconnects_the_debugger() {
+    let directory = tempfile::tempdir().unwrap();
+    let debugged = Debugged::start(directory.path());
+    let mut gdb = debugged.connect();
+    gdb.send(&format!("M20000010,4:{}", "0".repeat(4096)));
+    // Longer than the server wants, but complete: it is answered.
+    gdb.packet();
+    let mut begun = vec![b'0'; 20_000];
+    begun[0] = b'$';
+    // The server may reset the connection.
+    let _ = gdb.stream.write_all(&begun);
+    assert!(!matches!(gdb.stream.read(&mut [0]), Ok(1)));
+    debugged.runs_on();
 }

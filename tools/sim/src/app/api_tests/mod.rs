@@ -274,6 +274,11 @@ fn value_that_is_not_exactly_of_its_type_is_refused_and_changes_nothing() {
                 let reply = post(bench, target, &body);
                 assert_eq!(reply.status, 400, "{target} {body}: {}", reply.body);
             }
+            if serde_json::from_str::<Value>(value).is_ok() {
+                let reply = post(bench, target, &format!("{{\"{key}\":{value}}}"));
+                let error = reply.body["error"].as_str().unwrap();
+                assert!(error.starts_with('`'), "{key}: {value}: {error}");
+            }
         }
         assert_eq!((state(bench), get(bench, "/api/faults")), before);
     }
