@@ -28,6 +28,7 @@ class Board:
 
     def frames(self, since: int = 0) -> List[Frame]:
         """Returns the last 1000 frames on the line, oldest first; only those with numbers above `since`."""
+        since = _number("since", since)
         return [Frame.from_json(frame) for frame in self._get(f"frames?since={since}")["frames"]]
 
     def findings(self) -> List[Finding]:
@@ -44,7 +45,7 @@ class Board:
         body = {name: value for name, value in given.items() if value is not None}
         if len(body) != 1:
             raise ValueError("give one of energised, manual and millivolts")
-        return self._post(f"{_slot(port)}channels/{channel}", body)
+        return self._post(f"{_slot(port)}channels/{_number('channel', channel)}", body)
 
     def set_dip(self, value: int) -> State:
         """Moves the DIP switch; the firmware reads it at the next power-on."""
@@ -104,4 +105,11 @@ class Board:
 
 def _slot(port: Optional[int]) -> str:
     """Returns the part of a path that names a slot."""
-    return "" if port is None else f"slots/{port}/"
+    return "" if port is None else f"slots/{_number('port', port)}/"
+
+
+def _number(name: str, value: int) -> int:
+    """Returns a number that becomes a part of a path. ValueError when it is no whole number, such as a text."""
+    if type(value) is not int or value < 0:
+        raise ValueError(f"{name} must be a whole number from 0, not {value!r}")
+    return value

@@ -100,6 +100,19 @@ class Paths(unittest.TestCase):
                 self.simulator.set_channel(1, **given)
         self.assertEqual(self.simulator._http.asked, set())
 
+    def test_number_in_a_path_must_be_a_whole_number(self):
+        for wrong in ("1", "1?x", "../dip", True, 1.0, -1, None, float("nan")):
+            with self.assertRaisesRegex(ValueError, "channel must be a whole number"):
+                self.simulator.set_channel(wrong, energised=True)
+            with self.assertRaisesRegex(ValueError, "since must be a whole number"):
+                self.simulator.frames(wrong)
+            if wrong is not None:
+                with self.assertRaisesRegex(ValueError, "port must be a whole number"):
+                    self.simulator.set_channel(1, energised=True, port=wrong)
+                with self.assertRaisesRegex(ValueError, "port must be a whole number"):
+                    self.simulator.set_module("4do", port=wrong)
+        self.assertEqual(self.simulator._http.asked, set())
+
 
 class Types(unittest.TestCase):
     def test_every_described_member_is_a_field(self):

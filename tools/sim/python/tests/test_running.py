@@ -62,7 +62,14 @@ class Running(unittest.TestCase):
                 (409, "", lambda: self.simulator.set_channel(1, millivolts=5)),
                 (409, "power", lambda: self.simulator.set_module("4do")),
                 (400, "", lambda: self.simulator.set_dip(256)),
-                (400, "", lambda: self.simulator.set_channel(1, manual="yes"))):
+                (400, "", lambda: self.simulator.set_channel(1, manual="yes")),
+                (400, "", lambda: self.simulator.set_channel(1, manual="off")),
+                (400, "", lambda: self.simulator.set_channel(1, manual=1)),
+                (400, "", lambda: self.simulator.set_channel(1, millivolts=7.0)),
+                (400, "", lambda: self.simulator.set_channel(1, millivolts=float("nan"))),
+                (400, "", lambda: self.simulator.set_dip(True)),
+                (400, "", lambda: self.simulator.set_faults({"drop_rate": None})),
+                (400, "", lambda: self.simulator.set_module(None))):
             with self.assertRaises(modio_sim.RefusedError) as refused:
                 what()
             self.assertEqual(refused.exception.status, status)

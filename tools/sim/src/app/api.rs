@@ -18,6 +18,10 @@
 //! Every path also exists as `/api/boards/NAME/...`; without `boards/NAME` it means the first board. The reply to a
 //! POST is the new state, or the new faults. The reply to a wrong request is a 4xx status and `{"error": "..."}`.
 
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::{Map, Value, json};
 
 use register_map::Module;
@@ -27,6 +31,9 @@ use super::action::{Action, Change};
 use super::bench::Bench;
 use super::faults::Faults;
 use super::{frames, state};
+
+/// Longest reason of a refusal, in characters.
+const LONGEST_REASON: usize = 300;
 
 /// A request as it was received.
 #[derive(Clone, Debug)]
@@ -49,11 +56,15 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// Returns a refusal with an HTTP status and its reason.
+    /// Returns a refusal with an HTTP status and its reason. The reason may repeat what a client has sent: it is
+    /// shortened to one line of at most [`LONGEST_REASON`] characters.
     pub fn error(status: u16, what: impl Into<String>) -> Self {
+        let what: String = what.into();
+        let printed = |c| if char::is_control(c) { ' ' } else { c };
+        let what: String = what.chars().take(LONGEST_REASON).map(printed).collect();
         Self {
             status,
-            body: json!({ "error": what.into() }),
+            body: json!({ "error": what }),
         }
     }
 }
@@ -71,6 +82,37 @@ impl From<Error> for Reply {
 
 type Outcome = Result<(), Reply>;
 type Body = Map<String, Value>;
+
+/// A JSON object in which no entry stands twice.
+struct Unambiguous(Body);
+
+impl<'de> Deserialize<'de> for Unambiguous {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Entries)
+    }
+}
+
+/// Collects the entries of an [`Unambiguous`] object.
+struct Entries;
+
+impl<'de> Visitor<'de> for Entries {
+    type Value = Unambiguous;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Unambiguous, A::Error> {
+        let mut body = Body::new();
+        while let Some((key, value)) = entries.next_entry::<String, Value>()? {
+            if body.contains_key(&key) {
+                return Err(A::Error::custom(format_args!("`{key}` stands there twice")));
+            }
+            body.insert(key, value);
+        }
+        Ok(Unambiguous(body))
+    }
+}
 
 /// Carries out a request.
 pub fn answer(bench: &mut Bench, request: &Request) -> Reply {
@@ -145,7 +187,7 @@ fn of_slot(
     let (port, rest) = match path.strip_prefix("slots/") {
         Some(path) => {
             let (port, rest) = path.split_once('/')?;
-            (Some(port.parse().ok()?), rest)
+            (Some(port_number(port)?), rest)
         }
         None => (None, path),
     };
@@ -211,12 +253,9 @@ fn body(request: &Request) -> Result<Body, Reply> {
     if request.method != "POST" {
         return Err(Reply::error(405, "this path accepts POST only"));
     }
-    let body: Value = serde_json::from_slice(&request.body)
-        .map_err(|error| Reply::error(400, format!("the body is not JSON: {error}")))?;
-    match body {
-        Value::Object(body) => Ok(body),
-        _ => Err(Reply::error(400, "the body is not a JSON object")),
-    }
+    let body: Result<Unambiguous, _> = serde_json::from_slice(&request.body);
+    body.map(|Unambiguous(body)| body)
+        .map_err(|error| Reply::error(400, format!("the body must be a JSON object: {error}")))
 }
 
 /// Returns the only entry of an object. A second entry is an error, because a request must not be carried out in part.
@@ -256,6 +295,12 @@ fn channel_number(text: &str) -> Option<usize> {
         .iter()
         .position(|number| *number == text)
         .map(|position| position + 1)
+}
+
+/// The port in a path. Only the usual form of a number names a port, neither `+1` nor `01`.
+fn port_number(text: &str) -> Option<u8> {
+    let port: u8 = text.parse().ok()?;
+    (port.to_string() == text).then_some(port)
 }
 
 fn change(body: &Body) -> Result<Change, Reply> {
@@ -309,7 +354,13 @@ fn set_module(bench: &mut Bench, n: usize, port: Option<u8>, body: &Body) -> Out
 }
 
 fn set_faults(bench: &mut Bench, n: usize, body: Body) -> Outcome {
-    let faults: Faults = serde_json::from_value(Value::Object(body))
+    // An error of a single entry does not name it.
+    for (key, value) in &body {
+        let entry = json!({ key: value });
+        Faults::deserialize(entry)
+            .map_err(|error| Reply::error(400, format!("`{key}` is wrong: {error}")))?;
+    }
+    let faults = Faults::deserialize(Value::Object(body))
         .map_err(|error| Reply::error(400, error.to_string()))?;
     if faults.is_empty() {
         return Err(Reply::error(400, "the object names no fault"));
@@ -325,6 +376,7 @@ fn since(query: &str) -> Result<u64, Reply> {
     }
     query
         .strip_prefix("since=")
+        .filter(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
         .and_then(|number| number.parse().ok())
         .ok_or_else(|| Reply::error(400, "the query must be `since=K`, with K a whole number"))
 }

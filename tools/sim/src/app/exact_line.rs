@@ -1,7 +1,7 @@
 //! The RS-485 line in virtual time on a TCP socket: `--exact-line`. The protocol is in docs/conformance.md.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Sender};
@@ -13,6 +13,10 @@ use sim::exact_line::{Session, begin};
 
 use super::Event;
 use super::bench::Bench;
+use super::clients::{self, Client};
+
+/// Longest first line of a connection in bytes, with its end: `hello` and a number.
+const LONGEST_HELLO: usize = 32;
 
 /// Takes the answer to a request: a reply, or the reason why the request cannot be carried out.
 pub type Answers = Sender<Result<Reply, String>>;
@@ -23,46 +27,74 @@ pub type Answers = Sender<Result<Reply, String>>;
 ///
 /// In one line, why the simulator cannot listen there.
 pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, String> {
-    let cannot = |error| format!("cannot serve the exact line at {address}: {error}");
-    let listener = TcpListener::bind(address).map_err(cannot)?;
-    let address = listener.local_addr().map_err(cannot)?;
-    let in_use = Arc::new(AtomicBool::new(false));
-    thread::spawn(move || {
-        for mut stream in listener.incoming().flatten() {
-            if in_use.swap(true, Ordering::AcqRel) {
-                // A client that disconnects instead of reading this does not matter.
-                let _ = stream.write_all(b"error the line is in use by another client\n");
-                continue;
-            }
-            let (events, in_use) = (events.clone(), Arc::clone(&in_use));
-            thread::spawn(move || {
-                // An error is the end of the connection.
-                let _ = serve(&stream, &events);
-                in_use.store(false, Ordering::Release);
-            });
+    let in_use = InUse::default();
+    let serve = move |client: Client| {
+        if in_use.0.load(Ordering::Acquire) {
+            // A client that disconnects instead of reading this does not matter.
+            let _ = refuse(&client);
+            return;
         }
-    });
-    Ok(address)
+        let (events, in_use) = (events.clone(), in_use.clone());
+        thread::spawn(move || {
+            // An error is the end of the connection.
+            let _ = serve(&client, &in_use, &events);
+        });
+    };
+    clients::listen(address, serve)
+        .map_err(|error| format!("cannot serve the exact line at {address}: {error}"))
 }
 
-/// Serves a client until it disconnects.
-fn serve(stream: &TcpStream, events: &Sender<Event>) -> std::io::Result<()> {
+/// Whether a client has the line.
+#[derive(Clone, Default)]
+struct InUse(Arc<AtomicBool>);
+
+/// Gives the line back when it is dropped.
+struct Turn<'a>(&'a InUse);
+
+impl InUse {
+    /// Takes the line if no other client has it.
+    fn take(&self) -> Option<Turn<'_>> {
+        let taken = self.0.swap(true, Ordering::AcqRel);
+        (!taken).then(|| Turn(self))
+    }
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        self.0.0.store(false, Ordering::Release);
+    }
+}
+
+fn refuse(client: &Client) -> io::Result<()> {
+    client
+        .stream()
+        .write_all(b"error the line is in use by another client\n")
+}
+
+/// Serves a client until it disconnects. The client gets the line with its first request, which must be `hello`: a page
+/// in a browser, which begins with an HTTP request, and a connection that sends nothing have no effect.
+fn serve(client: &Client, in_use: &InUse, events: &Sender<Event>) -> io::Result<()> {
+    let (stream, mut writer) = (client.stream(), client.stream());
     // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them.
     stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(clients::FIRST))?;
     let mut reader = BufReader::new(stream);
-    let mut writer = stream;
+    let mut line = Vec::new();
+    reader
+        .by_ref()
+        .take(LONGEST_HELLO as u64)
+        .read_until(b'\n', &mut line)?;
+    if !line.starts_with(b"hello ") || !line.ends_with(b"\n") {
+        return writer.write_all(b"error the first request of a connection must be hello 1\n");
+    }
+    let Some(_turn) = in_use.take() else {
+        return refuse(client);
+    };
+    stream.set_read_timeout(None)?;
     loop {
-        let mut line = Vec::new();
-        let length = reader
-            .by_ref()
-            .take(LONGEST_LINE as u64 + 2)
-            .read_until(b'\n', &mut line)?;
-        if length == 0 {
-            return Ok(());
-        }
         let ended = line.ends_with(b"\n");
-        if !ended && length < LONGEST_LINE {
-            // The client disconnected in the middle of a line.
+        if !ended && line.len() < LONGEST_LINE {
+            // The client disconnected, at the end of a line or in the middle of one.
             return Ok(());
         }
         let text = match answer(&line, events) {
@@ -73,6 +105,11 @@ fn serve(stream: &TcpStream, events: &Sender<Event>) -> std::io::Result<()> {
         if !ended {
             return Ok(());
         }
+        line.clear();
+        reader
+            .by_ref()
+            .take(LONGEST_LINE as u64 + 2)
+            .read_until(b'\n', &mut line)?;
     }
 }
 

@@ -44,8 +44,8 @@ pub struct Live {
     frame: u64,
     /// The last state of each board that was sent, without its time.
     states: Vec<Value>,
-    /// Time at which a state was sent last.
-    sent: Option<Instant>,
+    /// Time at which the states were compared last.
+    compared: Option<Instant>,
 }
 
 impl Default for Live {
@@ -54,7 +54,7 @@ impl Default for Live {
             listeners: broadcast::Sender::new(WAITING),
             frame: 0,
             states: Vec::new(),
-            sent: None,
+            compared: None,
         }
     }
 }
@@ -79,9 +79,11 @@ impl Live {
                 .listeners
                 .send(Note::new(None, "frame", &frames::frame(frame)));
         }
-        if self.sent.is_some_and(|sent| now < sent + STATE_EVERY) {
+        // Only making a state as JSON shows whether it has changed, and that takes its time.
+        if self.compared.is_some_and(|at| now < at + STATE_EVERY) {
             return;
         }
+        self.compared = Some(now);
         self.states.resize(bench.units.len(), Value::Null);
         for (n, last) in self.states.iter_mut().enumerate() {
             let whole = state::json(bench, n);
@@ -89,7 +91,6 @@ impl Live {
             timeless["virtual_ms"] = Value::Null;
             if timeless != *last {
                 *last = timeless;
-                self.sent = Some(now);
                 let _ = self.listeners.send(Note::new(Some(n), "state", &whole));
             }
         }
@@ -149,19 +150,36 @@ mod tests {
     }
 
     #[test]
-    fn state_is_sent_at_most_ten_times_a_second_and_ends_with_the_last_one() {
+    fn states_are_compared_at_most_ten_times_a_second_also_when_nothing_changes() {
         let mut bench = bench(Module::Di4);
         let mut live = Live::default();
         let mut notes = live.listeners().subscribe();
         let begin = Instant::now();
+        live.send(&mut bench, begin);
+        live.send(&mut bench, begin + Duration::from_millis(1000));
+        assert_eq!(taken(&mut notes).len(), 1, "nothing has changed");
+        bench.first().set_energised(1, true).unwrap();
+        live.send(&mut bench, begin + Duration::from_millis(1050));
+        assert!(taken(&mut notes).is_empty(), "no state was made");
+        live.send(&mut bench, begin + Duration::from_millis(1100));
+        assert_eq!(taken(&mut notes).len(), 1);
+    }
+
+    #[test]
+    fn state_is_sent_at_most_ten_times_a_second_and_ends_with_the_last_one() {
+        let mut bench = bench(Module::Ai4);
+        let mut live = Live::default();
+        let mut notes = live.listeners().subscribe();
+        let begin = Instant::now();
         for ms in 0..1000 {
-            bench.first().set_energised(1, ms % 2 == 0).unwrap();
+            let millivolts = u16::try_from(ms).unwrap();
+            bench.first().set_millivolts(1, millivolts).unwrap();
             live.send(&mut bench, begin + Duration::from_millis(ms));
         }
         live.send(&mut bench, begin + Duration::from_millis(1100));
         let sent = taken(&mut notes);
         assert!((9..=12).contains(&sent.len()), "{}", sent.len());
         let last = &sent.last().unwrap().1;
-        assert_eq!(last["channels"][0]["energised"], false);
+        assert_eq!(last["channels"][0]["millivolts"], 999);
     }
 }

@@ -27,6 +27,7 @@ mod attached;
 mod bench;
 mod boards;
 mod capture;
+mod clients;
 mod disturbance;
 mod exact_line;
 mod faults;

@@ -2,22 +2,41 @@
 //! all clients are sent on the line.
 
 use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TrySendError};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::net::SocketAddr;
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 
+use super::clients::{self, Client};
 use super::{Event, pass_on};
 
 /// Pieces of received bytes that may wait for a client that does not read. The client misses further pieces.
 const WAITING: usize = 1024;
 
-type Clients = Arc<Mutex<Vec<SyncSender<Vec<u8>>>>>;
+/// The beginnings of the requests that a page in a browser can send without asking the server before. Any page can send
+/// them to this computer, and a part of such a request could be a valid frame on the line.
+const OF_A_PAGE: [&[u8]; 4] = [b"GET /", b"HEAD /", b"POST /", b"OPTIONS /"];
+
+/// Sends bytes to a client.
+struct Outlet {
+    client: Weak<Client>,
+    bytes: SyncSender<Vec<u8>>,
+}
+
+/// The outlets of all clients.
+#[derive(Clone, Default)]
+struct Outlets(Arc<Mutex<Vec<Outlet>>>);
+
+impl Outlets {
+    fn all(&self) -> MutexGuard<'_, Vec<Outlet>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 /// The listening socket and its clients.
 pub struct Tcp {
     address: SocketAddr,
-    clients: Clients,
+    outlets: Outlets,
 }
 
 impl Tcp {
@@ -27,23 +46,12 @@ impl Tcp {
     ///
     /// In one line, why the simulator cannot listen there.
     pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<Self, String> {
-        let cannot = |error| format!("cannot offer the line over TCP at {address}: {error}");
-        let listener = TcpListener::bind(address).map_err(cannot)?;
-        let address = listener.local_addr().map_err(cannot)?;
-        let clients = Clients::default();
-        let joined = Arc::clone(&clients);
-        thread::spawn(move || {
-            for stream in listener.incoming().flatten() {
-                let (sender, receiver) = mpsc::sync_channel(WAITING);
-                if serve(stream, events.clone(), receiver).is_ok() {
-                    joined
-                        .lock()
-                        .unwrap_or_else(PoisonError::into_inner)
-                        .push(sender);
-                }
-            }
-        });
-        Ok(Self { address, clients })
+        let outlets = Outlets::default();
+        let joined = outlets.clone();
+        let serve = move |client| serve(client, events.clone(), joined.clone());
+        let address = clients::listen(address, serve)
+            .map_err(|error| format!("cannot offer the line over TCP at {address}: {error}"))?;
+        Ok(Self { address, outlets })
     }
 
     /// The address of the socket: with port 0 the system has chosen the port.
@@ -53,48 +61,64 @@ impl Tcp {
 
     /// Sends these bytes to every client; never waits.
     pub fn write(&self, bytes: &[u8]) {
-        let mut clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
-        clients.retain(|client| {
-            !matches!(
-                client.try_send(bytes.to_vec()),
-                Err(TrySendError::Disconnected(_))
-            )
-        });
+        for outlet in &*self.outlets.all() {
+            // A client that reads too slowly, or that has just disconnected, misses them.
+            let _ = outlet.bytes.try_send(bytes.to_vec());
+        }
     }
 }
 
 /// Starts two threads for a client, one for each direction. They end when the client disconnects.
-fn serve(
-    stream: TcpStream,
-    events: Sender<Event>,
-    to_client: Receiver<Vec<u8>>,
-) -> std::io::Result<()> {
-    // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them.
-    stream.set_nodelay(true)?;
-    let (mut from, mut to) = (stream.try_clone()?, stream);
-    thread::spawn(move || {
-        for bytes in to_client {
-            if to.write_all(&bytes).is_err() {
-                return;
-            }
-        }
+fn serve(client: Client, events: Sender<Event>, outlets: Outlets) {
+    // Requests and replies are short and alternate. Collecting more bytes before sending would only delay them. An error
+    // means that the client has already disconnected.
+    let _ = client.stream().set_nodelay(true);
+    let client = Arc::new(client);
+    let (bytes, to_client) = mpsc::sync_channel(WAITING);
+    outlets.all().push(Outlet {
+        client: Arc::downgrade(&client),
+        bytes,
     });
+    let writing = Arc::clone(&client);
+    thread::spawn(move || write(&writing, to_client));
     thread::spawn(move || {
-        let mut buffer = [0; 4096];
-        while let Ok(length @ 1..) = from.read(&mut buffer) {
-            if !pass_on(&buffer[..length], Event::Bytes, &events) {
-                return;
-            }
-        }
-        // The writing thread ends when it next writes.
-        let _ = from.shutdown(std::net::Shutdown::Both);
+        read(&client, &events);
+        client.close();
+        // This also ends the writing thread.
+        let own = Arc::downgrade(&client);
+        outlets.all().retain(|outlet| !outlet.client.ptr_eq(&own));
     });
-    Ok(())
+}
+
+fn write(client: &Client, to_client: Receiver<Vec<u8>>) {
+    for bytes in to_client {
+        if client.stream().write_all(&bytes).is_err() {
+            return;
+        }
+    }
+}
+
+/// Passes on the bytes of a client until it disconnects.
+fn read(client: &Client, events: &Sender<Event>) {
+    let mut buffer = [0; 4096];
+    let mut is_first = true;
+    while let Ok(length @ 1..) = client.stream().read(&mut buffer) {
+        let bytes = &buffer[..length];
+        if is_first && OF_A_PAGE.iter().any(|page| bytes.starts_with(page)) {
+            return;
+        }
+        is_first = false;
+        client.heard();
+        if !pass_on(bytes, Event::Bytes, events) {
+            return;
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::net::{TcpListener, TcpStream};
     use std::time::{Duration, Instant};
 
     fn eventually(what: &str, mut is: impl FnMut() -> bool) {
@@ -112,12 +136,13 @@ mod tests {
         let mut first = TcpStream::connect(tcp.address()).unwrap();
         let mut second = TcpStream::connect(tcp.address()).unwrap();
         eventually("two clients are not connected", || {
-            tcp.clients.lock().unwrap().len() == 2
+            tcp.outlets.all().len() == 2
         });
 
         first.write_all(&[1, 2, 3]).unwrap();
         let event = queue.recv_timeout(Duration::from_secs(20)).unwrap();
-        assert!(matches!(event, Event::Bytes(bytes, _) if bytes == [1, 2, 3]));
+        assert!(matches!(&event, Event::Bytes(bytes, _) if bytes == &[1, 2, 3]));
+        drop(event);
 
         tcp.write(&[4, 5]);
         for client in [&mut first, &mut second] {
@@ -126,11 +151,28 @@ mod tests {
             assert_eq!(received, [4, 5]);
         }
 
+        // Nothing is sent to the client, so only the end of the connection shows that it has disconnected.
         drop(first);
         eventually("the disconnected client is not removed", || {
-            tcp.write(&[6]);
-            tcp.clients.lock().unwrap().len() == 1
+            tcp.outlets.all().len() == 1
         });
+    }
+
+    #[test]
+    fn request_of_a_page_in_a_browser_is_not_sent_on_the_line() {
+        let (events, queue) = mpsc::channel();
+        let tcp = Tcp::listen("127.0.0.1:0".parse().unwrap(), events).unwrap();
+        for method in ["GET", "HEAD", "POST", "OPTIONS"] {
+            let mut page = TcpStream::connect(tcp.address()).unwrap();
+            page.set_read_timeout(Some(Duration::from_secs(20)))
+                .unwrap();
+            write!(page, "{method} / HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+            assert!(!matches!(page.read(&mut [0]), Ok(1..)), "{method}");
+        }
+        let mut master = TcpStream::connect(tcp.address()).unwrap();
+        master.write_all(b"G").unwrap();
+        let event = queue.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(matches!(event, Event::Bytes(bytes, _) if bytes == b"G"));
     }
 
     #[test]

@@ -12,10 +12,19 @@ struct Client {
 }
 
 impl Client {
-    fn connect(address: &str) -> Self {
+    /// Connects and sends nothing.
+    fn silent(address: &str) -> Self {
         Self {
             stream: BufReader::new(connect(address)),
         }
+    }
+
+    /// Connects and sends the first request, which must be `hello`.
+    fn connect(address: &str) -> Self {
+        let mut client = Self::silent(address);
+        let hello = client.ask(b"hello 1\n");
+        assert!(hello.starts_with("ok "), "{hello}");
+        client
     }
 
     fn read(&mut self) -> String {
@@ -118,10 +127,10 @@ fn a_line_that_is_too_long_ends_the_connection_and_the_next_client_is_served() {
 fn served(line: &str) -> Client {
     let end = Instant::now() + Duration::from_secs(60);
     loop {
-        let mut client = Client::connect(line);
+        let mut client = Client::silent(line);
         // The server may reset the connection of a refused client.
         let mut reply = String::new();
-        let written = client.stream.get_mut().write_all(b"run 0\n");
+        let written = client.stream.get_mut().write_all(b"hello 1\n");
         let read = client.stream.read_line(&mut reply);
         if written.is_ok() && read.is_ok() && reply.starts_with("ok ") {
             return client;
@@ -136,12 +145,36 @@ fn second_client_is_refused_and_the_first_is_still_served() {
     let (_running, line, _) = started(&[]);
     let mut first = Client::connect(&line);
     assert_eq!(first.ask(b"run 10\n"), "ok 100010.000\n");
-    let mut second = Client::connect(&line);
+    let mut second = Client::silent(&line);
     assert_eq!(
         second.read(),
         "error the line is in use by another client\n"
     );
     assert_eq!(first.ask(b"run 10\n"), "ok 100020.000\n");
+}
+
+#[test]
+fn connection_that_does_not_begin_with_hello_has_no_effect() {
+    let (_running, line, http) = started(&[]);
+    let orders = "run 1000\npower off\nhello 1\n";
+    for begin in [
+        format!("POST / HTTP/1.1\r\nHost: localhost\r\n\r\n{orders}"),
+        orders.to_owned(),
+        format!("\n{orders}"),
+        format!("hello {}\n{orders}", "1".repeat(100)),
+    ] {
+        let mut client = Client::silent(&line);
+        client.stream.get_mut().write_all(begin.as_bytes()).unwrap();
+        // The server may reset the connection, because it does not read the rest.
+        let mut answer = String::new();
+        let _ = client.stream.read_to_string(&mut answer);
+        assert!(!answer.contains("ok "), "{answer}");
+    }
+    // A connection that sends nothing does not take the line either.
+    let _idle = Client::silent(&line);
+    let mut client = Client::connect(&line);
+    assert_eq!(client.ask(b"run 0\n"), "ok 100000.000\n");
+    assert_eq!(state(&http)["powered"], true);
 }
 
 #[test]

@@ -45,6 +45,7 @@ impl Debugged {
         stream
             .set_read_timeout(Some(Duration::from_secs(60)))
             .unwrap();
+        stream.set_nodelay(true).unwrap();
         Gdb { stream }
     }
 
@@ -250,10 +251,39 @@ fn core_keeps_running_when_a_debugger_disconnects_or_sends_invalid_data() {
     );
     let mut gdb = debugged.connect();
     gdb.stream
-        .write_all(b"GET / HTTP/1.1\r\n\r\n$zz#00$")
+        .write_all(b"+GET / HTTP/1.1\r\n\r\n$zz#00$")
         .unwrap();
     drop(gdb);
     debugged.runs_on();
     let mut gdb = debugged.connect();
     assert_eq!(gdb.ask("m8000000,4"), "00500020");
+}
+
+#[test]
+fn breakpoint_beyond_the_thousandth_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let debugged = Debugged::start(directory.path());
+    let mut gdb = debugged.connect();
+    for n in 0..1000 {
+        assert_eq!(gdb.ask(&format!("Z0,{:x},2", START + 100 + 2 * n)), "OK");
+    }
+    assert!(gdb.ask(&format!("Z0,{ADD:x},2")).starts_with('E'));
+    assert_eq!(gdb.ask(&format!("z0,{:x},2", START + 100)), "OK");
+    assert_eq!(gdb.ask(&format!("Z0,{ADD:x},2")), "OK");
+}
+
+#[test]
+fn packet_without_end_disconnects_the_debugger() {
+    let directory = tempfile::tempdir().unwrap();
+    let debugged = Debugged::start(directory.path());
+    let mut gdb = debugged.connect();
+    gdb.send(&format!("M20000010,4:{}", "0".repeat(4096)));
+    // Longer than the server wants, but complete: it is answered.
+    gdb.packet();
+    let mut begun = vec![b'0'; 20_000];
+    begun[0] = b'$';
+    // The server may reset the connection.
+    let _ = gdb.stream.write_all(&begun);
+    assert!(!matches!(gdb.stream.read(&mut [0]), Ok(1)));
+    debugged.runs_on();
 }

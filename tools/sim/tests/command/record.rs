@@ -64,7 +64,7 @@ fn recording_of_the_exact_line_has_the_instants_of_virtual_time() {
         let record = ["--record", path.to_str().unwrap()];
         let mut running = Running::start_loop(&[["--exact-line", "127.0.0.1:0"], record].concat());
         let mut line = TcpStream::connect(running.endpoint("exact-line: ")).unwrap();
-        line.write_all(b"run 1000\nsend 01 07 41 E2\nrun 2000000\n")
+        line.write_all(b"hello 1\nrun 1000\nsend 01 07 41 E2\nrun 2000000\n")
             .unwrap();
         let limit = Instant::now() + Duration::from_secs(60);
         while packets(&path).is_empty() {

@@ -152,6 +152,21 @@ fn malformed_request_is_refused_and_changes_nothing() {
         ("GET", "/api/frames?since=-1", "", 400),
         ("GET", "/api/frames?since=", "", 400),
         ("GET", "/api/frames?after=1", "", 400),
+        ("GET", "/api/frames?since=+1", "", 400),
+        ("GET", "/api/frames?since=1.0", "", 400),
+        ("GET", "/api/frames?since=18446744073709551616", "", 400),
+        (
+            "POST",
+            "/api/slots/+5/channels/1",
+            r#"{"energised":true}"#,
+            404,
+        ),
+        (
+            "POST",
+            "/api/slots/05/channels/1",
+            r#"{"energised":true}"#,
+            404,
+        ),
         ("POST", "/api/channels/0", r#"{"energised":true}"#, 404),
         ("POST", "/api/channels/5", r#"{"energised":true}"#, 404),
         ("POST", "/api/channels/01", r#"{"energised":true}"#, 404),
@@ -193,6 +208,98 @@ fn malformed_request_is_refused_and_changes_nothing() {
         assert!(!error.is_empty());
     }
     assert_eq!(state(&mut bench), before);
+}
+
+/// JSON values that other programs send for `off`, for a number, or by mistake, and text that is not JSON.
+const VALUES: [&str; 24] = [
+    "true",
+    "\"on\"",
+    "\"off\"",
+    "\"true\"",
+    "\"\"",
+    "null",
+    "[]",
+    "[1]",
+    "{}",
+    "1",
+    "0",
+    "\"7\"",
+    "7.0",
+    "7.5",
+    "7e0",
+    "-7",
+    "-0",
+    "256",
+    "3301",
+    "65543",
+    "18446744073709551623",
+    "1e400",
+    "NaN",
+    "Infinity",
+];
+
+#[test]
+fn value_that_is_not_exactly_of_its_type_is_refused_and_changes_nothing() {
+    use Module::{Ai4, Di4, Relay2};
+    for (module, target, key, accepted) in [
+        (Di4, "/api/channels/1", "energised", &["true"][..]),
+        (Relay2, "/api/channels/1", "manual", &["true"]),
+        (Ai4, "/api/channels/1", "millivolts", &["1", "0", "256"]),
+        (Di4, "/api/dip", "value", &["1", "0"]),
+        (Di4, "/api/power", "on", &["true"]),
+        (Di4, "/api/power", "cycle", &["true"]),
+        (Di4, "/api/module", "name", &[]),
+        (Di4, "/api/faults", "hse_failed", &["true"]),
+        (Di4, "/api/faults", "i2c_absent", &["true"]),
+        (Di4, "/api/faults", "drop_rate", &["1", "0", "-0"]),
+        (
+            Di4,
+            "/api/faults",
+            "noise_hz",
+            &["1", "0", "7.0", "7.5", "7e0", "-0", "256", "3301"],
+        ),
+    ] {
+        let bench = &mut bench(module);
+        let before = (state(bench), get(bench, "/api/faults"));
+        for value in VALUES.iter().filter(|value| !accepted.contains(value)) {
+            // The value alone, beside a correct value, and after a correct value with the same name.
+            let good = accepted.first().unwrap_or(&"\"4di\"");
+            for body in [
+                format!("{{\"{key}\":{value}}}"),
+                format!("{{\"lsi_khz\":30,\"{key}\":{value}}}"),
+                format!("{{\"{key}\":{good},\"{key}\":{value}}}"),
+                format!("{{\"{key}\":{good},\"{key}\":{good}}}"),
+                format!("{{\"{key}\":{good}}} {value}"),
+            ] {
+                let reply = post(bench, target, &body);
+                assert_eq!(reply.status, 400, "{target} {body}: {}", reply.body);
+            }
+            if serde_json::from_str::<Value>(value).is_ok() {
+                let reply = post(bench, target, &format!("{{\"{key}\":{value}}}"));
+                let error = reply.body["error"].as_str().unwrap();
+                assert!(error.starts_with('`'), "{key}: {value}: {error}");
+            }
+        }
+        assert_eq!((state(bench), get(bench, "/api/faults")), before);
+    }
+}
+
+#[test]
+fn reason_of_a_refusal_is_one_short_line() {
+    let mut bench = bench(Module::Di4);
+    let long = "x\\n\\u001b[31m".repeat(1000);
+    for (target, body) in [
+        ("/api/dip", format!("{{\"{long}\":1}}")),
+        ("/api/module", format!("{{\"name\":\"{long}\"}}")),
+        ("/api/faults", format!("{{\"{long}\":1}}")),
+        (&format!("/api/{long}"), "{}".to_owned()),
+    ] {
+        let reply = post(&mut bench, target, &body);
+        assert!((400..=404).contains(&reply.status));
+        let error = reply.body["error"].as_str().unwrap();
+        assert!(!error.contains(char::is_control), "{error:?}");
+        assert!(error.len() <= LONGEST_REASON, "{error}");
+    }
 }
 
 #[test]

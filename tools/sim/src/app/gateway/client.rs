@@ -1,7 +1,7 @@
 //! The clients of the gateway: a thread that reads requests, and one that writes responses, for each.
 
 use std::io::Write;
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TryRecvError};
 use std::thread;
@@ -9,10 +9,7 @@ use std::time::Duration;
 
 use super::Message;
 use super::mbap::{self, Request};
-use crate::app::Event;
-
-/// Most clients that are served at the same time. The connection of a further client is closed.
-pub const CLIENTS: usize = 32;
+use crate::app::{Event, clients};
 
 /// Most requests of a client that wait in the gateway. Further requests wait in the connection.
 const WAITING: usize = 16;
@@ -28,8 +25,6 @@ pub struct Client {
     requests: Receiver<Request>,
     /// Takes the responses for the client.
     pub responses: Responses,
-    /// The number of these references is the number of clients.
-    _place: Arc<()>,
 }
 
 impl Client {
@@ -37,9 +32,12 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// No request waits now, or the client has disconnected.
+    /// No request waits now, or the client has disconnected, or was disconnected.
     pub fn next(&self) -> Result<Request, TryRecvError> {
-        self.requests.try_recv()
+        match self.responses.client.is_closed() {
+            true => Err(TryRecvError::Disconnected),
+            false => self.requests.try_recv(),
+        }
     }
 }
 
@@ -47,14 +45,14 @@ impl Client {
 #[derive(Clone)]
 pub struct Responses {
     frames: SyncSender<Vec<u8>>,
-    stream: Arc<TcpStream>,
+    client: Arc<clients::Client>,
 }
 
 impl Responses {
     /// Sends a frame; never waits. A client with too many unread responses is disconnected.
     pub fn send(&self, frame: Vec<u8>) {
         if self.frames.try_send(frame).is_err() {
-            let _ = self.stream.shutdown(Shutdown::Both);
+            self.client.close();
         }
     }
 }
@@ -65,54 +63,40 @@ impl Responses {
 ///
 /// In one line, why the simulator cannot listen there.
 pub fn listen(address: SocketAddr, events: Sender<Event>) -> Result<SocketAddr, String> {
-    let cannot = |error| format!("cannot serve Modbus TCP at {address}: {error}");
-    let listener = TcpListener::bind(address).map_err(cannot)?;
-    let address = listener.local_addr().map_err(cannot)?;
-    let places = Arc::new(());
-    thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            let place = Arc::clone(&places);
-            // This thread has one reference, and each client, also this one, has one.
-            if Arc::strong_count(&places) > CLIENTS + 1 {
-                continue;
-            }
-            // An error means that the client has already disconnected.
-            let _ = serve(stream, place, events.clone());
-        }
-    });
-    Ok(address)
+    // An error means that the client has already disconnected.
+    let serve = move |client| drop(serve(client, events.clone()));
+    clients::listen(address, serve)
+        .map_err(|error| format!("cannot serve Modbus TCP at {address}: {error}"))
 }
 
 /// Starts the two threads of a client.
-fn serve(stream: TcpStream, place: Arc<()>, events: Sender<Event>) -> std::io::Result<()> {
+fn serve(client: clients::Client, events: Sender<Event>) -> std::io::Result<()> {
     // Requests and responses are short and alternate. Collecting more bytes before sending would only delay them.
-    stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    let (mut from, mut to) = (stream.try_clone()?, stream.try_clone()?);
+    client.stream().set_nodelay(true)?;
+    client.stream().set_write_timeout(Some(PATIENCE))?;
+    let client = Arc::new(client);
+    let (from, to) = (Arc::clone(&client), Arc::clone(&client));
     let (send_request, requests) = mpsc::sync_channel(WAITING);
     let (frames, to_send) = mpsc::sync_channel::<Vec<u8>>(UNREAD);
     let client = Client {
         requests,
-        responses: Responses {
-            frames,
-            stream: Arc::new(stream),
-        },
-        _place: place,
+        responses: Responses { frames, client },
     };
     // Sending fails only while the simulator is ending.
     let notify = move |message| drop(events.send(Event::Gateway(message)));
     notify(Message::Joined(client));
     thread::spawn(move || {
         for frame in to_send {
-            if to.write_all(&frame).is_err() {
+            if to.stream().write_all(&frame).is_err() {
                 break;
             }
         }
-        let _ = to.shutdown(Shutdown::Both);
+        to.close();
     });
     thread::spawn(move || {
         // The loop ends when the connection ends or carries something other than Modbus.
-        while let Ok(Some(request)) = mbap::read(&mut from) {
+        while let Ok(Some(request)) = mbap::read(&mut from.stream()) {
+            from.heard();
             if send_request.send(request).is_err() {
                 break;
             }

@@ -11,12 +11,18 @@ use super::super::bench::Bench;
 use super::Message;
 use super::wire::Wire;
 
+/// Longest packet of a debugger in bytes. The server asks for packets of at most 4096 bytes; crate gdbstub would keep a
+/// packet of any length.
+const LONGEST_PACKET: usize = 16 * 1024;
+
 type Machine = GdbStubStateMachine<'static, Bench, Wire>;
 
 /// The session with the debugger, if one is connected.
 #[derive(Default)]
 pub struct Session {
     machine: Option<Machine>,
+    /// Length of the packet that the debugger has begun, so far; `None` between two packets.
+    packet: Option<usize>,
 }
 
 impl Session {
@@ -29,8 +35,12 @@ impl Session {
     pub fn take(&mut self, message: Message, bench: &mut Bench) {
         match message {
             Message::Connected(stream) => self.start(stream, bench),
-            Message::Bytes(bytes) => {
+            // The next bytes are read when the hold is dropped, after these are handled.
+            Message::Bytes(bytes, _hold) => {
                 for byte in bytes {
+                    if self.is_too_long(byte) {
+                        self.machine = None;
+                    }
                     self.drive(bench, |machine, bench| incoming(machine, byte, bench));
                     self.step_if_wanted(bench);
                 }
@@ -51,7 +61,18 @@ impl Session {
         }
     }
 
+    /// Counts the bytes of a packet. Returns whether this byte makes it too long.
+    fn is_too_long(&mut self, byte: u8) -> bool {
+        self.packet = match (self.packet, byte) {
+            (_, b'#') => None,
+            (None, b'$') => Some(1),
+            (length, _) => length.map(|length| length + 1),
+        };
+        self.packet.is_some_and(|length| length > LONGEST_PACKET)
+    }
+
     fn start(&mut self, stream: TcpStream, bench: &mut Bench) {
+        self.packet = None;
         // A debugger that has already disconnected, or that cannot be answered, gets no session.
         self.machine = Wire::new(stream)
             .ok()

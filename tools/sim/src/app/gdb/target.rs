@@ -21,6 +21,8 @@ use super::super::bench::Bench;
 /// Number of registers that GDB gets, in the order of [`CortexM::target_description_xml`] and of
 /// [`sim::Board::register`].
 const REGISTERS: usize = 23;
+/// Most breakpoints that are in force at the same time.
+const BREAKPOINTS: usize = 1000;
 /// Number of the program counter.
 const PC: usize = 15;
 
@@ -99,6 +101,9 @@ impl Bench {
     }
 
     fn add_breakpoint(&mut self, address: u32) -> bool {
+        if self.debug.breakpoints.len() >= BREAKPOINTS {
+            return false;
+        }
         self.first().add_breakpoint(address);
         self.debug.breakpoints.push(address);
         true

@@ -2,11 +2,11 @@
 
 use std::io::{self, Write};
 use std::net::{Shutdown, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gdbstub::conn::Connection;
 
-/// A debugger that does not read for this long is disconnected, because the boards' thread waits for it.
+/// A debugger that takes longer to read a packet is disconnected, because the boards' thread waits for it.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Sends whole packets to the debugger. Dropping this closes the connection.
@@ -23,7 +23,6 @@ impl Wire {
     ///
     /// The debugger has already disconnected.
     pub fn new(stream: TcpStream) -> io::Result<Self> {
-        stream.set_write_timeout(Some(PATIENCE))?;
         stream.set_nodelay(true)?;
         Ok(Self {
             stream,
@@ -41,9 +40,20 @@ impl Connection for Wire {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let sent = Write::write_all(&mut self.stream, &self.packet);
-        self.packet.clear();
-        sent
+        let packet = std::mem::take(&mut self.packet);
+        let (mut rest, end) = (&packet[..], Instant::now() + PATIENCE);
+        while !rest.is_empty() {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            self.stream.set_write_timeout(Some(left))?;
+            match Write::write(&mut self.stream, rest)? {
+                0 => return Err(io::ErrorKind::WriteZero.into()),
+                sent => rest = &rest[sent..],
+            }
+        }
+        Ok(())
     }
 }
 

@@ -1,5 +1,6 @@
-//! Limits the number of connections to the HTTP server.
+//! Limits the number of connections to the HTTP server, and the time for which a connection can be of no use.
 
+use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
 use std::pin::Pin;
@@ -11,12 +12,15 @@ use axum::serve::Listener;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::timeout;
+use tokio::time::{Instant, Sleep, sleep, timeout};
 
 /// Most connections that are served at the same time.
 pub const MOST: usize = 64;
 /// Most connections that are being refused at the same time. Further connections are closed without a reply.
 const MOST_REFUSED: usize = 64;
+/// A connection over which the server could send nothing for this long is closed: its client sends no request, does not
+/// send it to its end, or does not read the reply. The server sends something on a stream of events every 15 s.
+pub const PATIENCE: Duration = Duration::from_secs(60);
 /// Time in which a refused client must read the reply.
 const FAREWELL: Duration = Duration::from_secs(2);
 
@@ -25,15 +29,17 @@ pub struct Bounded {
     listener: TcpListener,
     free: Arc<Semaphore>,
     free_to_refuse: Arc<Semaphore>,
+    patience: Duration,
 }
 
 impl Bounded {
-    /// Limits the connections of `listener`.
-    pub fn new(listener: TcpListener) -> Self {
+    /// Limits the connections of `listener`. A connection over which nothing can be sent for `patience` is closed.
+    pub fn new(listener: TcpListener, patience: Duration) -> Self {
         Self {
             listener,
             free: Arc::new(Semaphore::new(MOST)),
             free_to_refuse: Arc::new(Semaphore::new(MOST_REFUSED)),
+            patience,
         }
     }
 }
@@ -49,6 +55,8 @@ impl Listener for Bounded {
                 return (
                     Connection {
                         stream,
+                        patience: self.patience,
+                        end: Box::pin(sleep(self.patience)),
                         _permit: permit,
                     },
                     address,
@@ -85,7 +93,27 @@ async fn refuse(mut stream: TcpStream) -> io::Result<()> {
 /// A connection. Dropping it makes room for another one.
 pub struct Connection {
     stream: TcpStream,
+    patience: Duration,
+    /// Ends when nothing could be sent for `patience`.
+    end: Pin<Box<Sleep>>,
     _permit: OwnedSemaphorePermit,
+}
+
+impl Connection {
+    /// Returns what `polled` is, or an error if it is pending and the time of this connection is over.
+    fn or_end<T>(
+        &mut self,
+        polled: Poll<io::Result<T>>,
+        context: &mut Context<'_>,
+    ) -> Poll<io::Result<T>> {
+        match polled {
+            Poll::Pending => {
+                let over = self.end.as_mut().poll(context);
+                over.map(|()| Err(io::ErrorKind::TimedOut.into()))
+            }
+            ready => ready,
+        }
+    }
 }
 
 impl AsyncRead for Connection {
@@ -94,7 +122,8 @@ impl AsyncRead for Connection {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, buffer)
+        let polled = Pin::new(&mut self.stream).poll_read(context, buffer);
+        self.or_end(polled, context)
     }
 }
 
@@ -104,7 +133,12 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
+        let polled = Pin::new(&mut self.stream).poll_write(context, bytes);
+        if let Poll::Ready(Ok(1..)) = polled {
+            let end = Instant::now() + self.patience;
+            self.end.as_mut().reset(end);
+        }
+        self.or_end(polled, context)
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {

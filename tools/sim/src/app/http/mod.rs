@@ -8,6 +8,7 @@ mod tests;
 
 use std::convert::Infallible;
 use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread;
 use std::time::Duration;
@@ -19,7 +20,7 @@ use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::sse::{self, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use tokio::sync::{broadcast, oneshot};
+use tokio::sync::{Semaphore, broadcast, oneshot};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
 use tokio_stream::wrappers::errors::BroadcastStreamRecvError::Lagged;
@@ -36,6 +37,8 @@ const LONGEST_BODY: usize = 64 * 1024;
 const MOST_TO_DROP: usize = 64 * 1024 * 1024;
 /// A client that sends nothing of its body for this long is refused.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// Most streams of events at the same time. The other connections stay free for requests that end.
+const STREAMS: usize = 48;
 
 /// Starts to serve at `address`, and returns the address: with port 0 the system chooses the port. `live` carries the
 /// events that `/api/events` streams.
@@ -47,6 +50,16 @@ pub fn listen(
     address: SocketAddr,
     events: Sender<Event>,
     live: broadcast::Sender<Note>,
+) -> Result<SocketAddr, String> {
+    serve(address, events, live, connections::PATIENCE)
+}
+
+/// As [`listen`]. A connection over which nothing can be sent for `patience` is closed.
+fn serve(
+    address: SocketAddr,
+    events: Sender<Event>,
+    live: broadcast::Sender<Note>,
+    patience: Duration,
 ) -> Result<SocketAddr, String> {
     let cannot = |error: std::io::Error| {
         format!("cannot serve HTTP at {address}: {error} (choose another address with --http ADDR)")
@@ -66,6 +79,8 @@ pub fn listen(
         events,
         live,
         guard: Guard::new(bound),
+        requests: Arc::new(Semaphore::new(connections::MOST)),
+        streams: Arc::new(Semaphore::new(STREAMS)),
     };
     let app = Router::new()
         .merge(page::routes())
@@ -78,7 +93,8 @@ pub fn listen(
         .with_state(server);
     thread::spawn(move || {
         // The server ends with the program.
-        let _ = runtime.block_on(async { axum::serve(Bounded::new(listener), app).await });
+        let _ =
+            runtime.block_on(async { axum::serve(Bounded::new(listener, patience), app).await });
     });
     Ok(bound)
 }
@@ -89,17 +105,32 @@ struct Server {
     events: Sender<Event>,
     live: broadcast::Sender<Note>,
     guard: Guard,
+    /// Free places for requests in the queue of the boards' thread.
+    requests: Arc<Semaphore>,
+    /// Free places for streams of events.
+    streams: Arc<Semaphore>,
 }
 
 impl Server {
     /// Sends a request to the boards' thread and returns its reply.
     async fn board(&self, request: api::Request) -> api::Reply {
-        let (reply, answer) = oneshot::channel();
         let stopping = || api::Reply::error(503, "the simulator is stopping");
+        let place = Arc::clone(&self.requests).acquire_owned().await;
+        let (reply, answer) = oneshot::channel();
         if self.events.send(Event::Request(request, reply)).is_err() {
             return stopping();
         }
-        answer.await.unwrap_or_else(|_| stopping())
+        // A task of its own keeps the place until the boards' thread has replied. When the client disconnects, this
+        // function ends earlier.
+        let answered = tokio::spawn(async move {
+            let reply = answer.await;
+            drop(place);
+            reply
+        });
+        match answered.await {
+            Ok(Ok(reply)) => reply,
+            _ => stopping(),
+        }
     }
 
     /// The reply to `GET target`.
@@ -194,6 +225,10 @@ async fn stream_of(
 
 /// Streams server-sent events: the state of a board, and then its changes and the frames on the line.
 async fn stream(server: Server, board: usize, state: &str) -> Result<Response, api::Reply> {
+    let Ok(place) = Arc::clone(&server.streams).try_acquire_owned() else {
+        let what = format!("too many streams of events: {STREAMS} are open");
+        return Err(api::Reply::error(503, what));
+    };
     // Subscribe before reading the state, so that no event between the two is missed.
     let notes = BroadcastStream::new(server.live.subscribe());
     let state = server.get(state).await;
@@ -207,9 +242,11 @@ async fn stream(server: Server, board: usize, state: &str) -> Result<Response, a
         // A client that reads too slowly can read the state and the frames again.
         Err(Lagged(count)) => Some(event("lost", count.to_string())),
     });
-    let all = tokio_stream::once(first)
-        .chain(then)
-        .map(Ok::<_, Infallible>);
+    let all = tokio_stream::once(first).chain(then).map(move |event| {
+        // The stream keeps its place until it ends.
+        let _ = &place;
+        Ok::<_, Infallible>(event)
+    });
     let events = Sse::new(all).keep_alive(KeepAlive::default());
     Ok(events.into_response())
 }

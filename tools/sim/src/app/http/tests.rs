@@ -10,6 +10,11 @@ use super::*;
 use crate::app::testing::IN_USE;
 
 fn server() -> (SocketAddr, broadcast::Sender<Note>) {
+    server_with(connections::PATIENCE)
+}
+
+/// A server that closes a connection over which nothing can be sent for `patience`.
+fn server_with(patience: Duration) -> (SocketAddr, broadcast::Sender<Note>) {
     let (events, queue) = mpsc::channel();
     thread::spawn(move || {
         while let Ok(Event::Request(request, reply)) = queue.recv() {
@@ -19,7 +24,8 @@ fn server() -> (SocketAddr, broadcast::Sender<Note>) {
         }
     });
     let live = broadcast::Sender::new(16);
-    let address = listen("127.0.0.1:0".parse().unwrap(), events, live.clone()).unwrap();
+    let address = "127.0.0.1:0".parse().unwrap();
+    let address = serve(address, events, live.clone(), patience).unwrap();
     (address, live)
 }
 
@@ -158,6 +164,109 @@ fn connection_above_the_limit_is_refused_until_another_ends() {
         read_state(address).starts_with("HTTP/1.1 200")
     });
     assert!(served);
+}
+
+/// Reads until the server closes the connection, and returns what was read.
+fn until_closed(mut stream: TcpStream) -> String {
+    let patience = Some(Duration::from_secs(30));
+    stream.set_read_timeout(patience).unwrap();
+    let mut answer = Vec::new();
+    match stream.read_to_end(&mut answer) {
+        Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => panic!("still open"),
+        // A connection that is closed before its request is complete may be reset.
+        _ => String::from_utf8_lossy(&answer).into_owned(),
+    }
+}
+
+#[test]
+fn connection_without_a_complete_request_is_closed_after_a_time() {
+    let (address, _live) = server_with(Duration::from_millis(300));
+    let begin = |text: &str| {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.write_all(text.as_bytes()).unwrap();
+        stream
+    };
+    let idle = begin("");
+    let head = begin("GET /api/state HTTP/1.1\r\nHost: local");
+    let body = begin("POST /api/dip HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n{");
+    // This client has its reply, and sends no further request.
+    let kept = begin("GET /api/state HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    // This one sends its header a byte at a time, without end.
+    let slow = begin("GET /api/state HTTP/1.1\r\nX: ");
+    let mut sending = slow.try_clone().unwrap();
+    thread::spawn(move || {
+        while sending.write_all(b"x").is_ok() {
+            thread::sleep(Duration::from_millis(20));
+        }
+    });
+    for stream in [idle, head, body, slow] {
+        assert!(!until_closed(stream).contains("200 OK"));
+    }
+    assert!(until_closed(kept).starts_with("HTTP/1.1 200"));
+}
+
+#[test]
+fn connection_whose_client_does_not_read_is_closed_after_a_time() {
+    let (address, live) = server_with(Duration::from_millis(300));
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream
+        .write_all(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        .unwrap();
+    let note = Note {
+        board: None,
+        name: "frame",
+        data: "x".repeat(1 << 20).into(),
+    };
+    let closed = (0..2000).any(|_| {
+        thread::sleep(Duration::from_millis(10));
+        live.send(note.clone()).is_err() && stream.write_all(b"x").is_err()
+    });
+    assert!(closed);
+}
+
+#[test]
+fn stream_of_events_above_the_limit_is_refused_and_other_requests_are_answered() {
+    let (address, live) = server();
+    let streams: Vec<_> = (0..STREAMS)
+        .map(|_| {
+            let mut stream = TcpStream::connect(address).unwrap();
+            stream
+                .write_all(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                .unwrap();
+            stream.read_exact(&mut [0; 12]).unwrap();
+            stream
+        })
+        .collect();
+    assert_eq!(live.receiver_count(), STREAMS);
+    let request = format!("GET /api/events HTTP/1.1\r\n{HEAD}\r\n");
+    let answer = ask(address, request.as_bytes());
+    assert!(answer.starts_with("HTTP/1.1 503"), "{answer}");
+    assert!(answer.contains("too many streams of events"), "{answer}");
+    assert!(read_state(address).starts_with("HTTP/1.1 200"));
+    drop(streams);
+}
+
+#[test]
+fn requests_of_clients_that_disconnect_do_not_pile_up_in_the_queue() {
+    let (events, queue) = mpsc::channel();
+    let live = broadcast::Sender::new(1);
+    let address = listen("127.0.0.1:0".parse().unwrap(), events, live).unwrap();
+    for _ in 0..3 * connections::MOST {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream
+            .write_all(b"GET /api/state HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            .unwrap();
+        thread::sleep(Duration::from_millis(2));
+    }
+    let mut waiting = Vec::new();
+    while let Ok(event) = queue.recv_timeout(Duration::from_millis(300)) {
+        waiting.push(event);
+    }
+    assert_eq!(waiting.len(), connections::MOST);
+    drop(waiting);
+    thread::spawn(move || read_state(address));
+    let next = queue.recv_timeout(Duration::from_secs(20));
+    assert!(matches!(next, Ok(Event::Request(..))));
 }
 
 #[test]
