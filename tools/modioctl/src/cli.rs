@@ -33,6 +33,10 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
+    /// Read the unit's description of its registers again, even if it is stored on this computer
+    #[arg(long, global = true)]
+    pub refresh: bool,
+
     /// Print every frame on standard error, in words and with times
     #[arg(long, global = true)]
     pub trace: bool,
@@ -70,7 +74,7 @@ pub enum Command {
     /// Show the frames of other devices on the line, until Ctrl-C, without sending anything
     Sniff(Sniff),
     /// List the unit's points and registers with their meaning
-    Describe(Describe),
+    Describe,
     /// Write a configuration of another system for the unit
     Export(Export),
     /// Restart the unit
@@ -300,14 +304,6 @@ pub struct Sniff {
     /// Write a capture file (pcapng) for Wireshark as well; an existing file is overwritten
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-}
-
-/// List points and registers.
-#[derive(Args, Debug)]
-pub struct Describe {
-    /// Read the description from the unit even if it is already stored here
-    #[arg(long)]
-    pub refresh: bool,
 }
 
 /// Write a configuration of another system for the unit.

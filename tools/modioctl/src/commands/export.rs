@@ -14,7 +14,7 @@ use crate::output;
 ///
 /// When the unit does not answer, when the system cannot use the endpoint, or when the file cannot be written.
 pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
-    let learned = fetch(device, false).await?;
+    let learned = fetch(device).await?;
     let text = text(
         options.format,
         Source {

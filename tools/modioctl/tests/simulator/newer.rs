@@ -36,11 +36,11 @@ fn description() -> Description {
     description
 }
 
-/// Serves the unit's registers and its file over TCP.
-fn unit() -> SocketAddr {
+/// Serves the registers of a unit with this description, its file and this identity over TCP.
+fn unit(description: &Description, identity: u16) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
-    let file = description().file();
+    let file = description.file();
     let words = file
         .as_chunks::<2>()
         .0
@@ -56,8 +56,9 @@ fn unit() -> SocketAddr {
         (0x0204, 1),
         (0x0205, 99),
     ]);
+    registers.extend((0x0220..0x0226).map(|address| (address, identity)));
     registers.extend([
-        (0x020F, checksum(&description().encode())),
+        (0x020F, checksum(&description.encode())),
         (0x0500, 1234),
         (0x0010, 7),
     ]);
@@ -109,7 +110,7 @@ fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
 
 #[test]
 fn a_newer_unit_is_read_by_its_own_description() {
-    let at = At::tcp(unit());
+    let at = At::tcp(unit(&description(), 1));
     let first = at.run("read PRESSURE_LIMIT p5.1");
     assert!(
         first.err.contains("reading the unit's description"),
@@ -128,4 +129,48 @@ fn a_newer_unit_is_read_by_its_own_description() {
     );
     let text = at.run("read PRESURE_LIMIT").failed(2);
     assert!(text.contains("PRESSURE_LIMIT"), "{text}");
+}
+
+#[test]
+fn refresh_reads_the_description_again_with_every_command() {
+    let at = At::tcp(unit(&description(), 1));
+    for (words, is_read) in [
+        ("read PRESSURE_LIMIT", true),
+        ("read PRESSURE_LIMIT", false),
+        ("read --refresh PRESSURE_LIMIT", true),
+        ("--refresh export csv", true),
+        ("describe --refresh", true),
+    ] {
+        let ran = at.run(words);
+        assert_eq!(ran.err.contains("reading"), is_read, "{words}: {ran:?}");
+        ran.fine();
+    }
+}
+
+#[test]
+fn a_description_that_cannot_be_used_is_not_stored() {
+    let mut hostile = description();
+    // 65535 items, each with a copy of this text, were 3.9 GB.
+    let mut last = hostile.registers.pop().unwrap();
+    (last.count, last.about) = (0xFFFF, "x".repeat(50_000));
+    hostile.registers.push(last);
+    let at = At::tcp(unit(&hostile, 1));
+    for _ in 0..2 {
+        let ran = at.run("read BAUD");
+        assert!(ran.err.contains("reading"), "{ran:?}");
+        assert_eq!(ran.status, 1);
+        assert!(ran.err.contains("a text of 50000 bytes"), "{ran:?}");
+    }
+}
+
+#[test]
+fn a_stored_description_is_not_that_of_another_unit() {
+    let at = At::tcp(unit(&description(), 1));
+    at.run("describe").fine();
+    // The same registers and the same CRC, but another identity.
+    let other = at.elsewhere(unit(&description(), 2));
+    let ran = other.run("describe");
+    assert!(ran.err.contains("reading"), "{ran:?}");
+    let again = at.run("describe");
+    assert!(again.err.is_empty(), "{again:?}");
 }
