@@ -242,7 +242,8 @@ fn a_text_that_is_too_long_or_has_control_characters_is_rejected() {
 
 #[test]
 fn numbers_beyond_the_limits_are_rejected() {
-    let changes: [(fn(&mut Description), bool); 16] = [
+    type Change = fn(&mut Description);
+    let changes: [(Change, bool); 16] = [
         // One register with all addresses was 65535 items, each with its own texts.
         (|unit| run(unit, 0, 0xFFFF, Scope::Unit), false),
         (|unit| run(unit, 0x1000, 0x1001, Scope::Unit), false),
