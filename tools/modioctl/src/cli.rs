@@ -75,7 +75,7 @@ pub enum Command {
     Sniff(Sniff),
     /// List the unit's points and registers with their meaning
     Describe,
-    /// Write a configuration of another system for the unit
+    /// Write a configuration of another system for the unit, or for several units of the line
     Export(Export),
     /// Restart the unit
     Reboot,
@@ -313,9 +313,28 @@ pub struct Export {
     /// The system
     #[arg(id = "system", value_name = "SYSTEM", value_enum)]
     pub format: ExportFormat,
+    /// Addresses of the units on the line, such as 1-3,7; default: the unit of the endpoint
+    #[arg(long, value_name = "LIST", value_parser = units)]
+    pub units: Option<Units>,
+    /// Name of the line, in front of the names of its units; needed when the system has other lines with modio units
+    #[arg(long, value_name = "NAME", value_parser = line_name)]
+    pub name: Option<String>,
     /// Write to this file instead of standard output; an existing file is overwritten
     #[arg(long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+}
+
+fn line_name(text: &str) -> Result<String, String> {
+    let is_name = text.chars().any(|c| c.is_ascii_alphanumeric())
+        && text.chars().all(crate::export::is_plain)
+        && text.len() <= 64;
+    if is_name {
+        Ok(text.trim().to_owned())
+    } else {
+        Err(format!(
+            "{text:?} is not a name of letters A to Z, digits, spaces and `.`, `_`, `-`, 64 at most"
+        ))
+    }
 }
 
 /// A system for which a configuration can be written.
