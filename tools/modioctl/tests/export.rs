@@ -466,3 +466,41 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn masters_leave_the_silence_of_the_rate_between_frames() {
+    let pauses = |endpoint: &Endpoint| {
+        let export = |format| export(format, &analog(), endpoint).unwrap();
+        let hub = &yaml(&export(ExportFormat::HomeAssistant))["modbus"][0];
+        let nodes = nodes(&export(ExportFormat::NodeRed));
+        let delay = nodes
+            .iter()
+            .find_map(|node| node.get("commandDelay")?.as_u64());
+        let input = &toml(&export(ExportFormat::Telegraf))["inputs"]["modbus"][0];
+        let pause = input
+            .get("workarounds")
+            .map(|w| w["pause_between_requests"].to_string());
+        (hub["message_wait_milliseconds"].as_u64(), delay, pause)
+    };
+    let pause = |millis: u64| Some(format!("\"{millis}ms\""));
+    let at = |place: &str, baud| Endpoint {
+        baud,
+        ..endpoint(Place::Tcp(place.to_owned()), Framing::Rtu)
+    };
+    assert_eq!(
+        pauses(&at("gateway:4196", 9600)),
+        (Some(6), Some(6), pause(6))
+    );
+    assert_eq!(
+        pauses(&at("gateway:4196", 115_200)),
+        (Some(3), Some(3), pause(3))
+    );
+    assert_eq!(pauses(&serial()), (None, Some(6), pause(6)));
+    let slow = Endpoint {
+        baud: 1200,
+        ..serial()
+    };
+    assert_eq!(pauses(&slow), (Some(34), Some(34), pause(34)));
+    let tcp = endpoint(Place::ModbusTcp("[::1]:502".to_owned()), Framing::Mbap);
+    assert_eq!(pauses(&tcp), (None, Some(1), None));
+}

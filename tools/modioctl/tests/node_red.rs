@@ -167,7 +167,7 @@ fn a_word_output_with_scale_and_offset_gets_its_number_in_twos_complement() {
     assert_eq!(set[..4], [65436, 1, 65136, 1250]);
     assert_eq!(
         set[4],
-        "p5.3: 0.05 is not -30.0 to 135.0 °C in steps of 0.1"
+        "p5.3: \"0.05\" is not -30.0 to 135.0 °C in steps of 0.1"
     );
     assert!(set[5].is_string());
     let read = results("p5.3 to p5.4", &["[65436, 1]"]);

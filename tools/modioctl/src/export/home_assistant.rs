@@ -29,6 +29,8 @@ struct Hub {
     name: String,
     #[serde(flatten)]
     connection: Connection,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    message_wait_milliseconds: Option<u64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     sensors: Vec<Sensor>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -149,6 +151,10 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
     let mut hub = Hub {
         name: identifier(&title),
         connection: connection(line.endpoint)?,
+        // Home Assistant leaves 30 ms on a serial port, and nothing elsewhere.
+        message_wait_milliseconds: line
+            .silence()
+            .filter(|silence| *silence > 30 || !line.endpoint.place.is_serial()),
         sensors: Vec::new(),
         binary_sensors: Vec::new(),
         switches: Vec::new(),

@@ -11,6 +11,7 @@ mod telegraf;
 
 use modio_description::{Table, Unit, Value};
 
+use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
 use crate::cli::ExportFormat;
 use crate::failure::Failure;
@@ -57,6 +58,21 @@ pub fn text(format: ExportFormat, line: Line<'_>) -> Result<String, Failure> {
 }
 
 impl Line<'_> {
+    /// Returns the milliseconds that a master must leave after a reply, so that no unit takes the next request for a
+    /// part of another unit's reply: the 3.5 characters of the standard (V1.02, 2.5.1.1) and up to 2 ms. Returns
+    /// `None` where frames end in another way.
+    fn silence(&self) -> Option<u64> {
+        if self.endpoint.framing != Framing::Rtu {
+            return None;
+        }
+        // A character has 11 bits. Above 19200 bit/s the standard fixes the time at 1.75 ms.
+        let micros = match u64::from(self.endpoint.baud) {
+            baud @ 1..=19_200 => 38_500_000 / baud,
+            _ => 1_750,
+        };
+        Some(micros / 1000 + 2)
+    }
+
     /// Returns the name of the line: the name that the user gives, or else that of the only unit.
     fn title(&self) -> Result<String, Failure> {
         match (self.name, self.units) {
@@ -201,7 +217,7 @@ fn host_and_port(address: &str) -> Result<(String, u16), Failure> {
 
 /// Returns an error for ASCII frames over TCP, which a system cannot use.
 fn no_ascii_over_tcp(system: &str, endpoint: &Endpoint) -> Result<(), Failure> {
-    let ascii = endpoint.framing == crate::bus::adu::Framing::Ascii;
+    let ascii = endpoint.framing == Framing::Ascii;
     if ascii && matches!(endpoint.place, Place::Tcp(_)) {
         return Err(Failure::usage(format!(
             "{system} has no Modbus ASCII over TCP: use --port with a serial port, or leave out --mode ascii"

@@ -8,8 +8,8 @@ use modio_description::Table;
 use serde_json::{Value as Json, json};
 
 use super::{Line, Scaling, Source, host_and_port, identifier, no_ascii_over_tcp, plain};
+use crate::bus::Place;
 use crate::bus::adu::Framing;
-use crate::bus::{Endpoint, Place};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::value::quantities;
@@ -29,7 +29,7 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
     for source in line.units {
         nodes.extend(tab(source, &line.unit_name(source)?, &id));
     }
-    nodes.insert(1, client(line.endpoint, &id, &title, line.units)?);
+    nodes.insert(1, client(line, &id, &title)?);
     let text = serde_json::to_string_pretty(&nodes).map_err(Failure::usage)?;
     Ok(text + "\n")
 }
@@ -80,7 +80,8 @@ fn tab(source: &Source, name: &str, client: &str) -> Vec<Json> {
     nodes
 }
 
-fn client(endpoint: &Endpoint, id: &str, name: &str, units: &[Source]) -> Result<Json, Failure> {
+fn client(line: Line<'_>, id: &str, name: &str) -> Result<Json, Failure> {
+    let endpoint = line.endpoint;
     let mut client = json!({
         "id": id,
         "type": "modbus-client",
@@ -104,8 +105,8 @@ fn client(endpoint: &Endpoint, id: &str, name: &str, units: &[Source]) -> Result
             _ => "none",
         },
         "serialConnectionDelay": "100",
-        "unit_id": units.first().map_or(endpoint.unit, |source| source.unit),
-        "commandDelay": 1,
+        "unit_id": line.units.first().map_or(endpoint.unit, |source| source.unit),
+        "commandDelay": line.silence().unwrap_or(1),
         "clientTimeout": u64::try_from(endpoint.timeout.as_millis()).unwrap_or(1000),
         "reconnectOnTimeout": true,
         "reconnectTimeout": 2000,
@@ -235,7 +236,7 @@ const BIT: &str = r#"const states = new Map([["on", true], ["true", true], ["1",
 const text = typeof msg.payload === "object" ? "an object" : String(msg.payload);
 const state = states.get(text.trim().toLowerCase());
 if (state === undefined) {
-  node.error(`${output.name}: ${text} is not ${output.takes}`, msg);
+  node.error(`${output.name}: ${JSON.stringify(text)} is not ${output.takes}`, msg);
   return null;
 }
 msg.payload = state;
@@ -247,7 +248,7 @@ const decimal = /^\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*$/i;
 const steps = decimal.test(text) ? Number(text) / output.step : NaN;
 const n = Math.round(steps) - output.offset;
 if (!(Math.abs(steps - Math.round(steps)) < 1e-6 && n >= output.min && n <= output.max)) {
-  node.error(`${output.name}: ${text} is not ${output.takes}`, msg);
+  node.error(`${output.name}: ${JSON.stringify(text)} is not ${output.takes}`, msg);
   return null;
 }
 msg.payload = n & 0xFFFF;

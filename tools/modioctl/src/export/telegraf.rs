@@ -44,6 +44,13 @@ struct Modbus {
     transmission_mode: &'static str,
     configuration_type: &'static str,
     metric: Vec<Metric>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    workarounds: Option<Workarounds>,
+}
+
+#[derive(Serialize)]
+struct Workarounds {
+    pause_between_requests: String,
 }
 
 #[derive(Serialize)]
@@ -126,6 +133,9 @@ fn modbus(
         transmission_mode,
         configuration_type: "metric",
         metric: metrics,
+        workarounds: line.silence().map(|silence| Workarounds {
+            pause_between_requests: format!("{silence}ms"),
+        }),
     })
 }
 
