@@ -109,7 +109,7 @@ fn client(line: Line<'_>, id: &str, name: &str) -> Result<Json, Failure> {
         "commandDelay": line.silence().unwrap_or(1),
         "clientTimeout": u64::try_from(endpoint.timeout.as_millis()).unwrap_or(1000),
         "reconnectOnTimeout": true,
-        "reconnectTimeout": 2000,
+        "reconnectTimeout": 500,
         "parallelUnitIdsAllowed": true,
     });
     match &endpoint.place {
