@@ -36,7 +36,8 @@ fn description() -> Description {
     description
 }
 
-/// Serves the registers of a unit with this description, its file and this identity over TCP.
+/// Serves the registers of a unit with this description, its file and this identity over TCP, at every address but
+/// [`MISSING`].
 fn unit(description: &Description, identity: u16) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -67,6 +68,9 @@ fn unit(description: &Description, identity: u16) -> SocketAddr {
             let mut bytes = [0; 512];
             while let Ok(count @ 1..) = master.read(&mut bytes) {
                 let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
+                if unit == MISSING {
+                    continue;
+                }
                 let answer = answer(&pdu, &registers, &words);
                 master
                     .write_all(&Framing::Rtu.frame(0, unit, &answer))
@@ -76,6 +80,9 @@ fn unit(description: &Description, identity: u16) -> SocketAddr {
     });
     address
 }
+
+/// Address without a unit.
+const MISSING: u8 = 9;
 
 fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
     let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
@@ -161,6 +168,7 @@ fn a_description_that_cannot_be_used_is_not_stored() {
         assert_eq!(ran.status, 1);
         assert!(ran.err.contains("a text of 50000 bytes"), "{ran:?}");
     }
+    assert_eq!(at.stored(), 0);
 }
 
 #[test]
@@ -173,4 +181,20 @@ fn a_stored_description_is_not_that_of_another_unit() {
     assert!(ran.err.contains("reading"), "{ran:?}");
     let again = at.run("describe");
     assert!(again.err.is_empty(), "{again:?}");
+    assert_eq!(at.stored(), 2);
+}
+
+#[test]
+fn an_export_of_several_units_needs_all_of_them() {
+    let at = At::tcp(unit(&description(), 1));
+    let rows = at.run("export --units 1-2 csv").fine();
+    let of = |unit: &str| rows.lines().filter(|row| row.ends_with(unit)).count();
+    assert!(of(",1") > 50 && of(",1") == of(",2"), "{rows}");
+    let error = at
+        .run("--timeout 50ms --retries 0 export --units 1,9 csv")
+        .failed(3);
+    assert!(
+        error.contains("without unit 9") && error.contains("--units"),
+        "{error}"
+    );
 }

@@ -92,6 +92,12 @@ impl At {
         )
     }
 
+    /// Returns the number of files in the cache.
+    pub fn stored(&self) -> usize {
+        let cache = std::fs::read_dir(self.1.path().join("modio"));
+        cache.map_or(0, Iterator::count)
+    }
+
     /// Returns the program with the words of this command.
     pub fn command(&self, words: &str) -> Command {
         let endpoint: Vec<_> = self.0.iter().map(String::as_str).collect();
