@@ -1,17 +1,19 @@
-//! The fuzz targets. Each decodes an input into a script of events, applies it to the code and to an independent
-//! model, and panics when the two differ.
+//! The fuzz targets. Most decode an input into a script of events, apply it to the code and to an independent model,
+//! and panic when the two differ.
 //!
 //! | target | input | model |
 //! |---|---|---|
 //! | `receiver_rtu`, `receiver_ascii` | characters, faults, silences, buffers in use by requests | [`modbus_reference::Receiver`] |
 //! | `pdu` | requests of any content to one server, and their replies | [`modbus_reference::Server`] |
 //! | `store` | flash pages of any content, saves, starts, power cuts, wear | [`pages`]; a start finds what was saved last |
+//! | `description` | a document with any content | none: its own limits, and the same after encoding and decoding |
 //!
 //! Every target accepts any bytes. `examples/seeds` writes the seeds in `corpus/`.
 
 #[path = "../../modbus-server/tests/common/mod.rs"]
 #[allow(missing_docs, clippy::all)] // the tests' own
 pub mod common;
+pub mod description;
 #[path = "../../firmware/tests/store/flash.rs"]
 #[allow(missing_docs, dead_code)] // as above
 mod flash;

@@ -91,7 +91,7 @@ enum Command {
     },
     /// Test well-known Modbus servers with the conformance suite, and renew the table in docs/conformance.md
     Peers(peers::Options),
-    /// Run the fuzz targets: framers, server and configuration store
+    /// Run the fuzz targets: framers, server, configuration store and descriptions
     Fuzz(fuzz::Options),
     /// Send a million frames, good and damaged, to the image in simulation
     Soak(soak::Options),

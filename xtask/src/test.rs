@@ -6,11 +6,11 @@ use std::process::Command;
 
 use In::{Ci, Host, Test};
 use Run::{Each, Once};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use register_map::Board;
 use register_map::board::{MODIO_02, MODIO_08};
 
-use crate::error::usage;
+use crate::error::{missing, usage};
 use crate::python::{masters, page};
 use crate::renode::checks;
 use crate::steps::{self, Done};
@@ -273,7 +273,16 @@ fn suite(workspace: &mut Workspace) -> Result<()> {
 }
 
 fn tool(workspace: &mut Workspace) -> Result<()> {
-    simulated(workspace, "--test=simulator", "", &[])
+    simulated(workspace, "--test=simulator", "", &[])?;
+    ensure!(
+        which::which("node").is_ok(),
+        missing(
+            "passed, but the functions of the Node-RED export were not run (on Debian: apt-get install nodejs)"
+        )
+    );
+    let mut cargo = workspace.cargo("test");
+    cargo.args(ALL).args(["--features", SUITE]);
+    command::run(cargo.args(["--test=node_red", "--", "--include-ignored"]))
 }
 
 fn sim_slow(workspace: &mut Workspace) -> Result<()> {

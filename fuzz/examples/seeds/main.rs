@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::{fs, io};
 
+mod descriptions;
 mod line;
 mod requests;
 mod storage;
@@ -18,6 +19,7 @@ fn main() -> io::Result<()> {
         ("receiver_ascii", line::ascii()),
         ("pdu", requests::seeds()),
         ("store", storage::seeds()),
+        ("description", descriptions::seeds()),
     ] {
         let directory = corpus.join(target);
         // Remove old seeds first.

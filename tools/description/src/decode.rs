@@ -1,8 +1,12 @@
 //! Decodes CBOR into a description. The decoder skips fields that a later version of the format has appended.
+//!
+//! A unit can send any bytes, so the decoder limits what a description can contain. Programs then need no checks of
+//! their own: a text cannot control a terminal, and the memory for all registers stays small.
 
 use minicbor::Decoder;
 
 use crate::format::{self, PORT_BYTES, VERSION};
+use crate::limit;
 use crate::{
     Description, Error, ModuleType, Narrower, PointKind, Port, Reading, Register, Unit, Value,
     Values,
@@ -79,8 +83,25 @@ impl<'d, 'b> Fields<'d, 'b> {
     }
 }
 
-fn text(d: &mut Decoder<'_>) -> Read<String> {
-    Ok(d.str()?.to_owned())
+/// Reads a name, a version or a code of a unit.
+fn name(d: &mut Decoder<'_>) -> Read<String> {
+    text(d, limit::NAME)
+}
+
+/// Reads a text of up to `most` bytes.
+fn text(d: &mut Decoder<'_>, most: usize) -> Read<String> {
+    let at = d.position();
+    let text = d.str()?;
+    if text.len() > most {
+        let length = text.len();
+        return Err(form(format!(
+            "a text of {length} bytes, more than {most} (byte {at})"
+        )));
+    }
+    if text.chars().any(limit::is_control) {
+        return Err(form(format!("a control character in a text (byte {at})")));
+    }
+    Ok(text.to_owned())
 }
 
 fn u16(d: &mut Decoder<'_>) -> Read<u16> {
@@ -107,15 +128,16 @@ fn document(d: &mut Decoder<'_>) -> Read<Description> {
     let mut description = fields.next(firmware)?;
     description.ports = fields.next(ports)?;
     fields.end()?;
+    limit::check(&description).map_err(form)?;
     Ok(description)
 }
 
 /// Reads the part that the firmware determines: everything except the ports.
 fn firmware(d: &mut Decoder<'_>) -> Read<Description> {
     let mut fields = Fields::of(d)?;
-    let board = fields.next(text)?;
-    let model = fields.next(text)?;
-    let firmware = fields.next(text)?;
+    let board = fields.next(name)?;
+    let model = fields.next(name)?;
+    let firmware = fields.next(name)?;
     let map_version = fields.next(u16)?;
     let kinds = fields.next(|d| list(d, point_kind))?;
     let modules = fields.next(|d| list(d, |d| module_type(d, kinds.len())))?;
@@ -148,7 +170,7 @@ fn ports(d: &mut Decoder<'_>) -> Read<Vec<Port>> {
 fn point_kind(d: &mut Decoder<'_>) -> Read<PointKind> {
     let mut fields = Fields::of(d)?;
     let kind = PointKind {
-        name: fields.next(text)?,
+        name: fields.next(name)?,
         table: format::table_of(fields.next(u8)?),
         writable: fields.next(|d| Ok(d.bool()?))?,
         readings: fields.option(|d| list(d, reading))?.unwrap_or_default(),
@@ -190,7 +212,7 @@ fn known(place: u8, kinds: usize) -> Read<u8> {
 
 fn module_type(d: &mut Decoder<'_>, kinds: usize) -> Read<ModuleType> {
     let mut fields = Fields::of(d)?;
-    let (code, name) = (fields.next(u16)?, fields.next(text)?);
+    let (code, name) = (fields.next(u16)?, fields.next(name)?);
     let points = fields.next(|d| Ok(d.bytes()?))?;
     let points = <[u8; 4]>::try_from(points).map_err(|_| form("a module without four points"))?;
     for point in points {
@@ -203,9 +225,9 @@ fn module_type(d: &mut Decoder<'_>, kinds: usize) -> Read<ModuleType> {
 fn register(d: &mut Decoder<'_>, kinds: usize) -> Read<Register> {
     let mut fields = Fields::of(d)?;
     let address = fields.next(u16)?;
-    let name = fields.next(text)?;
+    let name = fields.next(name)?;
     let value = fields.next(value)?;
-    let about = fields.next(text)?;
+    let about = fields.next(|d| text(d, limit::ABOUT))?;
     let count = fields.option(u16)?.unwrap_or(format::COUNT);
     let scope = fields.option(u8)?.map_or(format::SCOPE, format::scope_of);
     let (writable, restart) = format::access_of(fields.option(u8)?.unwrap_or_default());
@@ -247,7 +269,7 @@ fn value(d: &mut Decoder<'_>) -> Read<Value> {
         format::NUMBER => Value::Number(unit(&mut fields)?),
         format::LONG => Value::Long(unit(&mut fields)?),
         format::CODES => Value::Codes(fields.next(|d| names(d, u16))?),
-        format::BITS => Value::Bits(fields.next(|d| names(d, u8))?),
+        format::BITS => Value::Bits(fields.next(|d| names(d, bit))?),
         _ => Value::Opaque,
     };
     fields.end()?;
@@ -262,20 +284,42 @@ fn names<'b, T>(
     let at = d.position();
     let entries = d.map()?;
     let entries = entries.ok_or_else(|| form(format!("a map without a length (byte {at})")))?;
+    if entries > limit::CODES as u64 {
+        return Err(form(format!("{entries} names of one value (byte {at})")));
+    }
     let mut names = Vec::new();
     for _ in 0..entries {
-        names.push((number(d)?, text(d)?));
+        names.push((number(d)?, name(d)?));
     }
     Ok(names)
+}
+
+/// Reads the number of a bit in a register.
+fn bit(d: &mut Decoder<'_>) -> Read<u8> {
+    let at = d.position();
+    let bit = u8(d)?;
+    if bit > 15 {
+        return Err(form(format!("bit {bit} of a register (byte {at})")));
+    }
+    Ok(bit)
 }
 
 /// Reads the unit at the end of an array.
 fn unit(fields: &mut Fields<'_, '_>) -> Read<Unit> {
     Ok(Unit {
-        code: fields.option(text)?.unwrap_or_default(),
-        exponent: fields.option(|d| Ok(d.i8()?))?.unwrap_or_default(),
+        code: fields.option(name)?.unwrap_or_default(),
+        exponent: fields.option(exponent)?.unwrap_or_default(),
         offset: fields.option(|d| Ok(d.i16()?))?.unwrap_or_default(),
     })
+}
+
+fn exponent(d: &mut Decoder<'_>) -> Read<i8> {
+    let at = d.position();
+    let exponent = d.i8()?;
+    if exponent.unsigned_abs() > limit::EXPONENT {
+        return Err(form(format!("exponent {exponent} (byte {at})")));
+    }
+    Ok(exponent)
 }
 
 /// Reads a set of values. An unknown kind of set becomes the set of all values.
@@ -285,6 +329,9 @@ fn values(d: &mut Decoder<'_>) -> Read<Values> {
         format::RANGE => Values::Range(fields.next(u16)?, fields.next(u16)?),
         format::RANGE_OR => {
             Values::RangeOr(fields.next(u16)?, fields.next(u16)?, fields.next(u16)?)
+        }
+        format::ONE_OF if fields.left > limit::CODES as u64 => {
+            return Err(form(format!("a set of {} values", fields.left)));
         }
         format::ONE_OF => return Ok(Values::OneOf(fields.all(u16)?)),
         _ => format::ANY,

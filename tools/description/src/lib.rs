@@ -5,7 +5,7 @@
 //! the tool.
 //!
 //! A unit has its description in file 1, as CBOR: [`Description::open`] decodes the file, [`Description::decode`]
-//! the CBOR. docs/self-description.md describes the format.
+//! the CBOR. docs/self-description.md describes the format and its limits.
 
 #![forbid(unsafe_code)]
 
@@ -15,6 +15,7 @@ mod error;
 mod file;
 mod format;
 mod known;
+mod limit;
 
 pub use error::Error;
 pub use file::{FILE, HEAD, checksum, records};

@@ -212,12 +212,106 @@ fn an_index_of_an_unknown_kind_is_rejected() {
     assert!(Description::decode(&unit.encode()).is_err());
 }
 
+#[test]
+fn a_text_that_is_too_long_or_has_control_characters_is_rejected() {
+    let decoded = |text: &str, change: fn(&mut Description, String)| {
+        let mut unit = unit(Module::Ai4);
+        change(&mut unit, text.to_owned());
+        Description::decode(&unit.encode()).map_err(|error| error.to_string())
+    };
+    let board: fn(&mut Description, String) = |unit, text| unit.board = text;
+    let about: fn(&mut Description, String) = |unit, text| unit.registers[0].about = text;
+    for (change, most) in [(board, 64), (about, 512)] {
+        assert!(decoded(&"x".repeat(most), change).is_ok());
+        let error = decoded(&"x".repeat(most + 1), change).unwrap_err();
+        assert!(error.contains("more than"), "{error}");
+        for text in [
+            "a\nb",
+            "\u{1B}[2J",
+            "\u{9B}2J",
+            "\u{202E}",
+            "\u{2028}",
+            "\0",
+        ] {
+            let error = decoded(text, change).unwrap_err();
+            assert!(error.contains("control character"), "{text:?}: {error}");
+        }
+        assert!(decoded("20 °C, 5 µA {{ x }} $", change).is_ok());
+    }
+}
+
+#[test]
+fn numbers_beyond_the_limits_are_rejected() {
+    type Change = fn(&mut Description);
+    let changes: [(Change, bool); 16] = [
+        // One register with all addresses was 65535 items, each with its own texts.
+        (|unit| run(unit, 0, 0xFFFF, Scope::Unit), false),
+        (|unit| run(unit, 0x1000, 0x1001, Scope::Unit), false),
+        (|unit| run(unit, 0x1000, 0, Scope::Unit), false),
+        (|unit| run(unit, 0xFFFF, 1, Scope::Unit), true),
+        (|unit| run(unit, 0xFFFF, 2, Scope::Unit), false),
+        (|unit| run(unit, 0xFFE0, 1, Scope::Point), true),
+        (|unit| run(unit, 0xFFE1, 1, Scope::Point), false),
+        // Each is a value for each of 32 points.
+        (
+            |unit| (0..200).for_each(|_| run(unit, 0, 1, Scope::Point)),
+            false,
+        ),
+        (|unit| unit.ports[0].number = 0, false),
+        (|unit| unit.ports[0].number = 9, false),
+        (|unit| unit.ports.push(unit.ports[0]), false),
+        (
+            |unit| last(unit).value = Value::Codes(vec![(0, String::new()); 64]),
+            true,
+        ),
+        (
+            |unit| last(unit).value = Value::Codes(vec![(0, String::new()); 65]),
+            false,
+        ),
+        (|unit| last(unit).values = Values::OneOf(vec![0; 65]), false),
+        (
+            |unit| last(unit).value = Value::Bits(vec![(16, String::new())]),
+            false,
+        ),
+        (|unit| last(unit).value = Value::Number(power(-19)), false),
+    ];
+    for (index, (change, is_usable)) in changes.into_iter().enumerate() {
+        let mut unit = unit(Module::Ai4);
+        change(&mut unit);
+        let decoded = Description::decode(&unit.encode());
+        assert_eq!(decoded.is_ok(), is_usable, "change {index}: {decoded:?}");
+    }
+}
+
+fn last(unit: &mut Description) -> &mut Register {
+    unit.registers.last_mut().unwrap()
+}
+
+/// Appends a run of registers.
+fn run(unit: &mut Description, address: u16, count: u16, scope: Scope) {
+    let run = Register {
+        address,
+        count,
+        scope,
+        value: Value::Number(Unit::default()),
+        ..last(unit).clone()
+    };
+    unit.registers.push(run);
+}
+
+fn power(exponent: i8) -> Unit {
+    Unit {
+        exponent,
+        ..Unit::default()
+    }
+}
+
 fn text() -> impl Strategy<Value = String> {
-    "[ -~äµ°]{0,40}"
+    "[ -~äµ°]{0,32}"
 }
 
 fn units() -> impl Strategy<Value = Unit> {
-    (text(), any::<i8>(), any::<i16>()).prop_map(|(code, exponent, offset)| Unit {
+    (text(), -18..=18_i8, any::<i16>()).prop_map(|(code, exponent, offset)| Unit {
         code,
         exponent,
         offset,
@@ -229,7 +323,7 @@ fn meanings() -> impl Strategy<Value = Value> {
         units().prop_map(Value::Number),
         units().prop_map(Value::Long),
         prop::collection::vec((any::<u16>(), text()), 0..4).prop_map(Value::Codes),
-        prop::collection::vec((any::<u8>(), text()), 0..4).prop_map(Value::Bits),
+        prop::collection::vec((0..16_u8, text()), 0..4).prop_map(Value::Bits),
         Just(Value::Opaque),
     ]
 }
@@ -255,7 +349,8 @@ fn narrowers() -> impl Strategy<Value = Narrower> {
 
 fn registers() -> impl Strategy<Value = Register> {
     let scopes = prop::sample::select(vec![Scope::Unit, Scope::Port, Scope::Point]);
-    let numbers = prop_oneof![Just([0x100, 1, 0]), any::<[u16; 3]>()];
+    let anywhere = (0..0xFC00_u16, 1..1000_u16, any::<u16>()).prop_map(<[u16; 3]>::from);
+    let numbers = prop_oneof![Just([0x100, 1, 0]), anywhere];
     let flags = any::<[bool; 2]>();
     let parts = (
         numbers,

@@ -113,8 +113,11 @@ impl Framing {
 /// Returns bytes in hexadecimal, and an ASCII frame as characters.
 #[must_use]
 pub fn bytes(framing: Framing, bytes: &[u8]) -> String {
-    if framing == Framing::Ascii && bytes.starts_with(b":") && bytes.is_ascii() {
-        return String::from_utf8_lossy(bytes).trim_end().to_owned();
+    let frame = bytes.trim_ascii_end();
+    // Other characters can control a terminal.
+    let is_text = frame.starts_with(b":") && frame.iter().all(u8::is_ascii_graphic);
+    if framing == Framing::Ascii && is_text {
+        return String::from_utf8_lossy(frame).into_owned();
     }
     let digits: Vec<_> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
     digits.join(" ")
@@ -236,6 +239,14 @@ mod tests {
             assert_eq!(framing.open(&damaged), None, "{framing:?}");
             assert!(framing.check(&damaged).unwrap_err().contains("wrong"));
         }
+    }
+
+    #[test]
+    fn an_ascii_frame_is_shown_as_text_unless_it_has_control_characters() {
+        let ascii = |frame| bytes(Framing::Ascii, frame);
+        assert_eq!(ascii(b":0103\r\n"), ":0103");
+        assert_eq!(ascii(b":\x1b[2J\r\n"), "3A 1B 5B 32 4A 0D 0A");
+        assert_eq!(ascii(b":01\r03\r\n"), "3A 30 31 0D 30 33 0D 0A");
     }
 
     #[test]

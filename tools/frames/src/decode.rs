@@ -132,8 +132,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         0x14 => groups(pdu)?,
         0x2B => {
             let objects = objects(pdu)?.into_iter();
-            let texts =
-                objects.map(|(id, text)| format!("{id:02X} {:?}", String::from_utf8_lossy(&text)));
+            let texts = objects.map(|(id, text)| format!("{id:02X} {text:?}"));
             format!("= {}", texts.collect::<Vec<_>>().join(", "))
         }
         _ => return None,
@@ -188,18 +187,29 @@ fn counted(pdu: &[u8]) -> Option<&[u8]> {
     (data.len() == usize::from(*pdu.get(1)?)).then_some(data)
 }
 
-/// Returns the objects in a response of function 2B/0E (V1.1b3, 6.21).
+/// Returns the objects in a response of function 2B/0E (V1.1b3, 6.21), as texts without control characters.
 #[must_use]
-pub fn objects(pdu: &[u8]) -> Option<Vec<(u8, Vec<u8>)>> {
+pub fn objects(pdu: &[u8]) -> Option<Vec<(u8, String)>> {
     let mut rest = pdu.get(7..)?;
     let mut objects = Vec::new();
     for _ in 0..*pdu.get(6)? {
         let (head, data) = rest.split_first_chunk::<2>()?;
         let (text, after) = data.split_at_checked(head[1].into())?;
-        objects.push((head[0], text.to_vec()));
+        objects.push((head[0], printable(text)));
         rest = after;
     }
     Some(objects)
+}
+
+/// Returns a text that a device sent, with `?` for everything except printable ASCII, letters and digits: other
+/// characters can control a terminal.
+fn printable(text: &[u8]) -> String {
+    let plain = |c: char| match c {
+        ' '..='~' => c,
+        _ if c.is_alphanumeric() => c,
+        _ => '?',
+    };
+    String::from_utf8_lossy(text).chars().map(plain).collect()
 }
 
 const fn coil(word: u16) -> &'static str {
@@ -234,6 +244,17 @@ fn bits(data: &[u8], count: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn texts_of_the_device_identification_have_no_control_characters() {
+        let object = |text: &[u8]| {
+            let head = [0x2B, 0x0E, 1, 1, 0, 0, 1, 0, text.len() as u8];
+            objects(&[&head, text].concat()).unwrap()[0].1.clone()
+        };
+        assert_eq!(object("MØ 2 (b)".as_bytes()), "MØ 2 (b)");
+        assert_eq!(object(b"a\x1b[2J\r\n\x9b\0"), "a?[2J????");
+        assert_eq!(object("\u{202E}\u{9B}2J".as_bytes()), "??2J");
+    }
 
     #[test]
     fn requests_and_responses_are_described() {

@@ -33,6 +33,10 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
+    /// Read the unit's description of its registers again, even if it is stored on this computer
+    #[arg(long, global = true)]
+    pub refresh: bool,
+
     /// Print every frame on standard error, in words and with times
     #[arg(long, global = true)]
     pub trace: bool,
@@ -70,8 +74,8 @@ pub enum Command {
     /// Show the frames of other devices on the line, until Ctrl-C, without sending anything
     Sniff(Sniff),
     /// List the unit's points and registers with their meaning
-    Describe(Describe),
-    /// Write a configuration of another system for the unit
+    Describe,
+    /// Write a configuration of another system for the unit, or for several units of the line
     Export(Export),
     /// Restart the unit
     Reboot,
@@ -302,14 +306,6 @@ pub struct Sniff {
     pub record: Option<PathBuf>,
 }
 
-/// List points and registers.
-#[derive(Args, Debug)]
-pub struct Describe {
-    /// Read the description from the unit even if it is already stored here
-    #[arg(long)]
-    pub refresh: bool,
-}
-
 /// Write a configuration of another system for the unit.
 #[derive(Args, Debug)]
 pub struct Export {
@@ -317,9 +313,28 @@ pub struct Export {
     /// The system
     #[arg(id = "system", value_name = "SYSTEM", value_enum)]
     pub format: ExportFormat,
+    /// Addresses of the units on the line, such as 1-3,7; default: the unit of the endpoint
+    #[arg(long, value_name = "LIST", value_parser = units)]
+    pub units: Option<Units>,
+    /// Name of the line, in front of the names of its units; needed when the system has other lines with modio units
+    #[arg(long, value_name = "NAME", value_parser = line_name)]
+    pub name: Option<String>,
     /// Write to this file instead of standard output; an existing file is overwritten
     #[arg(long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+}
+
+fn line_name(text: &str) -> Result<String, String> {
+    let is_name = text.chars().any(|c| c.is_ascii_alphanumeric())
+        && text.chars().all(crate::export::is_plain)
+        && text.len() <= 64;
+    if is_name {
+        Ok(text.trim().to_owned())
+    } else {
+        Err(format!(
+            "{text:?} is not a name of letters A to Z, digits, spaces and `.`, `_`, `-`, 64 at most"
+        ))
+    }
 }
 
 /// A system for which a configuration can be written.

@@ -152,7 +152,7 @@ impl Book {
             return Ok(item.clone());
         }
         if let Some(address) = address(name) {
-            let at = |item: &&Item| (item.address..item.address + item.words).contains(&address);
+            let at = |item: &&Item| address.wrapping_sub(item.address) < item.words;
             let known = self
                 .items
                 .iter()
@@ -355,6 +355,15 @@ mod tests {
         assert_eq!(address("0x0101"), Ok((0x101, 1)));
         assert_eq!(book.find("0x0101").unwrap().name, "BAUD");
         assert_eq!(book.find("4096").unwrap().meaning, Meaning::Unknown);
+    }
+
+    #[test]
+    fn a_register_at_the_last_address_is_found() {
+        let mut unit = describe(&MODIO_02, "0.1.0", |_| Module::None);
+        unit.registers[0].address = 0xFFFF;
+        let book = Book::new(unit, Vec::new());
+        assert_eq!(book.find("0xFFFF").unwrap().address, 0xFFFF);
+        assert_eq!(book.find("0x0000").unwrap().meaning, Meaning::Unknown);
     }
 
     #[test]

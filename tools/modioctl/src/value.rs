@@ -298,11 +298,13 @@ fn range(min: i64, max: i64, unit: &Unit) -> String {
             _ => format!("it takes only {min:#06X}"),
         };
     }
-    format!(
-        "it takes {} to {}",
-        number(min, unit).text,
-        number(max, unit)
-    )
+    format!("it takes {}", quantities(min, max, unit))
+}
+
+/// Describes the quantities of a range of numbers, such as `0 to 10000 mV`.
+#[must_use]
+pub fn quantities(min: i64, max: i64, unit: &Unit) -> String {
+    format!("{} to {}", number(min, unit).text, number(max, unit))
 }
 
 /// Returns the name of a table, for people.

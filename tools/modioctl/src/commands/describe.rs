@@ -1,7 +1,7 @@
 //! `modioctl describe`.
 
-use crate::cli::Describe;
-use crate::device::{Device, fetch};
+use super::learn;
+use crate::device::Device;
 use crate::failure::Failure;
 use crate::listing::{as_json, values};
 use crate::output;
@@ -12,8 +12,8 @@ use crate::value::table_name;
 /// # Errors
 ///
 /// When the unit does not answer or refuses.
-pub async fn run(device: &mut Device, options: &Describe, json: bool) -> Result<(), Failure> {
-    let learned = fetch(device, options.refresh).await?;
+pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
+    let learned = learn(device).await?;
     let about = learned.book.of_modio()?;
     let items = learned.book.items();
     if json {

@@ -4,29 +4,53 @@ use std::path::Path;
 
 use crate::cli::Export;
 use crate::device::{Device, fetch};
-use crate::export::{Source, text};
+use crate::export::{Line, Source, text};
 use crate::failure::Failure;
 use crate::output;
 
-/// Writes a configuration of another system for the unit.
+/// Writes a configuration of another system for the unit, or for several units of the line.
 ///
 /// # Errors
 ///
 /// When the unit does not answer, when the system cannot use the endpoint, or when the file cannot be written.
 pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
-    let learned = fetch(device, false).await?;
+    let only = [device.unit];
+    let addresses = options.units.as_ref().map_or(&only[..], |units| &units.0);
+    let mut units = Vec::new();
+    for address in addresses {
+        device.unit = *address;
+        units.push(source(device).await.map_err(|failure| {
+            if addresses.len() == 1 {
+                return failure;
+            }
+            failure.while_doing(format!(
+                "no export without unit {address}; connect it, or leave it out of --units"
+            ))
+        })?);
+    }
     let text = text(
         options.format,
-        Source {
-            book: &learned.book,
+        Line {
+            name: options.name.as_deref(),
             endpoint: device.master.endpoint(),
-            source: &learned.source,
+            units: &units,
         },
     )?;
     match options.output.as_deref() {
         None => output::line(format_args!("{}", text.trim_end())),
         Some(path) => write(path, &text),
     }
+}
+
+/// Learns the names of the unit.
+async fn source(device: &mut Device) -> Result<Source, Failure> {
+    let learned = fetch(device).await?;
+    learned.book.of_modio()?;
+    Ok(Source {
+        unit: device.unit,
+        book: learned.book,
+        source: learned.source,
+    })
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {

@@ -91,7 +91,7 @@ pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Fail
         for (id, text) in decode::objects(&answer).unwrap_or_default() {
             let name = OBJECTS.get(usize::from(id));
             let name = name.map_or_else(|| format!("object {id:02X}"), |name| (*name).to_owned());
-            found.push((name, String::from_utf8_lossy(&text).into_owned()));
+            found.push((name, text));
         }
         match (answer.get(4), answer.get(5)) {
             (Some(0xFF), Some(next)) if *next > object => object = *next,

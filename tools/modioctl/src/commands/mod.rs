@@ -71,7 +71,7 @@ async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
     }
     let endpoint = endpoint(&mut cli)?;
     if let Command::Monitor(options) = cli.command {
-        return monitor::run(endpoint, &options, cli.trace).await;
+        return monitor::run(endpoint, &options, cli.trace, cli.refresh).await;
     }
     if let Command::Sniff(options) = cli.command {
         return sniff::run(&endpoint, &options, json).await;
@@ -81,6 +81,7 @@ async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
         return scan::run(endpoint, observer, &options, json).await;
     }
     let mut device = Device::open(endpoint, observer).await?;
+    device.refresh = cli.refresh;
     match cli.command {
         Command::Info => info::run(&mut device, json).await,
         Command::Read(options) => read::run(&mut device, &options, json).await,
@@ -89,7 +90,7 @@ async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
         Command::Config(options) => config::run(device, options, json).await,
         Command::Watch(options) => watch::run(device, &options).await,
         Command::Raw(options) => raw::run(&mut device, &options).await,
-        Command::Describe(options) => describe::run(&mut device, &options, json).await,
+        Command::Describe => describe::run(&mut device, json).await,
         Command::Export(options) => export::run(&mut device, &options).await,
         Command::Reboot => module::reboot(device).await,
         Command::Identify => module::identify(&mut device).await,
@@ -109,5 +110,5 @@ fn endpoint(cli: &mut Cli) -> Result<Endpoint, Failure> {
 
 /// Learns the names of the unit.
 async fn learn(device: &mut Device) -> Result<Learned, Failure> {
-    fetch(device, false).await
+    fetch(device).await
 }

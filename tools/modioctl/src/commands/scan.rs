@@ -74,6 +74,7 @@ pub async fn run(
                 let mut device = Device {
                     master,
                     unit: address,
+                    refresh: false,
                 };
                 let unit = look_at(&mut device).await;
                 master = device.master;

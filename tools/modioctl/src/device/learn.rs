@@ -1,6 +1,6 @@
 //! Learns the names of a unit: from the unit's own description of its registers, or from a stored copy.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use etcetera::BaseStrategy;
 use modio_description::{Description, FILE, HEAD, checksum, describe, records};
@@ -28,14 +28,13 @@ pub struct Learned {
     pub source: String,
 }
 
-/// Learns the names of a unit. A unit that is not a modio has no names, only addresses. With `refresh` the
-/// description is read from the unit even if it is stored here.
+/// Learns the names of a unit. A unit that is not a modio has no names, only addresses.
 ///
 /// # Errors
 ///
 /// When the unit does not answer, or when its description cannot be read.
-pub async fn fetch(device: &mut Device, refresh: bool) -> Result<Learned, Failure> {
-    let Some((description, source)) = description(device, refresh).await? else {
+pub async fn fetch(device: &mut Device) -> Result<Learned, Failure> {
+    let Some((description, source)) = description(device).await? else {
         return Ok(Learned {
             book: Book::default(),
             source: "nothing: the unit is not a modio".to_owned(),
@@ -49,10 +48,7 @@ pub async fn fetch(device: &mut Device, refresh: bool) -> Result<Learned, Failur
 }
 
 /// Returns the unit's description and its source; `None` for a unit that is not a modio.
-async fn description(
-    device: &mut Device,
-    refresh: bool,
-) -> Result<Option<(Description, String)>, Failure> {
+async fn description(device: &mut Device) -> Result<Option<(Description, String)>, Failure> {
     if !is_modio(device).await? {
         return Ok(None);
     }
@@ -66,25 +62,28 @@ async fn description(
     let Some(own) = own else {
         return Ok(known.map(|known| (known, "this program: the unit has none".to_owned())));
     };
-    if !refresh {
-        let same = |description: &Description| checksum(&description.encode()) == own;
-        if let Some(known) = known.filter(same) {
-            return Ok(Some((known, "this program, which knows it".to_owned())));
-        }
-        if let Some(kept) = kept(own).filter(same) {
-            return Ok(Some((
-                kept,
-                format!("file {}", path(own).unwrap_or_default().display()),
-            )));
-        }
+    let same = |description: &Description| checksum(&description.encode()) == own;
+    if !device.refresh
+        && let Some(known) = known.filter(same)
+    {
+        return Ok(Some((known, "this program, which knows it".to_owned())));
+    }
+    let path = path(device).await?;
+    if !device.refresh
+        && let Some(path) = &path
+        && let Some(kept) = kept(path).filter(same)
+    {
+        return Ok(Some((kept, format!("file {}", path.display()))));
     }
     let file = read_file(device).await?;
-    keep(own, &file);
     let read = Description::open(&file).map_err(|error| {
         Failure::Refused(format!(
             "the unit's description cannot be used ({error}): a newer modioctl may be needed"
         ))
     })?;
+    if let Some(path) = &path {
+        keep(path, &file);
+    }
     Ok(Some((read, "the unit".to_owned())))
 }
 
@@ -175,27 +174,38 @@ async fn readings(
     Ok(ranges.into_iter().zip(scales).collect())
 }
 
-/// Returns the file that stores a description with this CRC; `None` without a home directory.
-fn path(crc: u16) -> Option<PathBuf> {
-    let strategy = etcetera::choose_base_strategy().ok()?;
+/// Returns the file that stores the unit's description; `None` without a home directory, or when the unit has no unique
+/// identity. Its name has the identity and the version of the firmware: a CRC of 16 bits could be that of another unit.
+async fn path(device: &mut Device) -> Result<Option<PathBuf>, Failure> {
+    let Ok(strategy) = etcetera::choose_base_strategy() else {
+        return Ok(None);
+    };
+    let mut words = Vec::new();
+    for (first, count) in [(state::UNIQUE_ID, 6), (state::FIRMWARE_VERSION, 2)] {
+        match device.read_words(first, count).await {
+            Ok(more) => words.extend(more),
+            Err(Failure::Refused(_)) => return Ok(None),
+            Err(failure) => return Err(failure),
+        }
+    }
+    let digits: String = words.iter().map(|word| format!("{word:04x}")).collect();
     let directory = strategy.cache_dir().join("modio");
-    Some(directory.join(format!("description-{crc:04x}.bin")))
+    Ok(Some(directory.join(format!("description-{digits}.bin"))))
 }
 
-fn kept(crc: u16) -> Option<Description> {
-    Description::open(&std::fs::read(path(crc)?).ok()?).ok()
+fn kept(path: &Path) -> Option<Description> {
+    Description::open(&std::fs::read(path).ok()?).ok()
 }
 
 /// Stores a description. If that fails, it is read again next time.
-fn keep(crc: u16, file: &[u8]) {
-    let Some(path) = path(crc) else { return };
+fn keep(path: &Path, file: &[u8]) {
     // Write another file and rename it, so that the file is never incomplete.
     let new = path.with_extension(format!("{}.new", std::process::id()));
     let written = path
         .parent()
         .map_or(Ok(()), std::fs::create_dir_all)
         .and_then(|()| std::fs::write(&new, file));
-    if written.and_then(|()| std::fs::rename(&new, &path)).is_err() {
+    if written.and_then(|()| std::fs::rename(&new, path)).is_err() {
         let _ = std::fs::remove_file(&new);
     }
 }

@@ -28,6 +28,8 @@ pub struct Device {
     pub master: Master,
     /// The unit's address.
     pub unit: u8,
+    /// Whether the unit's description is read from the unit even if it is stored on this computer.
+    pub refresh: bool,
 }
 
 impl Device {
@@ -39,7 +41,11 @@ impl Device {
     pub async fn open(endpoint: Endpoint, observer: Option<Observer>) -> Result<Self, Failure> {
         let unit = endpoint.unit;
         let master = Master::open(endpoint, observer).await?;
-        Ok(Self { master, unit })
+        Ok(Self {
+            master,
+            unit,
+            refresh: false,
+        })
     }
 
     /// Sends a request. An exception is a failure; `about` describes the request in its text.

@@ -2,21 +2,24 @@
 
 use modio_description::Table;
 
-use super::{Scaling, Source};
+use super::{Line, Scaling, plain};
 use crate::failure::Failure;
 use crate::listing::values;
 use crate::names::Item;
 use crate::value::{table_name, unit_name};
 
-const HEAD: &str = "name,address,table,function,words,type,scale,offset,unit,access,values,about";
+const HEAD: &str = "name,address,table,function,words,type,scale,offset,unit,access,values,about,line,unit_address";
 
-/// Returns one row for each point and register.
-pub fn text(source: Source<'_>) -> Result<String, Failure> {
-    source.unit_name()?;
+/// Returns one row for each point and register of each unit.
+pub fn text(line: Line<'_>) -> Result<String, Failure> {
     let mut text = format!("{HEAD}\n");
-    for item in source.book.items() {
-        text.push_str(&row(item).join(","));
-        text.push('\n');
+    let name = plain(line.name.unwrap_or_default());
+    for source in line.units {
+        source.book.of_modio()?;
+        for item in source.book.items() {
+            let row = row(item).join(",");
+            text.push_str(&format!("{row},{},{}\n", quoted(&name), source.unit));
+        }
     }
     Ok(text)
 }
@@ -43,7 +46,7 @@ fn row(item: &Item) -> [String; 12] {
         (true, true) => "read write restart",
     };
     [
-        quoted(&item.name),
+        quoted(&plain(&item.name)),
         item.address.to_string(),
         table_name(item.table).to_owned(),
         function.to_owned(),
@@ -58,10 +61,15 @@ fn row(item: &Item) -> [String; 12] {
     ]
 }
 
+/// Returns a text as a field. A spreadsheet would calculate a text that begins like a formula.
 fn quoted(text: &str) -> String {
+    let text = match text.starts_with(['=', '+', '-', '@']) {
+        true => format!("'{text}"),
+        false => text.to_owned(),
+    };
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
-        text.to_owned()
+        text
     }
 }

@@ -7,7 +7,7 @@
 use modio_description::Table;
 use serde::Serialize;
 
-use super::{Scaling, Source, host_and_port, identifier, no_ascii_over_tcp, power};
+use super::{Line, Scaling, Source, host_and_port, identifier, no_ascii_over_tcp, plain, power};
 use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
 use crate::failure::Failure;
@@ -28,7 +28,9 @@ struct File {
 struct Hub {
     name: String,
     #[serde(flatten)]
-    line: Line,
+    connection: Connection,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    message_wait_milliseconds: Option<u64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     sensors: Vec<Sensor>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -39,7 +41,7 @@ struct Hub {
 
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Line {
+enum Connection {
     Serial {
         r#type: &'static str,
         port: String,
@@ -141,47 +143,32 @@ struct Write {
     value: String,
 }
 
-/// Returns the YAML text.
-pub fn text(source: Source<'_>) -> Result<String, Failure> {
-    let unit = source.unit_name()?;
-    no_ascii_over_tcp("Home Assistant", source.endpoint)?;
-    let hub = identifier(&unit);
-    let points = || source.book.points();
-    let words = points().filter(|item| item.table == Table::Word);
-    let mut sensors: Vec<_> = words.map(|item| sensor(item, &unit, source)).collect();
-    sensors.extend(source.diagnostics().map(|item| {
-        let mut sensor = sensor(item, &unit, source);
-        sensor.scan_interval = Some(SLOWLY);
-        sensor
-    }));
-    let bits = |writable| {
-        points().filter(move |item| item.table == Table::Bit && item.writable == writable)
+/// Returns the YAML text. All units of the line are entities of one hub: Home Assistant ignores every further hub with
+/// the same port or host.
+pub fn text(line: Line<'_>) -> Result<String, Failure> {
+    no_ascii_over_tcp("Home Assistant", line.endpoint)?;
+    let title = line.title()?;
+    let mut hub = Hub {
+        name: identifier(&title),
+        connection: connection(line.endpoint)?,
+        // Home Assistant leaves 30 ms on a serial port, and nothing elsewhere.
+        message_wait_milliseconds: line
+            .silence()
+            .filter(|silence| *silence > 30 || !line.endpoint.place.is_serial()),
+        sensors: Vec::new(),
+        binary_sensors: Vec::new(),
+        switches: Vec::new(),
     };
-    let numbers: Vec<_> = points()
-        .filter(|item| item.table == Table::Word && item.writable)
-        .map(|item| number(item, &unit, &hub, source.endpoint))
-        .collect();
+    let mut numbers = Vec::new();
+    for source in line.units {
+        let unit = Unit {
+            name: &line.unit_name(source)?,
+            address: source.unit,
+        };
+        numbers.extend(entities(&mut hub, source, unit));
+    }
     let file = File {
-        modbus: [Hub {
-            name: hub,
-            line: line(source.endpoint)?,
-            sensors,
-            binary_sensors: bits(false)
-                .map(|item| BinarySensor {
-                    entity: entity(item, &unit, source),
-                    input_type: "discrete_input",
-                })
-                .collect(),
-            switches: bits(true)
-                .map(|item| Switch {
-                    entity: entity(item, &unit, source),
-                    write_type: "coil",
-                    command_on: 1,
-                    command_off: 0,
-                    verify: Verify { input_type: "coil" },
-                })
-                .collect(),
-        }],
+        modbus: [hub],
         template: if numbers.is_empty() {
             Vec::new()
         } else {
@@ -190,17 +177,56 @@ pub fn text(source: Source<'_>) -> Result<String, Failure> {
     };
     let yaml = serde_yaml_ng::to_string(&file).map_err(Failure::usage)?;
     Ok(format!(
-        "# Home Assistant configuration for {unit}, written by `modioctl export home-assistant`.\n{yaml}"
+        "# Home Assistant configuration for {title}, written by `modioctl export home-assistant`.\n{yaml}"
     ))
 }
 
-fn line(endpoint: &Endpoint) -> Result<Line, Failure> {
+/// A unit of a hub.
+#[derive(Clone, Copy)]
+struct Unit<'a> {
+    name: &'a str,
+    address: u8,
+}
+
+/// Adds the entities of a unit to its hub, and returns its numbers.
+fn entities(hub: &mut Hub, source: &Source, unit: Unit<'_>) -> Vec<Number> {
+    let points = || source.book.points();
+    let words = points().filter(|item| item.table == Table::Word);
+    hub.sensors.extend(words.map(|item| sensor(item, unit)));
+    hub.sensors.extend(source.counters().map(|item| Sensor {
+        state_class: Some("total_increasing"),
+        ..sensor(item, unit)
+    }));
+    hub.sensors.extend(source.diagnostics().map(|item| Sensor {
+        scan_interval: Some(SLOWLY),
+        ..sensor(item, unit)
+    }));
+    let bits = |writable| {
+        points().filter(move |item| item.table == Table::Bit && item.writable == writable)
+    };
+    hub.binary_sensors
+        .extend(bits(false).map(|item| BinarySensor {
+            entity: entity(item, unit),
+            input_type: "discrete_input",
+        }));
+    hub.switches.extend(bits(true).map(|item| Switch {
+        entity: entity(item, unit),
+        write_type: "coil",
+        command_on: 1,
+        command_off: 0,
+        verify: Verify { input_type: "coil" },
+    }));
+    let outputs = points().filter(|item| item.table == Table::Word && item.writable);
+    outputs.map(|item| number(item, unit, &hub.name)).collect()
+}
+
+fn connection(endpoint: &Endpoint) -> Result<Connection, Failure> {
     let network = |r#type, address: &str| {
         let (host, port) = host_and_port(address)?;
-        Ok(Line::Network { r#type, host, port })
+        Ok(Connection::Network { r#type, host, port })
     };
     match &endpoint.place {
-        Place::Serial(port) => Ok(Line::Serial {
+        Place::Serial(port) => Ok(Connection::Serial {
             r#type: "serial",
             port: port.clone(),
             baudrate: endpoint.baud,
@@ -214,22 +240,22 @@ fn line(endpoint: &Endpoint) -> Result<Line, Failure> {
     }
 }
 
-fn entity(item: &Item, unit: &str, source: Source<'_>) -> Entity {
-    let name = format!("{unit} {}", item.name);
+fn entity(item: &Item, unit: Unit<'_>) -> Entity {
+    let name = format!("{} {}", unit.name, plain(&item.name));
     Entity {
         unique_id: identifier(&name),
         name,
-        slave: source.endpoint.unit,
+        slave: unit.address,
         address: item.address,
     }
 }
 
-fn sensor(item: &Item, unit: &str, source: Source<'_>) -> Sensor {
+fn sensor(item: &Item, unit: Unit<'_>) -> Sensor {
     let scaling = Scaling::of(item);
     let shown = shown(&scaling);
     let offset = f64::from(scaling.unit.offset) * shown.factor;
     Sensor {
-        entity: entity(item, unit, source),
+        entity: entity(item, unit),
         input_type: if item.writable { "holding" } else { "input" },
         data_type: scaling.data_type(item).to_lowercase(),
         scale: (shown.exponent != 0).then_some(shown.factor),
@@ -242,7 +268,7 @@ fn sensor(item: &Item, unit: &str, source: Source<'_>) -> Sensor {
     }
 }
 
-fn number(item: &Item, unit: &str, hub: &str, endpoint: &Endpoint) -> Number {
+fn number(item: &Item, unit: Unit<'_>, hub: &str) -> Number {
     let scaling = Scaling::of(item);
     let shown = shown(&scaling);
     let offset = scaling.unit.offset;
@@ -251,13 +277,15 @@ fn number(item: &Item, unit: &str, hub: &str, endpoint: &Endpoint) -> Number {
         let steps = f64::from(steps) + f64::from(offset);
         // Division by a whole power of ten gives the nearest decimal fraction.
         if shown.exponent < 0 {
-            steps / power(-shown.exponent)
+            steps / power(shown.exponent.saturating_neg())
         } else {
             steps * shown.factor
         }
     };
-    let name = format!("{unit} {}", item.name);
-    let sensor = format!("sensor.{}", identifier(&name));
+    let Entity {
+        name, unique_id, ..
+    } = entity(item, unit);
+    let sensor = format!("sensor.{unique_id}");
     let mut value = match shown.factor {
         1.0 => "value | round | int".to_owned(),
         factor => format!("(value / {factor}) | round | int"),
@@ -271,7 +299,7 @@ fn number(item: &Item, unit: &str, hub: &str, endpoint: &Endpoint) -> Number {
     }
     let value = format!("{{{{ {value} }}}}");
     Number {
-        unique_id: format!("{}_set", identifier(&name)),
+        unique_id: format!("{unique_id}_set"),
         name: format!("{name} set"),
         state: format!("{{{{ states('{sensor}') }}}}"),
         availability: format!("{{{{ has_value('{sensor}') }}}}"),
@@ -283,7 +311,7 @@ fn number(item: &Item, unit: &str, hub: &str, endpoint: &Endpoint) -> Number {
             action: "modbus.write_register",
             data: Write {
                 hub: hub.to_owned(),
-                slave: endpoint.unit,
+                slave: unit.address,
                 address: item.address,
                 value,
             },
@@ -312,10 +340,12 @@ fn shown(scaling: &Scaling) -> Shown {
         "s" => (scaling.unit.exponent, "s", Some("duration")),
         code => (scaling.unit.exponent, unit_name(code), None),
     };
+    // Home Assistant evaluates templates in many of its texts.
+    let unit = unit.replace(['{', '}'], "_");
     Shown {
         exponent,
         factor: power(exponent),
-        unit: (!unit.is_empty()).then(|| unit.to_owned()),
+        unit: (!unit.is_empty()).then_some(unit),
         device_class,
     }
 }

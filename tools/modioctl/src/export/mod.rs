@@ -1,4 +1,7 @@
-//! Configurations of other systems for a unit with its present settings.
+//! Configurations of other systems for the units of a line with their present settings.
+//!
+//! A unit can send any text in its description. An export contains names in the form of [`plain`]; everything else is
+//! written by the serialiser of its format, so that no text becomes a part of the configuration's structure.
 
 mod csv;
 mod home_assistant;
@@ -8,42 +11,97 @@ mod telegraf;
 
 use modio_description::{Table, Unit, Value};
 
+use crate::bus::adu::Framing;
 use crate::bus::{Endpoint, Place};
 use crate::cli::ExportFormat;
 use crate::failure::Failure;
 use crate::names::{Book, Item, Meaning};
 
-/// Data of an export.
+/// Name of a line with several units, if the user gives none.
+const LINE: &str = "modio";
+
+/// The units of a line.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
-    /// The names of the unit.
-    pub book: &'a Book,
-    /// Connection to the unit.
+pub struct Line<'a> {
+    /// Name of the line, if the user gives one. It distinguishes this line from others in the same system.
+    pub name: Option<&'a str>,
+    /// Connection to the line.
     pub endpoint: &'a Endpoint,
+    /// The units.
+    pub units: &'a [Source],
+}
+
+/// A unit of an export.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Address of the unit.
+    pub unit: u8,
+    /// The names of the unit.
+    pub book: Book,
     /// Source of the unit's description.
-    pub source: &'a str,
+    pub source: String,
 }
 
 /// Returns the text of a configuration.
 ///
 /// # Errors
 ///
-/// When the unit is not a modio, or when the system cannot use the endpoint.
-pub fn text(format: ExportFormat, source: Source<'_>) -> Result<String, Failure> {
+/// When a unit is not a modio, or when the system cannot use the endpoint.
+pub fn text(format: ExportFormat, line: Line<'_>) -> Result<String, Failure> {
     match format {
-        ExportFormat::Csv => csv::text(source),
-        ExportFormat::Json => json::text(source),
-        ExportFormat::HomeAssistant => home_assistant::text(source),
-        ExportFormat::Telegraf => telegraf::text(source),
-        ExportFormat::NodeRed => node_red::text(source),
+        ExportFormat::Csv => csv::text(line),
+        ExportFormat::Json => json::text(line),
+        ExportFormat::HomeAssistant => home_assistant::text(line),
+        ExportFormat::Telegraf => telegraf::text(line),
+        ExportFormat::NodeRed => node_red::text(line),
     }
 }
 
-impl Source<'_> {
-    /// Returns a name for the unit: board and address.
-    fn unit_name(&self) -> Result<String, Failure> {
-        let about = self.book.of_modio()?;
-        Ok(format!("{} {}", about.board, self.endpoint.unit))
+impl Line<'_> {
+    /// Returns the milliseconds that a master must leave after a reply, so that no unit takes the next request for a
+    /// part of another unit's reply: the 3.5 characters of the standard (V1.02, 2.5.1.1) and up to 2 ms. Returns
+    /// `None` where frames end in another way.
+    fn silence(&self) -> Option<u64> {
+        if self.endpoint.framing != Framing::Rtu {
+            return None;
+        }
+        // A character has 11 bits. Above 19200 bit/s the standard fixes the time at 1.75 ms.
+        let micros = match u64::from(self.endpoint.baud) {
+            baud @ 1..=19_200 => 38_500_000 / baud,
+            _ => 1_750,
+        };
+        Some(micros / 1000 + 2)
+    }
+
+    /// Returns the name of the line: the name that the user gives, or else that of the only unit.
+    fn title(&self) -> Result<String, Failure> {
+        match (self.name, self.units) {
+            (Some(name), _) => Ok(plain(name)),
+            (None, [only]) => self.unit_name(only),
+            _ => Ok(LINE.to_owned()),
+        }
+    }
+
+    /// Returns a name for a unit: the name that the user gives to the line, board and address.
+    fn unit_name(&self, source: &Source) -> Result<String, Failure> {
+        let about = source.book.of_modio()?;
+        let name = format!("{} {}", plain(&about.board), source.unit);
+        Ok(match self.name {
+            Some(line) => format!("{} {name}", plain(line)),
+            None => name,
+        })
+    }
+}
+
+impl Source {
+    /// Returns the pulse counters of the inputs.
+    fn counters(&self) -> impl Iterator<Item = &Item> {
+        let is_input = |name: &str| {
+            let mut points = self.book.points();
+            points.any(|point| point.name == name && point.table == Table::Bit && !point.writable)
+        };
+        let items = self.book.items().iter();
+        items.filter(move |item| item.name.strip_suffix(".pulses").is_some_and(is_input))
     }
 
     /// Returns the registers that show whether the unit, its modules and its analog points work.
@@ -58,9 +116,15 @@ impl Source<'_> {
             .filter(move |item| match item.name.rsplit_once('.') {
                 None => matches!(item.name.as_str(), "status" | "uptime"),
                 Some((point, "channel_status")) => analog(point),
-                Some((_, name)) => name == "module_state",
+                Some((port, name)) => name == "module_state" && is_port(port),
             })
     }
+}
+
+/// Returns whether a name is that of a port, such as `p5`.
+fn is_port(name: &str) -> bool {
+    let number = name.strip_prefix('p');
+    number.is_some_and(|number| number.parse::<u8>().is_ok())
 }
 
 /// Conversion of a register's number to a quantity: `(number + offset) * 10^exponent`.
@@ -114,16 +178,24 @@ fn power(exponent: i8) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(1.0)
 }
 
-/// Returns a name with only letters, digits and underscores, in lower case.
+/// Returns whether a name may contain a character.
+#[must_use]
+pub const fn is_plain(c: char) -> bool {
+    c.is_ascii_alphanumeric() || matches!(c, ' ' | '.' | '_' | '-')
+}
+
+/// Returns a name with `_` for every character that may have a meaning in a configuration, such as `{` and `$`.
+fn plain(name: &str) -> String {
+    let plain = |c| if is_plain(c) { c } else { '_' };
+    name.chars().map(plain).collect()
+}
+
+/// Returns a name with only letters, digits and single underscores between them, in lower case. Home Assistant forms
+/// the ids of its entities in the same way.
 fn identifier(name: &str) -> String {
-    let character = |c: char| {
-        if c.is_ascii_alphanumeric() {
-            c.to_ascii_lowercase()
-        } else {
-            '_'
-        }
-    };
-    name.chars().map(character).collect()
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<_> = words.filter(|word| !word.is_empty()).collect();
+    words.join("_").to_ascii_lowercase()
 }
 
 /// Returns host and port of a network address.
@@ -145,7 +217,7 @@ fn host_and_port(address: &str) -> Result<(String, u16), Failure> {
 
 /// Returns an error for ASCII frames over TCP, which a system cannot use.
 fn no_ascii_over_tcp(system: &str, endpoint: &Endpoint) -> Result<(), Failure> {
-    let ascii = endpoint.framing == crate::bus::adu::Framing::Ascii;
+    let ascii = endpoint.framing == Framing::Ascii;
     if ascii && matches!(endpoint.place, Place::Tcp(_)) {
         return Err(Failure::usage(format!(
             "{system} has no Modbus ASCII over TCP: use --port with a serial port, or leave out --mode ascii"

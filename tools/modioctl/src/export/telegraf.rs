@@ -1,15 +1,21 @@
-//! An input for Telegraf, in the configuration style "metric" (Telegraf 1.28 and later).
+//! Inputs for Telegraf, in the configuration style "metric" (Telegraf 1.28 and later).
+//!
+//! Telegraf runs all its inputs at the same time, and an input has the line for itself. All units of a line are
+//! therefore one input. Telegraf discards all values of a unit in a round when the unit refuses one request (its
+//! `modbus.go`, `gatherFields`). A unit refuses to read an input whose module does not answer. Modbus TCP allows
+//! several connections, so that there the inputs of the units are a second input of Telegraf.
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 use modio_description::Table;
 
-use super::{Scaling, Source, identifier};
+use super::{Line, Scaling, Source, identifier, plain};
 use crate::bus::Place;
 use crate::bus::adu::Framing;
 use crate::failure::Failure;
-use crate::names::Item;
+use crate::names::{Item, Meaning};
 
 #[derive(Serialize)]
 struct File {
@@ -18,7 +24,7 @@ struct File {
 
 #[derive(Serialize)]
 struct Inputs {
-    modbus: [Modbus; 1],
+    modbus: Vec<Modbus>,
 }
 
 #[derive(Serialize)]
@@ -37,7 +43,14 @@ struct Modbus {
     stop_bits: Option<u8>,
     transmission_mode: &'static str,
     configuration_type: &'static str,
-    metric: [Metric; 1],
+    metric: Vec<Metric>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    workarounds: Option<Workarounds>,
+}
+
+#[derive(Serialize)]
+struct Workarounds {
+    pause_between_requests: String,
 }
 
 #[derive(Serialize)]
@@ -62,11 +75,40 @@ struct Field {
     output: Option<&'static str>,
 }
 
-/// Returns the configuration of the input.
-pub fn text(source: Source<'_>) -> Result<String, Failure> {
-    let name = source.unit_name()?;
-    let about = source.book.of_modio()?;
-    let endpoint = source.endpoint;
+/// Returns the configuration of the inputs.
+pub fn text(line: Line<'_>) -> Result<String, Failure> {
+    let name = line.title()?;
+    let is_input = |item: &Item| is_point(item) && !item.writable;
+    let modbus = match &line.endpoint.place {
+        Place::ModbusTcp(_) => vec![
+            modbus(line, &name, |item| !is_input(item))?,
+            modbus(line, &name, is_input)?,
+        ],
+        _ => vec![modbus(line, &name, |_| true)?],
+    };
+    let modbus = modbus.into_iter().filter(|input| !input.metric.is_empty());
+    let file = File {
+        inputs: Inputs {
+            modbus: modbus.collect(),
+        },
+    };
+    let toml = toml::to_string(&file).map_err(Failure::usage)?;
+    Ok(format!(
+        "# Telegraf input for {name}, written by `modioctl export telegraf`.\n\n{toml}"
+    ))
+}
+
+fn is_point(item: &Item) -> bool {
+    matches!(item.meaning, Meaning::Bit | Meaning::Analog(_))
+}
+
+/// Returns an input with the items of all units that `is_wanted` selects.
+fn modbus(
+    line: Line<'_>,
+    name: &str,
+    is_wanted: impl Fn(&Item) -> bool,
+) -> Result<Modbus, Failure> {
+    let endpoint = line.endpoint;
     let serial = endpoint.place.is_serial();
     let ascii = endpoint.framing == Framing::Ascii;
     let (controller, transmission_mode) = match (&endpoint.place, ascii) {
@@ -75,8 +117,12 @@ pub fn text(source: Source<'_>) -> Result<String, Failure> {
         (Place::Tcp(address), true) => (format!("tcp://{address}"), "ASCIIoverTCP"),
         (Place::ModbusTcp(address), _) => (format!("tcp://{address}"), "TCP"),
     };
-    let modbus = Modbus {
-        name: name.clone(),
+    let metrics = line.units.iter().map(|unit| metric(unit, &is_wanted));
+    let mut metrics = metrics.collect::<Result<Vec<_>, _>>()?;
+    // Telegraf refuses a metric without fields.
+    metrics.retain(|metric| !metric.fields.is_empty());
+    Ok(Modbus {
+        name: name.to_owned(),
         timeout: format!("{}ms", endpoint.timeout.as_millis()),
         busy_retries: endpoint.retries,
         controller,
@@ -86,37 +132,39 @@ pub fn text(source: Source<'_>) -> Result<String, Failure> {
         stop_bits: serial.then_some(endpoint.format.stop_bits),
         transmission_mode,
         configuration_type: "metric",
-        metric: [Metric {
-            slave_id: endpoint.unit,
-            byte_order: "ABCD",
-            measurement: "modio",
-            fields: source
-                .book
-                .points()
-                .chain(source.diagnostics())
-                .map(field)
-                .collect(),
-            tags: BTreeMap::from([
-                ("board", about.board.clone()),
-                ("unit", endpoint.unit.to_string()),
-            ]),
-        }],
-    };
-    let file = File {
-        inputs: Inputs { modbus: [modbus] },
-    };
-    let toml = toml::to_string(&file).map_err(Failure::usage)?;
-    Ok(format!(
-        "# Telegraf input for {name}, written by `modioctl export telegraf`.\n\n{toml}"
-    ))
+        metric: metrics,
+        workarounds: line.silence().map(|silence| Workarounds {
+            pause_between_requests: format!("{silence}ms"),
+        }),
+    })
 }
 
-/// Returns a serial port in Telegraf's form: a URL for a path, the name for a port of Windows.
+fn metric(source: &Source, is_wanted: impl Fn(&Item) -> bool) -> Result<Metric, Failure> {
+    let items = source.book.points().chain(source.counters());
+    let items = items.chain(source.diagnostics());
+    Ok(Metric {
+        slave_id: source.unit,
+        byte_order: "ABCD",
+        measurement: "modio",
+        fields: items.filter(|item| is_wanted(item)).map(field).collect(),
+        tags: BTreeMap::from([
+            ("board", plain(&source.book.of_modio()?.board)),
+            ("unit", source.unit.to_string()),
+        ]),
+    })
+}
+
+/// Returns a serial port in Telegraf's form: a URL for a path, the name for a port of Windows. Windows finds the ports
+/// from COM10 on by the name of their device only.
 fn serial_port(port: &str) -> String {
-    if port.starts_with('/') {
-        format!("file://{port}")
-    } else {
-        port.to_owned()
+    let number = port
+        .get(..3)
+        .filter(|front| front.eq_ignore_ascii_case("COM"))
+        .and_then(|_| port[3..].parse::<u32>().ok());
+    match number {
+        Some(10..) => format!(r"\\.\{port}"),
+        _ if port.starts_with('/') => format!("file://{port}"),
+        _ => port.to_owned(),
     }
 }
 
@@ -124,7 +172,7 @@ fn serial_port(port: &str) -> String {
 /// offset is exported as a plain number, without a unit.
 fn field(item: &Item) -> Field {
     let scaling = Scaling::of(item);
-    let name = item.name.replace(['.', ' '], "_");
+    let name = plain(&item.name).replace(['.', ' '], "_");
     let plain = scaling.unit.offset != 0 || scaling.unit.code.is_empty();
     let name = if plain {
         name

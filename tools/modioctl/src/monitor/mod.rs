@@ -53,7 +53,12 @@ const FRAME: Duration = Duration::from_millis(100);
 /// # Errors
 ///
 /// When there is no terminal, or no modio at the start. A unit that is lost later is shown as lost.
-pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<(), Failure> {
+pub async fn run(
+    endpoint: Endpoint,
+    options: &Monitor,
+    traced: bool,
+    refresh: bool,
+) -> Result<(), Failure> {
     if !stdout().is_terminal() {
         return Err(Failure::usage(
             "monitor needs a terminal; `modioctl watch` prints values into files and pipes",
@@ -84,6 +89,7 @@ pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<
         })
     };
     let mut device = Device::open(endpoint.clone(), Some(observers())).await?;
+    device.refresh = refresh;
     if let Some(failure) = first(&mut device).await? {
         let _ = updates.send(Update::Lost(failure));
     }
@@ -154,11 +160,13 @@ pub async fn run(endpoint: Endpoint, options: &Monitor, traced: bool) -> Result<
 /// Checks that the unit is a modio before the display begins. A single lost frame does not end the program: the
 /// failure is returned.
 async fn first(device: &mut Device) -> Result<Option<Failure>, Failure> {
-    let (learned, failure) = match fetch(device, false).await {
-        Err(failure) if failure.may_pass() => (fetch(device, false).await?, Some(failure)),
+    let (learned, failure) = match fetch(device).await {
+        Err(failure) if failure.may_pass() => (fetch(device).await?, Some(failure)),
         result => (result?, None),
     };
     learned.book.of_modio()?;
+    // The poller learns the same again, from the stored description.
+    device.refresh = false;
     Ok(failure)
 }
 

@@ -120,7 +120,7 @@ impl Poller {
             return Ok(Duration::ZERO);
         };
         let Some(plan) = &self.plan else {
-            let book = fetch(device, false).await?.book;
+            let book = fetch(device).await?.book;
             book.of_modio()?;
             self.answered = Instant::now();
             self.plan = Some(Plan::new(&book));

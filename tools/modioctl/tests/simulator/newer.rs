@@ -36,11 +36,12 @@ fn description() -> Description {
     description
 }
 
-/// Serves the unit's registers and its file over TCP.
-fn unit() -> SocketAddr {
+/// Serves the registers of a unit with this description, its file and this identity over TCP, at every address but
+/// [`MISSING`].
+fn unit(description: &Description, identity: u16) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
-    let file = description().file();
+    let file = description.file();
     let words = file
         .as_chunks::<2>()
         .0
@@ -56,8 +57,9 @@ fn unit() -> SocketAddr {
         (0x0204, 1),
         (0x0205, 99),
     ]);
+    registers.extend((0x0220..0x0226).map(|address| (address, identity)));
     registers.extend([
-        (0x020F, checksum(&description().encode())),
+        (0x020F, checksum(&description.encode())),
         (0x0500, 1234),
         (0x0010, 7),
     ]);
@@ -66,6 +68,9 @@ fn unit() -> SocketAddr {
             let mut bytes = [0; 512];
             while let Ok(count @ 1..) = master.read(&mut bytes) {
                 let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
+                if unit == MISSING {
+                    continue;
+                }
                 let answer = answer(&pdu, &registers, &words);
                 master
                     .write_all(&Framing::Rtu.frame(0, unit, &answer))
@@ -75,6 +80,9 @@ fn unit() -> SocketAddr {
     });
     address
 }
+
+/// Address without a unit.
+const MISSING: u8 = 9;
 
 fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
     let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
@@ -109,7 +117,7 @@ fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
 
 #[test]
 fn a_newer_unit_is_read_by_its_own_description() {
-    let at = At::tcp(unit());
+    let at = At::tcp(unit(&description(), 1));
     let first = at.run("read PRESSURE_LIMIT p5.1");
     assert!(
         first.err.contains("reading the unit's description"),
@@ -128,4 +136,65 @@ fn a_newer_unit_is_read_by_its_own_description() {
     );
     let text = at.run("read PRESURE_LIMIT").failed(2);
     assert!(text.contains("PRESSURE_LIMIT"), "{text}");
+}
+
+#[test]
+fn refresh_reads_the_description_again_with_every_command() {
+    let at = At::tcp(unit(&description(), 1));
+    for (words, is_read) in [
+        ("read PRESSURE_LIMIT", true),
+        ("read PRESSURE_LIMIT", false),
+        ("read --refresh PRESSURE_LIMIT", true),
+        ("--refresh export csv", true),
+        ("describe --refresh", true),
+    ] {
+        let ran = at.run(words);
+        assert_eq!(ran.err.contains("reading"), is_read, "{words}: {ran:?}");
+        ran.fine();
+    }
+}
+
+#[test]
+fn a_description_that_cannot_be_used_is_not_stored() {
+    let mut hostile = description();
+    // 65535 items, each with a copy of this text, were 3.9 GB.
+    let mut last = hostile.registers.pop().unwrap();
+    (last.count, last.about) = (0xFFFF, "x".repeat(50_000));
+    hostile.registers.push(last);
+    let at = At::tcp(unit(&hostile, 1));
+    for _ in 0..2 {
+        let ran = at.run("read BAUD");
+        assert!(ran.err.contains("reading"), "{ran:?}");
+        assert_eq!(ran.status, 1);
+        assert!(ran.err.contains("a text of 50000 bytes"), "{ran:?}");
+    }
+    assert_eq!(at.stored(), 0);
+}
+
+#[test]
+fn a_stored_description_is_not_that_of_another_unit() {
+    let at = At::tcp(unit(&description(), 1));
+    at.run("describe").fine();
+    // The same registers and the same CRC, but another identity.
+    let other = at.elsewhere(unit(&description(), 2));
+    let ran = other.run("describe");
+    assert!(ran.err.contains("reading"), "{ran:?}");
+    let again = at.run("describe");
+    assert!(again.err.is_empty(), "{again:?}");
+    assert_eq!(at.stored(), 2);
+}
+
+#[test]
+fn an_export_of_several_units_needs_all_of_them() {
+    let at = At::tcp(unit(&description(), 1));
+    let rows = at.run("export --units 1-2 csv").fine();
+    let of = |unit: &str| rows.lines().filter(|row| row.ends_with(unit)).count();
+    assert!(of(",1") > 50 && of(",1") == of(",2"), "{rows}");
+    let error = at
+        .run("--timeout 50ms --retries 0 export --units 1,9 csv")
+        .failed(3);
+    assert!(
+        error.contains("without unit 9") && error.contains("--units"),
+        "{error}"
+    );
 }

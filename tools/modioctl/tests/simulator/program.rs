@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Output, Stdio};
+use std::rc::Rc;
 use std::sync::mpsc::{Receiver, channel};
 
 /// Result of a run of the program.
@@ -61,7 +62,7 @@ pub fn modioctl(endpoint: &[&str]) -> Command {
 }
 
 /// The endpoint of a unit, for runs of the program that share a cache.
-pub struct At(Vec<String>, tempfile::TempDir);
+pub struct At(Vec<String>, Rc<tempfile::TempDir>);
 
 impl At {
     pub fn port(path: impl Display) -> Self {
@@ -79,8 +80,22 @@ impl At {
     fn new(option: &str, place: impl Display) -> Self {
         Self(
             vec![option.to_owned(), place.to_string()],
-            tempfile::tempdir().unwrap(),
+            Rc::new(tempfile::tempdir().unwrap()),
         )
+    }
+
+    /// Returns another TCP endpoint that shares the cache.
+    pub fn elsewhere(&self, address: impl Display) -> Self {
+        Self(
+            vec!["--tcp".to_owned(), address.to_string()],
+            Rc::clone(&self.1),
+        )
+    }
+
+    /// Returns the number of files in the cache.
+    pub fn stored(&self) -> usize {
+        let cache = std::fs::read_dir(self.1.path().join("modio"));
+        cache.map_or(0, Iterator::count)
     }
 
     /// Returns the program with the words of this command.
