@@ -375,6 +375,15 @@ mod tests {
     }
 
     #[test]
+    fn a_line_has_a_name_that_every_system_takes() {
+        assert_eq!(line_name("Hall 2"), Ok("Hall 2".to_owned()));
+        let long = "x".repeat(65);
+        for wrong in ["", " ", "-", "{{ x }}", "a\nb", "$HOME", "Größe", &long] {
+            assert!(line_name(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
     fn lists_of_units_are_parsed() {
         assert_eq!(units("3,1-2,2"), Ok(Units(vec![1, 2, 3])));
         for wrong in ["", "0", "248", "5-3", "1-", "x"] {

@@ -1,4 +1,4 @@
-//! Runs the functions of the Node-RED export with node, which is also what runs them in Node-RED.
+//! Runs the functions of the Node-RED export with node, in which Node-RED runs them, too.
 //!
 //! Without node these tests fail. `cargo test` leaves them out, and `cargo xtask test modioctl` runs them.
 
