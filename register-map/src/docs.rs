@@ -241,8 +241,9 @@ fn write_points(out: &mut impl Write) -> Result {
     }
     out.write_str(
         "\nThe bits of 2relay: 1 and 2 are the mode jumpers of relays 1 and 2 (1 = manual), 3 and 4 their coils. \
-         An output reads back\nwhat was commanded. RANGE and SCALE of a point say what its word means. Values below 0 are \
-         in two's complement. A write of\nanother value to an output is exception 03.\n\n",
+         An output reads back\nwhat was commanded, also while its module does not answer. RANGE and SCALE of a point say \
+         what its word means. Values\nbelow 0 are in two's complement. A write of another value to an output is exception \
+         03.\n\n",
     )?;
     write_readings(out)?;
     out.write_str("\n")?;
