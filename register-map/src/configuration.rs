@@ -57,8 +57,8 @@ block! {
     COMM_TIMEOUT "COMM_TIMEOUT": 0x0104 x 1, Value::tens("s", -1), Rule::now(Values::up_to(36_000), 0);
     /// Pause before a response, beyond t3.5
     RESPONSE_DELAY "RESPONSE_DELAY": 0x0105 x 1, Value::number("ms"), Rule::now(Values::up_to(1000), 0);
-    /// Silence that ends a frame; 0 = t3.5 by the standard
-    FRAME_GAP "FRAME_GAP": 0x0106 x 1, Value::tens("ms", -1), Rule::restart(Values::range(5, 1000).or(0), 0);
+    /// Silence that ends a frame, at least 1.5 characters; 0 = t3.5 by the standard
+    FRAME_GAP "FRAME_GAP": 0x0106 x 1, Value::tens("ms", -1), Rule::restart(Values::range(2, 1000).or(0), 0);
     /// Frames with a gap above t1.5
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
     /// Runs after the response. Reads 0
