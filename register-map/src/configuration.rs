@@ -3,7 +3,7 @@
 use crate::Module;
 use crate::block::block;
 use crate::codes;
-use crate::codes::{AirRate, Baud, Command, Format, GapRule, Mode, Power, Switch as OnOff};
+use crate::codes::{AirRate, Baud, Command, Format, GapRule, Lora, Mode, Power};
 use crate::points::Kind::{BitOutput, WordInput, WordOutput};
 use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
@@ -67,8 +67,8 @@ block! {
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
     /// Digital input: debounce. Analog input: low-pass over 2^n samples
     FILTER "FILTER": 0x0120 x 32, Value::number("ms") => Value::NUMBER, FILTER_RULE;
-    /// The LoRa line
-    LORA "LORA": 0x0140 x 1, Value::Codes(OnOff::NAMES), Rule::restart(Values::up_to(1), 0);
+    /// The LoRa line, which never takes settings by broadcast; 2 is recommended
+    LORA "LORA": 0x0140 x 1, Value::Codes(Lora::NAMES), Rule::restart(Values::up_to(2), 0);
     /// Address of the LoRa module
     LORA_ADDRESS "LORA_ADDRESS": 0x0141 x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
     /// Channel of the LoRa module

@@ -88,6 +88,7 @@ pub fn up(
         loaded.settings,
         loaded.invalid || loaded.rejected > 0,
     );
+    let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
     let settings = start_up::line(address, config.line());
@@ -187,6 +188,7 @@ pub fn up(
             identity.unit,
             (framing, t35.div_ceil(1_000_000)),
             radio_gap_ms.into(),
+            points_only,
         ),
         device,
         scanning,

@@ -3,6 +3,7 @@
 extern crate std;
 
 mod module;
+mod origin;
 
 use std::vec::Vec;
 
