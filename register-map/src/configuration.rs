@@ -15,6 +15,12 @@ pub const OPENING_KEY: u16 = 0x5A17;
 /// Time for which the lock stays open after the last configuration write, in seconds.
 pub const OPEN_S: u32 = 60;
 
+/// Number of saves that a unit may write to its flash one after another.
+pub const SAVES: u8 = 20;
+
+/// Time after which a unit may write one more save, in seconds.
+pub const SAVE_EVERY_S: u32 = 60;
+
 /// Value of SAFE that leaves an output unchanged.
 pub const HOLD: u16 = 0xFFFF;
 

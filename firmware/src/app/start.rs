@@ -83,11 +83,14 @@ pub fn up(
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
     let radio_config = RadioConfig::of(&loaded.settings);
-    let config = Config::new(
+    let mut config = Config::new(
         BOARD,
         loaded.settings,
         loaded.invalid || loaded.rejected > 0,
     );
+    if let Some(left) = board.saves_left {
+        config.set_saves_left(left);
+    }
     let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);

@@ -20,6 +20,7 @@
 mod in_force;
 mod lock;
 mod origin;
+mod saves;
 mod settings;
 
 #[cfg(test)]
@@ -30,7 +31,7 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{Command, Lora};
 use register_map::configuration::{
-    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES,
+    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES, SAVES,
 };
 use register_map::points::{self, CHANNELS};
 use register_map::state::status;
@@ -39,6 +40,7 @@ use register_map::{Board, Run, runs};
 pub use in_force::{LineConfig, Point, PortConfig, RadioConfig};
 use lock::Lock;
 pub use origin::{LineName, Origin};
+use saves::Saves;
 pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, takes_module};
@@ -54,6 +56,9 @@ pub struct Config<const SLOTS: usize> {
     differences: u16,
     /// A save was ordered and is not complete.
     saving: bool,
+    /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
+    unstored: bool,
+    saves: Saves,
     lock: Lock,
     /// Origin of the request that is being served.
     origin: Origin,
@@ -95,6 +100,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
             saved: stored,
             differences: 0,
             saving: false,
+            unstored: invalid,
+            saves: Saves::new(SAVES),
             lock: Lock::closed(),
             origin: Origin::default(),
             points_only,
@@ -163,7 +170,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// The first that applies: 02 for a gap; 03 for a value that is not allowed, including a setting by point that
     /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 for a broadcast over
     /// the air or a line that may not write here, when the lock is closed for the line and the request does not write
-    /// KEY alone, or when a save is ordered before the previous one is complete.
+    /// KEY alone, or when a save is ordered before the previous one is complete or with nothing left of the budget.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         let runs = runs(RULES, span.start(), span.count());
         let runs = runs.ok_or(Exception::IllegalDataAddress)?;
@@ -181,11 +188,29 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.check_line()?;
         let aired = self.origin.broadcast && self.origin.line == LineName::Radio;
         let order = words.get(COMMAND.wrapping_sub(span.start()));
-        let cannot_save = self.saving && order == Some(Command::Save.code());
+        let cannot_save =
+            order == Some(Command::Save.code()) && (self.saving || !self.can_pay(span, words));
         if aired || cannot_save || !(self.is_unlocked() || span == Span::single(KEY)) {
             return Err(Exception::ServerDeviceBusy);
         }
         Ok(())
+    }
+
+    /// Returns whether a save is possible after a write of these values: there is one left, or the save would write
+    /// nothing to the flash.
+    fn can_pay(&self, span: Span, words: Words<'_>) -> bool {
+        if self.saves.left() > 0 {
+            return true;
+        }
+        let written = span.addresses().zip(words.iter());
+        let settings = written.filter(|(address, _)| ![KEY, COMMAND].contains(address));
+        let differences = settings.fold(self.differences, |differences, (address, value)| {
+            let saved = self.saved.get(address);
+            differences
+                .wrapping_sub(u16::from(self.edited.get(address) != saved))
+                .wrapping_add(u16::from(value != saved))
+        });
+        differences == 0 && !self.unstored
     }
 
     /// Returns whether values for points are allowed by the modules of their ports, and values for MODULE by the
@@ -316,6 +341,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// [`Settings::needs_restart`].
     pub const fn end_save(&mut self, changed: bool) {
         self.saving = false;
+        self.unstored = false;
         self.waiting = self.left != 0 || changed;
     }
 
@@ -326,15 +352,35 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.saving = false;
     }
 
+    /// Takes one save from the budget, before the first operation on the flash. Returns false when none is left: the
+    /// other line has changed a setting since the order was checked. Then the save must not be written.
+    #[must_use]
+    pub const fn take_save(&mut self) -> bool {
+        self.saves.take()
+    }
+
+    /// Returns the number of saves in the budget, to be kept over a reset.
+    #[must_use]
+    pub const fn saves_left(&self) -> u8 {
+        self.saves.left()
+    }
+
+    /// Sets the number of saves in the budget to the number that was kept over the reset.
+    pub const fn set_saves_left(&mut self, left: u8) {
+        self.saves = Saves::new(left);
+    }
+
     /// Returns whether a save was ordered and is not complete.
     #[must_use]
     pub const fn is_saving(&self) -> bool {
         self.saving
     }
 
-    /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write.
+    /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write, and the budget gets one
+    /// save a minute.
     pub fn tick(&mut self, ms: u32) {
         self.lock.tick(ms);
+        self.saves.tick(ms);
     }
 
     /// Returns bits 1, 3, 4 and 5 of the status register, which the configuration defines. Bit 5 is that of the

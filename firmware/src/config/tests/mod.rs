@@ -4,6 +4,7 @@ extern crate std;
 
 mod module;
 mod origin;
+mod saves;
 
 use std::vec::Vec;
 

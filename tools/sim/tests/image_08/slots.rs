@@ -162,6 +162,7 @@ fn saved_modules_are_in_force_after_the_restart() {
     for n in 0..150 {
         bench.configure(0x0120, &[n]);
         bench.save();
+        bench.power_cycle_for_saves(n);
     }
     bench.power_cycle();
     assert_eq!(bench.registers(IN_FORCE, 4), Ok(vec![2, 4, 5, 3]));
