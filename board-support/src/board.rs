@@ -39,6 +39,8 @@ pub struct Board {
     pub faults: FaultRecord,
     /// SW01 as a number from 0 to 255, as read at power-on.
     pub dip: u8,
+    /// Number of saves that were left before the reset. `None` after power-on, or when no valid number was kept.
+    pub saves_left: Option<u8>,
     /// The chip's unique identity, half-words in the order of their addresses (RM0008 30.2).
     pub unique_id: [u16; 6],
     /// The slots, in the order of their ports.
@@ -141,6 +143,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         reset_cause,
         faults,
         dip,
+        saves_left: fault::kept_saves().filter(|_| reset_cause & POWER_ON == 0),
         unique_id: unique_id::read(),
         slots: array::from_fn(|index| Slot::new(&BOARD.slots[index])),
         sampler: Sampler::new(device.ADC1),

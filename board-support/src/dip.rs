@@ -36,23 +36,6 @@ pub(crate) fn stable(mut read: impl FnMut() -> u8, mut wait: impl FnMut()) -> u8
     value
 }
 
-/// Distinguishes a kept switch from what RAM holds after power-on.
-const MAGIC: u32 = 0xD1B5_0000;
-
-/// Returns the switch as a word to keep: the value, its complement and a magic number.
-pub(crate) const fn to_word(dip: u8) -> u32 {
-    MAGIC | (!dip as u32) << 8 | dip as u32
-}
-
-/// Returns the switch from a kept word, or `None` when the word is not valid.
-pub(crate) const fn from_word(word: u32) -> Option<u8> {
-    if to_word(word as u8) == word {
-        Some(word as u8)
-    } else {
-        None
-    }
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -96,20 +79,6 @@ mod tests {
         let (value, taken) = read(&bounces);
         assert_eq!(taken, 1 + DIP_POLLS as usize);
         assert_eq!(value, bounces[taken - 1]);
-    }
-
-    #[test]
-    fn kept_word_returns_its_switch_and_any_flipped_bit_is_detected() {
-        for dip in 0..=255 {
-            let word = to_word(dip);
-            assert_eq!(from_word(word), Some(dip));
-            for bit in 0..32 {
-                assert_eq!(from_word(word ^ 1 << bit), None, "{dip}, bit {bit}");
-            }
-        }
-        for noise in [0, u32::MAX, 0xA5A5_A5A5] {
-            assert_eq!(from_word(noise), None);
-        }
     }
 
     #[test]

@@ -77,6 +77,18 @@ impl Diagnostic {
         }
     }
 
+    /// Returns whether the sub-function changes nothing.
+    pub(crate) const fn only_reads(self) -> bool {
+        match self {
+            Self::Echo | Self::Register | Self::Counter(_) => true,
+            Self::Restart { .. }
+            | Self::Delimiter(_)
+            | Self::ListenOnly
+            | Self::Clear
+            | Self::ClearOverruns => false,
+        }
+    }
+
     /// Returns whether the bytes after function code 08 restart communication.
     pub(crate) const fn is_restart(fields: &[u8]) -> bool {
         matches!(fields, [0x00, RESTART, 0x00 | 0xFF, 0x00])

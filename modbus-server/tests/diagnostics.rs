@@ -343,3 +343,23 @@ fn the_server_reports_its_identity_and_run_indicator() {
     assert_eq!((reply.len(), reply[1]), (253, 251));
     assert_eq!(reply[250..], [0x00, b'm', b'o']);
 }
+
+#[test]
+fn read_only_diagnostics_refuse_every_sub_function_that_changes_something() {
+    let mut unit = unit();
+    unit.server = unit.server.with_read_only_diagnostics();
+    unit.request(&pdu(0x03, &[200, 1])).expect("an exception");
+    for sub in
+        (0x00..=0x14).filter(|sub| ![0x00, 0x02].contains(sub) && !(0x0B..=0x12).contains(sub))
+    {
+        let known = [0x01, 0x04, 0x0A, 0x14].contains(&sub);
+        let expected = if known { 6 } else { 1 };
+        assert_eq!(unit.refused(&diagnose(sub, 0)), expected, "{sub:02X}");
+    }
+    assert_eq!(unit.refused(&diagnose(0x01, 0xFF00)), 6);
+    assert_eq!(unit.refused(&diagnose(0x0A, 1)), 3, "the value comes first");
+    for sub in [0x00, 0x02].into_iter().chain(0x0B..=0x12) {
+        value(&mut unit, sub);
+    }
+    assert!(value(&mut unit, 0x0D) > 0, "the counters were not cleared");
+}

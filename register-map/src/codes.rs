@@ -160,10 +160,11 @@ codes! {
 }
 
 codes! {
-    /// LORA and other switches.
-    Switch {
+    /// LORA: what the radio serves.
+    Lora {
         Off = 0 "off",
-        On = 1 "on",
+        WithSettings = 1 "on with settings",
+        PointsOnly = 2 "on for points and reads only",
     }
 }
 

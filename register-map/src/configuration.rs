@@ -3,7 +3,7 @@
 use crate::Module;
 use crate::block::block;
 use crate::codes;
-use crate::codes::{AirRate, Baud, Command, Format, GapRule, Mode, Power, Switch as OnOff};
+use crate::codes::{AirRate, Baud, Command, Format, GapRule, Lora, Mode, Power};
 use crate::points::Kind::{BitOutput, WordInput, WordOutput};
 use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
@@ -14,6 +14,12 @@ pub const OPENING_KEY: u16 = 0x5A17;
 
 /// Time for which the lock stays open after the last configuration write, in seconds.
 pub const OPEN_S: u32 = 60;
+
+/// Number of saves that a unit may write to its flash one after another.
+pub const SAVES: u8 = 20;
+
+/// Time after which a unit may write one more save, in seconds.
+pub const SAVE_EVERY_S: u32 = 60;
 
 /// Value of SAFE that leaves an output unchanged.
 pub const HOLD: u16 = 0xFFFF;
@@ -57,8 +63,8 @@ block! {
     COMM_TIMEOUT "COMM_TIMEOUT": 0x0104 x 1, Value::tens("s", -1), Rule::now(Values::up_to(36_000), 0);
     /// Pause before a response, beyond t3.5
     RESPONSE_DELAY "RESPONSE_DELAY": 0x0105 x 1, Value::number("ms"), Rule::now(Values::up_to(1000), 0);
-    /// Silence that ends a frame; 0 = t3.5 by the standard
-    FRAME_GAP "FRAME_GAP": 0x0106 x 1, Value::tens("ms", -1), Rule::restart(Values::range(5, 1000).or(0), 0);
+    /// Silence that ends a frame, at least 1.5 characters; 0 = t3.5 by the standard
+    FRAME_GAP "FRAME_GAP": 0x0106 x 1, Value::tens("ms", -1), Rule::restart(Values::range(2, 1000).or(0), 0);
     /// Frames with a gap above t1.5
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
     /// Runs after the response. Reads 0
@@ -67,8 +73,8 @@ block! {
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
     /// Digital input: debounce. Analog input: low-pass over 2^n samples
     FILTER "FILTER": 0x0120 x 32, Value::number("ms") => Value::NUMBER, FILTER_RULE;
-    /// The LoRa line
-    LORA "LORA": 0x0140 x 1, Value::Codes(OnOff::NAMES), Rule::restart(Values::up_to(1), 0);
+    /// The LoRa line, which never takes settings by broadcast; 2 is recommended
+    LORA "LORA": 0x0140 x 1, Value::Codes(Lora::NAMES), Rule::restart(Values::up_to(2), 0);
     /// Address of the LoRa module
     LORA_ADDRESS "LORA_ADDRESS": 0x0141 x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
     /// Channel of the LoRa module

@@ -26,7 +26,7 @@ front: 0x0010 is then 17, 00017 or 10017 as a bit, and 40017 or 30017 as a word.
 - A write to several registers is checked completely, and then done completely or not at all.
 - The first failing check decides the exception: function (01), then quantity, byte count and form of the value (03),
   then the address (02), then the value (03), then the state (04: a module does not answer, 06: the configuration is
-  locked or its store is busy).
+  locked, its store is busy, there were too many saves, or the radio does not serve this).
 - A value of two registers has its high word first. A request that reads both registers gets one consistent value.
 ";
 
@@ -39,7 +39,14 @@ const CONFIGURATION_NOTES: &str = "
 - The response to COMMAND is sent before the command is executed. While a save runs, another save is exception 06 and a
   restart waits for the save. A change that is made during a save is not part of it. Status bit 3 clears when the save is
   complete. A save of values that are already stored writes nothing to the flash.
-- The lock closes 60 s after the last configuration write.
+- The lock closes 60 s after the last configuration write. It belongs to the line that opened it: writes over the other
+  line are exception 06, and KEY and status bit 5 read 1 over the owner's line only. KEY over the other line takes the
+  lock.
+- Twenty saves are possible one after another, and then one a minute; between them a save is exception 06. A save that
+  writes nothing is always possible and does not count. The number of saves left survives every reset but a power-on.
+- A broadcast over the air writes nothing here: it is exception 06, which is not sent. With LORA 2 no write over the air
+  is accepted here at all, and neither the clearing of pulse counters nor function 08 except 00, 02 and 0B-12.
+- FRAME_GAP counts as 1.5 characters when it is shorter than that at the rate in force.
 - Identify (6): all LEDs blink together for 10 s, and then show the state of the device again. Another identify starts
   the 10 s again.
 - Load defaults (3) and drop (4) change the settings as writes do: save to make them permanent.
@@ -241,8 +248,9 @@ fn write_points(out: &mut impl Write) -> Result {
     }
     out.write_str(
         "\nThe bits of 2relay: 1 and 2 are the mode jumpers of relays 1 and 2 (1 = manual), 3 and 4 their coils. \
-         An output reads back\nwhat was commanded. RANGE and SCALE of a point say what its word means. Values below 0 are \
-         in two's complement. A write of\nanother value to an output is exception 03.\n\n",
+         An output reads back\nwhat was commanded, also while its module does not answer. RANGE and SCALE of a point say \
+         what its word means. Values\nbelow 0 are in two's complement. A write of another value to an output is exception \
+         03.\n\n",
     )?;
     write_readings(out)?;
     out.write_str("\n")?;
@@ -328,7 +336,7 @@ mod tests {
             write_set(values, &mut text).unwrap();
             text
         };
-        assert_eq!(written(Values::range(5, 1000).or(0)), "0, 5-1000");
+        assert_eq!(written(Values::range(2, 1000).or(0)), "0, 2-1000");
         assert_eq!(written(Values::up_to(1).or(0xFFFF)), "0-1, 0xFFFF");
         assert_eq!(written(Values::only(0x5A17)), "0x5A17");
         assert_eq!(written(Values::only(0)), "0");

@@ -13,7 +13,7 @@
 //! use register_map::{BLOCKS, InForce, Values, configuration, rule_at};
 //!
 //! let (rule, _) = rule_at(configuration::RULES, configuration::FRAME_GAP).unwrap();
-//! assert_eq!(rule.values, Values::range(5, 1000).or(0));
+//! assert_eq!(rule.values, Values::range(2, 1000).or(0));
 //! assert_eq!(rule.in_force, InForce::Restart);
 //!
 //! let mut registers = BLOCKS.iter().flat_map(|block| block.registers());

@@ -4,8 +4,8 @@ that ${P}2 is its third point."""
 
 # Register BOARD, first port with a slot, and saves that write through both pages of the store.
 BOARDS = {
-    "modio-02": (1, 5, 100),
-    "modio-08": (2, 1, 200),
+    "modio-02": (1, 5, 10),
+    "modio-08": (2, 1, 18),
 }
 
 

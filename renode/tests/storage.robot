@@ -52,8 +52,12 @@ A New Module Takes Effect After The Restart
     Request Gives    05 ${P}0 0000    85 02
 
 Saves Continue When A Page Is Full
-    # A record takes about 25 bytes of the 1024 or 2048 of a page.
+    # A record takes about 280 bytes of the 1024 or 2048 of a page. Twenty saves are possible together.
     Unlock
+    ${values}=    Evaluate    '0064' * 32
+    Request Gives    10 0120 0020 40 ${values}    10 0120 0020
+    ${values}=    Evaluate    '07D0' * 32
+    Request Gives    10 0160 0020 40 ${values}    10 0160 0020
     FOR    ${n}    IN RANGE    1    ${{$SAVES + 1}}
         ${value}=    Evaluate    '%04X' % $n
         # LORA_ADDRESS, which has no other effect.

@@ -43,7 +43,7 @@ const HARDWARE: [Hardware; 2] = [
         board: &register_map::board::MODIO_02,
         part: Memory::kib("STM32F103CB", 128, 20),
         smaller: Some(Memory::kib("STM32F103C8", 64, 20)),
-        budget: Memory::kib("budget", 47, 8),
+        budget: Memory::kib("budget", 49, 9),
     },
     Hardware {
         board: &register_map::board::MODIO_08,

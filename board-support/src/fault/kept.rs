@@ -2,10 +2,8 @@
 
 use core::{array, cell::UnsafeCell, mem::MaybeUninit, ptr, sync::atomic::AtomicU8};
 
-use crate::dip;
-
 use super::{
-    Fault, FaultRecord, TASKS,
+    Fault, FaultRecord, TASKS, number,
     record::{Noted, WORDS},
 };
 
@@ -16,11 +14,12 @@ struct Kept {
     uptime: u32,
     marks: [AtomicU8; TASKS],
     dip: u32,
+    saves: u32,
 }
 
 struct Place(UnsafeCell<MaybeUninit<Kept>>);
 
-// SAFETY: only the functions of this module access record, uptime and dip, by single volatile accesses of a word,
+// SAFETY: only the functions of this module access record, uptime, dip and saves, by single volatile accesses of a word,
 // which cannot be torn. A fault handler may interrupt a sequence of these accesses, but the interrupted code never
 // continues. The marks are atomics.
 unsafe impl Sync for Place {}
@@ -93,13 +92,34 @@ pub fn keep_uptime(seconds: u32) {
 /// Returns the DIP switch as read at power-on, or `None` when no valid value is kept.
 pub(crate) fn kept_dip() -> Option<u8> {
     // SAFETY: as in `read`; a word may hold anything.
-    dip::from_word(unsafe { ptr::read_volatile(&raw const (*place()).dip) })
+    number::from_word(number::DIP, unsafe {
+        ptr::read_volatile(&raw const (*place()).dip)
+    })
 }
 
 /// Keeps the DIP switch over resets.
 pub(crate) fn keep_dip(dip: u8) {
     // SAFETY: as in `write`.
-    unsafe { ptr::write_volatile(&raw mut (*place()).dip, dip::to_word(dip)) };
+    unsafe { ptr::write_volatile(&raw mut (*place()).dip, number::to_word(number::DIP, dip)) };
+}
+
+/// Returns the number of saves left before the reset, or `None` when no valid number is kept.
+pub(crate) fn kept_saves() -> Option<u8> {
+    // SAFETY: as in `read`; a word may hold anything.
+    number::from_word(number::SAVES, unsafe {
+        ptr::read_volatile(&raw const (*place()).saves)
+    })
+}
+
+/// Keeps the number of saves that the firmware may still write to flash. Call this after every change.
+pub fn keep_saves(left: u8) {
+    // SAFETY: as in `write`.
+    unsafe {
+        ptr::write_volatile(
+            &raw mut (*place()).saves,
+            number::to_word(number::SAVES, left),
+        )
+    };
 }
 
 /// Returns the marks of the tasks, all 0 after [`take_at_start`]. After a watchdog reset the next start reports

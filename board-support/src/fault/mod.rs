@@ -12,17 +12,20 @@
 //!              crystal faults
 //!       uptime              marks                                             kept up to date
 //!       DIP switch                                                            written at power-on
+//!       saves left                                                            kept up to date
 //! ```
 
 #[cfg(target_os = "none")]
 mod kept;
 #[cfg(any(target_os = "none", test))]
+mod number;
+#[cfg(any(target_os = "none", test))]
 mod record;
 
 #[cfg(target_os = "none")]
-pub(crate) use kept::{keep_dip, kept_dip, take_at_start};
+pub(crate) use kept::{keep_dip, kept_dip, kept_saves, take_at_start};
 #[cfg(target_os = "none")]
-pub use kept::{keep_uptime, marks, note};
+pub use kept::{keep_saves, keep_uptime, marks, note};
 
 /// Number of tasks that leave a mark.
 pub const TASKS: usize = 4;

@@ -95,6 +95,11 @@ impl Persistence {
         let settings = device.lock(|device| device.config.to_save().clone());
         if core::mem::take(&mut self.ordered) {
             self.saving = Saving::new(&self.store, &self.pages, &settings);
+            if self.saving.is_some() && !device.lock(|device| device.config.take_save()) {
+                self.saving = None;
+                self.fail(device);
+                return None;
+            }
         }
         let Some(mut saving) = self.saving.take() else {
             // These settings are already stored, so nothing is written and the flash does not wear.
@@ -125,10 +130,15 @@ impl Persistence {
             Self::end(&settings, device);
             Event::Saved
         } else {
-            let stored = self.store.load(BOARD, &self.pages).settings;
-            device.lock(|device| device.config.save_failed(stored));
+            self.fail(device);
             Event::SaveFailed
         })
+    }
+
+    /// Reports the settings as not stored.
+    fn fail(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
+        let stored = self.store.load(BOARD, &self.pages).settings;
+        device.lock(|device| device.config.save_failed(stored));
     }
 
     /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.

@@ -58,7 +58,7 @@ impl Scanning {
         let now = clock::millis();
         // Filled inside the lock: returning the settings from it would copy them once more in every scan.
         let mut settings = None;
-        let (mut channels, revision, uptime_s, beat, tripped) = device.lock(|device| {
+        let (mut channels, revision, uptime_s, saves, beat, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
             let beat = passed > 0;
             let tripped = beat && device.tick(passed);
@@ -69,7 +69,9 @@ impl Scanning {
             if revision != self.revision {
                 settings = Some(ports.map(|port| *port.settings()));
             }
-            (channels, revision, device.state.uptime_s(), beat, tripped)
+            let uptime_s = device.state.uptime_s();
+            let saves = device.config.saves_left();
+            (channels, revision, uptime_s, saves, beat, tripped)
         });
         self.revision = revision;
         if let Some(settings) = settings {
@@ -119,6 +121,7 @@ impl Scanning {
         }
         if beat {
             fault::keep_uptime(uptime_s);
+            fault::keep_saves(saves);
             self.look_at_line(line, device, events);
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.

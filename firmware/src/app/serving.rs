@@ -9,19 +9,16 @@
 //! line wait for them.
 
 use board_support::pac::Interrupt;
-use firmware::{line::ServedLine, start_up::LOADER_UNIT};
+use firmware::{
+    config::{LineName, Origin},
+    line::ServedLine,
+    start_up::LOADER_UNIT,
+};
 use modbus_server::{Outcome, Request, Server, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
 use crate::{board::Device, line::Line, orders::Orders, radio::Radio};
-
-/// A line of the unit.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Which {
-    Rs485,
-    Radio,
-}
 
 /// The lines, under their locks.
 pub struct Lines<L, R> {
@@ -32,13 +29,16 @@ pub struct Lines<L, R> {
 impl<L: Mutex<T = Option<Line>>, R: Mutex<T = Option<Radio>>> Lines<L, R> {
     /// Calls `f` with a line, if it is on.
     #[inline(always)]
-    fn lock<T>(&mut self, which: Which, f: impl FnOnce(&mut dyn ServedLine) -> T) -> Option<T> {
+    fn lock<T>(&mut self, which: LineName, f: impl FnOnce(&mut dyn ServedLine) -> T) -> Option<T> {
         match which {
-            Which::Rs485 => self.rs485.lock(|line| line.as_mut().map(|line| f(line))),
-            Which::Radio => self.radio.lock(|line| line.as_mut().map(|line| f(line))),
+            LineName::Rs485 => self.rs485.lock(|line| line.as_mut().map(|line| f(line))),
+            LineName::Radio => self.radio.lock(|line| line.as_mut().map(|line| f(line))),
         }
     }
 }
+
+/// The unit address of a broadcast.
+const BROADCAST: u8 = 0;
 
 /// A line's part in serving.
 struct Served {
@@ -50,9 +50,9 @@ struct Served {
 }
 
 impl Served {
-    const fn new(framing: Framing, frame_gap_ms: u32) -> Self {
+    const fn new(server: Server, frame_gap_ms: u32) -> Self {
         Self {
-            server: Server::new(framing),
+            server,
             frame_gap_ms,
             order: None,
         }
@@ -95,11 +95,23 @@ pub struct Serving {
 
 impl Serving {
     /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
-    /// there, in ms, rounded up; `radio_gap_ms` is that of the radio line.
-    pub const fn new(unit: u8, rs485: (Framing, u32), radio_gap_ms: u32) -> Self {
+    /// there, in ms, rounded up; `radio_gap_ms` is that of the radio line. `points_only`: the radio line serves points
+    /// and reads only.
+    pub const fn new(
+        unit: u8,
+        rs485: (Framing, u32),
+        radio_gap_ms: u32,
+        points_only: bool,
+    ) -> Self {
+        let radio = Server::new(Framing::Rtu);
+        let radio = if points_only {
+            radio.with_read_only_diagnostics()
+        } else {
+            radio
+        };
         Self {
-            rs485: Served::new(rs485.0, rs485.1),
-            radio: Served::new(Framing::Rtu, radio_gap_ms),
+            rs485: Served::new(Server::new(rs485.0), rs485.1),
+            radio: Served::new(radio, radio_gap_ms),
             unit,
         }
     }
@@ -117,17 +129,17 @@ impl Serving {
         let taken = lines
             .rs485
             .lock(|line| take(line, &self.rs485.server, delay_ms));
-        let served = self.run_line(Which::Rs485, taken, lines, device, orders);
+        let served = self.run_line(LineName::Rs485, taken, lines, device, orders);
         // RESPONSE_DELAY is for masters on the RS-485 line; the air takes much longer.
         let taken = lines.radio.lock(|line| take(line, &self.radio.server, 0));
-        self.run_line(Which::Radio, taken, lines, device, orders) || served
+        self.run_line(LineName::Radio, taken, lines, device, orders) || served
     }
 
     // Not inlined: one copy serves both lines.
     #[inline(never)]
     fn run_line(
         &mut self,
-        which: Which,
+        which: LineName,
         taken: Taken,
         lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
@@ -146,10 +158,10 @@ impl Serving {
             .is_some_and(|request| self.serve(which, request, lines, device))
     }
 
-    const fn of(&mut self, which: Which) -> &mut Served {
+    const fn of(&mut self, which: LineName) -> &mut Served {
         match which {
-            Which::Rs485 => &mut self.rs485,
-            Which::Radio => &mut self.radio,
+            LineName::Rs485 => &mut self.rs485,
+            LineName::Radio => &mut self.radio,
         }
     }
 
@@ -164,13 +176,20 @@ impl Serving {
 
     fn serve(
         &mut self,
-        which: Which,
+        which: LineName,
         request: Request<'static>,
         lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) -> bool {
         let served = self.of(which);
-        let decided = device.lock(|device| request.decide(&served.server, &**device));
+        let origin = Origin {
+            line: which,
+            broadcast: request.unit() == BROADCAST,
+        };
+        let decided = device.lock(|device| {
+            device.set_origin(origin);
+            request.decide(&served.server, &**device)
+        });
         let Some(answered) = lines.lock(which, |line| line.answer(decided)) else {
             return false;
         };
@@ -206,8 +225,8 @@ impl Serving {
         lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
-        let rs485 = lines.lock(Which::Rs485, |line| line.counters());
-        let radio = lines.lock(Which::Radio, |line| line.counters());
+        let rs485 = lines.lock(LineName::Rs485, |line| line.counters());
+        let radio = lines.lock(LineName::Radio, |line| line.counters());
         device.lock(|device| {
             let state = &mut device.state;
             if let Some(line) = rs485 {

@@ -83,11 +83,15 @@ pub fn up(
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
     let radio_config = RadioConfig::of(&loaded.settings);
-    let config = Config::new(
+    let mut config = Config::new(
         BOARD,
         loaded.settings,
         loaded.invalid || loaded.rejected > 0,
     );
+    if let Some(left) = board.saves_left {
+        config.set_saves_left(left);
+    }
+    let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
     let settings = start_up::line(address, config.line());
@@ -187,6 +191,7 @@ pub fn up(
             identity.unit,
             (framing, t35.div_ceil(1_000_000)),
             radio_gap_ms.into(),
+            points_only,
         ),
         device,
         scanning,

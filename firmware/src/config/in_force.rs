@@ -17,7 +17,7 @@ pub struct LineConfig {
     pub format: Format,
     /// RTU or ASCII.
     pub mode: Mode,
-    /// Silence that ends a frame, in 0.1 ms, 5 to 1000; `None` stands for t3.5 as in the standard.
+    /// Silence that ends a frame, in 0.1 ms, 2 to 1000; `None` stands for t3.5 as in the standard.
     pub frame_gap: Option<u16>,
     /// What to do with a frame that contains a gap longer than t1.5.
     pub gap_rule: GapRule,

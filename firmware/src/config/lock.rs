@@ -2,21 +2,28 @@
 
 use register_map::configuration::OPEN_S;
 
-/// A lock that stays open for [`OPEN_S`] seconds after the last configuration write.
+use super::LineName;
+
+/// A lock that stays open for [`OPEN_S`] seconds after the last configuration write, for the line that opened it.
 #[derive(Debug, Default)]
 pub(super) struct Lock {
     left_ms: u32,
+    owner: LineName,
 }
 
 impl Lock {
     /// Returns a closed lock, as at every start.
     pub(super) const fn closed() -> Self {
-        Self { left_ms: 0 }
+        Self {
+            left_ms: 0,
+            owner: LineName::Rs485,
+        }
     }
 
-    /// Opens the lock, or keeps it open.
-    pub(super) const fn open(&mut self) {
+    /// Opens the lock for a line, or keeps it open. It closes for every other line.
+    pub(super) const fn open(&mut self, line: LineName) {
         self.left_ms = OPEN_S * 1000;
+        self.owner = line;
     }
 
     /// Advances the time by `ms` milliseconds.
@@ -24,29 +31,42 @@ impl Lock {
         self.left_ms = self.left_ms.saturating_sub(ms);
     }
 
-    /// Returns whether the lock is open.
-    pub(super) const fn is_open(&self) -> bool {
-        self.left_ms > 0
+    /// Returns whether the lock is open for requests over this line.
+    pub(super) const fn is_open(&self, line: LineName) -> bool {
+        self.left_ms > 0 && self.owner as u8 == line as u8
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::LineName::{Radio, Rs485};
     use super::*;
 
     #[test]
     fn the_lock_closes_sixty_seconds_after_the_last_opening() {
         let mut lock = Lock::closed();
-        assert!(!lock.is_open());
-        lock.open();
+        assert!(!lock.is_open(Rs485));
+        lock.open(Rs485);
         lock.tick(59_999);
-        assert!(lock.is_open());
-        lock.open();
+        assert!(lock.is_open(Rs485));
+        lock.open(Rs485);
         lock.tick(59_999);
-        assert!(lock.is_open());
+        assert!(lock.is_open(Rs485));
         lock.tick(1);
-        assert!(!lock.is_open());
+        assert!(!lock.is_open(Rs485));
         lock.tick(u32::MAX);
-        assert!(!lock.is_open());
+        assert!(!lock.is_open(Rs485));
+    }
+
+    #[test]
+    fn the_lock_is_open_for_the_line_that_opened_it_last() {
+        let mut lock = Lock::closed();
+        lock.open(Radio);
+        assert!(lock.is_open(Radio) && !lock.is_open(Rs485));
+        lock.tick(59_999);
+        lock.open(Rs485);
+        assert!(lock.is_open(Rs485) && !lock.is_open(Radio));
+        lock.tick(59_999);
+        assert!(lock.is_open(Rs485));
     }
 }

@@ -13,9 +13,14 @@
 //!
 //! A master reads back the edited values. A write is checked against the lock before it opens the lock, so a
 //! request that writes KEY and settings together needs the lock to be open already.
+//!
+//! Everybody in radio range can send requests over the air. So the lock is open only for the line over which it was
+//! opened, a broadcast over the air writes nothing here, and the radio may be set to write nothing here at all.
 
 mod in_force;
 mod lock;
+mod origin;
+mod saves;
 mod settings;
 
 #[cfg(test)]
@@ -24,9 +29,9 @@ mod tests;
 use core::array;
 
 use modbus_server::{Exception, Span, Words, WordsOut};
-use register_map::codes::Command;
+use register_map::codes::{Command, Lora};
 use register_map::configuration::{
-    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, MODE, MODULE, RESPONSE_DELAY, RULES,
+    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES, SAVES,
 };
 use register_map::points::{self, CHANNELS};
 use register_map::state::status;
@@ -34,6 +39,8 @@ use register_map::{Board, Run, runs};
 
 pub use in_force::{LineConfig, Point, PortConfig, RadioConfig};
 use lock::Lock;
+pub use origin::{LineName, Origin};
+use saves::Saves;
 pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, takes_module};
@@ -49,7 +56,14 @@ pub struct Config<const SLOTS: usize> {
     differences: u16,
     /// A save was ordered and is not complete.
     saving: bool,
+    /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
+    unstored: bool,
+    saves: Saves,
     lock: Lock,
+    /// Origin of the request that is being served.
+    origin: Origin,
+    /// The radio serves points and reads only.
+    points_only: bool,
     line: LineConfig,
     /// Modules and START values of the ports with slots.
     ports: [PortConfig; SLOTS],
@@ -75,6 +89,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         for (place, value) in started.iter_mut().zip(stored.restart_values()) {
             *place = value;
         }
+        let points_only = stored.get(LORA) == Lora::PointsOnly.code();
         Self {
             board,
             line: LineConfig::of(&stored),
@@ -85,13 +100,45 @@ impl<const SLOTS: usize> Config<SLOTS> {
             saved: stored,
             differences: 0,
             saving: false,
+            unstored: invalid,
+            saves: Saves::new(SAVES),
             lock: Lock::closed(),
+            origin: Origin::default(),
+            points_only,
             started,
             invalid,
             waiting: false,
             left: 0,
             revision: 0,
         }
+    }
+
+    /// Sets the origin of the requests that are checked and executed from now on.
+    pub const fn set_origin(&mut self, origin: Origin) {
+        self.origin = origin;
+    }
+
+    /// Returns whether the radio serves points and reads only.
+    #[must_use]
+    pub const fn air_serves_points_only(&self) -> bool {
+        self.points_only
+    }
+
+    /// Checks whether the line of the request may change more than points.
+    ///
+    /// # Errors
+    ///
+    /// Exception 06 for a request over the air while the radio serves points and reads only.
+    pub const fn check_line(&self) -> Result<(), Exception> {
+        match self.origin.line {
+            LineName::Radio if self.points_only => Err(Exception::ServerDeviceBusy),
+            LineName::Radio | LineName::Rs485 => Ok(()),
+        }
+    }
+
+    /// Returns whether the lock is open for the request.
+    const fn is_unlocked(&self) -> bool {
+        self.lock.is_open(self.origin.line)
     }
 
     /// Checks whether these registers can be read.
@@ -111,7 +158,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let mut values = self.edited.slice(span.start(), span.count()).iter();
         if span.start() == KEY {
             values.next();
-            out.push(u16::from(self.lock.is_open()));
+            out.push(u16::from(self.is_unlocked()));
         }
         values.for_each(|value| out.push(*value));
     }
@@ -121,9 +168,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// # Errors
     ///
     /// The first that applies: 02 for a gap; 03 for a value that is not allowed, including a setting by point that
-    /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 when the lock is
-    /// closed and the request does not write KEY alone, or when a save is ordered before the previous one is
-    /// complete.
+    /// the module chosen last does not allow, and a FORMAT with seven data bits in RTU mode; 06 for a broadcast over
+    /// the air or a line that may not write here, when the lock is closed for the line and the request does not write
+    /// KEY alone, or when a save is ordered before the previous one is complete or with nothing left of the budget.
     pub fn check_write(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         let runs = runs(RULES, span.start(), span.count());
         let runs = runs.ok_or(Exception::IllegalDataAddress)?;
@@ -138,12 +185,32 @@ impl<const SLOTS: usize> Config<SLOTS> {
         if !self.suits_the_mode(span, words) {
             return Err(Exception::IllegalDataValue);
         }
+        self.check_line()?;
+        let aired = self.origin.broadcast && self.origin.line == LineName::Radio;
         let order = words.get(COMMAND.wrapping_sub(span.start()));
-        let saves = self.saving && order == Some(Command::Save.code());
-        if saves || !(self.lock.is_open() || span == Span::single(KEY)) {
+        let cannot_save =
+            order == Some(Command::Save.code()) && (self.saving || !self.can_pay(span, words));
+        if aired || cannot_save || !(self.is_unlocked() || span == Span::single(KEY)) {
             return Err(Exception::ServerDeviceBusy);
         }
         Ok(())
+    }
+
+    /// Returns whether a save is possible after a write of these values: there is one left, or the save would write
+    /// nothing to the flash.
+    fn can_pay(&self, span: Span, words: Words<'_>) -> bool {
+        if self.saves.left() > 0 {
+            return true;
+        }
+        let written = span.addresses().zip(words.iter());
+        let settings = written.filter(|(address, _)| ![KEY, COMMAND].contains(address));
+        let differences = settings.fold(self.differences, |differences, (address, value)| {
+            let saved = self.saved.get(address);
+            differences
+                .wrapping_sub(u16::from(self.edited.get(address) != saved))
+                .wrapping_add(u16::from(value != saved))
+        });
+        differences == 0 && !self.unstored
     }
 
     /// Returns whether values for points are allowed by the modules of their ports, and values for MODULE by the
@@ -191,7 +258,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///   [`Self::is_saving`].
     #[must_use = "the caller must execute the command"]
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
-        self.lock.open();
+        self.lock.open(self.origin.line);
         if span.start() >= FILTER {
             self.write_plain(span, words);
             return None;
@@ -274,6 +341,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// [`Settings::needs_restart`].
     pub const fn end_save(&mut self, changed: bool) {
         self.saving = false;
+        self.unstored = false;
         self.waiting = self.left != 0 || changed;
     }
 
@@ -284,18 +352,39 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.saving = false;
     }
 
+    /// Takes one save from the budget, before the first operation on the flash. Returns false when none is left: the
+    /// other line has changed a setting since the order was checked. Then the save must not be written.
+    #[must_use]
+    pub const fn take_save(&mut self) -> bool {
+        self.saves.take()
+    }
+
+    /// Returns the number of saves in the budget, to be kept over a reset.
+    #[must_use]
+    pub const fn saves_left(&self) -> u8 {
+        self.saves.left()
+    }
+
+    /// Sets the number of saves in the budget to the number that was kept over the reset.
+    pub const fn set_saves_left(&mut self, left: u8) {
+        self.saves = Saves::new(left);
+    }
+
     /// Returns whether a save was ordered and is not complete.
     #[must_use]
     pub const fn is_saving(&self) -> bool {
         self.saving
     }
 
-    /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write.
+    /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write, and the budget gets one
+    /// save a minute.
     pub fn tick(&mut self, ms: u32) {
         self.lock.tick(ms);
+        self.saves.tick(ms);
     }
 
-    /// Returns bits 1, 3, 4 and 5 of the status register, which the configuration defines.
+    /// Returns bits 1, 3, 4 and 5 of the status register, which the configuration defines. Bit 5 is that of the
+    /// line of the request.
     #[must_use]
     pub const fn status(&self) -> u16 {
         const fn bit(mask: u16, set: bool) -> u16 {
@@ -304,7 +393,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         bit(status::STORED_INVALID, self.invalid)
             | bit(status::UNSAVED, self.differences > 0 || self.saving)
             | bit(status::RESTART_NEEDED, self.waiting)
-            | bit(status::UNLOCKED, self.lock.is_open())
+            | bit(status::UNLOCKED, self.is_unlocked())
     }
 
     /// Returns a counter that changes whenever a setting may have changed; it wraps. Code with copies of settings

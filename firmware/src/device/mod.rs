@@ -40,7 +40,7 @@ pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
 
-use crate::config::Config;
+use crate::config::{Config, Origin};
 
 /// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
@@ -147,6 +147,11 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// start.
     pub const fn request_seen(&mut self, at_ms: u32) {
         self.comm_watchdog.refresh(at_ms);
+    }
+
+    /// Sets the origin of the request that is decided and carried out next.
+    pub const fn set_origin(&mut self, origin: Origin) {
+        self.config.set_origin(origin);
     }
 
     /// Returns whether this work reads the counters of the lines. The caller must then copy them into the state
@@ -268,7 +273,8 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::State | Block::Fault | Block::Radio => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
                 check_exists(counters::SPANS, span)?;
-                points::check_clear(span, words)
+                points::check_clear(span, words)?;
+                self.config.check_line()
             }
         }
     }

@@ -86,14 +86,14 @@ impl<const SLOTS: usize> Points<SLOTS> {
     }
 
     /// Checks that all points of a span exist and have one of these kinds; otherwise exception 02. Returns whether
-    /// one of them cannot be read or driven.
-    fn check_kinds(&self, span: Span, kinds: Kinds) -> Result<bool, Exception> {
+    /// one of them that has one of the kinds `needed` cannot be read or driven.
+    fn check_kinds(&self, span: Span, kinds: Kinds, needed: Kinds) -> Result<bool, Exception> {
         let mut fails = false;
         // A long span fails at the first address after the last port.
         for index in self.indices(span) {
             match self.place(index) {
                 Some((port, channel)) if kinds.contain(port.kind(channel)) => {
-                    fails |= port.fails(channel);
+                    fails |= needed.contain(port.kind(channel)) && port.fails(channel);
                 }
                 _ => return Err(Exception::IllegalDataAddress),
             }
@@ -101,13 +101,15 @@ impl<const SLOTS: usize> Points<SLOTS> {
         Ok(fails)
     }
 
-    /// Checks whether these bit points can be read.
+    /// Checks whether these bit points can be read. Outputs always can: a read returns the commanded value, which
+    /// does not depend on the module. Some masters give up a unit at the first exception, so a failed output must
+    /// not hide the points that are read with it.
     ///
     /// # Errors
     ///
-    /// Exception 02 for points that do not exist, 04 when one of them cannot be read or driven.
+    /// Exception 02 for points that do not exist, 04 when one of them is an input that cannot be read.
     pub fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
-        answers(self.check_kinds(span, Kinds::BITS)?)
+        answers(self.check_kinds(span, Kinds::BITS, Kinds::INPUTS)?)
     }
 
     /// Checks whether these word points can be read.
@@ -116,16 +118,16 @@ impl<const SLOTS: usize> Points<SLOTS> {
     ///
     /// As for [`check_read_bits`](Self::check_read_bits).
     pub fn check_read_words(&self, span: Span) -> Result<(), Exception> {
-        answers(self.check_kinds(span, Kinds::WORDS)?)
+        answers(self.check_kinds(span, Kinds::WORDS, Kinds::INPUTS)?)
     }
 
     /// Checks whether these bit points can be written.
     ///
     /// # Errors
     ///
-    /// As for [`check_read_bits`](Self::check_read_bits), and 02 also for inputs.
+    /// Exception 02 for points that do not exist and for inputs, 04 when one of them cannot be driven.
     pub fn check_write_bits(&self, span: Span) -> Result<(), Exception> {
-        answers(self.check_kinds(span, Kinds::BIT_OUTPUTS)?)
+        answers(self.check_kinds(span, Kinds::BIT_OUTPUTS, Kinds::BIT_OUTPUTS)?)
     }
 
     /// Checks whether these word points can be written with these values.
@@ -135,7 +137,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// As for [`check_write_bits`](Self::check_write_bits), and 03 for a value out of range, which is checked after
     /// 02 and before 04.
     pub fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
-        let fails = self.check_kinds(span, Kinds::WORD_OUTPUTS)?;
+        let fails = self.check_kinds(span, Kinds::WORD_OUTPUTS, Kinds::WORD_OUTPUTS)?;
         let allowed = self.indices(span).zip(words.iter()).all(|(index, word)| {
             let place = self.place(index);
             place
@@ -213,6 +215,7 @@ struct Kinds(u8);
 impl Kinds {
     const BITS: Self = Self::of(&[Kind::BitInput, Kind::BitOutput]);
     const WORDS: Self = Self::of(&[Kind::WordInput, Kind::WordOutput]);
+    const INPUTS: Self = Self::of(&[Kind::BitInput, Kind::WordInput]);
     const BIT_OUTPUTS: Self = Self::of(&[Kind::BitOutput]);
     const WORD_OUTPUTS: Self = Self::of(&[Kind::WordOutput]);
 

@@ -61,10 +61,11 @@ impl Gaps {
     }
 
     /// Returns a silence between frames of this many tenths of a millisecond, in ns, to be used instead of t3.5. It
-    /// is at least 1.1 characters, because the line seems silent until a character has ended.
+    /// is at least 1.5 characters: the line seems silent until a character has ended, and a sender may leave up to t1.5
+    /// between two characters of a frame.
     pub const fn frame_gap(&self, tenths_of_ms: u16) -> u32 {
         let gap = (tenths_of_ms as u32).saturating_mul(100_000);
-        let shortest = self.character.saturating_add(self.character / 10);
+        let shortest = self.character.saturating_add(self.character.div_ceil(2));
         if gap < shortest { shortest } else { gap }
     }
 }
@@ -84,16 +85,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_gap_is_longer_than_a_character() {
+    fn a_frame_gap_below_one_and_a_half_characters_counts_as_these() {
         let gaps = Gaps::standard(9600, 11);
         assert_eq!(gaps.frame_gap(1000), 100_000_000);
-        assert_eq!(gaps.frame_gap(13), 1_300_000);
-        let shortest = gaps.frame_gap(5);
-        assert!(
-            shortest > gaps.character && shortest < 1_300_000,
-            "{shortest}"
-        );
-        assert_eq!(Gaps::standard(115_200, 10).frame_gap(5), 500_000);
+        // 16.5 bits are 1.719 ms.
+        assert_eq!(gaps.frame_gap(18), 1_800_000);
+        for shorter in [1, 2, 17] {
+            let shortest = gaps.frame_gap(shorter);
+            assert!(
+                (1_718_750..1_718_800).contains(&shortest),
+                "{shorter}: {shortest}"
+            );
+        }
+        // 16.5 bits are 286 us at 57600 bit/s and 143 us at 115200.
+        assert_eq!(Gaps::standard(57_600, 11).frame_gap(5), 500_000);
+        assert!((286_450..286_500).contains(&Gaps::standard(57_600, 11).frame_gap(2)));
+        assert_eq!(Gaps::standard(115_200, 11).frame_gap(2), 200_000);
     }
 
     #[test]

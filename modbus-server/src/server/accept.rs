@@ -1,6 +1,6 @@
 //! The decision: checks the request, asks the model, and creates the head of the reply.
 
-use super::Server;
+use super::{Diagnostics, Server};
 use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::exception::first_of;
@@ -91,12 +91,11 @@ pub(super) fn accept(
         Request::ReadFile(_) | Request::WriteFile(_) => return Err(Exception::IllegalFunction),
         Request::ExceptionStatus => (plain, Job::ExceptionStatus),
         Request::Diagnose(fields) => {
-            let Server {
-                framing,
-                can_listen_only,
-                ..
-            } = *server;
-            let diagnostic = Diagnostic::decode(fields, framing, can_listen_only)?;
+            let can_listen_only = server.diagnostics != Diagnostics::WithoutListenOnly;
+            let diagnostic = Diagnostic::decode(fields, server.framing, can_listen_only)?;
+            if server.diagnostics == Diagnostics::ReadOnly && !diagnostic.only_reads() {
+                return Err(Exception::ServerDeviceBusy);
+            }
             // The reply begins like the request; the rest repeats or replaces the request's data.
             let head = Head::in_place(unit, function, first(fields)?);
             (head, Job::Diagnose(diagnostic))

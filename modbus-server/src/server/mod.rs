@@ -32,8 +32,7 @@ pub struct Server {
     framing: Framing,
     /// Function 08, sub-function 04, was executed, and 01 not since then.
     listen_only: bool,
-    /// Function 08, sub-function 04, is supported.
-    can_listen_only: bool,
+    diagnostics: Diagnostics,
     /// The line's counters as last seen, and as they were when they were last cleared.
     line: LineCounters,
     cleared: LineCounters,
@@ -41,6 +40,17 @@ pub struct Server {
     cleared_bits: u16,
     tally: Tally,
     log: EventLog,
+}
+
+/// Sub-functions of function 08 that the server executes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Diagnostics {
+    /// All of them.
+    All,
+    /// All but 04, which the server does not know.
+    WithoutListenOnly,
+    /// Those that change nothing. The others are refused.
+    ReadOnly,
 }
 
 /// Treatment of a request, which its first bytes determine.
@@ -62,7 +72,7 @@ impl Server {
         Self {
             framing,
             listen_only: false,
-            can_listen_only: true,
+            diagnostics: Diagnostics::All,
             line: LineCounters::ZERO,
             cleared: LineCounters::ZERO,
             cleared_bits: 0,
@@ -79,7 +89,17 @@ impl Server {
     #[must_use]
     pub const fn without_listen_only(self) -> Self {
         Self {
-            can_listen_only: false,
+            diagnostics: Diagnostics::WithoutListenOnly,
+            ..self
+        }
+    }
+
+    /// Limits function 08 to the sub-functions that change nothing: 00, 02 and 0B to 12. Each of the others is
+    /// answered with exception 06, so nobody on this line can silence the unit or clear its counters.
+    #[must_use]
+    pub const fn with_read_only_diagnostics(self) -> Self {
+        Self {
+            diagnostics: Diagnostics::ReadOnly,
             ..self
         }
     }
@@ -119,7 +139,9 @@ impl Server {
         }
         if broadcast {
             Handling::Broadcast
-        } else if self.can_listen_only && diagnostics && Diagnostic::is_listen_only(request.from(2))
+        } else if self.diagnostics == Diagnostics::All
+            && diagnostics
+            && Diagnostic::is_listen_only(request.from(2))
         {
             Handling::Silent
         } else {

@@ -3,15 +3,19 @@
 use std::time::Duration;
 
 use register_map::codes::{Command, Format};
-use register_map::configuration::{BAUD, COMMAND};
+use register_map::configuration::{BAUD, COMMAND, SAVE_EVERY_S};
 
 use crate::bench::Bench;
 use crate::case::{Check, Stop, skip};
+use crate::frame::{Reply, hex};
 use crate::line::LineFormat;
 use crate::points::{pdu, write_words};
 
 /// Time for the unit to store its configuration.
 const STORING: Duration = Duration::from_millis(200);
+/// Time after which a unit accepts another save, with a margin, and the interval at which it is asked to save.
+const SAVED_AGAIN: Duration = Duration::from_secs(SAVE_EVERY_S as u64 + 5);
+const SAVE_INTERVAL: Duration = Duration::from_secs(5);
 /// Longest time that a restart may take, and the interval at which the unit is asked whether it has restarted.
 const START: Duration = Duration::from_millis(1500);
 const INTERVAL: Duration = Duration::from_millis(250);
@@ -95,6 +99,25 @@ fn look_for_it(bench: &mut Bench<'_>, lines: [LineFormat; 3]) -> Check {
     Ok(())
 }
 
+/// Saves the configuration, whose lock must be open. A unit that refuses, because there were too many saves, accepts
+/// another one within a minute.
+fn save(bench: &mut Bench<'_>) -> Check {
+    let request = pdu(6, COMMAND, Command::Save.code());
+    let latest = bench.endpoint.now() + SAVED_AGAIN;
+    loop {
+        let reply = bench.ask_due(&request)?;
+        if reply.exception(6) != Some(6) || bench.endpoint.now() > latest {
+            let echoed = reply == Reply::Pdu(request.clone());
+            bench.ensure(echoed, format!("the PDU {}", hex(&request)))?;
+            bench.rest(STORING)?;
+            return Ok(());
+        }
+        bench.rest(SAVE_INTERVAL)?;
+        // The lock would close in this time, because a refused write does not keep it open.
+        bench.unlock()?;
+    }
+}
+
 /// Writes, saves and restarts the unit with another rate and format, and sets the endpoint to them.
 fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     bench.unlock()?;
@@ -103,11 +126,10 @@ fn move_to(bench: &mut Bench<'_>, to: LineFormat) -> Check {
     bench.reply_is(&request, &request[..5])?;
     // The old rate is in force until the restart.
     bench.alive("a new rate that is in force after the restart")?;
-    for command in [Command::Save, Command::Restart] {
-        let request = pdu(6, COMMAND, command.code());
-        bench.reply_is(&request, &request)?;
-        bench.rest(STORING)?;
-    }
+    save(bench)?;
+    let request = pdu(6, COMMAND, Command::Restart.code());
+    bench.reply_is(&request, &request)?;
+    bench.rest(STORING)?;
     bench.endpoint.set_line(to)?;
     bench.patience.quiet = bench.patience.quiet.max(to.t35() + to.characters(2));
     bench.patience.reply = bench.patience.reply.max(to.t35() * 2 + to.characters(4));

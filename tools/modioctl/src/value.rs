@@ -385,7 +385,7 @@ mod tests {
         assert!(wrong("p5.3.range", "2").contains("4-20 mA"));
         assert!(!wrong("p5.3.range", "2").contains("NTC"));
         assert!(wrong("p5.1", "5").contains("only be read"));
-        assert!(wrong("FRAME_GAP", "1.23").contains("0.5 to 100.0 ms, or 0"));
+        assert!(wrong("FRAME_GAP", "1.23").contains("0.2 to 100.0 ms, or 0"));
         for text in ["", "-1", "1e300", "nan", "99999999999999999999", "ä"] {
             assert!(parsed(&book, "COMM_TIMEOUT", text).is_err(), "{text}");
         }

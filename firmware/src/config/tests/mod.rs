@@ -3,6 +3,8 @@
 extern crate std;
 
 mod module;
+mod origin;
+mod saves;
 
 use std::vec::Vec;
 

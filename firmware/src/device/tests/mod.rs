@@ -3,6 +3,7 @@
 extern crate std;
 
 mod files;
+mod over_the_air;
 mod points;
 mod state;
 

@@ -62,11 +62,11 @@ fn four_modules_answer_at_their_own_addresses() {
     assert_eq!(bench.read(0x0210, 8), Ok(modules));
     assert_eq!(state(&mut bench), [0, 0, 0, 0, 1, 1, 1, 1]);
     assert_eq!(bench.read(0x0205, 1), Ok(std::vec![2]));
-    bench.device.points.ports_mut()[3].set_failing(0b1111);
-    assert_eq!(state(&mut bench), [0, 0, 0, 2, 1, 1, 1, 1]);
-    assert_eq!(bench.read(8, 4).map(|words| words[3]), Ok(1234));
-    assert_eq!(bench.read(8, 8), Err(4), "port 4 does not answer");
-    bench.device.points.ports_mut()[3].set_failing(0);
+    bench.device.points.ports_mut()[2].set_failing(0b1111);
+    assert_eq!(state(&mut bench), [0, 0, 2, 0, 1, 1, 1, 1]);
+    assert_eq!(bench.read(12, 4), Ok(std::vec![1, 2, 3, 4]));
+    assert_eq!(bench.read(8, 8), Err(4), "port 3 does not answer");
+    bench.device.points.ports_mut()[2].set_failing(0);
 
     // The pulses of port 1, channel 3, and SAFE of port 4, channel 2.
     bench.scan_port(0, |channels| channels.set_bit(2, false));
@@ -177,18 +177,43 @@ fn a_new_scale_does_not_change_an_output() {
 }
 
 #[test]
-fn a_failing_channel_returns_04_and_does_not_affect_the_others() {
+fn a_failing_output_reads_its_commanded_value_and_refuses_writes_with_04() {
     let mut bench = Bench::new(Module::Ai2Ao2, &[]);
+    bench.write(0x12, &[100, 200]).unwrap();
     // The DAC fails, which drives channels 3 and 4.
     bench.device.points.ports_mut()[0].set_failing(0b1100);
-    assert_eq!(bench.read(0x10, 2), Ok(std::vec![0; 2]));
-    assert_eq!(bench.read(0x12, 1), Err(4));
-    assert_eq!(bench.read(0x11, 2), Err(4), "one of two fails");
+    assert_eq!(bench.read(0x10, 4), Ok(std::vec![0, 0, 100, 200]));
     assert_eq!(bench.write(0x12, &[1, 2]), Err(4));
+    assert_eq!(bench.ask(&[0x16, 0, 0x12, 0, 0, 0, 1]), [0x96, 4]);
+    let write_then_read = [0x17, 0, 0x10, 0, 1, 0, 0x12, 0, 1, 2, 0, 1];
+    assert_eq!(bench.ask(&write_then_read), [0x97, 4]);
+    assert_eq!(bench.read(0x12, 2), Ok(std::vec![100, 200]));
     assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
-    // One input fails.
+    assert_eq!(bench.read(0x020A, 1).unwrap()[0] & 4, 4);
+}
+
+#[test]
+fn a_failing_bit_output_reads_its_commanded_value_and_refuses_writes_with_04() {
+    let mut bench = Bench::new(Module::Relay2, &[]);
+    assert_eq!(bench.ask(&[5, 0, 0x12, 0xFF, 0]), [5, 0, 0x12, 0xFF, 0]);
+    bench.device.points.ports_mut()[0].set_failing(0b1100);
+    for function in [1, 2] {
+        assert_eq!(bench.ask(&[function, 0, 0x10, 0, 4]), [function, 1, 0b0100]);
+    }
+    assert_eq!(bench.ask(&[5, 0, 0x12, 0, 0]), [0x85, 4]);
+    assert_eq!(bench.ask(&[0x0F, 0, 0x12, 0, 2, 1, 0]), [0x8F, 4]);
+    // The jumpers, channels 1 and 2, are inputs.
+    bench.device.points.ports_mut()[0].set_failing(0b0001);
+    assert_eq!(bench.ask(&[1, 0, 0x10, 0, 4]), [0x81, 4]);
+    assert_eq!(bench.ask(&[1, 0, 0x12, 0, 1]), [1, 1, 1]);
+}
+
+#[test]
+fn a_failing_input_returns_04_and_does_not_affect_the_others() {
+    let mut bench = Bench::new(Module::Ai2Ao2, &[]);
     bench.device.points.ports_mut()[0].set_failing(0b0010);
     assert_eq!(bench.read(0x11, 1), Err(4));
+    assert_eq!(bench.read(0x11, 2), Err(4), "one of two fails");
     assert_eq!(bench.read(0x10, 1), Ok(std::vec![0]));
     bench.write(0x12, &[1, 2]).unwrap();
     assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
@@ -198,13 +223,12 @@ fn a_failing_channel_returns_04_and_does_not_affect_the_others() {
 fn a_module_that_does_not_answer_returns_04_after_all_other_checks() {
     let mut bench = Bench::new(Module::Ao4, &[]);
     bench.device.points.ports_mut()[0].set_failing(0b1111);
-    assert_eq!(bench.read(0x10, 4), Err(4));
     assert_eq!(bench.write(0x10, &[1]), Err(4));
     assert_eq!(bench.write(0x10, &[4096]), Err(3));
-    assert_eq!(bench.read(0x14, 1), Err(2));
+    assert_eq!(bench.write(0x13, &[1, 1]), Err(2));
     assert_eq!(bench.read(0x021C, 1), Ok(std::vec![2]));
     bench.device.points.ports_mut()[0].set_failing(0);
-    assert_eq!(bench.read(0x10, 4), Ok(std::vec![0; 4]));
+    assert_eq!(bench.write(0x10, &[1]), Ok(()));
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn wrong_key(bench: &mut Bench<'_>) -> Check {
 fn value_first(bench: &mut Bench<'_>) -> Check {
     let mut wrong = vec![
         (configuration::RESPONSE_DELAY, 1001),
-        (configuration::FRAME_GAP, 4),
+        (configuration::FRAME_GAP, 1),
         (configuration::COMM_TIMEOUT, 36_001),
         (configuration::MODULE, 7),
         (configuration::BETA, 1999),
@@ -105,7 +105,7 @@ fn all_or_nothing(bench: &mut Bench<'_>) -> Check {
     bench.unlock()?;
     let at = configuration::COMM_TIMEOUT;
     let before = bench.reply(&pdu(3, at, 4))?;
-    bench.exception(&write_words(at, &[700, 1, 4, 0]), 3)?;
+    bench.exception(&write_words(at, &[700, 1, 1, 0]), 3)?;
     bench.exception(&write_words(at, &[700, 1, 0, 2]), 3)?;
     let now = bench.reply(&pdu(3, at, 4))?;
     bench.ensure(now == before, "the four registers are unchanged")

@@ -34,6 +34,11 @@ const SOFTWARE: u16 = 0x28;
 /// Time that the lock stays open.
 const OPEN: Duration = Duration::from_secs(60);
 
+/// Saves that are left at the start. A unit that is tested was saved before, and the suite waits when none is left.
+const SAVES_LEFT: u8 = 5;
+/// Time after which one more save is possible.
+const SAVE_EVERY: Duration = Duration::from_secs(at::SAVE_EVERY_S as u64);
+
 /// Time between two outputs that are set to SAFE, with [`ModioFault::SafeOneByOne`].
 const ONE_BY_ONE: Duration = Duration::from_millis(1);
 
@@ -47,6 +52,9 @@ pub struct Modio {
     booted: Duration,
     cause: u16,
     open_until: Duration,
+    saves_left: u8,
+    /// When the number of saves left was last raised.
+    save_added: Duration,
     /// The last valid request.
     last: Duration,
     /// When the watchdog tripped. The flag can remain set after the watchdog is no longer in force.
@@ -74,6 +82,8 @@ impl Modio {
             booted: Duration::ZERO,
             cause: POWER_ON,
             open_until: Duration::ZERO,
+            saves_left: SAVES_LEFT,
+            save_added: Duration::ZERO,
             last: Duration::ZERO,
             tripped: None,
             flag: false,
@@ -368,8 +378,17 @@ impl Modio {
         if format.is_some_and(|format| !format.suits(mode)) {
             return Err(3);
         }
-        if locked {
+        while self.saves_left < at::SAVES && self.now >= self.save_added + SAVE_EVERY {
+            self.saves_left += 1;
+            self.save_added += SAVE_EVERY;
+        }
+        let order = words.get(usize::from(at::COMMAND.wrapping_sub(start)));
+        let saves = order == Some(&Command::Save.code()) && self.edited != self.saved;
+        if locked || saves && self.saves_left == 0 {
             return Err(6);
+        }
+        if saves {
+            self.saves_left -= 1;
         }
         self.open_until = self.now + OPEN;
         for (address, value) in (start..).zip(words) {

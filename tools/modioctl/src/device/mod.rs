@@ -206,7 +206,9 @@ impl Device {
             4 => {
                 "the module in the slot does not answer: check that it is plugged in and that MODULE names it"
             }
-            6 => "the configuration is locked, or a save is still under way: try again",
+            6 => {
+                "the configuration is locked, a save is under way, there were too many saves (wait for a minute), or LORA is 2 and this came over the air (use the cable)"
+            }
             _ => "see the manual of the unit",
         };
         Failure::Refused(format!(

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use register_map::configuration;
+use register_map::{codes::Lora, configuration};
 use sim::board::Layout;
 use sim::radio::Parameters;
 use sim::{Board, Config, Image};
@@ -91,12 +91,13 @@ fn image(elf: &Path) -> Result<Image, String> {
 }
 
 /// Stores the modules of all slots in the configuration, and that the radio is on if there is one, if nothing is stored
-/// yet.
+/// yet. The radio serves points and reads only, as the pages recommend for a real unit: a user who tries the radio here
+/// meets the same refusals.
 fn write_preset(config: &Config, flash: &mut [u8]) {
     if config.layout.stores_nothing(flash) {
         let mut settings: Vec<_> = configuration::modules(config.plugged()).collect();
         if config.radio.is_some() {
-            settings.push((configuration::LORA, 1));
+            settings.push((configuration::LORA, Lora::PointsOnly.code()));
         }
         // One setting for each port, and one more: a page has room for all of them.
         config.layout.store(flash, &settings);
@@ -154,7 +155,7 @@ mod tests {
         write_preset(&config, &mut flash);
         let at = (layout.board.store.first - FLASH_BASE) as usize;
         let (_, record) = record::records(&flash[at..]).next().unwrap();
-        assert_eq!(record.pairs().last(), Some((configuration::LORA, 1)));
+        assert_eq!(record.pairs().last(), Some((configuration::LORA, 2)));
     }
 
     #[test]

@@ -21,6 +21,7 @@ fn bsy_that_rises_late_does_not_end_a_program_or_an_erase_early() {
     for n in 0..60 {
         bench.configure(FILTER, &[100 + n]);
         bench.save();
+        bench.power_cycle_for_saves(n);
     }
     assert_eq!(stored_value_after_power_cycle(&mut bench), 159);
     let log = bench.board.take_log();

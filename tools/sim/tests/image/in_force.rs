@@ -164,10 +164,12 @@ fn shorter_frame_gap_is_in_force_after_the_restart() {
 #[ignore = "needs the image: cargo xtask test"]
 fn requests_are_answered_with_every_frame_gap() {
     for (baud, format, gap) in [
-        (12, 0, 5),
+        (12, 0, 2),
         (12, 3, 36),
         (48, 0, 5),
-        (96, 1, 5),
+        (96, 1, 2),
+        (576, 1, 2),
+        (1152, 0, 2),
         (1152, 0, 5),
     ] {
         let settings = [(BAUD, baud), (FORMAT, format), (FRAME_GAP, gap)];
@@ -178,7 +180,7 @@ fn requests_are_answered_with_every_frame_gap() {
         // With and without edges in the data bytes.
         bench.configure(0x01C0, &[0; 32]);
         let gap = Time::from_us(100 * u64::from(gap));
-        let shortest = bench.characters(1) + bench.bit();
+        let shortest = Time::from_ps(bench.characters(3).as_ps() / 2);
         let (due, slack) = (gap.max(shortest), Time::from_us(60) + bench.bit() * 2);
         assert_at(turnaround(&mut bench), due, slack);
     }

@@ -89,7 +89,7 @@ fn refused_write_changes_no_register_of_its_range() {
     bench.configure(COMM_TIMEOUT, &[10, 0, 0, 1]);
     for (address, words, code) in [
         (COMM_TIMEOUT, &[20, 1001][..], 3),
-        (COMM_TIMEOUT, &[20, 5, 4, 0], 3),
+        (COMM_TIMEOUT, &[20, 5, 1, 0], 3),
         (COMM_TIMEOUT, &[20, 5, 0, 0, 7], 3),
         (COMM_TIMEOUT, &[20, 5, 0, 0, 1, 0], 2),
         (0x00FF, &[0, 0x5A17], 2),

@@ -54,6 +54,7 @@ mod radio;
 mod ranges;
 mod refusals;
 mod registers;
+mod save_budget;
 mod saving;
 mod self_description;
 mod stack;

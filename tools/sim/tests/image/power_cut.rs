@@ -9,11 +9,14 @@ use crate::bench::{
 };
 
 const FILTER: u16 = 0x0120 + SLOT;
+const BETA: u16 = 0x0160;
 const INVALID: u16 = 2;
 /// Progress of the operation when the power fails. Each fraction leaves other cells unstable.
 const FRACTIONS: [f64; 4] = [0.0, 0.5, 0.75, 1.0];
 /// Number of half-words of the record that these tests save: head, six pairs, CRC, seals.
 const HALF_WORDS: u64 = 21;
+/// Bytes of a record with 32 more pairs.
+const LARGE_RECORD: usize = (HALF_WORDS as usize + 64) * 2;
 /// Number of operations that prepare a spare page: destroy its mark, erase, write the mark.
 const ERASE: u64 = 3;
 /// Number of saves that may fail in a row: the place for the record may not read as erased; then the next is used.
@@ -126,7 +129,14 @@ fn every_cut_of_a_save(prepare: impl Fn(&mut Bench, &mut u16), what: &str) -> u6
 
 /// Saves until the page in use has no room for another record. The other page is then spare.
 fn fill(bench: &mut Bench, round: &mut u16) {
-    // Both pages have records or a mark; the page with more bytes is in use.
+    // Both pages have records or a mark; the page with more bytes is in use. Large records come first, because only
+    // twenty saves are possible together.
+    while rooms(bench).iter().min() >= Some(&LARGE_RECORD) {
+        *round += 1;
+        bench.write(BETA, &[2000 + *round % 900; 32]).unwrap();
+        save(bench, set(*round));
+    }
+    bench.write(BETA, &[3950; 32]).unwrap();
     while rooms(bench).iter().min() >= Some(&(HALF_WORDS as usize * 2)) {
         *round += 1;
         save(bench, set(*round));

@@ -140,6 +140,14 @@ impl Bench {
         assert!(!self.status(8), "the configuration is saved");
     }
 
+    /// Switches the power off and on after every twentieth save, which fills the budget of saves again. `n` counts
+    /// the saves from 0.
+    pub fn power_cycle_for_saves(&mut self, n: u16) {
+        if n % 20 == 19 {
+            self.power_cycle();
+        }
+    }
+
     /// Switches the power off and on, with time to start.
     pub fn power_cycle(&mut self) {
         self.board.cycle();

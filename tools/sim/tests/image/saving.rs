@@ -121,12 +121,12 @@ fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     let mut master = Master::new(Module::Di4, &[]);
     master.write(0x0100, 0x5A17);
     let operations = master.bench.board.flash_operations();
-    for n in 0..40 {
+    for n in 0..20 {
         master.write(FILTER + n % 4, 10 + n);
         master.save();
     }
     let programmed = master.bench.board.flash_operations() - operations;
-    assert!(programmed > 40 * 8, "only {programmed} operations");
+    assert!(programmed > 20 * 8, "only {programmed} operations");
     assert!(
         master.late.len() <= 1,
         "more than one page was filled: {:?}",
@@ -135,7 +135,7 @@ fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
     assert_eq!(master.bench.register(0x0237), 0, "no character was lost");
     master.bench.power_cycle();
-    assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![46, 47, 48, 49]));
+    assert_eq!(master.bench.registers(FILTER, 4), Ok(vec![26, 27, 28, 29]));
 }
 
 /// The page that is no longer needed is erased after the save. One reply is late by the rest of the erase at the end of
@@ -333,7 +333,7 @@ fn uptime_and_communication_watchdog_are_right_over_many_erases() {
     };
     let mut erases = 0;
     bench.patience = Time::from_ms(50);
-    for n in 0..30 {
+    for n in 0..20 {
         bench.configure(FILTER, &[10 + n]);
         let before = spare(bench);
         bench.write(0x0108, &[1]).unwrap();

@@ -162,6 +162,7 @@ fn saved_modules_are_in_force_after_the_restart() {
     for n in 0..150 {
         bench.configure(0x0120, &[n]);
         bench.save();
+        bench.power_cycle_for_saves(n);
     }
     bench.power_cycle();
     assert_eq!(bench.registers(IN_FORCE, 4), Ok(vec![2, 4, 5, 3]));
@@ -177,7 +178,7 @@ fn a_missing_module_does_not_affect_the_other_slots() {
         [Module::None, Module::Do4, Module::None, Module::Di4],
     );
     bench.board.run_for(Time::from_ms(500));
-    assert_eq!(bench.registers(0, 4), Err(4), "the DAC is missing");
+    assert_eq!(bench.write(0, &[1]), Err(4), "the DAC is missing");
     assert_eq!(bench.registers(STATE, 1), Ok(vec![2]));
     bench.write_bits(4, &[true; 4]).unwrap();
     bench.board.run_for(Time::from_ms(5));

@@ -149,12 +149,12 @@ fn disturbed_register_of_the_uart_is_set_again() {
 fn saves_do_not_disturb_requests_over_the_air() {
     let mut bench = bench(&[(LORA_AIR_RATE, 5), (LORA_FRAME_GAP, 20)]);
     let mut changed = false;
-    for round in 0..60 {
+    for round in 0..20 {
         bench.configure(FILTER, &[round + 1; 30]);
         let now = bench.board.now();
         bench.air().send(now, &adu(&[1, 1, 0, FIRST, 0, 4]));
         // At a phase of the request and the reply that moves on from round to round.
-        bench.board.run_for(Time::from_ms(u64::from(round) * 3));
+        bench.board.run_for(Time::from_ms(u64::from(round) * 9));
         bench.write(COMMAND, &[1]).unwrap();
         bench.board.run_for(Time::from_ms(400));
         let reply = bench.air().take_received();

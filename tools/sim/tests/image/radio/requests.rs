@@ -2,14 +2,14 @@
 
 use register_map::{
     configuration::{
-        COMM_TIMEOUT, COMMAND, FILTER, KEY, LORA_AIR_RATE, LORA_FRAME_GAP, OPENING_KEY,
+        COMM_TIMEOUT, COMMAND, FILTER, KEY, LORA, LORA_AIR_RATE, LORA_FRAME_GAP, OPENING_KEY,
     },
     radio, state,
 };
-use sim::{Corner, Time};
+use sim::{Corner, Module, Time};
 
 use super::{SET_UP, bench};
-use crate::bench::{FIRST, adu, corner};
+use crate::bench::{FIRST, MODULE, adu, corner};
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
@@ -46,7 +46,7 @@ fn longest_reply_and_longest_request_pass_the_air_with_a_frame_gap_above_the_pau
         let mut bench = bench(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, gap)]);
         assert_eq!(bench.read_over_the_air(FILTER, 32).len(), 32);
         let request = [&[0x10, 0x01, 0xA0, 0, 32, 64][..], &[0; 64]].concat();
-        bench.unlock();
+        bench.write_over_the_air(KEY, OPENING_KEY);
         let reply = bench.ask_over_the_air(1, &request);
         assert_eq!(
             reply,
@@ -74,14 +74,43 @@ fn request_of_several_packets_with_pauses_above_the_frame_gap_is_lost_and_the_ne
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn broadcast_over_the_air_is_obeyed_in_silence() {
-    let mut bench = bench(&[]);
-    bench.unlock();
+fn broadcast_over_the_air_writes_points_in_silence_and_no_setting() {
+    let mut bench = bench(&[(MODULE, Module::Do4.code())]);
+    bench.write_over_the_air(KEY, OPENING_KEY);
     let before = bench.packets_of_the_unit().len();
     let [a, b] = FILTER.to_be_bytes();
     assert_eq!(bench.ask_over_the_air(0, &[6, a, b, 0, 99]), None);
+    assert_eq!(bench.ask_over_the_air(0, &[5, 0, FIRST, 0xFF, 0]), None);
     assert_eq!(bench.packets_of_the_unit().len(), before);
-    assert_eq!(bench.register(FILTER), 99);
+    assert_eq!(bench.register(FILTER), 5);
+    assert_eq!(bench.bits(1, FIRST.into(), 1), Ok(vec![true]));
+}
+
+/// A stranger in radio range asks for what the page on the radio says that nobody gets over the air.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn radio_for_points_and_reads_only_serves_nothing_else() {
+    let mut bench = bench(&[(LORA, 2)]);
+    let [k, y] = KEY.to_be_bytes();
+    let [c, d] = COMMAND.to_be_bytes();
+    bench.unlock();
+    for request in [
+        &[6, k, y, 0x5A, 0x17][..],
+        &[6, c, d, 0, 2],
+        &[8, 0, 4, 0, 0],
+        &[8, 0, 1, 0, 0],
+        &[8, 0, 10, 0, 0],
+    ] {
+        let refused = Some(vec![request[0] | 0x80, 6]);
+        assert_eq!(
+            bench.ask_over_the_air(1, request),
+            refused,
+            "{request:02X?}"
+        );
+    }
+    assert_eq!(bench.register(KEY), 1, "the cable keeps the lock");
+    bench.assert_answers_over_the_air();
+    assert_eq!(bench.read_over_the_air(KEY, 1), [0]);
 }
 
 #[test]
@@ -112,7 +141,7 @@ fn save_and_restart_ordered_over_the_air_are_answered_before_they_are_executed()
 fn command_of_one_line_waits_for_its_own_reply_only() {
     let mut bench = bench(&[]);
     bench.tolerant = true;
-    bench.unlock();
+    bench.write_over_the_air(KEY, OPENING_KEY);
     // A restart ordered over the air, while the other line is polled without pause.
     let [a, b] = COMMAND.to_be_bytes();
     let now = bench.board.now();

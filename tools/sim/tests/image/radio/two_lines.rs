@@ -1,7 +1,9 @@
 //! Orders over one line, and what happens over the other one at the same time.
 
 use register_map::{
-    configuration::{COMM_TIMEOUT, COMMAND, FILTER, LORA_AIR_RATE, LORA_FRAME_GAP},
+    configuration::{
+        COMM_TIMEOUT, COMMAND, FILTER, KEY, LORA_AIR_RATE, LORA_FRAME_GAP, OPENING_KEY,
+    },
     points, state,
 };
 use sim::Time;
@@ -33,8 +35,9 @@ fn save_ordered_over_the_air_is_done_before_a_restart_ordered_over_the_wire() {
     let mut bench = bench(&[]);
     bench.tolerant = true;
     bench.configure(FILTER, &[77]);
+    bench.write_over_the_air(KEY, OPENING_KEY);
     bench.order_over_the_air(1);
-    bench.write(COMMAND, &[2]).unwrap();
+    bench.command(2);
     bench.board.run_for(SET_UP);
     bench.assert_restarted();
     assert_eq!(bench.register(FILTER), 77);
@@ -45,8 +48,9 @@ fn save_ordered_over_the_air_is_done_before_a_restart_ordered_over_the_wire() {
 fn defaults_ordered_over_the_air_do_not_replace_later_settings() {
     let mut bench = bench(&[]);
     bench.configure(FILTER, &[77]);
+    bench.write_over_the_air(KEY, OPENING_KEY);
     bench.order_over_the_air(3);
-    bench.write(FILTER, &[78]).unwrap();
+    bench.configure(FILTER, &[78]);
     bench.board.run_for(SET_UP);
     assert_eq!(bench.register(FILTER), 78);
 }

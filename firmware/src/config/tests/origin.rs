@@ -1,0 +1,86 @@
+//! Which writes each line may make.
+
+use super::*;
+
+const OVER_THE_AIR: Origin = Origin {
+    line: LineName::Radio,
+    broadcast: false,
+};
+const OVER_THE_CABLE: Origin = Origin {
+    line: LineName::Rs485,
+    broadcast: false,
+};
+
+fn broadcast(line: LineName) -> Origin {
+    Origin {
+        line,
+        broadcast: true,
+    }
+}
+
+/// Returns whether KEY and the status report an open lock; both must agree.
+fn is_open(config: &mut Config, origin: Origin) -> bool {
+    config.set_origin(origin);
+    let key = read(config, KEY, 1).unwrap() == [1];
+    assert_eq!(config.status() & status::UNLOCKED != 0, key);
+    key
+}
+
+#[test]
+fn the_lock_belongs_to_the_line_that_wrote_key_last() {
+    let mut config = unlocked(&[]);
+    assert!(is_open(&mut config, OVER_THE_CABLE) && !is_open(&mut config, OVER_THE_AIR));
+    assert_eq!(write(&mut config, BETA, &[2000]), LOCKED, "over the air");
+    assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);
+    // The other line takes the lock.
+    assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+    assert!(is_open(&mut config, OVER_THE_AIR) && !is_open(&mut config, OVER_THE_CABLE));
+    assert_eq!(write(&mut config, BETA, &[2000]), LOCKED, "over the cable");
+    config.set_origin(OVER_THE_AIR);
+    assert_eq!(write(&mut config, BETA, &[2000]), DONE);
+    config.tick(60_000);
+    assert!(!is_open(&mut config, OVER_THE_AIR));
+}
+
+#[test]
+fn a_broadcast_over_the_air_writes_nothing_and_one_over_the_cable_does() {
+    for (line, expected) in [(LineName::Rs485, DONE), (LineName::Radio, LOCKED)] {
+        let mut config = config(&[(LORA, 1)]);
+        config.set_origin(broadcast(line));
+        assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), expected);
+        config.set_origin(Origin {
+            line,
+            broadcast: false,
+        });
+        assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+        config.set_origin(broadcast(line));
+        assert_eq!(write(&mut config, BETA, &[2000]), expected);
+        assert_eq!(write(&mut config, LORA, &[0]), expected);
+        assert_eq!(write(&mut config, COMMAND, &[5]).is_ok(), expected == DONE);
+        assert_eq!(
+            write(&mut config, BETA, &[1]),
+            VALUE,
+            "the value comes first"
+        );
+    }
+}
+
+#[test]
+fn air_for_points_and_reads_only_opens_no_lock_and_takes_no_command() {
+    let mut config = config(&[(LORA, 2)]);
+    assert!(config.air_serves_points_only());
+    for _ in 0..2 {
+        config.set_origin(OVER_THE_AIR);
+        assert_eq!(config.check_line(), Err(Exception::ServerDeviceBusy));
+        assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), LOCKED);
+        assert_eq!(write(&mut config, COMMAND, &[6]), LOCKED);
+        assert_eq!(write(&mut config, BETA, &[2000]), LOCKED);
+        assert_eq!(read(&config, KEY, 2), Ok(std::vec![0, 96]));
+        config.set_origin(OVER_THE_CABLE);
+        assert_eq!(config.check_line(), Ok(()));
+        assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
+        // The value of the start is in force, not the one that is written.
+        assert_eq!(write(&mut config, LORA, &[1]), DONE);
+    }
+    assert_eq!(write(&mut config, LORA, &[3]), VALUE);
+}
