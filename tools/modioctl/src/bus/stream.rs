@@ -54,7 +54,9 @@ impl Stream {
                 let lock = lock(path).map_err(not_opened)?;
                 let port = SerialPort::open(path, settings).map_err(not_opened)?;
                 #[cfg(unix)]
-                exclude(&lock);
+                if !is_pseudo_terminal(path) {
+                    exclude(&lock);
+                }
                 // Bytes received before are not part of any answer.
                 let _ = port.discard_buffers();
                 Ok(Self::Serial(Serial {
@@ -113,7 +115,8 @@ impl Stream {
     }
 }
 
-/// Locks the port against other programs: two masters on one line would garble each other's answers.
+/// Locks the port against other programs with such a lock: two masters on one line would garble each other's answers.
+/// The system removes the lock when the program ends, whatever ends it.
 #[cfg(unix)]
 fn lock(path: &str) -> io::Result<std::fs::File> {
     use rustix::fs::OFlags;
@@ -130,7 +133,8 @@ fn lock(path: &str) -> io::Result<std::fs::File> {
     }
 }
 
-/// Also prevents programs without such a lock from opening the port, except those of root.
+/// Also prevents programs without such a lock from opening the serial port, except those of root. A serial port
+/// forgets this at its last close. A pseudo-terminal whose other end stays open never does, so it has only the lock.
 #[cfg(unix)]
 fn exclude(file: &std::fs::File) {
     // A port that does not support this is used nevertheless.

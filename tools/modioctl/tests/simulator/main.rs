@@ -9,6 +9,7 @@ mod errors;
 mod gateway;
 mod listening;
 mod newer;
+mod ordinary;
 mod program;
 mod scanning;
 mod screen;
