@@ -12,7 +12,7 @@ pub use learn::{Learned, fetch, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};
-use crate::bus::{Lost, Master, Observer, adu, is_from_gateway};
+use crate::bus::{Lost, MOST, Master, Observer, adu, is_from_gateway};
 use crate::failure::Failure;
 
 /// Largest number of registers that one request can read (V1.1b3, 6.3).
@@ -215,8 +215,14 @@ impl Device {
         let unit = self.unit;
         let place = place(endpoint);
         match lost {
+            Lost::Silent if self.master.has_echo() => Failure::NoAnswer(format!(
+                "unit {unit} does not answer at {place}, and the adapter returns what it sends, which is not an answer: check power, wiring (A and B swapped?), address, rate and format; switch the echo of the adapter off if you can"
+            )),
             Lost::Silent => Failure::NoAnswer(format!(
                 "unit {unit} does not answer at {place}: check power, wiring (A and B swapped?), address, rate and format; `modioctl scan` looks for units"
+            )),
+            Lost::Garbled(bytes) if bytes.len() >= MOST => Failure::Garbled(format!(
+                "the line at {place} is never silent: wrong rate or format, a program that sends all the time, or a line without bias"
             )),
             Lost::Garbled(bytes) => {
                 let shown = bytes.get(..bytes.len().min(12)).unwrap_or_default();

@@ -7,6 +7,7 @@ mod bus;
 mod commands;
 mod errors;
 mod gateway;
+mod hostile;
 mod listening;
 mod newer;
 mod ordinary;
