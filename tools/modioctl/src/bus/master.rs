@@ -127,17 +127,6 @@ impl Master {
         Ok(())
     }
 
-    /// Closes the line and opens it with other settings.
-    ///
-    /// # Errors
-    ///
-    /// When the line cannot be opened; the error says why.
-    pub async fn reopen(self, endpoint: Endpoint) -> Result<Self, Failure> {
-        let observer = self.observer;
-        drop(self.stream);
-        Self::open(endpoint, observer).await
-    }
-
     /// Closes the line and discards bytes that the system has not sent yet. Otherwise a request without an answer
     /// could be delivered late, for example when a cable is plugged in again.
     pub fn close_unsent(self) {

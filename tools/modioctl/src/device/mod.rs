@@ -4,8 +4,6 @@ mod learn;
 mod orders;
 mod several;
 
-use std::time::Duration;
-
 use modbus_frames::names;
 
 pub use learn::{Learned, fetch, known};
@@ -152,27 +150,6 @@ impl Device {
         let response = self.ask(&request, &about).await?;
         // After function, total length, length of the group and reference type.
         Ok(response.get(4..).unwrap_or_default().to_vec())
-    }
-
-    /// Waits until the unit answers again, after a restart.
-    ///
-    /// # Errors
-    ///
-    /// When the unit did not answer within `most`.
-    pub async fn wait_until_back(&mut self, most: Duration) -> Result<(), Failure> {
-        let until = tokio::time::Instant::now() + most;
-        // A unit that has not restarted yet would also answer.
-        tokio::time::sleep(Duration::from_millis(100)).await;
-        loop {
-            match self.read_words(register_map::state::STATUS, 1).await {
-                Err(failure) if failure.may_pass() => {
-                    if tokio::time::Instant::now() > until {
-                        return Err(failure.while_doing("after the restart"));
-                    }
-                }
-                result => return result.map(|_| ()),
-            }
-        }
     }
 
     /// Returns whether a change of the unit's line settings also concerns this computer's port.

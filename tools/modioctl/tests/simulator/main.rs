@@ -12,6 +12,7 @@ mod listening;
 mod newer;
 mod ordinary;
 mod program;
+mod restart;
 mod scanning;
 mod screen;
 #[path = "../terminal/mod.rs"]
