@@ -32,6 +32,7 @@ mod error;
 mod fuzz;
 mod group;
 mod image;
+mod ordinary;
 mod peers;
 mod python;
 mod renode;

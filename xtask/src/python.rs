@@ -9,7 +9,7 @@ use register_map::board::{MODIO_02, MODIO_08};
 
 use crate::error::missing;
 use crate::workspace::Workspace;
-use crate::{build, command};
+use crate::{build, command, ordinary};
 
 /// The file that pins pymodbus and its serial port.
 pub const PYMODBUS: &str = "tools/sim/tests/pymodbus/requirements.txt";
@@ -94,9 +94,18 @@ fn on_page(workspace: &mut Workspace, name: &str) -> Result<Command> {
     script(workspace, &python, name)
 }
 
-/// Returns the call of a script that tests the images in the simulator.
+/// Returns the call of a script that tests the images in the simulator, as an ordinary user.
 fn script(workspace: &mut Workspace, interpreter: &Path, name: &str) -> Result<Command> {
-    let mut script = python(interpreter);
+    let python = python(interpreter);
+    let mut script = match ordinary::words()? {
+        [] => python,
+        [first, rest @ ..] => {
+            let mut script = Command::new(first);
+            script.args(rest).arg(python.get_program());
+            script.args(python.get_args());
+            script
+        }
+    };
     script.arg(workspace.root.join(name));
     for (option, board) in [("--elf", &MODIO_02), ("--elf-08", &MODIO_08)] {
         script.arg(option).arg(build::image(workspace, board)?);

@@ -15,7 +15,7 @@ use crate::python::{masters, page};
 use crate::renode::checks;
 use crate::steps::{self, Done};
 use crate::workspace::{ALL, Workspace};
-use crate::{bench, build, command, fuzz, group, peers, size, table};
+use crate::{bench, build, command, fuzz, group, ordinary, peers, size, table};
 
 /// The variable with the corner of the part for the tests of the image.
 pub const CORNER: &str = "MODIO_CORNER";
@@ -299,7 +299,7 @@ fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
     simulated(workspace, "--test=image_08", OWN_OF_08, &corner)
 }
 
-/// Runs tests that run the images in the simulator: those of these targets whose names contain one of `names`, or all.
+/// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one of `names`, or all.
 /// Spaces separate targets and names. The variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,
@@ -309,6 +309,11 @@ pub fn simulated(
 ) -> Result<()> {
     let mut cargo = workspace.cargo("test");
     cargo.args(ALL).args(["--features", SUITE]);
+    let ordinary = ordinary::words()?;
+    if !ordinary.is_empty() {
+        let runner = format!("target.'cfg(unix)'.runner={ordinary:?}");
+        cargo.args(["--config", &runner]);
+    }
     cargo.arg("--no-fail-fast").args(targets.split(' '));
     cargo.args(["--", "--include-ignored"]);
     cargo.args(names.split_whitespace());

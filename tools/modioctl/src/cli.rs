@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 
 use crate::bus::Options;
-use crate::bus::endpoint::duration;
+use crate::bus::endpoint::{RATES, duration};
 
 /// Finds, sets up and watches modio units over Modbus
 #[derive(Parser, Debug)]
@@ -91,7 +91,11 @@ pub enum Command {
 }
 
 /// Look for units on the line.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
+#[command(after_help = "\
+Each address has 25 ms to answer. Silent addresses are asked once more, with 150 ms each: about 40 s for all. Ctrl-C keeps \
+what was found. With --timeout there is a single pass that waits so long: for a RESPONSE_DELAY above 100 ms, or over the \
+air.")]
 pub struct Scan {
     /// Addresses to ask, such as 1-20,40
     #[arg(long, value_name = "LIST", default_value = "1-247", value_parser = units)]
@@ -141,7 +145,7 @@ fn rates(text: &str) -> Result<Rates, String> {
     let each = text.split(',').map(|part| part.trim().parse::<u32>());
     let rates = each.collect::<Result<Vec<_>, _>>();
     match rates {
-        Ok(rates) if rates.iter().all(|rate| (50..=4_000_000).contains(rate)) => Ok(Rates(rates)),
+        Ok(rates) if rates.iter().all(|rate| RATES.contains(rate)) => Ok(Rates(rates)),
         _ => Err(format!(
             "{text:?} is not a list of rates such as 9600,19200, nor `all`"
         )),

@@ -3,6 +3,7 @@
 use modio_description::{Description, PointKind, Reading, Register, Scope, Table, Value, Values};
 
 use crate::failure::Failure;
+use crate::value::number_of;
 
 /// Number of points of a port.
 const CHANNELS: u16 = 4;
@@ -151,13 +152,15 @@ impl Book {
         if let Some(item) = self.items.iter().find(|item| slug(&item.name) == wanted) {
             return Ok(item.clone());
         }
-        if let Some(address) = address(name) {
-            let at = |item: &&Item| address.wrapping_sub(item.address) < item.words;
-            let known = self
-                .items
-                .iter()
-                .find(at)
-                .filter(|item| item.address == address);
+        if let Some(address) = number_of(name) {
+            // The first item that contains the address, if it begins there.
+            let at = |item: &&Item| {
+                address
+                    .checked_sub(item.address)
+                    .is_some_and(|n| n < item.words)
+            };
+            let known = self.items.iter().find(at);
+            let known = known.filter(|item| item.address == address);
             return Ok(known.cloned().unwrap_or_else(|| unknown(address)));
         }
         Err(Failure::usage(self.no_such(name, &wanted)))
@@ -191,14 +194,6 @@ impl Book {
 /// Returns a name in the form in which names are compared.
 fn slug(name: &str) -> String {
     name.trim().to_lowercase().replace([' ', '-'], "_")
-}
-
-/// Parses an address: `0x0010`, or 16.
-fn address(text: &str) -> Option<u16> {
-    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
-        Some(digits) => u16::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
-    }
 }
 
 fn unknown(address: u16) -> Item {
@@ -420,5 +415,18 @@ mod tests {
         assert_eq!(book.points().count(), 16);
         assert_eq!(book.find("p4.4").unwrap().address, 15);
         assert!(book.find("p5.1").is_err());
+    }
+
+    #[test]
+    fn register_at_the_end_of_the_addresses_is_found() {
+        let mut description = describe(&MODIO_02, "0.1.0", |_| Module::None);
+        let counter = description
+            .registers
+            .iter_mut()
+            .find(|r| r.name == "uptime");
+        counter.unwrap().address = 0xFFFF;
+        let book = Book::new(description, Vec::new());
+        assert_eq!(book.find("0xFFFF").unwrap().name, "uptime");
+        assert_eq!(book.find("0xFFFE").unwrap().meaning, Meaning::Unknown);
     }
 }

@@ -68,7 +68,12 @@ fn register(value: &Value, words: &[u16], raw: bool) -> Shown {
             None => number(first.into(), &plain),
         },
         Value::Bits(names) if !raw => {
-            let set = names.iter().filter(|(bit, _)| first >> bit & 1 == 1);
+            let is_set = |bit: u8| {
+                first
+                    .checked_shr(bit.into())
+                    .is_some_and(|bits| bits & 1 == 1)
+            };
+            let set = names.iter().filter(|(bit, _)| is_set(*bit));
             let set: Vec<_> = set.map(|(_, name)| name.as_str()).collect();
             Shown {
                 text: if set.is_empty() {
@@ -160,10 +165,15 @@ pub fn parse(item: &Item, text: &str, raw: bool) -> Result<Vec<u16>, Failure> {
         Meaning::Analog(reading) => {
             let takes = || range(reading.min.into(), reading.max.into(), &reading.unit);
             let number = steps(text, &reading.unit).ok_or_else(|| wrong(takes()))?;
-            if !(i64::from(reading.min)..=i64::from(reading.max)).contains(&number) {
-                return Err(wrong(takes()));
-            }
-            Ok(vec![number as u16])
+            let allowed = i64::from(reading.min)..=i64::from(reading.max);
+            // A unit may describe a range that its register cannot have.
+            let word = if reading.min < 0 {
+                i16::try_from(number).map(i16::cast_unsigned)
+            } else {
+                u16::try_from(number)
+            };
+            let word = word.ok().filter(|_| allowed.contains(&number));
+            Ok(vec![word.ok_or_else(|| wrong(takes()))?])
         }
         Meaning::Value(Value::Codes(names)) => {
             let wanted = text.to_lowercase();
@@ -231,7 +241,11 @@ fn check_raw(item: &Item, word: u16) -> Result<(), String> {
 }
 
 /// Parses a number from 0 to 65535, decimal or hexadecimal.
-fn number_of(text: &str) -> Option<u16> {
+pub fn number_of(text: &str) -> Option<u16> {
+    // The functions of the standard library also accept a sign.
+    if text.contains(['+', '-']) {
+        return None;
+    }
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => u16::from_str_radix(digits, 16).ok(),
         None => text.parse().ok(),
@@ -388,6 +402,31 @@ mod tests {
         assert!(wrong("FRAME_GAP", "1.23").contains("0.2 to 100.0 ms, or 0"));
         for text in ["", "-1", "1e300", "nan", "99999999999999999999", "ä"] {
             assert!(parsed(&book, "COMM_TIMEOUT", text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_a_description_that_no_register_has_do_not_overflow() {
+        let mut item = book(1, 1).find("status").unwrap();
+        item.meaning = Meaning::Value(Value::Bits(vec![(0, "a".into()), (200, "b".into())]));
+        assert_eq!(show(&item, &[0xFFFF], false).text, "a");
+
+        let mut item = book(1, 1).find("p5.3").unwrap();
+        let Meaning::Analog(reading) = &mut item.meaning else {
+            panic!("not an analog point");
+        };
+        (reading.min, reading.max) = (0, i32::MAX);
+        assert_eq!(parse(&item, "65535", false), Ok(vec![0xFFFF]));
+        assert!(parse(&item, "65536", false).is_err());
+    }
+
+    #[test]
+    fn raw_numbers_are_decimal_or_hexadecimal_without_a_sign() {
+        let item = book(1, 1).find("COMM_TIMEOUT").unwrap();
+        let raw = |text| parse(&item, text, true).ok();
+        assert_eq!([raw("16"), raw("0x10")], [Some(vec![16]), Some(vec![16])]);
+        for text in ["+16", "-1", "0x+5", "0x", "1.5", "on", "", "65536"] {
+            assert_eq!(raw(text), None, "{text}");
         }
     }
 }

@@ -10,6 +10,9 @@ use super::adu::Framing;
 use super::format::Format;
 use crate::failure::Failure;
 
+/// Possible rates of a line in bit/s.
+pub const RATES: std::ops::RangeInclusive<u32> = 50..=4_000_000;
+
 /// Connection to the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -92,7 +95,7 @@ pub struct Options {
     pub modbus_tcp: Option<String>,
 
     /// Baud rate of the serial port in bit/s [default: 9600] [env: MODIO_BAUD]
-    #[arg(long, global = true, value_name = "RATE", value_parser = clap::value_parser!(u32).range(50..=4_000_000))]
+    #[arg(long, global = true, value_name = "RATE", value_parser = clap::value_parser!(u32).range(i64::from(*RATES.start())..=i64::from(*RATES.end())))]
     pub baud: Option<u32>,
 
     /// Data bits, parity, stop bits [default: 8N2] [env: MODIO_FORMAT]

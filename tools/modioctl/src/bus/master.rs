@@ -3,13 +3,14 @@
 use std::io;
 use std::time::Duration;
 
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, timeout, timeout_at};
 
-use super::adu::Framing;
+use super::adu::{ASCII_MOST, Framing};
 use super::endpoint::Endpoint;
 use super::stream::Stream;
 use super::{Direction, Waiting};
 use crate::failure::Failure;
+use register_map::state::PRODUCT_CODE;
 
 /// Pause after a broadcast, in which every unit executes it (V1.02, 2.4.1: 100 to 200 ms).
 const TURNAROUND: Duration = Duration::from_millis(100);
@@ -17,6 +18,27 @@ const TURNAROUND: Duration = Duration::from_millis(100);
 /// Silence that ends an answer, in addition to the time of some characters. USB adapters deliver bytes in batches,
 /// 16 ms apart and more.
 const BATCH: Duration = Duration::from_millis(60);
+
+/// Number of received bytes after which a line counts as never silent: several of the longest frames.
+pub const MOST: usize = 4 * ASCII_MOST;
+
+/// Number of bytes in front of a request that are discarded at most.
+const STALE: usize = 16 * 1024;
+
+/// Time limit for the system to take the bytes of a frame, in addition to the time of the frame on the line.
+const SENDING: Duration = Duration::from_secs(2);
+
+/// Reads one register. The response never equals the request, so this shows whether an adapter returns what it sends.
+const PROBE: [u8; 5] = [
+    3,
+    (PRODUCT_CODE >> 8) as u8,
+    (PRODUCT_CODE & 0xFF) as u8,
+    0,
+    1,
+];
+
+/// Number of bytes in front of a returned request that are tolerated, as in front of an answer.
+const NOISE: usize = 3;
 
 /// Reason why a request had no answer.
 #[derive(Debug)]
@@ -53,8 +75,8 @@ pub struct Master {
     transaction: u16,
     /// Time from which the next frame may be sent.
     free: Instant,
-    /// Whether the adapter returns what it sends.
-    echo: bool,
+    /// Whether the adapter returns what it sends; `None` while that is not known.
+    echo: Option<bool>,
     /// Unit and PDU of a request whose answer may still be received.
     owed: Option<(u8, Vec<u8>)>,
 }
@@ -72,7 +94,7 @@ impl Master {
             observer,
             transaction: 0,
             free: Instant::now(),
-            echo: false,
+            echo: None,
             owed: None,
         })
     }
@@ -83,15 +105,26 @@ impl Master {
         &self.endpoint
     }
 
-    /// Closes the line and opens it with other settings.
+    /// Returns whether the adapter has returned what it sends.
+    #[must_use]
+    pub const fn has_echo(&self) -> bool {
+        matches!(self.echo, Some(true))
+    }
+
+    /// Notes that the adapter returns what it sends.
+    pub(super) const fn note_echo(&mut self) {
+        self.echo = Some(true);
+    }
+
+    /// Changes rate, format and framing of the line.
     ///
     /// # Errors
     ///
-    /// When the line cannot be opened; the error says why.
-    pub async fn reopen(self, endpoint: Endpoint) -> Result<Self, Failure> {
-        let observer = self.observer;
-        drop(self.stream);
-        Self::open(endpoint, observer).await
+    /// When the port does not support the settings. The line then keeps its present ones.
+    pub fn change_line(&mut self, endpoint: Endpoint) -> Result<(), Failure> {
+        self.stream.change(&endpoint)?;
+        self.endpoint = endpoint;
+        Ok(())
     }
 
     /// Closes the line and discards bytes that the system has not sent yet. Otherwise a request without an answer
@@ -107,6 +140,9 @@ impl Master {
     ///
     /// The failure of the last attempt, unless an earlier one was garbled.
     pub async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Result<Vec<u8>, Lost> {
+        if self.echo.is_none() && !differs(pdu) {
+            self.look_for_echo(unit).await?;
+        }
         let mut garbled = None;
         for _ in 0..=self.endpoint.retries {
             match self.ask_once(unit, pdu).await {
@@ -116,6 +152,20 @@ impl Master {
             }
         }
         Err(garbled.map_or(Lost::Silent, Lost::Garbled))
+    }
+
+    /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
+    /// nothing.
+    async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
+        let mut result = Ok(());
+        for _ in 0..=self.endpoint.retries {
+            match self.ask_once(unit, &PROBE).await {
+                Err(Lost::Broken(error)) => return Err(Lost::Broken(error)),
+                Err(garbled) if self.echo.is_none() => result = Err(garbled),
+                _ => return Ok(()),
+            }
+        }
+        result
     }
 
     /// Sends a broadcast to all units.
@@ -141,15 +191,19 @@ impl Master {
         self.transaction = self.transaction.wrapping_add(1);
         let frame = self.endpoint.framing.frame(self.transaction, unit, pdu);
         self.see(Direction::Request, &frame);
-        self.stream.write(&frame).await?;
+        let time = self.endpoint.time_of(frame.len());
+        // A port whose other end reads nothing takes no more bytes when its buffer is full.
+        timeout(SENDING + time, self.stream.write(&frame))
+            .await
+            .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))?;
         // The system takes all bytes together and sends them one by one.
-        let sent = Instant::now() + self.endpoint.time_of(frame.len());
+        let sent = Instant::now() + time;
         self.free = sent + self.endpoint.frame_gap();
         Ok(frame)
     }
 
     /// Sets time-out and retries. Returns the previous values.
-    pub(super) fn be_patient(&mut self, timeout: Duration, retries: u8) -> (Duration, u8) {
+    pub(crate) const fn be_patient(&mut self, timeout: Duration, retries: u8) -> (Duration, u8) {
         let before = (self.endpoint.timeout, self.endpoint.retries);
         (self.endpoint.timeout, self.endpoint.retries) = (timeout, retries);
         before
@@ -172,9 +226,12 @@ impl Master {
         }
         // On a line that is never silent, the request is sent nevertheless.
         let most = self.free + self.endpoint.timeout;
+        let mut discarded = 0;
         loop {
             let mut stale = Vec::new();
-            if self.read_until(self.free, &mut stale).await? == 0 || self.free > most {
+            let count = self.read_until(self.free, &mut stale).await?;
+            discarded += count;
+            if count == 0 || self.free > most || discarded > STALE {
                 return Ok(());
             }
             self.see(Direction::Response, &stale);
@@ -212,23 +269,31 @@ impl Master {
         };
         let own = waiting.framing.frame(self.transaction, unit, pdu);
         let last = sent + self.endpoint.timeout;
+        // An answer that has begun in time has the same time again. Nothing is longer, except a line that is never
+        // silent.
+        let end = last + self.endpoint.timeout + self.endpoint.time_of(ASCII_MOST);
         let idle = BATCH + self.endpoint.time_of(12);
+        let mut returned = false;
         let mut junk = Vec::new();
         let mut got = Vec::new();
         let mut until = last;
         loop {
-            if self
-                .read_until(until, &mut got)
-                .await
-                .map_err(Lost::Broken)?
-                > 0
+            let never_silent = junk.len() + got.len() >= MOST || Instant::now() >= end;
+            let until_now = until.min(end);
+            if !never_silent
+                && self
+                    .read_until(until_now, &mut got)
+                    .await
+                    .map_err(Lost::Broken)?
+                    > 0
             {
-                self.drop_echo(&own, pdu, &mut got);
+                returned = returned || self.drop_echo(&own, pdu, &mut got);
                 // A busy computer delivers an answer in pieces, with a pause between them.
                 let all = [junk.as_slice(), &got].concat();
                 for bytes in [&got, &all] {
                     if let Some((answer, range)) = waiting.find(bytes) {
                         self.received(bytes.get(range).unwrap_or_default());
+                        self.note_no_echo(pdu);
                         return Ok(answer);
                     }
                 }
@@ -238,30 +303,43 @@ impl Master {
             // A silence ends the answer: later bytes do not belong to it.
             if let Some(answer) = waiting.whole(&got) {
                 self.received(&got);
+                self.note_no_echo(pdu);
                 return Ok(answer);
             }
             junk.append(&mut got);
-            if Instant::now() >= last {
+            if never_silent || Instant::now() >= last {
                 break;
             }
             until = last;
         }
         self.owed = Some((unit, pdu.to_vec()));
         if junk.is_empty() {
+            self.note_no_echo(pdu);
             return Err(Lost::Silent);
         }
         self.received(&junk);
         Err(Lost::Garbled(junk))
     }
 
-    /// Removes the request from the received bytes if the adapter returns it. Whether it does is detected with a
-    /// function whose response differs from the request.
-    fn drop_echo(&mut self, own: &[u8], pdu: &[u8], got: &mut Vec<u8>) {
-        let differs = !matches!(pdu.first(), Some(0x05 | 0x06 | 0x08 | 0x16));
-        if (self.echo || differs) && got.starts_with(own) && self.endpoint.framing != Framing::Mbap
-        {
-            self.echo = true;
-            got.drain(..own.len());
+    /// Removes the request from the received bytes if the adapter returns it. Returns whether it did. An echo is
+    /// detected with a function whose response differs from the request.
+    fn drop_echo(&mut self, own: &[u8], pdu: &[u8], got: &mut Vec<u8>) -> bool {
+        let starts = 0..=NOISE.min(got.len());
+        let mut starts = starts.filter(|start| got[*start..].starts_with(own));
+        match starts.next() {
+            Some(start) if self.echo.unwrap_or_else(|| differs(pdu)) => {
+                self.echo = Some(true);
+                got.drain(..start + own.len());
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Notes that the adapter does not return what it sends: this request would have shown an echo.
+    const fn note_no_echo(&mut self, pdu: &[u8]) {
+        if self.echo.is_none() && differs(pdu) {
+            self.echo = Some(false);
         }
     }
 
@@ -280,5 +358,49 @@ impl Master {
                 bytes: bytes.to_vec(),
             });
         }
+    }
+}
+
+/// Returns whether every response to this request differs from the request.
+const fn differs(pdu: &[u8]) -> bool {
+    matches!(
+        pdu,
+        [
+            0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x0F..=0x11 | 0x14 | 0x17 | 0x18,
+            ..
+        ] | [0x2B, 0x0E, ..]
+    )
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::bus::Place;
+    use crate::bus::format::Format;
+
+    /// As a simulator that is stopped: its pseudo-terminal is full at some time.
+    #[tokio::test]
+    async fn port_whose_other_end_reads_nothing_is_an_error() {
+        let pair = portable_pty::native_pty_system()
+            .openpty(portable_pty::PtySize::default())
+            .unwrap();
+        let port = pair.master.tty_name().unwrap();
+        let endpoint = Endpoint {
+            place: Place::Serial(port.to_str().unwrap().to_owned()),
+            baud: 9600,
+            format: Format::default(),
+            framing: Framing::Rtu,
+            unit: 1,
+            timeout: Duration::from_millis(10),
+            retries: 0,
+            timeout_given: true,
+        };
+        let mut master = Master::open(endpoint, None).await.unwrap();
+        let error = loop {
+            if let Err(error) = master.put(1, &[0x41; 253]).await {
+                break error;
+            }
+        };
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
     }
 }

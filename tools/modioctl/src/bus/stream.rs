@@ -41,20 +41,15 @@ impl Stream {
     pub async fn open(endpoint: &Endpoint) -> Result<Self, Failure> {
         match &endpoint.place {
             Place::Serial(path) => {
-                let settings = |mut settings: Settings| {
-                    settings.set_raw();
-                    settings.set_baud_rate(endpoint.baud)?;
-                    if !is_pseudo_terminal(path) {
-                        set_format(&mut settings, endpoint.format);
-                    }
-                    Ok(settings)
-                };
+                let settings = |settings| with(settings, path, endpoint);
                 let not_opened = |error| not_opened(path, endpoint, &error);
                 #[cfg(unix)]
                 let lock = lock(path).map_err(not_opened)?;
                 let port = SerialPort::open(path, settings).map_err(not_opened)?;
                 #[cfg(unix)]
-                exclude(&lock);
+                if !is_pseudo_terminal(path) {
+                    exclude(&lock);
+                }
                 // Bytes received before are not part of any answer.
                 let _ = port.discard_buffers();
                 Ok(Self::Serial(Serial {
@@ -76,6 +71,23 @@ impl Stream {
                 Ok(Self::Tcp(stream))
             }
         }
+    }
+
+    /// Changes the settings of the line. Over TCP they are those of the gateway.
+    ///
+    /// # Errors
+    ///
+    /// When the port does not support them.
+    pub fn change(&mut self, endpoint: &Endpoint) -> Result<(), Failure> {
+        let (Self::Serial(serial), Place::Serial(path)) = (self, &endpoint.place) else {
+            return Ok(());
+        };
+        let port = &mut serial.port;
+        let changed = port
+            .get_configuration()
+            .and_then(|settings| with(settings, path, endpoint))
+            .and_then(|settings| port.set_configuration(&settings));
+        changed.map_err(|error| not_opened(path, endpoint, &error))
     }
 
     /// Reads the available bytes, at least one. 0 bytes means that the other end has closed the connection.
@@ -113,7 +125,8 @@ impl Stream {
     }
 }
 
-/// Locks the port against other programs: two masters on one line would garble each other's answers.
+/// Locks the port against other programs with such a lock: two masters on one line would garble each other's answers.
+/// The system removes the lock when the program ends, whatever ends it.
 #[cfg(unix)]
 fn lock(path: &str) -> io::Result<std::fs::File> {
     use rustix::fs::OFlags;
@@ -130,7 +143,8 @@ fn lock(path: &str) -> io::Result<std::fs::File> {
     }
 }
 
-/// Also prevents programs without such a lock from opening the port, except those of root.
+/// Also prevents programs without such a lock from opening the serial port, except those of root. A serial port
+/// forgets this at its last close. A pseudo-terminal whose other end stays open never does, so it has only the lock.
 #[cfg(unix)]
 fn exclude(file: &std::fs::File) {
     // A port that does not support this is used nevertheless.
@@ -140,6 +154,16 @@ fn exclude(file: &std::fs::File) {
 /// Returns whether a port is a pseudo-terminal, which transfers bytes without parity and stop bits.
 pub fn is_pseudo_terminal(path: &str) -> bool {
     std::fs::canonicalize(path).is_ok_and(|path| path.starts_with("/dev/pts"))
+}
+
+/// Returns the settings of a port with rate and format of the endpoint.
+fn with(mut settings: Settings, path: &str, endpoint: &Endpoint) -> io::Result<Settings> {
+    settings.set_raw();
+    settings.set_baud_rate(endpoint.baud)?;
+    if !is_pseudo_terminal(path) {
+        set_format(&mut settings, endpoint.format);
+    }
+    Ok(settings)
 }
 
 fn set_format(settings: &mut Settings, format: Format) {

@@ -32,22 +32,38 @@ const INTERRUPTED: u8 = 130;
 /// # Errors
 ///
 /// The reason why the command failed.
-pub async fn run(cli: Cli) -> Result<ExitCode, Failure> {
+pub async fn run(mut cli: Cli) -> Result<ExitCode, Failure> {
     let until_stopped = matches!(
         cli.command,
         Command::Watch(_) | Command::Monitor(_) | Command::Sniff(_)
     );
+    if let Command::Scan(options) = &cli.command {
+        let options = options.clone();
+        let endpoint = endpoint(&mut cli)?;
+        let observer = cli.trace.then(trace::to_stderr);
+        let complete = scan::run(endpoint, observer, &options, cli.json).await?;
+        return Ok(if complete {
+            ExitCode::SUCCESS
+        } else {
+            stopped()
+        });
+    }
     tokio::select! {
         // Ctrl-C is handled before the command begins.
         biased;
         _ = tokio::signal::ctrl_c() => Ok(if until_stopped {
             ExitCode::SUCCESS
         } else {
-            eprintln!("modioctl: stopped");
-            ExitCode::from(INTERRUPTED)
+            stopped()
         }),
         result = dispatch(cli) => result.map(|()| ExitCode::SUCCESS),
     }
+}
+
+/// Reports that Ctrl-C has ended the command. Returns the exit status.
+fn stopped() -> ExitCode {
+    eprintln!("modioctl: stopped");
+    ExitCode::from(INTERRUPTED)
 }
 
 async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
@@ -77,9 +93,6 @@ async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
         return sniff::run(&endpoint, &options, json).await;
     }
     let observer = cli.trace.then(trace::to_stderr);
-    if let Command::Scan(options) = cli.command {
-        return scan::run(endpoint, observer, &options, json).await;
-    }
     let mut device = Device::open(endpoint, observer).await?;
     device.refresh = cli.refresh;
     match cli.command {

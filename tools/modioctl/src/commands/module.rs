@@ -68,6 +68,7 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
 /// When the unit does not answer or refuses.
 pub async fn reboot(mut device: Device) -> Result<(), Failure> {
     device.unlock().await?;
+    device.warn_of_restart().await?;
     let mut device = device.restart().await?;
     let words = device
         .read_words(state::MODULE_STATE, points::PORTS)

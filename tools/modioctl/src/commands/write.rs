@@ -29,6 +29,8 @@ pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
     {
         device.unlock().await?;
     }
+    let settings = checked.iter().filter(|(item, _)| item.setting);
+    device.warn_of_line(settings.map(|(item, _)| item.address));
     for (item, words) in &checked {
         device.write_item(item, words).await?;
     }

@@ -4,15 +4,13 @@ mod learn;
 mod orders;
 mod several;
 
-use std::time::Duration;
-
 use modbus_frames::names;
 
 pub use learn::{Learned, fetch, known};
 pub use orders::with_modules;
 
 use crate::bus::endpoint::{Endpoint, Place};
-use crate::bus::{Lost, Master, Observer, adu, is_from_gateway};
+use crate::bus::{Lost, MOST, Master, Observer, adu, is_from_gateway};
 use crate::failure::Failure;
 
 /// Largest number of registers that one request can read (V1.1b3, 6.3).
@@ -160,27 +158,6 @@ impl Device {
         Ok(response.get(4..).unwrap_or_default().to_vec())
     }
 
-    /// Waits until the unit answers again, after a restart.
-    ///
-    /// # Errors
-    ///
-    /// When the unit did not answer within `most`.
-    pub async fn wait_until_back(&mut self, most: Duration) -> Result<(), Failure> {
-        let until = tokio::time::Instant::now() + most;
-        // A unit that has not restarted yet would also answer.
-        tokio::time::sleep(Duration::from_millis(100)).await;
-        loop {
-            match self.read_words(register_map::state::STATUS, 1).await {
-                Err(failure) if failure.may_pass() => {
-                    if tokio::time::Instant::now() > until {
-                        return Err(failure.while_doing("after the restart"));
-                    }
-                }
-                result => return result.map(|_| ()),
-            }
-        }
-    }
-
     /// Returns whether a change of the unit's line settings also concerns this computer's port.
     #[must_use]
     pub const fn is_serial(&self) -> bool {
@@ -223,8 +200,14 @@ impl Device {
         let unit = self.unit;
         let place = place(endpoint);
         match lost {
+            Lost::Silent if self.master.has_echo() => Failure::NoAnswer(format!(
+                "unit {unit} does not answer at {place}, and the adapter returns what it sends, which is not an answer: check power, wiring (A and B swapped?), address, rate and format; switch the echo of the adapter off if you can"
+            )),
             Lost::Silent => Failure::NoAnswer(format!(
                 "unit {unit} does not answer at {place}: check power, wiring (A and B swapped?), address, rate and format; `modioctl scan` looks for units"
+            )),
+            Lost::Garbled(bytes) if bytes.len() >= MOST => Failure::Garbled(format!(
+                "the line at {place} is never silent: wrong rate or format, a program that sends all the time, or a line without bias"
             )),
             Lost::Garbled(bytes) => {
                 let shown = bytes.get(..bytes.len().min(12)).unwrap_or_default();

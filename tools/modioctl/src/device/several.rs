@@ -82,7 +82,7 @@ fn joined(spans: &[(Table, u16, u16)]) -> Vec<(Table, u16, u16)> {
                 if before == table
                     && !BLOCKS.iter().any(|block| block.first == *address)
                     && u32::from(*first) + u32::from(*length) == u32::from(*address)
-                    && *length + count <= MOST =>
+                    && length.saturating_add(*count) <= MOST =>
             {
                 *length += count;
             }
@@ -112,6 +112,9 @@ mod tests {
             joined(&many),
             [(Word, 0x1000, 120), (Word, 0x1078, 120), (Word, 0x10F0, 60)]
         );
+        // A description may have a longer item than there are addresses.
+        let long = [(Word, 0x1000, 0xEFFF), (Word, 0xFFFF, 0xFFFF)];
+        assert_eq!(joined(&long).len(), 2);
         // The fault record and the counters of the radio are two blocks.
         let blocks = [(Word, 0x026F, 1), (Word, 0x0270, 1), (Word, 0x0271, 1)];
         assert_eq!(joined(&blocks), [(Word, 0x026F, 1), (Word, 0x0270, 2)]);

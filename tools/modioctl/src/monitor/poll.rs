@@ -197,8 +197,8 @@ impl Poller {
             .fold(0, |long: u64, word| long << 16 | u64::from(*word));
         if let Some((before, at)) = self.uptime {
             // A unit on its internal oscillator may count a few per cent slower.
-            let least = before + at.elapsed().as_secs() * 9 / 10;
-            if now + 2 < least || now < before {
+            let least = before.saturating_add(at.elapsed().as_secs() * 9 / 10);
+            if now.saturating_add(2) < least || now < before {
                 self.waiting.clear();
                 self.plan = None;
             }

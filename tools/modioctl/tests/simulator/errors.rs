@@ -2,10 +2,13 @@
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
+use std::os::unix::fs::{PermissionsExt, chown};
+use std::path::PathBuf;
 use std::thread;
 
 use modioctl::bus::adu::Framing;
 
+use crate::ordinary::Ordinary;
 use crate::program::{At, Ran, modioctl};
 use crate::unit::Unit;
 
@@ -173,51 +176,52 @@ fn a_port_that_cannot_be_opened_is_status_5() {
     at.run("info").fine();
 }
 
-/// Root may open every port, so in that case the program runs as a user without permission.
-#[cfg(unix)]
-#[test]
-fn a_port_without_permission_is_status_5_and_names_the_group() {
-    use std::os::unix::fs::{MetadataExt, PermissionsExt};
-    use std::os::unix::process::CommandExt;
-
-    const NOBODY: u32 = 65534;
-    const ROOT: u32 = 0;
-    const DAEMON: u32 = 1;
-    let pseudo_terminal = portable_pty::native_pty_system()
+/// Returns a pseudo-terminal and the path of the end that programs open.
+fn pseudo_terminal() -> (portable_pty::PtyPair, PathBuf) {
+    let pair = portable_pty::native_pty_system()
         .openpty(portable_pty::PtySize::default())
         .unwrap();
-    let port = pseudo_terminal.master.tty_name().unwrap();
-    let permissions = |bits| std::fs::Permissions::from_mode(bits);
-    std::fs::set_permissions(&port, permissions(0)).unwrap();
-    // Every user may run the program from here.
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::set_permissions(folder.path(), permissions(0o755)).unwrap();
-    let is_root = folder.path().metadata().unwrap().uid() == ROOT;
-    let program = folder.path().join("modioctl");
-    // By another process: a child that a thread starts while this process writes the file would keep it open, and a
-    // program that is open for writing cannot be started.
-    let source = env!("CARGO_BIN_EXE_modioctl");
-    let copied = std::process::Command::new("cp")
-        .arg(source)
-        .arg(&program)
-        .status();
-    assert!(copied.unwrap().success());
+    let port = pair.master.tty_name().unwrap();
+    (pair, port)
+}
+
+#[test]
+fn a_port_without_permission_is_status_5_and_names_the_group() {
+    const ROOT: u32 = 0;
+    const DAEMON: u32 = 1;
+    let (_open, port) = pseudo_terminal();
+    std::fs::set_permissions(&port, PermissionsExt::from_mode(0o000)).unwrap();
+    let user = Ordinary::new();
     let refused = |group: u32| {
-        let mut command = std::process::Command::new(&program);
-        command.arg("--port").arg(&port).arg("info");
-        if is_root {
-            std::os::unix::fs::chown(&port, None, Some(group)).unwrap();
-            command.uid(NOBODY).gid(NOBODY);
+        if user.is_root {
+            chown(&port, None, Some(group)).unwrap();
         }
+        let mut command = user.modioctl(&["--port", port.to_str().unwrap(), "info"]);
         let text = Ran::of(&command.output().unwrap()).failed(5);
         assert!(text.contains("no permission for /dev/pts/"), "{text}");
         text
     };
     let (of_daemon, of_root) = (refused(DAEMON), refused(ROOT));
-    if is_root {
+    if user.is_root {
         let joins = of_daemon.contains("sudo usermod -aG daemon $USER");
         assert!(joins, "{of_daemon}");
         let takes = of_root.contains("sudo chown $USER /dev/pts/");
         assert!(takes, "{of_root}");
+    }
+}
+
+/// The other end of the pseudo-terminal stays open, as that of a simulator does.
+#[test]
+fn a_pseudo_terminal_is_free_for_every_program_when_the_program_has_ended() {
+    let (_open, port) = pseudo_terminal();
+    let user = Ordinary::new();
+    user.give(&port);
+    let port = port.to_str().unwrap();
+    for _ in 0..2 {
+        let words = ["--port", port, "--timeout", "10ms", "read", "0"];
+        let text = Ran::of(&user.modioctl(&words).output().unwrap()).failed(3);
+        assert!(text.contains("does not answer"), "{text}");
+        let mut other = user.command("sh", &["-c", "exec 3<>$0", port]);
+        assert!(other.status().unwrap().success());
     }
 }

@@ -7,9 +7,12 @@ mod bus;
 mod commands;
 mod errors;
 mod gateway;
+mod hostile;
 mod listening;
 mod newer;
+mod ordinary;
 mod program;
+mod restart;
 mod scanning;
 mod screen;
 #[path = "../terminal/mod.rs"]

@@ -58,12 +58,13 @@ fn found(at: &At, words: &str) -> BTreeSet<u8> {
 /// A busy computer lengthens some of the waits, so the shortest quarter of them counts.
 #[test]
 fn a_missing_unit_takes_a_third_of_the_time_of_sequential_waiting() {
-    let addresses: BTreeSet<u8> = (0..30).map(|n| n * 8 + 3).collect();
+    let addresses: BTreeSet<u8> = (0..5).map(|n| n * 8 + 3).collect();
     let (bus, requests) = bus(addresses.clone(), Duration::from_millis(12));
-    assert_eq!(found(&At::tcp(bus), "scan --units 1-247"), addresses);
-    let requests: Vec<_> = requests.try_iter().take(247).collect();
+    assert_eq!(found(&At::tcp(bus), "scan --units 1-40"), addresses);
+    // The silent addresses are asked again after all of them.
+    let requests: Vec<_> = requests.try_iter().take(40).collect();
     assert!(
-        (1..=247).eq(requests.iter().map(|request| request.0)),
+        (1..=40).eq(requests.iter().map(|request| request.0)),
         "{requests:?}"
     );
     let missing = requests
@@ -112,5 +113,97 @@ fn a_unit_that_answers_late_is_found() {
             addresses,
             "{delay} ms"
         );
+    }
+}
+
+/// A bus of units with a RESPONSE_DELAY of 100 ms. A unit drops its answer when another request comes before. The
+/// receiver gets the unit of each request.
+fn delayed(addresses: &[u8]) -> (SocketAddr, Receiver<u8>) {
+    let (tell, requests) = mpsc::channel();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let addresses = addresses.to_vec();
+    thread::spawn(move || {
+        let (mut master, _) = listener.accept().unwrap();
+        let mut server = Server::new(None, Device::new(4, 4));
+        let mut bytes = [0; 512];
+        let mut answer: Option<Vec<u8>> = None;
+        loop {
+            let delay = answer.is_some().then_some(Duration::from_millis(100));
+            master.set_read_timeout(delay).unwrap();
+            match (master.read(&mut bytes), answer.take()) {
+                (Ok(0), _) => return,
+                (Ok(count), _) => {
+                    let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
+                    let _ = tell.send(unit);
+                    let pdu = server.answer(&pdu);
+                    let pdu = pdu.unwrap_or_else(|code| vec![bytes[1] | 0x80, code]);
+                    answer = addresses.contains(&unit).then(|| framed(None, unit, &pdu));
+                }
+                (Err(_), Some(answer)) => master.write_all(&answer).unwrap(),
+                (Err(error), None) => panic!("{error}"),
+            }
+        }
+    });
+    (address, requests)
+}
+
+#[test]
+fn units_with_a_response_delay_are_found_by_the_second_pass() {
+    let (bus, _) = delayed(&[2, 5, 6]);
+    let units = found(&At::tcp(bus), "scan --units 1-9");
+    assert_eq!(units, BTreeSet::from([2, 5, 6]));
+}
+
+#[test]
+fn ctrl_c_keeps_the_units_that_were_found() {
+    let (bus, requests) = delayed(&[1]);
+    let scan = At::tcp(bus).start("scan");
+    // The second pass has asked unit 1.
+    while requests.recv().unwrap() != 247 {}
+    while requests.recv().unwrap() != 2 {}
+    let id = scan.child.id().to_string();
+    std::process::Command::new("kill")
+        .args(["-INT", &id])
+        .status()
+        .unwrap();
+    let ran = scan.end();
+    assert_eq!(ran.status, 130, "{ran:?}");
+    assert!(ran.out.starts_with("1  "), "{ran:?}");
+}
+
+/// A gateway that delivers each answer when the addresses after it are asked.
+#[test]
+fn an_answer_that_is_a_second_late_belongs_to_its_own_unit_and_is_not_a_second_unit() {
+    let addresses = BTreeSet::from([1, 4]);
+    let asked = addresses.clone();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let bus = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        let (mut master, _) = listener.accept().unwrap();
+        let mut bytes = [0; 512];
+        while let Ok(count @ 1..) = master.read(&mut bytes) {
+            let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
+            if !asked.contains(&unit) {
+                continue;
+            }
+            let wait = if pdu == [0x11] { 700 } else { 0 };
+            let answer = framed(None, unit, &[pdu[0] | 0x80, 1]);
+            let mut line = master.try_clone().unwrap();
+            thread::spawn(move || {
+                thread::sleep(Duration::from_millis(wait));
+                let _ = line.write_all(&answer);
+            });
+        }
+    });
+    assert_eq!(found(&At::tcp(bus), "scan --units 1-12"), addresses);
+}
+
+#[test]
+fn a_scan_that_finds_nothing_names_the_response_delay_and_the_radio() {
+    let (bus, _) = bus(BTreeSet::new(), Duration::ZERO);
+    let text = At::tcp(bus).run("scan --units 1-2").failed(3);
+    for part in ["RESPONSE_DELAY", "over the air", "--timeout"] {
+        assert!(text.contains(part), "{text}");
     }
 }

@@ -62,6 +62,10 @@ pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), 
         Config::Import { file, restart } => import(device, &book, &file, restart).await,
         Config::Reset { restart } => {
             device.unlock().await?;
+            let (items, values) = settings(&mut device, &book).await?;
+            let changes = items.iter().zip(&values);
+            let changes = changes.filter(|(item, words)| words[..] != [item.default]);
+            device.warn_of_line(changes.map(|(item, _)| item.address));
             device
                 .order(Command::LoadDefaults.code(), "loading the factory settings")
                 .await?;
@@ -113,6 +117,7 @@ async fn get(
 
 /// Writes settings that have been checked. The lock must be open.
 async fn write(device: &mut Device, changes: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+    device.warn_of_line(changes.iter().map(|(item, _)| item.address));
     // Modules first: a change of module resets the settings of its points. Registers with consecutive addresses go in one
     // request, so that the unit checks FORMAT and MODE together.
     let mut sorted: Vec<_> = changes.iter().collect();

@@ -1,0 +1,107 @@
+//! Tests with lines that return what they receive, or that are never silent. They must never count as a unit, and must
+//! end every command.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::thread;
+use std::time::Duration;
+
+use modbus_reference::{Device, Server, framed};
+use modioctl::bus::adu::Framing;
+
+use crate::program::At;
+
+/// Commands with requests whose responses equal the request.
+const COMMANDS: [&str; 10] = [
+    "write 0=1",
+    "config set BAUD=9600",
+    "identify",
+    "reboot",
+    "raw 05 0000 FF00",
+    "raw 06 0000 0001",
+    "raw 08 0000 1234",
+    "raw 15 09 06 0001 0000 0001 1234",
+    "raw 16 0000 0000 0000",
+    "raw 41 00",
+];
+
+/// Serves each connection in a new thread.
+fn serve(connection: impl Fn(TcpStream) + Clone + Send + 'static) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        for master in listener.incoming().flatten() {
+            master.set_nodelay(true).unwrap();
+            let connection = connection.clone();
+            thread::spawn(move || connection(master));
+        }
+    });
+    address
+}
+
+/// An adapter that returns what it sends. With `delay` there is also a unit with address 1, which answers after that
+/// time.
+fn echo(delay: Option<Duration>) -> SocketAddr {
+    serve(move |mut master| {
+        let mut server = Server::new(None, Device::new(4, 4));
+        let mut bytes = [0; 512];
+        while let Ok(count @ 1..) = master.read(&mut bytes) {
+            if master.write_all(&bytes[..count]).is_err() {
+                return;
+            }
+            let (Some(delay), Some((1, pdu))) = (delay, Framing::Rtu.open(&bytes[..count])) else {
+                continue;
+            };
+            let answer = server.answer(&pdu);
+            let answer = answer.unwrap_or_else(|code| vec![pdu[0] | 0x80, code]);
+            thread::sleep(delay);
+            let _ = master.write_all(&framed(None, 1, &answer));
+        }
+    })
+}
+
+#[test]
+fn an_echo_is_not_mistaken_for_a_unit() {
+    let nobody = echo(None);
+    for at in [At::tcp(nobody), At::modbus_tcp(nobody)] {
+        for words in COMMANDS {
+            let words = format!("--timeout 20ms --retries 1 {words}");
+            let text = at.run(&words).failed(3);
+            assert!(text.contains("returns what it sends"), "{words}: {text}");
+        }
+        let text = at.run("--timeout 20ms scan --units 1-3").failed(3);
+        assert!(text.contains("returns what it sends"), "{text}");
+    }
+}
+
+#[test]
+fn a_unit_behind_an_echo_answers() {
+    for delay in [Duration::ZERO, Duration::from_millis(30)] {
+        let at = At::tcp(echo(Some(delay)));
+        for words in ["raw 05 0000 FF00", "raw 06 0001 0007", "write 1=7"] {
+            at.run(words).fine();
+        }
+    }
+}
+
+#[test]
+fn a_line_that_is_never_silent_is_status_4() {
+    let line = serve(|mut master| while master.write_all(&[0; 4096]).is_ok() {});
+    for at in [At::tcp(line), At::modbus_tcp(line)] {
+        for words in ["read 0", "info", "watch 0 --count 1"] {
+            let words = format!("--timeout 100ms --retries 0 {words}");
+            assert_eq!(at.run(&words).status, 4, "{words}");
+        }
+        let ran = at.run("scan");
+        assert!(
+            ran.out.starts_with("the line is never silent at "),
+            "{ran:?}"
+        );
+        assert_eq!(ran.status, 4, "{ran:?}");
+        for words in COMMANDS {
+            let words = format!("--timeout 100ms --retries 0 {words}");
+            let text = at.run(&words).failed(4);
+            assert!(text.contains("is never silent"), "{words}: {text}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Tests of a restart after which the unit has other line settings, or not.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::thread;
+
+use modioctl::bus::adu::Framing;
+use register_map::configuration::{BAUD, COMMAND, KEY, MODE};
+use register_map::state::UPTIME;
+
+use crate::program::At;
+use crate::unit::Unit;
+
+/// What a restart does.
+#[derive(Clone, Copy)]
+enum Restart {
+    /// The values of the registers are saved.
+    Saved,
+    /// They are not, and a restart loses them.
+    Unsaved,
+    /// They are saved, and the gateway does not follow.
+    Gateway,
+}
+
+/// A unit over TCP in RTU mode whose registers announce ASCII mode.
+fn unit(mode: Restart) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        let mut framing = Framing::Rtu;
+        for mut master in listener.incoming().flatten() {
+            master.set_nodelay(true).unwrap();
+            let mut words = vec![0_u16; 0x400];
+            words[usize::from(UPTIME) + 1] = 1000;
+            words[usize::from(BAUD)] = 96;
+            words[usize::from(MODE)] = 1;
+            let mut bytes = [0; 512];
+            while let Ok(count @ 1..) = master.read(&mut bytes) {
+                let Some((unit, pdu)) = framing.open(&bytes[..count]) else {
+                    continue;
+                };
+                let word = |at: usize| u16::from_be_bytes([pdu[at], pdu[at + 1]]);
+                let answer = match pdu[0] {
+                    3 => {
+                        let words = &words[word(1).into()..][..word(3).into()];
+                        let bytes: Vec<_> = words.iter().flat_map(|w| w.to_be_bytes()).collect();
+                        [vec![3, bytes.len() as u8], bytes].concat()
+                    }
+                    _ => pdu.clone(),
+                };
+                master.write_all(&framing.frame(0, unit, &answer)).unwrap();
+                if pdu[0] == 6 && word(1) == COMMAND {
+                    words[usize::from(UPTIME) + 1] = 0;
+                    framing = match mode {
+                        Restart::Saved => Framing::Ascii,
+                        Restart::Unsaved => Framing::Rtu,
+                        // Nothing more is answered.
+                        Restart::Gateway => Framing::Mbap,
+                    };
+                } else if pdu[0] == 6 {
+                    assert_eq!(word(1), KEY);
+                }
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn a_restart_is_followed_by_the_settings_with_which_the_unit_answers() {
+    for (mode, wanted) in [
+        (Restart::Saved, "now answers with ASCII"),
+        (Restart::Unsaved, "still answers with RTU"),
+    ] {
+        let text = At::tcp(unit(mode)).run("--timeout 200ms reboot").fine();
+        assert!(text.contains(wanted), "{text}");
+        assert!(text.ends_with("restarted\n"), "{text}");
+    }
+    let lost = At::tcp(unit(Restart::Gateway)).run("--timeout 200ms reboot");
+    let text = lost.failed(3);
+    let both = "neither with the RTU that it had nor with the ASCII that it announced";
+    assert!(text.contains(both) && text.contains("gateway"), "{text}");
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_line_setting_that_is_not_saved_is_lost_by_a_restart_and_the_unit_is_still_found() {
+    let unit = Unit::start(1, "4di");
+    let at = At::port(unit.pty.display());
+    at.run("config set MODE=ASCII").fine();
+    let text = at.run("reboot").fine();
+    let still = "the unit still answers with 9600 bit/s 8N2 RTU";
+    assert!(text.contains(still), "{text}");
+    at.run("config set MODE=ASCII").fine();
+    at.run("config save").fine();
+    let text = at.run("reboot").fine();
+    let now = "the unit now answers with 9600 bit/s 8N2 ASCII";
+    assert!(text.contains(now), "{text}");
+}
+
+/// The cable's settings do not concern the gateway's port.
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_restart_over_the_air_keeps_the_settings_of_the_gateway() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("gateway");
+    let options = ["--module", "4di", "--lora", link.to_str().unwrap()];
+    let unit = Unit::with(1, &options);
+    unit.wait(2500);
+    let cable = At::tcp(unit.tcp);
+    cable.run("config set BAUD=19200 MODE=ASCII").fine();
+    cable.run("config save").fine();
+    let air = At::port(link.display());
+    let text = air.run("--format 8N1 --timeout 3s reboot").fine();
+    let still = "the unit still answers with 9600 bit/s 8N1 RTU";
+    assert!(text.contains(still), "{text}");
+}
+
+#[test]
+#[ignore = "needs the simulator: cargo xtask test"]
+fn a_change_of_the_line_behind_a_gateway_is_warned_of_before_it_is_in_force() {
+    let unit = Unit::with(1, &["--module", "4di", "--fixed-line"]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("unit.toml");
+    std::fs::write(&file, "FORMAT = \"8E1\"\n").unwrap();
+    let warning = |ran: crate::program::Ran| {
+        assert_eq!(ran.status, 0, "{ran:?}");
+        ran.err.contains("the gateway at")
+    };
+    let serial = At::port(unit.pty.display());
+    assert!(!warning(serial.run("config set BAUD=19200")));
+    let at = At::tcp(unit.tcp);
+    assert!(!warning(at.run("config set COMM_TIMEOUT=1")));
+    for words in [
+        "config set BAUD=19200".to_owned(),
+        "write FORMAT=8E1".to_owned(),
+        "config reset".to_owned(),
+        format!("config import {}", file.display()),
+    ] {
+        assert!(warning(at.run(&words)), "{words}");
+    }
+    let text = at.run("--timeout 300ms reboot").err;
+    assert!(text.contains("the gateway at"), "{text}");
+}
