@@ -43,7 +43,7 @@ impl<L: Mutex<T = Option<Line>>, R: Mutex<T = Option<Radio>>> Lines<L, R> {
 /// A line's part in serving.
 struct Served {
     server: Server,
-    /// Silence that ends a frame, in ms, rounded up.
+    /// Time from the end of a frame until the line reports it, in ms, rounded up.
     frame_gap_ms: u32,
     /// The command of the last request, which is executed when its reply has been sent.
     order: Option<Command>,
@@ -95,11 +95,11 @@ pub struct Serving {
 
 impl Serving {
     /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
-    /// there, in ms, rounded up; `radio_gap_ms` is that of the radio line.
-    pub const fn new(unit: u8, rs485: (Framing, u32), radio_gap_ms: u32) -> Self {
+    /// there, in ms, rounded up. The radio line reports when a frame has ended itself.
+    pub const fn new(unit: u8, rs485: (Framing, u32)) -> Self {
         Self {
             rs485: Served::new(rs485.0, rs485.1),
-            radio: Served::new(Framing::Rtu, radio_gap_ms),
+            radio: Served::new(Framing::Rtu, 0),
             unit,
         }
     }

@@ -161,7 +161,6 @@ pub fn up(
         Some(Line::new(Rs485Uart(uart), Rs485Gap(gap), port, longest_ms))
     });
 
-    let radio_gap_ms = radio_config.map_or(0, |config| config.frame_gap_ms);
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
             let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
@@ -183,11 +182,7 @@ pub fn up(
         line,
         radio,
         radio_uart,
-        serving: Serving::new(
-            identity.unit,
-            (framing, t35.div_ceil(1_000_000)),
-            radio_gap_ms.into(),
-        ),
+        serving: Serving::new(identity.unit, (framing, t35.div_ceil(1_000_000))),
         device,
         scanning,
         analog_outputs,
