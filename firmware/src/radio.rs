@@ -1,12 +1,12 @@
 //! The radio line: the LoRa radio and the port that serves Modbus RTU over it.
 //!
 //! The radio is a serial port over the air with its own timing. It outputs a frame in packets of up to 58 bytes with
-//! pauses between them, so a frame ends after LORA_FRAME_GAP instead of t3.5, and pauses inside a frame do not
-//! count. Its bytes take a millisecond each, so a task that runs once a millisecond moves them.
+//! pauses between them. So a frame ends when its length and its CRC fit, instead of after t3.5, and pauses inside a
+//! frame do not count. LORA_FRAME_GAP ends a frame that never becomes complete. Its bytes take a millisecond each, so a
+//! task that runs once a millisecond moves them.
 //!
 //! A silence is measured from the call that found the last byte. While flash is erased the task does not run for up to
-//! 40 ms. A silence that begins in that time counts as up to 40 ms shorter, and one that ends in it is not seen, so two
-//! frames with less than 40 ms between them become one.
+//! 40 ms. A silence that begins in that time counts as up to 40 ms shorter, and one that ends in it is not seen.
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal_nb::serial::{Read, Write};
@@ -22,10 +22,12 @@ use crate::{config::RadioConfig, line::ServedLine};
 pub struct RadioLine<S, M, A> {
     radio: Lora<S, M, A>,
     port: Port<'static>,
-    /// Silence that ends a frame, in milliseconds.
+    /// Silence that ends a frame that is not complete, in milliseconds.
     frame_gap_ms: u16,
-    /// Time since the last byte, in milliseconds, until the silence has ended the frame.
+    /// Time since the last byte, in milliseconds, until it has reached the frame gap.
     silence: Option<u16>,
+    /// A complete frame of another unit has just ended. A byte 0 that follows immediately is the last one of its CRC.
+    may_end_in_0: bool,
     /// A byte of the reply that the UART could not take yet.
     unsent: Option<u8>,
     /// Longest time of a packet on the air, and what is left of it since the radio began to send the last packet of a
@@ -37,6 +39,10 @@ pub struct RadioLine<S, M, A> {
 
 /// Largest number of bytes that are received in one call: more than a UART can receive while flash is erased.
 const BYTES_PER_CALL: u8 = 64;
+
+/// Longest time between two bytes of a packet as this code measures it, in milliseconds: the module outputs a byte in
+/// 1.04 ms.
+const BYTE_MS: u16 = 3;
 
 impl<S, M, A> RadioLine<S, M, A>
 where
@@ -65,6 +71,7 @@ where
             port: Port::new(Receiver::rtu(unit, false), adus),
             frame_gap_ms,
             silence: Some(0),
+            may_end_in_0: false,
             unsent: None,
             packet_ms,
             on_air_ms: 0,
@@ -123,30 +130,42 @@ where
         let _ = (0..BYTES_PER_CALL).any(|_| self.radio.read().is_err());
     }
 
+    /// Receives bytes up to the end of a frame. Returns whether a request waits to be served.
     fn receive(&mut self, now_ms: u32, passed: u16) -> bool {
-        let mut received = false;
+        let (mut received, mut complete) = (false, false);
         for _ in 0..BYTES_PER_CALL {
             let (byte, faults) = match self.radio.read() {
+                Ok(0) if self.may_end_in_0 => continue,
                 Ok(byte) => (byte, Faults::NONE),
                 Err(nb::Error::Other(_)) => (0, Faults::FRAMING),
                 Err(nb::Error::WouldBlock) => break,
             };
             self.port.received(byte, faults);
+            self.may_end_in_0 = false;
             received = true;
+            complete = self.port.is_complete();
+            if complete {
+                break;
+            }
         }
-        if received {
-            self.silence = Some(0);
-            return false;
-        }
-        let Some(silence) = &mut self.silence else {
-            return false;
+        let silence = match self.silence {
+            _ if received => 0,
+            Some(silence) => silence.saturating_add(passed),
+            None => return false,
         };
-        *silence = silence.saturating_add(passed);
-        if *silence < self.frame_gap_ms {
-            return false;
+        if silence > BYTE_MS {
+            self.may_end_in_0 = false;
         }
-        self.silence = None;
-        self.port.long_silence(now_ms)
+        self.silence = Some(silence);
+        if !complete {
+            if silence < self.frame_gap_ms {
+                return false;
+            }
+            self.silence = None;
+        }
+        let is_request = self.port.long_silence(now_ms.wrapping_sub(silence.into()));
+        self.may_end_in_0 = complete && !is_request;
+        is_request
     }
 
     /// Sends as much of the reply as the UART takes. The reply begins when the radio is free, and ends when the radio

@@ -14,6 +14,7 @@ mod file;
 mod function;
 mod head;
 mod identification;
+mod length;
 pub mod line;
 mod model;
 mod pdu;

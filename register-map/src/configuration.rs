@@ -83,8 +83,8 @@ block! {
     LORA_AIR_RATE "LORA_AIR_RATE": 0x0143 x 1, Value::Codes(AirRate::NAMES), Rule::restart(Values::up_to(5), 2);
     /// Power on the air
     LORA_POWER "LORA_POWER": 0x0144 x 1, Value::Codes(Power::NAMES), Rule::restart(Values::up_to(3), 0);
-    /// Silence that ends a LoRa frame
-    LORA_FRAME_GAP "LORA_FRAME_GAP": 0x0145 x 1, Value::number("ms"), Rule::restart(Values::range(5, 500), 50);
+    /// Silence that ends an incomplete LoRa frame
+    LORA_FRAME_GAP "LORA_FRAME_GAP": 0x0145 x 1, Value::number("ms"), Rule::restart(Values::range(5, 500), 300);
     /// NTC constant of an analog input
     BETA "BETA": 0x0160 x 32, Value::number("K"), Rule::now(Values::range(2000, 5000), 3950);
     /// Signal of an analog point; an output has a jumper too

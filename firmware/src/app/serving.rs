@@ -43,7 +43,7 @@ const BROADCAST: u8 = 0;
 /// A line's part in serving.
 struct Served {
     server: Server,
-    /// Silence that ends a frame, in ms, rounded up.
+    /// Time from the end of a frame until the line reports it, in ms, rounded up.
     frame_gap_ms: u32,
     /// The command of the last request, which is executed when its reply has been sent.
     order: Option<Command>,
@@ -95,14 +95,9 @@ pub struct Serving {
 
 impl Serving {
     /// Creates the servers of a unit. `rs485` is the framing of the RS-485 line and the silence that ends a frame
-    /// there, in ms, rounded up; `radio_gap_ms` is that of the radio line. `points_only`: the radio line serves points
-    /// and reads only.
-    pub const fn new(
-        unit: u8,
-        rs485: (Framing, u32),
-        radio_gap_ms: u32,
-        points_only: bool,
-    ) -> Self {
+    /// there, in ms, rounded up. The radio line reports when a frame has ended itself. `points_only`: the radio line
+    /// serves points and reads only.
+    pub const fn new(unit: u8, rs485: (Framing, u32), points_only: bool) -> Self {
         let radio = Server::new(Framing::Rtu);
         let radio = if points_only {
             radio.with_read_only_diagnostics()
@@ -111,7 +106,7 @@ impl Serving {
         };
         Self {
             rs485: Served::new(Server::new(rs485.0), rs485.1),
-            radio: Served::new(radio, radio_gap_ms),
+            radio: Served::new(radio, 0),
             unit,
         }
     }

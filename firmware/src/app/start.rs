@@ -165,7 +165,6 @@ pub fn up(
         Some(Line::new(Rs485Uart(uart), Rs485Gap(gap), port, longest_ms))
     });
 
-    let radio_gap_ms = radio_config.map_or(0, |config| config.frame_gap_ms);
     let (radio, radio_uart) = radio_config
         .and_then(|config| {
             let (uart, mode, aux) = board.radio.start(&mut board.rcc)?;
@@ -190,7 +189,6 @@ pub fn up(
         serving: Serving::new(
             identity.unit,
             (framing, t35.div_ceil(1_000_000)),
-            radio_gap_ms.into(),
             points_only,
         ),
         device,

@@ -74,6 +74,22 @@ impl<'a, U: Units> Port<'a, U> {
         self.receiver.character(byte, faults);
     }
 
+    /// Returns whether the RTU frame so far has a valid CRC and the length that its function requires: of a request,
+    /// or, for a frame of another unit, of a request or a reply. On a line with pauses inside frames, like a radio, the
+    /// caller may then end the frame with [`long_silence`](Self::long_silence) without waiting.
+    ///
+    /// Always `false` for function 08 with more than one data word, for a function of unknown length, for a damaged
+    /// frame, while there is no buffer for the frame, and in ASCII mode.
+    ///
+    /// The beginning of a longer frame can be complete by chance, with a probability of 1 in 65,536. All but the last
+    /// byte of a frame of another unit can be complete if that byte is 0, because a CRC that ends in 0 is valid without
+    /// it. So a byte 0 that follows immediately belongs to the frame.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.receiver.is_complete()
+    }
+
     /// Ends the short silence, in tick `now`. Returns whether a request waits to be served. That is only possible
     /// on an ASCII line: its frame was complete, and its sender has released the line by now.
     #[inline]

@@ -8,7 +8,7 @@ use super::state::{
 use super::{Faults, Framing, Units};
 use crate::counters::count;
 use crate::server::BROADCAST;
-use crate::{Adu, LineCounters, crc};
+use crate::{Adu, LineCounters, crc, length};
 
 /// A valid request for this unit, or a broadcast.
 #[derive(Debug)]
@@ -138,6 +138,27 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.state & ASCII_IDLE == ASCII && self.reader.is_over()
     }
 
+    /// Returns whether the RTU frame so far has a valid CRC and the length that its function requires: of a request,
+    /// or, for a frame of another unit, of a request or a reply. Always `false` in ASCII mode, for a damaged frame, and
+    /// for a frame that is not stored.
+    // Inlined, so that the caller decides whether this code is in RAM.
+    #[inline(always)]
+    pub fn is_complete(&self) -> bool {
+        // The CRC is almost never valid before the end, so this is cheap for a call after each character.
+        if self.check != crc::GOOD || self.state != 0 {
+            return false;
+        }
+        self.filling.as_ref().is_some_and(|adu| {
+            length::is_request(adu) || (!self.takes(adu.get(0)) && length::is_reply(adu))
+        })
+    }
+
+    /// Returns whether requests to this address are taken.
+    #[inline(always)]
+    fn takes(&self, address: u8) -> bool {
+        address == BROADCAST || self.units.contains(address)
+    }
+
     /// Returns whether no frame has begun.
     pub const fn is_idle(&self) -> bool {
         self.state & IDLE != 0
@@ -203,8 +224,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             return None;
         }
         count(&mut self.counters.bus_messages);
-        let is_for_us = address == BROADCAST || self.units.contains(address);
-        if !is_for_us {
+        if !self.takes(address) {
             return None;
         }
         if state & (TORN | UNKEPT) != 0 {

@@ -3,6 +3,7 @@
 mod faults;
 mod requests;
 mod set_up;
+mod several;
 mod two_lines;
 
 use register_map::{configuration::LORA, state};

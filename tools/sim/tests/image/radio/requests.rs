@@ -45,14 +45,6 @@ fn longest_reply_and_longest_request_pass_the_air_with_a_frame_gap_above_the_pau
     for &(air_rate, gap) in cases {
         let mut bench = bench(&[(LORA_AIR_RATE, air_rate), (LORA_FRAME_GAP, gap)]);
         assert_eq!(bench.read_over_the_air(FILTER, 32).len(), 32);
-        let request = [&[0x10, 0x01, 0xA0, 0, 32, 64][..], &[0; 64]].concat();
-        bench.write_over_the_air(KEY, OPENING_KEY);
-        let reply = bench.ask_over_the_air(1, &request);
-        assert_eq!(
-            reply,
-            Some(vec![0x10, 0x01, 0xA0, 0, 32]),
-            "air rate {air_rate}"
-        );
         let echo: Vec<u8> = [8, 0, 0].into_iter().chain((0..=249).rev()).collect();
         assert_eq!(
             bench.ask_over_the_air(1, &echo).as_ref(),
@@ -70,6 +62,39 @@ fn request_of_several_packets_with_pauses_above_the_frame_gap_is_lost_and_the_ne
     let echo: Vec<u8> = [8, 0, 0].into_iter().chain([0x55; 100]).collect();
     assert_eq!(bench.ask_over_the_air(1, &echo), None);
     bench.assert_answers_over_the_air();
+}
+
+/// The pause between the packets is 244 ms at 2.4 kbit/s, and at the slow corner at 4.8 kbit/s.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn write_of_two_packets_is_answered_with_the_factory_frame_gap() {
+    let air_rate = match corner() {
+        Corner::Nominal | Corner::Fast => 2,
+        Corner::Slow => 3,
+    };
+    let mut bench = bench(&[(LORA_AIR_RATE, air_rate)]);
+    bench.write_over_the_air(KEY, OPENING_KEY);
+    let request = [&[0x10, 0x01, 0xA0, 0, 32, 64][..], &[0; 64]].concat();
+    let reply = bench.ask_over_the_air(1, &request);
+    assert_eq!(reply, Some(vec![0x10, 0x01, 0xA0, 0, 32]));
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn only_a_request_that_is_never_complete_waits_for_the_frame_gap() {
+    let mut bench = bench(&[(LORA_FRAME_GAP, 500)]);
+    for (pdu, least_ms, most_ms) in [
+        (&[1, 0, FIRST, 0, 4][..], 0, 60),
+        (&[8, 0, 0, 1, 2, 3, 4], 500, 560),
+    ] {
+        let request = adu(&[&[1], pdu].concat());
+        bench.ask_over_the_air(1, pdu).expect("a reply");
+        let mut packets = bench.air().packets().rev();
+        let [reply, asked] = [packets.next(), packets.next()].map(Option::unwrap);
+        assert_eq!(asked.bytes, request);
+        let ms = (reply.start - asked.end).as_ms();
+        assert!((least_ms..most_ms).contains(&ms), "{pdu:02X?}: {ms} ms");
+    }
 }
 
 #[test]
