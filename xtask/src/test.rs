@@ -299,7 +299,8 @@ fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
     simulated(workspace, "--test=image_08", OWN_OF_08, &corner)
 }
 
-/// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one of `names`, or all.
+/// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one
+/// of `names`, or all.
 /// Spaces separate targets and names. The variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,

@@ -24,7 +24,7 @@ fn loaded(pairs: &[(u16, u16)]) -> (Settings, u16) {
 fn defaults_are_the_factory_settings_and_count_as_unchanged() {
     let settings = Settings::defaults();
     assert_eq!((settings.get(BAUD), settings.get(FILTER + SLOT)), (96, 5));
-    assert_eq!((settings.get(0x0145), settings.get(0x017F)), (50, 3950));
+    assert_eq!((settings.get(0x0145), settings.get(0x017F)), (300, 3950));
     assert_eq!((settings.get(0x0201), settings.get(0x0001)), (0, 0));
     assert_eq!(changed(&settings), []);
     assert_eq!(RESTARTS, 5 + 8 + 6 + 32);

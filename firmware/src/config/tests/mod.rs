@@ -90,7 +90,7 @@ fn every_setting_reads_its_default_and_key_and_command_read_0() {
     let first = read(&config, KEY, 9).unwrap();
     assert_eq!(first, [0, 96, 0, 0, 0, 0, 0, 0, 0]);
     let mut middle = std::vec![5; 32];
-    middle.extend([0, 0, 23, 2, 0, 50]);
+    middle.extend([0, 0, 23, 2, 0, 300]);
     assert_eq!(read(&config, FILTER, 38).unwrap(), middle);
     assert_eq!(read(&config, BETA, 32).unwrap(), [3950; 32]);
     assert_eq!(read(&config, RANGE, 125).unwrap(), [0; 125]);

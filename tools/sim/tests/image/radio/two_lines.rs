@@ -10,7 +10,7 @@ use sim::Time;
 use sim::radio::Mode;
 
 use super::{SET_UP, bench};
-use crate::bench::{Bench, FIRST, adu};
+use crate::bench::{Bench, adu};
 
 impl Bench {
     /// Writes COMMAND over the air, and returns at the instant at which the gateway has the reply.
