@@ -2,8 +2,9 @@
 //!
 //! The radio is a serial port over the air with its own timing. It outputs a frame in packets of up to 58 bytes with
 //! pauses between them. So a frame ends when its length and its CRC fit, instead of after t3.5, and pauses inside a
-//! frame do not count. LORA_FRAME_GAP ends a frame that never becomes complete. Its bytes take a millisecond each, so a
-//! task that runs once a millisecond moves them.
+//! frame do not count. LORA_FRAME_GAP ends a frame that never becomes complete, and a shorter silence one that cannot:
+//! traffic that a unit has joined in the middle becomes too long for a frame soon. The bytes of the radio take a
+//! millisecond each, so a task that runs once a millisecond moves them.
 //!
 //! A silence is measured from the call that found the last byte. While flash is erased the task does not run for up to
 //! 40 ms. A silence that begins in that time counts as up to 40 ms shorter, and one that ends in it is not seen.
@@ -43,6 +44,11 @@ const BYTES_PER_CALL: u8 = 64;
 /// Longest time between two bytes of a packet as this code measures it, in milliseconds: the module outputs a byte in
 /// 1.04 ms.
 const BYTE_MS: u16 = 3;
+
+/// Silence that ends a frame that can never become valid, in milliseconds. Other units answer sooner than after the
+/// frame gap. Without this limit a unit that has missed a part of their traffic would find no silence that is long
+/// enough, and receive nothing more.
+const LOST_GAP_MS: u16 = 20;
 
 impl<S, M, A> RadioLine<S, M, A>
 where
@@ -158,7 +164,12 @@ where
         }
         self.silence = Some(silence);
         if !complete {
-            if silence < self.frame_gap_ms {
+            let gap = if self.port.is_lost() {
+                LOST_GAP_MS.min(self.frame_gap_ms)
+            } else {
+                self.frame_gap_ms
+            };
+            if silence < gap {
                 return false;
             }
             self.silence = None;

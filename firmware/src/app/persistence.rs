@@ -3,7 +3,7 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::flash::FlashError;
+use board_support::{fault, flash::FlashError};
 use firmware::{
     config::Settings,
     store::{Operation, Saving, Store, StoreError},
@@ -95,10 +95,14 @@ impl Persistence {
         let settings = device.lock(|device| device.config.to_save().clone());
         if core::mem::take(&mut self.ordered) {
             self.saving = Saving::new(&self.store, &self.pages, &settings);
-            if self.saving.is_some() && !device.lock(|device| device.config.take_save()) {
-                self.saving = None;
-                self.fail(device);
-                return None;
+            if self.saving.is_some() {
+                let Some(left) = device.lock(|device| device.config.take_save()) else {
+                    self.saving = None;
+                    self.fail(device);
+                    return None;
+                };
+                // A restart may follow before the next scan, which keeps the number otherwise.
+                fault::keep_saves(left);
             }
         }
         let Some(mut saving) = self.saving.take() else {

@@ -352,11 +352,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.saving = false;
     }
 
-    /// Takes one save from the budget, before the first operation on the flash. Returns false when none is left: the
-    /// other line has changed a setting since the order was checked. Then the save must not be written.
+    /// Takes one save from the budget, before the first operation on the flash. Returns the number that is left, to be
+    /// kept over a reset. `None`: there was none, and the save must not be written. The order was accepted because it
+    /// changed no setting, but the other line has changed one since, or the stored record is not what would be written.
     #[must_use]
-    pub const fn take_save(&mut self) -> bool {
-        self.saves.take()
+    pub fn take_save(&mut self) -> Option<u8> {
+        self.saves.take().then(|| self.saves.left())
     }
 
     /// Returns the number of saves in the budget, to be kept over a reset.

@@ -98,6 +98,37 @@ fn other_units_requests_and_replies_end_when_they_are_complete() {
     assert_eq!(counters.communication_errors, 0);
 }
 
+/// No silence is as long as the frame gap, because the others answer sooner.
+#[test]
+fn unit_that_is_out_of_step_with_a_busy_air_receives_again() {
+    let reply_of_two_packets = frame(&[&[0x12, 0x03, 64][..], &[7; 64]].concat());
+    let after_a_lost_packet = || {
+        let mut bench = Bench::new();
+        bench.receive(&reply_of_two_packets[..58]);
+        bench
+    };
+    let after_the_start = || {
+        let mut bench = Bench::starting();
+        while bench.line.works().is_none() {
+            bench.pass(1);
+        }
+        bench
+    };
+    for mut bench in [after_a_lost_packet(), after_the_start()] {
+        let mut received = Vec::new();
+        for _ in 0..20 {
+            for other in [&[0x12, 0x03, 0, 4, 0, 1][..], &[0x12, 0x03, 2, 0, 1]] {
+                bench.pass(GAP_MS - 1);
+                bench.receive(&frame(other));
+            }
+            bench.pass(GAP_MS - 1);
+            bench.receive(&[0x00, 0x06, 0x00, 0x02, 0xAB, 0xCD, 0x97, 0x7E]);
+            received.push(bench.pass(GAP_MS - 1).is_some());
+        }
+        assert_eq!(received[10..], [true; 10], "{received:?}");
+    }
+}
+
 /// A frame whose CRC ends in 0 can be complete one byte before its end. The byte 0 is not the beginning of a frame.
 #[test]
 fn last_byte_of_another_units_crc_is_not_the_beginning_of_the_next_frame() {

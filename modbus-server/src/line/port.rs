@@ -90,6 +90,14 @@ impl<'a, U: Units> Port<'a, U> {
         self.receiver.is_complete()
     }
 
+    /// Returns whether the frame so far can never become valid: it is damaged or too long, or its beginning was missed.
+    /// On a line with pauses inside frames, the caller may end it at any pause, to find the beginning of the next one.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_lost(&self) -> bool {
+        self.receiver.is_lost()
+    }
+
     /// Ends the short silence, in tick `now`. Returns whether a request waits to be served. That is only possible
     /// on an ASCII line: its frame was complete, and its sender has released the line by now.
     #[inline]

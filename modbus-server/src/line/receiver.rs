@@ -153,6 +153,12 @@ impl<'a, U: Units> Receiver<'a, U> {
         })
     }
 
+    /// Returns whether the frame so far can never become valid: it is damaged or too long, or its beginning was missed.
+    #[inline(always)]
+    pub const fn is_lost(&self) -> bool {
+        self.state & (DEAF | SPOILED) != 0
+    }
+
     /// Returns whether requests to this address are taken.
     #[inline(always)]
     fn takes(&self, address: u8) -> bool {

@@ -127,11 +127,8 @@ fn no_request_goes_unanswered_while_saves_run_one_after_another() {
     }
     let programmed = master.bench.board.flash_operations() - operations;
     assert!(programmed > 20 * 8, "only {programmed} operations");
-    assert!(
-        master.late.len() <= 1,
-        "more than one page was filled: {:?}",
-        master.late
-    );
+    // Twenty small records fit in a page, so nothing is erased.
+    assert_eq!(master.late, [], "a reply was late");
     assert_eq!(master.bench.register(0x0231), 0, "no bus error was seen");
     assert_eq!(master.bench.register(0x0237), 0, "no character was lost");
     master.bench.power_cycle();

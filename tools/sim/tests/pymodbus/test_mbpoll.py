@@ -245,12 +245,12 @@ class NoModule(Mbpoll):
 
     MODULE = "4ao"
 
-    def test_points_return_a_device_failure(self):
+    def test_outputs_read_the_commanded_values_and_refuse_writes(self):
         self.simulator.power_off()
         self.simulator.set_module("none")
         self.simulator.power_on()
         self.simulator.wait(500)
         for table in WORDS:
-            self.assertEqual(self.read(table, FIRST, 4), FAILURE)
+            self.assertEqual(self.read(table, FIRST, 4), [0, 0, 0, 0])
         self.assertEqual(self.write(HOLDING_REGISTERS, FIRST, 1), FAILURE)
         self.assertEqual(self.write(HOLDING_REGISTERS, FIRST, 1, 2, 3, 4), FAILURE)
