@@ -9,15 +9,11 @@ use std::{
 use modio_description::{FILE, HEAD, PORT_BYTES, checksum};
 use register_map::{Board, Module};
 
-#[path = "build/pack.rs"]
-mod pack;
-
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     fs::write(out.join("self_description.rs"), self_descriptions()).expect("OUT_DIR is writable");
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=build");
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
@@ -43,22 +39,8 @@ fn self_descriptions() -> String {
                 .encode();
         let ports = usize::from(board.slots) * PORT_BYTES;
         let fixed = &document[..document.len() - ports];
-        let (code, crc, length) = (board.code, checksum(fixed), fixed.len());
-        let pack::Packed {
-            bytes,
-            blocks,
-            phrases,
-            text,
-        } = pack::pack(fixed);
-        rows += &format!(
-            "    Fixed {{ board: {code}, crc: {crc:#06X}, document: Packed {{
-        length: {length},
-        bytes: &{bytes:?},
-        blocks: &{blocks:?},
-        phrases: &{phrases:?},
-        text: &{text:?},
-    }} }},\n"
-        );
+        let (code, crc) = (board.code, checksum(fixed));
+        rows += &format!("    Fixed {{ board: {code}, crc: {crc:#06X}, document: &{fixed:?} }},\n");
     }
     format!(
         "/// File number.
@@ -70,10 +52,8 @@ const PORT_BYTES: usize = {PORT_BYTES};
 /// Fixed part of each board's document.
 const BOARDS: [Fixed; {}] = [
 {rows}];
-const _: () = assert!(packed::BLOCK == {});
 ",
         Board::ALL.len(),
-        pack::BLOCK,
     )
 }
 

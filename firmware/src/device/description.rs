@@ -3,8 +3,8 @@
 //! ```text
 //!  record    0         1      2 ...
 //!         +--------+-------+----------------------+---------------+
-//!         | length | CRC   | fixed part, packed   | ports, made   |
-//!         |        |       | by the build script  | when read     |
+//!         | length | CRC   | fixed part, made by  | ports, made   |
+//!         |        |       | the build script     | when read     |
 //!         +--------+-------+----------------------+---------------+
 //! ```
 //!
@@ -12,12 +12,11 @@
 //! Therefore the document is never stored in RAM, and its CRC is continued from the CRC of the fixed part.
 //! docs/self-description.md describes the format.
 
-use core::array;
+use core::{array, slice};
 
 use modbus_server::{Exception, Span, WordsOut, crc};
 use register_map::Board;
 
-use super::packed::{self, Packed};
 use crate::config::Config;
 
 include!(concat!(env!("OUT_DIR"), "/self_description.rs"));
@@ -28,7 +27,7 @@ pub struct Fixed {
     /// The code of the board.
     board: u16,
     /// The document up to its ports.
-    document: Packed,
+    document: &'static [u8],
     /// CRC of `document`.
     crc: u16,
 }
@@ -102,23 +101,26 @@ impl Description {
         let head = [self.length::<SLOTS>() as u16, self.crc].map(u16::to_be_bytes);
         let head = head.as_flattened();
         let start = usize::from(records.start()) * 2;
-        packed::copy(head.get(start..).unwrap_or_default(), &mut out);
-        let document = &self.fixed.document;
+        copy(head, start, &mut out);
         let start = start.saturating_sub(head.len());
-        document.copy(start, &mut out);
+        copy(self.fixed.document, start, &mut out);
         if out.len() > 0 {
-            let ports = ports(config);
-            let start = start.saturating_sub(document.length);
-            packed::copy(
-                ports.as_flattened().get(start..).unwrap_or_default(),
-                &mut out,
-            );
+            let start = start.saturating_sub(self.fixed.document.len());
+            copy(ports(config).as_flattened(), start, &mut out);
         }
     }
 
     /// Returns the length of the document in bytes.
     const fn length<const SLOTS: usize>(&self) -> usize {
-        self.fixed.document.length + PORT_BYTES * SLOTS
+        self.fixed.document.len() + PORT_BYTES * SLOTS
+    }
+}
+
+/// Copies bytes from a position on to `out`, as far as there is room.
+fn copy(bytes: &[u8], at: usize, out: &mut slice::IterMut<'_, u8>) {
+    let bytes = bytes.get(at..).unwrap_or_default();
+    for (byte, slot) in bytes.iter().zip(out) {
+        *slot = *byte;
     }
 }
 

@@ -17,7 +17,6 @@
 mod comm_watchdog;
 mod description;
 mod identification;
-mod packed;
 mod points;
 mod port;
 mod state;

@@ -87,7 +87,7 @@ fn groups_of_one_request_are_read_in_their_order() {
     assert_eq!(bench.read_file(&[(1, 9, 125)]), Err(3));
 }
 
-/// Reading can begin in the middle of a packed phrase, and at the border of the packed part.
+/// Reading can begin at every record, also at the borders of head, fixed part and ports.
 #[test]
 fn each_record_can_be_read_alone() {
     let mut bench = Bench::new(Module::Ai2Ao2, &[]);

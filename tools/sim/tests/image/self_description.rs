@@ -94,8 +94,7 @@ fn file_1_describes_the_unit_with_any_number_of_groups() {
     }
 }
 
-/// The unit reads the records while it sends. Groups cost more than records, and a group costs most near the end of a
-/// packed block of 32 bytes.
+/// The unit reads the records while it sends. Groups cost more than records.
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn replies_with_the_most_records_or_groups_are_sent_without_long_silences() {
