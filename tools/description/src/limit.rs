@@ -1,6 +1,6 @@
 //! Limits of a description. They leave room for many times the registers of today's units.
 
-use crate::{Description, Register, Scope, Value};
+use crate::{Description, Reading, Register, Scope, Value};
 
 /// Longest name, version or code of a unit, in bytes.
 pub const NAME: usize = 64;
@@ -40,6 +40,18 @@ pub fn check(description: &Description) -> Result<(), String> {
             return Err(format!("port {number}: ports ascend from 1 to {PORTS}"));
         }
         last = port.number;
+    }
+    // Points of a table that a later version adds may be wider than a register.
+    let kinds = description.kinds.iter().filter(|kind| kind.table.is_some());
+    for Reading { min, max, .. } in kinds.flat_map(|kind| &kind.readings) {
+        let highest = if *min < 0 {
+            i16::MAX.into()
+        } else {
+            u16::MAX.into()
+        };
+        if *min < i16::MIN.into() || *max > highest {
+            return Err(format!("{min} to {max} is no range of a register"));
+        }
     }
     let mut all = 0;
     for register in &description.registers {

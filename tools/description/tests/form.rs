@@ -2,8 +2,8 @@
 
 use minicbor::Encoder;
 use modio_description::{
-    Description, Error, FILE, HEAD, Narrower, PORT_BYTES, Port, Register, Scope, Unit, VERSION,
-    Value, Values, checksum, describe, records,
+    Description, Error, FILE, HEAD, Narrower, PORT_BYTES, Port, Reading, Register, Scope, Unit,
+    VERSION, Value, Values, checksum, describe, records,
 };
 use proptest::prelude::*;
 use register_map::board::{MODIO_02, MODIO_08};
@@ -243,7 +243,7 @@ fn a_text_that_is_too_long_or_has_control_characters_is_rejected() {
 #[test]
 fn numbers_beyond_the_limits_are_rejected() {
     type Change = fn(&mut Description);
-    let changes: [(Change, bool); 16] = [
+    let changes: [(Change, bool); 18] = [
         // One register with all addresses was 65535 items, each with its own texts.
         (|unit| run(unit, 0, 0xFFFF, Scope::Unit), false),
         (|unit| run(unit, 0x1000, 0x1001, Scope::Unit), false),
@@ -274,6 +274,8 @@ fn numbers_beyond_the_limits_are_rejected() {
             false,
         ),
         (|unit| last(unit).value = Value::Number(power(-19)), false),
+        (|unit| reading(unit).max = 65_536, false),
+        (|unit| reading(unit).min = -32_769, false),
     ];
     for (index, (change, is_usable)) in changes.into_iter().enumerate() {
         let mut unit = unit(Module::Ai4);
@@ -281,6 +283,12 @@ fn numbers_beyond_the_limits_are_rejected() {
         let decoded = Description::decode(&unit.encode());
         assert_eq!(decoded.is_ok(), is_usable, "change {index}: {decoded:?}");
     }
+}
+
+/// Returns a reading of a kind of point.
+fn reading(unit: &mut Description) -> &mut Reading {
+    let mut readings = unit.kinds.iter_mut().flat_map(|kind| &mut kind.readings);
+    readings.next().unwrap()
 }
 
 fn last(unit: &mut Description) -> &mut Register {

@@ -155,12 +155,14 @@ impl Master {
     }
 
     /// Finds out whether the adapter returns what it sends. Without that a response that equals its request proves
-    /// nothing.
+    /// nothing. Silence leaves it open, and the request is sent nevertheless: a unit in listen-only mode obeys without
+    /// an answer.
     async fn look_for_echo(&mut self, unit: u8) -> Result<(), Lost> {
         let mut result = Ok(());
         for _ in 0..=self.endpoint.retries {
             match self.ask_once(unit, &PROBE).await {
                 Err(Lost::Broken(error)) => return Err(Lost::Broken(error)),
+                Err(Lost::Silent) => {}
                 Err(garbled) if self.echo.is_none() => result = Err(garbled),
                 _ => return Ok(()),
             }
@@ -287,9 +289,14 @@ impl Master {
                     .map_err(Lost::Broken)?
                     > 0
             {
-                returned = returned || self.drop_echo(&own, pdu, &mut got);
-                // A busy computer delivers an answer in pieces, with a pause between them.
-                let all = [junk.as_slice(), &got].concat();
+                returned = returned || self.drop_echo(&own, &mut got);
+                // A busy computer delivers an answer, or an echo, in pieces with a pause between them.
+                let mut all = [junk.as_slice(), &got].concat();
+                if !returned && self.drop_echo(&own, &mut all) {
+                    returned = true;
+                    junk.clear();
+                    got.clone_from(&all);
+                }
                 for bytes in [&got, &all] {
                     if let Some((answer, range)) = waiting.find(bytes) {
                         self.received(bytes.get(range).unwrap_or_default());
@@ -314,20 +321,19 @@ impl Master {
         }
         self.owed = Some((unit, pdu.to_vec()));
         if junk.is_empty() {
-            self.note_no_echo(pdu);
             return Err(Lost::Silent);
         }
         self.received(&junk);
         Err(Lost::Garbled(junk))
     }
 
-    /// Removes the request from the received bytes if the adapter returns it. Returns whether it did. An echo is
-    /// detected with a function whose response differs from the request.
-    fn drop_echo(&mut self, own: &[u8], pdu: &[u8], got: &mut Vec<u8>) -> bool {
+    /// Removes the request from the received bytes if the adapter returns it. Returns whether it did. Bytes that equal
+    /// the request are an echo until a response that differs from its request has shown that there is none.
+    fn drop_echo(&mut self, own: &[u8], got: &mut Vec<u8>) -> bool {
         let starts = 0..=NOISE.min(got.len());
         let mut starts = starts.filter(|start| got[*start..].starts_with(own));
         match starts.next() {
-            Some(start) if self.echo.unwrap_or_else(|| differs(pdu)) => {
+            Some(start) if self.echo.unwrap_or(true) => {
                 self.echo = Some(true);
                 got.drain(..start + own.len());
                 true

@@ -129,6 +129,8 @@ impl Master {
         for unit in suspects.difference(&found.units.clone()) {
             found.asked(*unit, 1 + retries);
             match self.ask(*unit, &[REPORT]).await {
+                // A gateway answers for a missing unit.
+                Ok(pdu) if matches!(pdu[..], [_, code] if is_from_gateway(code)) => {}
                 Ok(_) => found.answered(*unit),
                 Err(Lost::Silent) => {}
                 Err(Lost::Garbled(mut bytes)) => {

@@ -131,7 +131,7 @@ impl Device {
                 shown(had),
                 shown(announced),
                 if self.is_serial() {
-                    "`modioctl scan --rates all --formats all` looks for it"
+                    "`modioctl --timeout 0.2s scan --rates all --formats all` looks for it"
                 } else {
                     "set the gateway to what the unit has"
                 }

@@ -75,6 +75,25 @@ fn an_echo_is_not_mistaken_for_a_unit() {
 }
 
 #[test]
+fn an_echo_that_begins_late_and_in_pieces_is_not_mistaken_for_a_unit() {
+    let nobody = serve(|mut master| {
+        let mut bytes = [0; 512];
+        // The adapter is not ready for the first request.
+        let _ = master.read(&mut bytes);
+        while let Ok(count @ 1..) = master.read(&mut bytes) {
+            let _ = master.write_all(&bytes[..4]);
+            thread::sleep(Duration::from_millis(150));
+            let _ = master.write_all(&bytes[4..count]);
+        }
+    });
+    for words in ["identify", "raw 06 0000 0001"] {
+        let words = format!("--timeout 300ms --retries 0 {words}");
+        let text = At::tcp(nobody).run(&words).failed(3);
+        assert!(text.contains("returns what it sends"), "{words}: {text}");
+    }
+}
+
+#[test]
 fn a_unit_behind_an_echo_answers() {
     for delay in [Duration::ZERO, Duration::from_millis(30)] {
         let at = At::tcp(echo(Some(delay)));

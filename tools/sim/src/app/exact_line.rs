@@ -90,6 +90,7 @@ fn serve(client: &Client, in_use: &InUse, events: &Sender<Event>) -> io::Result<
     let Some(_turn) = in_use.take() else {
         return refuse(client);
     };
+    client.heard();
     stream.set_read_timeout(None)?;
     loop {
         let ended = line.ends_with(b"\n");
