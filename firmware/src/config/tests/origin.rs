@@ -79,7 +79,7 @@ fn air_for_points_and_reads_only_opens_no_lock_and_takes_no_command() {
         config.set_origin(OVER_THE_CABLE);
         assert_eq!(config.check_line(), Ok(()));
         assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
-        // The value of the start is in force, not the one that is written.
+        // A new value of LORA takes effect after the next start only.
         assert_eq!(write(&mut config, LORA, &[1]), DONE);
     }
     assert_eq!(write(&mut config, LORA, &[3]), VALUE);

@@ -1,7 +1,6 @@
 //! `modioctl describe`.
 
-use super::learn;
-use crate::device::Device;
+use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::listing::{as_json, values};
 use crate::output;
@@ -13,7 +12,7 @@ use crate::value::table_name;
 ///
 /// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
-    let learned = learn(device).await?;
+    let learned = fetch(device).await?;
     let about = learned.book.of_modio()?;
     let items = learned.book.items();
     if json {

@@ -2,9 +2,8 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::learn;
 use crate::bus::decode;
-use crate::device::Device;
+use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::output;
@@ -28,7 +27,7 @@ const OBJECTS: [&str; 7] = [
 /// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
     let mut identity = identity(device).await?;
-    let book = learn(device).await?.book;
+    let book = fetch(device).await?.book;
     if book.description().is_some() {
         // The objects that the standard does not define are also registers.
         identity.retain(|(name, text)| OBJECTS.contains(&name.as_str()) && !text.is_empty());

@@ -20,7 +20,7 @@ use clap::CommandFactory;
 
 use crate::bus::Endpoint;
 use crate::cli::{Cli, Command};
-use crate::device::{Device, Learned, fetch};
+use crate::device::Device;
 use crate::failure::Failure;
 use crate::{monitor, output, trace};
 
@@ -119,9 +119,4 @@ async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
 fn endpoint(cli: &mut Cli) -> Result<Endpoint, Failure> {
     let options = std::mem::take(&mut cli.endpoint);
     options.endpoint(cli.at.as_deref(), cli.endpoints.as_deref().map(Path::new))
-}
-
-/// Learns the names of the unit.
-async fn learn(device: &mut Device) -> Result<Learned, Failure> {
-    fetch(device).await
 }

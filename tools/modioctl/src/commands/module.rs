@@ -2,9 +2,8 @@
 
 use register_map::{points, state};
 
-use super::learn;
 use crate::cli::Module;
-use crate::device::Device;
+use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::output;
 use crate::value::{parse, show};
@@ -19,7 +18,7 @@ const IDENTIFY: u16 = 6;
 /// When the unit does not have the port or the module, does not answer or refuses.
 pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let Module::Set { port, module } = options;
-    let book = learn(&mut device).await?.book;
+    let book = fetch(&mut device).await?.book;
     let description = book.of_modio()?;
     if !description.ports.iter().any(|known| known.number == port) {
         let ports: Vec<_> = description

@@ -2,9 +2,8 @@
 
 use serde_json::{Value as Json, json};
 
-use super::learn;
 use crate::cli::Read;
-use crate::device::Device;
+use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::Item;
 use crate::output;
@@ -16,7 +15,7 @@ use crate::value::show;
 ///
 /// When a name is unknown, or the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Read, json: bool) -> Result<(), Failure> {
-    let book = learn(device).await?.book;
+    let book = fetch(device).await?.book;
     let items: Vec<Item> = options
         .names
         .iter()

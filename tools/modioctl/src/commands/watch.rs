@@ -4,9 +4,8 @@ use chrono::{DateTime, Local, SecondsFormat};
 use serde_json::{Map, Value as Json, json};
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::learn;
 use crate::cli::Watch;
-use crate::device::Device;
+use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
 use crate::output;
@@ -18,7 +17,7 @@ use crate::value::{Shown, show};
 ///
 /// When a name is unknown, or when the unit refuses.
 pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
-    let items = chosen(&learn(&mut device).await?.book, &options.names)?;
+    let items = chosen(&fetch(&mut device).await?.book, &options.names)?;
     if options.csv {
         let names: Vec<_> = items.iter().map(|item| item.name.as_str()).collect();
         output::line(format_args!("time,{}", names.join(",")))?;

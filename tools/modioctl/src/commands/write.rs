@@ -2,9 +2,8 @@
 
 use modio_description::Table;
 
-use super::learn;
 use crate::cli::Write;
-use crate::device::Device;
+use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::Item;
 use crate::output;
@@ -16,7 +15,7 @@ use crate::value::{parse, show};
 ///
 /// When a name or a value is wrong; nothing is written then. When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, options: &Write) -> Result<(), Failure> {
-    let book = learn(device).await?.book;
+    let book = fetch(device).await?.book;
     let mut checked = Vec::new();
     for (name, text) in &options.values {
         let item = book.find(name)?;

@@ -8,9 +8,9 @@ use register_map::codes::Command;
 use register_map::state::{self, status};
 use register_map::{configuration, points};
 
-use super::{learn, read};
+use super::read;
 use crate::cli::Config;
-use crate::device::{Device, with_modules};
+use crate::device::{Device, fetch, with_modules};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
 use crate::output;
@@ -25,7 +25,7 @@ const MOST: usize = 100;
 ///
 /// When a name, a value or a file is wrong; nothing is written then. When the unit does not answer or refuses.
 pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), Failure> {
-    let book = learn(&mut device).await?.book;
+    let book = fetch(&mut device).await?.book;
     let modules = device
         .read_words(configuration::MODULE, points::PORTS)
         .await?;
