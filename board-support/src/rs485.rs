@@ -230,16 +230,6 @@ impl Rs485 {
         }
     }
 
-    /// Stops asking for bytes until [`resume_sending`](Self::resume_sending): no byte is ready yet.
-    pub fn pause_sending(&mut self) {
-        self.usart.cr1().modify(|_, w| w.txeie().disabled());
-    }
-
-    /// Asks for bytes again.
-    pub fn resume_sending(&mut self) {
-        self.usart.cr1().modify(|_, w| w.txeie().enabled());
-    }
-
     /// Ends the sending: the last byte was given to the UART. [`Status::sent`] reports when it has been sent.
     #[inline]
     pub fn finish_sending(&mut self) {

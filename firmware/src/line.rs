@@ -5,27 +5,9 @@
 //! programmed. Functions that are called from here must be in RAM, too (`memory/sections.x`).
 
 use modbus_server::{
-    Answered, Decided, LineCounters, Request, Served, Server,
-    line::{Faults, Next, Port},
+    LineCounters, Reply, Request,
+    line::{Faults, Port},
 };
-
-/// A line as the task that serves requests sees it. The methods are the steps of a request, in this order.
-pub trait ServedLine {
-    /// Returns whether a reply is being sent or waits to be sent.
-    fn is_replying(&self) -> bool;
-    /// Returns whether the end of the last reply may still be on its way, so that a restart would lose it.
-    fn is_on_air(&self) -> bool {
-        false
-    }
-    /// Takes the waiting request, if any. Its reply starts now, or after `delay_ms`.
-    fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>>;
-    /// Passes the decision on the reply to the port.
-    fn answer(&mut self, decided: Decided<'static>) -> Answered<'static>;
-    /// Ends a request whose work is done.
-    fn finish(&mut self, served: Served<'static>);
-    /// Returns the counters of the line.
-    fn counters(&self) -> LineCounters;
-}
 
 /// A UART with the driver enable of its transceiver.
 pub trait Uart {
@@ -47,10 +29,6 @@ pub trait Uart {
     fn start_sending(&mut self, first: u8);
     /// Sends the next byte.
     fn send(&mut self, byte: u8);
-    /// Stops asking for bytes until [`resume_sending`](Self::resume_sending): no byte is ready yet.
-    fn pause_sending(&mut self);
-    /// Asks for bytes again.
-    fn resume_sending(&mut self);
     /// Ends the sending: the last byte was given to the UART. [`sent`](Self::sent) reports when it has been sent.
     fn finish_sending(&mut self);
     /// Turns the driver off and the receiver on.
@@ -156,10 +134,9 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
             self.port.received(byte, faults);
         }
         if U::wants_byte(status) {
-            match self.port.next() {
-                Next::Byte(byte) => self.uart.send(byte),
-                Next::Wait => self.uart.pause_sending(),
-                Next::Done => self.uart.finish_sending(),
+            match self.port.next_byte() {
+                Some(byte) => self.uart.send(byte),
+                None => self.uart.finish_sending(),
             }
         } else if !U::received(status) {
             self.without_cause();
@@ -252,39 +229,25 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Continues a reply whose next bytes may be ready now.
-    #[inline]
-    fn resume(&mut self) {
-        if self.port.is_sending() {
-            self.uart.resume_sending();
-        }
-    }
-}
-
-impl<U: Uart, G: GapTimer> ServedLine for Line<U, G> {
-    fn is_replying(&self) -> bool {
+    /// Returns whether a reply is being sent or waits to be sent.
+    pub fn is_replying(&self) -> bool {
         self.port.is_replying()
     }
 
+    /// Takes the waiting request, if any.
     #[inline]
-    fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {
-        let request = server.take(&mut self.port, delay_ms);
+    pub fn take(&mut self) -> Option<Request<'static>> {
+        self.port.take()
+    }
+
+    /// Sends a reply, if there is one, now or after `delay_ms`.
+    pub fn send(&mut self, reply: Reply<'static>, delay_ms: u16) {
+        self.port.send(reply, delay_ms);
         self.start();
-        request
     }
 
-    fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {
-        let answered = decided.answer(&mut self.port);
-        self.resume();
-        answered
-    }
-
-    fn finish(&mut self, served: Served<'static>) {
-        served.finish(&mut self.port);
-        self.resume();
-    }
-
-    fn counters(&self) -> LineCounters {
+    /// Returns the counters of the line.
+    pub fn counters(&self) -> LineCounters {
         *self.port.counters()
     }
 }

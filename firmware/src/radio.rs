@@ -12,12 +12,12 @@
 use embedded_hal::digital::OutputPin;
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
-    Adu, Answered, Decided, LineCounters, Request, Served, Server,
-    line::{Faults, Next, Port, Receiver},
+    Adu, LineCounters, Reply, Request,
+    line::{Faults, Port, Receiver},
 };
 use modio_drivers::{AuxPin, Lora};
 
-use crate::{config::RadioConfig, line::ServedLine};
+use crate::config::RadioConfig;
 
 /// The radio line.
 pub struct RadioLine<S, M, A> {
@@ -192,10 +192,9 @@ where
         while self.port.is_sending() {
             let byte = match self.unsent.take() {
                 Some(byte) => byte,
-                None => match self.port.next() {
-                    Next::Byte(byte) => byte,
-                    Next::Wait => return false,
-                    Next::Done => {
+                None => match self.port.next_byte() {
+                    Some(byte) => byte,
+                    None => {
                         let ended = self.radio.flush().is_ok() && self.radio.is_free();
                         if ended {
                             self.on_air_ms = self.packet_ms;
@@ -212,31 +211,32 @@ where
         }
         false
     }
-}
 
-impl<S, M, A> ServedLine for RadioLine<S, M, A> {
-    /// The next request shows that the packet has been received.
-    fn is_on_air(&self) -> bool {
+    /// Returns whether the end of the last reply may still be on its way, so that a restart would lose it. The next
+    /// request shows that the packet has been received.
+    #[must_use]
+    pub fn is_on_air(&self) -> bool {
         self.on_air_ms > 0 && self.port.waiting().is_none()
     }
 
-    fn is_replying(&self) -> bool {
+    /// Returns whether a reply is being sent or waits to be sent.
+    #[must_use]
+    pub fn is_replying(&self) -> bool {
         self.port.is_replying()
     }
 
-    fn take(&mut self, server: &Server, delay_ms: u16) -> Option<Request<'static>> {
-        server.take(&mut self.port, delay_ms)
+    /// Takes the waiting request, if any.
+    pub fn take(&mut self) -> Option<Request<'static>> {
+        self.port.take()
     }
 
-    fn answer(&mut self, decided: Decided<'static>) -> Answered<'static> {
-        decided.answer(&mut self.port)
+    /// Sends a reply, if there is one, as soon as the radio is free.
+    pub fn send_reply(&mut self, reply: Reply<'static>) {
+        self.port.send(reply, 0);
     }
 
-    fn finish(&mut self, served: Served<'static>) {
-        served.finish(&mut self.port);
-    }
-
-    fn counters(&self) -> LineCounters {
+    /// Returns the counters of the line.
+    pub fn counters(&self) -> LineCounters {
         *self.port.counters()
     }
 }

@@ -62,7 +62,7 @@ pub fn run(input: &[u8]) {
     let port = Port::new(receiver, &mut adus);
     let mut pair = Pair {
         reference: Server::new(delimiter(framing), device.clone()),
-        unit: UnitOn::on(port, framing, Points(device)).without_unsupported_modes(),
+        unit: UnitOn::on(port, framing, Points(device)),
     };
     while let Some(tag) = script.tag() {
         pair.set_state(match tag >> 5 {

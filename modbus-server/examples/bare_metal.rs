@@ -7,7 +7,7 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
-use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Silences, TimedPort};
+use modbus_server::line::{Faults, Framing, Port, Receiver, Silences, TimedPort};
 use modbus_server::{Adu, DataModel, Server, Tables};
 use serial2::SerialPort;
 
@@ -50,8 +50,9 @@ impl<S: Read + ReadReady + Write, D: OutputPin> Unit<S, D> {
             }
             waits = self.port.received(byte[0], Faults::NONE, now);
         }
-        if waits {
-            self.server.serve(self.port.port(), 0, model);
+        let port = self.port.port();
+        if let Some(request) = port.take() {
+            port.send(self.server.serve(request, model), 0);
             self.send()?;
         }
         Ok(())
@@ -64,7 +65,7 @@ impl<S: Read + ReadReady + Write, D: OutputPin> Unit<S, D> {
         // A pin of the microcontroller itself does not fail.
         let _ = self.driver.set_high();
         let mut result = self.serial.write_all(&[first]);
-        while let Next::Byte(byte) = self.port.port().next() {
+        while let Some(byte) = self.port.port().next_byte() {
             result = result.and_then(|()| self.serial.write_all(&[byte]));
         }
         // `flush` must return exactly when the last stop bit has been sent: from then on the master may use the

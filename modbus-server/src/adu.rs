@@ -74,6 +74,14 @@ impl Adu {
         self.bytes.get(..self.len).unwrap_or_default()
     }
 
+    /// Discards the bytes after the first `len`.
+    #[inline]
+    pub const fn truncate(&mut self, len: usize) {
+        if len < self.len {
+            self.len = len;
+        }
+    }
+
     /// Discards the content.
     #[inline]
     pub const fn clear(&mut self) {
@@ -96,12 +104,6 @@ impl Adu {
         self.bytes
             .get(usize::from(index)..self.len)
             .unwrap_or_default()
-    }
-
-    /// Removes the last `count` bytes.
-    #[inline]
-    pub(crate) fn cut(&mut self, count: usize) {
-        self.len = self.len.saturating_sub(count);
     }
 
     /// Sets the length to `len`, at most [`CAPACITY`](Self::CAPACITY), with any content, and returns the bytes for
@@ -134,13 +136,13 @@ mod tests {
     }
 
     #[test]
-    fn cutting_more_bytes_than_in_use_empties_the_buffer() {
+    fn truncating_never_makes_a_buffer_longer() {
         let mut adu = Adu::new();
         adu.extend(&[1, 2, 3]);
-        adu.cut(2);
+        adu.truncate(1);
         assert_eq!(adu.as_slice(), [1]);
-        adu.cut(4);
-        assert!(adu.is_empty());
+        adu.truncate(4);
+        assert_eq!(adu.as_slice(), [1]);
     }
 
     #[test]

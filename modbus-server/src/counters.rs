@@ -18,6 +18,8 @@ pub struct LineCounters {
     /// Valid frames for this unit or a broadcast that were not served: no buffer was free, a gap longer than t1.5
     /// is not tolerated, or it was too late for a reply. `bus_messages` includes them.
     pub dropped: u16,
+    /// Replies that were not sent, because another frame had begun by then.
+    pub unsent: u16,
 }
 
 impl LineCounters {
@@ -28,6 +30,7 @@ impl LineCounters {
         overruns: 0,
         gaps: 0,
         dropped: 0,
+        unsent: 0,
     };
 
     /// Returns the difference to an older copy `then`, for fewer than 65536 counts.
@@ -40,6 +43,7 @@ impl LineCounters {
             overruns: self.overruns.wrapping_sub(then.overruns),
             gaps: self.gaps.wrapping_sub(then.gaps),
             dropped: self.dropped.wrapping_sub(then.dropped),
+            unsent: self.unsent.wrapping_sub(then.unsent),
         }
     }
 }

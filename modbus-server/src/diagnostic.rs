@@ -38,13 +38,8 @@ impl Diagnostic {
     /// Decodes the bytes after the function code.
     ///
     /// # Errors
-    /// 01 for a sub-function that is not supported: 03 needs ASCII mode, 04 a server that `can_listen_only`. 03 for
-    /// data or a length that is not allowed.
-    pub(crate) fn decode(
-        fields: &[u8],
-        framing: Framing,
-        can_listen_only: bool,
-    ) -> Result<Self, Exception> {
+    /// 01 for a sub-function that is not supported: 03 needs ASCII mode. 03 for data or a length that is not allowed.
+    pub(crate) fn decode(fields: &[u8], framing: Framing) -> Result<Self, Exception> {
         let &[high, sub, ref data @ ..] = fields else {
             return Err(Exception::IllegalDataValue);
         };
@@ -65,7 +60,7 @@ impl Diagnostic {
                 }
                 _ => return Err(Exception::IllegalDataValue),
             },
-            LISTEN_ONLY if can_listen_only => Self::ListenOnly,
+            LISTEN_ONLY => Self::ListenOnly,
             0x0A => Self::Clear,
             FIRST_COUNTER..=0x12 => Self::Counter(sub - FIRST_COUNTER),
             0x14 => Self::ClearOverruns,
@@ -109,7 +104,7 @@ mod tests {
         for sub in 0..=0x20 {
             for data in [[0, 0], [0xFF, 0], [0, 1], [1, 0], [0xFF, 0xFF]] {
                 for fields in [&[0, sub, data[0], data[1]][..], &[0, sub, data[0]]] {
-                    let decoded = Diagnostic::decode(fields, Framing::Rtu, true);
+                    let decoded = Diagnostic::decode(fields, Framing::Rtu);
                     let restarts = matches!(decoded, Ok(Diagnostic::Restart { .. }));
                     assert_eq!(Diagnostic::is_restart(fields), restarts, "{fields:02X?}");
                     assert_eq!(

@@ -141,13 +141,10 @@ pub(crate) fn check(
     result.map(|()| reply)
 }
 
+/// Makes a checked request of function 14 its reply, with groups of `bytes` bytes.
 #[inline(never)]
-/// Replaces a checked request of function 14 by the groups of its reply.
-pub(crate) fn read(adu: &mut Adu, model: &impl DataModel) {
-    // Lets the compiler remove this function for a model without files.
-    if !model.has_files() {
-        return;
-    }
+pub(crate) fn read(adu: &mut Adu, bytes: u8, model: &impl DataModel) {
+    // The groups of the reply are written over those of the request.
     let mut copy = [0; *READ.end() as usize];
     let request = adu.from(GROUPS_FROM);
     let len = request.len();
@@ -156,7 +153,8 @@ pub(crate) fn read(adu: &mut Adu, model: &impl DataModel) {
     }
     // A checked request always fits.
     let rest = copy.get(..len).unwrap_or_default();
-    adu.clear();
+    adu.set(GROUPS_FROM - 1, bytes);
+    adu.truncate(GROUPS_FROM.into());
     let with_words = false;
     let mut groups = Groups { rest, with_words };
     while let Some(group) = groups.take() {
@@ -172,13 +170,10 @@ pub(crate) fn read(adu: &mut Adu, model: &impl DataModel) {
     }
 }
 
+/// Writes the records of a checked request of function 15. `fields` are the bytes after the function code.
 #[inline(never)]
-/// Writes the records of a checked request of function 15.
-pub(crate) fn write(adu: &Adu, model: &mut impl DataModel) {
-    if !model.has_files() {
-        return;
-    }
-    let (rest, with_words) = (adu.from(GROUPS_FROM), true);
+pub(crate) fn write(fields: &[u8], model: &mut impl DataModel) {
+    let (rest, with_words) = (fields.get(1..).unwrap_or_default(), true);
     let mut groups = Groups { rest, with_words };
     while let Some(group) = groups.take() {
         if let Ok(records) = group.records() {

@@ -1,10 +1,9 @@
 //! Read device identification: function 2B, MEI type 0E (V1.1b3 6.21).
 //!
 //! ```text
-//!  head            body
-//!  +----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
-//!  | 2B | 0E |code| conformity | more follows| next object | count | id | len | value  |...
-//!  +----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
+//!  +------+----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
+//!  | unit | 2B | 0E |code| conformity | more follows| next object | count | id | len | value  |...
+//!  +------+----+----+----+------------+-------------+-------------+-------+----+-----+--------+---
 //! ```
 
 use crate::{Adu, DataModel, Exception, TextOut};
@@ -24,26 +23,28 @@ pub(crate) enum ReadCode {
 }
 
 /// The MEI type of read device identification.
-pub(crate) const MEI_TYPE: u8 = 0x0E;
+const MEI_TYPE: u8 = 0x0E;
 
 /// First object of the device's own; objects 07 to 7F are reserved.
 const FIRST_EXTENDED: u8 = 0x80;
 /// Last object that the standard defines.
 const LAST_REGULAR: u8 = 0x06;
 
-/// Largest number of bytes of a body: the 253 of the PDU, less function code, MEI type and read code.
-const MAX_BODY: usize = 253 - 3;
+/// Length of a unit address and the longest PDU.
+const LONGEST: usize = 1 + 253;
+/// Bytes before conformity, which the reply repeats from the request: unit, function code, MEI type and read code.
+const REPEATED: usize = 4;
 /// Bytes of conformity, more follows, next object and count.
 const FIXED: usize = 4;
 /// Bytes of an object's number and length.
 const OBJECT: usize = 2;
 /// Length of the longest value that fits a reply. Longer values are cut.
-const MAX_VALUE: usize = MAX_BODY - FIXED - OBJECT;
+const MAX_VALUE: usize = LONGEST - REPEATED - FIXED - OBJECT;
 
-/// Positions of these fields in the body.
-const MORE_FOLLOWS: u8 = 1;
-const NEXT_OBJECT: u8 = 2;
-const COUNT: u8 = 3;
+/// Positions of these fields, counted from the unit address.
+const MORE_FOLLOWS: u8 = 5;
+const NEXT_OBJECT: u8 = 6;
+const COUNT: u8 = 7;
 
 impl ReadCode {
     const fn from_code(code: u8) -> Option<Self> {
@@ -90,9 +91,9 @@ pub(crate) fn decode(fields: &[u8], model: &impl DataModel) -> Result<(ReadCode,
     }
 }
 
-/// Creates the body.
+/// Makes a checked request its reply.
 pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut Adu) {
-    adu.clear();
+    adu.truncate(REPEATED);
     adu.extend(&[conformity(model), 0x00, 0x00, 0]);
     let mut count = 0;
     let mut next = Some(first);
@@ -122,15 +123,15 @@ pub(crate) fn fill(code: ReadCode, first: u8, model: &impl DataModel, adu: &mut 
 /// object does not exist, `Some(false)` if this reply has no room for it.
 fn append(object: u8, model: &impl DataModel, adu: &mut Adu) -> Option<bool> {
     let start = adu.len();
-    let bytes = adu.resize(MAX_BODY);
+    let bytes = adu.resize(LONGEST);
     let mut text = TextOut::new(bytes.get_mut(start + OBJECT..).unwrap_or_default());
     let exists = is_known(object) && model.identification(object, &mut text);
     let len = text.len().min(MAX_VALUE);
     let end = start + OBJECT + len;
-    let fits = exists && end <= MAX_BODY;
+    let fits = exists && end <= LONGEST;
     adu.resize(if fits { end } else { start });
     if fits {
-        // Both values are below 250.
+        // Both values are below 254.
         adu.set(start as u8, object);
         adu.set(start as u8 + 1, len as u8);
     }

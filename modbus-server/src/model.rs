@@ -1,6 +1,8 @@
 //! The interface that the device must implement.
 
-use crate::{Adu, Bits, BitsOut, Exception, Function, Span, Table, TextOut, Words, WordsOut};
+use crate::{
+    Adu, Bits, BitsOut, Exception, Function, Server, Span, Table, TextOut, Words, WordsOut,
+};
 
 /// The points and registers of the device.
 ///
@@ -14,16 +16,11 @@ use crate::{Adu, Bits, BitsOut, Exception, Function, Span, Table, TextOut, Words
 /// state of the device (04, 06). They change nothing and may be called for a request that is then not executed.
 /// Function 16 reads a holding register to write it; function 17 writes some and then reads some.
 ///
-/// The methods that read and write cannot fail. They are called only after the matching check succeeded, but
-/// possibly some time later. If the state has changed since the check, write what is still valid and read what
-/// exists. One call serves one request, except that each group of file records has its own call. So a read returns
+/// The methods that read and write cannot fail. They are called right after the matching check succeeded. One call serves one request, except that each group of file records has its own call. So a read returns
 /// the values of one moment, and a write takes effect as a whole.
 pub trait DataModel {
     /// Returns whether the device has this function. The server answers a function that the device does not have
     /// with exception 01, before any other check. The default is all functions.
-    ///
-    /// A model without function 08 needs a server
-    /// [without listen-only mode](crate::Server::without_listen_only).
     fn has(&self, function: Function) -> bool {
         let _ = function;
         true
@@ -70,6 +67,12 @@ pub trait DataModel {
     /// Pushes every bit of `span` in order. Bits that are not pushed read as 0.
     fn read_bits(&self, table: Table, span: Span, out: &mut BitsOut<'_>) {
         let _ = (table, span, out);
+    }
+
+    /// Called before [`read_words`](Self::read_words), with the server of this request. A model whose registers show
+    /// the server's [`counters`](Server::counters), which include the request, copies them here.
+    fn before_read_words(&mut self, span: Span, server: &Server) {
+        let _ = (span, server);
     }
 
     /// Pushes every word of `span` in order. Words that are not pushed read as 0.
@@ -185,10 +188,10 @@ pub trait DataModel {
     }
 
     /// Serves a request that [`check_custom`](Self::check_custom) accepted; a broadcast is not served. `adu` holds
-    /// the unit address, the function code and the data of the request. Replace all of it by the data of the reply,
-    /// with [`Adu::clear`] and [`Adu::push`]: up to 252 bytes; the rest is cut.
+    /// the unit address, the function code and the data of the request. Replace the data by those of the reply: keep
+    /// the first two bytes ([`Adu::truncate`]), then [`Adu::push`] up to 252 bytes; the rest is cut.
     fn serve_custom(&mut self, code: u8, adu: &mut Adu) {
         let _ = code;
-        adu.clear();
+        adu.truncate(2);
     }
 }

@@ -14,28 +14,13 @@ const MAX_WRITE_WORDS: u16 = 123;
 /// Largest number of words that one request may write when it also reads (V1.1b3 6.17).
 const MAX_WRITE_WORDS_AND_READ: u16 = 121;
 
-/// Position of the value of a single write, counted from the unit address.
-pub(crate) const SINGLE_FROM: u8 = 4;
-/// Position of the values of a multiple write, counted from the unit address.
-pub(crate) const MULTIPLE_FROM: u8 = 7;
-/// Position of the values of a write with a read, counted from the unit address.
-pub(crate) const WITH_READ_FROM: u8 = 11;
-
 /// A request with a valid form.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Request<'a> {
+pub(crate) enum Pdu<'a> {
     ReadBits(Span),
     ReadWords(Span),
-    WriteBits {
-        span: Span,
-        bits: Bits<'a>,
-        from: u8,
-    },
-    WriteWords {
-        span: Span,
-        words: Words<'a>,
-        from: u8,
-    },
+    WriteBits(Span, Bits<'a>),
+    WriteWords(Span, Words<'a>),
     MaskWord {
         address: u16,
         and: u16,
@@ -44,7 +29,6 @@ pub(crate) enum Request<'a> {
     WriteThenRead {
         write: Span,
         words: Words<'a>,
-        from: u8,
         read: Span,
     },
     /// The bytes after the function code. The model decides first: a device without files has neither function 14
@@ -63,7 +47,7 @@ pub(crate) enum Request<'a> {
     Identify(&'a [u8]),
 }
 
-impl<'a> Request<'a> {
+impl<'a> Pdu<'a> {
     /// Decodes a request from its function and the bytes after the function code.
     ///
     /// # Errors
@@ -108,27 +92,19 @@ fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
 
 /// Decodes address and FF00 (on) or 0000 (off). Used as packed bits, the first value byte contains exactly this
 /// bit.
-fn write_single_bit(fields: &[u8]) -> Result<Request<'_>, Exception> {
+fn write_single_bit(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     let (&[hi, lo], value @ ([0x00, 0x00] | [0xFF, 0x00])) = single(fields)? else {
         return Err(Exception::IllegalDataValue);
     };
     let span = Span::single(u16::from_be_bytes([hi, lo]));
-    Ok(Request::WriteBits {
-        span,
-        bits: Bits::new(value, 1),
-        from: SINGLE_FROM,
-    })
+    Ok(Pdu::WriteBits(span, Bits::new(value, 1)))
 }
 
 /// Decodes address and value.
-fn write_single_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
+fn write_single_word(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     let (&address, value) = single(fields)?;
     let span = Span::single(u16::from_be_bytes(address));
-    Ok(Request::WriteWords {
-        span,
-        words: Words::new(value),
-        from: SINGLE_FROM,
-    })
+    Ok(Pdu::WriteWords(span, Words::new(value)))
 }
 
 /// Returns the address and the value of a single write.
@@ -141,37 +117,29 @@ fn single(fields: &[u8]) -> Result<(&[u8; 2], &[u8; 2]), Exception> {
 }
 
 /// Decodes address, quantity, byte count and packed bits.
-fn write_bits(fields: &[u8]) -> Result<Request<'_>, Exception> {
+fn write_bits(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     let (start, quantity, data) = multiple(fields)?;
     if data.len() != usize::from(quantity.div_ceil(8)) {
         return Err(Exception::IllegalDataValue);
     }
     let span = span(start, quantity, MAX_WRITE_BITS)?;
-    Ok(Request::WriteBits {
-        span,
-        bits: Bits::new(data, quantity),
-        from: MULTIPLE_FROM,
-    })
+    Ok(Pdu::WriteBits(span, Bits::new(data, quantity)))
 }
 
 /// Decodes address, quantity, byte count and words.
-fn write_words(fields: &[u8]) -> Result<Request<'_>, Exception> {
+fn write_words(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     let (start, quantity, data) = multiple(fields)?;
     if data.len() != usize::from(quantity) * 2 {
         return Err(Exception::IllegalDataValue);
     }
     let span = span(start, quantity, MAX_WRITE_WORDS)?;
-    Ok(Request::WriteWords {
-        span,
-        words: Words::new(data),
-        from: MULTIPLE_FROM,
-    })
+    Ok(Pdu::WriteWords(span, Words::new(data)))
 }
 
 /// Decodes address, AND mask and OR mask.
-fn mask_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
+fn mask_word(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     match *fields {
-        [a, b, c, d, e, f] => Ok(Request::MaskWord {
+        [a, b, c, d, e, f] => Ok(Pdu::MaskWord {
             address: u16::from_be_bytes([a, b]),
             and: u16::from_be_bytes([c, d]),
             or: u16::from_be_bytes([e, f]),
@@ -182,7 +150,7 @@ fn mask_word(fields: &[u8]) -> Result<Request<'_>, Exception> {
 
 /// Decodes address and quantity to read, then the fields of [`write_words`]. Both quantities are checked before the
 /// end of either range.
-fn write_then_read(fields: &[u8]) -> Result<Request<'_>, Exception> {
+fn write_then_read(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     let (to_read, to_write) = fields
         .split_first_chunk::<4>()
         .ok_or(Exception::IllegalDataValue)?;
@@ -194,16 +162,15 @@ fn write_then_read(fields: &[u8]) -> Result<Request<'_>, Exception> {
     if read == Err(Exception::IllegalDataValue) {
         return Err(Exception::IllegalDataValue);
     }
-    Ok(Request::WriteThenRead {
+    Ok(Pdu::WriteThenRead {
         write: span(start, quantity, MAX_WRITE_WORDS_AND_READ)?,
         words: Words::new(data),
-        from: WITH_READ_FROM,
         read: read?,
     })
 }
 
 /// Decodes a function without fields.
-fn alone<'a>(fields: &[u8], request: Request<'a>) -> Result<Request<'a>, Exception> {
+fn alone<'a>(fields: &[u8], request: Pdu<'a>) -> Result<Pdu<'a>, Exception> {
     if fields.is_empty() {
         Ok(request)
     } else {
@@ -256,7 +223,7 @@ mod tests {
             fields
         };
         let decode =
-            |fields: &[u8]| Request::decode(Function::WriteMultipleRegisters, fields).map(|_| ());
+            |fields: &[u8]| Pdu::decode(Function::WriteMultipleRegisters, fields).map(|_| ());
         assert_eq!(decode(&fields(124)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(123)[..5 + 246]), Ok(()));
 
@@ -267,40 +234,9 @@ mod tests {
             fields[8] = count * 2;
             fields
         };
-        let decode = |fields: &[u8]| {
-            Request::decode(Function::ReadWriteMultipleRegisters, fields).map(|_| ())
-        };
+        let decode =
+            |fields: &[u8]| Pdu::decode(Function::ReadWriteMultipleRegisters, fields).map(|_| ());
         assert_eq!(decode(&fields(122)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(121)[..9 + 242]), Ok(()));
-    }
-
-    #[test]
-    fn values_are_at_their_positions_in_the_request() {
-        // Positions without the unit address and the function code.
-        let [single, multiple] = [SINGLE_FROM, MULTIPLE_FROM].map(|from| usize::from(from) - 2);
-        let fields = [0, 9, 0xFF, 0x00];
-        let Ok(Request::WriteWords { span, words, from }) =
-            Request::decode(Function::WriteSingleRegister, &fields)
-        else {
-            panic!("function 06");
-        };
-        assert_eq!((span, usize::from(from) - 2), (Span::single(9), single));
-        assert!(words.iter().eq(Words::new(&fields[single..]).iter()));
-        let fields = [0, 9, 0, 2, 1, 0b10];
-        let Ok(Request::WriteBits { bits, from, .. }) =
-            Request::decode(Function::WriteMultipleCoils, &fields)
-        else {
-            panic!("function 0F");
-        };
-        assert_eq!(usize::from(from) - 2, multiple);
-        assert!(bits.iter().eq([false, true]));
-        let fields = [0, 9, 0, 2, 0, 7, 0, 1, 2, 0x12, 0x34];
-        let Ok(Request::WriteThenRead { words, from, .. }) =
-            Request::decode(Function::ReadWriteMultipleRegisters, &fields)
-        else {
-            panic!("function 17");
-        };
-        assert!(words.iter().eq([0x1234]));
-        assert_eq!(fields[usize::from(from) - 2..], [0x12, 0x34]);
     }
 }

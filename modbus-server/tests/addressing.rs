@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{Points, UNIT, Unit, frame, pdu, write_words};
-use modbus_server::line::{Faults, Framing, Next, Port, Receiver, UnitSet};
+use common::{Points, UNIT, Unit, frame, pdu, send, write_words};
+use modbus_server::line::{Faults, Framing, Port, Receiver, UnitSet};
 use modbus_server::{Adu, Outcome, Server, Tables};
 
 fn unit() -> Unit {
@@ -91,8 +91,9 @@ fn a_set_of_units_is_served_under_each_of_its_addresses() {
         for byte in frame(to, pdu) {
             port.received(byte, Faults::NONE);
         }
-        assert_eq!(port.long_silence(0), port.waiting().is_some());
-        let unit = port.waiting()?;
+        port.long_silence(0);
+        let request = port.take()?;
+        let unit = request.unit();
         assert_eq!(unit, to);
         // A broadcast is executed by all of them.
         let mut register = [registers[usize::from(unit)]];
@@ -100,21 +101,15 @@ fn a_set_of_units_is_served_under_each_of_its_addresses() {
             holding_registers: &mut register,
             ..Tables::default()
         };
-        assert_eq!(
-            server.serve(&mut port, 0, &mut tables),
-            Some(Outcome::Accepted)
-        );
+        let reply = server.serve(request, &mut tables);
+        assert_eq!(reply.outcome(), Outcome::Accepted);
+        port.send(reply, 0);
         for address in [1, 17, 255] {
             if [0, address].contains(&unit) {
                 registers[usize::from(address)] = register[0];
             }
         }
-        let mut reply: Vec<u8> = port.start().into_iter().collect();
-        while let Next::Byte(byte) = port.next() {
-            reply.push(byte);
-        }
-        port.sent();
-        (!reply.is_empty()).then_some(reply)
+        send(&mut port)
     };
     let read = pdu(0x03, &[0, 1]);
     for to in 1..=255 {
@@ -147,18 +142,19 @@ fn listen_only_mode_of_one_address_silences_all_and_any_address_ends_it() {
             port.received(byte, Faults::NONE);
         }
         port.long_silence(0);
-        let outcome = server.serve(&mut port, 0, &mut tables);
-        let answered = port.start().is_some();
-        port.sent();
-        (outcome, answered)
+        let request = port.take().expect("a request waits");
+        let reply = server.serve(request, &mut tables);
+        let outcome = reply.outcome();
+        port.send(reply, 0);
+        (outcome, send(&mut port).is_some())
     };
-    assert_eq!(outcome(1, &[0, 7]), (Some(Outcome::Accepted), true));
-    assert_eq!(outcome(1, &[4, 0]), (Some(Outcome::Accepted), false));
+    assert_eq!(outcome(1, &[0, 7]), (Outcome::Accepted, true));
+    assert_eq!(outcome(1, &[4, 0]), (Outcome::Accepted, false));
     for unit in [1, 17] {
-        assert_eq!(outcome(unit, &[0, 7]), (Some(Outcome::NotObeyed), false));
+        assert_eq!(outcome(unit, &[0, 7]), (Outcome::NotObeyed, false));
     }
-    assert_eq!(outcome(17, &[1, 0]), (Some(Outcome::Accepted), false));
+    assert_eq!(outcome(17, &[1, 0]), (Outcome::Accepted, false));
     for unit in [1, 17] {
-        assert_eq!(outcome(unit, &[0, 7]), (Some(Outcome::Accepted), true));
+        assert_eq!(outcome(unit, &[0, 7]), (Outcome::Accepted, true));
     }
 }

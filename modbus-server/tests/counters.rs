@@ -111,7 +111,7 @@ fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     receiver.give_back(buffer());
     receive(&mut receiver, &ours);
-    let first = receiver.close().expect("a buffer was free").adu;
+    let first = receiver.close().expect("a buffer was free");
 
     receive(&mut receiver, &ours);
     receiver.pause();
@@ -137,9 +137,9 @@ fn request_without_a_free_buffer_is_counted_as_unanswered_not_as_busy() {
     receiver.give_back(first);
     receive(&mut receiver, &ours);
     let closed = receiver.close().expect("a buffer is free again");
-    assert_eq!(closed.adu.as_slice(), &ours[..6]);
+    assert_eq!(closed.as_slice(), &ours[..6]);
 
-    assert_eq!(closed.line.dropped, 1);
+    assert_eq!(receiver.counters().dropped, 1);
 }
 
 #[test]
@@ -156,10 +156,7 @@ fn buffers_given_back_during_a_frame_are_used_for_the_next() {
         assert_eq!(receiver.counters().dropped, 1);
         for _ in 0..2 {
             receive(&mut receiver, &ours);
-            assert_eq!(
-                receiver.close().expect("a buffer").adu.as_slice(),
-                &ours[..6]
-            );
+            assert_eq!(receiver.close().expect("a buffer").as_slice(), &ours[..6]);
         }
     }
 }
@@ -174,8 +171,8 @@ fn two_requests_can_be_held_at_once() {
     let first = receiver.close().expect("the first");
     receive(&mut receiver, &two);
     let second = receiver.close().expect("the second");
-    assert_eq!(first.adu.as_slice(), &one[..6]);
-    assert_eq!(second.adu.as_slice(), &two[..6]);
+    assert_eq!(first.as_slice(), &one[..6]);
+    assert_eq!(second.as_slice(), &two[..6]);
 }
 
 #[test]
@@ -197,12 +194,12 @@ fn a_third_buffer_does_not_disturb_a_frame() {
     receiver.give_back(buffer());
     let ours = frame(UNIT, &pdu(0x03, &[0, 1]));
     receive(&mut receiver, &ours);
-    let first = receiver.close().expect("the first").adu;
+    let first = receiver.close().expect("the first");
     receive(&mut receiver, &ours[..3]);
     receiver.give_back(first);
     receiver.give_back(buffer());
     receive(&mut receiver, &ours[3..]);
-    assert_eq!(receiver.close().expect("whole").adu.as_slice(), &ours[..6]);
+    assert_eq!(receiver.close().expect("whole").as_slice(), &ours[..6]);
 }
 
 #[test]
@@ -211,20 +208,14 @@ fn counters_read_while_a_request_is_pending_do_not_wrap() {
     let at_port = |unit: &Unit| unit.counters().as_words();
     unit.characters(&frame(UNIT, &[0x0C]));
     assert!(unit.port.long_silence(0));
-    let pending = unit.server.take(&mut unit.port, 0).expect("a request");
+    let pending = unit.port.take().expect("a request");
     // A damaged frame is received while the request is pending.
     unit.characters(&[0x55; 5]);
     assert!(!unit.port.long_silence(0));
     assert_eq!(at_port(&unit), [1, 1, 0, 0, 0, 0, 0, 0, 0]);
-    let mut reply: Vec<u8> = unit.port.start().into_iter().collect();
-    let answered = pending
-        .decide(&unit.server, &unit.points)
-        .answer(&mut unit.port);
-    let committed = answered.commit(&mut unit.server);
-    let served = committed.carry_out(&mut unit.server, &mut unit.points);
-    served.finish(&mut unit.port);
-    send(&mut unit.port, &mut reply);
-    unit.port.sent();
+    let reply = unit.server.serve(pending, &mut unit.points);
+    unit.port.send(reply, 0);
+    let reply = send(&mut unit.port).expect("a reply");
     // Byte count, status, event count, message count, events.
     let expected = [0x0C, 7, 0, 0, 0, 0, 0, 1, 0x80];
     assert_eq!(reply, frame(UNIT, &expected));

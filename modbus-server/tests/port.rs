@@ -1,6 +1,6 @@
 //! A port and its server: start and end of a reply, and the use of the buffers.
 
-use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Width};
+use modbus_server::line::{Faults, Framing, Port, Receiver, Width};
 use modbus_server::{Adu, Counters, Outcome, Server, Tables};
 
 /// Holding registers at 0 to 9.
@@ -60,8 +60,12 @@ impl<'a> Unit<'a> {
     }
 
     fn serve(&mut self, delay: u16) -> Option<Outcome> {
-        self.server
-            .serve(&mut self.port, delay, &mut self.registers.tables())
+        let request = self.port.take()?;
+        assert_eq!(request.ended(), self.now);
+        let reply = self.server.serve(request, &mut self.registers.tables());
+        let outcome = reply.outcome();
+        self.port.send(reply, delay);
+        Some(outcome)
     }
 
     /// Returns the bytes of a reply that may start, and ends the reply.
@@ -71,7 +75,7 @@ impl<'a> Unit<'a> {
             return sent;
         }
         assert!(self.port.is_sending());
-        while let Next::Byte(byte) = self.port.next() {
+        while let Some(byte) = self.port.next_byte() {
             sent.push(byte);
         }
         self.port.sent();
@@ -118,39 +122,6 @@ fn port_with_one_buffer_serves_requests_but_none_before_the_end_of_a_reply() {
 }
 
 #[test]
-fn the_first_byte_is_sent_before_anything_is_decided() {
-    let mut adus = [Adu::new(), Adu::new()];
-    let mut unit = Unit::rtu(&mut adus);
-    unit.now = 1234;
-    assert!(unit.receive_frame(&READ));
-    unit.now = 1300;
-    let request = unit
-        .server
-        .take(&mut unit.port, 0)
-        .expect("a request waits");
-    assert_eq!(unit.port.start(), Some(UNIT));
-    assert_eq!(unit.port.start(), None, "the reply has already started");
-    assert_eq!(unit.port.next(), Next::Wait);
-    let answered = request
-        .decide(&unit.server, &unit.registers.tables())
-        .answer(&mut unit.port);
-    assert_eq!(unit.port.next(), Next::Byte(3));
-    assert_eq!(unit.port.next(), Next::Byte(2));
-    assert_eq!(unit.port.next(), Next::Wait);
-    let committed = answered.commit(&mut unit.server);
-    assert_eq!(committed.ended(), 1234);
-    assert_eq!(unit.server.counters().unit_messages, 1);
-    let served = committed.carry_out(&mut unit.server, &mut unit.registers.tables());
-    served.finish(&mut unit.port);
-    for byte in &REPLY[3..] {
-        assert_eq!(unit.port.next(), Next::Byte(*byte));
-    }
-    assert_eq!(unit.port.next(), Next::Done);
-    unit.port.sent();
-    unit.is_well();
-}
-
-#[test]
 fn a_delayed_reply_starts_after_its_ticks() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
@@ -169,22 +140,34 @@ fn a_delayed_reply_starts_after_its_ticks() {
     unit.is_well();
 }
 
+/// The frame is received while the request is served, or during the delay after it.
 #[test]
-fn a_delayed_reply_is_dropped_when_another_frame_is_received() {
+fn a_reply_is_dropped_and_counted_when_another_frame_begins_before_it() {
     for frame in [&OTHERS[..], &OTHERS[..3]] {
-        let mut adus = [Adu::new(), Adu::new()];
-        let mut unit = Unit::rtu(&mut adus);
-        assert!(unit.receive_frame(&READ));
-        unit.serve(2);
-        unit.receive(frame);
-        if frame.len() == OTHERS.len() {
-            assert!(!unit.silence());
+        for delay in [0, 2] {
+            let mut adus = [Adu::new(), Adu::new()];
+            let mut unit = Unit::rtu(&mut adus);
+            assert!(unit.receive_frame(&READ));
+            let request = unit.port.take().expect("a request waits");
+            let reply = unit.server.serve(request, &mut unit.registers.tables());
+            if delay > 0 {
+                unit.port.send(reply, delay);
+                unit.receive(frame);
+            } else {
+                unit.receive(frame);
+                unit.port.send(reply, delay);
+            }
+            if frame.len() == OTHERS.len() {
+                assert!(!unit.silence());
+            }
+            (0..5).for_each(|_| unit.port.tick());
+            assert_eq!(unit.port.start(), None);
+            assert!(!unit.port.is_replying());
+            let counters = unit.counters();
+            assert_eq!((counters.unit_messages, counters.no_response), (1, 1));
+            unit.silence();
+            unit.is_well();
         }
-        (0..5).for_each(|_| unit.port.tick());
-        assert_eq!(unit.port.start(), None);
-        assert!(!unit.port.is_replying());
-        unit.silence();
-        unit.is_well();
     }
 }
 
@@ -199,6 +182,24 @@ fn a_new_request_drops_the_delayed_reply_before_it() {
     assert!(!unit.port.is_replying(), "that reply is not sent");
     unit.serve(0);
     assert_eq!(unit.sends(), REPLY);
+    assert_eq!(unit.counters().no_response, 1);
+    unit.is_well();
+}
+
+#[test]
+fn no_buffer_is_lost_when_a_second_request_is_taken_before_the_first_reply_is_sent() {
+    let mut adus = [Adu::new(), Adu::new()];
+    let mut unit = Unit::rtu(&mut adus);
+    let mut served = [(); 2].map(|()| {
+        assert!(unit.receive_frame(&READ));
+        let request = unit.port.take().expect("a request waits");
+        Some(unit.server.serve(request, &mut unit.registers.tables()))
+    });
+    for (reply, sends) in served.iter_mut().zip([false, true]) {
+        unit.port.send(reply.take().unwrap(), 0);
+        assert_eq!(!unit.sends().is_empty(), sends);
+    }
+    assert_eq!(unit.counters().no_response, 1);
     unit.is_well();
 }
 
@@ -225,33 +226,12 @@ fn an_aborted_reply_gives_its_buffer_back() {
         unit.serve(0);
         assert_eq!(unit.port.start(), Some(UNIT));
         for byte in &REPLY[1..=sent.min(REPLY.len() - 1)] {
-            assert_eq!(unit.port.next(), Next::Byte(*byte));
+            assert_eq!(unit.port.next_byte(), Some(*byte));
         }
         unit.port.sent();
         assert!(!unit.port.is_replying());
         unit.is_well();
     }
-}
-
-#[test]
-fn a_reply_aborted_before_it_is_served_takes_no_body() {
-    let mut adus = [Adu::new(), Adu::new()];
-    let mut unit = Unit::rtu(&mut adus);
-    assert!(unit.receive_frame(&READ));
-    let request = unit
-        .server
-        .take(&mut unit.port, 0)
-        .expect("a request waits");
-    assert_eq!(unit.port.start(), Some(UNIT));
-    unit.port.sent();
-    request
-        .decide(&unit.server, &unit.registers.tables())
-        .answer(&mut unit.port)
-        .commit(&mut unit.server)
-        .carry_out(&mut unit.server, &mut unit.registers.tables())
-        .finish(&mut unit.port);
-    assert!(!unit.port.is_replying());
-    unit.is_well();
 }
 
 #[test]
@@ -284,20 +264,15 @@ fn an_ascii_request_is_served_at_the_short_silence_and_too_late_at_the_long_one(
             }
             if late {
                 assert!(!port.long_silence(0));
-                assert!(
-                    server
-                        .serve(&mut port, 0, &mut registers.tables())
-                        .is_none()
-                );
+                assert!(port.take().is_none());
                 assert_eq!(port.counters().dropped, round + 1);
                 continue;
             }
             assert!(port.short_silence(0));
-            server
-                .serve(&mut port, 0, &mut registers.tables())
-                .expect("a request waits");
+            let request = port.take().expect("a request waits");
+            port.send(server.serve(request, &mut registers.tables()), 0);
             let mut sent = vec![port.start().expect("the request is answered")];
-            while let Next::Byte(byte) = port.next() {
+            while let Some(byte) = port.next_byte() {
                 sent.push(byte);
             }
             port.sent();

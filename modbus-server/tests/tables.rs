@@ -86,22 +86,6 @@ fn a_function_that_the_model_does_not_have_returns_01_before_any_other_check() {
 }
 
 #[test]
-fn without_listen_only_mode_its_sub_function_returns_illegal_function() {
-    let mut unit = Unit::new(Points::new(1, 1));
-    unit.server = unit.server.without_listen_only();
-    for data in [0x0000, 0x0001, 0xFF00] {
-        assert_eq!(unit.refused(&pdu(0x08, &[4, data])), 1, "{data:04X}");
-    }
-    assert_eq!(unit.refused(&[0x08, 0, 4]), 1);
-    assert!(!unit.server.is_listen_only());
-    for sub in [0x00, 0x01, 0x0A, 0x0B] {
-        let reply = unit.request(&pdu(0x08, &[sub, 0])).expect("a reply");
-        assert_eq!(reply[0], 0x08);
-    }
-    unit.must_answer();
-}
-
-#[test]
 fn tables_that_a_model_does_not_implement_are_empty() {
     /// A model with one register to read, as holding and as input register.
     struct Register;

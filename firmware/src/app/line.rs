@@ -52,16 +52,6 @@ impl Uart for Rs485Uart {
     }
 
     #[inline]
-    fn pause_sending(&mut self) {
-        self.0.pause_sending();
-    }
-
-    #[inline]
-    fn resume_sending(&mut self) {
-        self.0.resume_sending();
-    }
-
-    #[inline]
     fn finish_sending(&mut self) {
         self.0.finish_sending();
     }

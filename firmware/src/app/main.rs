@@ -62,7 +62,7 @@ mod app {
         orders::Orders,
         radio::{Polling, Radio, on_interrupt},
         scanning::Scanning,
-        serving::{Lines, Serving},
+        serving::Serving,
         signals::Signals,
         start,
     };
@@ -214,14 +214,12 @@ mod app {
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
         let mut shared = cx.shared;
-        let mut lines = Lines {
-            rs485: shared.line,
-            radio: shared.radio,
-        };
-        let served = cx
-            .local
-            .serving
-            .run(&mut lines, &mut shared.device, &mut shared.orders);
+        let served = cx.local.serving.run(
+            &mut shared.line,
+            &mut shared.radio,
+            &mut shared.device,
+            &mut shared.orders,
+        );
         if served {
             shared.activity.lock(|activity| *activity = true);
         }

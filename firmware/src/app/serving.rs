@@ -1,46 +1,25 @@
-//! Serves a request, from its port to its reply.
+//! Serves a request: takes it from its line, executes it, and sends the reply.
 //!
 //! ```text
-//! line    take: reply starts          answer           finish
-//! device  .....................decide........carry out.......   <- one lock for each phase
+//! line    take          send     <- the locks of a line are short, because its interrupts wait for them
+//! device       ...serve...
 //! ```
-//!
-//! No lock is held between the phases. The locks of the lines are kept short, because the interrupts of the RS-485
-//! line wait for them.
 
 use board_support::pac::Interrupt;
 use firmware::{
     config::{LineName, Origin},
-    line::ServedLine,
     start_up::LOADER_UNIT,
 };
-use modbus_server::{Outcome, Request, Server, line::Framing};
+use modbus_server::{LineCounters, Outcome, Reply, Request, Server, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
 use crate::{board::Device, line::Line, orders::Orders, radio::Radio};
 
-/// The lines, under their locks.
-pub struct Lines<L, R> {
-    pub rs485: L,
-    pub radio: R,
-}
-
-impl<L: Mutex<T = Option<Line>>, R: Mutex<T = Option<Radio>>> Lines<L, R> {
-    /// Calls `f` with a line, if it is on.
-    #[inline(always)]
-    fn lock<T>(&mut self, which: LineName, f: impl FnOnce(&mut dyn ServedLine) -> T) -> Option<T> {
-        match which {
-            LineName::Rs485 => self.rs485.lock(|line| line.as_mut().map(|line| f(line))),
-            LineName::Radio => self.radio.lock(|line| line.as_mut().map(|line| f(line))),
-        }
-    }
-}
-
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
 
-/// A line's part in serving.
+/// A server, and what belongs to its line.
 struct Served {
     server: Server,
     /// Time from the end of a frame until the line reports it, in ms, rounded up.
@@ -56,32 +35,6 @@ impl Served {
             frame_gap_ms,
             order: None,
         }
-    }
-}
-
-/// The waiting request of a line.
-struct Taken {
-    /// The previous reply has been sent, or will never be sent.
-    silent: bool,
-    /// Its end may still be on its way.
-    on_air: bool,
-    request: Option<Request<'static>>,
-}
-
-/// Takes the waiting request of a line, if the line is on and there is one. Its reply starts now, or after `delay_ms`.
-#[inline(always)]
-fn take(line: &mut Option<impl ServedLine>, server: &Server, delay_ms: u16) -> Taken {
-    let Some(line) = line else {
-        return Taken {
-            silent: false,
-            on_air: false,
-            request: None,
-        };
-    };
-    Taken {
-        silent: !line.is_replying(),
-        on_air: line.is_on_air(),
-        request: line.take(server, delay_ms),
     }
 }
 
@@ -115,42 +68,46 @@ impl Serving {
     /// Returns whether there was a request.
     pub fn run(
         &mut self,
-        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
+        rs485: &mut impl Mutex<T = Option<Line>>,
+        radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
-        let delay_ms = self.delay_ms(device);
-        // The UART sends the unit address while the code below runs.
-        let taken = lines
+        let order = self
             .rs485
-            .lock(|line| take(line, &self.rs485.server, delay_ms));
-        let served = self.run_line(LineName::Rs485, taken, lines, device, orders);
-        // RESPONSE_DELAY is for masters on the RS-485 line; the air takes much longer.
-        let taken = lines.radio.lock(|line| take(line, &self.radio.server, 0));
-        self.run_line(LineName::Radio, taken, lines, device, orders) || served
-    }
-
-    // Not inlined: one copy serves both lines.
-    #[inline(never)]
-    fn run_line(
-        &mut self,
-        which: LineName,
-        taken: Taken,
-        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
-        device: &mut impl Mutex<T = &'static mut Device>,
-        orders: &mut impl Mutex<T = Orders>,
-    ) -> bool {
-        let order = &mut self.of(which).order;
-        if taken.silent
-            // Only a restart affects a reply that is on its way. The other commands are executed before the master can
-            // have the reply, because a command of the other line may follow it.
-            && let Some(order) = order.take_if(|order| !taken.on_air || *order != Command::Restart)
-        {
-            pass_order_on(order, device, orders);
+            .order
+            .take_if(|_| rs485.lock(|line| line.as_ref().is_some_and(|line| !line.is_replying())));
+        execute(order, device, orders);
+        let request = rs485.lock(|line| line.as_mut()?.take());
+        let served = request.is_some();
+        if let Some(request) = request {
+            if let Some(line) = radio.lock(|line| Some(line.as_ref()?.counters())) {
+                self.copy_counters(LineName::Radio, &line, device);
+            }
+            let (reply, delay_ms) = self.serve(LineName::Rs485, request, device);
+            rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
         }
-        taken
-            .request
-            .is_some_and(|request| self.serve(which, request, lines, device))
+
+        // Only a restart affects a reply that is on its way. The other commands are executed before the master can
+        // have the reply, because a command of the other line may follow it.
+        let order = self.radio.order.take_if(|order| {
+            radio.lock(|line| {
+                line.as_ref().is_some_and(|line| {
+                    !line.is_replying() && (*order != Command::Restart || !line.is_on_air())
+                })
+            })
+        });
+        execute(order, device, orders);
+        let Some(request) = radio.lock(|line| line.as_mut()?.take()) else {
+            return served;
+        };
+        if let Some(line) = rs485.lock(|line| Some(line.as_ref()?.counters())) {
+            self.copy_counters(LineName::Rs485, &line, device);
+        }
+        // RESPONSE_DELAY is for masters on the RS-485 line; the air takes much longer.
+        let (reply, _) = self.serve(LineName::Radio, request, device);
+        radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
+        true
     }
 
     const fn of(&mut self, which: LineName) -> &mut Served {
@@ -160,86 +117,65 @@ impl Serving {
         }
     }
 
-    fn delay_ms(&self, device: &mut impl Mutex<T = &'static mut Device>) -> u16 {
-        if self.unit == LOADER_UNIT {
-            // In loader mode a unit must be found even by a master with a short time-out.
-            0
-        } else {
-            device.lock(|device| device.config.response_delay_ms())
-        }
-    }
-
+    /// Serves a request. Returns the reply and its delay in milliseconds.
+    // Not inlined: one copy serves both lines.
+    #[inline(never)]
     fn serve(
         &mut self,
         which: LineName,
         request: Request<'static>,
-        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
-    ) -> bool {
+    ) -> (Reply<'static>, u16) {
+        // In recovery mode a unit must be found even by a master with a short time-out.
+        let delays = self.unit != LOADER_UNIT;
         let served = self.of(which);
         let origin = Origin {
             line: which,
             broadcast: request.unit() == BROADCAST,
         };
-        let decided = device.lock(|device| {
+        let seen_at = request.ended().wrapping_sub(served.frame_gap_ms);
+        let (reply, delay_ms) = device.lock(|device| {
+            let delay_ms = device.config.response_delay_ms();
             device.set_origin(origin);
-            request.decide(&served.server, &**device)
-        });
-        let Some(answered) = lines.lock(which, |line| line.answer(decided)) else {
-            return false;
-        };
-        let committed = answered.commit(&mut served.server);
-        let decision = *committed.decision();
-        if Device::shows_counters(&decision.work) {
-            self.copy_counters(lines, device);
-        }
-        let served = self.of(which);
-        let done = device.lock(|device| {
+            let reply = served.server.serve(request, &mut **device);
             // In listen-only mode requests do not count, so that the outputs go to SAFE.
-            if !matches!(decision.outcome, Outcome::NoRequest | Outcome::NotObeyed) {
-                device.request_seen(committed.ended().wrapping_sub(served.frame_gap_ms));
+            if !matches!(reply.outcome(), Outcome::NoRequest | Outcome::NotObeyed) {
+                device.request_seen(seen_at);
             }
-            let done = committed.carry_out(&mut served.server, &mut **device);
             served.order = device.take_order();
-            done
+            (reply, delay_ms)
         });
-        lines.lock(which, |line| line.finish(done));
-        if decision.work.writes() {
+        if reply.writes() {
             rtic::pend(Interrupt::EXTI1);
-            if !decision.is_answered() {
-                // There is no reply to wait for, so execute the command now.
-                rtic::pend(Interrupt::EXTI3);
-            }
         }
-        true
+        if served.order.is_some() && !reply.is_answered() {
+            // There is no reply to wait for, so execute the command now.
+            rtic::pend(Interrupt::EXTI3);
+        }
+        (reply, if delays { delay_ms } else { 0 })
     }
 
-    /// Copies the counters of both lines to the device's state.
+    /// Copies the counters of a line to the device's state. Those of the line whose request is being served are copied
+    /// by the device itself.
     fn copy_counters(
-        &self,
-        lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
+        &mut self,
+        which: LineName,
+        line: &LineCounters,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) {
-        let rs485 = lines.lock(LineName::Rs485, |line| line.counters());
-        let radio = lines.lock(LineName::Radio, |line| line.counters());
-        device.lock(|device| {
-            let state = &mut device.state;
-            if let Some(line) = rs485 {
-                state.counters = self.rs485.server.counters_at(&line);
-            }
-            if let Some(line) = radio {
-                state.radio_counters = self.radio.server.counters_at(&line);
-            }
-        });
+        let counters = self.of(which).server.counters_at(line);
+        device.lock(|device| *device.state.counters_of(which) = counters);
     }
 }
 
-/// Executes the command of a request whose reply has been sent, or passes it on to the background task.
-fn pass_order_on(
-    order: Command,
+/// Executes the command of a request whose reply has been sent, if there is one, or passes it on to the background
+/// task.
+fn execute(
+    order: Option<Command>,
     device: &mut impl Mutex<T = &'static mut Device>,
     orders: &mut impl Mutex<T = Orders>,
 ) {
+    let Some(order) = order else { return };
     if let Some(order) = device.lock(|device| device.carry_out(order)) {
         orders.lock(|orders| match order {
             Command::Save => orders.save = true,

@@ -118,6 +118,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.origin = origin;
     }
 
+    /// Returns the line of the request that is being served.
+    #[must_use]
+    pub const fn origin_line(&self) -> LineName {
+        self.origin.line
+    }
+
     /// Returns whether the radio serves points and reads only.
     #[must_use]
     pub const fn air_serves_points_only(&self) -> bool {

@@ -27,7 +27,7 @@ mod tests;
 use core::ops::Range;
 
 use modbus_server::{
-    Bits, BitsOut, DataModel, Exception, Span, Table, TextOut, Words, WordsOut, Work,
+    Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
 use modio_drivers::{CHANNELS, Kind};
 use register_map::{codes::Command, configuration, counters, fault, radio, state as state_map};
@@ -148,21 +148,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.comm_watchdog.refresh(at_ms);
     }
 
-    /// Sets the origin of the request that is decided and carried out next.
+    /// Sets the origin of the request that is served next.
     pub const fn set_origin(&mut self, origin: Origin) {
         self.config.set_origin(origin);
-    }
-
-    /// Returns whether this work reads the counters of the lines. The caller must then copy them into the state
-    /// first.
-    #[must_use]
-    pub const fn shows_counters(work: &Work) -> bool {
-        match work.reads() {
-            Some((Table::HoldingRegisters | Table::InputRegisters, span)) => {
-                matches!(Block::of(span), Block::State | Block::Radio)
-            }
-            _ => false,
-        }
     }
 
     /// Returns whether a module or the radio does not work.
@@ -280,6 +268,12 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
 
     fn read_bits(&self, _: Table, span: Span, out: &mut BitsOut<'_>) {
         self.points.read_bits(span, out);
+    }
+
+    fn before_read_words(&mut self, span: Span, server: &Server) {
+        if matches!(Block::of(span), Block::State | Block::Radio) {
+            *self.state.counters_of(self.config.origin_line()) = server.counters();
+        }
     }
 
     fn read_words(&self, _: Table, span: Span, out: &mut WordsOut<'_>) {

@@ -7,7 +7,7 @@ use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
 use super::port::IoPort;
 use crate::built;
-use crate::config::Config;
+use crate::config::{Config, LineName};
 
 /// Data that is known when the device starts and never changes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -56,9 +56,9 @@ pub struct State {
     part_ms: u32,
     uptime_s: u32,
     /// The counters of the RS-485 line, copied from its server when they were last read.
-    pub counters: Counters,
+    counters: Counters,
     /// The counters of the radio line, copied in the same way. Zero while the radio is off.
-    pub radio_counters: Counters,
+    radio_counters: Counters,
     /// Whether the radio works; `None` while it is off or being set up for the first time.
     pub radio_works: Option<bool>,
     /// The smallest amount of free stack so far, in bytes.
@@ -93,6 +93,14 @@ impl State {
         while self.part_ms >= 1000 {
             self.part_ms -= 1000;
             self.uptime_s = self.uptime_s.wrapping_add(1);
+        }
+    }
+
+    /// Returns the counters of a line, to be updated.
+    pub const fn counters_of(&mut self, line: LineName) -> &mut Counters {
+        match line {
+            LineName::Rs485 => &mut self.counters,
+            LineName::Radio => &mut self.radio_counters,
         }
     }
 

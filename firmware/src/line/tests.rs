@@ -5,7 +5,7 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use modbus_server::line::{Framing, Receiver};
-use modbus_server::{Adu, Tables};
+use modbus_server::{Adu, Server, Tables};
 
 use super::*;
 
@@ -65,14 +65,6 @@ impl Uart for FakeUart {
     fn send(&mut self, byte: u8) {
         assert!(self.driver, "a byte was sent while the driver is off");
         self.sent.push(byte);
-    }
-
-    fn pause_sending(&mut self) {
-        self.wants = false;
-    }
-
-    fn resume_sending(&mut self) {
-        self.wants = true;
     }
 
     fn finish_sending(&mut self) {
@@ -184,20 +176,15 @@ impl Bench {
         }
     }
 
-    /// Takes the waiting request; its reply begins.
-    fn take(&mut self) -> Request<'static> {
-        self.line.take(&self.server, 0).unwrap()
-    }
-
-    fn serve(&mut self, request: Request<'static>) {
+    /// Serves the waiting request; its reply begins.
+    fn serve(&mut self) {
         let mut tables = Tables {
             holding_registers: &mut self.registers,
             ..Tables::default()
         };
-        let decided = request.decide(&self.server, &tables);
-        let committed = self.line.answer(decided).commit(&mut self.server);
-        let served = committed.carry_out(&mut self.server, &mut tables);
-        self.line.finish(served);
+        let request = self.line.take().expect("a request waits");
+        let reply = self.server.serve(request, &mut tables);
+        self.line.send(reply, 0);
     }
 
     /// Runs the UART's interrupts up to the end of the reply.
@@ -222,18 +209,12 @@ fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
     assert!(!bench.line.uart.driver);
     assert!(!bench.silence(Silence::T15));
     assert!(bench.silence(Silence::T35), "a request waits");
-    let request = bench.take();
+    bench.serve();
     assert!(bench.line.uart.driver && bench.line.gap.limited);
     assert!(
         !bench.line.gap.running,
         "no silence is measured after the unit's own reply"
     );
-    assert!(!bench.line.on_uart());
-    assert!(
-        !bench.line.uart.wants,
-        "the reply is not decided yet, so no byte is wanted"
-    );
-    bench.serve(request);
     bench.send();
     assert_eq!(bench.line.uart.sent, REPLY);
     assert!(!bench.line.uart.driver && !bench.line.is_replying());
@@ -274,7 +255,7 @@ fn reply_that_does_not_end_is_aborted() {
     let mut bench = Bench::new();
     bench.receive(&REQUEST);
     assert!(bench.silence(Silence::T35));
-    let _request = bench.take();
+    bench.serve();
     bench.pass(LONGEST_MS - 1);
     assert!(bench.line.uart.driver && !bench.line.take_repaired());
     bench.pass(1);
@@ -283,7 +264,7 @@ fn reply_that_does_not_end_is_aborted() {
     let mut bench = Bench::new();
     bench.receive(&REQUEST);
     assert!(bench.silence(Silence::T35));
-    let _request = bench.take();
+    bench.serve();
     bench.line.on_limit();
     assert!(bench.line.uart.driver, "the limit has not been reached");
     bench.line.gap.limit_passed = true;

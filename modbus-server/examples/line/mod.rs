@@ -6,7 +6,7 @@
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
-use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Silences, TimedPort, Width};
+use modbus_server::line::{Faults, Framing, Port, Receiver, Silences, TimedPort, Width};
 use modbus_server::{Adu, DataModel, Server};
 use serial2::SerialPort;
 
@@ -89,12 +89,15 @@ impl Line {
     /// Serves the request and sends the reply, if there is one.
     pub fn serve(&mut self, model: &mut impl DataModel) -> io::Result<()> {
         let port = self.port.port();
-        self.server.serve(port, 0, model);
+        let Some(request) = port.take() else {
+            return Ok(());
+        };
+        port.send(self.server.serve(request, model), 0);
         let Some(first) = port.start() else {
             return Ok(());
         };
         let mut reply = vec![first];
-        while let Next::Byte(byte) = port.next() {
+        while let Some(byte) = port.next_byte() {
             reply.push(byte);
         }
         self.port.sent();

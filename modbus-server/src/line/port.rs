@@ -1,9 +1,8 @@
 //! A line as its server uses it: takes characters and silences, returns requests; takes replies, returns
 //! characters.
 
-use super::{Closed, Faults, Framing, Next, Receiver, Transmitter, Units};
-use crate::head::Head;
-use crate::{Adu, LineCounters};
+use super::{Faults, Receiver, Transmitter, Units};
+use crate::{Adu, LineCounters, Reply, Request};
 
 /// One serial line of a server, without UART, timer or clock.
 ///
@@ -15,14 +14,15 @@ use crate::{Adu, LineCounters};
 /// | the short silence has passed | [`short_silence`](Self::short_silence) | when `true`, serve |
 /// | the long silence has passed | [`long_silence`](Self::long_silence) | when `true`, serve |
 /// | a tick of the caller's clock | [`tick`](Self::tick) | [`start`](Self::start) |
-/// | the UART can take a character | [`next`](Self::next) | send it, wait, or wait for the last stop bit |
+/// | the UART can take a character | [`next_byte`](Self::next_byte) | send it, or wait for the last stop bit |
 /// | the last stop bit was sent | [`sent`](Self::sent) | driver off, receiver on |
 ///
 /// The short and the long silence are t1.5 and t3.5 in RTU mode ([`Gaps`](super::Gaps)), and t3.5 and
 /// [`Gaps::ASCII_TIMEOUT`](super::Gaps::ASCII_TIMEOUT) in ASCII mode. Do not measure silences while the unit sends.
 ///
-/// To serve is [`Server::take`](crate::Server::take) and the steps after it. Once the reply may start,
-/// [`start`](Self::start) returns its first character: turn the driver on and the receiver off.
+/// To serve is to [`take`](Self::take) the request, let a [`Server`](crate::Server) serve it, and [`send`](Self::send)
+/// the reply. Once the reply may start, [`start`](Self::start) returns its first character: turn the driver on and the
+/// receiver off.
 ///
 /// A tick can be any unit of time, the same for the delay of a reply and for the end of a request. It need not be
 /// short, because the caller measures the silences.
@@ -30,17 +30,15 @@ use crate::{Adu, LineCounters};
 pub struct Port<'a, U = u8> {
     receiver: Receiver<'a, U>,
     transmitter: Transmitter<'a>,
-    request: Option<Closed<'a>>,
-    /// Tick in which the request ended.
-    ended: u32,
-    reply: Reply,
-    /// Number of valid frames on the bus when the delay of a reply began.
+    request: Option<Request<'a>>,
+    reply: State,
+    /// Number of valid frames on the bus when the request of a delayed reply ended.
     messages_before: u16,
 }
 
 /// State of the reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Reply {
+enum State {
     /// There is no reply.
     None,
     /// The reply waits for this many ticks. It is dropped if another frame is received in the meantime.
@@ -62,8 +60,7 @@ impl<'a, U: Units> Port<'a, U> {
             receiver,
             transmitter: Transmitter::idle(),
             request: None,
-            ended: 0,
-            reply: Reply::None,
+            reply: State::None,
             messages_before: 0,
         }
     }
@@ -116,70 +113,97 @@ impl<'a, U: Units> Port<'a, U> {
         if !self.close(now) {
             return false;
         }
-        if late && let Some(closed) = self.request.take() {
-            self.receiver.drop_request(closed.adu);
+        if late && let Some(request) = self.request.take() {
+            self.receiver.drop_request(request.adu);
             return false;
         }
         true
     }
 
-    fn close(&mut self, now: u32) -> bool {
-        let Some(closed) = self.receiver.close() else {
+    fn close(&mut self, ended: u32) -> bool {
+        let Some(adu) = self.receiver.close() else {
             return false;
         };
-        self.ended = now;
+        let line = *self.receiver.counters();
         // A request that has not been taken yet cannot be answered in time any more.
-        if let Some(late) = self.request.replace(closed) {
+        if let Some(late) = self.request.replace(Request { adu, line, ended }) {
             self.receiver.drop_request(late.adu);
         }
         true
     }
 
-    /// Advances the time by a tick. A reply may [`start`](Self::start) when its delay has passed, unless another
-    /// frame was received in the meantime.
+    /// Takes the waiting request, if any, to be served. A reply that has not begun yet is not sent any more, because
+    /// the master no longer expects it.
+    #[inline]
+    pub fn take(&mut self) -> Option<Request<'a>> {
+        let request = self.request.take()?;
+        if matches!(self.reply, State::Delayed(_) | State::Ready) {
+            self.drop_reply();
+        }
+        Some(request)
+    }
+
+    /// Takes the reply to the last request, if it has one, and the request's buffer back. The reply may
+    /// [`start`](Self::start) now, or after `delay` ticks, unless another frame begins before that. Then it is dropped
+    /// and counted.
+    #[inline]
+    pub fn send(&mut self, reply: Reply<'a>, delay: u16) {
+        self.receiver.set_framing(reply.next_framing);
+        if !reply.is_answered {
+            return self.receiver.give_back(reply.adu);
+        }
+        match self.reply {
+            State::None => {}
+            State::Delayed(_) | State::Ready => self.drop_reply(),
+            State::Sending => {
+                self.receiver.count_unsent();
+                return self.receiver.give_back(reply.adu);
+            }
+        }
+        self.transmitter = Transmitter::new(reply.adu, reply.framing);
+        self.messages_before = reply.messages;
+        self.reply = State::Delayed(delay);
+        if delay == 0 {
+            self.tick();
+        }
+    }
+
+    /// Advances the time by a tick. A reply may [`start`](Self::start) when its delay has passed.
     pub fn tick(&mut self) {
         match self.reply {
-            Reply::Delayed(0) => {
-                if self.receiver.is_idle() && self.messages() == self.messages_before {
-                    self.reply = Reply::Ready;
+            State::Delayed(0) => {
+                let messages = self.receiver.counters().bus_messages;
+                if self.receiver.is_idle() && messages == self.messages_before {
+                    self.reply = State::Ready;
                 } else {
-                    self.give_up();
+                    self.drop_reply();
                 }
             }
-            Reply::Delayed(ticks) => self.reply = Reply::Delayed(ticks - 1),
-            Reply::None | Reply::Ready | Reply::Sending => {}
+            State::Delayed(ticks) => self.reply = State::Delayed(ticks - 1),
+            State::None | State::Ready | State::Sending => {}
         }
     }
 
     /// Returns the first character of a reply that starts now, if there is one.
     #[inline]
     pub fn start(&mut self) -> Option<u8> {
-        if self.reply != Reply::Ready {
+        if self.reply != State::Ready {
             return None;
         }
-        self.reply = Reply::Sending;
-        match self.transmitter.next() {
-            Next::Byte(byte) => Some(byte),
-            Next::Wait | Next::Done => None,
-        }
+        self.reply = State::Sending;
+        self.transmitter.next()
     }
 
-    /// Returns what to send next. After [`Next::Wait`], call this again when the reply has been
-    /// [answered](crate::Decided::answer) or [finished](crate::Served::finish). After [`Next::Done`], wait for the
-    /// last stop bit.
+    /// Returns the next character to send. After `None`, wait for the last stop bit.
     #[inline(always)]
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "not an iterator: the next byte may not be ready yet"
-    )]
-    pub fn next(&mut self) -> Next {
+    pub fn next_byte(&mut self) -> Option<u8> {
         self.transmitter.next()
     }
 
     /// Ends the reply: its last stop bit was sent, or the line was set up again. The next character starts a frame.
     #[inline]
     pub fn sent(&mut self) {
-        if self.reply == Reply::Sending {
+        if self.reply == State::Sending {
             self.give_up();
         }
         self.receiver.resume();
@@ -189,17 +213,17 @@ impl<'a, U: Units> Port<'a, U> {
     #[inline]
     #[must_use]
     pub fn is_sending(&self) -> bool {
-        self.reply == Reply::Sending
+        self.reply == State::Sending
     }
 
-    /// Returns whether a reply is being sent or will be sent. A delayed reply is not sent when a new request has
-    /// been received.
+    /// Returns whether a reply is being sent or will be sent. A delayed reply is not sent when a new request has been
+    /// received.
     #[must_use]
     pub fn is_replying(&self) -> bool {
         match self.reply {
-            Reply::None => false,
-            Reply::Delayed(_) => self.request.is_none(),
-            Reply::Ready | Reply::Sending => true,
+            State::None => false,
+            State::Delayed(_) => self.request.is_none(),
+            State::Ready | State::Sending => true,
         }
     }
 
@@ -212,7 +236,7 @@ impl<'a, U: Units> Port<'a, U> {
     /// Returns the unit address of the request that waits to be served, if any; 0 for a broadcast.
     #[must_use]
     pub fn waiting(&self) -> Option<u8> {
-        self.request.as_ref().map(|closed| closed.adu.get(0))
+        self.request.as_ref().map(Request::unit)
     }
 
     /// Returns the counters of the line.
@@ -221,58 +245,15 @@ impl<'a, U: Units> Port<'a, U> {
         self.receiver.counters()
     }
 
-    /// Takes the waiting request, if any, and the tick in which it ended. Drops a reply that has not begun yet,
-    /// because the master no longer expects it.
-    pub(crate) fn take_request(&mut self) -> Option<(Closed<'a>, u32)> {
-        let closed = self.request.take()?;
-        if matches!(self.reply, Reply::Delayed(_)) {
-            self.give_up();
-        }
-        Some((closed, self.ended))
-    }
-
-    /// Announces a reply of `unit`: its first character may be sent now, or after `delay` ticks.
-    #[inline]
-    pub(crate) fn open(&mut self, unit: u8, framing: Framing, delay: u16) {
-        self.transmitter = Transmitter::open(unit, framing);
-        self.reply = if delay == 0 {
-            Reply::Ready
-        } else {
-            self.messages_before = self.messages();
-            Reply::Delayed(delay)
-        };
-    }
-
-    /// Sets the first bytes of the reply.
-    #[inline]
-    pub(crate) const fn set_head(&mut self, head: Head) {
-        self.transmitter.head(head);
-    }
-
-    /// Takes the request's buffer back: as the body of the reply that was begun, or for the receiver. The next
-    /// frame ends as `framing` says.
-    #[inline]
-    pub(crate) fn finish(&mut self, adu: &'a mut Adu, replying: bool, framing: Framing) {
-        self.receiver.set_framing(framing);
-        // A reply that has been aborted by now takes no body.
-        let unneeded = if replying && self.reply != Reply::None {
-            self.transmitter.body(adu)
-        } else {
-            Some(adu)
-        };
-        if let Some(adu) = unneeded {
-            self.receiver.give_back(adu);
-        }
-    }
-
-    /// Returns the number of valid frames on the bus so far.
-    fn messages(&self) -> u16 {
-        self.receiver.counters().bus_messages
+    /// Ends a reply that is not sent.
+    fn drop_reply(&mut self) {
+        self.receiver.count_unsent();
+        self.give_up();
     }
 
     #[inline(always)]
     fn give_up(&mut self) {
-        self.reply = Reply::None;
+        self.reply = State::None;
         if let Some(adu) = self.transmitter.take_buffer() {
             self.receiver.give_back(adu);
         }

@@ -10,15 +10,6 @@ use crate::counters::count;
 use crate::server::BROADCAST;
 use crate::{Adu, LineCounters, crc, length};
 
-/// A valid request for this unit, or a broadcast.
-#[derive(Debug)]
-pub struct Closed<'a> {
-    /// Unit address and PDU, without CRC or LRC. Give the buffer back to the receiver when it is free again.
-    pub adu: &'a mut Adu,
-    /// The counters of the line, including this frame.
-    pub line: LineCounters,
-}
-
 /// The receiving half of a line (V1.02 2.5.1.1, figure 14, for RTU; 2.5.2.1, figure 17, for ASCII).
 ///
 /// A program creates it for its [`Port`](super::Port), which calls all other methods.
@@ -106,6 +97,13 @@ impl<'a, U: Units> Receiver<'a, U> {
         self.give_back(adu);
     }
 
+    /// Counts a reply that was not sent.
+    #[cold]
+    #[inline(never)]
+    pub(super) const fn count_unsent(&mut self) {
+        count(&mut self.counters.unsent);
+    }
+
     /// Processes a received character.
     #[inline(always)]
     pub fn character(&mut self, byte: u8, faults: Faults) {
@@ -174,9 +172,10 @@ impl<'a, U: Units> Receiver<'a, U> {
     /// when the frame [`is_over`](Self::is_over), or when one second has passed without a character; the partial
     /// frame is then counted as damaged.
     ///
-    /// Returns `Some` only for a valid frame to this unit or a broadcast. All other frames are counted and dropped.
+    /// Returns unit address and PDU of a valid frame to this unit or a broadcast. All other frames are counted and
+    /// dropped. Give the buffer back when it is free again.
     #[inline]
-    pub fn close(&mut self) -> Option<Closed<'a>> {
+    pub fn close(&mut self) -> Option<&'a mut Adu> {
         let request = self.judge(self.state);
         self.resume();
         request
@@ -205,7 +204,7 @@ impl<'a, U: Units> Receiver<'a, U> {
 
     /// Decides about the received frame.
     #[inline]
-    fn judge(&mut self, state: u16) -> Option<Closed<'a>> {
+    fn judge(&mut self, state: u16) -> Option<&'a mut Adu> {
         if state & (DEAF | IDLE) != 0 {
             return None;
         }
@@ -238,11 +237,8 @@ impl<'a, U: Units> Receiver<'a, U> {
             return None;
         }
         let adu = self.filling.take()?;
-        adu.cut(check_len);
-        Some(Closed {
-            adu,
-            line: self.counters,
-        })
+        adu.truncate(len - check_len);
+        Some(adu)
     }
 
     /// Returns the counters.
@@ -308,7 +304,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             // A frame without its end is counted as damaged. A complete frame is dropped, because its reply would
             // be sent too late.
             if let Some(late) = self.close() {
-                self.drop_request(late.adu);
+                self.drop_request(late);
             }
             self.begin();
             self.reader.begin();

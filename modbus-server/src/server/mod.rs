@@ -1,32 +1,27 @@
-//! The server: takes requests, returns decisions and replies.
+//! The server: takes requests, returns replies.
 
-mod accept;
-mod serving;
+mod execute;
 mod tally;
-mod work;
 
-use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::events::EventLog;
-use crate::head::Head;
 use crate::line::Framing;
-use crate::{Adu, Counters, DataModel, Decision, Function, LineCounters, Outcome, Work};
-pub use serving::{Answered, Committed, Decided, Request, Served};
+use crate::{Adu, Counters, DataModel, Function, LineCounters, Outcome, Reply, Request};
+use execute::{Effect, Refusal, execute};
 use tally::Tally;
 
 /// The unit address of a broadcast (V1.02 2.2).
 pub(crate) const BROADCAST: u8 = 0;
 
 /// The server of one line. It serves the requests that its [`Port`](crate::line::Port) has received, for one data
-/// model.
-///
-/// [`serve`](Self::serve) serves a request; [`take`](Self::take) begins to serve one step by step.
+/// model, with three calls: [`Port::take`](crate::line::Port::take), [`serve`](Self::serve),
+/// [`Port::send`](crate::line::Port::send). The server never sees the port, so each call needs only its own lock.
 ///
 /// A port may have several unit addresses ([`UnitSet`](crate::line::UnitSet)). Its reply has the address of the
 /// request. For the standard's diagnostics all addresses are one unit: they share counters, event log and
 /// listen-only mode. A request to any address is counted, one request puts all addresses into listen-only mode, and
-/// one request restarts them. [`Port::waiting`](crate::line::Port::waiting) and [`Request::unit`] return the
-/// address of a request, so that the caller can pass the server a model that depends on the address.
+/// one request restarts them. [`Request::unit`] returns the address of a request, so that the caller can pass the
+/// server a model that depends on the address.
 #[derive(Debug)]
 pub struct Server {
     framing: Framing,
@@ -47,23 +42,8 @@ pub struct Server {
 enum Diagnostics {
     /// All of them.
     All,
-    /// All but 04, which the server does not know.
-    WithoutListenOnly,
     /// Those that change nothing. The others are refused.
     ReadOnly,
-}
-
-/// Treatment of a request, which its first bytes determine.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Handling {
-    /// It is ignored.
-    Dismissed(Outcome),
-    /// It is decided upon and answered.
-    Answered,
-    /// It is a broadcast.
-    Broadcast,
-    /// It is executed without a reply.
-    Silent,
 }
 
 impl Server {
@@ -81,19 +61,6 @@ impl Server {
         }
     }
 
-    /// Disables listen-only mode (function 08, sub-function 04, which silences the unit until sub-function 01
-    /// restarts it). A request for it is then answered with exception 01.
-    ///
-    /// This is required for a model that does not [have](DataModel::has) function 08. The server decides whether a
-    /// request is answered without asking the model, and it never answers a request for listen-only mode.
-    #[must_use]
-    pub const fn without_listen_only(self) -> Self {
-        Self {
-            diagnostics: Diagnostics::WithoutListenOnly,
-            ..self
-        }
-    }
-
     /// Limits function 08 to the sub-functions that change nothing: 00, 02 and 0B to 12. Each of the others is
     /// answered with exception 06, so nobody on this line can silence the unit or clear its counters.
     #[must_use]
@@ -104,8 +71,7 @@ impl Server {
         }
     }
 
-    /// Returns the framing of the next reply and of the request after it. A request that changes it takes effect
-    /// when it is executed; its own reply has already begun by then.
+    /// Returns the framing of the next request. The reply to a request that changes it has the framing of that request.
     pub const fn framing(&self) -> Framing {
         self.framing
     }
@@ -115,76 +81,59 @@ impl Server {
         self.listen_only
     }
 
-    /// Returns whether `request` (unit address and PDU, without CRC) will be answered, including with an exception.
-    /// This takes the same few instructions for every request, while [`decide`](Self::decide) takes longer the more
-    /// values there are to check. So the first byte of the reply, the unit address, can be sent before the rest is
-    /// decided.
-    fn answers(&self, request: &Adu) -> bool {
-        self.handling(request) == Handling::Answered
-    }
-
-    fn handling(&self, request: &Adu) -> Handling {
-        let (unit, function) = (request.get(0), request.get(1));
-        let broadcast = unit == BROADCAST;
-        if !matches!(function, 1..Function::EXCEPTION) {
-            return Handling::Dismissed(Outcome::NoRequest);
-        }
-        let diagnostics = !broadcast && function == Function::Diagnostics.code();
-        if self.listen_only {
-            return if diagnostics && Diagnostic::is_restart(request.from(2)) {
-                Handling::Silent
-            } else {
-                Handling::Dismissed(Outcome::NotObeyed)
-            };
-        }
-        if broadcast {
-            Handling::Broadcast
-        } else if self.diagnostics == Diagnostics::All
-            && diagnostics
-            && Diagnostic::is_listen_only(request.from(2))
-        {
-            Handling::Silent
+    /// Serves a request: checks it, executes it, and makes its buffer the reply.
+    #[inline]
+    pub fn serve<'a>(&mut self, request: Request<'a>, model: &mut impl DataModel) -> Reply<'a> {
+        let Request { adu, line, .. } = request;
+        let (unit, code) = (adu.get(0), adu.get(1));
+        let (broadcast, framing) = (unit == BROADCAST, self.framing);
+        let is_answered = self.is_answered(adu, model);
+        self.begin(&line, broadcast, is_answered);
+        let executed = if !matches!(code, 1..Function::EXCEPTION) {
+            Err(Outcome::NoRequest)
+        } else if self.listen_only && !is_restart(adu) {
+            Err(Outcome::NotObeyed)
         } else {
-            Handling::Answered
+            execute(self, broadcast, adu, model).map_err(|refusal| match refusal {
+                Refusal::NotForAll => Outcome::NoEffect,
+                Refusal::Exception(exception) => {
+                    adu.set(1, code | Function::EXCEPTION);
+                    adu.truncate(2);
+                    adu.extend(&[exception.code()]);
+                    Outcome::Refused(exception)
+                }
+            })
+        };
+        self.end(executed, is_answered);
+        Reply {
+            adu,
+            is_answered,
+            framing,
+            next_framing: self.framing,
+            messages: line.bus_messages,
+            outcome: executed.map_or_else(|outcome| outcome, |_| Outcome::Accepted),
+            writes: executed == Ok(Effect::Written),
         }
     }
 
-    /// Decides the reply to `request` (unit address and PDU, without CRC). Everything that can be rejected is
-    /// rejected here. Changes nothing.
-    fn decide(&self, request: &Adu, model: &impl DataModel) -> Decision {
-        let (unit, function) = (request.get(0), request.get(1));
-        let broadcast = unit == BROADCAST;
-        let silence = |outcome| Decision {
-            reply: None,
-            work: Work(Job::None),
-            outcome,
-            broadcast,
+    /// Returns whether a request is answered, including with an exception.
+    #[inline]
+    fn is_answered(&self, request: &Adu, model: &impl DataModel) -> bool {
+        let (unit, code) = (request.get(0), request.get(1));
+        let is_silent = || {
+            self.diagnostics == Diagnostics::All
+                && code == Function::Diagnostics.code()
+                && Diagnostic::is_listen_only(request.from(2))
+                && model.has(Function::Diagnostics)
         };
-        let handling = match self.handling(request) {
-            Handling::Dismissed(outcome) => return silence(outcome),
-            handling => handling,
-        };
-        let accepted = accept::accept(self, unit, function, request.from(2), model);
-        let (head, work, outcome) = match accepted {
-            Ok((_, work)) if broadcast && !work.can_be_broadcast() => {
-                return silence(Outcome::NoEffect);
-            }
-            Ok((head, work)) => (head, work, Outcome::Accepted),
-            Err(exception) => {
-                let head = Head::exception(unit, function, exception);
-                (head, Job::None, Outcome::Refused(exception))
-            }
-        };
-        Decision {
-            reply: (handling == Handling::Answered).then_some(head),
-            work: Work(work),
-            outcome,
-            broadcast,
-        }
+        unit != BROADCAST
+            && matches!(code, 1..Function::EXCEPTION)
+            && !self.listen_only
+            && !is_silent()
     }
 
-    /// Returns all counters as of the last request that was [committed](Answered::commit), less what function 08
-    /// has cleared.
+    /// Returns all counters as of the last request that was served, including a request that is being served, less what
+    /// function 08 has cleared.
     pub const fn counters(&self) -> Counters {
         self.counters_at(&self.line)
     }
@@ -202,11 +151,20 @@ impl Server {
             // A dropped frame was a message to this unit and got no reply. It is not part of `busy`, which counts
             // exceptions 06 that were sent (V1.1b3 6.8.1).
             unit_messages: tally.unit_messages.wrapping_add(line.dropped),
-            no_response: tally.no_response.wrapping_add(line.dropped),
+            no_response: (tally.no_response)
+                .wrapping_add(line.dropped)
+                .wrapping_add(line.unsent),
             nak: tally.nak,
             busy: tally.busy,
             overruns: line.overruns,
             gaps: line.gaps,
         }
     }
+}
+
+/// Returns whether a request to a unit in listen-only mode is obeyed: only a restart of the communication is.
+fn is_restart(request: &Adu) -> bool {
+    request.get(0) != BROADCAST
+        && request.get(1) == Function::Diagnostics.code()
+        && Diagnostic::is_restart(request.from(2))
 }

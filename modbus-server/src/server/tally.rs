@@ -1,11 +1,10 @@
 //! Counters and event log of the requests (V1.1b3 6.8 to 6.10).
 
-use super::Server;
+use super::{Effect, Server};
 use crate::counters::count;
-use crate::decision::Job;
 use crate::diagnostic::Diagnostic;
 use crate::events::{Event, EventLog};
-use crate::{Decision, Exception, LineCounters, Outcome};
+use crate::{Exception, LineCounters, Outcome};
 
 /// The server's own counters.
 #[derive(Debug)]
@@ -31,34 +30,15 @@ impl Tally {
 }
 
 impl Server {
-    /// Counts and logs a decision that is now executed, with the line's counters at the end of its request.
-    /// Counters and event log include the request from now on.
+    /// Counts and logs a request, with the line's counters at its end, before it is executed.
     ///
-    /// Requests are committed in the order in which the receiver has received them.
-    pub(super) fn commit(&mut self, decision: &Decision, line: &LineCounters) {
+    /// Requests are served in the order in which the receiver has received them.
+    pub(super) fn begin(&mut self, line: &LineCounters, broadcast: bool, is_answered: bool) {
         self.note_line(line);
-        self.log
-            .push(Event::received(decision.broadcast, self.listen_only));
-        let tally = &mut self.tally;
-        count(&mut tally.unit_messages);
-        if decision.reply.is_none() {
-            count(&mut tally.no_response);
-        }
-        match decision.outcome {
-            // "Not incremented for exception responses, poll commands, or fetch event counter commands" (6.9).
-            // Reading the log counts as such a command, because it returns the same count as function 0B (6.10).
-            Outcome::Accepted if matches!(decision.work.0, Job::EventCounter | Job::EventLog) => {}
-            Outcome::Accepted => count(&mut tally.events),
-            Outcome::Refused(exception) => {
-                count(&mut tally.exceptions);
-                match exception {
-                    _ if decision.reply.is_none() => {}
-                    Exception::NegativeAcknowledge => count(&mut tally.nak),
-                    Exception::ServerDeviceBusy => count(&mut tally.busy),
-                    _ => {}
-                }
-            }
-            _ => {}
+        self.log.push(Event::received(broadcast, self.listen_only));
+        count(&mut self.tally.unit_messages);
+        if !is_answered {
+            count(&mut self.tally.no_response);
         }
     }
 
@@ -79,14 +59,30 @@ impl Server {
         self.line = *line;
     }
 
-    /// Ends a request after its work is done: logs its reply and executes what must happen after it.
-    pub(super) fn finish(&mut self, decision: &Decision) {
-        let exception = match decision.outcome {
-            Outcome::Refused(exception) if decision.reply.is_some() => Some(exception),
-            _ => None,
-        };
-        self.log.push(Event::sent(exception, self.listen_only));
-        let Job::Diagnose(diagnostic) = decision.work.0 else {
+    /// Ends a request: counts its result, logs its reply, and executes what must happen after it.
+    pub(super) fn end(&mut self, executed: Result<Effect, Outcome>, is_answered: bool) {
+        let tally = &mut self.tally;
+        let mut sent = None;
+        match executed {
+            // "Not incremented for exception responses, poll commands, or fetch event counter commands" (6.9).
+            // Reading the log counts as such a command, because it returns the same count as function 0B (6.10).
+            Ok(Effect::Polled) => {}
+            Ok(_) => count(&mut tally.events),
+            Err(Outcome::Refused(exception)) => {
+                count(&mut tally.exceptions);
+                if is_answered {
+                    sent = Some(exception);
+                    match exception {
+                        Exception::NegativeAcknowledge => count(&mut tally.nak),
+                        Exception::ServerDeviceBusy => count(&mut tally.busy),
+                        _ => {}
+                    }
+                }
+            }
+            Err(_) => {}
+        }
+        self.log.push(Event::sent(sent, self.listen_only));
+        let Ok(Effect::Diagnosed(diagnostic)) = executed else {
             return;
         };
         match diagnostic {

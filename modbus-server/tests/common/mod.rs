@@ -9,7 +9,7 @@ pub use modbus_reference::{
     Device, MAX_WORD, UNIT, answer, ascii_frame, crc, frame, framed, lrc, object, pack, pdu,
     read_files, unframed, write_bits, write_files, write_then_read, write_words,
 };
-use modbus_server::line::{Faults, Framing, Next, Port, Receiver, Width};
+use modbus_server::line::{Faults, Framing, Port, Receiver, Units, Width};
 use modbus_server::{Adu, Counters, DataModel, Server};
 #[allow(unused_imports)] // as above
 pub use points::Points;
@@ -54,7 +54,7 @@ impl Unit {
     }
 
     fn of(receiver: Receiver<'static>, framing: Framing, points: Points) -> Self {
-        Self::on(port(receiver), framing, points).without_unsupported_modes()
+        Self::on(port(receiver), framing, points)
     }
 
     /// Sends a request that must be rejected and returns the exception code.
@@ -65,16 +65,6 @@ impl Unit {
         assert_eq!(reply[0], pdu[0] | 0x80);
         assert_eq!(self.points, points, "a rejected request changes nothing");
         reply[1]
-    }
-}
-
-impl UnitOn<'_> {
-    /// Disables listen-only mode if the model does not have function 08.
-    pub fn without_unsupported_modes(mut self) -> Self {
-        if self.points.lacks.contains(&0x08) {
-            self.server = self.server.without_listen_only();
-        }
-        self
     }
 }
 
@@ -133,30 +123,18 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
         self.said.take()
     }
 
-    /// Serves the waiting request step by step, and sends as early as each step allows.
+    /// Serves the waiting request and returns the reply as it is sent.
     fn serve(&mut self) -> Option<Vec<u8>> {
         let waiting = self.port.waiting();
-        let request = self
-            .server
-            .take(&mut self.port, 0)
-            .expect("a request waits");
+        let request = self.port.take().expect("a request waits");
         assert_eq!(waiting, Some(request.unit()));
-        let mut reply: Vec<u8> = self.port.start().into_iter().collect();
-        let answers = !reply.is_empty();
-        let rest = send(&mut self.port, &mut reply);
-        let expected = if answers { Next::Wait } else { Next::Done };
-        assert_eq!(rest, expected, "the unit address is sent immediately");
-        let decided = request.decide(&self.server, &self.points);
-        let answered = decided.answer(&mut self.port);
-        send(&mut self.port, &mut reply);
-        let committed = answered.commit(&mut self.server);
-        assert_eq!(committed.decision().is_answered(), answers);
-        let served = committed.carry_out(&mut self.server, &mut self.points);
-        served.finish(&mut self.port);
-        assert_eq!(send(&mut self.port, &mut reply), Next::Done);
-        self.port.sent();
+        let reply = self.server.serve(request, &mut self.points);
+        let answers = reply.is_answered();
+        self.port.send(reply, 0);
+        let sent = send(&mut self.port);
+        assert_eq!(sent.is_some(), answers);
         assert!(!self.port.is_replying());
-        answers.then_some(reply)
+        sent
     }
 
     /// Receives a whole frame including its CRC or LRC. Returns the reply, if any.
@@ -188,12 +166,12 @@ impl<'a, M: DataModel> UnitOn<'a, M> {
     }
 }
 
-/// Sends the bytes of the reply. Afterwards the port waits or is done.
-pub fn send(port: &mut Port<'_>, reply: &mut Vec<u8>) -> Next {
-    loop {
-        match port.next() {
-            Next::Byte(byte) => reply.push(byte),
-            rest => return rest,
-        }
+/// Returns the characters of a reply that may start, and ends the reply.
+pub fn send(port: &mut Port<'_, impl Units>) -> Option<Vec<u8>> {
+    let mut sent = vec![port.start()?];
+    while let Some(byte) = port.next_byte() {
+        sent.push(byte);
     }
+    port.sent();
+    Some(sent)
 }

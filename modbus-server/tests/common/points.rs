@@ -213,7 +213,7 @@ impl DataModel for Points {
         assert_eq!(self.custom, Some(code));
         assert_eq!(adu.as_slice()[..2], [UNIT, code]);
         self.kept = adu.as_slice()[2..].to_vec();
-        adu.clear();
+        adu.truncate(2);
         for byte in self.kept.repeat(3).iter().rev() {
             adu.push(*byte);
         }

@@ -9,7 +9,7 @@ mod state;
 
 use std::vec::Vec;
 
-use modbus_server::line::{Faults, Framing, Next, Port, Receiver};
+use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server};
 use modio_drivers::ChannelStatus;
 use modio_drivers::Scale;
@@ -83,19 +83,14 @@ impl<const SLOTS: usize> Bench<SLOTS> {
             port.received(*byte, Faults::NONE);
         }
         assert!(port.long_silence(0));
-        let request = self.server.take(&mut port, 0).expect("a request waits");
-        let answered = request.decide(&self.server, &self.device).answer(&mut port);
-        let committed = answered.commit(&mut self.server);
-        if Device::<SLOTS>::shows_counters(&committed.decision().work) {
-            self.device.state.counters = self.server.counters();
-        }
-        let served = committed.carry_out(&mut self.server, &mut self.device);
-        served.finish(&mut port);
+        let request = port.take().expect("a request waits");
+        let reply = self.server.serve(request, &mut self.device);
+        port.send(reply, 0);
         if let Some(order) = self.device.take_order() {
             self.device.carry_out(order);
         }
         let mut reply: Vec<u8> = port.start().into_iter().collect();
-        while let Next::Byte(byte) = port.next() {
+        while let Some(byte) = port.next_byte() {
             reply.push(byte);
         }
         reply[1..reply.len() - 2].to_vec()

@@ -10,7 +10,7 @@ use std::vec::Vec;
 
 use embedded_hal::digital::{self, InputPin, PinState};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType};
-use modbus_server::{Counters, Outcome, Tables, crc, line::Framing};
+use modbus_server::{Server, Counters, Outcome, Tables, crc, line::Framing};
 use modio_drivers::LoraSettings;
 
 use super::super::*;
@@ -189,12 +189,10 @@ impl Bench {
             holding_registers: &mut self.registers,
             ..Tables::default()
         };
-        let request = self.line.take(&self.server, 0)?;
-        let decided = request.decide(&self.server, &tables);
-        let committed = self.line.answer(decided).commit(&mut self.server);
-        let outcome = committed.decision().outcome;
-        let done = committed.carry_out(&mut self.server, &mut tables);
-        self.line.finish(done);
+        let request = self.line.take()?;
+        let reply = self.server.serve(request, &mut tables);
+        let outcome = reply.outcome();
+        self.line.send_reply(reply);
         Some(outcome)
     }
 
@@ -208,7 +206,7 @@ impl Bench {
     }
 
     pub(super) fn counters(&self) -> Counters {
-        self.server.counters_at(&ServedLine::counters(&self.line))
+        self.server.counters_at(&self.line.counters())
     }
 
     #[track_caller]
