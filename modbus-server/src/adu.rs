@@ -82,6 +82,12 @@ impl Adu {
         }
     }
 
+    /// Discards the last `count` bytes.
+    #[inline]
+    pub(crate) const fn cut(&mut self, count: usize) {
+        self.len = self.len.saturating_sub(count);
+    }
+
     /// Discards the content.
     #[inline]
     pub const fn clear(&mut self) {
@@ -96,6 +102,12 @@ impl Adu {
             .get(usize::from(index))
             .copied()
             .unwrap_or_default()
+    }
+
+    /// Returns the bytes after the function code.
+    #[inline(always)]
+    pub(crate) fn fields(&self) -> &[u8] {
+        self.bytes.get(2..self.len).unwrap_or_default()
     }
 
     /// Returns the bytes from `index` on, or none if there are fewer.

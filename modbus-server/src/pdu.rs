@@ -1,12 +1,12 @@
-//! Decodes request PDUs: checks quantities, byte counts, lengths and the form of values (exception 03), then the
-//! wrap at 16 bits (02). The model checks the addresses.
+//! Decodes the fields of requests, the bytes after the function code: checks quantities, byte counts, lengths and the
+//! form of values (exception 03), then the wrap at 16 bits (02). The model checks the addresses.
 
-use crate::{Bits, Exception, Function, Span, Words};
+use crate::{Bits, Exception, Span, Words};
 
 /// Largest number of bits that one request may read (V1.1b3 6.1).
-const MAX_READ_BITS: u16 = 2000;
+pub(crate) const MAX_READ_BITS: u16 = 2000;
 /// Largest number of words that one request may read (V1.1b3 6.3).
-const MAX_READ_WORDS: u16 = 125;
+pub(crate) const MAX_READ_WORDS: u16 = 125;
 /// Largest number of bits that one request may write (V1.1b3 6.11).
 const MAX_WRITE_BITS: u16 = 1968;
 /// Largest number of words that one request may write (V1.1b3 6.12).
@@ -14,72 +14,8 @@ const MAX_WRITE_WORDS: u16 = 123;
 /// Largest number of words that one request may write when it also reads (V1.1b3 6.17).
 const MAX_WRITE_WORDS_AND_READ: u16 = 121;
 
-/// A request with a valid form.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Pdu<'a> {
-    ReadBits(Span),
-    ReadWords(Span),
-    WriteBits(Span, Bits<'a>),
-    WriteWords(Span, Words<'a>),
-    MaskWord {
-        address: u16,
-        and: u16,
-        or: u16,
-    },
-    WriteThenRead {
-        write: Span,
-        words: Words<'a>,
-        read: Span,
-    },
-    /// The bytes after the function code. The model decides first: a device without files has neither function 14
-    /// nor 15.
-    ReadFile(&'a [u8]),
-    /// As for [`ReadFile`](Self::ReadFile).
-    WriteFile(&'a [u8]),
-    ExceptionStatus,
-    /// The sub-function and the bytes after it. Their meaning depends on the server's modes.
-    Diagnose(&'a [u8]),
-    EventCounter,
-    EventLog,
-    ServerId,
-    /// The MEI type and the bytes after it. The model decides first: a device without identification does not have
-    /// function 2B.
-    Identify(&'a [u8]),
-}
-
-impl<'a> Pdu<'a> {
-    /// Decodes a request from its function and the bytes after the function code.
-    ///
-    /// # Errors
-    /// The exception to answer with.
-    pub(crate) fn decode(function: Function, fields: &'a [u8]) -> Result<Self, Exception> {
-        match function {
-            Function::ReadCoils | Function::ReadDiscreteInputs => {
-                read(fields, MAX_READ_BITS).map(Self::ReadBits)
-            }
-            Function::ReadHoldingRegisters | Function::ReadInputRegisters => {
-                read(fields, MAX_READ_WORDS).map(Self::ReadWords)
-            }
-            Function::WriteSingleCoil => write_single_bit(fields),
-            Function::WriteSingleRegister => write_single_word(fields),
-            Function::WriteMultipleCoils => write_bits(fields),
-            Function::WriteMultipleRegisters => write_words(fields),
-            Function::MaskWriteRegister => mask_word(fields),
-            Function::ReadWriteMultipleRegisters => write_then_read(fields),
-            Function::ReadFileRecord => Ok(Self::ReadFile(fields)),
-            Function::WriteFileRecord => Ok(Self::WriteFile(fields)),
-            Function::Diagnostics => Ok(Self::Diagnose(fields)),
-            Function::ReadExceptionStatus => alone(fields, Self::ExceptionStatus),
-            Function::GetCommEventCounter => alone(fields, Self::EventCounter),
-            Function::GetCommEventLog => alone(fields, Self::EventLog),
-            Function::ReportServerId => alone(fields, Self::ServerId),
-            Function::EncapsulatedInterface => Ok(Self::Identify(fields)),
-        }
-    }
-}
-
 /// Decodes address and quantity.
-fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
+pub(crate) fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
     let &[address_hi, address_lo, quantity_hi, quantity_lo] = fields else {
         return Err(Exception::IllegalDataValue);
     };
@@ -92,19 +28,19 @@ fn read(fields: &[u8], most: u16) -> Result<Span, Exception> {
 
 /// Decodes address and FF00 (on) or 0000 (off). Used as packed bits, the first value byte contains exactly this
 /// bit.
-fn write_single_bit(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
+pub(crate) fn write_single_bit(fields: &[u8]) -> Result<(Span, Bits<'_>), Exception> {
     let (&[hi, lo], value @ ([0x00, 0x00] | [0xFF, 0x00])) = single(fields)? else {
         return Err(Exception::IllegalDataValue);
     };
     let span = Span::single(u16::from_be_bytes([hi, lo]));
-    Ok(Pdu::WriteBits(span, Bits::new(value, 1)))
+    Ok((span, Bits::new(value, 1)))
 }
 
 /// Decodes address and value.
-fn write_single_word(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
+pub(crate) fn write_single_word(fields: &[u8]) -> Result<(Span, Words<'_>), Exception> {
     let (&address, value) = single(fields)?;
     let span = Span::single(u16::from_be_bytes(address));
-    Ok(Pdu::WriteWords(span, Words::new(value)))
+    Ok((span, Words::new(value)))
 }
 
 /// Returns the address and the value of a single write.
@@ -117,40 +53,35 @@ fn single(fields: &[u8]) -> Result<(&[u8; 2], &[u8; 2]), Exception> {
 }
 
 /// Decodes address, quantity, byte count and packed bits.
-fn write_bits(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
+pub(crate) fn write_bits(fields: &[u8]) -> Result<(Span, Bits<'_>), Exception> {
     let (start, quantity, data) = multiple(fields)?;
     if data.len() != usize::from(quantity.div_ceil(8)) {
         return Err(Exception::IllegalDataValue);
     }
     let span = span(start, quantity, MAX_WRITE_BITS)?;
-    Ok(Pdu::WriteBits(span, Bits::new(data, quantity)))
+    Ok((span, Bits::new(data, quantity)))
 }
 
 /// Decodes address, quantity, byte count and words.
-fn write_words(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
+pub(crate) fn write_words(fields: &[u8]) -> Result<(Span, Words<'_>), Exception> {
     let (start, quantity, data) = multiple(fields)?;
     if data.len() != usize::from(quantity) * 2 {
         return Err(Exception::IllegalDataValue);
     }
     let span = span(start, quantity, MAX_WRITE_WORDS)?;
-    Ok(Pdu::WriteWords(span, Words::new(data)))
+    Ok((span, Words::new(data)))
 }
 
 /// Decodes address, AND mask and OR mask.
-fn mask_word(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
-    match *fields {
-        [a, b, c, d, e, f] => Ok(Pdu::MaskWord {
-            address: u16::from_be_bytes([a, b]),
-            and: u16::from_be_bytes([c, d]),
-            or: u16::from_be_bytes([e, f]),
-        }),
-        _ => Err(Exception::IllegalDataValue),
-    }
+pub(crate) fn mask_word(fields: &[u8]) -> Result<[u16; 3], Exception> {
+    let fields: [u8; 6] = fields.try_into().map_err(|_| Exception::IllegalDataValue)?;
+    let [a, b, c, d, e, f] = fields;
+    Ok([[a, b], [c, d], [e, f]].map(u16::from_be_bytes))
 }
 
-/// Decodes address and quantity to read, then the fields of [`write_words`]. Both quantities are checked before the
-/// end of either range.
-fn write_then_read(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
+/// Decodes address and quantity to read, then the fields of [`write_words`]. Returns what to read, and what to write.
+/// Both quantities are checked before the end of either range.
+pub(crate) fn write_then_read(fields: &[u8]) -> Result<(Span, Span, Words<'_>), Exception> {
     let (to_read, to_write) = fields
         .split_first_chunk::<4>()
         .ok_or(Exception::IllegalDataValue)?;
@@ -162,17 +93,14 @@ fn write_then_read(fields: &[u8]) -> Result<Pdu<'_>, Exception> {
     if read == Err(Exception::IllegalDataValue) {
         return Err(Exception::IllegalDataValue);
     }
-    Ok(Pdu::WriteThenRead {
-        write: span(start, quantity, MAX_WRITE_WORDS_AND_READ)?,
-        words: Words::new(data),
-        read: read?,
-    })
+    let write = span(start, quantity, MAX_WRITE_WORDS_AND_READ)?;
+    Ok((read?, write, Words::new(data)))
 }
 
-/// Decodes a function without fields.
-fn alone<'a>(fields: &[u8], request: Pdu<'a>) -> Result<Pdu<'a>, Exception> {
+/// Checks that a function without fields has none.
+pub(crate) const fn nothing(fields: &[u8]) -> Result<(), Exception> {
     if fields.is_empty() {
-        Ok(request)
+        Ok(())
     } else {
         Err(Exception::IllegalDataValue)
     }
@@ -222,8 +150,7 @@ mod tests {
             fields[4] = count * 2;
             fields
         };
-        let decode =
-            |fields: &[u8]| Pdu::decode(Function::WriteMultipleRegisters, fields).map(|_| ());
+        let decode = |fields: &[u8]| write_words(fields).map(|_| ());
         assert_eq!(decode(&fields(124)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(123)[..5 + 246]), Ok(()));
 
@@ -234,8 +161,7 @@ mod tests {
             fields[8] = count * 2;
             fields
         };
-        let decode =
-            |fields: &[u8]| Pdu::decode(Function::ReadWriteMultipleRegisters, fields).map(|_| ());
+        let decode = |fields: &[u8]| write_then_read(fields).map(|_| ());
         assert_eq!(decode(&fields(122)), Err(Exception::IllegalDataValue));
         assert_eq!(decode(&fields(121)[..9 + 242]), Ok(()));
     }

@@ -9,7 +9,7 @@ use crate::{Adu, Exception, LineCounters};
 pub struct Request<'a> {
     /// Unit address and PDU, without CRC or LRC.
     pub(crate) adu: &'a mut Adu,
-    /// The counters of the line, including this frame.
+    /// The counters of the line when it was taken.
     pub(crate) line: LineCounters,
     /// Tick in which the request ended.
     pub(crate) ended: u32,
@@ -39,10 +39,9 @@ pub struct Reply<'a> {
     /// Unit address and PDU of the reply.
     pub(crate) adu: &'a mut Adu,
     pub(crate) is_answered: bool,
-    /// Framing of the reply, and of the request after it.
+    /// Framing of what follows the reply.
     pub(crate) framing: Framing,
-    pub(crate) next_framing: Framing,
-    /// Number of valid frames on the bus when the request ended.
+    /// Number of valid frames on the bus when the request was taken.
     pub(crate) messages: u16,
     pub(crate) outcome: Outcome,
     pub(crate) writes: bool,

@@ -10,7 +10,7 @@ use firmware::{
     config::{LineName, Origin},
     start_up::LOADER_UNIT,
 };
-use modbus_server::{LineCounters, Outcome, Reply, Request, Server, line::Framing};
+use modbus_server::{LineCounters, Outcome, Request, Server, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
@@ -19,31 +19,22 @@ use crate::{board::Device, line::Line, orders::Orders, radio::Radio};
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
 
-/// A server, and what belongs to its line.
+/// The server of a line, and what belongs to it.
 struct Served {
     server: Server,
+    line: LineName,
     /// Time from the end of a frame until the line reports it, in ms, rounded up.
     frame_gap_ms: u32,
+    /// RESPONSE_DELAY does not apply. It is for masters on the RS-485 line; the air takes much longer.
+    at_once: bool,
     /// The command of the last request, which is executed when its reply has been sent.
     order: Option<Command>,
-}
-
-impl Served {
-    const fn new(server: Server, frame_gap_ms: u32) -> Self {
-        Self {
-            server,
-            frame_gap_ms,
-            order: None,
-        }
-    }
 }
 
 /// The servers of the lines.
 pub struct Serving {
     rs485: Served,
     radio: Served,
-    /// Unit address.
-    unit: u8,
 }
 
 impl Serving {
@@ -58,9 +49,21 @@ impl Serving {
             radio
         };
         Self {
-            rs485: Served::new(Server::new(rs485.0), rs485.1),
-            radio: Served::new(radio, 0),
-            unit,
+            rs485: Served {
+                server: Server::new(rs485.0),
+                line: LineName::Rs485,
+                frame_gap_ms: rs485.1,
+                // In recovery mode a unit must be found even by a master with a short time-out.
+                at_once: unit == LOADER_UNIT,
+                order: None,
+            },
+            radio: Served {
+                server: radio,
+                line: LineName::Radio,
+                frame_gap_ms: 0,
+                at_once: true,
+                order: None,
+            },
         }
     }
 
@@ -73,109 +76,110 @@ impl Serving {
         device: &mut impl Mutex<T = &'static mut Device>,
         orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
-        let order = self
-            .rs485
-            .order
-            .take_if(|_| rs485.lock(|line| line.as_ref().is_some_and(|line| !line.is_replying())));
-        execute(order, device, orders);
-        let request = rs485.lock(|line| line.as_mut()?.take());
-        let served = request.is_some();
-        if let Some(request) = request {
-            if let Some(line) = radio.lock(|line| Some(line.as_ref()?.counters())) {
-                self.copy_counters(LineName::Radio, &line, device);
-            }
-            let (reply, delay_ms) = self.serve(LineName::Rs485, request, device);
-            rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
+        if let Some(order) = self.rs485.order
+            && rs485.lock(|line| line.as_ref().is_some_and(|line| !line.is_replying()))
+        {
+            self.rs485.order = None;
+            execute(order, device, orders);
         }
-
         // Only a restart affects a reply that is on its way. The other commands are executed before the master can
         // have the reply, because a command of the other line may follow it.
-        let order = self.radio.order.take_if(|order| {
-            radio.lock(|line| {
+        if let Some(order) = self.radio.order
+            && radio.lock(|line| {
                 line.as_ref().is_some_and(|line| {
-                    !line.is_replying() && (*order != Command::Restart || !line.is_on_air())
+                    !line.is_replying() && (order != Command::Restart || !line.is_on_air())
                 })
             })
-        });
-        execute(order, device, orders);
-        let Some(request) = radio.lock(|line| line.as_mut()?.take()) else {
-            return served;
-        };
-        if let Some(line) = rs485.lock(|line| Some(line.as_ref()?.counters())) {
-            self.copy_counters(LineName::Rs485, &line, device);
+        {
+            self.radio.order = None;
+            execute(order, device, orders);
         }
-        // RESPONSE_DELAY is for masters on the RS-485 line; the air takes much longer.
-        let (reply, _) = self.serve(LineName::Radio, request, device);
-        radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
-        true
-    }
-
-    const fn of(&mut self, which: LineName) -> &mut Served {
-        match which {
-            LineName::Rs485 => &mut self.rs485,
-            LineName::Radio => &mut self.radio,
+        let mut served = false;
+        if let Some(request) = rs485.lock(|line| line.as_mut()?.take()) {
+            self.rs485.serve(request, rs485, radio, device);
+            served = true;
         }
+        if let Some(request) = radio.lock(|line| line.as_mut()?.take()) {
+            self.radio.serve(request, rs485, radio, device);
+            served = true;
+        }
+        if !served {
+            // The scan runs this every 100 ms.
+            if let Some(line) = rs485.lock(|line| Some(line.as_ref()?.counters())) {
+                self.rs485.copy_counters(&line, device);
+            }
+            if let Some(line) = radio.lock(|line| Some(line.as_ref()?.counters())) {
+                self.radio.copy_counters(&line, device);
+            }
+        }
+        served
     }
+}
 
-    /// Serves a request. Returns the reply and its delay in milliseconds.
+impl Served {
+    /// Serves a request of this line and sends its reply.
     // Not inlined: one copy serves both lines.
     #[inline(never)]
     fn serve(
         &mut self,
-        which: LineName,
         request: Request<'static>,
+        rs485: &mut impl Mutex<T = Option<Line>>,
+        radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
-    ) -> (Reply<'static>, u16) {
-        // In recovery mode a unit must be found even by a master with a short time-out.
-        let delays = self.unit != LOADER_UNIT;
-        let served = self.of(which);
+    ) {
         let origin = Origin {
-            line: which,
+            line: self.line,
             broadcast: request.unit() == BROADCAST,
         };
-        let seen_at = request.ended().wrapping_sub(served.frame_gap_ms);
+        let ended = request.ended();
         let (reply, delay_ms) = device.lock(|device| {
             let delay_ms = device.config.response_delay_ms();
             device.set_origin(origin);
-            let reply = served.server.serve(request, &mut **device);
-            // In listen-only mode requests do not count, so that the outputs go to SAFE.
-            if !matches!(reply.outcome(), Outcome::NoRequest | Outcome::NotObeyed) {
-                device.request_seen(seen_at);
-            }
-            served.order = device.take_order();
-            (reply, delay_ms)
+            (self.server.serve(request, &mut **device), delay_ms)
         });
-        if reply.writes() {
+        let (outcome, writes, is_answered) = (reply.outcome(), reply.writes(), reply.is_answered());
+        match self.line {
+            LineName::Rs485 => {
+                let delay_ms = if self.at_once { 0 } else { delay_ms };
+                rs485.lock(|line| line.as_mut().map(|line| line.send(reply, delay_ms)));
+            }
+            LineName::Radio => {
+                radio.lock(|line| line.as_mut().map(|line| line.send_reply(reply)));
+            }
+        }
+        self.server.settle();
+        self.order = device.lock(|device| {
+            // In listen-only mode requests do not count, so that the outputs go to SAFE.
+            if !matches!(outcome, Outcome::NoRequest | Outcome::NotObeyed) {
+                device.request_seen(ended.wrapping_sub(self.frame_gap_ms));
+            }
+            device.end_request()
+        });
+        if writes {
             rtic::pend(Interrupt::EXTI1);
         }
-        if served.order.is_some() && !reply.is_answered() {
+        if self.order.is_some() && !is_answered {
             // There is no reply to wait for, so execute the command now.
             rtic::pend(Interrupt::EXTI3);
         }
-        (reply, if delays { delay_ms } else { 0 })
     }
 
-    /// Copies the counters of a line to the device's state. Those of the line whose request is being served are copied
-    /// by the device itself.
-    fn copy_counters(
-        &mut self,
-        which: LineName,
-        line: &LineCounters,
-        device: &mut impl Mutex<T = &'static mut Device>,
-    ) {
-        let counters = self.of(which).server.counters_at(line);
-        device.lock(|device| *device.state.counters_of(which) = counters);
+    /// Copies the counters of this line to the device's state, for requests of the other line. The device itself copies
+    /// those of the line of a request.
+    #[inline(never)]
+    fn copy_counters(&self, line: &LineCounters, device: &mut impl Mutex<T = &'static mut Device>) {
+        let counters = self.server.counters_at(line);
+        device.lock(|device| *device.state.counters_of(self.line) = counters);
     }
 }
 
-/// Executes the command of a request whose reply has been sent, if there is one, or passes it on to the background
-/// task.
+/// Executes the command of a request whose reply has been sent, or passes it on to the background task.
+#[inline(never)]
 fn execute(
-    order: Option<Command>,
+    order: Command,
     device: &mut impl Mutex<T = &'static mut Device>,
     orders: &mut impl Mutex<T = Orders>,
 ) {
-    let Some(order) = order else { return };
     if let Some(order) = device.lock(|device| device.carry_out(order)) {
         orders.lock(|orders| match order {
             Command::Save => orders.save = true,

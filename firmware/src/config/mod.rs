@@ -452,6 +452,6 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// Returns RESPONSE_DELAY in milliseconds, 0 to 1000.
     #[must_use]
     pub fn response_delay_ms(&self) -> u16 {
-        self.edited.get(RESPONSE_DELAY)
+        self.edited.at::<RESPONSE_DELAY>()
     }
 }

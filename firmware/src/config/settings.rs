@@ -79,6 +79,13 @@ impl Settings {
         }
     }
 
+    /// Returns the value of a setting whose address is known, faster than [`get`](Self::get).
+    #[inline]
+    #[must_use]
+    pub const fn at<const ADDRESS: u16>(&self) -> u16 {
+        self.values[const { (ADDRESS - PAGE * 0x100) as usize }]
+    }
+
     /// Returns the module chosen for a port, 1 to 8.
     #[must_use]
     pub fn module(&self, port: u16) -> Module {

@@ -69,11 +69,18 @@ enum Block {
 }
 
 impl Block {
+    #[inline(always)]
     const fn of(span: Span) -> Self {
-        // Checked first, because most requests are for points.
+        // Most requests are for points.
         if span.start() < 0x0100 {
-            return Self::Points;
+            Self::Points
+        } else {
+            Self::of_others(span)
         }
+    }
+
+    #[inline(never)]
+    const fn of_others(span: Span) -> Self {
         match span.start().to_be_bytes() {
             [1, _] => Self::Config,
             [2, 0x00..=0x5F] => Self::State,
@@ -114,6 +121,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     }
 
     /// Applies the settings in force to the points, after the settings may have changed.
+    #[inline(never)]
     fn configure_points(&mut self) {
         self.revision = self.config.revision();
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
@@ -163,8 +171,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.state.radio_works == Some(false)
     }
 
-    /// Takes the command that a request ordered.
-    pub const fn take_order(&mut self) -> Option<Command> {
+    /// Ends a request whose reply has begun: applies changed settings to the points. Returns the command that the
+    /// request ordered.
+    pub fn end_request(&mut self) -> Option<Command> {
+        self.settings_may_have_changed();
         self.ordered.take()
     }
 
@@ -187,6 +197,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         }
     }
 
+    #[inline]
     fn settings_may_have_changed(&mut self) {
         if self.revision != self.config.revision() {
             self.configure_points();
@@ -270,8 +281,11 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         self.points.read_bits(span, out);
     }
 
+    #[inline]
     fn before_read_words(&mut self, span: Span, server: &Server) {
-        if matches!(Block::of(span), Block::State | Block::Radio) {
+        // The request may have written settings.
+        self.settings_may_have_changed();
+        if span.start() >= state_map::PRODUCT_CODE {
             *self.state.counters_of(self.config.origin_line()) = server.counters();
         }
     }
@@ -301,7 +315,6 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
             Block::Points => self.points.write_words(span, words),
             Block::Config => {
                 self.ordered = self.config.write(span, words);
-                self.settings_may_have_changed();
             }
             Block::Pulses => self.points.clear_pulses(span),
             // `check_write_words` rejects writes to these blocks.

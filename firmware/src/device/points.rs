@@ -88,17 +88,17 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// Checks that all points of a span exist and have one of these kinds; otherwise exception 02. Returns whether
     /// one of them that has one of the kinds `needed` cannot be read or driven.
     fn check_kinds(&self, span: Span, kinds: Kinds, needed: Kinds) -> Result<bool, Exception> {
-        let mut fails = false;
+        let mut fails = 0;
         // A long span fails at the first address after the last port.
         for index in self.indices(span) {
             match self.place(index) {
                 Some((port, channel)) if kinds.contain(port.kind(channel)) => {
-                    fails |= needed.contain(port.kind(channel)) && port.fails(channel);
+                    fails |= needed.bit(port.kind(channel)) & port.failing() >> channel;
                 }
                 _ => return Err(Exception::IllegalDataAddress),
             }
         }
-        Ok(fails)
+        Ok(fails != 0)
     }
 
     /// Checks whether these bit points can be read. Outputs always can: a read returns the commanded value, which
@@ -229,7 +229,12 @@ impl Kinds {
     }
 
     const fn contain(self, kind: Kind) -> bool {
-        self.0 >> kind as u8 & 1 != 0
+        self.bit(kind) != 0
+    }
+
+    /// Returns 1 if the set contains this kind, otherwise 0.
+    const fn bit(self, kind: Kind) -> u8 {
+        self.0 >> kind as u8 & 1
     }
 }
 

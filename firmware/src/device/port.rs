@@ -150,11 +150,6 @@ impl IoPort {
         self.settings.get(channel)
     }
 
-    /// Returns whether a channel, 0 to 3, cannot be read or driven.
-    pub(super) const fn fails(&self, channel: usize) -> bool {
-        self.failing >> (channel & 3) & 1 != 0
-    }
-
     /// Returns a channel's pulse counter.
     pub(super) fn pulses(&self, channel: usize) -> u32 {
         self.pulses.get(channel).copied().unwrap_or_default()

@@ -79,6 +79,13 @@ impl Reader {
         }
     }
 
+    /// Returns the framing, with its end mark.
+    pub(super) const fn framing(&self) -> Framing {
+        Framing::Ascii {
+            delimiter: self.delimiter,
+        }
+    }
+
     pub(super) const fn set_delimiter(&mut self, delimiter: u8) {
         self.delimiter = delimiter;
     }

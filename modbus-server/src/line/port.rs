@@ -30,7 +30,8 @@ use crate::{Adu, LineCounters, Reply, Request};
 pub struct Port<'a, U = u8> {
     receiver: Receiver<'a, U>,
     transmitter: Transmitter<'a>,
-    request: Option<Request<'a>>,
+    /// Unit address and PDU of the request that waits, and the tick in which it ended.
+    request: Option<(&'a mut Adu, u32)>,
     reply: State,
     /// Number of valid frames on the bus when the request of a delayed reply ended.
     messages_before: u16,
@@ -41,10 +42,8 @@ pub struct Port<'a, U = u8> {
 enum State {
     /// There is no reply.
     None,
-    /// The reply waits for this many ticks. It is dropped if another frame is received in the meantime.
-    Delayed(u16),
-    /// The reply may start.
-    Ready,
+    /// The reply may start after this many ticks, unless another frame begins before.
+    Waiting(u32),
     /// The reply is being sent.
     Sending,
 }
@@ -109,25 +108,22 @@ impl<'a, U: Units> Port<'a, U> {
     pub fn long_silence(&mut self, now: u32) -> bool {
         // An ASCII frame that was complete before this silence was not served at the short silence, so a reply
         // would be too late.
-        let late = self.receiver.is_over();
-        if !self.close(now) {
+        if self.receiver.is_over() {
+            if let Some(adu) = self.receiver.close() {
+                self.receiver.drop_request(adu);
+            }
             return false;
         }
-        if late && let Some(request) = self.request.take() {
-            self.receiver.drop_request(request.adu);
-            return false;
-        }
-        true
+        self.close(now)
     }
 
     fn close(&mut self, ended: u32) -> bool {
         let Some(adu) = self.receiver.close() else {
             return false;
         };
-        let line = *self.receiver.counters();
         // A request that has not been taken yet cannot be answered in time any more.
-        if let Some(late) = self.request.replace(Request { adu, line, ended }) {
-            self.receiver.drop_request(late.adu);
+        if let Some((late, _)) = self.request.replace((adu, ended)) {
+            self.receiver.drop_request(late);
         }
         true
     }
@@ -136,58 +132,55 @@ impl<'a, U: Units> Port<'a, U> {
     /// the master no longer expects it.
     #[inline]
     pub fn take(&mut self) -> Option<Request<'a>> {
-        let request = self.request.take()?;
-        if matches!(self.reply, State::Delayed(_) | State::Ready) {
+        let (adu, ended) = self.request.take()?;
+        if matches!(self.reply, State::Waiting(_)) {
             self.drop_reply();
         }
-        Some(request)
+        Some(Request {
+            adu,
+            line: *self.receiver.counters(),
+            ended,
+        })
     }
 
     /// Takes the reply to the last request, if it has one, and the request's buffer back. The reply may
-    /// [`start`](Self::start) now, or after `delay` ticks, unless another frame begins before that. Then it is dropped
-    /// and counted.
-    #[inline]
+    /// [`start`](Self::start) now, or after `delay` ticks.
     pub fn send(&mut self, reply: Reply<'a>, delay: u16) {
-        self.receiver.set_framing(reply.next_framing);
+        let framing = self.receiver.framing();
+        self.receiver.set_framing(reply.framing);
         if !reply.is_answered {
             return self.receiver.give_back(reply.adu);
         }
         match self.reply {
             State::None => {}
-            State::Delayed(_) | State::Ready => self.drop_reply(),
+            State::Waiting(_) => self.drop_reply(),
             State::Sending => {
                 self.receiver.count_unsent();
                 return self.receiver.give_back(reply.adu);
             }
         }
-        self.transmitter = Transmitter::new(reply.adu, reply.framing);
+        self.transmitter = Transmitter::new(reply.adu, framing);
         self.messages_before = reply.messages;
-        self.reply = State::Delayed(delay);
-        if delay == 0 {
-            self.tick();
+        // The request ended within a tick, so the first tick does not count.
+        self.reply = State::Waiting(if delay == 0 { 0 } else { 1 + u32::from(delay) });
+    }
+
+    /// Advances the time by a tick.
+    pub const fn tick(&mut self) {
+        if let State::Waiting(ticks) = &mut self.reply {
+            *ticks = ticks.saturating_sub(1);
         }
     }
 
-    /// Advances the time by a tick. A reply may [`start`](Self::start) when its delay has passed.
-    pub fn tick(&mut self) {
-        match self.reply {
-            State::Delayed(0) => {
-                let messages = self.receiver.counters().bus_messages;
-                if self.receiver.is_idle() && messages == self.messages_before {
-                    self.reply = State::Ready;
-                } else {
-                    self.drop_reply();
-                }
-            }
-            State::Delayed(ticks) => self.reply = State::Delayed(ticks - 1),
-            State::None | State::Ready | State::Sending => {}
-        }
-    }
-
-    /// Returns the first character of a reply that starts now, if there is one.
-    #[inline]
+    /// Starts a reply whose delay has passed, if there is one, and returns its first character. When another frame has
+    /// begun since the request, the reply is dropped and counted instead.
     pub fn start(&mut self) -> Option<u8> {
-        if self.reply != State::Ready {
+        if self.reply != State::Waiting(0) {
+            return None;
+        }
+        let messages = self.receiver.counters().bus_messages;
+        if !self.receiver.is_idle() || messages != self.messages_before {
+            self.drop_reply();
             return None;
         }
         self.reply = State::Sending;
@@ -216,14 +209,14 @@ impl<'a, U: Units> Port<'a, U> {
         self.reply == State::Sending
     }
 
-    /// Returns whether a reply is being sent or will be sent. A delayed reply is not sent when a new request has been
+    /// Returns whether a reply is being sent or will be sent. A reply that waits is not sent when a new request has been
     /// received.
     #[must_use]
     pub fn is_replying(&self) -> bool {
         match self.reply {
             State::None => false,
-            State::Delayed(_) => self.request.is_none(),
-            State::Ready | State::Sending => true,
+            State::Waiting(_) => self.request.is_none(),
+            State::Sending => true,
         }
     }
 
@@ -236,7 +229,7 @@ impl<'a, U: Units> Port<'a, U> {
     /// Returns the unit address of the request that waits to be served, if any; 0 for a broadcast.
     #[must_use]
     pub fn waiting(&self) -> Option<u8> {
-        self.request.as_ref().map(Request::unit)
+        self.request.as_ref().map(|(adu, _)| adu.get(0))
     }
 
     /// Returns the counters of the line.
@@ -246,6 +239,8 @@ impl<'a, U: Units> Port<'a, U> {
     }
 
     /// Ends a reply that is not sent.
+    #[cold]
+    #[inline(never)]
     fn drop_reply(&mut self) {
         self.receiver.count_unsent();
         self.give_up();

@@ -67,6 +67,16 @@ impl<'a, U: Units> Receiver<'a, U> {
         }
     }
 
+    /// Returns the framing of the line.
+    #[inline]
+    pub(super) const fn framing(&self) -> Framing {
+        if self.state & ASCII == 0 {
+            Framing::Rtu
+        } else {
+            self.reader.framing()
+        }
+    }
+
     /// Sets the end mark of an ASCII line. The mode itself does not change.
     pub const fn set_framing(&mut self, framing: Framing) {
         if let Framing::Ascii { delimiter } = framing {
@@ -237,7 +247,7 @@ impl<'a, U: Units> Receiver<'a, U> {
             return None;
         }
         let adu = self.filling.take()?;
-        adu.truncate(len - check_len);
+        adu.cut(check_len);
         Some(adu)
     }
 

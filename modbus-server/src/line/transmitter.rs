@@ -22,9 +22,9 @@ pub(super) struct Transmitter<'a> {
 /// Next part of the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// In ASCII mode, the colon.
+    /// In RTU mode, unit and PDU, then the first byte of the CRC. In ASCII mode, the colon.
     Start,
-    /// Unit and PDU, then the LRC or the first byte of the CRC.
+    /// In ASCII mode, unit and PDU, then the LRC.
     Bytes,
     /// The second byte of the CRC, or the carriage return.
     End,
@@ -51,19 +51,19 @@ impl<'a> Transmitter<'a> {
     /// Returns a transmitter of a reply, unit address and PDU.
     #[inline]
     pub(super) const fn new(adu: &'a mut Adu, framing: Framing) -> Self {
-        let (stage, left, check) = match framing {
+        let left = match framing {
             // At most 256.
-            Framing::Rtu => (Stage::Bytes, adu.len() as u16, crc::START),
-            Framing::Ascii { .. } => (Stage::Start, 0, 0),
+            Framing::Rtu => adu.len() as u16,
+            Framing::Ascii { .. } => 0,
         };
         Self {
             framing,
-            stage,
+            stage: Stage::Start,
             half: None,
             adu: Some(adu),
             left,
             at: 0,
-            check,
+            check: crc::START,
         }
     }
 
@@ -90,7 +90,7 @@ impl<'a> Transmitter<'a> {
             return self.ascii(delimiter);
         }
         self.stage = match self.stage {
-            Stage::Bytes => Stage::End,
+            Stage::Start => Stage::End,
             Stage::End => Stage::Over,
             _ => return None,
         };
@@ -115,7 +115,10 @@ impl<'a> Transmitter<'a> {
                     self.check.to_le_bytes()[0].wrapping_neg()
                 })
             }
-            Stage::Start => return self.then(Stage::Bytes, ascii::START),
+            Stage::Start => {
+                self.check = 0;
+                return self.then(Stage::Bytes, ascii::START);
+            }
             Stage::End => return self.then(Stage::Delimiter, ascii::CR),
             Stage::Delimiter => return self.then(Stage::Over, delimiter),
             Stage::Over => return None,

@@ -3,10 +3,9 @@
 use super::{Diagnostics, Server};
 use crate::diagnostic::Diagnostic;
 use crate::exception::first_of;
-use crate::pdu::Pdu;
 use crate::{
     Adu, BitsOut, DataModel, Exception, Function, Span, Table, Words, WordsOut, file,
-    identification,
+    identification, pdu,
 };
 
 /// What an executed request means for the counters, the event log and the modes of the server.
@@ -57,7 +56,7 @@ const DIAGNOSTIC_DATA: u8 = 4;
 ///
 /// # Errors
 /// The reason why it is not executed.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn execute(
     server: &mut Server,
     broadcast: bool,
@@ -69,7 +68,7 @@ pub(super) fn execute(
     } else {
         Ok(())
     };
-    let (code, fields) = (adu.get(1), adu.from(FIELDS));
+    let (code, fields) = (adu.get(1), adu.fields());
     let function = match Function::from_code(code) {
         Some(function) if model.has(function) => function,
         Some(_) => return Err(Exception::IllegalFunction.into()),
@@ -79,8 +78,9 @@ pub(super) fn execute(
             return Ok(serve_custom(code, adu, model));
         }
     };
-    match Pdu::decode(function, fields)? {
-        Pdu::ReadBits(span) => {
+    match function {
+        Function::ReadCoils | Function::ReadDiscreteInputs => {
+            let span = pdu::read(fields, pdu::MAX_READ_BITS)?;
             let table = match function {
                 Function::ReadCoils => Table::Coils,
                 _ => Table::DiscreteInputs,
@@ -90,7 +90,8 @@ pub(super) fn execute(
             let bytes = body(adu, usize::from(span.count().div_ceil(8)));
             model.read_bits(table, span, &mut BitsOut::new(bytes, span.count()));
         }
-        Pdu::ReadWords(span) => {
+        Function::ReadHoldingRegisters | Function::ReadInputRegisters => {
+            let span = pdu::read(fields, pdu::MAX_READ_WORDS)?;
             let table = match function {
                 Function::ReadHoldingRegisters => Table::HoldingRegisters,
                 _ => Table::InputRegisters,
@@ -99,24 +100,34 @@ pub(super) fn execute(
             alone?;
             read_words(server, table, span, adu, model);
         }
-        Pdu::WriteBits(span, bits) => {
+        Function::WriteSingleCoil | Function::WriteMultipleCoils => {
+            let (span, bits) = match function {
+                Function::WriteSingleCoil => pdu::write_single_bit(fields)?,
+                _ => pdu::write_bits(fields)?,
+            };
             model.check_write_bits(span, bits)?;
             model.write_bits(span, bits);
             adu.truncate(ECHO);
             return Ok(Effect::Written);
         }
-        Pdu::WriteWords(span, words) => {
+        Function::WriteSingleRegister | Function::WriteMultipleRegisters => {
+            let (span, words) = match function {
+                Function::WriteSingleRegister => pdu::write_single_word(fields)?,
+                _ => pdu::write_words(fields)?,
+            };
             model.check_write_words(span, words)?;
             model.write_words(span, words);
             adu.truncate(ECHO);
             return Ok(Effect::Written);
         }
-        Pdu::MaskWord { address, and, or } => {
+        Function::MaskWriteRegister => {
+            let [address, and, or] = pdu::mask_word(fields)?;
             let value = masked(address, and, or, model)?.to_be_bytes();
             model.write_words(Span::single(address), Words::new(&value));
             return Ok(Effect::Written);
         }
-        Pdu::WriteThenRead { write, words, read } => {
+        Function::ReadWriteMultipleRegisters => {
+            let (read, write, words) = pdu::write_then_read(fields)?;
             first_of(
                 model.check_write_words(write, words),
                 model.check_read_words(Table::HoldingRegisters, read),
@@ -126,21 +137,24 @@ pub(super) fn execute(
             read_words(server, Table::HoldingRegisters, read, adu, model);
             return Ok(Effect::Written);
         }
-        Pdu::ReadFile(fields) if model.has_files() => {
+        Function::ReadFileRecord if model.has_files() => {
             let bytes = file::check(fields, false, model)?;
             alone?;
             file::read(adu, bytes, model);
         }
-        Pdu::WriteFile(fields) if model.has_files() => {
+        Function::WriteFileRecord if model.has_files() => {
             file::check(fields, true, model)?;
             file::write(fields, model);
         }
-        Pdu::ReadFile(_) | Pdu::WriteFile(_) => return Err(Exception::IllegalFunction.into()),
-        Pdu::ExceptionStatus => {
+        Function::ReadFileRecord | Function::WriteFileRecord => {
+            return Err(Exception::IllegalFunction.into());
+        }
+        Function::ReadExceptionStatus => {
+            pdu::nothing(fields)?;
             alone?;
             data(adu, &[model.exception_status()]);
         }
-        Pdu::Diagnose(fields) => {
+        Function::Diagnostics => {
             let diagnostic = Diagnostic::decode(fields, server.framing)?;
             if server.diagnostics == Diagnostics::ReadOnly && !diagnostic.only_reads() {
                 return Err(Exception::ServerDeviceBusy.into());
@@ -149,13 +163,15 @@ pub(super) fn execute(
             server.diagnose(diagnostic, adu, model);
             return Ok(Effect::Diagnosed(diagnostic));
         }
-        Pdu::EventCounter => {
+        Function::GetCommEventCounter => {
+            pdu::nothing(fields)?;
             alone?;
             data(adu, &NOT_BUSY);
             adu.extend(&server.tally.events.to_be_bytes());
             return Ok(Effect::Polled);
         }
-        Pdu::EventLog => {
+        Function::GetCommEventLog => {
+            pdu::nothing(fields)?;
             alone?;
             // At most 6 + 64.
             data(adu, &[6 + server.log.count()]);
@@ -165,7 +181,8 @@ pub(super) fn execute(
             server.log.append_to(adu);
             return Ok(Effect::Polled);
         }
-        Pdu::ServerId => {
+        Function::ReportServerId => {
+            pdu::nothing(fields)?;
             alone?;
             let id = model.server_id();
             let id = id.get(..MAX_SERVER_ID).unwrap_or(id);
@@ -177,7 +194,7 @@ pub(super) fn execute(
             adu.extend(&[if model.is_running() { 0xFF } else { 0x00 }]);
             adu.extend(more);
         }
-        Pdu::Identify(fields) => {
+        Function::EncapsulatedInterface => {
             let (code, object) = identification::decode(fields, model)?;
             alone?;
             identification::fill(code, object, model, adu);

@@ -8,7 +8,7 @@ use crate::events::EventLog;
 use crate::line::Framing;
 use crate::{Adu, Counters, DataModel, Function, LineCounters, Outcome, Reply, Request};
 use execute::{Effect, Refusal, execute};
-use tally::Tally;
+use tally::{Sent, Tally};
 
 /// The unit address of a broadcast (V1.02 2.2).
 pub(crate) const BROADCAST: u8 = 0;
@@ -35,6 +35,8 @@ pub struct Server {
     cleared_bits: u16,
     tally: Tally,
     log: EventLog,
+    /// The last reply, until it is logged.
+    sent: Option<Sent>,
 }
 
 /// Sub-functions of function 08 that the server executes.
@@ -58,6 +60,7 @@ impl Server {
             cleared_bits: 0,
             tally: Tally::ZERO,
             log: EventLog::new(),
+            sent: None,
         }
     }
 
@@ -82,54 +85,49 @@ impl Server {
     }
 
     /// Serves a request: checks it, executes it, and makes its buffer the reply.
-    #[inline]
+    ///
+    /// The reply is logged with the next request, or by [`settle`](Self::settle).
     pub fn serve<'a>(&mut self, request: Request<'a>, model: &mut impl DataModel) -> Reply<'a> {
-        let Request { adu, line, .. } = request;
-        let (unit, code) = (adu.get(0), adu.get(1));
-        let (broadcast, framing) = (unit == BROADCAST, self.framing);
-        let is_answered = self.is_answered(adu, model);
-        self.begin(&line, broadcast, is_answered);
-        let executed = if !matches!(code, 1..Function::EXCEPTION) {
-            Err(Outcome::NoRequest)
-        } else if self.listen_only && !is_restart(adu) {
-            Err(Outcome::NotObeyed)
-        } else {
-            execute(self, broadcast, adu, model).map_err(|refusal| match refusal {
-                Refusal::NotForAll => Outcome::NoEffect,
-                Refusal::Exception(exception) => {
-                    adu.set(1, code | Function::EXCEPTION);
-                    adu.truncate(2);
-                    adu.extend(&[exception.code()]);
-                    Outcome::Refused(exception)
-                }
-            })
+        let Request { adu, ref line, .. } = request;
+        let broadcast = adu.get(0) == BROADCAST;
+        let dismissed = self.dismissed(adu);
+        let is_answered = !broadcast && dismissed.is_none() && !self.is_silent(adu, model);
+        self.begin(line, broadcast, is_answered);
+        let executed = match dismissed {
+            Some(outcome) => Err(outcome),
+            None => execute(self, broadcast, adu, model).map_err(|refusal| refuse(adu, refusal)),
         };
         self.end(executed, is_answered);
         Reply {
             adu,
             is_answered,
-            framing,
-            next_framing: self.framing,
+            framing: self.framing,
             messages: line.bus_messages,
             outcome: executed.map_or_else(|outcome| outcome, |_| Outcome::Accepted),
             writes: executed == Ok(Effect::Written),
         }
     }
 
-    /// Returns whether a request is answered, including with an exception.
+    /// Returns the outcome of a request that is not executed, whatever the model says.
     #[inline]
-    fn is_answered(&self, request: &Adu, model: &impl DataModel) -> bool {
-        let (unit, code) = (request.get(0), request.get(1));
-        let is_silent = || {
-            self.diagnostics == Diagnostics::All
-                && code == Function::Diagnostics.code()
-                && Diagnostic::is_listen_only(request.from(2))
-                && model.has(Function::Diagnostics)
-        };
-        unit != BROADCAST
-            && matches!(code, 1..Function::EXCEPTION)
-            && !self.listen_only
-            && !is_silent()
+    fn dismissed(&self, request: &Adu) -> Option<Outcome> {
+        if !matches!(request.get(1), 1..Function::EXCEPTION) {
+            Some(Outcome::NoRequest)
+        } else if self.listen_only && !is_restart(request) {
+            Some(Outcome::NotObeyed)
+        } else {
+            None
+        }
+    }
+
+    /// Returns whether a request to this unit is executed without a reply.
+    #[inline]
+    fn is_silent(&self, request: &Adu, model: &impl DataModel) -> bool {
+        self.listen_only
+            || (request.get(1) == Function::Diagnostics.code()
+                && self.diagnostics == Diagnostics::All
+                && Diagnostic::is_listen_only(request.fields())
+                && model.has(Function::Diagnostics))
     }
 
     /// Returns all counters as of the last request that was served, including a request that is being served, less what
@@ -162,9 +160,21 @@ impl Server {
     }
 }
 
+/// Makes a request that is refused an exception.
+#[inline(never)]
+fn refuse(adu: &mut Adu, refusal: Refusal) -> Outcome {
+    let Refusal::Exception(exception) = refusal else {
+        return Outcome::NoEffect;
+    };
+    adu.set(1, adu.get(1) | Function::EXCEPTION);
+    adu.truncate(2);
+    adu.extend(&[exception.code()]);
+    Outcome::Refused(exception)
+}
+
 /// Returns whether a request to a unit in listen-only mode is obeyed: only a restart of the communication is.
 fn is_restart(request: &Adu) -> bool {
     request.get(0) != BROADCAST
         && request.get(1) == Function::Diagnostics.code()
-        && Diagnostic::is_restart(request.from(2))
+        && Diagnostic::is_restart(request.fields())
 }

@@ -18,6 +18,13 @@ pub(super) struct Tally {
     pub(super) events: u16,
 }
 
+/// The event of a reply, and whether the event counter counts the request.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent {
+    event: Event,
+    counts: bool,
+}
+
 impl Tally {
     pub(super) const ZERO: Self = Self {
         exceptions: 0,
@@ -33,13 +40,32 @@ impl Server {
     /// Counts and logs a request, with the line's counters at its end, before it is executed.
     ///
     /// Requests are served in the order in which the receiver has received them.
+    #[inline(never)]
     pub(super) fn begin(&mut self, line: &LineCounters, broadcast: bool, is_answered: bool) {
+        self.settle();
         self.note_line(line);
         self.log.push(Event::received(broadcast, self.listen_only));
         count(&mut self.tally.unit_messages);
         if !is_answered {
             count(&mut self.tally.no_response);
         }
+    }
+
+    /// Logs the last reply. The next request would do this, before its own reply begins; call this when that reply has
+    /// begun, to make the next one begin sooner.
+    #[inline]
+    pub fn settle(&mut self) {
+        if let Some(sent) = self.sent.take() {
+            self.log_sent(sent);
+        }
+    }
+
+    #[inline(never)]
+    fn log_sent(&mut self, Sent { event, counts }: Sent) {
+        if counts {
+            count(&mut self.tally.events);
+        }
+        self.log.push(event);
     }
 
     /// Stores the line's counters at the end of a request, and logs the damaged frames before that request.
@@ -59,32 +85,44 @@ impl Server {
         self.line = *line;
     }
 
-    /// Ends a request: counts its result, logs its reply, and executes what must happen after it.
+    /// Ends a request: counts an exception, and executes what must happen after the request.
+    #[inline]
     pub(super) fn end(&mut self, executed: Result<Effect, Outcome>, is_answered: bool) {
-        let tally = &mut self.tally;
-        let mut sent = None;
-        match executed {
-            // "Not incremented for exception responses, poll commands, or fetch event counter commands" (6.9).
-            // Reading the log counts as such a command, because it returns the same count as function 0B (6.10).
-            Ok(Effect::Polled) => {}
-            Ok(_) => count(&mut tally.events),
-            Err(Outcome::Refused(exception)) => {
-                count(&mut tally.exceptions);
-                if is_answered {
-                    sent = Some(exception);
-                    match exception {
-                        Exception::NegativeAcknowledge => count(&mut tally.nak),
-                        Exception::ServerDeviceBusy => count(&mut tally.busy),
-                        _ => {}
-                    }
-                }
-            }
-            Err(_) => {}
-        }
-        self.log.push(Event::sent(sent, self.listen_only));
-        let Ok(Effect::Diagnosed(diagnostic)) = executed else {
-            return;
+        // "Not incremented for exception responses, poll commands, or fetch event counter commands" (6.9). Reading the
+        // log counts as such a command, because it returns the same count as function 0B (6.10).
+        let counts = executed.is_ok_and(|effect| effect != Effect::Polled);
+        let exception = match executed {
+            Err(Outcome::Refused(exception)) => self.count_exception(exception, is_answered),
+            _ => None,
         };
+        let event = Event::sent(exception, self.listen_only);
+        self.sent = Some(Sent { event, counts });
+        if let Ok(Effect::Diagnosed(diagnostic)) = executed {
+            self.settle();
+            self.finish(diagnostic);
+        }
+    }
+
+    /// Counts an exception. Returns it if it is sent.
+    #[cold]
+    #[inline(never)]
+    fn count_exception(&mut self, exception: Exception, is_answered: bool) -> Option<Exception> {
+        let tally = &mut self.tally;
+        count(&mut tally.exceptions);
+        if !is_answered {
+            return None;
+        }
+        match exception {
+            Exception::NegativeAcknowledge => count(&mut tally.nak),
+            Exception::ServerDeviceBusy => count(&mut tally.busy),
+            _ => {}
+        }
+        Some(exception)
+    }
+
+    /// Executes what must happen after the reply of function 08.
+    #[inline(never)]
+    fn finish(&mut self, diagnostic: Diagnostic) {
         match diagnostic {
             Diagnostic::Restart { clear_log } => {
                 self.listen_only = false;

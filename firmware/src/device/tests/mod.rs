@@ -86,7 +86,7 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         let request = port.take().expect("a request waits");
         let reply = self.server.serve(request, &mut self.device);
         port.send(reply, 0);
-        if let Some(order) = self.device.take_order() {
+        if let Some(order) = self.device.end_request() {
             self.device.carry_out(order);
         }
         let mut reply: Vec<u8> = port.start().into_iter().collect();

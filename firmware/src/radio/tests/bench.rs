@@ -10,7 +10,7 @@ use std::vec::Vec;
 
 use embedded_hal::digital::{self, InputPin, PinState};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType};
-use modbus_server::{Server, Counters, Outcome, Tables, crc, line::Framing};
+use modbus_server::{Counters, Outcome, Server, Tables, crc, line::Framing};
 use modio_drivers::LoraSettings;
 
 use super::super::*;
