@@ -3,7 +3,9 @@
 //! has a pull-up of 10 k to 3.3 V.
 
 use crate::analog_inputs::AnalogInputs;
-use crate::{AnalogSource, CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{
+    AnalogSource, CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError,
+};
 
 /// Four filtered analog inputs.
 ///
@@ -39,7 +41,7 @@ impl<S: AnalogSource> IoModule for Ai4<S> {
         self.inputs.scan(channels)
     }
 
-    fn drive_outputs(&mut self, _channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, _: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         Ok(())
     }
 }

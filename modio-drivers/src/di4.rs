@@ -3,7 +3,7 @@
 use embedded_hal::digital::InputPin;
 
 use crate::debounce::{DEBOUNCE_DEFAULT_MS, Debounce};
-use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError};
 
 /// Four debounced digital inputs.
 ///
@@ -53,7 +53,7 @@ impl<P: InputPin> IoModule for Di4<P> {
         result
     }
 
-    fn drive_outputs(&mut self, _channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, _: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         Ok(())
     }
 }

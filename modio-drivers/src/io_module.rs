@@ -1,6 +1,6 @@
 //! The interface of every module's driver.
 
-use crate::{CHANNELS, ChannelSettings, Channels, Kind};
+use crate::{CHANNELS, ChannelSettings, Channels, DacLink, Kind};
 
 /// Channels of a module that could not be read or driven. They keep their values and are tried again at every scan.
 /// All other channels have been served.
@@ -86,13 +86,13 @@ pub trait IoModule {
     /// ones are tried again at the next call.
     fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError>;
 
-    /// Drives the outputs from `channels`. Must be called as often as [`read_inputs`](Self::read_inputs), and also
+    /// Drives the outputs from `channels`. `dac` is the link to the DAC of the module's slot. Must be called as often as [`read_inputs`](Self::read_inputs), and also
     /// immediately after an output was commanded. Returns within a few microseconds.
     ///
     /// # Errors
     ///
     /// [`ModuleError`] with the channels that could not be driven. Every other channel has been driven.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError>;
+    fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError>;
 }
 
 /// An empty slot.
@@ -110,7 +110,7 @@ impl IoModule for Absent {
         Ok(())
     }
 
-    fn drive_outputs(&mut self, _channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, _: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         Ok(())
     }
 }

@@ -4,7 +4,7 @@
 use embedded_hal::digital::{InputPin, OutputPin, PinState};
 
 use crate::debounce::Debounce;
-use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError};
 
 /// Debounce of the mode jumpers, in milliseconds. A jumper is moved by hand, and its contacts bounce for longer
 /// than a switch.
@@ -61,7 +61,7 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
     }
 
     /// Drives both coils in every call, as [`Do4`](crate::Do4) does.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, channels: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         let mut result = Ok(());
         for (channel, coil) in (FIRST_COIL..).zip(&mut self.coils) {
             let energised = PinState::from(channels.bit(channel));
@@ -149,11 +149,17 @@ mod tests {
         let mut channels = Channels::new();
         channels.set_bit(0, true);
         channels.set_bit(1, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         channels.set_bit(2, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         channels.set_bit(3, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         finish(module);
     }
 
@@ -168,7 +174,10 @@ mod tests {
         channels.set_bit(3, true);
         assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(0)));
         assert!(channels.bit(1));
-        assert_eq!(module.drive_outputs(&channels), Err(ModuleError::line(2)));
+        assert_eq!(
+            module.drive_outputs(&channels, &mut DacLink::default()),
+            Err(ModuleError::line(2))
+        );
         finish(module);
     }
 }

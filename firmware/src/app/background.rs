@@ -1,7 +1,8 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::stack::LowWater;
+use board_support::{boards::SLOTS, stack::LowWater};
 use heapless::spsc::Consumer;
+use modio_drivers::DacLink;
 use rtic::Mutex;
 
 use crate::{
@@ -31,9 +32,10 @@ impl Background {
         device: &mut impl Mutex<T = &'static mut Device>,
         activity: &mut impl Mutex<T = bool>,
         orders: &mut impl Mutex<T = Orders>,
+        dacs: &mut impl Mutex<T = [DacLink; SLOTS]>,
         logged: &mut Consumer<'static, Event>,
     ) {
-        self.analog_outputs.work();
+        self.analog_outputs.work(dacs);
 
         let Orders {
             save,

@@ -48,10 +48,13 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{RadioUart, ScanTimer, Watchdog, fault, pac::Interrupt, stack::LowWater};
+    use board_support::{
+        RadioUart, ScanTimer, Watchdog, boards::SLOTS, fault, pac::Interrupt, stack::LowWater,
+    };
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
+    use modio_drivers::DacLink;
 
     use crate::{
         background::Background,
@@ -81,6 +84,8 @@ mod app {
         activity: bool,
         /// Commands from requests for the background task.
         orders: Orders,
+        /// What the scan and the background task exchange about each slot's DAC.
+        dacs: [DacLink; SLOTS],
     }
 
     #[local]
@@ -121,6 +126,7 @@ mod app {
                 radio_uart: started.radio_uart,
                 activity: false,
                 orders: Orders::default(),
+                dacs: started.dacs,
                 device: started.device,
             },
             Local {
@@ -228,16 +234,18 @@ mod app {
         alive::end(fault::marks(), Task::Serve);
     }
 
-    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device])]
+    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device, dacs])]
     fn scan(cx: scan::Context) {
         let mark = alive::look(fault::marks(), Task::Scan);
         alive::begin(fault::marks(), Task::Scan);
         alive::end_line(fault::marks());
         let mut shared = cx.shared;
-        let beat = cx
-            .local
-            .scanning
-            .run(&mut shared.line, &mut shared.device, cx.local.events);
+        let beat = cx.local.scanning.run(
+            &mut shared.line,
+            &mut shared.device,
+            &mut shared.dacs,
+            cx.local.events,
+        );
         if beat {
             alive::end(fault::marks(), Task::Scan);
             if *cx.local.radio_is_on {
@@ -262,7 +270,7 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, orders])]
+    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, orders, dacs])]
     fn background(cx: background::Context) {
         alive::begin(fault::marks(), Task::Background);
         let mut shared = cx.shared;
@@ -270,6 +278,7 @@ mod app {
             &mut shared.device,
             &mut shared.activity,
             &mut shared.orders,
+            &mut shared.dacs,
             cx.local.logged,
         );
         alive::end(fault::marks(), Task::Background);

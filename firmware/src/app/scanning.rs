@@ -3,7 +3,7 @@
 use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
 use firmware::{device::IoPort, lamps::TICK_MS};
 use heapless::spsc::Producer;
-use modio_drivers::{IoModule, ModuleError};
+use modio_drivers::{DacLink, IoModule, ModuleError};
 use rtic::Mutex;
 
 use crate::{
@@ -31,12 +31,17 @@ pub struct Scanning {
 
 impl Scanning {
     /// Configures the modules and drives their outputs for the first time. The sampler samples their analog lines.
-    pub fn new(mut modules: [Installed; SLOTS], sampler: Sampler, device: &Device) -> Self {
+    pub fn new(
+        mut modules: [Installed; SLOTS],
+        sampler: Sampler,
+        device: &Device,
+        dacs: &mut [DacLink; SLOTS],
+    ) -> Self {
         let ports = device.points.ports();
-        for (module, port) in modules.iter_mut().zip(ports) {
+        for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs) {
             module.configure(port.settings());
             // If a module cannot be driven, the first scan reports it.
-            let _ = module.drive_outputs(port.channels());
+            let _ = module.drive_outputs(port.channels(), dac);
         }
         Self {
             modules,
@@ -53,6 +58,7 @@ impl Scanning {
         &mut self,
         line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,
+        dacs: &mut impl Mutex<T = [DacLink; SLOTS]>,
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
@@ -82,9 +88,11 @@ impl Scanning {
 
         let mut results = [Ok(()); SLOTS];
         let modules = self.modules.iter_mut().zip(&channels);
-        for ((module, channels), result) in modules.zip(&mut results) {
-            *result = module.drive_outputs(channels);
-        }
+        dacs.lock(|dacs| {
+            for (((module, channels), result), dac) in modules.zip(&mut results).zip(dacs) {
+                *result = module.drive_outputs(channels, dac);
+            }
+        });
         if beat {
             self.sampler.run();
             let modules = self.modules.iter_mut().zip(&mut channels);

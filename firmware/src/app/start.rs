@@ -3,7 +3,8 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Leds, RadioUart, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, pac, uart,
+    Leds, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes,
+    pac, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -17,7 +18,7 @@ use modbus_server::{
     Adu,
     line::{Framing, Gaps, Port, Receiver, Width},
 };
-use modio_drivers::IoModule;
+use modio_drivers::{DacLink, IoModule};
 use register_map::{
     codes::{Format, GapRule, Mode},
     state::reset_cause::POWER_ON,
@@ -48,6 +49,7 @@ pub struct Started {
     pub device: &'static mut Device,
     pub scanning: Scanning,
     pub analog_outputs: AnalogOutputs,
+    pub dacs: [DacLink; SLOTS],
     pub persistence: Persistence,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
@@ -108,7 +110,8 @@ pub fn up(
     };
     let kinds = modules.each_ref().map(IoModule::kinds);
     let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
-    let scanning = Scanning::new(modules, sampler, device);
+    let mut dacs = [DacLink::default(); SLOTS];
+    let scanning = Scanning::new(modules, sampler, device, &mut dacs);
 
     log.start(&log::Start {
         address,
@@ -194,6 +197,7 @@ pub fn up(
         device,
         scanning,
         analog_outputs,
+        dacs,
         persistence: Persistence::new(store, pages, erase),
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,

@@ -4,9 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use super::*;
-use crate::{ChannelStatus, DAC_ADDRESS, DacWorker, Scale, Signal};
-use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
-use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
+use crate::{ChannelStatus, Scale, Signal};
 
 /// A converter with two lines. Any other line fails the test.
 struct Lines([u16; 2], Vec<u8>);
@@ -41,8 +39,7 @@ fn commanded(third: u16, fourth: u16) -> Channels {
 
 #[test]
 fn inputs_are_lines_1_and_2_and_reading_does_not_change_outputs() {
-    let link = DacLink::new();
-    let mut module = Ai2Ao2::new(Lines([1000, 2000], Vec::new()), &link);
+    let mut module = Ai2Ao2::new(Lines([1000, 2000], Vec::new()));
     use Kind::{WordInput, WordOutput};
     assert_eq!(
         module.kinds(),
@@ -53,25 +50,24 @@ fn inputs_are_lines_1_and_2_and_reading_does_not_change_outputs() {
         assert_eq!(module.read_inputs(&mut channels), Ok(()));
     }
     assert_eq!([0, 1, 2, 3].map(|c| channels.word(c)), [1000, 2000, 7, 8]);
-    assert_eq!(link.wanted(), None, "reading posts nothing");
     assert_eq!(module.inputs.source_mut().1, [0, 1, 0, 1, 0, 1]);
 }
 
 #[test]
 fn outputs_are_the_channels_c_and_d_in_their_own_units() {
-    let link = DacLink::new();
-    let mut module = Ai2Ao2::new(Lines([0, 0], Vec::new()), &link);
+    let mut link = DacLink::default();
+    let mut module = Ai2Ao2::new(Lines([0, 0], Vec::new()));
     let channels = commanded(4000, 4095);
-    module.drive_outputs(&channels).unwrap();
-    assert_eq!(link.wanted(), Some([0, 0, 4000, 4095].map(Code::new)));
+    module.drive_outputs(&channels, &mut link).unwrap();
+    assert_eq!(link.wanted, Some([0, 0, 4000, 4095].map(Code::new)));
     module.configure(&[
         with(Signal::Ntc, Scale::Engineering),
         with(Signal::Current, Scale::Engineering),
         with(Signal::Current, Scale::Engineering),
         with(Signal::Voltage, Scale::Engineering),
     ]);
-    module.drive_outputs(&channels).unwrap();
-    assert_eq!(link.wanted(), Some([0, 0, 819, 1677].map(Code::new)));
+    module.drive_outputs(&channels, &mut link).unwrap();
+    assert_eq!(link.wanted, Some([0, 0, 819, 1677].map(Code::new)));
 
     let mut channels = channels;
     module.read_inputs(&mut channels).unwrap();
@@ -81,45 +77,19 @@ fn outputs_are_the_channels_c_and_d_in_their_own_units() {
 }
 
 #[test]
-fn a_dac_that_does_not_answer_is_an_error_while_inputs_are_still_read() {
-    let bytes = |high, low| std::vec![0x40, 0, 0, 0x42, 0, 0, 0x44, high, low, 0x46, 0x0F, 0xFF];
-    let refused = || {
-        Transaction::write(DAC_ADDRESS, bytes(0, 5))
-            .with_error(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address))
+fn a_dac_that_does_not_answer_is_an_error_of_its_channels_while_inputs_are_still_read() {
+    let mut link = DacLink {
+        failed: true,
+        ..DacLink::default()
     };
-    let mut bus = Mock::new(&[
-        refused(),
-        refused(),
-        Transaction::write(DAC_ADDRESS, bytes(0, 6)),
-    ]);
-    let link = DacLink::new();
-    let mut worker = DacWorker::new(DAC_ADDRESS);
-    let mut module = Ai2Ao2::new(Lines([1, 2], Vec::new()), &link);
+    let mut module = Ai2Ao2::new(Lines([1, 2], Vec::new()));
     let mut channels = commanded(5, 4095);
-    assert_eq!(module.drive_outputs(&channels), Ok(()));
-    assert!(worker.work(&mut bus, &link).is_err() && worker.work(&mut bus, &link).is_err());
-
     let failed = Err(ModuleError::chip(0b1100));
-    channels.set_word(2, 6);
-    assert_eq!(module.drive_outputs(&channels), failed);
-    assert_eq!(module.read_inputs(&mut channels), failed);
+    assert_eq!(module.drive_outputs(&channels, &mut link), failed);
+    assert_eq!(link.wanted, Some([0, 0, 5, 4095].map(Code::new)));
+    assert_eq!(module.read_inputs(&mut channels), Ok(()));
     assert_eq!([0, 1].map(|c| channels.word(c)), [1, 2]);
-    module.inputs.source_mut().0 = [u16::MAX, 3];
-    let both = module.read_inputs(&mut channels).unwrap_err();
-    assert_eq!(
-        both.channels(),
-        0b1101,
-        "the DAC's channels and that of the line"
-    );
-    assert_eq!(both.first_line(), None);
 
-    assert_eq!(
-        worker.work(&mut bus, &link),
-        Ok(false),
-        "skipped after two failures"
-    );
-    assert_eq!(worker.work(&mut bus, &link), Ok(true));
-    assert_eq!(module.drive_outputs(&channels), Ok(()));
+    module.inputs.source_mut().0 = [u16::MAX, 3];
     assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(0)));
-    bus.done();
 }

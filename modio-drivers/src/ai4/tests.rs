@@ -81,7 +81,10 @@ fn every_line_is_sampled_once_per_scan_and_shown_immediately() {
     assert_eq!(module.kinds(), [Kind::WordInput; 4]);
     assert_eq!(scan(&mut module, &mut channels), [0, 1, 2048, 4095]);
     assert_eq!(scan(&mut module, &mut channels), [0, 1, 2048, 4095]);
-    assert_eq!(module.drive_outputs(&channels), Ok(()));
+    assert_eq!(
+        module.drive_outputs(&channels, &mut DacLink::default()),
+        Ok(())
+    );
     assert_eq!(converter.answered, [0, 1, 2, 3, 0, 1, 2, 3]);
     assert_eq!(converter.calls, 8);
 }
