@@ -60,7 +60,7 @@ mod watchdog;
 
 #[cfg(target_os = "none")]
 pub use {
-    adc::{AnalogInputs, NotCalibrated, Sampler},
+    adc::Sampler,
     clock::ClockSource,
     flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},
@@ -71,7 +71,7 @@ pub use {
     rs485::{Character, Rs485, Status},
     safe::outputs_off,
     scan_timer::ScanTimer,
-    slot::{AnalogLines, Slot},
+    slot::Slot,
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };

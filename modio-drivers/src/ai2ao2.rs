@@ -4,31 +4,38 @@
 use crate::analog_inputs::AnalogInputs;
 use crate::ao4::output_code;
 use crate::{
-    AnalogSource, CHANNELS, ChannelSettings, Channels, Code, DacLink, IoModule, Kind, ModuleError,
+    CHANNELS, ChannelSettings, Channels, Code, Codes, DacLink, IoModule, Kind, ModuleError,
 };
 
 /// Two filtered analog inputs and two analog outputs.
 #[derive(Debug)]
-pub struct Ai2Ao2<S> {
-    inputs: AnalogInputs<S>,
+pub struct Ai2Ao2 {
+    inputs: AnalogInputs,
     /// Settings of channels 3 and 4.
     outputs: [ChannelSettings; 2],
 }
 
-impl<S: AnalogSource> Ai2Ao2<S> {
-    /// Creates the driver. Lines 1 and 2 of the converter must already be analog inputs.
-    pub const fn new(source: S) -> Self {
+impl Ai2Ao2 {
+    /// Creates the driver.
+    #[must_use]
+    pub const fn new() -> Self {
         Self {
-            inputs: AnalogInputs::new(source, 2),
+            inputs: AnalogInputs::new(2),
             outputs: [ChannelSettings::default_for(Kind::WordOutput); 2],
         }
+    }
+}
+
+impl Default for Ai2Ao2 {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
 /// Channels 3 and 4, which the DAC drives; channel 1 is bit 0.
 const OUTPUTS: u8 = 0b1100;
 
-impl<S: AnalogSource> IoModule for Ai2Ao2<S> {
+impl IoModule for Ai2Ao2 {
     fn kinds(&self) -> [Kind; CHANNELS] {
         use Kind::{WordInput, WordOutput};
         [WordInput, WordInput, WordOutput, WordOutput]
@@ -41,8 +48,8 @@ impl<S: AnalogSource> IoModule for Ai2Ao2<S> {
         self.outputs = [third, fourth];
     }
 
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
-        self.inputs.scan(channels)
+    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError> {
+        self.inputs.scan(codes, channels)
     }
 
     /// Leaves the codes in the link. The DAC channels A and B, which are not connected, stay at 0. Returns an error for

@@ -2,7 +2,7 @@
 //! MCP4728 whose full scale is 10 V or 20 mA.
 
 use crate::{
-    CHANNELS, ChannelSettings, Channels, Code, DacLink, IoModule, Kind, ModuleError,
+    CHANNELS, ChannelSettings, Channels, Code, Codes, DacLink, IoModule, Kind, ModuleError,
     scale::output_to_raw,
 };
 
@@ -44,7 +44,7 @@ impl IoModule for Ao4 {
         self.settings = *settings;
     }
 
-    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
+    fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
         Ok(())
     }
 

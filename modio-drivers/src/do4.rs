@@ -2,7 +2,7 @@
 
 use embedded_hal::digital::{OutputPin, PinState};
 
-use crate::{CHANNELS, ChannelSettings, Channels, DacLink, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Four digital outputs.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ impl<P: OutputPin> IoModule for Do4<P> {
 
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
-    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
+    fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
         Ok(())
     }
 

@@ -5,7 +5,6 @@
 mod ai2ao2;
 mod ai4;
 mod analog_inputs;
-mod analog_source;
 mod ao4;
 mod channels;
 mod code;
@@ -24,8 +23,7 @@ mod settings;
 
 pub use ai2ao2::Ai2Ao2;
 pub use ai4::Ai4;
-pub use analog_inputs::{POLLS_PER_SCAN, STALLED_SCANS};
-pub use analog_source::AnalogSource;
+pub use analog_inputs::{Codes, STALLED_SCANS};
 pub use ao4::Ao4;
 pub use channels::{CHANNELS, ChannelStatus, Channels, Kind};
 pub use code::Code;

@@ -1,14 +1,12 @@
 //! The modules installed in the slots.
 
-use board_support::{AnalogLines, DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
+use board_support::{DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
 use modio_drivers::{
-    Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, DacLink, DacWorker, Di4, Do4,
-    IoModule, Kind, ModuleError, Relay2,
+    Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, Codes, DacLink, DacWorker, Di4,
+    Do4, IoModule, Kind, ModuleError, Relay2,
 };
 use register_map::Module;
 use rtic::Mutex;
-
-use crate::converter::Converter;
 
 /// A module and the lines of its slot, configured for it.
 pub enum Installed {
@@ -16,19 +14,14 @@ pub enum Installed {
     Di4(Di4<PinInput>),
     Do4(Do4<PinOutput>),
     Relay2(Relay2<PinInput, PinOutput>),
-    Ai4(Ai4<Converter>),
+    Ai4(Ai4),
     Ao4(Ao4),
-    Ai2Ao2(Ai2Ao2<Converter>),
+    Ai2Ao2(Ai2Ao2),
 }
 
 impl Installed {
-    /// Configures the slot for a module.
-    fn new(module: Module, slot: Slot, sampler: &mut Sampler) -> Self {
-        let mut analog = |slot: Slot, lines| {
-            let inputs = slot.into_analog(lines);
-            sampler.serve(&inputs);
-            Converter(inputs)
-        };
+    /// Configures the slot for a module. `analog` is for the slot's inputs of the ADC.
+    fn new(module: Module, slot: Slot, analog: &mut [Option<u8>; 4]) -> Self {
         match module {
             Module::None => Self::None(Absent),
             Module::Di4 => Self::Di4(Di4::new(slot.into_inputs())),
@@ -37,9 +30,15 @@ impl Installed {
                 let (jumpers, coils) = slot.into_relay();
                 Self::Relay2(Relay2::new(jumpers, coils))
             }
-            Module::Ai4 => Self::Ai4(Ai4::new(analog(slot, AnalogLines::Four))),
+            Module::Ai4 => {
+                *analog = slot.into_analog(4);
+                Self::Ai4(Ai4::new())
+            }
             Module::Ao4 => Self::Ao4(Ao4::new()),
-            Module::Ai2Ao2 => Self::Ai2Ao2(Ai2Ao2::new(analog(slot, AnalogLines::Two))),
+            Module::Ai2Ao2 => {
+                *analog = slot.into_analog(2);
+                Self::Ai2Ao2(Ai2Ao2::new())
+            }
         }
     }
 
@@ -77,8 +76,8 @@ impl IoModule for Installed {
         self.driver_mut().configure(settings);
     }
 
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
-        self.driver_mut().read_inputs(channels)
+    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError> {
+        self.driver_mut().read_inputs(channels, codes)
     }
 
     fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError> {
@@ -121,13 +120,15 @@ pub fn install(
 ) -> ([Installed; SLOTS], AnalogOutputs) {
     let mut workers = [const { None }; SLOTS];
     let mut installed = [const { Installed::None(Absent) }; SLOTS];
-    let plugged = modules.into_iter().zip(slots);
-    for ((module, slot), (place, worker)) in plugged.zip(installed.iter_mut().zip(&mut workers)) {
+    let plugged = modules.into_iter().zip(slots).zip(&mut sampler.inputs);
+    for (((module, slot), analog), (place, worker)) in
+        plugged.zip(installed.iter_mut().zip(&mut workers))
+    {
         *worker = match module {
             Module::Ao4 | Module::Ai2Ao2 => Some(DacWorker::new(slot.dac_address())),
             Module::None | Module::Di4 | Module::Do4 | Module::Relay2 | Module::Ai4 => None,
         };
-        *place = Installed::new(module, slot, sampler);
+        *place = Installed::new(module, slot, analog);
     }
     (installed, AnalogOutputs { bus, workers })
 }

@@ -27,7 +27,6 @@
 mod background;
 mod board;
 mod clock;
-mod converter;
 mod every;
 mod fault_record;
 mod installed;

@@ -94,10 +94,10 @@ impl Scanning {
             }
         });
         if beat {
-            self.sampler.run();
-            let modules = self.modules.iter_mut().zip(&mut channels);
-            for ((module, channels), result) in modules.zip(&mut results) {
-                *result = ModuleError::in_either(*result, module.read_inputs(channels));
+            let codes = self.sampler.run();
+            let modules = self.modules.iter_mut().zip(&mut channels).zip(&codes);
+            for (((module, channels), codes), result) in modules.zip(&mut results) {
+                *result = ModuleError::in_either(*result, module.read_inputs(channels, codes));
             }
         }
         let changed = device.lock(|device| {
