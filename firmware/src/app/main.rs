@@ -32,7 +32,6 @@ mod fault_record;
 mod installed;
 mod line;
 mod log;
-mod orders;
 mod pages;
 mod persistence;
 mod radio;
@@ -61,7 +60,6 @@ mod app {
         clock,
         line::Line,
         log::Event,
-        orders::Orders,
         radio::{Polling, Radio, on_interrupt},
         scanning::Scanning,
         serving::{Lines, Serving},
@@ -81,8 +79,6 @@ mod app {
         device: &'static mut Device,
         /// A request for this unit has been served since the LEDs were last updated.
         activity: bool,
-        /// Commands from requests for the background task.
-        orders: Orders,
         /// What the scan and the background task exchange about each slot's DAC.
         dacs: [DacLink; SLOTS],
     }
@@ -124,7 +120,6 @@ mod app {
                 radio: started.radio,
                 radio_uart: started.radio_uart,
                 activity: false,
-                orders: Orders::default(),
                 dacs: started.dacs,
                 device: started.device,
             },
@@ -214,7 +209,7 @@ mod app {
         binds = EXTI3,
         priority = 3,
         local = [serving],
-        shared = [line, radio, device, activity, orders],
+        shared = [line, radio, device, activity],
     )]
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
@@ -223,10 +218,7 @@ mod app {
             rs485: shared.line,
             radio: shared.radio,
         };
-        let served = cx
-            .local
-            .serving
-            .run(&mut lines, &mut shared.device, &mut shared.orders);
+        let served = cx.local.serving.run(&mut lines, &mut shared.device);
         if served {
             shared.activity.lock(|activity| *activity = true);
         }
@@ -269,14 +261,13 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, orders, dacs])]
+    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, dacs])]
     fn background(cx: background::Context) {
         alive::begin(fault::marks(), Task::Background);
         let mut shared = cx.shared;
         cx.local.background_work.run(
             &mut shared.device,
             &mut shared.activity,
-            &mut shared.orders,
             &mut shared.dacs,
             cx.local.logged,
         );

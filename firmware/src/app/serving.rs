@@ -18,7 +18,7 @@ use modbus_server::{Outcome, Request, Server, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
-use crate::{board::Device, line::Line, orders::Orders, radio::Radio};
+use crate::{board::Device, line::Line, radio::Radio};
 
 /// The lines, under their locks.
 pub struct Lines<L, R> {
@@ -117,17 +117,16 @@ impl Serving {
         &mut self,
         lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
-        orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
         let delay_ms = self.delay_ms(device);
         // The UART sends the unit address while the code below runs.
         let taken = lines
             .rs485
             .lock(|line| take(line, &self.rs485.server, delay_ms));
-        let served = self.run_line(LineName::Rs485, taken, lines, device, orders);
+        let served = self.run_line(LineName::Rs485, taken, lines, device);
         // RESPONSE_DELAY is for masters on the RS-485 line; the air takes much longer.
         let taken = lines.radio.lock(|line| take(line, &self.radio.server, 0));
-        self.run_line(LineName::Radio, taken, lines, device, orders) || served
+        self.run_line(LineName::Radio, taken, lines, device) || served
     }
 
     // Not inlined: one copy serves both lines.
@@ -138,7 +137,6 @@ impl Serving {
         taken: Taken,
         lines: &mut Lines<impl Mutex<T = Option<Line>>, impl Mutex<T = Option<Radio>>>,
         device: &mut impl Mutex<T = &'static mut Device>,
-        orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
         let order = &mut self.of(which).order;
         if taken.silent
@@ -146,7 +144,8 @@ impl Serving {
             // have the reply, because a command of the other line may follow it.
             && let Some(order) = order.take_if(|order| !taken.on_air || *order != Command::Restart)
         {
-            pass_order_on(order, device, orders);
+            device.lock(|device| device.carry_out(order));
+            rtic::pend(Interrupt::EXTI0);
         }
         taken
             .request
@@ -231,22 +230,5 @@ impl Serving {
                 state.radio_counters = self.radio.server.counters_at(&line);
             }
         });
-    }
-}
-
-/// Executes the command of a request whose reply has been sent, or passes it on to the background task.
-fn pass_order_on(
-    order: Command,
-    device: &mut impl Mutex<T = &'static mut Device>,
-    orders: &mut impl Mutex<T = Orders>,
-) {
-    if let Some(order) = device.lock(|device| device.carry_out(order)) {
-        orders.lock(|orders| match order {
-            Command::Save => orders.save = true,
-            Command::Restart => orders.restart = true,
-            Command::Identify => orders.identify = true,
-            _ => {}
-        });
-        rtic::pend(Interrupt::EXTI0);
     }
 }
