@@ -10,7 +10,7 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, Sampler, ScanTimer, Slot, Watchdog,
+    ClockSource, DacBus, Flash, GapTimer, PinOutput, Rs485, Sampler, ScanTimer, Slot, Watchdog,
     boards::{BOARD, SLOTS},
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
@@ -18,7 +18,7 @@ use crate::{
     fault::{self, FaultRecord},
     gap::LineTimes,
     i2c::BusPins,
-    pin::Port,
+    pin::{Pin, Port},
     radio::RadioOff,
     rs485,
     uart::LineSettings,
@@ -51,8 +51,8 @@ pub struct Board {
     pub dacs: DacBus,
     /// The flash pages that keep data without power.
     pub flash: Flash,
-    /// The status LEDs, all off.
-    pub leds: Leds,
+    /// The LEDs for activity and fault, which high lights, and for running, which low lights. All are off.
+    pub leds: [PinOutput; 3],
     /// The timer that starts each scan, not started yet.
     pub scan_timer: ScanTimer,
     /// The watchdog, running with the long period for the start-up.
@@ -109,8 +109,8 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     let clock = clock::start(&rcc, &device.FLASH, crystal);
 
     let mut a = device.GPIOA.split(&mut rcc);
-    let mut b = device.GPIOB.split(&mut rcc);
-    let mut c = device.GPIOC.split(&mut rcc);
+    let b = device.GPIOB.split(&mut rcc);
+    let _c = device.GPIOC.split(&mut rcc);
 
     // Configure the driver-enable pin first, so that nothing is sent on the bus.
     let mut driver = a
@@ -128,7 +128,12 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         .unwrap_or_else(|| dip::stable(read_dip, || wait::wait_us(DIP_POLL_US, clock.core_mhz())));
     fault::keep_dip(dip);
 
-    let leds = Leds::new(b.pb8, b.pb9, &mut b.crh, c.pc13, &mut c.crh);
+    // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
+    let leds = [
+        PinOutput::low(Pin::b(8)),
+        PinOutput::low(Pin::b(9)),
+        PinOutput::high(Pin::c(13)),
+    ];
 
     // Allow a debug probe to read the log while the core sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());

@@ -30,8 +30,6 @@ pub mod flash;
 #[cfg(target_os = "none")]
 mod gap_timer;
 #[cfg(target_os = "none")]
-mod leds;
-#[cfg(target_os = "none")]
 mod mem;
 #[cfg(target_os = "none")]
 mod pin_io;
@@ -65,7 +63,6 @@ pub use {
     flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},
     i2c::{DacBus, DacBusError, Held},
-    leds::Leds,
     pin_io::{PinInput, PinOutput},
     radio::{Damaged, RadioUart},
     rs485::{Character, Rs485, Status},

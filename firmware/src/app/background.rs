@@ -1,6 +1,7 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::{boards::SLOTS, stack::LowWater};
+use board_support::{PinOutput, boards::SLOTS, stack::LowWater};
+use firmware::leds::Leds;
 use heapless::spsc::Consumer;
 use modio_drivers::DacLink;
 use rtic::Mutex;
@@ -10,14 +11,13 @@ use crate::{
     installed::AnalogOutputs,
     log::{Event, Log},
     persistence::Persistence,
-    signals::Signals,
 };
 
 /// The state of the background task.
 pub struct Background {
     pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
-    pub signals: Signals,
+    pub leds: Leds<PinOutput>,
     pub log: Log,
     pub stack: LowWater,
     /// The state of the radio that was logged last.
@@ -54,9 +54,9 @@ impl Background {
             self.log.event(Event::Radio(works));
         }
         if identify {
-            self.signals.identify();
+            self.leds.identify();
         }
-        self.signals
+        self.leds
             .show(millis, failing, || activity.lock(core::mem::take));
         while let Some(event) = logged.dequeue() {
             self.log.event(event);

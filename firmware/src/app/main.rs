@@ -38,7 +38,6 @@ mod radio;
 mod rtt;
 mod scanning;
 mod serving;
-mod signals;
 mod start;
 mod trap;
 
@@ -63,7 +62,6 @@ mod app {
         radio::{Polling, Radio, on_interrupt},
         scanning::Scanning,
         serving::{Lines, Serving},
-        signals::Signals,
         start,
     };
 
@@ -133,7 +131,7 @@ mod app {
                 background_work: Background {
                     analog_outputs: started.analog_outputs,
                     persistence: started.persistence,
-                    signals: Signals::new(started.leds, started.trouble),
+                    leds: started.leds,
                     log: started.log,
                     stack: LowWater::new(),
                     radio: None,

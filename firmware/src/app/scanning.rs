@@ -1,7 +1,7 @@
 //! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
 use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
-use firmware::{device::IoPort, lamps::TICK_MS};
+use firmware::{device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{DacLink, IoModule, ModuleError};
 use rtic::Mutex;

@@ -3,14 +3,14 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Leds, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes,
-    pac, uart,
+    PinOutput, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError,
+    gap::LineTimes, pac, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
     config::{self, Config, RadioConfig},
     device::Identity,
-    lamps::Trouble,
+    leds::{Leds, Trouble},
     start_up::{self, Address},
     store::{Store, StoreError},
 };
@@ -53,9 +53,8 @@ pub struct Started {
     pub persistence: Persistence,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
-    pub leds: Leds,
+    pub leds: Leds<PinOutput>,
     pub log: Log,
-    pub trouble: Trouble,
 }
 
 /// The memory for what is too large to be moved over the stack, or is shared with interrupts.
@@ -201,9 +200,11 @@ pub fn up(
         persistence: Persistence::new(store, pages, erase),
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
-        leds: board.leds,
         log,
-        trouble: Trouble::at_start(address, board.clock.is_crystal()),
+        leds: Leds::new(
+            board.leds,
+            Trouble::at_start(address, board.clock.is_crystal()),
+        ),
     }
 }
 
