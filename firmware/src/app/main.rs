@@ -32,7 +32,6 @@ mod fault_record;
 mod installed;
 mod line;
 mod log;
-mod pages;
 mod persistence;
 mod radio;
 mod rtt;

@@ -3,7 +3,7 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::{fault, flash::FlashError};
+use board_support::{Flash, fault, flash::FlashError};
 use firmware::{
     config::Settings,
     store::{Operation, Saving, Store, StoreError},
@@ -13,13 +13,12 @@ use rtic::Mutex;
 use crate::{
     board::{BOARD, Device},
     log::Event,
-    pages::Pages,
 };
 
 /// The store, and a save under way.
 pub struct Persistence {
     store: Store,
-    pages: Pages,
+    pages: Flash,
     saving: Option<Saving>,
     /// The operation of the save that the flash refused because of a low supply.
     refused: Option<Operation>,
@@ -31,7 +30,7 @@ pub struct Persistence {
 
 impl Persistence {
     /// `erase`: the start could not erase the page that is no longer needed.
-    pub fn new(store: Store, pages: Pages, erase: bool) -> Self {
+    pub fn new(store: Store, pages: Flash, erase: bool) -> Self {
         Self {
             store,
             pages,

@@ -30,7 +30,6 @@ use crate::{
     installed::{AnalogOutputs, install},
     line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
-    pages::Pages,
     persistence::Persistence,
     radio::{Aux, Radio, Serial},
     scanning::Scanning,
@@ -80,7 +79,7 @@ pub fn up(
     let mut board = board::setup(device, scb, masked);
     let address = Address::from_dip(board.dip);
 
-    let mut pages = Pages(board.flash);
+    let mut pages = board.flash;
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
     let radio_config = RadioConfig::of(&loaded.settings);

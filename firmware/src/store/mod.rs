@@ -32,7 +32,6 @@
 //! - When something was stored but no record is valid, the defaults are in force and the damage is reported at
 //!   every start until something is saved. One page is left unchanged as evidence.
 
-mod flash;
 mod operation;
 mod saving;
 mod survey;
@@ -41,7 +40,7 @@ use register_map::Board;
 use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
 
 use crate::config::Settings;
-pub use flash::{Flash, Page, StoreError};
+pub use board_support::pages::{Page, Pages};
 pub use operation::Operation;
 use operation::{Readying, Writing};
 pub use saving::Saving;
@@ -50,6 +49,15 @@ use survey::{Found, Survey, record_at};
 /// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede
 /// it.
 const LITTLE_ROOM: usize = 256;
+
+/// Error of the store. It never damages what was stored before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoreError<E> {
+    /// The flash refused the operation or failed. The page may be worn out.
+    Flash(Page, E),
+    /// The flash does not read back as programmed at this offset: the page is worn out.
+    Worn(Page, usize),
+}
 
 /// The configuration that a start found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -79,7 +87,7 @@ pub struct Store {
 impl Store {
     /// Examines both pages.
     #[must_use]
-    pub fn open(flash: &impl Flash) -> Self {
+    pub fn open(flash: &impl Pages) -> Self {
         Self {
             first: Survey::of(flash.page(Page::First)),
             second: Survey::of(flash.page(Page::Second)),
@@ -88,7 +96,7 @@ impl Store {
 
     /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
-    pub fn load(&mut self, board: &Board, flash: &impl Flash) -> Loaded {
+    pub fn load(&mut self, board: &Board, flash: &impl Pages) -> Loaded {
         while let Some(Newest { page, found }) = self.newest() {
             if let Some(record) = record_at(flash.page(page), found.offset) {
                 let (settings, rejected) = Settings::load(board, record.pairs());
@@ -114,7 +122,7 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid, and later saves are still tried.
-    pub fn prepare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn prepare<F: Pages>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         // Use the survey that selected the configuration in force. A second survey could find another record,
         // because a seal whose programming was interrupted may read differently every time.
         let sealed = self.seal_again(flash);
@@ -145,7 +153,7 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid.
-    pub fn make_spare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn make_spare<F: Pages>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let result = match self.newest() {
             Some(newest) => self.make_ready(newest.page.other(), flash),
             None => Ok(()),
@@ -156,7 +164,7 @@ impl Store {
 
     /// Programs the seals of the newest record again when the power was cut between them, because the first one may
     /// not read the same every time.
-    fn seal_again<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn seal_again<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let Some(Newest { page, found }) = self.newest().filter(|newest| newest.found.sealed == 1)
         else {
             return Ok(());
@@ -175,7 +183,7 @@ impl Store {
 
     /// Clears the page without the newest record, and moves the newest record there if its own page has little room
     /// left.
-    fn make_room<F: Flash>(
+    fn make_room<F: Pages>(
         &self,
         newest: Newest,
         flash: &mut F,
@@ -213,7 +221,7 @@ impl Store {
     }
 
     /// Prepares one page when something was stored but no record is valid. The other page is left unchanged.
-    fn make_one_ready<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn make_one_ready<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         if self.first.is_ready() || self.second.is_ready() {
             return Ok(());
         }
@@ -224,7 +232,7 @@ impl Store {
     /// in the first save. It uses a page that needs no erase, so that a power cut here leaves nothing that looks
     /// like a damaged configuration. Exception: when only the first page is blank, an erase may have been
     /// interrupted here before, so the page must be erased again before it is programmed.
-    fn begin<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn begin<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let page = if self.first.blank || self.first.is_ready() || !self.second.blank {
             Page::First
         } else {
@@ -246,7 +254,7 @@ impl Store {
         self.make_ready(page.other(), flash)
     }
 
-    fn make_ready<F: Flash>(&self, page: Page, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn make_ready<F: Pages>(&self, page: Page, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let survey = self.survey(page);
         if survey.is_ready() {
             return Ok(());
@@ -258,7 +266,7 @@ impl Store {
         Ok(())
     }
 
-    fn look_again(&mut self, flash: &impl Flash) {
+    fn look_again(&mut self, flash: &impl Pages) {
         *self = Self::open(flash);
     }
 

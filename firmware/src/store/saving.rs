@@ -4,7 +4,7 @@ use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA};
 
 use super::operation::{Operation, Readying, Writing};
 use super::survey::record_at;
-use super::{Flash, Page, Store, StoreError};
+use super::{Page, Pages, Store, StoreError};
 use crate::config::Settings;
 
 /// A save under way. Pass the same settings to every step.
@@ -20,7 +20,7 @@ pub struct Saving {
 impl Saving {
     /// Begins a save of these settings. Returns `None` when they are already stored.
     #[must_use]
-    pub fn new(store: &Store, flash: &impl Flash, settings: &Settings) -> Option<Self> {
+    pub fn new(store: &Store, flash: &impl Pages, settings: &Settings) -> Option<Self> {
         let newest = store.newest();
         let stored =
             newest.and_then(|newest| record_at(flash.page(newest.page), newest.found.offset));
@@ -60,7 +60,7 @@ impl Saving {
     /// # Errors
     ///
     /// When the settings are not stored.
-    pub fn finish<F: Flash>(
+    pub fn finish<F: Pages>(
         &self,
         store: &mut Store,
         flash: &F,

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use firmware::store::{Flash, Operation, Page};
+use firmware::store::{Operation, Page, Pages};
 
 use crate::PAGE_SIZE;
 
@@ -193,7 +193,7 @@ impl MockFlash {
     }
 }
 
-impl Flash for MockFlash {
+impl Pages for MockFlash {
     type Error = Fault;
 
     fn page(&self, page: Page) -> &[u8] {
