@@ -8,7 +8,7 @@ use stm32f1xx_hal::pac;
 
 use crate::{
     boards::SLOTS,
-    design::{ADC_CALIBRATION_US, ADC_LOOKS, ADC_SAMPLE_HALF_CYCLES, ADC_SETTLING_US},
+    design::{ADC_CALIBRATION_US, ADC_POLLS, ADC_SAMPLE_HALF_CYCLES, ADC_SETTLING_US},
     wait::{delay_us, within_us},
 };
 
@@ -35,7 +35,7 @@ impl Sampler {
     }
 
     /// Samples every line once: 5.7 us each, 6.8 us without a crystal. Returns the codes by slot: 0 for ground to 4095
-    /// for 3.3 V. If a conversion has not ended after [`ADC_LOOKS`] polls, this call stops there and skips the
+    /// for 3.3 V. If a conversion has not ended after [`ADC_POLLS`] polls, this call stops there and skips the
     /// remaining lines.
     pub fn run(&mut self) -> [[Option<u16>; 4]; SLOTS] {
         let mut codes = [[None; 4]; SLOTS];
@@ -61,7 +61,7 @@ impl Sampler {
         self.adc.sqr3().write(|w| unsafe { w.sq1().bits(input) });
         let _ = self.adc.dr().read();
         self.adc.cr2().modify(|_, w| w.swstart().set_bit());
-        for _ in 0..ADC_LOOKS {
+        for _ in 0..ADC_POLLS {
             if self.adc.sr().read().eoc().bit_is_set() {
                 // Reading DR also clears EOC (RM0008 11.12.1).
                 return Some(self.adc.dr().read().data().bits());

@@ -50,7 +50,7 @@ enum Operation {
 }
 
 /// Starts an operation of the controller, which must be set up for it, and polls for its end from RAM, with BASEPRI
-/// set to `masked`. Returns false when the operation has not ended after `looks` polls.
+/// set to `masked`. Returns false when the operation has not ended after `polls` polls.
 ///
 /// # Safety
 ///
@@ -61,7 +61,7 @@ unsafe fn run(
     flash: &pac::flash::RegisterBlock,
     operation: Operation,
     masked: u8,
-    looks: u32,
+    polls: u32,
 ) -> bool {
     let before = basepri::read();
     basepri_max::write(masked);
@@ -78,7 +78,7 @@ unsafe fn run(
     // "Flash memory BSY bit delay versus STRT bit setting"; assumed to apply to this part, too). Without this extra
     // read the first poll would find BSY clear, and the controller would be locked during the operation.
     let _ = flash.sr().read();
-    let mut left = looks;
+    let mut left = polls;
     let ended = loop {
         if flash.sr().read().bsy().bit_is_clear() {
             break true;
@@ -122,7 +122,7 @@ impl Flash {
     /// As for [`run`].
     unsafe fn operate(&mut self, operation: Operation) -> Result<(), FlashError> {
         /// Cycles of one poll of the controller, at least: a load of a register, a test and a branch.
-        const CYCLES_OF_A_LOOK: u32 = 5;
+        const CYCLES_OF_A_POLL: u32 = 5;
         let bound_us = match operation {
             Operation::Program { .. } => FLASH_PROGRAM_US,
             Operation::Erase { .. } => FLASH_ERASE_US,
@@ -141,9 +141,9 @@ impl Flash {
             Operation::Program { .. } => w.pg().set_bit(),
             Operation::Erase { .. } => w.per().set_bit(),
         });
-        let looks = bound_us * (SYSCLK_ON_HSE_HZ / 1_000_000) / CYCLES_OF_A_LOOK;
+        let polls = bound_us * (SYSCLK_ON_HSE_HZ / 1_000_000) / CYCLES_OF_A_POLL;
         // SAFETY: by the caller's promise.
-        let done = unsafe { run(flash, operation, self.masked, looks) };
+        let done = unsafe { run(flash, operation, self.masked, polls) };
         let status = flash.sr().read();
         // Clear every mode bit and lock the controller.
         flash.cr().write(|w| w.lock().set_bit());

@@ -130,7 +130,7 @@ impl Scanning {
         if beat {
             fault::keep_uptime(uptime_s);
             fault::keep_saves(saves);
-            self.look_at_line(line, device, events);
+            self.check_line(line, device, events);
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.
         if self.background_beat.is_due() || !beat || tripped {
@@ -139,7 +139,7 @@ impl Scanning {
         beat
     }
 
-    fn look_at_line(
+    fn check_line(
         &mut self,
         line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,

@@ -12,7 +12,7 @@ use board_support::pac::Interrupt;
 use firmware::{
     config::{LineName, Origin},
     line::ServedLine,
-    start_up::LOADER_UNIT,
+    start_up::RECOVERY_UNIT,
 };
 use modbus_server::{Outcome, Request, Server, line::Framing};
 use register_map::codes::Command;
@@ -160,8 +160,8 @@ impl Serving {
     }
 
     fn delay_ms(&self, device: &mut impl Mutex<T = &'static mut Device>) -> u16 {
-        if self.unit == LOADER_UNIT {
-            // In loader mode a unit must be found even by a master with a short time-out.
+        if self.unit == RECOVERY_UNIT {
+            // In recovery mode a unit must be found even by a master with a short time-out.
             0
         } else {
             device.lock(|device| device.config.response_delay_ms())

@@ -141,7 +141,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.state.tick(ms);
         self.config.tick(ms);
         let timeout_ms = self.config.comm_timeout_ms();
-        let tripped = self.comm_watchdog.look(self.state.millis(), timeout_ms);
+        let tripped = self.comm_watchdog.check(self.state.millis(), timeout_ms);
         if tripped {
             self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
         }

@@ -44,7 +44,7 @@ pub use board_support::pages::{Page, Pages};
 pub use operation::Operation;
 use operation::{Readying, Writing};
 pub use saving::Saving;
-use survey::{Found, Survey, record_at};
+use survey::{Place, Survey, record_at};
 
 /// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede
 /// it.
@@ -74,7 +74,7 @@ pub struct Loaded {
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     page: Page,
-    found: Found,
+    place: Place,
 }
 
 /// The state of the two pages.
@@ -97,8 +97,8 @@ impl Store {
     /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
     pub fn load(&mut self, board: &Board, flash: &impl Pages) -> Loaded {
-        while let Some(Newest { page, found }) = self.newest() {
-            if let Some(record) = record_at(flash.page(page), found.offset) {
+        while let Some(Newest { page, place }) = self.newest() {
+            if let Some(record) = record_at(flash.page(page), place.offset) {
                 let (settings, rejected) = Settings::load(board, record.pairs());
                 return Loaded {
                     settings,
@@ -135,7 +135,7 @@ impl Store {
             None if self.first.written || self.second.written => self.make_one_ready(flash),
             None => self.begin(flash),
         };
-        self.look_again(flash);
+        self.survey_again(flash);
         result
     }
 
@@ -158,18 +158,18 @@ impl Store {
             Some(newest) => self.make_ready(newest.page.other(), flash),
             None => Ok(()),
         };
-        self.look_again(flash);
+        self.survey_again(flash);
         result
     }
 
     /// Programs the seals of the newest record again when the power was cut between them, because the first one may
     /// not read the same every time.
     fn seal_again<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
-        let Some(Newest { page, found }) = self.newest().filter(|newest| newest.found.sealed == 1)
+        let Some(Newest { page, place }) = self.newest().filter(|newest| newest.place.sealed == 1)
         else {
             return Ok(());
         };
-        for offset in [found.seals, found.seals.saturating_add(2)] {
+        for offset in [place.seals, place.seals.saturating_add(2)] {
             // 0 can be programmed over any value.
             Operation::Program {
                 page,
@@ -188,8 +188,8 @@ impl Store {
         newest: Newest,
         flash: &mut F,
     ) -> Result<(), StoreError<F::Error>> {
-        let Newest { page, found } = newest;
-        let offset = found.offset;
+        let Newest { page, place } = newest;
+        let offset = place.offset;
         let to = page.other();
         self.make_ready(to, flash)?;
         let survey = self.survey(page);
@@ -201,7 +201,7 @@ impl Store {
         };
         // Copy the record unchanged: the next start may run a newer firmware, which knows all of its values.
         let count = u16::try_from(record.count()).unwrap_or(u16::MAX);
-        let sequence = found.sequence.wrapping_add(1);
+        let sequence = place.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
         // Version 0.1 wrote records without seals, so its longest record does not fit with seals.
         if encoder.size() > flash.page(to).len().saturating_sub(FIRST_OFFSET) {
@@ -266,7 +266,7 @@ impl Store {
         Ok(())
     }
 
-    fn look_again(&mut self, flash: &impl Pages) {
+    fn survey_again(&mut self, flash: &impl Pages) {
         *self = Self::open(flash);
     }
 
@@ -277,11 +277,11 @@ impl Store {
 
     fn newest(&self) -> Option<Newest> {
         let on = |page: Page| {
-            let found = self.survey(page).newest?;
-            Some(Newest { page, found })
+            let place = self.survey(page).newest?;
+            Some(Newest { page, place })
         };
         match (on(Page::First), on(Page::Second)) {
-            (Some(first), Some(second)) if second.found.counts_before(&first.found) => Some(second),
+            (Some(first), Some(second)) if second.place.counts_before(&first.place) => Some(second),
             (None, second) => second,
             (first, _) => first,
         }

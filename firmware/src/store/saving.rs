@@ -23,11 +23,11 @@ impl Saving {
     pub fn new(store: &Store, flash: &impl Pages, settings: &Settings) -> Option<Self> {
         let newest = store.newest();
         let stored =
-            newest.and_then(|newest| record_at(flash.page(newest.page), newest.found.offset));
+            newest.and_then(|newest| record_at(flash.page(newest.page), newest.place.offset));
         if stored.is_some_and(|stored| stored.pairs().eq(settings.changed_from(0))) {
             return None;
         }
-        let sequence = newest.map_or(1, |newest| newest.found.sequence.wrapping_add(1));
+        let sequence = newest.map_or(1, |newest| newest.place.sequence.wrapping_add(1));
         // There are at most as many settings as addresses.
         let count = settings
             .changed_from(0)
@@ -65,9 +65,9 @@ impl Saving {
         store: &mut Store,
         flash: &F,
     ) -> Result<(), StoreError<F::Error>> {
-        store.look_again(flash);
+        store.survey_again(flash);
         match store.newest() {
-            Some(newest) if newest.found.sequence == self.sequence => Ok(()),
+            Some(newest) if newest.place.sequence == self.sequence => Ok(()),
             _ => {
                 store.avoid(self.writing.page);
                 Err(StoreError::Worn(self.writing.page, self.writing.offset()))
