@@ -1,121 +1,67 @@
-//! ADC1, which samples the analog lines of all slots. Once per scan the [`Sampler`] converts every line in use and
-//! stores the codes; [`AnalogInputs`] reads them.
+//! ADC1, which samples the analog lines of all slots, once per scan.
 //!
 //! Software starts each conversion and polls for its end a limited number of times. The HAL's driver is not used,
 //! because it polls a conversion and the calibration without a limit. Voltages are relative to the board's 3.3 V.
 //! The same 3.3 V supplies the signal conditioning of the module, so supply drift cancels out.
 
-use core::sync::atomic::{AtomicU16, Ordering::Relaxed};
-
 use stm32f1xx_hal::pac;
 
 use crate::{
-    design::{ADC_CALIBRATION_US, ADC_LOOKS, ADC_SAMPLE_HALF_CYCLES, ADC_SETTLING_US},
-    pin::Pin,
+    boards::SLOTS,
+    design::{ADC_CALIBRATION_US, ADC_POLLS, ADC_SAMPLE_HALF_CYCLES, ADC_SETTLING_US},
     wait::{delay_us, within_us},
 };
 
-/// Inputs of ADC1 on pins.
-const INPUTS: usize = 16;
-
-/// The newest code of each input, or [`NONE`] or [`FAILED`]. Only the scan task writes and reads these values.
-static SAMPLES: [AtomicU16; INPUTS] = [const { AtomicU16::new(NONE) }; INPUTS];
-/// No new code since the last read.
-const NONE: u16 = 0xFFFF;
-/// The converter does not work; there is no code until the next start.
-const FAILED: u16 = 0xFFFE;
-
-/// Error when the calibration of the converter did not end. The converter does not work until the next restart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NotCalibrated;
-
-/// The analog lines of a slot.
-pub struct AnalogInputs {
-    /// ADC input number of each line, 0 to 15.
-    inputs: [u8; 4],
-    /// Number of analog lines, counted from line 1.
-    count: u8,
-}
-
-impl AnalogInputs {
-    pub(crate) fn new(lines: [Pin; 4], count: u8) -> Self {
-        Self {
-            // `Descriptor::check` has verified that every line of a slot has an ADC input.
-            inputs: lines.map(|line| line.adc_input().unwrap_or_default()),
-            count,
-        }
-    }
-
-    /// Returns the code of a line, counted from 0, if it was sampled since the last call: 0 for ground to 4095 for
-    /// 3.3 V.
-    ///
-    /// # Errors
-    ///
-    /// `WouldBlock` when there is no new code, [`NotCalibrated`] when the converter does not work.
-    pub fn read(&mut self, line: u8) -> nb::Result<u16, NotCalibrated> {
-        let input = self.inputs.get(usize::from(line));
-        let Some(sample) = input.and_then(|input| SAMPLES.get(usize::from(*input))) else {
-            return Err(nb::Error::WouldBlock);
-        };
-        match sample.load(Relaxed) {
-            NONE => Err(nb::Error::WouldBlock),
-            FAILED => Err(nb::Error::Other(NotCalibrated)),
-            code => {
-                sample.store(NONE, Relaxed);
-                Ok(code)
-            }
-        }
-    }
-}
-
-/// The converter and the list of inputs to sample.
+/// The converter and the lines to sample.
 pub struct Sampler {
     adc: pac::ADC1,
-    /// Inputs in use, input 0 in bit 0.
-    used: u16,
+    /// The ADC's input for each line of a slot, 0 to 15; `None` for a line that is not sampled.
+    pub inputs: [[Option<u8>; 4]; SLOTS],
+    /// The calibration has succeeded.
+    calibrated: bool,
 }
 
 impl Sampler {
-    /// The ADC's clock must be on. The converter is powered up by the first call of [`serve`](Self::serve).
-    pub(crate) const fn new(adc: pac::ADC1) -> Self {
-        Self { adc, used: 0 }
+    /// Powers the converter up and calibrates it, which takes about 15 us. The ADC's clock must be on. If the
+    /// calibration fails, there are no codes until the next start.
+    pub(crate) fn new(adc: pac::ADC1) -> Self {
+        let mut sampler = Self {
+            adc,
+            inputs: [[None; 4]; SLOTS],
+            calibrated: false,
+        };
+        sampler.power_up();
+        sampler
     }
 
-    /// Adds the analog lines of a slot. The first call powers the converter up and calibrates it, which takes about
-    /// 15 us. If the calibration fails, every reading returns [`NotCalibrated`].
-    pub fn serve(&mut self, lines: &AnalogInputs) {
-        if self.used == 0 && !self.power_up() {
-            SAMPLES
-                .iter()
-                .for_each(|sample| sample.store(FAILED, Relaxed));
-        }
-        for input in lines.inputs.iter().take(lines.count.into()) {
-            self.used |= 1 << (input % 16);
-        }
-    }
-
-    /// Samples every line in use once: 5.7 us each, 6.8 us without a crystal. If a conversion has not ended after
-    /// [`ADC_LOOKS`] polls, this call stops there and skips the remaining lines.
-    pub fn run(&mut self) {
-        for (input, sample) in (0_u8..).zip(&SAMPLES) {
-            if self.used >> input & 1 == 0 || sample.load(Relaxed) == FAILED {
-                continue;
+    /// Samples every line once: 5.7 us each, 6.8 us without a crystal. Returns the codes by slot: 0 for ground to 4095
+    /// for 3.3 V. If a conversion has not ended after [`ADC_POLLS`] polls, this call stops there and skips the
+    /// remaining lines.
+    pub fn run(&mut self) -> [[Option<u16>; 4]; SLOTS] {
+        let mut codes = [[None; 4]; SLOTS];
+        let inputs = self.inputs.as_flattened().iter();
+        for (input, code) in inputs.zip(codes.as_flattened_mut()) {
+            if let Some(input) = *input {
+                *code = self.convert(input);
+                if code.is_none() {
+                    break;
+                }
             }
-            let Some(code) = self.convert(input) else {
-                return;
-            };
-            sample.store(code, Relaxed);
         }
+        codes
     }
 
-    fn convert(&mut self, input: u8) -> Option<u16> {
+    fn convert(&self, input: u8) -> Option<u16> {
+        if !self.calibrated {
+            return None;
+        }
         // A new sequence aborts a conversion that has not ended (RM0008 11.3.3). Reading DR discards the result of
         // a conversion that ended too late.
         // SAFETY: an input is below 16, and the field takes channel numbers of five bits.
         self.adc.sqr3().write(|w| unsafe { w.sq1().bits(input) });
         let _ = self.adc.dr().read();
         self.adc.cr2().modify(|_, w| w.swstart().set_bit());
-        for _ in 0..ADC_LOOKS {
+        for _ in 0..ADC_POLLS {
             if self.adc.sr().read().eoc().bit_is_set() {
                 // Reading DR also clears EOC (RM0008 11.12.1).
                 return Some(self.adc.dr().read().data().bits());
@@ -124,8 +70,7 @@ impl Sampler {
         None
     }
 
-    /// Powers the converter up and calibrates it. Returns whether the calibration succeeded.
-    fn power_up(&mut self) -> bool {
+    fn power_up(&mut self) {
         const {
             assert!(
                 ADC_SAMPLE_HALF_CYCLES == 2 * 55 + 1,
@@ -146,12 +91,12 @@ impl Sampler {
             .cr2()
             .write(|w| w.adon().enabled().exttrig().enabled().extsel().swstart());
         delay_us(ADC_SETTLING_US);
-        self.calibrate()
+        self.calibrated = self.calibrate();
     }
 
     /// Calibrates the converter: resets the calibration registers, then runs the calibration (RM0008 11.4). Returns
     /// whether both ended in time.
-    fn calibrate(&mut self) -> bool {
+    fn calibrate(&self) -> bool {
         let adc = &self.adc;
         adc.cr2().modify(|_, w| w.rstcal().set_bit());
         let reset = within_us(ADC_CALIBRATION_US, || {

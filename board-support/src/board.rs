@@ -4,21 +4,19 @@ use core::array;
 
 use cortex_m::peripheral::SCB;
 use stm32f1xx_hal::{
-    gpio::{GpioExt, IOPinSpeed, OutputSpeed, PinState},
     pac,
-    rcc::Enable,
+    rcc::{Enable, Reset},
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, GapTimer, Leds, Rs485, Sampler, ScanTimer, Slot, Watchdog,
+    ClockSource, DacBus, Flash, GapTimer, PinOutput, Rs485, Sampler, ScanTimer, Slot, Watchdog,
     boards::{BOARD, SLOTS},
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
     dip,
     fault::{self, FaultRecord},
     gap::LineTimes,
-    i2c::BusPins,
-    pin::Port,
+    pin::{Pin, Port},
     radio::RadioOff,
     rs485,
     uart::LineSettings,
@@ -51,8 +49,8 @@ pub struct Board {
     pub dacs: DacBus,
     /// The flash pages that keep data without power.
     pub flash: Flash,
-    /// The status LEDs, all off.
-    pub leds: Leds,
+    /// The LEDs for activity and fault, which high lights, and for running, which low lights. All are off.
+    pub leds: [PinOutput; 3],
     /// The timer that starts each scan, not started yet.
     pub scan_timer: ScanTimer,
     /// The watchdog, running with the long period for the start-up.
@@ -68,7 +66,6 @@ pub struct Board {
 /// The RS-485 line before it is set up.
 pub struct LineOff {
     usart: pac::USART1,
-    pins: rs485::Pins,
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     clock: ClockSource,
@@ -87,9 +84,7 @@ impl LineOff {
         let clock = self.clock;
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
-        let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
-        // TX needs no faster edges than the 10 MHz setting gives, either.
-        Port::A.registers().crh().modify(|_, w| w.mode9().output());
+        let line = Rs485::new(self.usart, settings, clock, rcc)?;
         Some((line, gap))
     }
 }
@@ -108,17 +103,16 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     let crystal = faults.crystal_faults < CRYSTAL_FAULTS;
     let clock = clock::start(&rcc, &device.FLASH, crystal);
 
-    let mut a = device.GPIOA.split(&mut rcc);
-    let mut b = device.GPIOB.split(&mut rcc);
-    let mut c = device.GPIOC.split(&mut rcc);
+    // Every pin floats, as after a reset of the chip.
+    pac::GPIOA::enable(&mut rcc);
+    pac::GPIOB::enable(&mut rcc);
+    pac::GPIOC::enable(&mut rcc);
+    pac::GPIOA::reset(&mut rcc);
+    pac::GPIOB::reset(&mut rcc);
+    pac::GPIOC::reset(&mut rcc);
 
     // Configure the driver-enable pin first, so that nothing is sent on the bus.
-    let mut driver = a
-        .pa8
-        .into_push_pull_output_with_state(&mut a.crh, PinState::Low);
-    // 10 MHz gives a rise time of 25 ns (DS5319 table 37), which is 1/40 of a bit at 921600 bit/s.
-    driver.set_speed(&mut a.crh, IOPinSpeed::Mhz10);
-    let rx = a.pa10.into_pull_up_input(&mut a.crh);
+    rs485::set_up_pins();
 
     // SW01: one side of each switch is connected to ground.
     BOARD.switch.iter().for_each(|pin| pin.pull_up());
@@ -128,7 +122,12 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         .unwrap_or_else(|| dip::stable(read_dip, || wait::wait_us(DIP_POLL_US, clock.core_mhz())));
     fault::keep_dip(dip);
 
-    let leds = Leds::new(b.pb8, b.pb9, &mut b.crh, c.pc13, &mut c.crh);
+    // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
+    let leds = [
+        PinOutput::low(Pin::b(8)),
+        PinOutput::low(Pin::b(9)),
+        PinOutput::high(Pin::c(13)),
+    ];
 
     // Allow a debug probe to read the log while the core sleeps.
     device.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
@@ -147,28 +146,19 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         unique_id: unique_id::read(),
         slots: array::from_fn(|index| Slot::new(&BOARD.slots[index])),
         sampler: Sampler::new(device.ADC1),
-        dacs: DacBus::new(device.I2C1, BusPins::new(b.pb6, b.pb7, b.crl), clock),
+        dacs: DacBus::new(device.I2C1, clock),
         flash: Flash::new(device.FLASH, device.PWR, masked),
         leds,
         scan_timer: ScanTimer::new(device.TIM4, clock, &mut rcc),
         watchdog,
         line: LineOff {
             usart: device.USART1,
-            pins: rs485::Pins {
-                driver,
-                tx: a.pa9,
-                rx,
-                cr: a.crh,
-            },
             timer: device.TIM2,
             start_bit: device.TIM1,
             clock,
         },
         radio: RadioOff {
             usart: device.USART3,
-            _tx: b.pb10,
-            _rx: b.pb11,
-            _cr: b.crh,
             clock,
         },
         rcc,

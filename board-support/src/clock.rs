@@ -7,7 +7,7 @@
 
 use stm32f1xx_hal::pac;
 
-use crate::design::{HSE_HZ, HSE_READY_LOOKS, PLL_READY_LOOKS, SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ};
+use crate::design::{HSE_HZ, HSE_READY_POLLS, PLL_READY_POLLS, SYSCLK_ON_HSE_HZ, SYSCLK_ON_HSI_HZ};
 
 /// Clock source of the core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,17 +85,17 @@ pub(crate) fn start(rcc: &pac::RCC, flash: &pac::FLASH, crystal: bool) -> ClockS
 /// have left the PLL on, and its settings can only be changed while it is off.
 fn to_internal_without_pll(rcc: &pac::RCC) {
     rcc.cr().modify(|_, w| w.hsion().set_bit());
-    looked(PLL_READY_LOOKS, || rcc.cr().read().hsirdy().bit_is_set());
+    polled(PLL_READY_POLLS, || rcc.cr().read().hsirdy().bit_is_set());
     rcc.cfgr().modify(|_, w| w.sw().hsi());
-    looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_hsi());
+    polled(PLL_READY_POLLS, || rcc.cfgr().read().sws().is_hsi());
     rcc.cr().modify(|_, w| w.pllon().clear_bit());
     // The PLL keeps running for a while, and its settings must not be written before it is off (RM0008 7.3.2).
-    looked(PLL_READY_LOOKS, || rcc.cr().read().pllrdy().bit_is_clear());
+    polled(PLL_READY_POLLS, || rcc.cr().read().pllrdy().bit_is_clear());
 }
 
 fn crystal_starts(rcc: &pac::RCC) -> bool {
     rcc.cr().modify(|_, w| w.hseon().set_bit());
-    let ready = looked(HSE_READY_LOOKS, || rcc.cr().read().hserdy().bit_is_set());
+    let ready = polled(HSE_READY_POLLS, || rcc.cr().read().hserdy().bit_is_set());
     if !ready {
         rcc.cr().modify(|_, w| w.hseon().clear_bit());
     }
@@ -116,14 +116,14 @@ fn pll_runs(rcc: &pac::RCC, source: ClockSource) -> bool {
         w.ppre1().div2().adcpre().div6()
     });
     rcc.cr().modify(|_, w| w.pllon().set_bit());
-    if !looked(PLL_READY_LOOKS, || rcc.cr().read().pllrdy().bit_is_set()) {
+    if !polled(PLL_READY_POLLS, || rcc.cr().read().pllrdy().bit_is_set()) {
         return false;
     }
     rcc.cfgr().modify(|_, w| w.sw().pll());
-    looked(PLL_READY_LOOKS, || rcc.cfgr().read().sws().is_pll())
+    polled(PLL_READY_POLLS, || rcc.cfgr().read().sws().is_pll())
 }
 
-/// Evaluates a condition up to `looks` times. Returns whether it became true.
-fn looked(looks: u32, mut is_so: impl FnMut() -> bool) -> bool {
-    (0..looks).any(|_| is_so())
+/// Evaluates a condition up to `polls` times. Returns whether it became true.
+fn polled(polls: u32, mut is_so: impl FnMut() -> bool) -> bool {
+    (0..polls).any(|_| is_so())
 }

@@ -27,7 +27,7 @@ pub const ADC_CALIBRATION_US: u32 = 100;
 
 /// Number of polls after which a conversion is given up: at least twice what it needs. A poll takes four cycles or
 /// more.
-pub const ADC_LOOKS: u32 = 2 * 68 * (SYSCLK_ON_HSE_HZ / ADCCLK_ON_HSE_HZ) / 4;
+pub const ADC_POLLS: u32 = 2 * 68 * (SYSCLK_ON_HSE_HZ / ADCCLK_ON_HSE_HZ) / 4;
 
 /// SCL frequency of the DACs' bus, in Hz. It is fast mode, so that the 13 bytes for four outputs take 0.4 ms and
 /// the communication watchdog sets the outputs to SAFE in time. It is below the 400 kHz of fast mode, because the
@@ -78,11 +78,11 @@ pub const LINE_ASYMMETRY_NS: u32 = 50;
 /// Number of polls of the crystal's ready flag before the crystal is given up. One poll takes about ten cycles of
 /// the 8 MHz that the chip starts with, so the limit is about 100 ms; a working crystal needs 2 ms (DS5319 table
 /// 22).
-pub const HSE_READY_LOOKS: u32 = 80_000;
+pub const HSE_READY_POLLS: u32 = 80_000;
 
 /// Number of polls of the PLL's ready flag, or of the system clock switch: about 10 ms. The PLL locks within 200 us
 /// (DS5319 table 27).
-pub const PLL_READY_LOOKS: u32 = 8_000;
+pub const PLL_READY_POLLS: u32 = 8_000;
 
 /// Cycles between switching the pull-ups on and reading the DIP switch: 100 us, ample for 40 kOhm and the stray
 /// capacitance.

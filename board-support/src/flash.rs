@@ -2,8 +2,8 @@
 //!
 //! An operation stalls every read of flash: 40 to 70 us for a half-word, 20 to 40 ms for a page. Code in RAM
 //! continues. The operation is therefore started and polled from RAM, and only interrupts whose handlers are in RAM
-//! are enabled during it. Every operation unlocks the controller, checks the result, and locks the controller again
-//! even when it fails.
+//! are enabled during it. Every operation unlocks the controller, checks what it reports, and locks it again even when
+//! the operation failed. The store checks that the flash reads back as written.
 //!
 //! Programming needs a supply of at least 2.0 V (DS5319 table 28). Every operation first reads the voltage
 //! detector, and does not begin while the supply is below its threshold ([`PVD_LEVEL`]).
@@ -19,38 +19,20 @@ use stm32f1xx_hal::pac;
 use crate::{
     boards::BOARD,
     design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ},
+    pages::{Page, Pages},
 };
 
-/// The addresses of the store's pages.
-const STORE_PAGES: [u32; 2] = BOARD.store;
-/// Bytes of each page.
-const PAGE_BYTES: u32 = BOARD.page_bytes;
 /// Key sequence that unlocks the controller (PM0075 2.3.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-const ERASED: u16 = 0xFFFF;
-
-/// Error of a flash operation. The address is the requested one.
+/// Error of a flash operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashError {
-    /// The address is not on the store's pages, or not at the start of a half-word or page. This is an error of the
-    /// caller.
-    Address(u32),
-    /// The half-word is not erased, and over a written half-word only 0 can be programmed. Erase the page first.
-    NotErased(u32),
-    /// The page is write-protected by the option bytes. Only a programmer can change that.
-    Protected(u32),
-    /// The controller cannot be unlocked before the next reset.
-    Locked,
-    /// The operation did not end in time. It may or may not have taken effect.
-    Timeout(u32),
-    /// The controller did not report the end of the operation (EOP, PM0075 3.5). The operation may or may not have
-    /// taken effect.
-    NotEnded(u32),
     /// The supply is too low. Nothing was done; try again when the supply has recovered.
     LowSupply,
-    /// The flash does not read back as programmed or erased: the page is worn out.
-    Worn(u32),
+    /// The controller refused the operation, reported an error or did not end in time. The operation may or may not have
+    /// taken effect.
+    Failed,
 }
 
 /// The store's pages and the flash controller.
@@ -67,18 +49,8 @@ enum Operation {
     Erase { page: u32 },
 }
 
-impl Operation {
-    /// Returns the address and the time limit in microseconds.
-    fn bounds(self) -> (u32, u32) {
-        match self {
-            Self::Program { place, .. } => (place as u32, FLASH_PROGRAM_US),
-            Self::Erase { page } => (page, FLASH_ERASE_US),
-        }
-    }
-}
-
 /// Starts an operation of the controller, which must be set up for it, and polls for its end from RAM, with BASEPRI
-/// set to `masked`. Returns false when the operation has not ended after `looks` polls.
+/// set to `masked`. Returns false when the operation has not ended after `polls` polls.
 ///
 /// # Safety
 ///
@@ -89,7 +61,7 @@ unsafe fn run(
     flash: &pac::flash::RegisterBlock,
     operation: Operation,
     masked: u8,
-    looks: u32,
+    polls: u32,
 ) -> bool {
     let before = basepri::read();
     basepri_max::write(masked);
@@ -106,7 +78,7 @@ unsafe fn run(
     // "Flash memory BSY bit delay versus STRT bit setting"; assumed to apply to this part, too). Without this extra
     // read the first poll would find BSY clear, and the controller would be locked during the operation.
     let _ = flash.sr().read();
-    let mut left = looks;
+    let mut left = polls;
     let ended = loop {
         if flash.sr().read().bsy().bit_is_clear() {
             break true;
@@ -142,64 +114,6 @@ impl Flash {
         self.power.csr().read().pvdo().bit_is_clear()
     }
 
-    /// Returns the bytes of the store's pages, in the order of the [descriptor](crate::boards::Descriptor::store).
-    #[must_use]
-    pub fn pages(&self) -> [&[u8]; 2] {
-        // SAFETY: a page of flash is always readable, as bytes. Only the `&mut` methods of this value change it,
-        // and the borrow prevents calls of those. They end with a barrier that the compiler treats as a write to
-        // all memory.
-        STORE_PAGES.map(|address| unsafe {
-            slice::from_raw_parts(address as *const u8, PAGE_BYTES as usize)
-        })
-    }
-
-    /// Programs an erased half-word, or any half-word with 0.
-    ///
-    /// # Errors
-    ///
-    /// Every variant of [`FlashError`].
-    pub fn program_half_word(&mut self, address: u32, half: u16) -> Result<(), FlashError> {
-        let [first, last] = STORE_PAGES;
-        if !(first..last + PAGE_BYTES).contains(&address) || !address.is_multiple_of(2) {
-            return Err(FlashError::Address(address));
-        }
-        let place = address as *mut u16;
-        // SAFETY: the address was just checked: it is that of a half-word of flash.
-        let read = || unsafe { ptr::read_volatile(place) };
-        if read() != ERASED && half != 0 {
-            return Err(FlashError::NotErased(address));
-        }
-        // SAFETY: the half-word belongs to the store, and no reference to it is alive (`&mut self`).
-        unsafe { self.operate(Operation::Program { place, half }) }?;
-        if read() == half {
-            Ok(())
-        } else {
-            Err(FlashError::Worn(address))
-        }
-    }
-
-    /// Erases a page of the store.
-    ///
-    /// # Errors
-    ///
-    /// Every variant of [`FlashError`] except `NotErased`.
-    pub fn erase_page(&mut self, address: u32) -> Result<(), FlashError> {
-        if !STORE_PAGES.contains(&address) {
-            return Err(FlashError::Address(address));
-        }
-        // SAFETY: the page belongs to the store and contains no code.
-        unsafe { self.operate(Operation::Erase { page: address }) }?;
-        let erased = (address..address + PAGE_BYTES)
-            .step_by(4)
-            // SAFETY: these are the words of the page, which is readable and aligned.
-            .all(|word| unsafe { ptr::read_volatile(word as *const u32) } == u32::MAX);
-        if erased {
-            Ok(())
-        } else {
-            Err(FlashError::Worn(address))
-        }
-    }
-
     /// Runs an operation: unlocks the controller, sets it up, waits for the end within a time limit, and locks it
     /// again.
     ///
@@ -208,8 +122,11 @@ impl Flash {
     /// As for [`run`].
     unsafe fn operate(&mut self, operation: Operation) -> Result<(), FlashError> {
         /// Cycles of one poll of the controller, at least: a load of a register, a test and a branch.
-        const CYCLES_OF_A_LOOK: u32 = 5;
-        let (address, bound_us) = operation.bounds();
+        const CYCLES_OF_A_POLL: u32 = 5;
+        let bound_us = match operation {
+            Operation::Program { .. } => FLASH_PROGRAM_US,
+            Operation::Erase { .. } => FLASH_ERASE_US,
+        };
         if !self.has_supply() {
             return Err(FlashError::LowSupply);
         }
@@ -224,24 +141,21 @@ impl Flash {
             Operation::Program { .. } => w.pg().set_bit(),
             Operation::Erase { .. } => w.per().set_bit(),
         });
-        let looks = bound_us * (SYSCLK_ON_HSE_HZ / 1_000_000) / CYCLES_OF_A_LOOK;
+        let polls = bound_us * (SYSCLK_ON_HSE_HZ / 1_000_000) / CYCLES_OF_A_POLL;
         // SAFETY: by the caller's promise.
-        let done = unsafe { run(flash, operation, self.masked, looks) };
+        let done = unsafe { run(flash, operation, self.masked, polls) };
         let status = flash.sr().read();
         // Clear every mode bit and lock the controller.
         flash.cr().write(|w| w.lock().set_bit());
         // Pages borrowed from now on may hold other bytes.
         asm::dsb();
-        if status.wrprterr().bit_is_set() {
-            Err(FlashError::Protected(address))
-        } else if !done {
-            Err(FlashError::Timeout(address))
-        } else if status.pgerr().bit_is_set() {
-            Err(FlashError::NotErased(address))
-        } else if status.eop().bit_is_clear() {
-            Err(FlashError::NotEnded(address))
-        } else {
+        // WRPRTERR: the page is write-protected by the option bytes. PGERR: the half-word is not erased, and over a
+        // written half-word only 0 can be programmed.
+        let failed = status.wrprterr().bit_is_set() || status.pgerr().bit_is_set();
+        if done && !failed && status.eop().bit_is_set() {
             Ok(())
+        } else {
+            Err(FlashError::Failed)
         }
     }
 
@@ -255,9 +169,44 @@ impl Flash {
             }
         }
         if locked() {
-            Err(FlashError::Locked)
+            Err(FlashError::Failed)
         } else {
             Ok(())
         }
+    }
+}
+
+const fn address(page: Page) -> u32 {
+    let [first, second] = BOARD.store;
+    match page {
+        Page::First => first,
+        Page::Second => second,
+    }
+}
+
+impl Pages for Flash {
+    type Error = FlashError;
+
+    fn page(&self, page: Page) -> &[u8] {
+        // SAFETY: a page of flash is always readable, as bytes. Only the `&mut` methods of this value change it,
+        // and the borrow prevents calls of those. They end with a barrier that the compiler treats as a write to
+        // all memory.
+        unsafe { slice::from_raw_parts(address(page) as *const u8, BOARD.page_bytes as usize) }
+    }
+
+    fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), FlashError> {
+        let offset = offset as u32;
+        if offset >= BOARD.page_bytes || !offset.is_multiple_of(2) {
+            return Err(FlashError::Failed);
+        }
+        let place = (address(page) + offset) as *mut u16;
+        // SAFETY: the half-word belongs to the store, and no reference to it is alive (`&mut self`).
+        unsafe { self.operate(Operation::Program { place, half }) }
+    }
+
+    fn erase(&mut self, page: Page) -> Result<(), FlashError> {
+        let page = address(page);
+        // SAFETY: the page belongs to the store and contains no code.
+        unsafe { self.operate(Operation::Erase { page }) }
     }
 }

@@ -13,6 +13,7 @@ pub mod fault;
 pub mod gap;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
+pub mod pages;
 mod pin;
 pub mod tolerance;
 pub mod uart;
@@ -29,8 +30,6 @@ mod dip;
 pub mod flash;
 #[cfg(target_os = "none")]
 mod gap_timer;
-#[cfg(target_os = "none")]
-mod leds;
 #[cfg(target_os = "none")]
 mod mem;
 #[cfg(target_os = "none")]
@@ -60,18 +59,17 @@ mod watchdog;
 
 #[cfg(target_os = "none")]
 pub use {
-    adc::{AnalogInputs, NotCalibrated, Sampler},
+    adc::Sampler,
     clock::ClockSource,
     flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},
     i2c::{DacBus, DacBusError, Held},
-    leds::Leds,
     pin_io::{PinInput, PinOutput},
     radio::{Damaged, RadioUart},
     rs485::{Character, Rs485, Status},
     safe::outputs_off,
     scan_timer::ScanTimer,
-    slot::{AnalogLines, Slot},
+    slot::Slot,
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };

@@ -1,7 +1,7 @@
 //! Pins as data, and access to a pin through the registers of its port.
 //!
-//! The HAL has one type per pin, which would spread a board's pins over the code as types. Here they are listed in
-//! the board's [descriptor](crate::boards::Descriptor).
+//! The HAL has one type per pin and mode, which would spread a board's pins over the code as types. Here they are data,
+//! most of them in the board's [descriptor](crate::boards::Descriptor).
 //!
 //! Code changes a configuration register (CRL, CRH) by a read and a write. A change by another context in between
 //! would be lost, so only one context at a time may change each register:
@@ -96,6 +96,16 @@ pub(crate) enum Mode {
     Analog = 0b0000,
     /// A push-pull output with the slowest edges, 2 MHz.
     Output = 0b0010,
+    /// A push-pull output with faster edges, 10 MHz.
+    FastOutput = 0b0001,
+    /// An open-drain output with the slowest edges.
+    OpenDrain = 0b0110,
+    /// A push-pull output of a peripheral, with the slowest edges.
+    Peripheral = 0b1010,
+    /// The same with faster edges, 10 MHz.
+    FastPeripheral = 0b1001,
+    /// An open-drain output of a peripheral, with the slowest edges.
+    PeripheralOpenDrain = 0b1110,
 }
 
 #[cfg(target_os = "none")]
@@ -106,6 +116,7 @@ mod registers {
 
     impl Port {
         /// Returns the port's registers. The caller must own the pins that it changes.
+        #[inline(always)]
         pub(crate) fn registers(self) -> &'static RegisterBlock {
             // All three blocks have the same layout, and the PAC uses one type for them.
             let block = match self {
@@ -147,7 +158,7 @@ mod registers {
         }
 
         /// Sets the output bit of the pin, which also selects between pull-up and pull-down.
-        #[inline]
+        #[inline(always)]
         pub(crate) fn set(self, high: bool) {
             let bit = 1 << self.number;
             let bits = if high { bit } else { bit << 16 };
@@ -156,6 +167,12 @@ mod registers {
                 .registers()
                 .bsrr()
                 .write(|w| unsafe { w.bits(bits) });
+        }
+
+        /// Returns the output bit of the pin.
+        #[inline(always)]
+        pub(crate) fn is_set(self) -> bool {
+            self.port.registers().odr().read().bits() >> self.number & 1 != 0
         }
 
         /// Returns whether the pin is high.

@@ -4,7 +4,6 @@
 //! is erased or programmed.
 
 use stm32f1xx_hal::{
-    gpio::{Cr, PB10, PB11},
     pac,
     rcc::{Enable, Reset},
 };
@@ -12,7 +11,7 @@ use stm32f1xx_hal::{
 use crate::{
     ClockSource, PinInput, PinOutput,
     boards::BOARD,
-    pin::{Pin, Port},
+    pin::{Mode, Pin},
     uart::divider,
 };
 
@@ -32,10 +31,6 @@ const TXEIE: u16 = 1 << 7;
 /// The radio before it is set up.
 pub struct RadioOff {
     pub(crate) usart: pac::USART3,
-    pub(crate) _tx: PB10,
-    pub(crate) _rx: PB11,
-    /// Permission to change the configuration register of both pins.
-    pub(crate) _cr: Cr<'B', true>,
     pub(crate) clock: ClockSource,
 }
 
@@ -67,10 +62,7 @@ impl RadioOff {
         };
         uart.set_up();
         // The transmitter is on and drives high before the pin becomes its output.
-        Port::B
-            .registers()
-            .crh()
-            .modify(|_, w| w.mode10().output2().cnf10().alt_push_pull());
+        Pin::b(10).configure(Mode::Peripheral);
         Pin::b(11).pull_up();
         let [m0, m1] = BOARD.radio.mode;
         let mode = [PinOutput::high(m0), PinOutput::high(m1)];

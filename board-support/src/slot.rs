@@ -1,7 +1,7 @@
 //! A slot: four lines that are configured for the module in it.
 
 use crate::{
-    AnalogInputs, PinInput, PinOutput,
+    PinInput, PinOutput,
     boards::SlotPins,
     pin::{Mode, Pin},
 };
@@ -11,15 +11,6 @@ use crate::{
 pub struct Slot {
     lines: [Pin; 4],
     dac_address: u8,
-}
-
-/// Number of a slot's lines that are analog inputs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AnalogLines {
-    /// Lines 1 and 2.
-    Two,
-    /// All four.
-    Four,
 }
 
 impl Slot {
@@ -60,16 +51,14 @@ impl Slot {
         )
     }
 
-    /// Makes the first lines analog inputs and leaves the others floating.
+    /// Makes the first `count` lines analog inputs and leaves the others floating. Returns their inputs of the ADC.
     #[must_use]
-    pub fn into_analog(self, lines: AnalogLines) -> AnalogInputs {
-        let count: u8 = match lines {
-            AnalogLines::Two => 2,
-            AnalogLines::Four => 4,
-        };
-        for line in self.lines.iter().take(count.into()) {
+    pub fn into_analog(self, count: usize) -> [Option<u8>; 4] {
+        let mut inputs = [None; 4];
+        for (line, input) in self.lines.iter().zip(&mut inputs).take(count) {
             line.configure(Mode::Analog);
+            *input = line.adc_input();
         }
-        AnalogInputs::new(self.lines, count)
+        inputs
     }
 }

@@ -69,7 +69,7 @@ pub struct LineSettings {
 }
 
 impl LineSettings {
-    /// The factory setting, 9600 8N2, also used in loader mode.
+    /// The factory setting, 9600 8N2, also used in recovery mode.
     pub const FACTORY: Self = Self {
         baud: 9600,
         format: Format::N2,

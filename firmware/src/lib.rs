@@ -9,7 +9,7 @@ mod built;
 pub mod byte_queue;
 pub mod config;
 pub mod device;
-pub mod lamps;
+pub mod leds;
 pub mod line;
 pub mod radio;
 pub mod start_up;

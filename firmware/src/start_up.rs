@@ -7,15 +7,15 @@ use crate::config::LineConfig;
 pub enum Address {
     /// Serve the line as this unit, 1 to 247.
     Unit(u8),
-    /// Serve the line as unit [`LOADER_UNIT`] with the factory's line settings, so that a unit with unknown
+    /// Serve the line as unit [`RECOVERY_UNIT`] with the factory's line settings, so that a unit with unknown
     /// settings can be reached.
-    Loader,
+    Recovery,
     /// Not a unit address (0 and 248 to 254): send nothing and blink the fault LED.
     Invalid,
 }
 
-/// The unit address of the loader mode.
-pub const LOADER_UNIT: u8 = 255;
+/// The unit address of recovery mode.
+pub const RECOVERY_UNIT: u8 = 255;
 
 impl Address {
     /// Returns the meaning of the switch's number.
@@ -23,7 +23,7 @@ impl Address {
     pub const fn from_dip(dip: u8) -> Self {
         match dip {
             1..=247 => Self::Unit(dip),
-            LOADER_UNIT => Self::Loader,
+            RECOVERY_UNIT => Self::Recovery,
             0 | 248..=254 => Self::Invalid,
         }
     }
@@ -33,19 +33,19 @@ impl Address {
     pub const fn unit(self) -> Option<u8> {
         match self {
             Self::Unit(unit) => Some(unit),
-            Self::Loader => Some(LOADER_UNIT),
+            Self::Recovery => Some(RECOVERY_UNIT),
             Self::Invalid => None,
         }
     }
 }
 
-/// Returns the line settings to use: the configured ones, or the factory settings in loader mode and without a
+/// Returns the line settings to use: the configured ones, or the factory settings in recovery mode and without a
 /// valid address.
 #[must_use]
 pub const fn line(address: Address, configured: LineConfig) -> LineConfig {
     match address {
         Address::Unit(_) => configured,
-        Address::Loader | Address::Invalid => LineConfig::FACTORY,
+        Address::Recovery | Address::Invalid => LineConfig::FACTORY,
     }
 }
 
@@ -63,16 +63,16 @@ mod tests {
             };
             assert_eq!(Address::from_dip(dip).unit(), expected, "{dip}");
         }
-        assert_eq!(Address::from_dip(255), Address::Loader);
+        assert_eq!(Address::from_dip(255), Address::Recovery);
     }
 
     #[test]
-    fn the_loader_mode_uses_the_factory_line_settings() {
+    fn recovery_mode_uses_the_factory_line_settings() {
         let configured = LineConfig {
             baud: register_map::codes::Baud::B115200,
             ..LineConfig::FACTORY
         };
         assert_eq!(line(Address::Unit(1), configured), configured);
-        assert_eq!(line(Address::Loader, configured), LineConfig::FACTORY);
+        assert_eq!(line(Address::Recovery, configured), LineConfig::FACTORY);
     }
 }

@@ -2,35 +2,40 @@
 //! those of ModIO-AO, on the channels C and D of an MCP4728.
 
 use crate::analog_inputs::AnalogInputs;
-use crate::ao4::{health, output_code};
+use crate::ao4::output_code;
 use crate::{
-    AnalogSource, CHANNELS, ChannelSettings, Channels, Code, DacLink, IoModule, Kind, ModuleError,
+    CHANNELS, ChannelSettings, Channels, Code, Codes, DacLink, IoModule, Kind, ModuleError,
 };
 
 /// Two filtered analog inputs and two analog outputs.
 #[derive(Debug)]
-pub struct Ai2Ao2<'a, S> {
-    inputs: AnalogInputs<S>,
-    link: &'a DacLink,
+pub struct Ai2Ao2 {
+    inputs: AnalogInputs,
     /// Settings of channels 3 and 4.
     outputs: [ChannelSettings; 2],
 }
 
-impl<'a, S: AnalogSource> Ai2Ao2<'a, S> {
-    /// Creates the driver. Lines 1 and 2 of the converter must already be analog inputs.
-    pub const fn new(source: S, link: &'a DacLink) -> Self {
+impl Ai2Ao2 {
+    /// Creates the driver.
+    #[must_use]
+    pub const fn new() -> Self {
         Self {
-            inputs: AnalogInputs::new(source, 2),
-            link,
+            inputs: AnalogInputs::new(2),
             outputs: [ChannelSettings::default_for(Kind::WordOutput); 2],
         }
+    }
+}
+
+impl Default for Ai2Ao2 {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
 /// Channels 3 and 4, which the DAC drives; channel 1 is bit 0.
 const OUTPUTS: u8 = 0b1100;
 
-impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
+impl IoModule for Ai2Ao2 {
     fn kinds(&self) -> [Kind; CHANNELS] {
         use Kind::{WordInput, WordOutput};
         [WordInput, WordInput, WordOutput, WordOutput]
@@ -43,22 +48,21 @@ impl<S: AnalogSource> IoModule for Ai2Ao2<'_, S> {
         self.outputs = [third, fourth];
     }
 
-    /// Reads the inputs, and returns an error for a DAC that does not answer.
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
-        let inputs = self.inputs.scan(channels);
-        ModuleError::in_either(health(self.link, OUTPUTS), inputs)
+    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError> {
+        self.inputs.scan(codes, channels)
     }
 
-    /// Posts the codes to the link. The DAC channels A and B, which are not connected, stay at 0.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+    /// Leaves the codes in the link. The DAC channels A and B, which are not connected, stay at 0. Returns an error for
+    /// both outputs while the codes do not reach the DAC.
+    fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError> {
         let [third, fourth] = &self.outputs;
-        self.link.post([
+        let codes = [
             Code::default(),
             Code::default(),
             output_code(channels, 2, third),
             output_code(channels, 3, fourth),
-        ]);
-        health(self.link, OUTPUTS)
+        ];
+        dac.drive(codes, OUTPUTS)
     }
 }
 

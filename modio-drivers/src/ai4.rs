@@ -3,43 +3,44 @@
 //! has a pull-up of 10 k to 3.3 V.
 
 use crate::analog_inputs::AnalogInputs;
-use crate::{AnalogSource, CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Four filtered analog inputs.
 ///
 /// A channel's word and status are computed from its filtered code. [`scale`](crate::scale) describes the units,
 /// [`input_status`](crate::input_status) the status.
 #[derive(Debug)]
-pub struct Ai4<S> {
-    inputs: AnalogInputs<S>,
-}
+pub struct Ai4(AnalogInputs);
 
-impl<S: AnalogSource> Ai4<S> {
-    /// Creates the driver. The converter's lines must already be analog inputs. The first sample of each line is
-    /// shown without filtering.
-    pub const fn new(source: S) -> Self {
-        Self {
-            inputs: AnalogInputs::new(source, CHANNELS),
-        }
+impl Ai4 {
+    /// Creates the driver. The first sample of each line is shown without filtering.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(AnalogInputs::new(CHANNELS))
     }
 }
 
-impl<S: AnalogSource> IoModule for Ai4<S> {
+impl Default for Ai4 {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl IoModule for Ai4 {
     fn kinds(&self) -> [Kind; CHANNELS] {
         [Kind::WordInput; CHANNELS]
     }
 
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
-        self.inputs.configure(settings);
+        self.0.configure(settings);
     }
 
-    /// A channel fails when its conversion failed. All channels fail when the converter has not answered for
-    /// [`STALLED_SCANS`](crate::STALLED_SCANS) scans.
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
-        self.inputs.scan(channels)
+    /// A channel fails when its line has had no code for [`STALLED_SCANS`](crate::STALLED_SCANS) scans.
+    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError> {
+        self.0.scan(codes, channels)
     }
 
-    fn drive_outputs(&mut self, _channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, _: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         Ok(())
     }
 }

@@ -1,39 +1,32 @@
-//! The analog inputs of a module: selects the lines to sample and computes each channel from its samples.
+//! The analog inputs of a module: computes each channel from the codes of its line.
 
 use crate::low_pass::{LOW_PASS_DEFAULT, LowPass};
 use crate::{
-    AnalogSource, CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, ModuleError,
-    Scale, input_status, scale::Measured,
+    CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, ModuleError, Scale,
+    input_status, scale::Measured,
 };
 
-/// Largest number of calls of [`AnalogSource::read`] that a module makes in one scan, for all its lines together. A
-/// converter that converts on demand may take about 20 calls for each line.
-pub const POLLS_PER_SCAN: u8 = 64;
+/// The codes of the slot's lines from an analog-to-digital converter of 12 bits: 0 for ground, 4095 for the
+/// reference. `None` for a line that was not converted in this scan.
+pub type Codes = [Option<u16>; CHANNELS];
 
-/// Number of scans in a row without an answer from the converter after which all its lines count as failed.
+/// Number of scans in a row without a code after which a line counts as failed.
 pub const STALLED_SCANS: u8 = 10;
 
 /// Analog inputs on the slot's first lines.
 #[derive(Debug)]
-pub(crate) struct AnalogInputs<S> {
-    source: S,
+pub(crate) struct AnalogInputs {
     inputs: [Input; CHANNELS],
     /// Number of inputs.
     count: usize,
-    /// Line to sample next, or being sampled.
-    line: usize,
-    stalled: u8,
 }
 
-impl<S: AnalogSource> AnalogInputs<S> {
+impl AnalogInputs {
     /// Creates one input for each of the first `count` lines, at most four.
-    pub(crate) const fn new(source: S, count: usize) -> Self {
+    pub(crate) const fn new(count: usize) -> Self {
         Self {
-            source,
             inputs: [Input::NEW; CHANNELS],
             count,
-            line: 0,
-            stalled: 0,
         }
     }
 
@@ -43,55 +36,22 @@ impl<S: AnalogSource> AnalogInputs<S> {
         }
     }
 
-    #[cfg(test)]
-    pub(crate) const fn source_mut(&mut self) -> &mut S {
-        &mut self.source
-    }
-
-    /// Samples every line once, or as many as the converter has time for, and updates all channels.
-    pub(crate) fn scan(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
-        self.sample();
+    /// Adds the codes of a scan and updates all channels.
+    pub(crate) fn scan(
+        &mut self,
+        codes: &Codes,
+        channels: &mut Channels,
+    ) -> Result<(), ModuleError> {
         let mut result = Ok(());
-        for (channel, input) in self.inputs.iter_mut().take(self.count).enumerate() {
+        let inputs = self.inputs.iter_mut().zip(codes).take(self.count);
+        for (channel, (input, code)) in inputs.enumerate() {
+            input.sample(*code);
             input.show(channels, channel);
-            if input.failed {
+            if input.stalled >= STALLED_SCANS {
                 result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
             }
         }
         result
-    }
-
-    fn sample(&mut self) {
-        let mut answers = 0;
-        for _ in 0..POLLS_PER_SCAN {
-            // The line is at most 3, so the cast keeps the value.
-            let answer = self.source.read(self.line as u8);
-            let Some(input) = self.inputs.get_mut(self.line) else {
-                return;
-            };
-            match answer {
-                Ok(code) => input.sample(code),
-                Err(nb::Error::Other(_)) => input.fail(),
-                Err(nb::Error::WouldBlock) => continue,
-            }
-            self.line = if self.line + 1 < self.count {
-                self.line + 1
-            } else {
-                0
-            };
-            answers += 1;
-            if answers == self.count {
-                break;
-            }
-        }
-        if answers > 0 {
-            self.stalled = 0;
-        } else if self.stalled < STALLED_SCANS - 1 {
-            self.stalled += 1;
-        } else {
-            // The converter serves all lines, so all of them fail.
-            self.inputs.iter_mut().for_each(Input::fail);
-        }
     }
 }
 
@@ -101,7 +61,8 @@ struct Input {
     settings: ChannelSettings,
     filter: LowPass,
     status: ChannelStatus,
-    failed: bool,
+    /// Number of scans since the last code.
+    stalled: u8,
 }
 
 impl Input {
@@ -109,7 +70,7 @@ impl Input {
         settings: ChannelSettings::default_for(Kind::WordInput),
         filter: LowPass::new(LOW_PASS_DEFAULT),
         status: ChannelStatus::Good,
-        failed: false,
+        stalled: 0,
     };
 
     fn configure(&mut self, settings: &ChannelSettings) {
@@ -121,15 +82,17 @@ impl Input {
         self.settings = *settings;
     }
 
-    fn sample(&mut self, code: Code) {
-        self.failed = false;
-        self.filter.sample(code);
-    }
-
-    /// Marks the input as failed. The channel keeps its word, and the filter restarts when the line works again.
-    fn fail(&mut self) {
-        self.failed = true;
-        self.filter.reset();
+    fn sample(&mut self, code: Option<u16>) {
+        if let Some(code) = code {
+            self.stalled = 0;
+            self.filter.sample(Code::new(code));
+            return;
+        }
+        self.stalled = self.stalled.saturating_add(1);
+        if self.stalled >= STALLED_SCANS {
+            // The channel keeps its word, and the filter restarts when the line works again.
+            self.filter.reset();
+        }
     }
 
     fn show(&mut self, channels: &mut Channels, channel: usize) {

@@ -2,35 +2,38 @@
 //! MCP4728 whose full scale is 10 V or 20 mA.
 
 use crate::{
-    CHANNELS, ChannelSettings, Channels, Code, DacLink, IoModule, Kind, ModuleError,
+    CHANNELS, ChannelSettings, Channels, Code, Codes, DacLink, IoModule, Kind, ModuleError,
     scale::output_to_raw,
 };
 
 /// Four analog outputs.
 ///
-/// The driver only posts codes to a [`DacLink`]; a [`DacWorker`](crate::DacWorker) transfers them.
+/// The driver only leaves codes in a [`DacLink`]; a [`DacWorker`](crate::DacWorker) transfers them.
 #[derive(Debug)]
-pub struct Ao4<'a> {
-    link: &'a DacLink,
+pub struct Ao4 {
     settings: [ChannelSettings; CHANNELS],
 }
 
-impl<'a> Ao4<'a> {
-    /// Creates the driver. It drives the DAC at the other end of the link from the first
-    /// [`drive_outputs`](IoModule::drive_outputs) on.
+impl Ao4 {
+    /// Creates the driver.
     #[must_use]
-    pub const fn new(link: &'a DacLink) -> Self {
+    pub const fn new() -> Self {
         Self {
-            link,
             settings: [ChannelSettings::default_for(Kind::WordOutput); CHANNELS],
         }
+    }
+}
+
+impl Default for Ao4 {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
 /// Channels that the DAC drives: all of the module.
 const ALL: u8 = 0b1111;
 
-impl IoModule for Ao4<'_> {
+impl IoModule for Ao4 {
     fn kinds(&self) -> [Kind; CHANNELS] {
         [Kind::WordOutput; CHANNELS]
     }
@@ -41,34 +44,23 @@ impl IoModule for Ao4<'_> {
         self.settings = *settings;
     }
 
-    /// There are no inputs. Returns an error for a DAC that does not answer.
-    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
-        health(self.link, ALL)
+    fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
+        Ok(())
     }
 
-    /// Posts the codes to the link. Returns an error for all channels while the codes do not reach the DAC.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+    /// Leaves the codes in the link. Returns an error for all channels while the codes do not reach the DAC.
+    fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError> {
         let mut codes = [Code::default(); CHANNELS];
         for (channel, (code, settings)) in codes.iter_mut().zip(&self.settings).enumerate() {
             *code = output_code(channels, channel, settings);
         }
-        self.link.post(codes);
-        health(self.link, ALL)
+        dac.drive(codes, ALL)
     }
 }
 
 /// Returns the DAC's code for a channel's word.
 pub(crate) fn output_code(channels: &Channels, channel: usize, settings: &ChannelSettings) -> Code {
     output_to_raw(channels.word(channel), settings.signal, settings.scale)
-}
-
-/// Returns an error for these channels, channel 1 in bit 0, while their DAC does not answer.
-pub(crate) fn health(link: &DacLink, channels: u8) -> Result<(), ModuleError> {
-    if link.failed() {
-        Err(ModuleError::chip(channels))
-    } else {
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -95,19 +87,20 @@ mod tests {
     }
 
     #[test]
-    fn raw_words_are_posted_unchanged_up_to_the_largest_code() {
-        let link = DacLink::new();
-        let mut module = Ao4::new(&link);
+    fn raw_words_are_driven_unchanged_up_to_the_largest_code() {
+        let mut link = DacLink::default();
+        let mut module = Ao4::new();
         assert_eq!(module.kinds(), [Kind::WordOutput; 4]);
-        assert_eq!(link.wanted(), None, "nothing before the first scan");
-        module.drive_outputs(&words([0, 1, 4095, 4096])).unwrap();
-        assert_eq!(link.wanted(), Some([0, 1, 4095, 4095].map(Code::new)));
+        module
+            .drive_outputs(&words([0, 1, 4095, 4096]), &mut link)
+            .unwrap();
+        assert_eq!(link.wanted, Some([0, 1, 4095, 4095].map(Code::new)));
     }
 
     #[test]
     fn each_channel_has_its_own_units() {
-        let link = DacLink::new();
-        let mut module = Ao4::new(&link);
+        let mut link = DacLink::default();
+        let mut module = Ao4::new();
         module.configure(&[
             settings(Signal::Voltage, Scale::Engineering),
             settings(Signal::Current, Scale::Engineering),
@@ -115,33 +108,24 @@ mod tests {
             settings(Signal::Current, Scale::Raw),
         ]);
         let channels = words([5_000, 12_000, 2_000, 819]);
-        module.drive_outputs(&channels).unwrap();
-        assert_eq!(
-            link.wanted(),
-            Some([2_048, 2_457, 2_000, 819].map(Code::new))
-        );
+        module.drive_outputs(&channels, &mut link).unwrap();
+        assert_eq!(link.wanted, Some([2_048, 2_457, 2_000, 819].map(Code::new)));
 
         module.configure(&[settings(Signal::Voltage, Scale::Raw); 4]);
-        module.drive_outputs(&channels).unwrap();
-        assert_eq!(
-            link.wanted(),
-            Some([4_095, 4_095, 2_000, 819].map(Code::new))
-        );
+        module.drive_outputs(&channels, &mut link).unwrap();
+        assert_eq!(link.wanted, Some([4_095, 4_095, 2_000, 819].map(Code::new)));
     }
 
     #[test]
     fn a_failed_link_is_reported_and_still_receives_codes() {
-        let link = DacLink::new();
-        let mut module = Ao4::new(&link);
-        let mut channels = words([1, 2, 3, 4]);
-        link.set_failed(true);
+        let mut link = DacLink::default();
+        let mut module = Ao4::new();
+        let channels = words([1, 2, 3, 4]);
+        link.failed = true;
         let failed = Err(ModuleError::chip(ALL));
-        assert_eq!(module.drive_outputs(&channels), failed);
-        assert_eq!(module.read_inputs(&mut channels), failed);
-        assert_eq!(channels, words([1, 2, 3, 4]));
-        assert_eq!(link.wanted(), Some([1, 2, 3, 4].map(Code::new)));
-        link.set_failed(false);
-        assert_eq!(module.drive_outputs(&channels), Ok(()));
-        assert_eq!(module.read_inputs(&mut channels), Ok(()));
+        assert_eq!(module.drive_outputs(&channels, &mut link), failed);
+        assert_eq!(link.wanted, Some([1, 2, 3, 4].map(Code::new)));
+        link.failed = false;
+        assert_eq!(module.drive_outputs(&channels, &mut link), Ok(()));
     }
 }

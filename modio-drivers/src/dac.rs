@@ -12,10 +12,10 @@
 //! changes its output at its last byte, whatever the level of the LDAC pin. The command only writes the volatile
 //! registers. The EEPROM, which would wear out, is never written.
 
-use embedded_hal::i2c::{ErrorKind, I2c, NoAcknowledgeSource};
+use embedded_hal::i2c::{Error as _, ErrorKind, I2c};
 use mcp4728::{Channel, ChannelState, Error, MCP4728, OutputEnableMode, VoltageReferenceMode};
 
-use crate::{CHANNELS, Code, DacLink};
+use crate::{CHANNELS, Code, ModuleError};
 
 /// The lowest address that a DAC can be ordered with, and the most common one (DS22187E, 5.3). The highest is 0x67.
 pub const DAC_ADDRESS: u8 = 0x60;
@@ -24,45 +24,40 @@ pub const DAC_ADDRESS: u8 = 0x60;
 /// DAC that has lost its power is detected, or set again when its power has returned.
 const REFRESH_CALLS: u8 = 10;
 
-/// Number of failures in a row after which the link counts as failed. A single failure may be noise on the bus.
+/// Number of failures in a row after which the DAC counts as failed. A single failure may be noise on the bus.
 const FAILURES_TO_FAIL: u8 = 2;
 
 /// Largest number of calls to skip after a failure: 160 ms at one call every 10 ms. Time-outs on a stuck bus then
 /// take little of the background's time, and a DAC that works again is soon detected.
 const PAUSE_MAX_CALLS: u8 = 16;
 
-/// Error of a transfer. The worker repeats the transfer automatically; the variants differ in what the caller can
-/// do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DacError {
-    /// No device acknowledged the address: the module or its power is missing. The caller can do nothing.
-    NotAnswering(NoAcknowledgeSource),
-    /// The bus is held, disturbed or timed out. The caller must recover it before the next call: clock SCL until
-    /// SDA is released, and reset the peripheral.
-    Bus(ErrorKind),
+/// What a module's driver and the worker of its DAC tell each other. The scan and the background task share it under
+/// a lock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DacLink {
+    /// Codes for the channels A to D; `None` before the first scan.
+    pub wanted: Option<[Code; CHANNELS]>,
+    /// The DAC does not answer, or its bus is stuck.
+    pub failed: bool,
 }
 
-impl DacError {
-    fn sort(error: &Error<impl embedded_hal::i2c::Error>) -> Self {
-        match error {
-            Error::I2CError(error) => match error.kind() {
-                ErrorKind::NoAcknowledge(source) => Self::NotAnswering(source),
-                kind @ (ErrorKind::Bus
-                | ErrorKind::ArbitrationLoss
-                | ErrorKind::Overrun
-                | ErrorKind::Other) => Self::Bus(kind),
-                // The enum may get more variants. Resetting the bus is safe for an unknown error.
-                kind => Self::Bus(kind),
-            },
-            // Four channels with 12-bit codes always pass these checks of the crate.
-            Error::ValueOutOfBounds(_)
-            | Error::WriteSizeExceeded
-            | Error::StartingChannelMismatch => Self::Bus(ErrorKind::Other),
+impl DacLink {
+    /// Sets the codes. Returns an error for these channels, channel 1 in bit 0, while they do not reach the DAC.
+    pub(crate) const fn drive(
+        &mut self,
+        wanted: [Code; CHANNELS],
+        channels: u8,
+    ) -> Result<(), ModuleError> {
+        self.wanted = Some(wanted);
+        if self.failed {
+            Err(ModuleError::chip(channels))
+        } else {
+            Ok(())
         }
     }
 }
 
-/// Transfers the codes in a [`DacLink`] to one DAC. Several workers with different addresses may share a bus.
+/// Transfers codes to one DAC. Several workers with different addresses may share a bus.
 #[derive(Debug)]
 pub struct DacWorker {
     /// The DAC's address on its bus, 7 bits.
@@ -89,21 +84,27 @@ impl DacWorker {
         }
     }
 
-    /// Transfers codes if needed. Call this every 10 ms, and also as soon as codes have been posted. It makes one
+    /// Transfers codes if needed. Call this every 10 ms, and also as soon as the codes have changed. It makes one
     /// transfer of 13 bytes, 0.3 ms at 400 kHz, when codes have changed, when a refresh is due, or to repeat a
     /// failed transfer. A failed transfer is repeated at the next call, and after more failures once 1, 2, 4, 8 and
-    /// then 16 calls have been skipped. Returns whether a transfer was made. Before the first post the DAC is not
-    /// accessed. Every transfer of the bus must end within a bounded time.
+    /// then 16 calls have been skipped. Returns whether a transfer was made. Without codes the DAC is not accessed. Every
+    /// transfer of the bus must end within a bounded time.
     ///
     /// # Errors
-    /// [`DacError`] when a transfer failed. From the second failure in a row until the next success,
-    /// [`DacLink::failed`] also returns true.
-    pub fn work(&mut self, bus: &mut impl I2c, link: &DacLink) -> Result<bool, DacError> {
+    ///
+    /// The kind of the error when a transfer failed. After any other than [`ErrorKind::NoAcknowledge`] the bus may be
+    /// held or disturbed, and must be recovered before the next call: clock SCL until SDA is released, and reset the
+    /// peripheral.
+    pub fn work(
+        &mut self,
+        bus: &mut impl I2c,
+        wanted: Option<[Code; CHANNELS]>,
+    ) -> Result<bool, ErrorKind> {
         if self.pause > 0 {
             self.pause -= 1;
             return Ok(false);
         }
-        let Some(wanted) = link.wanted() else {
+        let Some(wanted) = wanted else {
             return Ok(false);
         };
         self.until_refresh = self.until_refresh.saturating_sub(1);
@@ -120,11 +121,17 @@ impl DacWorker {
             self.failures = self.failures.saturating_add(1);
             self.pause = pause_after(self.failures);
         }
-        link.set_failed(self.failures >= FAILURES_TO_FAIL);
         result.map(|()| true)
     }
 
-    fn transfer(&self, bus: &mut impl I2c, codes: [Code; CHANNELS]) -> Result<(), DacError> {
+    /// Returns whether the DAC does not answer or its bus is stuck: from the second failure in a row until the next
+    /// success.
+    #[must_use]
+    pub const fn failed(&self) -> bool {
+        self.failures >= FAILURES_TO_FAIL
+    }
+
+    fn transfer(&self, bus: &mut impl I2c, codes: [Code; CHANNELS]) -> Result<(), ErrorKind> {
         let [a, b, c, d] = codes.map(|code| {
             // A code above 12 bits would change the gain bit, because the crate does not check it. [`Code`]
             // excludes that.
@@ -139,16 +146,18 @@ impl DacWorker {
                 (Channel::C, OutputEnableMode::Update, c),
                 (Channel::D, OutputEnableMode::Update, d),
             ])
-            .map_err(|error| DacError::sort(&error))
+            .map_err(|error| match error {
+                Error::I2CError(error) => error.kind(),
+                // Four channels with 12-bit codes always pass the checks of the crate.
+                _ => ErrorKind::Other,
+            })
     }
 }
 
 /// Returns the number of calls to skip after this many failures: 0, 1, 2, 4, 8, 16, 16 and so on.
 fn pause_after(failures: u8) -> u8 {
     match failures.checked_sub(2) {
-        Some(doublings) => 1_u8
-            .checked_shl(doublings.into())
-            .map_or(PAUSE_MAX_CALLS, |pause| pause.clamp(1, PAUSE_MAX_CALLS)),
+        Some(doublings) => PAUSE_MAX_CALLS.min(1 << doublings.min(7)),
         None => 0,
     }
 }

@@ -3,7 +3,7 @@
 use embedded_hal::digital::InputPin;
 
 use crate::debounce::{DEBOUNCE_DEFAULT_MS, Debounce};
-use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Four debounced digital inputs.
 ///
@@ -39,7 +39,7 @@ impl<P: InputPin> IoModule for Di4<P> {
         }
     }
 
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
+    fn read_inputs(&mut self, channels: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
         let mut result = Ok(());
         let lines = self.lines.iter_mut().zip(&mut self.filters);
         for (channel, (line, filter)) in lines.enumerate() {
@@ -53,7 +53,7 @@ impl<P: InputPin> IoModule for Di4<P> {
         result
     }
 
-    fn drive_outputs(&mut self, _channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, _: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         Ok(())
     }
 }
@@ -91,7 +91,7 @@ mod tests {
     fn the_first_scan_takes_the_inputs_without_delay() {
         let mut module = Di4::new([true, false, false, true].map(|on| line(&[on])));
         let mut channels = Channels::new();
-        module.read_inputs(&mut channels).unwrap();
+        module.read_inputs(&mut channels, &[None; 4]).unwrap();
         assert_eq!(
             [0, 1, 2, 3].map(|c| channels.bit(c)),
             [true, false, false, true]
@@ -113,7 +113,7 @@ mod tests {
             let seen: Vec<bool> = levels
                 .iter()
                 .map(|_| {
-                    module.read_inputs(&mut channels).unwrap();
+                    module.read_inputs(&mut channels, &[None; 4]).unwrap();
                     channels.bit(2)
                 })
                 .collect();
@@ -132,7 +132,7 @@ mod tests {
         let mut module = Di4::new([(); 4].map(|()| line(&levels)));
         let mut channels = Channels::new();
         for _ in levels {
-            module.read_inputs(&mut channels).unwrap();
+            module.read_inputs(&mut channels, &[None; 4]).unwrap();
             assert!(!channels.bit(0));
         }
         finish(module);
@@ -148,8 +148,11 @@ mod tests {
         let good = || line(&[true, true]);
         let mut module = Di4::new([good(), failing, good(), good()]);
         let mut channels = Channels::new();
-        module.read_inputs(&mut channels).unwrap();
-        assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(1)));
+        module.read_inputs(&mut channels, &[None; 4]).unwrap();
+        assert_eq!(
+            module.read_inputs(&mut channels, &[None; 4]),
+            Err(ModuleError::line(1))
+        );
         assert_eq!([0, 1, 2, 3].map(|c| channels.bit(c)), [true; 4]);
         finish(module);
     }
@@ -161,7 +164,7 @@ mod tests {
         let mut channels = Channels::new();
         let seen = levels.map(|_| {
             module.configure(&[0, 2, 4, 5].map(settings));
-            module.read_inputs(&mut channels).unwrap();
+            module.read_inputs(&mut channels, &[None; 4]).unwrap();
             [0, 1, 2, 3].map(|c| u8::from(channels.bit(c)))
         });
         assert_eq!(

@@ -2,7 +2,7 @@
 
 use embedded_hal::digital::{OutputPin, PinState};
 
-use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Four digital outputs.
 #[derive(Debug)]
@@ -25,12 +25,12 @@ impl<P: OutputPin> IoModule for Do4<P> {
 
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
-    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
+    fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
         Ok(())
     }
 
     /// Drives every line in every call, changed or not, so that a disturbed output is wrong for one scan at most.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, channels: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         let mut result = Ok(());
         for (channel, line) in self.lines.iter_mut().enumerate() {
             if line
@@ -76,11 +76,17 @@ mod tests {
         let mut channels = Channels::new();
         channels.set_bit(0, true);
         channels.set_bit(3, true);
-        module.drive_outputs(&channels).unwrap();
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         channels.set_bit(0, false);
         channels.set_bit(1, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         assert!(
             channels.bit(1) && channels.bit(3),
             "reading does not change outputs"
@@ -95,7 +101,7 @@ mod tests {
         let low = || line(&[State::Low]);
         let mut module = Do4::new([failing, low(), low(), low()]);
         assert_eq!(
-            module.drive_outputs(&Channels::new()),
+            module.drive_outputs(&Channels::new(), &mut DacLink::default()),
             Err(ModuleError::line(0))
         );
         module.lines.iter_mut().for_each(Mock::done);

@@ -1,6 +1,6 @@
 //! The interface of every module's driver.
 
-use crate::{CHANNELS, ChannelSettings, Channels, Kind};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, Kind};
 
 /// Channels of a module that could not be read or driven. They keep their values and are tried again at every scan.
 /// All other channels have been served.
@@ -77,22 +77,22 @@ pub trait IoModule {
     /// range. Until the first call, [`ChannelSettings::default_for`] is in force.
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]);
 
-    /// Reads the inputs into `channels`. Must be called once per millisecond, which is the unit of the filters.
+    /// Reads the inputs into `channels`. `codes` are the codes of the slot's lines. Must be called once per millisecond, which is the unit of the filters.
     /// Returns within a few microseconds.
     ///
     /// # Errors
     ///
     /// [`ModuleError`] with the channels that could not be read. Every other channel has been read, and the failed
     /// ones are tried again at the next call.
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError>;
+    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError>;
 
-    /// Drives the outputs from `channels`. Must be called as often as [`read_inputs`](Self::read_inputs), and also
+    /// Drives the outputs from `channels`. `dac` is the link to the DAC of the module's slot. Must be called as often as [`read_inputs`](Self::read_inputs), and also
     /// immediately after an output was commanded. Returns within a few microseconds.
     ///
     /// # Errors
     ///
     /// [`ModuleError`] with the channels that could not be driven. Every other channel has been driven.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError>;
+    fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError>;
 }
 
 /// An empty slot.
@@ -106,11 +106,11 @@ impl IoModule for Absent {
 
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
-    fn read_inputs(&mut self, _channels: &mut Channels) -> Result<(), ModuleError> {
+    fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
         Ok(())
     }
 
-    fn drive_outputs(&mut self, _channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, _: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         Ok(())
     }
 }

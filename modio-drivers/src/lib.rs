@@ -5,12 +5,10 @@
 mod ai2ao2;
 mod ai4;
 mod analog_inputs;
-mod analog_source;
 mod ao4;
 mod channels;
 mod code;
 mod dac;
-mod dac_link;
 mod debounce;
 mod di4;
 mod do4;
@@ -25,13 +23,11 @@ mod settings;
 
 pub use ai2ao2::Ai2Ao2;
 pub use ai4::Ai4;
-pub use analog_inputs::{POLLS_PER_SCAN, STALLED_SCANS};
-pub use analog_source::AnalogSource;
+pub use analog_inputs::{Codes, STALLED_SCANS};
 pub use ao4::Ao4;
 pub use channels::{CHANNELS, ChannelStatus, Channels, Kind};
 pub use code::Code;
-pub use dac::{DAC_ADDRESS, DacError, DacWorker};
-pub use dac_link::DacLink;
+pub use dac::{DAC_ADDRESS, DacLink, DacWorker};
 pub use debounce::{DEBOUNCE_DEFAULT_MS, DEBOUNCE_MAX_MS};
 pub use di4::Di4;
 pub use do4::Do4;

@@ -4,7 +4,7 @@
 use embedded_hal::digital::{InputPin, OutputPin, PinState};
 
 use crate::debounce::Debounce;
-use crate::{CHANNELS, ChannelSettings, Channels, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Debounce of the mode jumpers, in milliseconds. A jumper is moved by hand, and its contacts bounce for longer
 /// than a switch.
@@ -46,7 +46,7 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
     /// There are no settings: the jumpers' debounce is [`JUMPER_DEBOUNCE_MS`].
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
+    fn read_inputs(&mut self, channels: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
         let mut result = Ok(());
         let jumpers = self.jumpers.iter_mut().zip(&mut self.filters);
         for (channel, (jumper, filter)) in jumpers.enumerate() {
@@ -61,7 +61,7 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
     }
 
     /// Drives both coils in every call, as [`Do4`](crate::Do4) does.
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
+    fn drive_outputs(&mut self, channels: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
         let mut result = Ok(());
         for (channel, coil) in (FIRST_COIL..).zip(&mut self.coils) {
             let energised = PinState::from(channels.bit(channel));
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(module.kinds(), [BitInput, BitInput, BitOutput, BitOutput]);
         let mut channels = Channels::new();
         channels.set_bit(3, true);
-        module.read_inputs(&mut channels).unwrap();
+        module.read_inputs(&mut channels, &[None; 4]).unwrap();
         assert_eq!(
             [0, 1, 2, 3].map(|c| channels.bit(c)),
             [true, false, false, true]
@@ -132,7 +132,7 @@ mod tests {
         let mut channels = Channels::new();
         for scan in 0..levels.len() {
             module.configure(&[settings; 4]);
-            module.read_inputs(&mut channels).unwrap();
+            module.read_inputs(&mut channels, &[None; 4]).unwrap();
             assert_eq!(channels.bit(0), scan == 2 * wait, "scan {scan}");
             assert_eq!(channels.bit(1), channels.bit(0));
         }
@@ -149,11 +149,17 @@ mod tests {
         let mut channels = Channels::new();
         channels.set_bit(0, true);
         channels.set_bit(1, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         channels.set_bit(2, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         channels.set_bit(3, true);
-        module.drive_outputs(&channels).unwrap();
+        module
+            .drive_outputs(&channels, &mut DacLink::default())
+            .unwrap();
         finish(module);
     }
 
@@ -166,9 +172,15 @@ mod tests {
         );
         let mut channels = Channels::new();
         channels.set_bit(3, true);
-        assert_eq!(module.read_inputs(&mut channels), Err(ModuleError::line(0)));
+        assert_eq!(
+            module.read_inputs(&mut channels, &[None; 4]),
+            Err(ModuleError::line(0))
+        );
         assert!(channels.bit(1));
-        assert_eq!(module.drive_outputs(&channels), Err(ModuleError::line(2)));
+        assert_eq!(
+            module.drive_outputs(&channels, &mut DacLink::default()),
+            Err(ModuleError::line(2))
+        );
         finish(module);
     }
 }

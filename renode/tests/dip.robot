@@ -23,7 +23,7 @@ Another Unit's Request Gets Silence
     Request Gets Silence    03 0204 0001    18
     Unit Answers    17
 
-Position 255 Selects The Loader Mode
+Position 255 Selects Recovery Mode
     Start Board    dip=255
     Unit Answers    255
     Request Gives    03 0206 0001    03 02 00FF    255

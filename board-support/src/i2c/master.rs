@@ -47,7 +47,6 @@ impl Timing {
 /// The DACs' bus. Its pins float until the first transfer.
 pub struct DacBus {
     i2c: pac::I2C1,
-    pins: BusPins,
     timing: Timing,
     /// The peripheral is enabled on the bus and no error is known.
     ready: bool,
@@ -55,10 +54,9 @@ pub struct DacBus {
 
 impl DacBus {
     /// The peripheral's clock must be on.
-    pub(crate) const fn new(i2c: pac::I2C1, pins: BusPins, clock: ClockSource) -> Self {
+    pub(crate) const fn new(i2c: pac::I2C1, clock: ClockSource) -> Self {
         Self {
             i2c,
-            pins,
             timing: match clock {
                 ClockSource::Crystal => const { Timing::on(ClockSource::Crystal) },
                 ClockSource::Internal => const { Timing::on(ClockSource::Internal) },
@@ -75,9 +73,9 @@ impl DacBus {
             return Ok(());
         }
         self.leave();
-        self.pins.by_hand();
-        free(&mut self.pins).map_err(DacBusError::Held)?;
-        self.pins.by_peripheral();
+        BusPins.by_hand();
+        free(&mut BusPins).map_err(DacBusError::Held)?;
+        BusPins.by_peripheral();
         // End the reset that `leave` has begun.
         self.i2c.cr1().write(|w| w.swrst().clear_bit());
         let Timing { mhz, third, rise } = self.timing;

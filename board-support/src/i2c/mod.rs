@@ -19,6 +19,4 @@ mod master;
 mod pins;
 
 #[cfg(target_os = "none")]
-pub(crate) use pins::BusPins;
-#[cfg(target_os = "none")]
 pub use {error::DacBusError, freeing::Held, master::DacBus};

@@ -1,23 +1,23 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::stack::LowWater;
+use board_support::{PinOutput, boards::SLOTS, stack::LowWater};
+use firmware::leds::Leds;
 use heapless::spsc::Consumer;
+use modio_drivers::DacLink;
 use rtic::Mutex;
 
 use crate::{
     board::Device,
     installed::AnalogOutputs,
     log::{Event, Log},
-    orders::Orders,
     persistence::Persistence,
-    signals::Signals,
 };
 
 /// The state of the background task.
 pub struct Background {
     pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
-    pub signals: Signals,
+    pub leds: Leds<PinOutput>,
     pub log: Log,
     pub stack: LowWater,
     /// The state of the radio that was logged last.
@@ -30,43 +30,33 @@ impl Background {
         &mut self,
         device: &mut impl Mutex<T = &'static mut Device>,
         activity: &mut impl Mutex<T = bool>,
-        orders: &mut impl Mutex<T = Orders>,
+        dacs: &mut impl Mutex<T = [DacLink; SLOTS]>,
         logged: &mut Consumer<'static, Event>,
     ) {
-        self.analog_outputs.work();
+        self.analog_outputs.work(dacs);
 
-        let Orders {
-            save,
-            restart,
-            identify,
-        } = orders.lock(core::mem::take);
-        if save {
-            self.persistence.begin();
-        }
-        if restart {
-            self.persistence.restart_when_done();
-        }
         if let Some(event) = self.persistence.work(device) {
             self.log.event(event);
         }
         self.persistence.erase();
 
-        if identify {
-            self.signals.identify();
-        }
         let free = self.stack.check();
-        let (failing, millis, radio) = device.lock(|device| {
+        let (identify, failing, millis, radio) = device.lock(|device| {
+            let identify = core::mem::take(&mut device.identify);
             let state = &mut device.state;
             state.stack_free = free;
             let (millis, radio) = (state.millis(), state.radio_works);
-            (device.any_fails(), millis, radio)
+            (identify, device.any_fails(), millis, radio)
         });
         if let Some(works) = radio
             && self.radio.replace(works) != radio
         {
             self.log.event(Event::Radio(works));
         }
-        self.signals
+        if identify {
+            self.leds.identify();
+        }
+        self.leds
             .show(millis, failing, || activity.lock(core::mem::take));
         while let Some(event) = logged.dequeue() {
             self.log.event(event);

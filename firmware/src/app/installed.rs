@@ -1,17 +1,12 @@
 //! The modules installed in the slots.
 
-use board_support::{AnalogLines, DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
+use board_support::{DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
 use modio_drivers::{
-    Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, DacError, DacLink, DacWorker,
-    Di4, Do4, IoModule, Kind, ModuleError, Relay2,
+    Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, Codes, DacLink, DacWorker, Di4,
+    Do4, IoModule, Kind, ModuleError, Relay2,
 };
 use register_map::Module;
-
-use crate::converter::Converter;
-
-/// Links between the scan, which commands analog outputs, and the background, which sends them to the DACs. One for
-/// each slot.
-static DAC_LINKS: [DacLink; SLOTS] = [const { DacLink::new() }; SLOTS];
+use rtic::Mutex;
 
 /// A module and the lines of its slot, configured for it.
 pub enum Installed {
@@ -19,19 +14,14 @@ pub enum Installed {
     Di4(Di4<PinInput>),
     Do4(Do4<PinOutput>),
     Relay2(Relay2<PinInput, PinOutput>),
-    Ai4(Ai4<Converter>),
-    Ao4(Ao4<'static>),
-    Ai2Ao2(Ai2Ao2<'static, Converter>),
+    Ai4(Ai4),
+    Ao4(Ao4),
+    Ai2Ao2(Ai2Ao2),
 }
 
 impl Installed {
-    /// Configures the slot for a module. `link` connects the module to the slot's DAC, if it has one.
-    fn new(module: Module, slot: Slot, sampler: &mut Sampler, link: &'static DacLink) -> Self {
-        let mut analog = |slot: Slot, lines| {
-            let inputs = slot.into_analog(lines);
-            sampler.serve(&inputs);
-            Converter(inputs)
-        };
+    /// Configures the slot for a module. `analog` is for the slot's inputs of the ADC.
+    fn new(module: Module, slot: Slot, analog: &mut [Option<u8>; 4]) -> Self {
         match module {
             Module::None => Self::None(Absent),
             Module::Di4 => Self::Di4(Di4::new(slot.into_inputs())),
@@ -40,9 +30,15 @@ impl Installed {
                 let (jumpers, coils) = slot.into_relay();
                 Self::Relay2(Relay2::new(jumpers, coils))
             }
-            Module::Ai4 => Self::Ai4(Ai4::new(analog(slot, AnalogLines::Four))),
-            Module::Ao4 => Self::Ao4(Ao4::new(link)),
-            Module::Ai2Ao2 => Self::Ai2Ao2(Ai2Ao2::new(analog(slot, AnalogLines::Two), link)),
+            Module::Ai4 => {
+                *analog = slot.into_analog(4);
+                Self::Ai4(Ai4::new())
+            }
+            Module::Ao4 => Self::Ao4(Ao4::new()),
+            Module::Ai2Ao2 => {
+                *analog = slot.into_analog(2);
+                Self::Ai2Ao2(Ai2Ao2::new())
+            }
         }
     }
 
@@ -80,12 +76,12 @@ impl IoModule for Installed {
         self.driver_mut().configure(settings);
     }
 
-    fn read_inputs(&mut self, channels: &mut Channels) -> Result<(), ModuleError> {
-        self.driver_mut().read_inputs(channels)
+    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError> {
+        self.driver_mut().read_inputs(channels, codes)
     }
 
-    fn drive_outputs(&mut self, channels: &Channels) -> Result<(), ModuleError> {
-        self.driver_mut().drive_outputs(channels)
+    fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError> {
+        self.driver_mut().drive_outputs(channels, dac)
     }
 }
 
@@ -98,17 +94,20 @@ pub struct AnalogOutputs {
 
 impl AnalogOutputs {
     /// Sends pending output values to the DACs.
-    pub fn work(&mut self) {
-        for (worker, link) in self.workers.iter_mut().zip(&DAC_LINKS) {
-            let Some(worker) = worker else {
-                continue;
-            };
-            match worker.work(&mut self.bus, link) {
-                Ok(_) => {}
-                // The driver recovers the bus before its next transfer.
-                Err(DacError::NotAnswering(_) | DacError::Bus(_)) => {}
+    pub fn work(&mut self, dacs: &mut impl Mutex<T = [DacLink; SLOTS]>) {
+        let mut links = dacs.lock(|dacs| *dacs);
+        for (worker, link) in self.workers.iter_mut().zip(&mut links) {
+            if let Some(worker) = worker {
+                // After an error the bus is recovered before its next transfer.
+                let _ = worker.work(&mut self.bus, link.wanted);
+                link.failed = worker.failed();
             }
         }
+        dacs.lock(|dacs| {
+            for (dac, link) in dacs.iter_mut().zip(links) {
+                dac.failed = link.failed;
+            }
+        });
     }
 }
 
@@ -121,15 +120,15 @@ pub fn install(
 ) -> ([Installed; SLOTS], AnalogOutputs) {
     let mut workers = [const { None }; SLOTS];
     let mut installed = [const { Installed::None(Absent) }; SLOTS];
-    let plugged = modules.into_iter().zip(slots).zip(&DAC_LINKS);
-    for (((module, slot), link), (place, worker)) in
+    let plugged = modules.into_iter().zip(slots).zip(&mut sampler.inputs);
+    for (((module, slot), analog), (place, worker)) in
         plugged.zip(installed.iter_mut().zip(&mut workers))
     {
         *worker = match module {
             Module::Ao4 | Module::Ai2Ao2 => Some(DacWorker::new(slot.dac_address())),
             Module::None | Module::Di4 | Module::Do4 | Module::Relay2 | Module::Ai4 => None,
         };
-        *place = Installed::new(module, slot, sampler, link);
+        *place = Installed::new(module, slot, analog);
     }
     (installed, AnalogOutputs { bus, workers })
 }

@@ -155,7 +155,7 @@ impl Log {
         }
         match start.address {
             Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),
-            Address::Loader => self.write(&mut Line::of("unit address 255 (loader mode)")),
+            Address::Recovery => self.write(&mut Line::of("unit address 255 (recovery mode)")),
             Address::Invalid => {
                 let text = ", which is no unit address: the line stays silent";
                 self.write(

@@ -27,20 +27,16 @@
 mod background;
 mod board;
 mod clock;
-mod converter;
 mod every;
 mod fault_record;
 mod installed;
 mod line;
 mod log;
-mod orders;
-mod pages;
 mod persistence;
 mod radio;
 mod rtt;
 mod scanning;
 mod serving;
-mod signals;
 mod start;
 mod trap;
 
@@ -48,10 +44,13 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{RadioUart, ScanTimer, Watchdog, fault, pac::Interrupt, stack::LowWater};
+    use board_support::{
+        RadioUart, ScanTimer, Watchdog, boards::SLOTS, fault, pac::Interrupt, stack::LowWater,
+    };
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
+    use modio_drivers::DacLink;
 
     use crate::{
         background::Background,
@@ -59,11 +58,9 @@ mod app {
         clock,
         line::Line,
         log::Event,
-        orders::Orders,
         radio::{Polling, Radio, on_interrupt},
         scanning::Scanning,
         serving::Serving,
-        signals::Signals,
         start,
     };
 
@@ -79,8 +76,8 @@ mod app {
         device: &'static mut Device,
         /// A request for this unit has been served since the LEDs were last updated.
         activity: bool,
-        /// Commands from requests for the background task.
-        orders: Orders,
+        /// What the scan and the background task exchange about each slot's DAC.
+        dacs: [DacLink; SLOTS],
     }
 
     #[local]
@@ -120,7 +117,7 @@ mod app {
                 radio: started.radio,
                 radio_uart: started.radio_uart,
                 activity: false,
-                orders: Orders::default(),
+                dacs: started.dacs,
                 device: started.device,
             },
             Local {
@@ -133,7 +130,7 @@ mod app {
                 background_work: Background {
                     analog_outputs: started.analog_outputs,
                     persistence: started.persistence,
-                    signals: Signals::new(started.leds, started.trouble),
+                    leds: started.leds,
                     log: started.log,
                     stack: LowWater::new(),
                     radio: None,
@@ -209,33 +206,33 @@ mod app {
         binds = EXTI3,
         priority = 3,
         local = [serving],
-        shared = [line, radio, device, activity, orders],
+        shared = [line, radio, device, activity],
     )]
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
         let mut shared = cx.shared;
-        let served = cx.local.serving.run(
-            &mut shared.line,
-            &mut shared.radio,
-            &mut shared.device,
-            &mut shared.orders,
-        );
+        let served = cx
+            .local
+            .serving
+            .run(&mut shared.line, &mut shared.radio, &mut shared.device);
         if served {
             shared.activity.lock(|activity| *activity = true);
         }
         alive::end(fault::marks(), Task::Serve);
     }
 
-    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device])]
+    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device, dacs])]
     fn scan(cx: scan::Context) {
         let mark = alive::look(fault::marks(), Task::Scan);
         alive::begin(fault::marks(), Task::Scan);
         alive::end_line(fault::marks());
         let mut shared = cx.shared;
-        let beat = cx
-            .local
-            .scanning
-            .run(&mut shared.line, &mut shared.device, cx.local.events);
+        let beat = cx.local.scanning.run(
+            &mut shared.line,
+            &mut shared.device,
+            &mut shared.dacs,
+            cx.local.events,
+        );
         if beat {
             alive::end(fault::marks(), Task::Scan);
             if *cx.local.radio_is_on {
@@ -260,14 +257,14 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, orders])]
+    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, dacs])]
     fn background(cx: background::Context) {
         alive::begin(fault::marks(), Task::Background);
         let mut shared = cx.shared;
         cx.local.background_work.run(
             &mut shared.device,
             &mut shared.activity,
-            &mut shared.orders,
+            &mut shared.dacs,
             cx.local.logged,
         );
         alive::end(fault::marks(), Task::Background);

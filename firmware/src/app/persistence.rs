@@ -3,7 +3,7 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::{fault, flash::FlashError};
+use board_support::{Flash, fault, flash::FlashError};
 use firmware::{
     config::Settings,
     store::{Operation, Saving, Store, StoreError},
@@ -13,59 +13,40 @@ use rtic::Mutex;
 use crate::{
     board::{BOARD, Device},
     log::Event,
-    pages::Pages,
 };
 
 /// The store, and a save under way.
 pub struct Persistence {
     store: Store,
-    pages: Pages,
+    pages: Flash,
     saving: Option<Saving>,
-    /// A save was ordered and has not begun.
-    ordered: bool,
     /// The operation of the save that the flash refused because of a low supply.
     refused: Option<Operation>,
     /// The low supply has been logged.
     low: bool,
     /// The page that is no longer needed is to be erased.
     erase: bool,
-    restart: bool,
 }
 
 impl Persistence {
     /// `erase`: the start could not erase the page that is no longer needed.
-    pub fn new(store: Store, pages: Pages, erase: bool) -> Self {
+    pub fn new(store: Store, pages: Flash, erase: bool) -> Self {
         Self {
             store,
             pages,
             saving: None,
-            ordered: false,
             refused: None,
             low: false,
             erase,
-            restart: false,
         }
     }
 
-    /// Saves the settings that the configuration has set aside, in the next [`work`](Self::work).
-    pub const fn begin(&mut self) {
-        self.ordered = true;
-    }
-
-    /// Restarts the device as soon as no save is under way or waiting.
-    pub const fn restart_when_done(&mut self) {
-        self.restart = true;
-    }
-
-    /// Continues a save until its end or until the supply is too low, one flash operation at a time with interrupts
-    /// in between. Then restarts the device if that was ordered.
+    /// Begins a save that was ordered, or continues one, until its end or until the supply is too low, one flash
+    /// operation at a time with interrupts in between. Then restarts the device if that was ordered.
     pub fn work(&mut self, device: &mut impl Mutex<T = &'static mut Device>) -> Option<Event> {
-        let event = if self.ordered || self.saving.is_some() {
-            self.save(device)
-        } else {
-            None
-        };
-        if self.restart && self.saving.is_none() {
+        let (save, restart) = device.lock(|device| (device.config.is_saving(), device.restart));
+        let event = if save { self.save(device) } else { None };
+        if restart && self.saving.is_none() {
             board_support::restart();
         }
         event
@@ -93,22 +74,22 @@ impl Persistence {
         // A copy, so that requests do not wait while the settings are encoded. They stay the same until the end of
         // the save.
         let settings = device.lock(|device| device.config.to_save().clone());
-        if core::mem::take(&mut self.ordered) {
-            self.saving = Saving::new(&self.store, &self.pages, &settings);
-            if self.saving.is_some() {
+        let mut saving = match self.saving.take() {
+            Some(saving) => saving,
+            None => {
+                let Some(saving) = Saving::new(&self.store, &self.pages, &settings) else {
+                    // These settings are already stored, so nothing is written and the flash does not wear.
+                    Self::end(&settings, device);
+                    return None;
+                };
                 let Some(left) = device.lock(|device| device.config.take_save()) else {
-                    self.saving = None;
                     self.fail(device);
                     return None;
                 };
                 // A restart may follow before the next scan, which keeps the number otherwise.
                 fault::keep_saves(left);
+                saving
             }
-        }
-        let Some(mut saving) = self.saving.take() else {
-            // These settings are already stored, so nothing is written and the flash does not wear.
-            Self::end(&settings, device);
-            return None;
         };
         let mut good = true;
         if !self.pages.has_supply() {

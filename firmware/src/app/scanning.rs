@@ -1,9 +1,9 @@
 //! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
 use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
-use firmware::{device::IoPort, lamps::TICK_MS};
+use firmware::{device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
-use modio_drivers::{IoModule, ModuleError};
+use modio_drivers::{DacLink, IoModule, ModuleError};
 use rtic::Mutex;
 
 use crate::{
@@ -31,12 +31,17 @@ pub struct Scanning {
 
 impl Scanning {
     /// Configures the modules and drives their outputs for the first time. The sampler samples their analog lines.
-    pub fn new(mut modules: [Installed; SLOTS], sampler: Sampler, device: &Device) -> Self {
+    pub fn new(
+        mut modules: [Installed; SLOTS],
+        sampler: Sampler,
+        device: &Device,
+        dacs: &mut [DacLink; SLOTS],
+    ) -> Self {
         let ports = device.points.ports();
-        for (module, port) in modules.iter_mut().zip(ports) {
+        for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs) {
             module.configure(port.settings());
             // If a module cannot be driven, the first scan reports it.
-            let _ = module.drive_outputs(port.channels());
+            let _ = module.drive_outputs(port.channels(), dac);
         }
         Self {
             modules,
@@ -53,6 +58,7 @@ impl Scanning {
         &mut self,
         line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,
+        dacs: &mut impl Mutex<T = [DacLink; SLOTS]>,
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
@@ -82,14 +88,16 @@ impl Scanning {
 
         let mut results = [Ok(()); SLOTS];
         let modules = self.modules.iter_mut().zip(&channels);
-        for ((module, channels), result) in modules.zip(&mut results) {
-            *result = module.drive_outputs(channels);
-        }
+        dacs.lock(|dacs| {
+            for (((module, channels), result), dac) in modules.zip(&mut results).zip(dacs) {
+                *result = module.drive_outputs(channels, dac);
+            }
+        });
         if beat {
-            self.sampler.run();
-            let modules = self.modules.iter_mut().zip(&mut channels);
-            for ((module, channels), result) in modules.zip(&mut results) {
-                *result = ModuleError::in_either(*result, module.read_inputs(channels));
+            let codes = self.sampler.run();
+            let modules = self.modules.iter_mut().zip(&mut channels).zip(&codes);
+            for (((module, channels), codes), result) in modules.zip(&mut results) {
+                *result = ModuleError::in_either(*result, module.read_inputs(channels, codes));
             }
         }
         let changed = device.lock(|device| {
@@ -122,7 +130,7 @@ impl Scanning {
         if beat {
             fault::keep_uptime(uptime_s);
             fault::keep_saves(saves);
-            self.look_at_line(line, device, events);
+            self.check_line(line, device, events);
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.
         if self.background_beat.is_due() || !beat || tripped {
@@ -131,7 +139,7 @@ impl Scanning {
         beat
     }
 
-    fn look_at_line(
+    fn check_line(
         &mut self,
         line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,

@@ -8,13 +8,13 @@
 use board_support::pac::Interrupt;
 use firmware::{
     config::{LineName, Origin},
-    start_up::LOADER_UNIT,
+    start_up::RECOVERY_UNIT,
 };
 use modbus_server::{LineCounters, Outcome, Request, Server, line::Framing};
 use register_map::codes::Command;
 use rtic::Mutex;
 
-use crate::{board::Device, line::Line, orders::Orders, radio::Radio};
+use crate::{board::Device, line::Line, radio::Radio};
 
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
@@ -54,7 +54,7 @@ impl Serving {
                 line: LineName::Rs485,
                 frame_gap_ms: rs485.1,
                 // In recovery mode a unit must be found even by a master with a short time-out.
-                at_once: unit == LOADER_UNIT,
+                at_once: unit == RECOVERY_UNIT,
                 order: None,
             },
             radio: Served {
@@ -74,13 +74,12 @@ impl Serving {
         rs485: &mut impl Mutex<T = Option<Line>>,
         radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
-        orders: &mut impl Mutex<T = Orders>,
     ) -> bool {
         if let Some(order) = self.rs485.order
             && rs485.lock(|line| line.as_ref().is_some_and(|line| !line.is_replying()))
         {
             self.rs485.order = None;
-            execute(order, device, orders);
+            execute(order, device);
         }
         // Only a restart affects a reply that is on its way. The other commands are executed before the master can
         // have the reply, because a command of the other line may follow it.
@@ -92,7 +91,7 @@ impl Serving {
             })
         {
             self.radio.order = None;
-            execute(order, device, orders);
+            execute(order, device);
         }
         let mut served = false;
         if let Some(request) = rs485.lock(|line| line.as_mut()?.take()) {
@@ -175,18 +174,7 @@ impl Served {
 
 /// Executes the command of a request whose reply has been sent, or passes it on to the background task.
 #[inline(never)]
-fn execute(
-    order: Command,
-    device: &mut impl Mutex<T = &'static mut Device>,
-    orders: &mut impl Mutex<T = Orders>,
-) {
-    if let Some(order) = device.lock(|device| device.carry_out(order)) {
-        orders.lock(|orders| match order {
-            Command::Save => orders.save = true,
-            Command::Restart => orders.restart = true,
-            Command::Identify => orders.identify = true,
-            _ => {}
-        });
-        rtic::pend(Interrupt::EXTI0);
-    }
+fn execute(order: Command, device: &mut impl Mutex<T = &'static mut Device>) {
+    device.lock(|device| device.carry_out(order));
+    rtic::pend(Interrupt::EXTI0);
 }

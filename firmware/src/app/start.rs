@@ -3,13 +3,14 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Leds, RadioUart, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, pac, uart,
+    PinOutput, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError,
+    gap::LineTimes, pac, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
     config::{self, Config, RadioConfig},
     device::Identity,
-    lamps::Trouble,
+    leds::{Leds, Trouble},
     start_up::{self, Address},
     store::{Store, StoreError},
 };
@@ -17,7 +18,7 @@ use modbus_server::{
     Adu,
     line::{Framing, Gaps, Port, Receiver, Width},
 };
-use modio_drivers::IoModule;
+use modio_drivers::{DacLink, IoModule};
 use register_map::{
     codes::{Format, GapRule, Mode},
     state::reset_cause::POWER_ON,
@@ -29,7 +30,6 @@ use crate::{
     installed::{AnalogOutputs, install},
     line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
-    pages::Pages,
     persistence::Persistence,
     radio::{Aux, Radio, Serial},
     scanning::Scanning,
@@ -48,12 +48,12 @@ pub struct Started {
     pub device: &'static mut Device,
     pub scanning: Scanning,
     pub analog_outputs: AnalogOutputs,
+    pub dacs: [DacLink; SLOTS],
     pub persistence: Persistence,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
-    pub leds: Leds,
+    pub leds: Leds<PinOutput>,
     pub log: Log,
-    pub trouble: Trouble,
 }
 
 /// The memory for what is too large to be moved over the stack, or is shared with interrupts.
@@ -79,7 +79,7 @@ pub fn up(
     let mut board = board::setup(device, scb, masked);
     let address = Address::from_dip(board.dip);
 
-    let mut pages = Pages(board.flash);
+    let mut pages = board.flash;
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
     let radio_config = RadioConfig::of(&loaded.settings);
@@ -108,7 +108,8 @@ pub fn up(
     };
     let kinds = modules.each_ref().map(IoModule::kinds);
     let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
-    let scanning = Scanning::new(modules, sampler, device);
+    let mut dacs = [DacLink::default(); SLOTS];
+    let scanning = Scanning::new(modules, sampler, device, &mut dacs);
 
     log.start(&log::Start {
         address,
@@ -194,12 +195,15 @@ pub fn up(
         device,
         scanning,
         analog_outputs,
+        dacs,
         persistence: Persistence::new(store, pages, erase),
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
-        leds: board.leds,
         log,
-        trouble: Trouble::at_start(address, board.clock.is_crystal()),
+        leds: Leds::new(
+            board.leds,
+            Trouble::at_start(address, board.clock.is_crystal()),
+        ),
     }
 }
 

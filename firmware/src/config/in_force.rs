@@ -24,7 +24,7 @@ pub struct LineConfig {
 }
 
 impl LineConfig {
-    /// The factory setting: 9600 8N2 RTU. The loader mode always uses it.
+    /// The factory setting: 9600 8N2 RTU. Recovery mode always uses it.
     pub const FACTORY: Self = Self {
         baud: Baud::B9600,
         format: Format::F8N2,

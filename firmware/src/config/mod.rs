@@ -45,6 +45,17 @@ pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, takes_module};
 
+/// How far a save is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Save {
+    /// No save is ordered.
+    None,
+    /// The reply to the order has not been sent yet.
+    Ordered,
+    /// The settings to be stored are set aside.
+    Begun,
+}
+
 /// The configuration of a running device on a board with `SLOTS` slots.
 #[derive(Debug)]
 pub struct Config<const SLOTS: usize> {
@@ -54,8 +65,7 @@ pub struct Config<const SLOTS: usize> {
     saved: Settings,
     /// Number of settings in `edited` that differ from `saved`.
     differences: u16,
-    /// A save was ordered and is not complete.
-    saving: bool,
+    save: Save,
     /// The flash does not hold `saved`, because the stored configuration was invalid at the start.
     unstored: bool,
     saves: Saves,
@@ -99,7 +109,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             edited: stored.clone(),
             saved: stored,
             differences: 0,
-            saving: false,
+            save: Save::None,
             unstored: invalid,
             saves: Saves::new(SAVES),
             lock: Lock::closed(),
@@ -194,8 +204,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.check_line()?;
         let aired = self.origin.broadcast && self.origin.line == LineName::Radio;
         let order = words.get(COMMAND.wrapping_sub(span.start()));
-        let cannot_save =
-            order == Some(Command::Save.code()) && (self.saving || !self.can_pay(span, words));
+        let cannot_save = order == Some(Command::Save.code())
+            && (self.save != Save::None || !self.can_pay(span, words));
         if aired || cannot_save || !(self.is_unlocked() || span == Span::single(KEY)) {
             return Err(Exception::ServerDeviceBusy);
         }
@@ -260,8 +270,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     ///
     /// - [`Command::Save`]: [`Self::begin_save`], then the save itself.
     /// - [`Command::LoadDefaults`], [`Command::DropChanges`]: the method of that name.
-    /// - [`Command::Restart`], [`Command::EnterLoader`]: only when no save is running,
-    ///   [`Self::is_saving`].
+    /// - [`Command::Restart`]: only when no save is running, [`Self::is_saving`].
     #[must_use = "the caller must execute the command"]
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
         self.lock.open(self.origin.line);
@@ -280,7 +289,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
         if span != Span::single(KEY) && span != Span::single(COMMAND) {
             self.edited_anew();
         }
-        self.saving |= command == Some(Command::Save);
+        if command == Some(Command::Save) {
+            self.save = Save::Ordered;
+        }
         command
     }
 
@@ -326,7 +337,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// COMMAND 1: copies the present settings for a save, which later changes do not affect. [`Self::to_save`]
     /// returns the copy until [`Self::end_save`] or [`Self::save_failed`].
     pub fn begin_save(&mut self) {
-        self.saving = true;
+        self.save = Save::Begun;
         self.saved.clone_from(&self.edited);
         self.differences = 0;
     }
@@ -346,7 +357,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// Ends a successful save. `changed` says whether the saved settings need a restart to be in force, see
     /// [`Settings::needs_restart`].
     pub const fn end_save(&mut self, changed: bool) {
-        self.saving = false;
+        self.save = Save::None;
         self.unstored = false;
         self.waiting = self.left != 0 || changed;
     }
@@ -355,7 +366,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn save_failed(&mut self, stored: Settings) {
         self.saved = stored;
         self.differences = self.edited.differences(&self.saved);
-        self.saving = false;
+        self.save = Save::None;
     }
 
     /// Takes one save from the budget, before the first operation on the flash. Returns the number that is left, to be
@@ -377,10 +388,10 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.saves = Saves::new(left);
     }
 
-    /// Returns whether a save was ordered and is not complete.
+    /// Returns whether a save has begun and is not complete.
     #[must_use]
     pub const fn is_saving(&self) -> bool {
-        self.saving
+        matches!(self.save, Save::Begun)
     }
 
     /// Advances the time by `ms` milliseconds. The lock closes 60 s after the last write, and the budget gets one
@@ -397,8 +408,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
         const fn bit(mask: u16, set: bool) -> u16 {
             if set { mask } else { 0 }
         }
+        let unsaved = self.differences > 0 || !matches!(self.save, Save::None);
         bit(status::STORED_INVALID, self.invalid)
-            | bit(status::UNSAVED, self.differences > 0 || self.saving)
+            | bit(status::UNSAVED, unsaved)
             | bit(status::RESTART_NEEDED, self.waiting)
             | bit(status::UNLOCKED, self.is_unlocked())
     }

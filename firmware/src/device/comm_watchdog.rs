@@ -37,7 +37,7 @@ impl CommWatchdog {
 
     /// Checks the silence at the time `now`; `timeout_ms` is `None` while the watchdog is off. Returns true once
     /// per silence, when it has reached the time-out.
-    pub const fn look(&mut self, now: u32, timeout_ms: Option<u32>) -> bool {
+    pub const fn check(&mut self, now: u32, timeout_ms: Option<u32>) -> bool {
         let Some(timeout_ms) = timeout_ms else {
             // While the watchdog is off, restart the silence, so that it counts from when the watchdog is switched
             // on.
@@ -73,7 +73,7 @@ mod tests {
     /// Returns the time at which the watchdog trips when it is checked every millisecond after `now`.
     fn trips_at(watchdog: &mut CommWatchdog, now: u32, timeout_ms: u32) -> u32 {
         (now + 1..now + 10_000)
-            .find(|now| watchdog.look(*now, Some(timeout_ms)))
+            .find(|now| watchdog.check(*now, Some(timeout_ms)))
             .unwrap()
     }
 
@@ -81,13 +81,13 @@ mod tests {
     fn it_trips_once_per_silence_and_the_flag_stays_set() {
         let mut watchdog = CommWatchdog::new();
         assert_eq!(trips_at(&mut watchdog, 0, 100), 100);
-        assert!((101..1000).all(|now| !watchdog.look(now, Some(100))));
+        assert!((101..1000).all(|now| !watchdog.check(now, Some(100))));
         watchdog.refresh(1000);
         assert!(watchdog.has_tripped(), "a request does not clear the flag");
         assert_eq!(trips_at(&mut watchdog, 1000, 100), 1100);
         watchdog.clear();
         assert!(!watchdog.has_tripped());
-        assert!((1101..2000).all(|now| !watchdog.look(now, Some(100))));
+        assert!((1101..2000).all(|now| !watchdog.check(now, Some(100))));
     }
 
     #[test]
@@ -107,13 +107,13 @@ mod tests {
     fn a_late_check_measures_exactly_the_silence() {
         let mut watchdog = CommWatchdog::new();
         watchdog.refresh(1000);
-        assert!(!watchdog.look(1090, Some(100)));
+        assert!(!watchdog.check(1090, Some(100)));
         // Nothing could be checked for 40 ms; a request ended in the middle of them.
         watchdog.refresh(1110);
-        assert!(!watchdog.look(1130, Some(100)));
+        assert!(!watchdog.check(1130, Some(100)));
         assert_eq!(trips_at(&mut watchdog, 1130, 100), 1210);
         watchdog.refresh(1300);
-        assert!(watchdog.look(1440, Some(100)));
+        assert!(watchdog.check(1440, Some(100)));
     }
 
     #[test]
@@ -135,18 +135,18 @@ mod tests {
         let mut watchdog = CommWatchdog::new();
         watchdog.refresh(u32::MAX - 2_000);
         watchdog.refresh(u32::MAX - 9);
-        assert!(!watchdog.look(89, Some(100)));
-        assert!(watchdog.look(90, Some(100)));
+        assert!(!watchdog.check(89, Some(100)));
+        assert!(watchdog.check(90, Some(100)));
     }
 
     #[test]
     fn requests_prevent_a_trip_and_the_silence_counts_from_switching_on() {
         let mut watchdog = CommWatchdog::new();
         for n in 0..100 {
-            assert!((0..100).all(|ms| !watchdog.look(100 * n + ms, Some(100))));
+            assert!((0..100).all(|ms| !watchdog.check(100 * n + ms, Some(100))));
             watchdog.refresh(100 * (n + 1));
         }
-        assert!((10_000..11_000).all(|now| !watchdog.look(now, None)));
+        assert!((10_000..11_000).all(|now| !watchdog.check(now, None)));
         assert_eq!(trips_at(&mut watchdog, 10_999, 100), 11_099);
     }
 }

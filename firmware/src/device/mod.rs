@@ -54,6 +54,10 @@ pub struct Device<const SLOTS: usize> {
     comm_watchdog: CommWatchdog,
     /// A command from a request, to be executed when its reply has been sent.
     ordered: Option<Command>,
+    /// The device is to restart once no save is under way.
+    pub restart: bool,
+    /// The LEDs are to blink.
+    pub identify: bool,
     /// Revision of the configuration whose settings the points have.
     revision: u16,
 }
@@ -109,6 +113,8 @@ impl<const SLOTS: usize> Device<SLOTS> {
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
             ordered: None,
+            restart: false,
+            identify: false,
             revision: config.revision(),
             config,
         };
@@ -143,7 +149,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.state.tick(ms);
         self.config.tick(ms);
         let timeout_ms = self.config.comm_timeout_ms();
-        let tripped = self.comm_watchdog.look(self.state.millis(), timeout_ms);
+        let tripped = self.comm_watchdog.check(self.state.millis(), timeout_ms);
         if tripped {
             self.points.ports_mut().iter_mut().for_each(IoPort::go_safe);
         }
@@ -178,23 +184,20 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.ordered.take()
     }
 
-    /// Executes the part of a command that only changes memory; the reply has been sent. Returns what is left to
-    /// do: a save that has begun, a restart, identify, or the loader.
-    pub fn carry_out(&mut self, order: Command) -> Option<Command> {
+    /// Executes a command whose reply has been sent. The background task does what is left: a save that has begun,
+    /// a restart, identify.
+    pub fn carry_out(&mut self, order: Command) {
         match order {
+            Command::Save => self.config.begin_save(),
+            Command::Restart => self.restart = true,
             Command::LoadDefaults => self.config.load_defaults(),
             Command::DropChanges => self.config.drop_changes(),
             Command::ClearWatchdogFlag => self.comm_watchdog.clear(),
-            Command::Save => self.config.begin_save(),
-            Command::Restart | Command::Identify | Command::EnterLoader => {}
+            Command::Identify => self.identify = true,
+            // `check_ready` rejects it.
+            Command::EnterLoader => {}
         }
         self.settings_may_have_changed();
-        match order {
-            Command::Save | Command::Restart | Command::Identify | Command::EnterLoader => {
-                Some(order)
-            }
-            Command::LoadDefaults | Command::DropChanges | Command::ClearWatchdogFlag => None,
-        }
     }
 
     #[inline]

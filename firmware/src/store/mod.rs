@@ -32,7 +32,6 @@
 //! - When something was stored but no record is valid, the defaults are in force and the damage is reported at
 //!   every start until something is saved. One page is left unchanged as evidence.
 
-mod flash;
 mod operation;
 mod saving;
 mod survey;
@@ -41,15 +40,24 @@ use register_map::Board;
 use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA, pair_of};
 
 use crate::config::Settings;
-pub use flash::{Flash, Page, StoreError};
+pub use board_support::pages::{Page, Pages};
 pub use operation::Operation;
 use operation::{Readying, Writing};
 pub use saving::Saving;
-use survey::{Found, Survey, record_at};
+use survey::{Place, Survey, record_at};
 
 /// A start moves the newest record to the other page when fewer bytes than this follow it and older records precede
 /// it.
 const LITTLE_ROOM: usize = 256;
+
+/// Error of the store. It never damages what was stored before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoreError<E> {
+    /// The flash refused the operation or failed. The page may be worn out.
+    Flash(Page, E),
+    /// The flash does not read back as programmed at this offset: the page is worn out.
+    Worn(Page, usize),
+}
 
 /// The configuration that a start found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,7 +74,7 @@ pub struct Loaded {
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     page: Page,
-    found: Found,
+    place: Place,
 }
 
 /// The state of the two pages.
@@ -79,7 +87,7 @@ pub struct Store {
 impl Store {
     /// Examines both pages.
     #[must_use]
-    pub fn open(flash: &impl Flash) -> Self {
+    pub fn open(flash: &impl Pages) -> Self {
         Self {
             first: Survey::of(flash.page(Page::First)),
             second: Survey::of(flash.page(Page::Second)),
@@ -88,9 +96,9 @@ impl Store {
 
     /// Returns the stored configuration, as far as this board allows it. [`Self::prepare`] uses the same record.
     #[must_use]
-    pub fn load(&mut self, board: &Board, flash: &impl Flash) -> Loaded {
-        while let Some(Newest { page, found }) = self.newest() {
-            if let Some(record) = record_at(flash.page(page), found.offset) {
+    pub fn load(&mut self, board: &Board, flash: &impl Pages) -> Loaded {
+        while let Some(Newest { page, place }) = self.newest() {
+            if let Some(record) = record_at(flash.page(page), place.offset) {
                 let (settings, rejected) = Settings::load(board, record.pairs());
                 return Loaded {
                     settings,
@@ -114,7 +122,7 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid, and later saves are still tried.
-    pub fn prepare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn prepare<F: Pages>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         // Use the survey that selected the configuration in force. A second survey could find another record,
         // because a seal whose programming was interrupted may read differently every time.
         let sealed = self.seal_again(flash);
@@ -127,7 +135,7 @@ impl Store {
             None if self.first.written || self.second.written => self.make_one_ready(flash),
             None => self.begin(flash),
         };
-        self.look_again(flash);
+        self.survey_again(flash);
         result
     }
 
@@ -145,23 +153,23 @@ impl Store {
     /// # Errors
     ///
     /// When the flash fails. The stored configuration is still valid.
-    pub fn make_spare<F: Flash>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn make_spare<F: Pages>(&mut self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let result = match self.newest() {
             Some(newest) => self.make_ready(newest.page.other(), flash),
             None => Ok(()),
         };
-        self.look_again(flash);
+        self.survey_again(flash);
         result
     }
 
     /// Programs the seals of the newest record again when the power was cut between them, because the first one may
     /// not read the same every time.
-    fn seal_again<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
-        let Some(Newest { page, found }) = self.newest().filter(|newest| newest.found.sealed == 1)
+    fn seal_again<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+        let Some(Newest { page, place }) = self.newest().filter(|newest| newest.place.sealed == 1)
         else {
             return Ok(());
         };
-        for offset in [found.seals, found.seals.saturating_add(2)] {
+        for offset in [place.seals, place.seals.saturating_add(2)] {
             // 0 can be programmed over any value.
             Operation::Program {
                 page,
@@ -175,13 +183,13 @@ impl Store {
 
     /// Clears the page without the newest record, and moves the newest record there if its own page has little room
     /// left.
-    fn make_room<F: Flash>(
+    fn make_room<F: Pages>(
         &self,
         newest: Newest,
         flash: &mut F,
     ) -> Result<(), StoreError<F::Error>> {
-        let Newest { page, found } = newest;
-        let offset = found.offset;
+        let Newest { page, place } = newest;
+        let offset = place.offset;
         let to = page.other();
         self.make_ready(to, flash)?;
         let survey = self.survey(page);
@@ -193,7 +201,7 @@ impl Store {
         };
         // Copy the record unchanged: the next start may run a newer firmware, which knows all of its values.
         let count = u16::try_from(record.count()).unwrap_or(u16::MAX);
-        let sequence = found.sequence.wrapping_add(1);
+        let sequence = place.sequence.wrapping_add(1);
         let encoder = Encoder::new(record.schema, sequence, count);
         // Version 0.1 wrote records without seals, so its longest record does not fit with seals.
         if encoder.size() > flash.page(to).len().saturating_sub(FIRST_OFFSET) {
@@ -213,7 +221,7 @@ impl Store {
     }
 
     /// Prepares one page when something was stored but no record is valid. The other page is left unchanged.
-    fn make_one_ready<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn make_one_ready<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         if self.first.is_ready() || self.second.is_ready() {
             return Ok(());
         }
@@ -224,7 +232,7 @@ impl Store {
     /// in the first save. It uses a page that needs no erase, so that a power cut here leaves nothing that looks
     /// like a damaged configuration. Exception: when only the first page is blank, an erase may have been
     /// interrupted here before, so the page must be erased again before it is programmed.
-    fn begin<F: Flash>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn begin<F: Pages>(&self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let page = if self.first.blank || self.first.is_ready() || !self.second.blank {
             Page::First
         } else {
@@ -246,7 +254,7 @@ impl Store {
         self.make_ready(page.other(), flash)
     }
 
-    fn make_ready<F: Flash>(&self, page: Page, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    fn make_ready<F: Pages>(&self, page: Page, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         let survey = self.survey(page);
         if survey.is_ready() {
             return Ok(());
@@ -258,7 +266,7 @@ impl Store {
         Ok(())
     }
 
-    fn look_again(&mut self, flash: &impl Flash) {
+    fn survey_again(&mut self, flash: &impl Pages) {
         *self = Self::open(flash);
     }
 
@@ -269,11 +277,11 @@ impl Store {
 
     fn newest(&self) -> Option<Newest> {
         let on = |page: Page| {
-            let found = self.survey(page).newest?;
-            Some(Newest { page, found })
+            let place = self.survey(page).newest?;
+            Some(Newest { page, place })
         };
         match (on(Page::First), on(Page::Second)) {
-            (Some(first), Some(second)) if second.found.counts_before(&first.found) => Some(second),
+            (Some(first), Some(second)) if second.place.counts_before(&first.place) => Some(second),
             (None, second) => second,
             (first, _) => first,
         }

@@ -2,7 +2,7 @@
 
 use register_map::record::{Encoder, PAGE_MARK};
 
-use super::{Flash, Page, StoreError};
+use super::{Page, Pages, StoreError};
 
 /// One flash operation, the longest step during which nothing else can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl Operation {
     /// # Errors
     ///
     /// When the flash failed or does not read back as expected.
-    pub fn perform<F: Flash>(self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
+    pub fn perform<F: Pages>(self, flash: &mut F) -> Result<(), StoreError<F::Error>> {
         match self {
             Self::Program { page, offset, half } => {
                 let done = flash.program(page, offset, half);

@@ -4,7 +4,7 @@ use register_map::record::{Encoder, FIRST_OFFSET, SCHEMA};
 
 use super::operation::{Operation, Readying, Writing};
 use super::survey::record_at;
-use super::{Flash, Page, Store, StoreError};
+use super::{Page, Pages, Store, StoreError};
 use crate::config::Settings;
 
 /// A save under way. Pass the same settings to every step.
@@ -20,14 +20,14 @@ pub struct Saving {
 impl Saving {
     /// Begins a save of these settings. Returns `None` when they are already stored.
     #[must_use]
-    pub fn new(store: &Store, flash: &impl Flash, settings: &Settings) -> Option<Self> {
+    pub fn new(store: &Store, flash: &impl Pages, settings: &Settings) -> Option<Self> {
         let newest = store.newest();
         let stored =
-            newest.and_then(|newest| record_at(flash.page(newest.page), newest.found.offset));
+            newest.and_then(|newest| record_at(flash.page(newest.page), newest.place.offset));
         if stored.is_some_and(|stored| stored.pairs().eq(settings.changed_from(0))) {
             return None;
         }
-        let sequence = newest.map_or(1, |newest| newest.found.sequence.wrapping_add(1));
+        let sequence = newest.map_or(1, |newest| newest.place.sequence.wrapping_add(1));
         // There are at most as many settings as addresses.
         let count = settings
             .changed_from(0)
@@ -60,14 +60,14 @@ impl Saving {
     /// # Errors
     ///
     /// When the settings are not stored.
-    pub fn finish<F: Flash>(
+    pub fn finish<F: Pages>(
         &self,
         store: &mut Store,
         flash: &F,
     ) -> Result<(), StoreError<F::Error>> {
-        store.look_again(flash);
+        store.survey_again(flash);
         match store.newest() {
-            Some(newest) if newest.found.sequence == self.sequence => Ok(()),
+            Some(newest) if newest.place.sequence == self.sequence => Ok(()),
             _ => {
                 store.avoid(self.writing.page);
                 Err(StoreError::Worn(self.writing.page, self.writing.offset()))

@@ -6,7 +6,7 @@ use register_map::record::{
 
 /// The place of a valid record on its page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Found {
+pub(super) struct Place {
     /// Offset of the record, in bytes.
     pub(super) offset: usize,
     /// Offset of its seals, in bytes.
@@ -16,7 +16,7 @@ pub(super) struct Found {
     pub(super) sealed: u8,
 }
 
-impl Found {
+impl Place {
     fn new(page: &[u8], offset: usize, record: Record<'_>) -> Self {
         let seals = offset.saturating_add(record.size());
         let sealed = match page.get(seals..).and_then(<[u8]>::first_chunk) {
@@ -47,7 +47,7 @@ impl Found {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Survey {
     /// The valid record that counts.
-    pub(super) newest: Option<Found>,
+    pub(super) newest: Option<Place>,
     /// The page was erased completely, and the area after its sealed records is still erased.
     pub(super) clean: bool,
     /// The page has the mark of a complete erase.
@@ -79,15 +79,15 @@ impl Survey {
             records: 0,
         };
         for (offset, record) in records(page) {
-            let found = Found::new(page, offset, record);
-            survey.clean &= offset == survey.end && found.sealed == 2;
-            survey.end = found.seals.saturating_add(SEALS);
+            let place = Place::new(page, offset, record);
+            survey.clean &= offset == survey.end && place.sealed == 2;
+            survey.end = place.seals.saturating_add(SEALS);
             survey.records = survey.records.saturating_add(1);
             if survey
                 .newest
-                .is_none_or(|newest| found.counts_before(&newest))
+                .is_none_or(|newest| place.counts_before(&newest))
             {
-                survey.newest = Some(found);
+                survey.newest = Some(place);
             }
         }
         survey.clean &= used <= survey.end;
@@ -166,7 +166,7 @@ mod tests {
         let newest = |bytes: [u8; PAGE_SIZE]| {
             Survey::of(&bytes)
                 .newest
-                .map(|found| (found.sequence, found.sealed))
+                .map(|place| (place.sequence, place.sealed))
         };
         assert_eq!(newest(records_of(&[1, 2], 0)), Some((2, 2)));
         assert_eq!(newest(records_of(&[1, 2], 2)), Some((2, 1)));
@@ -190,7 +190,7 @@ mod tests {
         assert!(Survey::of(&bytes).clean);
         bytes[size + 10] = 0;
         let survey = Survey::of(&bytes);
-        assert!(!survey.clean && survey.newest.map(|found| found.offset) == Some(2));
+        assert!(!survey.clean && survey.newest.map(|place| place.offset) == Some(2));
     }
 
     #[test]
@@ -206,7 +206,7 @@ mod tests {
         put(200, 1);
         put(300, 0);
         let survey = Survey::of(&bytes);
-        let newest = survey.newest.map(|found| (found.offset, found.sequence));
+        let newest = survey.newest.map(|place| (place.offset, place.sequence));
         assert_eq!((newest, survey.records), (Some((200, 1)), 4));
     }
 }

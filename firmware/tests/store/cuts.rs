@@ -2,7 +2,7 @@
 //! leave. The next start must find the complete old or new configuration, and later saves must work.
 
 use firmware::config::Settings;
-use firmware::store::{Flash, Operation, Page, Store, StoreError};
+use firmware::store::{Operation, Page, Pages, Store, StoreError};
 use register_map::board::MODIO_02;
 
 use crate::PAGE_SIZE;
@@ -271,11 +271,11 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
         }
         // Every second read finds the page differently: here the reads at the start differ from those of the save.
         if starts % 2 == 0 {
-            let _ = Flash::page(&flash, Page::First);
+            let _ = Pages::page(&flash, Page::First);
         }
         let mut store = Store::open(&flash);
         let loaded = store.load(&MODIO_02, &flash);
-        let _ = Flash::page(&flash, Page::First);
+        let _ = Pages::page(&flash, Page::First);
         store.prepare(&mut flash).unwrap();
         assert!(loaded.settings == old && !loaded.invalid, "{starts}");
         if let Err(failure) = save(&mut store, &mut flash, &new) {

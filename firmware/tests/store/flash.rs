@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use firmware::store::{Flash, Operation, Page};
+use firmware::store::{Operation, Page, Pages};
 
 use crate::PAGE_SIZE;
 
@@ -52,12 +52,12 @@ struct Torn {
 }
 
 impl Torn {
-    /// Returns what the half-word reads as. The same number of the look always returns the same value.
-    fn read(&self, look: u64) -> [u8; 2] {
+    /// Returns what the half-word reads as. The same number of the read always returns the same value.
+    fn read(&self, nth: u64) -> [u8; 2] {
         let cells = match self.mess {
-            Mess::Nearly if !look.is_multiple_of(2) => 1 << self.before.trailing_zeros(),
+            Mess::Nearly if !nth.is_multiple_of(2) => 1 << self.before.trailing_zeros(),
             Mess::Nearly => 0,
-            _ => Noise(look << 16 ^ self.offset as u64).next() as u16,
+            _ => Noise(nth << 16 ^ self.offset as u64).next() as u16,
         };
         (self.half | self.before & cells).to_le_bytes()
     }
@@ -85,7 +85,7 @@ pub struct MockFlash {
     torn: Vec<Torn>,
     /// The pages as every second read finds them: half-words whose programming was interrupted read differently.
     other: [[u8; PAGE_SIZE]; 2],
-    looks: Cell<u64>,
+    reads: Cell<u64>,
     /// Number of times the power has returned.
     starts: u64,
     /// Number of operations before the one in which the power is cut.
@@ -112,7 +112,7 @@ impl MockFlash {
             unsteady: [false; 2],
             torn: Vec::new(),
             other: pages,
-            looks: Cell::new(0),
+            reads: Cell::new(0),
             starts: 0,
             cut: None,
             off: false,
@@ -151,12 +151,12 @@ impl MockFlash {
                     self.pages[index][bit / 8] ^= 1 << (bit % 8);
                 }
             }
-            self.look_otherwise(index);
+            self.read_otherwise(index);
         }
     }
 
     /// Updates what every second read finds on a page.
-    fn look_otherwise(&mut self, page: usize) {
+    fn read_otherwise(&mut self, page: usize) {
         self.other[page] = self.pages[page];
         for torn in self.torn.iter().filter(|torn| torn.page == page) {
             let read = torn.read(self.starts + 1);
@@ -193,14 +193,14 @@ impl MockFlash {
     }
 }
 
-impl Flash for MockFlash {
+impl Pages for MockFlash {
     type Error = Fault;
 
     fn page(&self, page: Page) -> &[u8] {
         let index = page as usize;
-        let look = self.looks.get();
-        self.looks.set(look + 1);
-        if look.is_multiple_of(2) || self.torn.iter().all(|torn| torn.page != index) {
+        let nth = self.reads.get();
+        self.reads.set(nth + 1);
+        if nth.is_multiple_of(2) || self.torn.iter().all(|torn| torn.page != index) {
             &self.pages[index]
         } else {
             &self.other[index]
@@ -262,7 +262,7 @@ impl Flash for MockFlash {
                 mess,
             });
         }
-        self.look_otherwise(index);
+        self.read_otherwise(index);
         if self.off {
             Err(Fault::PowerCut)
         } else {
@@ -294,7 +294,7 @@ impl Flash for MockFlash {
                 bytes.fill_with(|| noise.next() as u8);
             }
         }
-        self.look_otherwise(index);
+        self.read_otherwise(index);
         if self.off {
             Err(Fault::PowerCut)
         } else {

@@ -180,7 +180,7 @@ fn what_is_stored_is_the_documented_record() {
         operation.perform(&mut flash).unwrap();
     }
     saving.finish(&mut store, &flash).unwrap();
-    let bytes = firmware::store::Flash::page(&flash, Page::First);
+    let bytes = firmware::store::Pages::page(&flash, Page::First);
     assert_eq!(bytes[..SEALED.len()], SEALED);
     assert!(Store::open(&flash).load(&MODIO_02, &flash).settings == settings);
 }

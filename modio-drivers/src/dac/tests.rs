@@ -4,7 +4,7 @@
 extern crate std;
 use std::vec::Vec;
 
-use embedded_hal::i2c::{ErrorType, Operation};
+use embedded_hal::i2c::{ErrorType, NoAcknowledgeSource, Operation};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction};
 
 use super::*;
@@ -24,18 +24,15 @@ fn transfer_to(address: u8, codes: [u16; 4]) -> Transaction {
     Transaction::write(address, bytes.collect())
 }
 
-fn posted(codes: [u16; 4]) -> DacLink {
-    let link = DacLink::new();
-    link.post(codes.map(Code::new));
-    link
+fn wanted(codes: [u16; 4]) -> Option<[Code; 4]> {
+    Some(codes.map(Code::new))
 }
 
 #[test]
-fn nothing_is_transferred_before_the_first_post() {
+fn nothing_is_transferred_without_codes() {
     let mut bus = Mock::new(&[]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
-    let link = DacLink::new();
-    assert!((0..100).all(|_| worker.work(&mut bus, &link) == Ok(false)));
+    assert!((0..100).all(|_| worker.work(&mut bus, None) == Ok(false)));
     bus.done();
 }
 
@@ -47,7 +44,7 @@ fn a_transfer_is_one_multi_write_of_codes_and_configuration() {
     let mut bus = Mock::new(&[Transaction::write(0x60, bytes)]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
     assert_eq!(
-        worker.work(&mut bus, &posted([0, 0x123, 0xABC, 0xFFF])),
+        worker.work(&mut bus, wanted([0, 0x123, 0xABC, 0xFFF])),
         Ok(true)
     );
     bus.done();
@@ -58,7 +55,7 @@ fn a_code_above_the_range_does_not_change_the_configuration() {
     let mut bus = Mock::new(&[transfer([0xFFF, 0xFFF, 0xFFF, 1])]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
     assert_eq!(
-        worker.work(&mut bus, &posted([0x1000, 0x8001, 0xFFFF, 1])),
+        worker.work(&mut bus, wanted([0x1000, 0x8001, 0xFFFF, 1])),
         Ok(true)
     );
     bus.done();
@@ -73,50 +70,20 @@ fn a_change_is_sent_at_the_next_call_and_all_codes_at_every_tenth() {
         transfer([1, 2, 3, 5]),
     ]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
-    let link = posted([1, 2, 3, 4]);
-    assert_eq!(worker.work(&mut bus, &link), Ok(true));
-    assert_eq!(worker.work(&mut bus, &link), Ok(false));
-    link.post([1, 2, 3, 5].map(Code::new));
-    assert_eq!(worker.work(&mut bus, &link), Ok(true));
+    let mut codes = wanted([1, 2, 3, 4]);
+    assert_eq!(worker.work(&mut bus, codes), Ok(true));
+    assert_eq!(worker.work(&mut bus, codes), Ok(false));
+    codes = wanted([1, 2, 3, 5]);
+    assert_eq!(worker.work(&mut bus, codes), Ok(true));
     let transfers: Vec<_> = (1..=20)
-        .filter(|_| worker.work(&mut bus, &link) == Ok(true))
+        .filter(|_| worker.work(&mut bus, codes) == Ok(true))
         .collect();
     assert_eq!(transfers, [10, 20]);
     bus.done();
 }
 
 #[test]
-fn failures_are_classified_by_what_the_caller_can_do() {
-    let no_answer = [
-        NoAcknowledgeSource::Address,
-        NoAcknowledgeSource::Data,
-        NoAcknowledgeSource::Unknown,
-    ];
-    let bus = [
-        ErrorKind::Bus,
-        ErrorKind::ArbitrationLoss,
-        ErrorKind::Overrun,
-        ErrorKind::Other,
-    ];
-    let cases = no_answer
-        .map(|source| {
-            (
-                ErrorKind::NoAcknowledge(source),
-                DacError::NotAnswering(source),
-            )
-        })
-        .into_iter()
-        .chain(bus.map(|kind| (kind, DacError::Bus(kind))));
-    for (kind, expected) in cases {
-        let mut bus = Mock::new(&[transfer([9; 4]).with_error(kind)]);
-        let mut worker = DacWorker::new(DAC_ADDRESS);
-        assert_eq!(worker.work(&mut bus, &posted([9; 4])), Err(expected));
-        bus.done();
-    }
-}
-
-#[test]
-fn the_link_fails_after_two_failures_until_a_transfer_succeeds() {
+fn the_dac_fails_after_two_failures_until_a_transfer_succeeds() {
     let mut bus = Mock::new(&[
         transfer([9; 4]).with_error(NO_ANSWER),
         transfer([9; 4]),
@@ -125,26 +92,26 @@ fn the_link_fails_after_two_failures_until_a_transfer_succeeds() {
         transfer([8; 4]),
     ]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
-    let link = posted([9; 4]);
-    assert!(worker.work(&mut bus, &link).is_err());
-    assert!(!link.failed());
-    assert_eq!(worker.work(&mut bus, &link), Ok(true));
-    assert!(!link.failed());
+    let mut codes = wanted([9; 4]);
+    assert!(worker.work(&mut bus, codes).is_err());
+    assert!(!worker.failed());
+    assert_eq!(worker.work(&mut bus, codes), Ok(true));
+    assert!(!worker.failed());
 
-    link.post([7; 4].map(Code::new));
-    assert!(worker.work(&mut bus, &link).is_err());
-    assert!(!link.failed());
-    assert!(worker.work(&mut bus, &link).is_err());
-    assert!(link.failed());
-    link.post([8; 4].map(Code::new));
-    assert_eq!(worker.work(&mut bus, &link), Ok(false));
-    assert!(link.failed(), "no transfer was tried");
+    codes = wanted([7; 4]);
+    assert!(worker.work(&mut bus, codes).is_err());
+    assert!(!worker.failed());
+    assert!(worker.work(&mut bus, codes).is_err());
+    assert!(worker.failed());
+    codes = wanted([8; 4]);
+    assert_eq!(worker.work(&mut bus, codes), Ok(false));
+    assert!(worker.failed(), "no transfer was tried");
     assert_eq!(
-        worker.work(&mut bus, &link),
+        worker.work(&mut bus, codes),
         Ok(true),
         "with the newest codes"
     );
-    assert!(!link.failed());
+    assert!(!worker.failed());
     bus.done();
 }
 
@@ -152,9 +119,9 @@ fn the_link_fails_after_two_failures_until_a_transfer_succeeds() {
 fn tries_become_rarer_down_to_one_in_seventeen_calls_and_never_stop() {
     let mut bus = Mock::new(&std::vec![transfer([1; 4]).with_error(NO_ANSWER); 300]);
     let mut worker = DacWorker::new(DAC_ADDRESS);
-    let link = posted([1; 4]);
+    let codes = wanted([1; 4]);
     let tries: Vec<_> = (0..6_000)
-        .filter(|_| worker.work(&mut bus, &link).is_err())
+        .filter(|_| worker.work(&mut bus, codes).is_err())
         .take(300)
         .collect();
     assert_eq!(tries[..8], [0, 1, 3, 6, 11, 20, 37, 54]);
@@ -235,8 +202,8 @@ impl I2c for Dac {
 fn a_dac_is_configured_by_one_transfer_and_again_after_a_loss_of_power() {
     let mut worker = DacWorker::new(DAC_ADDRESS);
     let mut bus = Dac::new();
-    let link = posted([0, 819, 2048, 4095]);
-    assert_eq!(worker.work(&mut bus, &link), Ok(true));
+    let mut codes = wanted([0, 819, 2048, 4095]);
+    assert_eq!(worker.work(&mut bus, codes), Ok(true));
     assert_eq!(bus.output, [0, 819, 2048, 4095]);
 
     // The power is lost for too short a time to be noticed on the bus.
@@ -244,23 +211,23 @@ fn a_dac_is_configured_by_one_transfer_and_again_after_a_loss_of_power() {
     bus.power(true);
     assert_ne!(bus.output, [0, 819, 2048, 4095]);
     for _ in 0..REFRESH_CALLS {
-        worker.work(&mut bus, &link).unwrap();
+        worker.work(&mut bus, codes).unwrap();
     }
     assert_eq!(bus.output, [0, 819, 2048, 4095]);
 
     // The power is lost for longer, and the codes change.
     bus.power(false);
     for _ in 0..1000 {
-        let _ = worker.work(&mut bus, &link);
+        let _ = worker.work(&mut bus, codes);
     }
-    assert!(link.failed());
-    link.post([1, 2, 3, 4].map(Code::new));
+    assert!(worker.failed());
+    codes = wanted([1, 2, 3, 4]);
     bus.power(true);
     let calls = (1..)
-        .find(|_| worker.work(&mut bus, &link) == Ok(true))
+        .find(|_| worker.work(&mut bus, codes) == Ok(true))
         .unwrap();
     assert!(calls <= PAUSE_MAX_CALLS + 1, "{calls} calls");
-    assert!(!link.failed());
+    assert!(!worker.failed());
     assert_eq!(bus.output, [1, 2, 3, 4]);
 }
 
@@ -269,32 +236,32 @@ fn an_interrupted_transfer_is_repeated_completely() {
     for cut_after in 0..12 {
         let mut worker = DacWorker::new(DAC_ADDRESS);
         let mut bus = Dac::new();
-        let link = posted([10, 20, 30, 40]);
+        let codes = wanted([10, 20, 30, 40]);
         bus.cut_after = cut_after;
         assert_eq!(
-            worker.work(&mut bus, &link),
-            Err(DacError::NotAnswering(NoAcknowledgeSource::Data))
+            worker.work(&mut bus, codes),
+            Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data))
         );
         bus.cut_after = usize::MAX;
-        assert_eq!(worker.work(&mut bus, &link), Ok(true));
+        assert_eq!(worker.work(&mut bus, codes), Ok(true));
         assert_eq!(bus.output, [10, 20, 30, 40], "cut {cut_after}");
     }
 }
 
 #[test]
-fn a_change_that_failed_half_way_is_undone_when_the_old_codes_are_posted() {
+fn a_change_that_failed_half_way_is_undone_when_the_old_codes_are_wanted() {
     let mut worker = DacWorker::new(DAC_ADDRESS);
     let mut bus = Dac::new();
-    let link = posted([1; 4]);
-    assert_eq!(worker.work(&mut bus, &link), Ok(true));
-    link.post([2; 4].map(Code::new));
+    let mut codes = wanted([1; 4]);
+    assert_eq!(worker.work(&mut bus, codes), Ok(true));
+    codes = wanted([2; 4]);
     bus.cut_after = 6;
-    assert!(worker.work(&mut bus, &link).is_err());
+    assert!(worker.work(&mut bus, codes).is_err());
     assert_eq!(bus.output, [2, 2, 1, 1]);
-    link.post([1; 4].map(Code::new));
+    codes = wanted([1; 4]);
     bus.cut_after = usize::MAX;
     assert_eq!(
-        worker.work(&mut bus, &link),
+        worker.work(&mut bus, codes),
         Ok(true),
         "without waiting for a refresh"
     );
@@ -308,11 +275,11 @@ fn workers_with_different_addresses_share_a_bus() {
         transfer_to(0x63, [2; 4]),
         transfer_to(0x60, [1; 4]),
     ]);
-    let (first, second) = (posted([1; 4]), posted([2; 4]));
+    let (first, second) = (wanted([1; 4]), wanted([2; 4]));
     let (mut near, mut far) = (DacWorker::new(0x60), DacWorker::new(0x63));
-    assert!(near.work(&mut bus, &first).is_err());
-    assert_eq!(far.work(&mut bus, &second), Ok(true));
-    assert_eq!(near.work(&mut bus, &first), Ok(true));
-    assert_eq!(far.work(&mut bus, &second), Ok(false));
+    assert!(near.work(&mut bus, first).is_err());
+    assert_eq!(far.work(&mut bus, second), Ok(true));
+    assert_eq!(near.work(&mut bus, first), Ok(true));
+    assert_eq!(far.work(&mut bus, second), Ok(false));
     bus.done();
 }

@@ -147,7 +147,7 @@ impl fmt::Display for Modio {
 /// The unit under test.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// Its address, 1 to 247 (255 for a modio in loader mode).
+    /// Its address, 1 to 247 (255 for a modio in recovery mode).
     pub unit: u8,
     /// RTU or ASCII.
     pub mode: Mode,

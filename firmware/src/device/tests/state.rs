@@ -111,12 +111,13 @@ fn a_mask_write_of_a_setting_acts_like_any_other_write() {
 }
 
 #[test]
-fn identify_is_returned_for_the_leds() {
+fn identify_and_restart_are_left_for_the_background_task() {
     let mut bench = Bench::new(Module::None, &[]);
     assert_eq!(bench.write(at::COMMAND, &[6]), Err(6), "locked");
     bench.unlock();
     assert_eq!(bench.write(at::COMMAND, &[7]), Err(3));
     assert_eq!(bench.write(at::COMMAND, &[6]), Ok(()));
-    let left = bench.device.carry_out(Command::Identify);
-    assert_eq!(left, Some(Command::Identify));
+    assert!(bench.device.identify && !bench.device.restart);
+    assert_eq!(bench.write(at::COMMAND, &[2]), Ok(()));
+    assert!(bench.device.restart);
 }

@@ -45,8 +45,8 @@ pub mod wires;
 use bench_file::{Analog, Wire};
 use report::{Finding, Report};
 
-/// The unit address of loader mode, in which the line has a fixed rate.
-const LOADER: u8 = 255;
+/// The unit address of recovery mode, in which the line has a fixed rate.
+const RECOVERY: u8 = 255;
 
 /// Bits of the unit's status: settings are not saved, or not in force.
 const UNSETTLED: u16 = 1 << 3 | 1 << 4;
@@ -213,8 +213,8 @@ fn may_change_rate(bench: &mut Bench<'_>, home: LineFormat) -> Result<()> {
     if !bench.endpoint.abilities().set_line {
         bail!("--rates needs a serial port: a socket has no rate");
     }
-    if bench.unit() == LOADER {
-        bail!("--rates: in loader mode the unit stays at 9600 8N2");
+    if bench.unit() == RECOVERY {
+        bail!("--rates: in recovery mode the unit stays at 9600 8N2");
     }
     let status = bench.read_word(state::STATUS)?;
     if status & UNSETTLED != 0 {

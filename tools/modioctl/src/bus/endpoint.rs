@@ -106,7 +106,7 @@ pub struct Options {
     #[arg(long, global = true, value_enum)]
     pub mode: Option<Mode>,
 
-    /// Address of the unit, 1 to 247; 255 for the loader's mode [default: 1] [env: MODIO_UNIT]
+    /// Address of the unit, 1 to 247; 255 for recovery mode [default: 1] [env: MODIO_UNIT]
     #[arg(long, global = true, value_name = "N", value_parser = unit)]
     pub unit: Option<u8>,
 
@@ -131,7 +131,7 @@ pub enum Mode {
 fn unit(text: &str) -> Result<u8, String> {
     match text.parse() {
         Ok(unit @ (1..=247 | 255)) => Ok(unit),
-        _ => Err("a unit address is 1 to 247 (255 for the loader's mode)".to_owned()),
+        _ => Err("a unit address is 1 to 247 (255 for recovery mode)".to_owned()),
     }
 }
 

@@ -198,7 +198,7 @@ fn announced(now: &Endpoint, line: &[u16]) -> Option<Endpoint> {
         let format = format.and_then(|format| format.name().parse().ok());
         then.format = format.unwrap_or(now.format);
     }
-    // With the loader's address the unit always uses the factory's line settings.
+    // In recovery mode the unit always uses the factory's line settings.
     let same = (then.baud, then.format, then.framing) == (now.baud, now.format, now.framing);
     (!same && now.unit != 255).then_some(then)
 }

@@ -248,7 +248,7 @@ fn unit_answers_through_the_gateway() {
     assert_eq!(
         client.ask(255, READ),
         [0x83, 0x0B],
-        "a unit in loader mode does not answer"
+        "a unit in recovery mode does not answer"
     );
     assert_eq!(state(&http)["line"]["tx_frames"], 21);
 }

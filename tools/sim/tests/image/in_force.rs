@@ -212,7 +212,7 @@ fn delayed_response_is_dropped_when_other_traffic_has_begun() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn the_loader_mode_is_in_force_immediately() {
+fn recovery_mode_is_in_force_immediately() {
     let mut bench = Bench::set_up(Module::Di4, &[(RESPONSE_DELAY, 1000)]);
     bench.board.set_dip(255);
     bench.power_cycle();

@@ -29,8 +29,8 @@ class Unit247(Unit1):
     DIP = 247
 
 
-class Loader(Unit1):
-    """Loader mode: 9600 8N2, unit 255, with any stored settings."""
+class Recovery(Unit1):
+    """Recovery mode: 9600 8N2, unit 255, with any stored settings."""
 
     DIP = 255
 

@@ -5,8 +5,8 @@ use register_map::{codes, configuration};
 use sim::Board;
 use sim::line::{Format, Settings};
 
-/// Value of the DIP switch for the loader mode: the line is in RTU mode, whatever is stored.
-const LOADER: u8 = 255;
+/// Value of the DIP switch for recovery mode: the line is in RTU mode, whatever is stored.
+const RECOVERY: u8 = 255;
 
 /// The mode of the unit's line, which the unit read from its settings when it started.
 #[derive(Debug, Default)]
@@ -40,7 +40,7 @@ impl Mode {
             Format::SevenE1 | Format::SevenO1 | Format::SevenN2 => true,
             Format::N2 | Format::E1 | Format::O1 | Format::N1 => false,
         };
-        let ascii = self.stored == codes::Mode::Ascii.code() && self.dip != LOADER;
+        let ascii = self.stored == codes::Mode::Ascii.code() && self.dip != RECOVERY;
         if seven || ascii {
             Framing::Ascii
         } else {
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn mode_is_the_stored_one_except_in_loader_mode_and_with_seven_bits() {
+    fn mode_is_the_stored_one_except_in_recovery_mode_and_with_seven_bits() {
         assert_eq!(framing(1, 0, Format::N2), Framing::Rtu);
         assert_eq!(framing(1, 1, Format::N2), Framing::Ascii);
         assert_eq!(framing(255, 1, Format::N2), Framing::Rtu);

@@ -96,7 +96,7 @@ fn radio_that_is_off_leaves_its_pins_alone() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
-fn radio_is_off_in_loader_mode_and_without_a_unit_address() {
+fn radio_is_off_in_recovery_mode_and_without_a_unit_address() {
     for dip in [255, 0, 248] {
         let all = [(MODULE, Module::Di4.code()), (LORA, 1)];
         let mut bench = Bench::with(Config {

@@ -1,4 +1,8 @@
-//! The flash interface that the store uses.
+//! The flash pages that keep data without power, as the store sees them.
+//!
+//! The traits of embedded-storage cannot say what the store needs. `ReadNorFlash` copies bytes, but the store reads pages
+//! in place. The store makes a mark invalid by writing 0 over it; `NorFlash` writes erased bytes only, and
+//! `MultiwriteNorFlash` promises that any bit can be cleared later, but this flash takes only a half-word of 0.
 
 /// One of the store's two pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +28,7 @@ impl Page {
 ///
 /// An operation that is interrupted may leave any content in its half-word or page, and does not change anything
 /// else.
-pub trait Flash {
+pub trait Pages {
     /// Error of an operation.
     type Error;
 
@@ -45,13 +49,4 @@ pub trait Flash {
     ///
     /// When the flash reports an error.
     fn erase(&mut self, page: Page) -> Result<(), Self::Error>;
-}
-
-/// Error of the store. It never damages what was stored before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StoreError<E> {
-    /// The flash refused the operation or failed. The page may be worn out.
-    Flash(Page, E),
-    /// The flash does not read back as programmed at this offset: the page is worn out.
-    Worn(Page, usize),
 }

@@ -1,4 +1,4 @@
-//! The patterns of the status LEDs, in steps of 10 ms.
+//! The status LEDs, set in steps of 10 ms.
 //!
 //! | LED | shows |
 //! |---|---|
@@ -7,16 +7,18 @@
 //! | all three | blink together for 10 s after COMMAND 6, identify, instead of all other patterns |
 //! | fault | blinks five times in two seconds: SW01 is not set to a unit address; steady: a module does not answer; a short flash every two seconds: no crystal |
 
+use embedded_hal::digital::{OutputPin, PinState};
+
 use crate::start_up::Address;
 
-/// Interval between calls of [`Lamps::tick`], in milliseconds.
+/// Interval between two steps of the patterns, in milliseconds.
 pub const TICK_MS: u16 = 10;
 
 const PERIOD: u16 = 2000 / TICK_MS;
 const BLINK: u16 = 200 / TICK_MS;
 const RUN: u16 = 500 / TICK_MS;
 const FLASH: u16 = 100 / TICK_MS;
-/// Duration of the blinking after [`Lamps::identify`], in ticks.
+/// Duration of the blinking after [`Leds::identify`], in ticks.
 const IDENTIFY: u16 = 10_000 / TICK_MS;
 const ACTIVITY: u8 = (50 / TICK_MS) as u8;
 
@@ -54,31 +56,29 @@ impl Trouble {
     }
 }
 
-/// Which LEDs are lit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lit {
-    /// The activity LED.
-    pub activity: bool,
-    /// The fault LED.
-    pub fault: bool,
-    /// The running LED.
-    pub run: bool,
-}
-
-/// The state of the LEDs' patterns.
-#[derive(Debug, Default)]
-pub struct Lamps {
+/// The LEDs for activity, fault and running, and the state of their patterns.
+#[derive(Debug)]
+pub struct Leds<P> {
+    /// High lights activity and fault. The running LED is connected to the supply, so low lights it.
+    pins: [P; 3],
+    /// A fault that lasts as long as the device runs.
+    standing: Trouble,
+    /// Time when the LEDs were last set, in milliseconds since the start.
+    set_at: u32,
     tick: u16,
     activity: u8,
     /// Ticks for which all LEDs still blink.
     identify: u16,
 }
 
-impl Lamps {
-    /// Starts the patterns.
+impl<P> Leds<P> {
+    /// Starts the patterns. `pins` are those of activity, fault and running.
     #[must_use]
-    pub const fn new() -> Self {
+    pub const fn new(pins: [P; 3], standing: Trouble) -> Self {
         Self {
+            pins,
+            standing,
+            set_at: 0,
             tick: 0,
             activity: 0,
             identify: 0,
@@ -90,9 +90,9 @@ impl Lamps {
         self.identify = IDENTIFY;
     }
 
-    /// Returns which LEDs are lit for the next [`TICK_MS`]. `request` says that a request has been served since the
-    /// last tick.
-    pub fn tick(&mut self, request: bool, trouble: Trouble) -> Lit {
+    /// Returns which LEDs are lit for the next [`TICK_MS`]: activity, fault, running. `request` says that a request
+    /// has been served since the last tick.
+    fn tick(&mut self, request: bool, module_fails: bool) -> [bool; 3] {
         self.activity = if request {
             ACTIVITY
         } else {
@@ -103,22 +103,29 @@ impl Lamps {
         if let Some(left) = self.identify.checked_sub(1) {
             self.identify = left;
             // Lit for the first 200 ms, dark for the last 200 ms.
-            let lit = !(left / BLINK).is_multiple_of(2);
-            return Lit {
-                activity: lit,
-                fault: lit,
-                run: lit,
-            };
+            return [!(left / BLINK).is_multiple_of(2); 3];
         }
-        Lit {
-            activity: self.activity > 0,
-            fault: match trouble {
-                Trouble::NoAddress => (tick / BLINK).is_multiple_of(2),
-                Trouble::Module => true,
-                Trouble::NoCrystal => tick < FLASH,
-                Trouble::None => false,
-            },
-            run: (tick / RUN).is_multiple_of(2),
+        let fault = match self.standing.or_module(module_fails) {
+            Trouble::NoAddress => (tick / BLINK).is_multiple_of(2),
+            Trouble::Module => true,
+            Trouble::NoCrystal => tick < FLASH,
+            Trouble::None => false,
+        };
+        [self.activity > 0, fault, (tick / RUN).is_multiple_of(2)]
+    }
+}
+
+impl<P: OutputPin> Leds<P> {
+    /// Sets the LEDs, if their next step is due. `request` is only called then and returns whether a request has
+    /// been served since the last call.
+    pub fn show(&mut self, millis: u32, module_fails: bool, request: impl FnOnce() -> bool) {
+        if millis.wrapping_sub(self.set_at) < u32::from(TICK_MS) {
+            return;
+        }
+        self.set_at = millis;
+        let [activity, fault, run] = self.tick(request(), module_fails);
+        for (pin, high) in self.pins.iter_mut().zip([activity, fault, !run]) {
+            let _ = pin.set_state(PinState::from(high));
         }
     }
 }
@@ -130,12 +137,14 @@ mod tests {
 
     use super::*;
 
+    const ACTIVE: usize = 0;
+    const FAULT: usize = 1;
+    const RUNNING: usize = 2;
+
     /// Returns the milliseconds lit and the number of times switched on in two seconds.
-    fn measure(trouble: Trouble, led: fn(Lit) -> bool) -> (u16, usize) {
-        let mut lamps = Lamps::new();
-        let lit: Vec<bool> = (0..PERIOD)
-            .map(|_| led(lamps.tick(false, trouble)))
-            .collect();
+    fn measure(trouble: Trouble, led: usize) -> (u16, usize) {
+        let mut leds = Leds::new([(); 3], trouble);
+        let lit: Vec<bool> = (0..PERIOD).map(|_| leds.tick(false, false)[led]).collect();
         let rises = (0..lit.len()).filter(|&i| lit[i] && !lit[(i + lit.len() - 1) % lit.len()]);
         let count = lit.iter().filter(|&&on| on).count() as u16;
         (count * TICK_MS, rises.count())
@@ -143,48 +152,40 @@ mod tests {
 
     #[test]
     fn each_trouble_has_its_own_pattern() {
-        assert_eq!(measure(Trouble::None, |l| l.fault), (0, 0));
-        assert_eq!(measure(Trouble::NoAddress, |l| l.fault), (1000, 5));
-        assert_eq!(measure(Trouble::Module, |l| l.fault), (2000, 0));
-        assert_eq!(measure(Trouble::NoCrystal, |l| l.fault), (100, 1));
-        assert_eq!(measure(Trouble::None, |l| l.run), (1000, 2));
+        assert_eq!(measure(Trouble::None, FAULT), (0, 0));
+        assert_eq!(measure(Trouble::NoAddress, FAULT), (1000, 5));
+        assert_eq!(measure(Trouble::Module, FAULT), (2000, 0));
+        assert_eq!(measure(Trouble::NoCrystal, FAULT), (100, 1));
+        assert_eq!(measure(Trouble::None, RUNNING), (1000, 2));
     }
 
     #[test]
     fn identify_makes_all_leds_blink_together_for_ten_seconds() {
-        let mut lamps = Lamps::new();
-        lamps.tick(false, Trouble::Module);
-        lamps.identify();
+        let mut leds = Leds::new([(); 3], Trouble::Module);
+        leds.tick(false, false);
+        leds.identify();
         let mut lit = 0;
         for tick in 0..IDENTIFY {
             let on = (tick / BLINK).is_multiple_of(2);
-            let expected = Lit {
-                activity: on,
-                fault: on,
-                run: on,
-            };
-            assert_eq!(lamps.tick(false, Trouble::Module), expected, "tick {tick}");
+            assert_eq!(leds.tick(false, false), [on; 3], "tick {tick}");
             lit += u16::from(on);
         }
         assert_eq!(lit * TICK_MS, 5000);
-        let after = lamps.tick(false, Trouble::Module);
-        assert!(
-            after.fault && !after.activity,
-            "the module's fault is shown again"
-        );
+        let [activity, fault, _] = leds.tick(false, false);
+        assert!(fault && !activity, "the module's fault is shown again");
     }
 
     #[test]
     fn identify_while_the_leds_blink_restarts_the_ten_seconds() {
-        let mut lamps = Lamps::new();
-        lamps.identify();
+        let mut leds = Leds::new([(); 3], Trouble::None);
+        leds.identify();
         for _ in 0..IDENTIFY - 1 {
-            lamps.tick(false, Trouble::None);
+            leds.tick(false, false);
         }
-        lamps.identify();
-        let mut blinking = (0..IDENTIFY).map(|_| lamps.tick(false, Trouble::None).fault);
+        leds.identify();
+        let mut blinking = (0..IDENTIFY).map(|_| leds.tick(false, false)[FAULT]);
         assert_eq!(blinking.by_ref().filter(|fault| *fault).count(), 500);
-        assert!(!lamps.tick(false, Trouble::None).fault);
+        assert!(!leds.tick(false, false)[FAULT]);
     }
 
     #[test]
@@ -203,12 +204,12 @@ mod tests {
 
     #[test]
     fn a_request_lights_the_activity_led_for_fifty_milliseconds() {
-        let mut lamps = Lamps::new();
-        assert!(!lamps.tick(false, Trouble::None).activity);
-        assert!(lamps.tick(true, Trouble::None).activity);
+        let mut leds = Leds::new([(); 3], Trouble::None);
+        assert!(!leds.tick(false, false)[ACTIVE]);
+        assert!(leds.tick(true, false)[ACTIVE]);
         for _ in 0..4 {
-            assert!(lamps.tick(false, Trouble::None).activity);
+            assert!(leds.tick(false, false)[ACTIVE]);
         }
-        assert!(!lamps.tick(false, Trouble::None).activity);
+        assert!(!leds.tick(false, false)[ACTIVE]);
     }
 }
