@@ -131,6 +131,10 @@ impl Flash {
             return Err(FlashError::LowSupply);
         }
         let flash = &self.flash;
+        // The manual asks for this check first (PM0075 2.3.3): an operation that did not end in time may still run.
+        if flash.sr().read().bsy().bit_is_set() {
+            return Err(FlashError::Failed);
+        }
         self.unlock()?;
         // Clear the flags of an earlier operation by writing 1; otherwise its EOP would count for this operation.
         flash.sr().write(|w| {
