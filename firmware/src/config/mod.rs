@@ -31,7 +31,7 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{Command, Lora};
 use register_map::configuration::{
-    COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES, SAVES,
+    COMM_TIMEOUT, COMMAND, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES, SAVES,
 };
 use register_map::points::{self, CHANNELS};
 use register_map::state::status;
@@ -274,10 +274,6 @@ impl<const SLOTS: usize> Config<SLOTS> {
     #[must_use = "the caller must execute the command"]
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
         self.lock.open(self.origin.line);
-        if span.start() >= FILTER {
-            self.write_plain(span, words);
-            return None;
-        }
         let mut command = None;
         for (address, value) in span.addresses().zip(words.iter()) {
             match address {
@@ -287,7 +283,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             }
         }
         if span != Span::single(KEY) && span != Span::single(COMMAND) {
-            self.edited_anew();
+            self.revision = self.revision.wrapping_add(1);
         }
         if command == Some(Command::Save) {
             self.save = Save::Ordered;
@@ -295,30 +291,21 @@ impl<const SLOTS: usize> Config<SLOTS> {
         command
     }
 
-    /// Writes registers that do not affect other registers.
-    fn write_plain(&mut self, span: Span, words: Words<'_>) {
-        let edited = self.edited.slice_mut(span.start(), span.count()).iter_mut();
-        let saved = self.saved.slice(span.start(), span.count());
-        let mut differences = self.differences;
-        for ((edited, saved), word) in edited.zip(saved).zip(words.iter()) {
-            differences = differences
-                .wrapping_sub(u16::from(*edited != *saved))
-                .wrapping_add(u16::from(word != *saved));
-            *edited = word;
-        }
-        self.differences = differences;
-        self.revision = self.revision.wrapping_add(1);
-    }
-
-    fn edited_anew(&mut self) {
+    /// Compares the edited settings with the others after [`revision`](Self::revision) has changed. The next
+    /// request needs the result.
+    pub fn compare(&mut self) {
         self.differences = self.edited.differences(&self.saved);
-        self.revision = self.revision.wrapping_add(1);
         for (index, port) in self.ports.iter().enumerate() {
             let number = self.board.first_port.wrapping_add(index as u16);
             if self.edited.module(number) != port.module {
                 self.left |= 1 << (index & 7);
             }
         }
+    }
+
+    fn edited_anew(&mut self) {
+        self.revision = self.revision.wrapping_add(1);
+        self.compare();
     }
 
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.

@@ -203,6 +203,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     #[inline]
     fn settings_may_have_changed(&mut self) {
         if self.revision != self.config.revision() {
+            self.config.compare();
             self.configure_points();
         }
     }

@@ -38,7 +38,9 @@ fn write<const SLOTS: usize>(
         .collect();
     let span = Span::new(start, values.len() as u16).unwrap();
     config.check_write(span, Words::new(&bytes))?;
-    Ok(config.write(span, Words::new(&bytes)))
+    let command = config.write(span, Words::new(&bytes));
+    config.compare();
+    Ok(command)
 }
 
 fn read(config: &Config, start: u16, count: u16) -> Result<Vec<u16>, Exception> {
