@@ -63,7 +63,7 @@ pub use {
     clock::ClockSource,
     flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},
-    i2c::{DacBus, DacBusError, Held},
+    i2c::DacBus,
     pin_io::{PinInput, PinOutput},
     radio::{Damaged, RadioUart},
     rs485::{Character, Rs485, Status},

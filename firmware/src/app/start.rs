@@ -18,7 +18,7 @@ use modbus_server::{
     Adu,
     line::{Framing, Gaps, Port, Receiver, Width},
 };
-use modio_drivers::{DacLink, IoModule};
+use modio_drivers::DacLink;
 use register_map::{
     codes::{Format, GapRule, Mode},
     state::reset_cause::POWER_ON,
@@ -98,7 +98,7 @@ pub fn up(
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
+    let (mut modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
@@ -106,7 +106,7 @@ pub fn up(
         fault: fault_record::words(&board.faults),
         internal_oscillator: !board.clock.is_crystal(),
     };
-    let kinds = modules.each_ref().map(IoModule::kinds);
+    let kinds = modules.each_mut().map(|module| module.driver().kinds());
     let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
     let mut dacs = [DacLink::default(); SLOTS];
     let scanning = Scanning::new(modules, sampler, device, &mut dacs);
