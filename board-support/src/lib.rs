@@ -64,7 +64,7 @@ pub use {
     flash::{Flash, FlashError},
     gap_timer::{GapEvent, GapTimer},
     i2c::DacBus,
-    pin_io::{PinInput, PinOutput},
+    pin_io::IoPin,
     radio::{Damaged, RadioUart},
     rs485::{Character, Rs485, Status},
     safe::outputs_off,

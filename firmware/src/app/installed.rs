@@ -1,6 +1,6 @@
 //! The modules installed in the slots.
 
-use board_support::{DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
+use board_support::{DacBus, IoPin, Sampler, Slot, boards::SLOTS};
 use modio_drivers::{Absent, Ai2Ao2, Ai4, Ao4, DacLink, DacWorker, Di4, Do4, IoModule, Relay2};
 use register_map::Module;
 use rtic::Mutex;
@@ -8,9 +8,9 @@ use rtic::Mutex;
 /// A module and the lines of its slot, configured for it.
 pub enum Installed {
     None(Absent),
-    Di4(Di4<PinInput>),
-    Do4(Do4<PinOutput>),
-    Relay2(Relay2<PinInput, PinOutput>),
+    Di4(Di4<IoPin>),
+    Do4(Do4<IoPin>),
+    Relay2(Relay2<IoPin, IoPin>),
     Ai4(Ai4),
     Ao4(Ao4),
     Ai2Ao2(Ai2Ao2),

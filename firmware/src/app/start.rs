@@ -3,8 +3,8 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    PinOutput, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError,
-    gap::LineTimes, pac, uart,
+    IoPin, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes,
+    pac, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -31,7 +31,7 @@ use crate::{
     line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
     persistence::Persistence,
-    radio::{Aux, Radio, Serial},
+    radio::{Radio, Serial},
     scanning::Scanning,
     serving::Serving,
 };
@@ -52,7 +52,7 @@ pub struct Started {
     pub persistence: Persistence,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
-    pub leds: Leds<PinOutput>,
+    pub leds: Leds<IoPin>,
     pub log: Log,
 }
 
@@ -173,7 +173,7 @@ pub fn up(
             let radio = Radio::new(
                 Serial,
                 mode,
-                Aux(aux),
+                aux,
                 config,
                 identity.unit,
                 power_on,
