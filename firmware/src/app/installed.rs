@@ -29,12 +29,12 @@ impl Installed {
             }
             Module::Ai4 => {
                 *analog = slot.into_analog(4);
-                Self::Ai4(Ai4::new())
+                Self::Ai4(Ai4::default())
             }
-            Module::Ao4 => Self::Ao4(Ao4::new()),
+            Module::Ao4 => Self::Ao4(Ao4::default()),
             Module::Ai2Ao2 => {
                 *analog = slot.into_analog(2);
-                Self::Ai2Ao2(Ai2Ao2::new())
+                Self::Ai2Ao2(Ai2Ao2::default())
             }
         }
     }

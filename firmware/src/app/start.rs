@@ -3,8 +3,8 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    IoPin, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes,
-    pac, uart,
+    RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes, pac,
+    stack::LowWater, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -25,9 +25,10 @@ use register_map::{
 };
 
 use crate::{
+    background::Background,
     board::{BOARD, DESCRIPTION, Device},
     fault_record,
-    installed::{AnalogOutputs, install},
+    installed::install,
     line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
     persistence::Persistence,
@@ -47,13 +48,10 @@ pub struct Started {
     pub serving: Serving,
     pub device: &'static mut Device,
     pub scanning: Scanning,
-    pub analog_outputs: AnalogOutputs,
     pub dacs: [DacLink; SLOTS],
-    pub persistence: Persistence,
+    pub background: Background,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
-    pub leds: Leds<IoPin>,
-    pub log: Log,
 }
 
 /// The memory for what is too large to be moved over the stack, or is shared with interrupts.
@@ -194,16 +192,20 @@ pub fn up(
         ),
         device,
         scanning,
-        analog_outputs,
         dacs,
-        persistence: Persistence::new(store, pages, erase),
+        background: Background {
+            analog_outputs,
+            persistence: Persistence::new(store, pages, erase),
+            leds: Leds::new(
+                board.leds,
+                Trouble::at_start(address, board.clock.is_crystal()),
+            ),
+            log,
+            stack: LowWater::new(),
+            radio: None,
+        },
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
-        log,
-        leds: Leds::new(
-            board.leds,
-            Trouble::at_start(address, board.clock.is_crystal()),
-        ),
     }
 }
 
