@@ -36,7 +36,7 @@ const FAILURES_TO_FAIL: u8 = 2;
 /// take little of the background's time, and a DAC that works again is soon detected.
 const PAUSE_MAX_CALLS: u8 = 16;
 
-/// What a module's driver and the worker of its DAC tell each other. The scan and the background task share it under
+/// What a module's driver and the worker of its DAC exchange. The scan and the background task share it under
 /// a lock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DacLink {
