@@ -9,7 +9,7 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, GapTimer, PinOutput, Rs485, Sampler, ScanTimer, Slot, Watchdog,
+    ClockSource, DacBus, Flash, GapTimer, IoPin, Rs485, Sampler, ScanTimer, Slot, Watchdog,
     boards::{BOARD, SLOTS},
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
@@ -50,7 +50,7 @@ pub struct Board {
     /// The flash pages that keep data without power.
     pub flash: Flash,
     /// The LEDs for activity and fault, which high lights, and for running, which low lights. All are off.
-    pub leds: [PinOutput; 3],
+    pub leds: [IoPin; 3],
     /// The timer that starts each scan, not started yet.
     pub scan_timer: ScanTimer,
     /// The watchdog, running with the long period for the start-up.
@@ -124,9 +124,9 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
 
     // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
     let leds = [
-        PinOutput::low(Pin::b(8)),
-        PinOutput::low(Pin::b(9)),
-        PinOutput::high(Pin::c(13)),
+        IoPin::low(Pin::b(8)),
+        IoPin::low(Pin::b(9)),
+        IoPin::high(Pin::c(13)),
     ];
 
     // Allow a debug probe to read the log while the core sleeps.

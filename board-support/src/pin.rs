@@ -110,7 +110,7 @@ pub(crate) enum Mode {
 
 #[cfg(target_os = "none")]
 mod registers {
-    use stm32f1xx_hal::pac::{GPIOA, GPIOB, GPIOC, gpioa::RegisterBlock};
+    use stm32f1xx_hal::pac::{GPIOA, gpioa::RegisterBlock};
 
     use super::{Mode, Pin, Port};
 
@@ -118,12 +118,9 @@ mod registers {
         /// Returns the port's registers. The caller must own the pins that it changes.
         #[inline(always)]
         pub(crate) fn registers(self) -> &'static RegisterBlock {
-            // All three blocks have the same layout, and the PAC uses one type for them.
-            let block = match self {
-                Self::A => GPIOA::ptr(),
-                Self::B => GPIOB::ptr(),
-                Self::C => GPIOC::ptr(),
-            };
+            // The blocks have the same layout and lie 0x400 bytes apart (RM0008 table 3), and the PAC uses one type for
+            // them. Code in RAM must not look them up in a table.
+            let block = GPIOA::ptr().wrapping_byte_add(0x400 * self as usize);
             // SAFETY: the registers always exist, and no access to them can violate memory safety.
             unsafe { &*block }
         }

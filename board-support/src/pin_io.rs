@@ -1,5 +1,5 @@
-//! Pins from the board's descriptor as inputs and outputs of embedded-hal. The HAL's type for any pin of a port is not
-//! used: it looks the pin up in an array and panics when it does not exist.
+//! Pins from the board's descriptor as pins of embedded-hal. The HAL's type for any pin of a port is not used: it looks
+//! the pin up in an array and panics when it does not exist.
 
 use core::convert::Infallible;
 
@@ -7,28 +7,18 @@ use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 
 use crate::pin::{Mode, Pin};
 
-/// A pin as an input with pull-up, or with pull-down.
-pub struct PinInput(Pin);
+/// A pin as an input or as a push-pull output. An input is pulled to the level that is set.
+pub struct IoPin(Pin);
 
-/// A pin as a push-pull output.
-pub struct PinOutput(Pin);
-
-impl PinInput {
-    /// Makes a pin an input with pull-up. Call this in `init`, before the first interrupt.
+/// Call these in `init`, before the first interrupt.
+impl IoPin {
+    /// Makes a pin an input with pull-up.
     pub(crate) fn pulled_up(pin: Pin) -> Self {
         pin.pull_up();
         Self(pin)
     }
 
-    /// Pulls the pin up or down.
-    pub fn pull(&mut self, up: bool) {
-        self.0.set(up);
-    }
-}
-
-impl PinOutput {
-    /// Makes a pin an output that is low from the start, with the slowest edges. Call this in `init`, before the
-    /// first interrupt.
+    /// Makes a pin an output that is low from the start, with the slowest edges.
     pub(crate) fn low(pin: Pin) -> Self {
         Self::starting(pin, false)
     }
@@ -45,11 +35,11 @@ impl PinOutput {
     }
 }
 
-impl ErrorType for PinInput {
+impl ErrorType for IoPin {
     type Error = Infallible;
 }
 
-impl InputPin for PinInput {
+impl InputPin for IoPin {
     fn is_high(&mut self) -> Result<bool, Infallible> {
         Ok(self.0.is_high())
     }
@@ -59,11 +49,7 @@ impl InputPin for PinInput {
     }
 }
 
-impl ErrorType for PinOutput {
-    type Error = Infallible;
-}
-
-impl OutputPin for PinOutput {
+impl OutputPin for IoPin {
     fn set_high(&mut self) -> Result<(), Infallible> {
         self.0.set(true);
         Ok(())

@@ -9,7 +9,7 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, PinInput, PinOutput,
+    ClockSource, IoPin,
     boards::BOARD,
     pin::{Mode, Pin},
     uart::divider,
@@ -51,7 +51,7 @@ impl RadioOff {
     /// has its settings, and AUX, which is pulled up.
     /// Returns `None` when the clock cannot produce the baud rate; the radio then stays off.
     #[must_use]
-    pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [PinOutput; 2], PinInput)> {
+    pub fn start(self, rcc: &mut pac::RCC) -> Option<(RadioUart, [IoPin; 2], IoPin)> {
         let divider = divider(self.clock.apb1_hz(), BAUD)?;
         pac::USART3::enable(rcc);
         pac::USART3::reset(rcc);
@@ -65,8 +65,8 @@ impl RadioOff {
         Pin::b(10).configure(Mode::Peripheral);
         Pin::b(11).pull_up();
         let [m0, m1] = BOARD.radio.mode;
-        let mode = [PinOutput::high(m0), PinOutput::high(m1)];
-        Some((uart, mode, PinInput::pulled_up(BOARD.radio.aux)))
+        let mode = [IoPin::high(m0), IoPin::high(m1)];
+        Some((uart, mode, IoPin::pulled_up(BOARD.radio.aux)))
     }
 }
 

@@ -1,7 +1,7 @@
 //! A slot: four lines that are configured for the module in it.
 
 use crate::{
-    PinInput, PinOutput,
+    IoPin,
     boards::SlotPins,
     pin::{Mode, Pin},
 };
@@ -30,24 +30,24 @@ impl Slot {
 
     /// Makes all lines inputs with pull-ups.
     #[must_use]
-    pub fn into_inputs(self) -> [PinInput; 4] {
-        self.lines.map(PinInput::pulled_up)
+    pub fn into_inputs(self) -> [IoPin; 4] {
+        self.lines.map(IoPin::pulled_up)
     }
 
     /// Makes all lines outputs that are low from the start, with the slowest edges: relays and open collectors need
     /// no fast ones.
     #[must_use]
-    pub fn into_outputs_low(self) -> [PinOutput; 4] {
-        self.lines.map(PinOutput::low)
+    pub fn into_outputs_low(self) -> [IoPin; 4] {
+        self.lines.map(IoPin::low)
     }
 
     /// Makes lines 1 and 2 inputs with pull-ups, and lines 3 and 4 outputs that are low from the start.
     #[must_use]
-    pub fn into_relay(self) -> ([PinInput; 2], [PinOutput; 2]) {
+    pub fn into_relay(self) -> ([IoPin; 2], [IoPin; 2]) {
         let [line1, line2, line3, line4] = self.lines;
         (
-            [line1, line2].map(PinInput::pulled_up),
-            [line3, line4].map(PinOutput::low),
+            [line1, line2].map(IoPin::pulled_up),
+            [line3, line4].map(IoPin::low),
         )
     }
 

@@ -9,13 +9,13 @@
 //! A silence is measured from the call that found the last byte. While flash is erased the task does not run for up to
 //! 40 ms. A silence that begins in that time counts as up to 40 ms shorter, and one that ends in it is not seen.
 
-use embedded_hal::digital::OutputPin;
+use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal_nb::serial::{Read, Write};
 use modbus_server::{
     Adu, LineCounters, Reply, Request,
     line::{Faults, Port, Receiver},
 };
-use modio_drivers::{AuxPin, Lora};
+use modio_drivers::Lora;
 
 use crate::config::RadioConfig;
 
@@ -54,7 +54,7 @@ impl<S, M, A> RadioLine<S, M, A>
 where
     S: Read<u8> + Write<u8>,
     M: OutputPin,
-    A: AuxPin,
+    A: InputPin + OutputPin,
 {
     /// Creates the line of a unit, 1 to 247. M0 and M1 are high, AUX is pulled up. After a `power_on` the module has
     /// just been started too; after another reset it may be sending a reply.

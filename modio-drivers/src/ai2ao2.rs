@@ -15,20 +15,12 @@ pub struct Ai2Ao2 {
     outputs: [ChannelSettings; 2],
 }
 
-impl Ai2Ao2 {
-    /// Creates the driver.
-    #[must_use]
-    pub const fn new() -> Self {
+impl Default for Ai2Ao2 {
+    fn default() -> Self {
         Self {
             inputs: AnalogInputs::new(2),
             outputs: [ChannelSettings::default_for(Kind::WordOutput); 2],
         }
-    }
-}
-
-impl Default for Ai2Ao2 {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -12,17 +12,9 @@ use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind,
 #[derive(Debug)]
 pub struct Ai4(AnalogInputs);
 
-impl Ai4 {
-    /// Creates the driver. The first sample of each line is shown without filtering.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self(AnalogInputs::new(CHANNELS))
-    }
-}
-
 impl Default for Ai4 {
     fn default() -> Self {
-        Self::new()
+        Self(AnalogInputs::new(CHANNELS))
     }
 }
 

@@ -14,19 +14,11 @@ pub struct Ao4 {
     settings: [ChannelSettings; CHANNELS],
 }
 
-impl Ao4 {
-    /// Creates the driver.
-    #[must_use]
-    pub const fn new() -> Self {
+impl Default for Ao4 {
+    fn default() -> Self {
         Self {
             settings: [ChannelSettings::default_for(Kind::WordOutput); CHANNELS],
         }
-    }
-}
-
-impl Default for Ao4 {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -89,7 +81,7 @@ mod tests {
     #[test]
     fn raw_words_are_driven_unchanged_up_to_the_largest_code() {
         let mut link = DacLink::default();
-        let mut module = Ao4::new();
+        let mut module = Ao4::default();
         assert_eq!(module.kinds(), [Kind::WordOutput; 4]);
         module
             .drive_outputs(&words([0, 1, 4095, 4096]), &mut link)
@@ -100,7 +92,7 @@ mod tests {
     #[test]
     fn each_channel_has_its_own_units() {
         let mut link = DacLink::default();
-        let mut module = Ao4::new();
+        let mut module = Ao4::default();
         module.configure(&[
             settings(Signal::Voltage, Scale::Engineering),
             settings(Signal::Current, Scale::Engineering),
@@ -119,7 +111,7 @@ mod tests {
     #[test]
     fn a_failed_link_is_reported_and_still_receives_codes() {
         let mut link = DacLink::default();
-        let mut module = Ao4::new();
+        let mut module = Ao4::default();
         let channels = words([1, 2, 3, 4]);
         link.failed = true;
         let failed = Err(ModuleError::chip(ALL));

@@ -11,14 +11,19 @@
 //! transfer the DAC is therefore configured correctly, whatever its EEPROM contains. With UDAC = 0 each channel
 //! changes its output at its last byte, whatever the level of the LDAC pin. The command only writes the volatile
 //! registers. The EEPROM, which would wear out, is never written.
+//!
+//! Crate `mcp4728` 0.2 was used for these twelve bytes. It is not any more: all that it adds to them are errors that
+//! cannot occur here.
 
 use embedded_hal::i2c::{Error as _, ErrorKind, I2c};
-use mcp4728::{Channel, ChannelState, Error, MCP4728, OutputEnableMode, VoltageReferenceMode};
 
 use crate::{CHANNELS, Code, ModuleError};
 
 /// The lowest address that a DAC can be ordered with, and the most common one (DS22187E, 5.3). The highest is 0x67.
 pub const DAC_ADDRESS: u8 = 0x60;
+
+/// The command and UDAC = 0.
+const MULTI_WRITE: u8 = 0b0100_0000;
 
 /// Number of calls between transfers when nothing has changed: 100 ms at one call every 10 ms. Within that time a
 /// DAC that has lost its power is detected, or set again when its power has returned.
@@ -31,7 +36,7 @@ const FAILURES_TO_FAIL: u8 = 2;
 /// take little of the background's time, and a DAC that works again is soon detected.
 const PAUSE_MAX_CALLS: u8 = 16;
 
-/// What a module's driver and the worker of its DAC tell each other. The scan and the background task share it under
+/// What a module's driver and the worker of its DAC exchange. The scan and the background task share it under
 /// a lock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DacLink {
@@ -132,25 +137,13 @@ impl DacWorker {
     }
 
     fn transfer(&self, bus: &mut impl I2c, codes: [Code; CHANNELS]) -> Result<(), ErrorKind> {
-        let [a, b, c, d] = codes.map(|code| {
-            // A code above 12 bits would change the gain bit, because the crate does not check it. [`Code`]
-            // excludes that.
-            ChannelState::new()
-                .voltage_reference_mode(VoltageReferenceMode::External)
-                .value(code.get())
-        });
-        MCP4728::new(bus, self.address)
-            .multi_write(&[
-                (Channel::A, OutputEnableMode::Update, a),
-                (Channel::B, OutputEnableMode::Update, b),
-                (Channel::C, OutputEnableMode::Update, c),
-                (Channel::D, OutputEnableMode::Update, d),
-            ])
-            .map_err(|error| match error {
-                Error::I2CError(error) => error.kind(),
-                // Four channels with 12-bit codes always pass the checks of the crate.
-                _ => ErrorKind::Other,
-            })
+        let mut bytes = [[0; 3]; CHANNELS];
+        for ((channel, code), bytes) in (0..).zip(codes).zip(&mut bytes) {
+            let [high, low] = code.get().to_be_bytes();
+            *bytes = [MULTI_WRITE | channel << 1, high, low];
+        }
+        bus.write(self.address, bytes.as_flattened())
+            .map_err(|error| error.kind())
     }
 }
 

@@ -32,7 +32,7 @@ pub use debounce::{DEBOUNCE_DEFAULT_MS, DEBOUNCE_MAX_MS};
 pub use di4::Di4;
 pub use do4::Do4;
 pub use io_module::{Absent, IoModule, ModuleError};
-pub use lora::{AuxPin, Lora, LoraSettings};
+pub use lora::{Lora, LoraSettings};
 pub use low_pass::{LOW_PASS_DEFAULT, LOW_PASS_MAX};
 pub use relay2::{JUMPER_DEBOUNCE_MS, Relay2};
 pub use settings::{ChannelSettings, Scale, Signal};

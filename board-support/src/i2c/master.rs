@@ -1,9 +1,11 @@
 //! The bus master (RM0008 26.3.3), polled.
 
-use embedded_hal::i2c::{ErrorType, I2c, NoAcknowledgeSource, Operation, SevenBitAddress};
+use embedded_hal::i2c::{
+    ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation, SevenBitAddress,
+};
 use stm32f1xx_hal::pac;
 
-use super::{error::DacBusError, freeing::free, pins::BusPins};
+use super::{freeing::free, pins::BusPins};
 use crate::{
     ClockSource,
     design::{I2C_HZ, I2C_STEP_US},
@@ -66,7 +68,7 @@ impl DacBus {
     }
 
     /// Recovers the bus and enables the peripheral on it, unless that is already so.
-    fn make_ready(&mut self) -> Result<(), DacBusError> {
+    fn make_ready(&mut self) -> Result<(), ErrorKind> {
         // BUSY without a transfer under way means that a wire is or was held low. The flag may also stick without a
         // cause; toggling the pins and resetting the peripheral clears it (errata sheet, I2C analog filter).
         if self.ready && self.i2c.sr2().read().busy().bit_is_clear() {
@@ -74,7 +76,9 @@ impl DacBus {
         }
         self.leave();
         BusPins.by_hand();
-        free(&mut BusPins).map_err(DacBusError::Held)?;
+        if !free(&mut BusPins) {
+            return Err(ErrorKind::Bus);
+        }
         BusPins.by_peripheral();
         // End the reset that `leave` has begun.
         self.i2c.cr1().write(|w| w.swrst().clear_bit());
@@ -101,13 +105,13 @@ impl DacBus {
     /// it off the bus.
     fn on_bus(
         &mut self,
-        transfer: impl FnOnce(&mut Self) -> Result<(), DacBusError>,
-    ) -> Result<(), DacBusError> {
+        transfer: impl FnOnce(&mut Self) -> Result<(), ErrorKind>,
+    ) -> Result<(), ErrorKind> {
         self.make_ready()?;
         let result = transfer(self);
         let clean = match result {
             Ok(()) => true,
-            Err(DacBusError::NoAcknowledge(source)) => {
+            Err(ErrorKind::NoAcknowledge(source)) => {
                 // When a data byte was not acknowledged, the next byte may still be in DR and would begin the next
                 // transfer.
                 self.stop_after_no_acknowledge().is_ok() && source == NoAcknowledgeSource::Address
@@ -125,7 +129,7 @@ impl DacBus {
         &mut self,
         address: SevenBitAddress,
         bytes: impl Iterator<Item = &'a u8>,
-    ) -> Result<(), DacBusError> {
+    ) -> Result<(), ErrorKind> {
         self.i2c.cr1().modify(|_, w| w.start().set_bit());
         self.call(address)?;
         self.write_bytes(bytes)?;
@@ -133,13 +137,13 @@ impl DacBus {
     }
 
     /// Waits for the start condition, sends the slave's address for a write, and waits for the acknowledge.
-    fn call(&self, address: SevenBitAddress) -> Result<(), DacBusError> {
+    fn call(&self, address: SevenBitAddress) -> Result<(), ErrorKind> {
         self.wait_for(flag::SB, NoAcknowledgeSource::Unknown)?;
         self.put(address << 1);
         self.wait_for(flag::ADDR, NoAcknowledgeSource::Address)
     }
 
-    fn write_bytes<'a>(&self, bytes: impl Iterator<Item = &'a u8>) -> Result<(), DacBusError> {
+    fn write_bytes<'a>(&self, bytes: impl Iterator<Item = &'a u8>) -> Result<(), ErrorKind> {
         self.clear_addr();
         let mut sent = false;
         for byte in bytes {
@@ -169,36 +173,37 @@ impl DacBus {
     }
 
     /// Waits for a flag. `source` is reported when no acknowledge is received instead.
-    fn wait_for(&self, wanted: u16, source: NoAcknowledgeSource) -> Result<(), DacBusError> {
+    fn wait_for(&self, wanted: u16, source: NoAcknowledgeSource) -> Result<(), ErrorKind> {
         let mut seen = 0;
         within_us(I2C_STEP_US, || {
             seen = self.i2c.sr1().read().bits();
             seen & (wanted | flag::BERR | flag::ARLO | flag::AF) != 0
         });
         if seen & flag::ARLO != 0 {
-            Err(DacBusError::ArbitrationLost)
+            Err(ErrorKind::ArbitrationLoss)
         } else if seen & flag::BERR != 0 {
-            Err(DacBusError::Misplaced)
+            Err(ErrorKind::Bus)
         } else if seen & flag::AF != 0 {
-            Err(DacBusError::NoAcknowledge(source))
+            Err(ErrorKind::NoAcknowledge(source))
         } else if seen & wanted != 0 {
             Ok(())
         } else {
-            Err(DacBusError::Timeout)
+            // A device stretches or holds the clock.
+            Err(ErrorKind::Other)
         }
     }
 
     /// Waits until the stop condition has been sent.
-    fn wait_for_stop(&self) -> Result<(), DacBusError> {
+    fn wait_for_stop(&self) -> Result<(), ErrorKind> {
         if within_us(I2C_STEP_US, || self.i2c.cr1().read().stop().bit_is_clear()) {
             Ok(())
         } else {
-            Err(DacBusError::Timeout)
+            Err(ErrorKind::Other)
         }
     }
 
     /// Ends a transfer that was not acknowledged with a stop condition, like any other.
-    fn stop_after_no_acknowledge(&mut self) -> Result<(), DacBusError> {
+    fn stop_after_no_acknowledge(&mut self) -> Result<(), ErrorKind> {
         self.i2c.sr1().modify(|_, w| w.af().clear_bit());
         self.stop();
         self.wait_for_stop()
@@ -206,19 +211,19 @@ impl DacBus {
 }
 
 impl ErrorType for DacBus {
-    type Error = DacBusError;
+    type Error = ErrorKind;
 }
 
-/// Writes only, because the DACs are never read. A transaction with a read fails with [`DacBusError::Reads`].
+/// Writes only, because the DACs are never read. A transaction with a read fails.
 impl I2c for DacBus {
     fn transaction(
         &mut self,
         address: SevenBitAddress,
         operations: &mut [Operation<'_>],
-    ) -> Result<(), DacBusError> {
+    ) -> Result<(), ErrorKind> {
         let reads = |operation: &Operation<'_>| matches!(operation, Operation::Read(_));
         if operations.iter().any(reads) {
-            return Err(DacBusError::Reads);
+            return Err(ErrorKind::Other);
         }
         if operations.is_empty() {
             return Ok(());
@@ -231,7 +236,7 @@ impl I2c for DacBus {
         self.on_bus(|bus| bus.write_all(address, bytes))
     }
 
-    fn write(&mut self, address: SevenBitAddress, bytes: &[u8]) -> Result<(), DacBusError> {
+    fn write(&mut self, address: SevenBitAddress, bytes: &[u8]) -> Result<(), ErrorKind> {
         self.on_bus(|bus| bus.write_all(address, bytes.iter()))
     }
 }

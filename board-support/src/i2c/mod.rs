@@ -10,8 +10,6 @@
 //! The HAL's driver is not used: it resets the peripheral but recovers no bus, and it keeps the pins. It panics on
 //! an empty write or read, and its transactions are `todo!()`.
 
-#[cfg(target_os = "none")]
-mod error;
 mod freeing;
 #[cfg(target_os = "none")]
 mod master;
@@ -19,4 +17,4 @@ mod master;
 mod pins;
 
 #[cfg(target_os = "none")]
-pub use {error::DacBusError, freeing::Held, master::DacBus};
+pub use master::DacBus;

@@ -1,6 +1,6 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::{PinOutput, boards::SLOTS, stack::LowWater};
+use board_support::{IoPin, boards::SLOTS, stack::LowWater};
 use firmware::leds::Leds;
 use heapless::spsc::Consumer;
 use modio_drivers::DacLink;
@@ -17,7 +17,7 @@ use crate::{
 pub struct Background {
     pub analog_outputs: AnalogOutputs,
     pub persistence: Persistence,
-    pub leds: Leds<PinOutput>,
+    pub leds: Leds<IoPin>,
     pub log: Log,
     pub stack: LowWater,
     /// The state of the radio that was logged last.

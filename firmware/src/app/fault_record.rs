@@ -1,19 +1,6 @@
 //! The fault record of the last start in the terms of the register map.
 
 use board_support::fault;
-use register_map::codes::FaultKind;
-
-/// Returns the kind of a fault as its register has it.
-pub const fn kind(kind: fault::Kind) -> FaultKind {
-    match kind {
-        fault::Kind::None => FaultKind::None,
-        fault::Kind::Panic => FaultKind::Panic,
-        fault::Kind::HardFault => FaultKind::HardFault,
-        fault::Kind::Watchdog => FaultKind::Watchdog,
-        fault::Kind::Crystal => FaultKind::Crystal,
-        fault::Kind::StackOverflow => FaultKind::StackOverflow,
-    }
-}
 
 /// Returns the fault record as the 16 registers from 0x0260 on.
 pub fn words(record: &fault::FaultRecord) -> [u16; 16] {
@@ -27,7 +14,7 @@ pub fn words(record: &fault::FaultRecord) -> [u16; 16] {
         crystal_faults: _,
     } = *record;
     [
-        kind(fault.kind).code(),
+        fault.kind as u16,
         count,
         high(fault.pc),
         low(fault.pc),

@@ -1,19 +1,16 @@
 //! The modules installed in the slots.
 
-use board_support::{DacBus, PinInput, PinOutput, Sampler, Slot, boards::SLOTS};
-use modio_drivers::{
-    Absent, Ai2Ao2, Ai4, Ao4, CHANNELS, ChannelSettings, Channels, Codes, DacLink, DacWorker, Di4,
-    Do4, IoModule, Kind, ModuleError, Relay2,
-};
+use board_support::{DacBus, IoPin, Sampler, Slot, boards::SLOTS};
+use modio_drivers::{Absent, Ai2Ao2, Ai4, Ao4, DacLink, DacWorker, Di4, Do4, IoModule, Relay2};
 use register_map::Module;
 use rtic::Mutex;
 
 /// A module and the lines of its slot, configured for it.
 pub enum Installed {
     None(Absent),
-    Di4(Di4<PinInput>),
-    Do4(Do4<PinOutput>),
-    Relay2(Relay2<PinInput, PinOutput>),
+    Di4(Di4<IoPin>),
+    Do4(Do4<IoPin>),
+    Relay2(Relay2<IoPin, IoPin>),
     Ai4(Ai4),
     Ao4(Ao4),
     Ai2Ao2(Ai2Ao2),
@@ -32,29 +29,18 @@ impl Installed {
             }
             Module::Ai4 => {
                 *analog = slot.into_analog(4);
-                Self::Ai4(Ai4::new())
+                Self::Ai4(Ai4::default())
             }
-            Module::Ao4 => Self::Ao4(Ao4::new()),
+            Module::Ao4 => Self::Ao4(Ao4::default()),
             Module::Ai2Ao2 => {
                 *analog = slot.into_analog(2);
-                Self::Ai2Ao2(Ai2Ao2::new())
+                Self::Ai2Ao2(Ai2Ao2::default())
             }
         }
     }
 
-    fn driver(&self) -> &dyn IoModule {
-        match self {
-            Self::None(module) => module,
-            Self::Di4(module) => module,
-            Self::Do4(module) => module,
-            Self::Relay2(module) => module,
-            Self::Ai4(module) => module,
-            Self::Ao4(module) => module,
-            Self::Ai2Ao2(module) => module,
-        }
-    }
-
-    fn driver_mut(&mut self) -> &mut dyn IoModule {
+    /// Returns the driver of the module.
+    pub fn driver(&mut self) -> &mut dyn IoModule {
         match self {
             Self::None(module) => module,
             Self::Di4(module) => module,
@@ -67,45 +53,24 @@ impl Installed {
     }
 }
 
-impl IoModule for Installed {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        self.driver().kinds()
-    }
-
-    fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
-        self.driver_mut().configure(settings);
-    }
-
-    fn read_inputs(&mut self, channels: &mut Channels, codes: &Codes) -> Result<(), ModuleError> {
-        self.driver_mut().read_inputs(channels, codes)
-    }
-
-    fn drive_outputs(&mut self, channels: &Channels, dac: &mut DacLink) -> Result<(), ModuleError> {
-        self.driver_mut().drive_outputs(channels, dac)
-    }
-}
-
-/// The modules' analog outputs, which the background sends to the DACs.
+/// The DACs of the slots, which the background task serves.
 pub struct AnalogOutputs {
     bus: DacBus,
-    /// One entry per slot; `None` when the module has no DAC.
-    workers: [Option<DacWorker>; SLOTS],
+    /// One for each slot. Without codes from a module, it does not use the bus.
+    workers: [DacWorker; SLOTS],
 }
 
 impl AnalogOutputs {
     /// Sends pending output values to the DACs.
     pub fn work(&mut self, dacs: &mut impl Mutex<T = [DacLink; SLOTS]>) {
-        let mut links = dacs.lock(|dacs| *dacs);
-        for (worker, link) in self.workers.iter_mut().zip(&mut links) {
-            if let Some(worker) = worker {
-                // After an error the bus is recovered before its next transfer.
-                let _ = worker.work(&mut self.bus, link.wanted);
-                link.failed = worker.failed();
-            }
+        let links = dacs.lock(|dacs| *dacs);
+        for (worker, link) in self.workers.iter_mut().zip(links) {
+            // After an error the bus is recovered before its next transfer.
+            let _ = worker.work(&mut self.bus, link.wanted);
         }
         dacs.lock(|dacs| {
-            for (dac, link) in dacs.iter_mut().zip(links) {
-                dac.failed = link.failed;
+            for (dac, worker) in dacs.iter_mut().zip(&self.workers) {
+                dac.failed = worker.failed();
             }
         });
     }
@@ -118,16 +83,12 @@ pub fn install(
     sampler: &mut Sampler,
     bus: DacBus,
 ) -> ([Installed; SLOTS], AnalogOutputs) {
-    let mut workers = [const { None }; SLOTS];
+    let workers = slots
+        .each_ref()
+        .map(|slot| DacWorker::new(slot.dac_address()));
     let mut installed = [const { Installed::None(Absent) }; SLOTS];
     let plugged = modules.into_iter().zip(slots).zip(&mut sampler.inputs);
-    for (((module, slot), analog), (place, worker)) in
-        plugged.zip(installed.iter_mut().zip(&mut workers))
-    {
-        *worker = match module {
-            Module::Ao4 | Module::Ai2Ao2 => Some(DacWorker::new(slot.dac_address())),
-            Module::None | Module::Di4 | Module::Do4 | Module::Relay2 | Module::Ai4 => None,
-        };
+    for (((module, slot), analog), place) in plugged.zip(&mut installed) {
         *place = Installed::new(module, slot, analog);
     }
     (installed, AnalogOutputs { bus, workers })

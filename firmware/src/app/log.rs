@@ -12,7 +12,7 @@ use register_map::{
 };
 use rtt_target::{ChannelMode, UpChannel};
 
-use crate::{board::BOARD, clock, fault_record, rtt};
+use crate::{board::BOARD, clock, rtt};
 
 /// Events that are logged while the device runs.
 #[derive(Clone, Copy)]
@@ -137,8 +137,8 @@ impl Log {
                 self.write(Line::of("reset: ").text(cause));
             }
         }
-        let fault = fault_record::kind(start.faults.fault.kind);
-        if fault != FaultKind::None {
+        let fault = FaultKind::from_code(start.faults.fault.kind as u16);
+        if let Some(fault) = fault.filter(|fault| *fault != FaultKind::None) {
             self.write(Line::of("WARN last fault: ").text(fault.name()));
         }
         if start.clock == ClockSource::Internal {

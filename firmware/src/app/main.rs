@@ -44,9 +44,7 @@ mod trap;
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{
-        RadioUart, ScanTimer, Watchdog, boards::SLOTS, fault, pac::Interrupt, stack::LowWater,
-    };
+    use board_support::{RadioUart, ScanTimer, Watchdog, boards::SLOTS, fault, pac::Interrupt};
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
@@ -127,14 +125,7 @@ mod app {
                 serving: started.serving,
                 scanning: started.scanning,
                 events,
-                background_work: Background {
-                    analog_outputs: started.analog_outputs,
-                    persistence: started.persistence,
-                    leds: started.leds,
-                    log: started.log,
-                    stack: LowWater::new(),
-                    radio: None,
-                },
+                background_work: started.background,
                 logged,
                 watchdog: started.watchdog,
             },

@@ -8,25 +8,17 @@
 //!
 //! The task does not run while flash is erased, for up to 40 ms. A queue holds 64 bytes, which take 66 ms.
 
-use core::{
-    convert::Infallible,
-    sync::atomic::{AtomicBool, Ordering},
-};
+use core::sync::atomic::{AtomicBool, Ordering};
 
-use board_support::{Damaged, PinInput, PinOutput, RadioUart, pac::Interrupt};
-use embedded_hal::digital::{self, InputPin, PinState};
+use board_support::{Damaged, IoPin, RadioUart, pac::Interrupt};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
 use firmware::{byte_queue::ByteQueue, radio};
-use modio_drivers::AuxPin;
 use rtic::Mutex;
 
 use crate::{board::Device, clock, every::Every};
 
 /// The radio line.
-pub type Radio = radio::RadioLine<Serial, PinOutput, Aux>;
-
-/// The pin at AUX.
-pub struct Aux(pub PinInput);
+pub type Radio = radio::RadioLine<Serial, IoPin, IoPin>;
 
 /// Milliseconds between two checks of the UART's registers.
 const CHECK_MS: u8 = 100;
@@ -54,26 +46,6 @@ pub fn on_interrupt(uart: &mut RadioUart) {
         },
         || TO_SEND.pop(),
     );
-}
-
-impl digital::ErrorType for Aux {
-    type Error = Infallible;
-}
-
-impl InputPin for Aux {
-    fn is_high(&mut self) -> Result<bool, Infallible> {
-        self.0.is_high()
-    }
-
-    fn is_low(&mut self) -> Result<bool, Infallible> {
-        self.0.is_low()
-    }
-}
-
-impl AuxPin for Aux {
-    fn pull(&mut self, level: PinState) {
-        self.0.pull(level.into());
-    }
 }
 
 impl ErrorType for Serial {

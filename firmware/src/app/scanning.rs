@@ -3,7 +3,7 @@
 use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
 use firmware::{device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
-use modio_drivers::{DacLink, IoModule, ModuleError};
+use modio_drivers::{DacLink, ModuleError};
 use rtic::Mutex;
 
 use crate::{
@@ -39,9 +39,9 @@ impl Scanning {
     ) -> Self {
         let ports = device.points.ports();
         for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs) {
-            module.configure(port.settings());
+            module.driver().configure(port.settings());
             // If a module cannot be driven, the first scan reports it.
-            let _ = module.drive_outputs(port.channels(), dac);
+            let _ = module.driver().drive_outputs(port.channels(), dac);
         }
         Self {
             modules,
@@ -82,7 +82,7 @@ impl Scanning {
         self.revision = revision;
         if let Some(settings) = settings {
             for (module, settings) in self.modules.iter_mut().zip(&settings) {
-                module.configure(settings);
+                module.driver().configure(settings);
             }
         }
 
@@ -90,14 +90,15 @@ impl Scanning {
         let modules = self.modules.iter_mut().zip(&channels);
         dacs.lock(|dacs| {
             for (((module, channels), result), dac) in modules.zip(&mut results).zip(dacs) {
-                *result = module.drive_outputs(channels, dac);
+                *result = module.driver().drive_outputs(channels, dac);
             }
         });
         if beat {
             let codes = self.sampler.run();
             let modules = self.modules.iter_mut().zip(&mut channels).zip(&codes);
             for (((module, channels), codes), result) in modules.zip(&mut results) {
-                *result = ModuleError::in_either(*result, module.read_inputs(channels, codes));
+                *result =
+                    ModuleError::in_either(*result, module.driver().read_inputs(channels, codes));
             }
         }
         let changed = device.lock(|device| {

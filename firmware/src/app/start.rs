@@ -3,8 +3,8 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    PinOutput, RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError,
-    gap::LineTimes, pac, uart,
+    RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes, pac,
+    stack::LowWater, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -18,20 +18,21 @@ use modbus_server::{
     Adu,
     line::{Framing, Gaps, Port, Receiver, Width},
 };
-use modio_drivers::{DacLink, IoModule};
+use modio_drivers::DacLink;
 use register_map::{
     codes::{Format, GapRule, Mode},
     state::reset_cause::POWER_ON,
 };
 
 use crate::{
+    background::Background,
     board::{BOARD, DESCRIPTION, Device},
     fault_record,
-    installed::{AnalogOutputs, install},
+    installed::install,
     line::{Line, Rs485Gap, Rs485Uart},
     log::{self, Log},
     persistence::Persistence,
-    radio::{Aux, Radio, Serial},
+    radio::{Radio, Serial},
     scanning::Scanning,
     serving::Serving,
 };
@@ -47,13 +48,10 @@ pub struct Started {
     pub serving: Serving,
     pub device: &'static mut Device,
     pub scanning: Scanning,
-    pub analog_outputs: AnalogOutputs,
     pub dacs: [DacLink; SLOTS],
-    pub persistence: Persistence,
+    pub background: Background,
     pub scan_timer: ScanTimer,
     pub watchdog: Watchdog,
-    pub leds: Leds<PinOutput>,
-    pub log: Log,
 }
 
 /// The memory for what is too large to be moved over the stack, or is shared with interrupts.
@@ -98,7 +96,7 @@ pub fn up(
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
+    let (mut modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
@@ -106,7 +104,7 @@ pub fn up(
         fault: fault_record::words(&board.faults),
         internal_oscillator: !board.clock.is_crystal(),
     };
-    let kinds = modules.each_ref().map(IoModule::kinds);
+    let kinds = modules.each_mut().map(|module| module.driver().kinds());
     let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
     let mut dacs = [DacLink::default(); SLOTS];
     let scanning = Scanning::new(modules, sampler, device, &mut dacs);
@@ -173,7 +171,7 @@ pub fn up(
             let radio = Radio::new(
                 Serial,
                 mode,
-                Aux(aux),
+                aux,
                 config,
                 identity.unit,
                 power_on,
@@ -194,16 +192,20 @@ pub fn up(
         ),
         device,
         scanning,
-        analog_outputs,
         dacs,
-        persistence: Persistence::new(store, pages, erase),
+        background: Background {
+            analog_outputs,
+            persistence: Persistence::new(store, pages, erase),
+            leds: Leds::new(
+                board.leds,
+                Trouble::at_start(address, board.clock.is_crystal()),
+            ),
+            log,
+            stack: LowWater::new(),
+            radio: None,
+        },
         scan_timer: board.scan_timer,
         watchdog: board.watchdog,
-        log,
-        leds: Leds::new(
-            board.leds,
-            Trouble::at_start(address, board.clock.is_crystal()),
-        ),
     }
 }
 

@@ -20,7 +20,7 @@ fn commanded(third: u16, fourth: u16) -> Channels {
 
 #[test]
 fn inputs_are_lines_1_and_2_and_reading_does_not_change_outputs() {
-    let mut module = Ai2Ao2::new();
+    let mut module = Ai2Ao2::default();
     use Kind::{WordInput, WordOutput};
     assert_eq!(
         module.kinds(),
@@ -37,7 +37,7 @@ fn inputs_are_lines_1_and_2_and_reading_does_not_change_outputs() {
 #[test]
 fn outputs_are_the_channels_c_and_d_in_their_own_units() {
     let mut link = DacLink::default();
-    let mut module = Ai2Ao2::new();
+    let mut module = Ai2Ao2::default();
     let channels = commanded(4000, 4095);
     module.drive_outputs(&channels, &mut link).unwrap();
     assert_eq!(link.wanted, Some([0, 0, 4000, 4095].map(Code::new)));
@@ -63,7 +63,7 @@ fn a_dac_that_does_not_answer_is_an_error_of_its_channels_while_inputs_are_still
         failed: true,
         ..DacLink::default()
     };
-    let mut module = Ai2Ao2::new();
+    let mut module = Ai2Ao2::default();
     let mut channels = commanded(5, 4095);
     let failed = Err(ModuleError::chip(0b1100));
     assert_eq!(module.drive_outputs(&channels, &mut link), failed);

@@ -35,7 +35,7 @@ fn scan(module: &mut Ai4, channels: &mut Channels, codes: [u16; 4]) -> [u16; 4] 
 
 #[test]
 fn first_sample_of_every_line_is_shown_immediately() {
-    let mut module = Ai4::new();
+    let mut module = Ai4::default();
     let mut channels = Channels::new();
     assert_eq!(module.kinds(), [Kind::WordInput; 4]);
     let codes = [0, 1, 2048, 4095];
@@ -48,7 +48,7 @@ fn first_sample_of_every_line_is_shown_immediately() {
 
 #[test]
 fn each_channel_has_its_own_range_and_scale() {
-    let mut module = Ai4::new();
+    let mut module = Ai4::default();
     module.configure(&[
         with(0, Signal::Voltage, Scale::Engineering),
         with(0, Signal::Current, Scale::Engineering),
@@ -91,7 +91,7 @@ fn status_reports_breaks_and_shorts_while_they_last() {
         ([0, 2048, 2048, 4060], [Good, Good, Good, UnderRange]),
     ];
     for (codes, expected) in cases {
-        let mut module = Ai4::new();
+        let mut module = Ai4::default();
         module.configure(&settings);
         let mut channels = Channels::new();
         scan(&mut module, &mut channels, codes);
@@ -99,7 +99,7 @@ fn status_reports_breaks_and_shorts_while_they_last() {
     }
 
     // One module for all cases, as when its wires are moved.
-    let mut module = Ai4::new();
+    let mut module = Ai4::default();
     module.configure(&settings);
     let mut channels = Channels::new();
     for (codes, expected) in cases {
@@ -111,7 +111,7 @@ fn status_reports_breaks_and_shorts_while_they_last() {
 #[test]
 fn equal_settings_do_not_disturb_a_filter_and_a_new_filter_does_not_jump() {
     let step = |again: bool| {
-        let mut module = Ai4::new();
+        let mut module = Ai4::default();
         module.configure(&raw(6));
         let mut channels = Channels::new();
         scan(&mut module, &mut channels, [0; 4]);
@@ -145,7 +145,7 @@ fn equal_settings_do_not_disturb_a_filter_and_a_new_filter_does_not_jump() {
 
 #[test]
 fn another_range_starts_with_status_good() {
-    let mut module = Ai4::new();
+    let mut module = Ai4::default();
     let mut channels = Channels::new();
     let mut show = |signal, codes: [u16; 4]| {
         module.configure(&[with(0, signal, Scale::Raw); 4]);
@@ -170,7 +170,7 @@ fn another_range_starts_with_status_good() {
 
 #[test]
 fn a_line_without_codes_is_reported_keeps_its_word_and_restarts_its_filter() {
-    let mut module = Ai4::new();
+    let mut module = Ai4::default();
     module.configure(&raw(8));
     let mut channels = Channels::new();
     scan(&mut module, &mut channels, [100; 4]);
@@ -194,7 +194,7 @@ fn a_line_without_codes_is_reported_keeps_its_word_and_restarts_its_filter() {
 
 #[test]
 fn short_stalls_are_not_added_up() {
-    let mut module = Ai4::new();
+    let mut module = Ai4::default();
     let mut channels = Channels::new();
     for _ in 0..10 {
         for _ in 1..STALLED_SCANS {

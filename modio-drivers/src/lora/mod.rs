@@ -72,12 +72,6 @@ enum Step {
     Failed,
 }
 
-/// The pin at AUX.
-pub trait AuxPin: InputPin {
-    /// Pulls the pin up or down.
-    fn pull(&mut self, level: PinState);
-}
-
 /// The radio: its UART, at 9600 8N1 in both modes, and its pins.
 ///
 /// Call [`poll`](Self::poll) about once a millisecond. When the radio [is ready](Self::is_ready), bytes that are
@@ -107,9 +101,10 @@ impl<S, M, A> Lora<S, M, A>
 where
     S: Read<u8> + Write<u8>,
     M: OutputPin,
-    A: AuxPin,
+    A: InputPin + OutputPin,
 {
-    /// Creates the driver. `mode` are M0 and M1, both high; AUX is pulled up. The module gets these settings.
+    /// Creates the driver. `mode` are M0 and M1, both high; `aux` is an input that is pulled to the level that is set,
+    /// high at first. The module gets these settings.
     ///
     /// AUX goes high when the module begins to send its last packet. `sending` is the time in ms for which it may then
     /// still be sending: [`LoraSettings::packet_ms`] after a reset that the module has not had, 0 after power-on.
@@ -215,7 +210,7 @@ where
         self.sending = 0;
         self.received = 0;
         self.equal = true;
-        self.aux.pull((step != Step::Ready).into());
+        let _ = self.aux.set_state((step != Step::Ready).into());
         // What was received before this step is no reply, and no data either. The number of reads is limited, because
         // a broken UART may report an error each time.
         let _ = (0..DISCARDED).any(|_| matches!(self.serial.read(), Err(nb::Error::WouldBlock)));

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::vec::Vec;
 
-use embedded_hal::digital::{self, InputPin, PinState};
+use embedded_hal::digital::{self, InputPin};
 use embedded_hal_nb::serial::{ErrorKind, ErrorType};
 use modbus_server::{Counters, Outcome, Server, Tables, crc, line::Framing};
 use modio_drivers::LoraSettings;
@@ -57,7 +57,8 @@ pub(super) struct Module {
 #[derive(Clone, Default)]
 pub(super) struct Shared(pub(super) Rc<RefCell<Module>>);
 
-pub(super) struct Pin(pub(super) Shared);
+/// M0 or M1, or else AUX.
+pub(super) struct Pin(pub(super) Shared, bool);
 
 impl ErrorType for Shared {
     type Error = ErrorKind;
@@ -103,12 +104,12 @@ impl digital::ErrorType for Pin {
 
 impl OutputPin for Pin {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.0.0.borrow_mut().asleep = false;
+        self.0.0.borrow_mut().asleep &= !self.1;
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.0.0.borrow_mut().asleep = true;
+        self.0.0.borrow_mut().asleep |= self.1;
         Ok(())
     }
 }
@@ -121,10 +122,6 @@ impl InputPin for Pin {
     fn is_low(&mut self) -> Result<bool, Infallible> {
         Ok(self.0.0.borrow().busy)
     }
-}
-
-impl AuxPin for Pin {
-    fn pull(&mut self, _: PinState) {}
 }
 
 /// Unit 17 with ten registers of value 0x1111.
@@ -141,12 +138,12 @@ impl Bench {
     pub(super) fn starting() -> Self {
         let module = Shared::default();
         module.0.borrow_mut().room = 1000;
-        let pin = || Pin(module.clone());
+        let pin = |mode| Pin(module.clone(), mode);
         let adus = Box::leak(Box::new([Adu::new()]));
         let line = RadioLine::new(
             module.clone(),
-            [pin(), pin()],
-            pin(),
+            [pin(true), pin(true)],
+            pin(false),
             CONFIG,
             17,
             true,

@@ -135,9 +135,15 @@ impl InputPin for Aux {
     }
 }
 
-impl AuxPin for Aux {
-    fn pull(&mut self, level: PinState) {
-        self.0.0.borrow_mut().pull = level.into();
+impl OutputPin for Aux {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.0.borrow_mut().pull = false;
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.0.borrow_mut().pull = true;
+        Ok(())
     }
 }
 
