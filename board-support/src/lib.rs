@@ -13,6 +13,7 @@ pub mod fault;
 pub mod gap;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
+pub mod kept;
 mod pin;
 pub mod tolerance;
 pub mod uart;

@@ -1,6 +1,6 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::stack::LowWater;
+use board_support::{kept, stack::LowWater};
 use heapless::spsc::Consumer;
 use rtic::Mutex;
 
@@ -55,12 +55,14 @@ impl Background {
             self.signals.identify();
         }
         let free = self.stack.check();
-        let (failing, millis, radio) = device.lock(|device| {
+        let (failing, millis, radio, saves) = device.lock(|device| {
             let state = &mut device.state;
             state.stack_free = free;
             let (millis, radio) = (state.millis(), state.radio_works);
-            (device.any_fails(), millis, radio)
+            let saves = device.config.saves_left();
+            (device.any_fails(), millis, radio, saves)
         });
+        kept::keep_saves(saves);
         if let Some(works) = radio
             && self.radio.replace(works) != radio
         {

@@ -137,7 +137,7 @@ impl Log {
                 self.write(Line::of("reset: ").text(cause));
             }
         }
-        let fault = fault_record::kind(start.faults.fault.kind);
+        let fault = fault_record::kind(&start.faults);
         if fault != FaultKind::None {
             self.write(Line::of("WARN last fault: ").text(fault.name()));
         }

@@ -3,7 +3,7 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::{fault, flash::FlashError};
+use board_support::{flash::FlashError, kept};
 use firmware::{
     config::Settings,
     store::{Operation, Saving, Store, StoreError},
@@ -66,6 +66,7 @@ impl Persistence {
             None
         };
         if self.restart && self.saving.is_none() {
+            kept::keep_asked();
             board_support::restart();
         }
         event
@@ -101,8 +102,8 @@ impl Persistence {
                     self.fail(device);
                     return None;
                 };
-                // A restart may follow before the next scan, which keeps the number otherwise.
-                fault::keep_saves(left);
+                // A restart may follow before the background keeps the number.
+                kept::keep_saves(left);
             }
         }
         let Some(mut saving) = self.saving.take() else {

@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    Leds, RadioUart, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, pac, uart,
+    Leds, RadioUart, ScanTimer, Watchdog, board, flash::FlashError, gap::LineTimes, kept, pac, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -88,9 +88,7 @@ pub fn up(
         loaded.settings,
         loaded.invalid || loaded.rejected > 0,
     );
-    if let Some(left) = board.saves_left {
-        config.set_saves_left(left);
-    }
+    config.set_saves_left(board.saves_left);
     let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
@@ -108,7 +106,10 @@ pub fn up(
     };
     let kinds = modules.each_ref().map(IoModule::kinds);
     let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
-    let scanning = Scanning::new(modules, sampler, device);
+    for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {
+        port.set_pulses(kept::pulses(slot));
+    }
+    let scanning = Scanning::new(modules, sampler, device, board.powered_s);
 
     log.start(&log::Start {
         address,
