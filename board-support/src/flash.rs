@@ -16,15 +16,26 @@ use cortex_m::{
 };
 use stm32f1xx_hal::pac;
 
-use crate::{
-    boards::BOARD,
-    design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ},
-};
+use crate::design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ};
 
-/// The addresses of the store's pages.
-const STORE_PAGES: [u32; 2] = BOARD.store;
-/// Bytes of each page.
-const PAGE_BYTES: u32 = BOARD.page_bytes;
+// From the linker script.
+unsafe extern "C" {
+    /// The first page of the store. The second one follows.
+    static _store: u8;
+    /// Its address is the number of bytes of a page.
+    static _page_bytes: u8;
+}
+
+fn page_bytes() -> u32 {
+    &raw const _page_bytes as u32
+}
+
+/// Returns the addresses of the store's pages.
+fn store_pages() -> [u32; 2] {
+    let first = &raw const _store as u32;
+    [first, first + page_bytes()]
+}
+
 /// Key sequence that unlocks the controller (PM0075 2.3.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
@@ -142,14 +153,14 @@ impl Flash {
         self.power.csr().read().pvdo().bit_is_clear()
     }
 
-    /// Returns the bytes of the store's pages, in the order of the [descriptor](crate::boards::Descriptor::store).
+    /// Returns the bytes of the store's pages, in ascending order.
     #[must_use]
     pub fn pages(&self) -> [&[u8]; 2] {
         // SAFETY: a page of flash is always readable, as bytes. Only the `&mut` methods of this value change it,
         // and the borrow prevents calls of those. They end with a barrier that the compiler treats as a write to
         // all memory.
-        STORE_PAGES.map(|address| unsafe {
-            slice::from_raw_parts(address as *const u8, PAGE_BYTES as usize)
+        store_pages().map(|address| unsafe {
+            slice::from_raw_parts(address as *const u8, page_bytes() as usize)
         })
     }
 
@@ -159,8 +170,8 @@ impl Flash {
     ///
     /// Every variant of [`FlashError`].
     pub fn program_half_word(&mut self, address: u32, half: u16) -> Result<(), FlashError> {
-        let [first, last] = STORE_PAGES;
-        if !(first..last + PAGE_BYTES).contains(&address) || !address.is_multiple_of(2) {
+        let [first, last] = store_pages();
+        if !(first..last + page_bytes()).contains(&address) || !address.is_multiple_of(2) {
             return Err(FlashError::Address(address));
         }
         let place = address as *mut u16;
@@ -184,12 +195,12 @@ impl Flash {
     ///
     /// Every variant of [`FlashError`] except `NotErased`.
     pub fn erase_page(&mut self, address: u32) -> Result<(), FlashError> {
-        if !STORE_PAGES.contains(&address) {
+        if !store_pages().contains(&address) {
             return Err(FlashError::Address(address));
         }
         // SAFETY: the page belongs to the store and contains no code.
         unsafe { self.operate(Operation::Erase { page: address }) }?;
-        let erased = (address..address + PAGE_BYTES)
+        let erased = (address..address + page_bytes())
             .step_by(4)
             // SAFETY: these are the words of the page, which is readable and aligned.
             .all(|word| unsafe { ptr::read_volatile(word as *const u32) } == u32::MAX);

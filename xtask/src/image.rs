@@ -9,11 +9,7 @@ use object::{Endianness, Object as _, ObjectSymbol as _, SymbolKind};
 
 use crate::error::usage;
 
-/// First address of flash.
-pub const FLASH_BASE: u32 = 0x0800_0000;
-
-/// First address of RAM.
-pub const RAM_BASE: u32 = 0x2000_0000;
+pub use register_map::part::{FLASH_BASE, RAM_BASE};
 
 /// Start of the names that lld gives to thunks. The rest is the name of the function that the thunk jumps to.
 const THUNK: &str = "__Thumbv7ABSLongThunk_";
