@@ -14,8 +14,9 @@ use crate::{
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
     dip,
-    fault::{self, FaultRecord},
+    fault::FaultRecord,
     gap::LineTimes,
+    kept,
     pin::{Pin, Port},
     radio::RadioOff,
     rs485,
@@ -23,7 +24,8 @@ use crate::{
     unique_id, vectors, wait,
 };
 
-/// The power-on flag in [`Board::reset_cause`].
+/// Flags in [`Board::reset_cause`].
+const WATCHDOG: u8 = 1 << 2;
 const POWER_ON: u8 = 1 << 4;
 
 /// The board's devices.
@@ -37,8 +39,10 @@ pub struct Board {
     pub faults: FaultRecord,
     /// SW01 as a number from 0 to 255, as read at power-on.
     pub dip: u8,
-    /// Number of saves that were left before the reset. `None` after power-on, or when no valid number was kept.
-    pub saves_left: Option<u8>,
+    /// Number of saves that were left before the reset, 255 after power-on.
+    pub saves_left: u8,
+    /// Seconds from power-on to this start.
+    pub powered_s: u32,
     /// The chip's unique identity, half-words in the order of their addresses (RM0008 30.2).
     pub unique_id: [u16; 6],
     /// The slots, in the order of their ports.
@@ -99,7 +103,8 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     let mut rcc = device.RCC;
     let reset_cause = take_reset_cause(&rcc);
     let watchdog = Watchdog::start(device.IWDG, &device.DBGMCU);
-    let faults = fault::take_at_start(reset_cause);
+    let kept = kept::at_start(reset_cause & (WATCHDOG | POWER_ON) == WATCHDOG);
+    let faults = kept.record();
     let crystal = faults.crystal_faults < CRYSTAL_FAULTS;
     let clock = clock::start(&rcc, &device.FLASH, crystal);
 
@@ -117,10 +122,11 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
     // SW01: one side of each switch is connected to ground.
     BOARD.switch.iter().for_each(|pin| pin.pull_up());
     cortex_m::asm::delay(DIP_SETTLE_CYCLES);
-    let kept = fault::kept_dip().filter(|_| reset_cause & POWER_ON == 0);
-    let dip = kept
-        .unwrap_or_else(|| dip::stable(read_dip, || wait::wait_us(DIP_POLL_US, clock.core_mhz())));
-    fault::keep_dip(dip);
+    let dip = kept.dip().unwrap_or_else(|| {
+        let dip = dip::stable(read_dip, || wait::wait_us(DIP_POLL_US, clock.core_mhz()));
+        kept::keep_dip(dip);
+        dip
+    });
 
     // PC13 must not be faster than 2 MHz nor drive more than 3 mA (DS5319 table 5, notes).
     let leds = [
@@ -142,7 +148,8 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         reset_cause,
         faults,
         dip,
-        saves_left: fault::kept_saves().filter(|_| reset_cause & POWER_ON == 0),
+        saves_left: kept.saves(),
+        powered_s: kept.started(),
         unique_id: unique_id::read(),
         slots: array::from_fn(|index| Slot::new(&BOARD.slots[index])),
         sampler: Sampler::new(device.ADC1),
@@ -170,10 +177,14 @@ fn read_dip() -> u8 {
     dip::number(&BOARD.switch, Port::levels())
 }
 
-/// Reads and clears the reset flags, so that the next start sees only its own flags.
+/// Reads and clears the reset flags, so that the next start sees only its own flags. After a power-on clears the kept
+/// region first; otherwise another reset in between would hide the power-on.
 fn take_reset_cause(rcc: &pac::RCC) -> u8 {
     // The six most significant bits, from LPWRRSTF down to PINRSTF (RM0008 7.3.10).
-    let flags = rcc.csr().read().bits().reverse_bits();
+    let cause = rcc.csr().read().bits().reverse_bits() as u8 & 0b11_1111;
+    if cause & POWER_ON != 0 {
+        kept::forget();
+    }
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    flags as u8 & 0b11_1111
+    cause
 }

@@ -17,7 +17,6 @@ use cortex_m::{
 use stm32f1xx_hal::pac;
 
 use crate::{
-    boards::BOARD,
     design::{FLASH_ERASE_US, FLASH_PROGRAM_US, PVD_LEVEL, SYSCLK_ON_HSE_HZ},
     pages::{Page, Pages},
 };
@@ -180,11 +179,23 @@ impl Flash {
     }
 }
 
-const fn address(page: Page) -> u32 {
-    let [first, second] = BOARD.store;
+// From the linker script.
+unsafe extern "C" {
+    /// The first page of the store. The second one follows.
+    static _store: u8;
+    /// Its address is the number of bytes of a page.
+    static _page_bytes: u8;
+}
+
+fn page_bytes() -> u32 {
+    &raw const _page_bytes as u32
+}
+
+fn address(page: Page) -> u32 {
+    let first = &raw const _store as u32;
     match page {
         Page::First => first,
-        Page::Second => second,
+        Page::Second => first + page_bytes(),
     }
 }
 
@@ -195,12 +206,12 @@ impl Pages for Flash {
         // SAFETY: a page of flash is always readable, as bytes. Only the `&mut` methods of this value change it,
         // and the borrow prevents calls of those. They end with a barrier that the compiler treats as a write to
         // all memory.
-        unsafe { slice::from_raw_parts(address(page) as *const u8, BOARD.page_bytes as usize) }
+        unsafe { slice::from_raw_parts(address(page) as *const u8, page_bytes() as usize) }
     }
 
     fn program(&mut self, page: Page, offset: usize, half: u16) -> Result<(), FlashError> {
         let offset = offset as u32;
-        if offset >= BOARD.page_bytes || !offset.is_multiple_of(2) {
+        if offset >= page_bytes() || !offset.is_multiple_of(2) {
             return Err(FlashError::Failed);
         }
         let place = (address(page) + offset) as *mut u16;

@@ -13,6 +13,7 @@ pub mod fault;
 pub mod gap;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
+pub mod kept;
 pub mod pages;
 mod pin;
 pub mod tolerance;

@@ -1,9 +1,10 @@
-//! The boards as a master or a tool sees them: codes, names, ports. `board-support` describes the pins.
+//! The boards: a row for each, with its code, its name, its ports and its memory. `board-support` describes the pins.
 
 use core::fmt;
 use core::ops::Range;
 use core::str::FromStr;
 
+use crate::part::{self, KIB, Part, STM32F103C8, STM32F103CB, STM32F103RC};
 use crate::points;
 
 /// A board that the firmware is built for.
@@ -28,7 +29,7 @@ pub struct Board {
 pub struct StorePages {
     /// Address of the first page. The second one follows.
     pub first: u32,
-    /// Bytes of a page, the smallest unit that can be erased (PM0075 2.1).
+    /// Bytes of a page, the smallest unit that can be erased.
     pub bytes: u32,
 }
 
@@ -40,33 +41,92 @@ impl StorePages {
     }
 }
 
-/// The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
-pub const MODIO_02: Board = Board {
-    name: "modio-02",
-    code: 1,
-    model: "LLD-ModbusIO-02",
-    first_port: 5,
-    slots: 1,
-    // The last 2 KiB of the 64 KiB part, so that one image fits both parts.
-    store: StorePages {
-        first: 0x0800_F800,
-        bytes: 1024,
-    },
-};
+/// What the image of a board is linked for, and what it may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// The part on the board.
+    pub part: Part,
+    /// A smaller part that the same image must fit. The store lies in its last pages.
+    pub smaller: Option<Part>,
+    /// Bytes of the stack, at the start of the RAM.
+    pub stack: u32,
+    /// Bytes of flash and of RAM that the application may use. The rest is for the stack, the store and a loader.
+    pub budget: [u32; 2],
+}
 
-/// The larger board with an STM32F103RC: four slots, ports 1 to 4.
-pub const MODIO_08: Board = Board {
-    name: "modio-08",
-    code: 2,
-    model: "modio-08",
-    first_port: 1,
-    slots: 4,
-    // The last 4 KiB of 256. This part's pages have 2 KiB.
-    store: StorePages {
-        first: 0x0803_F000,
-        bytes: 2048,
+impl Memory {
+    /// Returns the smallest part.
+    #[must_use]
+    pub const fn least(&self) -> Part {
+        match self.smaller {
+            Some(smaller) => smaller,
+            None => self.part,
+        }
+    }
+}
+
+/// A board: everything about it but its pins, which are in `board-support`.
+struct Row {
+    name: &'static str,
+    code: u16,
+    model: &'static str,
+    first_port: u16,
+    slots: u16,
+    memory: Memory,
+}
+
+const ROWS: [Row; 2] = [
+    // The LLD-ModbusIO-02 with an STM32F103CB, or a C8 on a "Blue Pill": one slot, port 5.
+    Row {
+        name: "modio-02",
+        code: 1,
+        model: "LLD-ModbusIO-02",
+        first_port: 5,
+        slots: 1,
+        memory: Memory {
+            part: STM32F103CB,
+            smaller: Some(STM32F103C8),
+            stack: 8 * KIB,
+            budget: [49 * KIB, 9 * KIB],
+        },
     },
-};
+    // The larger board with an STM32F103RC: four slots, ports 1 to 4.
+    Row {
+        name: "modio-08",
+        code: 2,
+        model: "modio-08",
+        first_port: 1,
+        slots: 4,
+        memory: Memory {
+            part: STM32F103RC,
+            smaller: None,
+            stack: 9 * KIB,
+            budget: [50 * KIB, 12 * KIB],
+        },
+    },
+];
+
+impl Row {
+    const fn board(&self) -> Board {
+        let part = self.memory.least();
+        Board {
+            name: self.name,
+            code: self.code,
+            model: self.model,
+            first_port: self.first_port,
+            slots: self.slots,
+            store: StorePages {
+                first: part::FLASH_BASE + part.flash - 2 * part.page,
+                bytes: part.page,
+            },
+        }
+    }
+}
+
+/// The modio-02.
+pub const MODIO_02: Board = ROWS[0].board();
+/// The modio-08.
+pub const MODIO_08: Board = ROWS[1].board();
 
 impl Board {
     /// All boards, in the order of their codes.
@@ -82,6 +142,13 @@ impl Board {
         }
         names
     };
+
+    /// Returns the memory of the board.
+    #[must_use]
+    pub fn memory(&self) -> &'static Memory {
+        let row = const { &ROWS }.iter().find(|row| row.code == self.code);
+        &row.expect("every board comes from a row").memory
+    }
 
     /// Returns the board with this code in register BOARD.
     #[must_use]
@@ -190,12 +257,8 @@ mod tests {
     }
 
     #[test]
-    fn both_pages_of_a_store_are_aligned_pages_of_the_flash() {
-        for board in Board::ALL {
-            let [first, second] = board.store.addresses();
-            assert!(first.is_multiple_of(board.store.bytes), "{board}");
-            assert_eq!(second - first, board.store.bytes, "{board}");
-        }
+    fn store_is_in_the_last_pages_of_the_smallest_part() {
+        assert_eq!(MODIO_02.store.addresses(), [0x0800_F800, 0x0800_FC00]);
         assert_eq!(MODIO_08.store.addresses(), [0x0803_F000, 0x0803_F800]);
     }
 }

@@ -32,6 +32,7 @@ pub mod counters;
 pub mod docs;
 pub mod fault;
 mod module;
+pub mod part;
 pub mod points;
 mod port;
 pub mod radio;

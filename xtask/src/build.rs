@@ -9,7 +9,6 @@ use fs_err as fs;
 use register_map::Board;
 use register_map::board::MODIO_02;
 
-use crate::board::Hardware;
 use crate::error::usage;
 use crate::image;
 use crate::toolchain::TARGET;
@@ -86,7 +85,7 @@ pub fn linked(
     let artifacts = workspace::artifacts(&mut cargo)?;
     let elf = workspace::executable(&artifacts, "modio")?;
     let bytes = image::read(&elf)?;
-    let flash = image::flat(&bytes, Hardware::of(board).part.flash)?;
+    let flash = image::flat(&bytes, board.memory().part.flash)?;
     image::check(&bytes)?;
     fs::write(elf.with_extension("bin"), flash)?;
     let packages = workspace::packages(&artifacts, &target.join(TARGET));

@@ -9,7 +9,6 @@ use std::process::{Command, Output};
 
 use anyhow::{Context as _, Result, anyhow, ensure};
 
-use crate::board::Hardware;
 use crate::group::Group;
 use crate::workspace::Workspace;
 use crate::{build, command};
@@ -140,7 +139,7 @@ fn check_list(list: io::Result<Output>) -> Result<()> {
 impl Options {
     /// Returns a command of probe-rs with the options for the probe.
     fn probe_rs(&self, subcommand: &str) -> Command {
-        let part = Hardware::of(self.given.board()).part.name;
+        let part = self.given.board().memory().part.name;
         let mut command = Command::new("probe-rs");
         command.args([subcommand, "--chip", self.chip.as_deref().unwrap_or(part)]);
         if let Some(probe) = &self.probe {

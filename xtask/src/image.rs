@@ -9,11 +9,7 @@ use object::{Endianness, Object as _, ObjectSymbol as _, SymbolKind};
 
 use crate::error::usage;
 
-/// First address of flash.
-pub const FLASH_BASE: u32 = 0x0800_0000;
-
-/// First address of RAM.
-pub const RAM_BASE: u32 = 0x2000_0000;
+pub use register_map::part::{FLASH_BASE, RAM_BASE};
 
 /// An ELF file for a 32-bit microcontroller.
 pub type Elf<'data> = ElfFile32<'data, Endianness>;

@@ -23,7 +23,6 @@ macro_rules! say {
 }
 
 mod bench;
-mod board;
 mod build;
 mod command;
 mod debug;

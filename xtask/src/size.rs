@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use register_map::Board;
+use register_map::board::{Board, Memory};
+use register_map::part::KIB;
 use serde_json::{Value, json};
 
-use crate::board::{Hardware, Memory};
 use crate::workspace::Workspace;
 use crate::{build, image, table};
 
@@ -17,20 +17,18 @@ mod source;
 use measure::{Bytes, Sizes, measure};
 pub use source::{Source, structures};
 
-const KIB: u32 = 1024;
-
 /// `cargo xtask size`. An image that exceeds a limit is an error.
 pub fn run(workspace: &mut Workspace, given: &build::Given) -> Result<()> {
     let sizes = of(&given.elf(workspace)?)?;
-    let hardware = Hardware::of(given.board());
-    say!("{}", as_table(&sizes, hardware));
-    within_limits(sizes.total(), hardware)
+    let memory = given.board().memory();
+    say!("{}", as_table(&sizes, memory));
+    within_limits(sizes.total(), memory)
 }
 
 /// Fails when the image does not fit the parts and the budget of a board.
 pub fn check(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     let elf = build::image(workspace, board)?;
-    within_limits(of(&elf)?.total(), Hardware::of(board))
+    within_limits(of(&elf)?.total(), board.memory())
 }
 
 /// Returns flash and RAM of an image, and of each crate.
@@ -49,14 +47,20 @@ fn of(elf: &Path) -> Result<Sizes> {
     measure(&image::read(elf)?).with_context(|| elf.display().to_string())
 }
 
-fn within_limits([flash, ram]: Bytes, hardware: &Hardware) -> Result<()> {
-    for limit in hardware.limits() {
+/// Returns the limits of an image, each with its name: the parts, the smaller one first, and the budget.
+fn limits(memory: &Memory) -> impl Iterator<Item = (&'static str, Bytes)> {
+    let parts = memory.smaller.into_iter().chain([memory.part]);
+    let parts = parts.map(|part| (part.name, [part.flash, part.ram]));
+    parts.chain([("budget", memory.budget)])
+}
+
+fn within_limits([flash, ram]: Bytes, memory: &Memory) -> Result<()> {
+    for (name, limit) in limits(memory) {
         ensure!(
-            flash <= limit.flash && ram <= limit.ram,
-            "the image takes {flash} bytes of flash and {ram} of RAM, more than {} has ({} and {})",
-            limit.name,
-            limit.flash,
-            limit.ram
+            flash <= limit[0] && ram <= limit[1],
+            "the image takes {flash} bytes of flash and {ram} of RAM, more than {name} has ({} and {})",
+            limit[0],
+            limit[1]
         );
     }
     Ok(())
@@ -67,7 +71,7 @@ fn left(limit: u32, taken: u32) -> i64 {
     i64::from(limit) - i64::from(taken)
 }
 
-fn as_table(sizes: &Sizes, hardware: &Hardware) -> String {
+fn as_table(sizes: &Sizes, memory: &Memory) -> String {
     let row = |(name, taken): &(String, Bytes)| {
         let [flash, ram] = taken.map(|bytes| bytes.to_string());
         [name.clone(), flash, ram]
@@ -80,7 +84,7 @@ fn as_table(sizes: &Sizes, hardware: &Hardware) -> String {
     rows.extend(sizes.crates.iter().map(row));
     rows.push(row(&("total".to_owned(), total)));
     rows.extend(heading("left of (stack not counted)"));
-    rows.extend(hardware.limits().map(|Memory { name, flash, ram }| {
+    rows.extend(limits(memory).map(|(name, [flash, ram])| {
         let name = format!("{name} ({} KiB / {} KiB)", flash / KIB, ram / KIB);
         let (flash, ram) = (left(flash, total[0]), left(ram, total[1]));
         [name, flash.to_string(), ram.to_string()]
@@ -90,23 +94,22 @@ fn as_table(sizes: &Sizes, hardware: &Hardware) -> String {
 
 #[cfg(test)]
 mod tests {
-    use register_map::board::{MODIO_02, MODIO_08};
+    use register_map::board::MODIO_02;
 
     use super::*;
 
     #[test]
     fn image_that_exceeds_a_limit_is_an_error_that_names_it() {
-        for (board, flash, ram, limit) in [
-            (&MODIO_02, 49 * KIB, 9 * KIB, None),
-            (&MODIO_02, 49 * KIB + 1, 0, Some("budget")),
-            (&MODIO_02, 0, 9 * KIB + 1, Some("budget")),
-            (&MODIO_02, 64 * KIB + 1, 0, Some("STM32F103C8")),
-            (&MODIO_02, 0, 20 * KIB + 1, Some("STM32F103C8")),
-            (&MODIO_08, 47 * KIB, 12 * KIB, None),
-            (&MODIO_08, 0, 12 * KIB + 1, Some("budget")),
-            (&MODIO_08, 256 * KIB + 1, 0, Some("STM32F103RC")),
+        let memory = MODIO_02.memory();
+        let [flash, ram] = memory.budget;
+        for (taken, limit) in [
+            ([flash, ram], None),
+            ([flash + 1, 0], Some("budget")),
+            ([0, ram + 1], Some("budget")),
+            ([64 * KIB + 1, 0], Some("STM32F103C8")),
+            ([0, 20 * KIB + 1], Some("STM32F103C8")),
         ] {
-            let error = within_limits([flash, ram], Hardware::of(board)).err();
+            let error = within_limits(taken, memory).err();
             let text = error.map(|error| error.to_string());
             assert_eq!(text.is_some(), limit.is_some(), "{text:?}");
             assert!(text.unwrap_or_default().contains(limit.unwrap_or_default()));
@@ -117,7 +120,7 @@ mod tests {
     fn report_has_what_is_left_of_parts_and_budget() {
         let sections = vec![(".text".to_owned(), [70_000, 5_000])];
         let crates = Vec::new();
-        let table = as_table(&Sizes { sections, crates }, Hardware::of(&MODIO_02));
+        let table = as_table(&Sizes { sections, crates }, MODIO_02.memory());
         assert!(table.contains("budget (49 KiB / 9 KiB)"), "{table}");
         assert!(table.contains("-4464"), "{table}");
     }

@@ -1,4 +1,5 @@
-//! The boards. One constant per board says what is connected to which pin.
+//! The boards. One constant per board says what is connected to which pin. The rest of a board is its row in crate
+//! register-map, which the linker script has from there.
 //!
 //! A cargo feature with the board's name selects the board. [`board`](crate::board) holds what all boards share:
 //! the RS-485 line on PA8 to PA10, the radio's UART on PB10 and PB11, the DACs' bus on PB6 and PB7, the LEDs on PB8,
@@ -20,12 +21,6 @@ pub struct Descriptor {
     pub switch: [Pin; 8],
     /// The pins of the LoRa radio, besides its UART on PB10 and PB11.
     pub radio: RadioPins,
-    /// Number of the part's interrupts: 43 for medium density, 60 for high density (RM0008 table 63).
-    pub interrupts: usize,
-    /// Addresses of the two flash pages that keep the configuration. The linker script places no code there.
-    pub store: [u32; 2],
-    /// Bytes of a flash page, the smallest unit that can be erased (PM0075 2.1).
-    pub page_bytes: u32,
 }
 
 /// The pins and the DAC address of a slot.
@@ -63,13 +58,6 @@ impl Descriptor {
             }
             slot += 1;
         }
-        assert!(self.interrupts <= 60);
-        let [first, second] = self.store;
-        assert!(first.is_multiple_of(self.page_bytes));
-        assert!(
-            first + self.page_bytes == second,
-            "the second page must follow the first"
-        );
     }
 }
 

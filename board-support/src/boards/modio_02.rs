@@ -24,8 +24,4 @@ pub const BOARD: Descriptor = Descriptor {
         mode: [Pin::b(0), Pin::b(1)],
         aux: Pin::b(5),
     },
-    interrupts: 43,
-    // The last two pages of the smaller part, the 64 KiB one (DS5319 table 2), so that one image fits both parts.
-    store: [0x0800_F800, 0x0800_FC00],
-    page_bytes: 1024,
 };

@@ -38,8 +38,4 @@ pub const BOARD: Descriptor = Descriptor {
         mode: [Pin::c(10), Pin::c(11)],
         aux: Pin::c(12),
     },
-    interrupts: 60,
-    // The last two pages of 256 KiB (DS5792 table 2; pages of 2 KiB: PM0075 2.1).
-    store: [0x0803_F000, 0x0803_F800],
-    page_bytes: 2048,
 };

@@ -1,6 +1,6 @@
 //! Background work that is not urgent: DAC transfers, configuration store, LEDs, log.
 
-use board_support::{IoPin, boards::SLOTS, stack::LowWater};
+use board_support::{IoPin, boards::SLOTS, kept, stack::LowWater};
 use firmware::leds::Leds;
 use heapless::spsc::Consumer;
 use modio_drivers::DacLink;
@@ -41,13 +41,15 @@ impl Background {
         self.persistence.erase();
 
         let free = self.stack.check();
-        let (identify, failing, millis, radio) = device.lock(|device| {
+        let (identify, failing, millis, radio, saves) = device.lock(|device| {
             let identify = core::mem::take(&mut device.identify);
             let state = &mut device.state;
             state.stack_free = free;
             let (millis, radio) = (state.millis(), state.radio_works);
-            (identify, device.any_fails(), millis, radio)
+            let saves = device.config.saves_left();
+            (identify, device.any_fails(), millis, radio, saves)
         });
+        kept::keep_saves(saves);
         if let Some(works) = radio
             && self.radio.replace(works) != radio
         {

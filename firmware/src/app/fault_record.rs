@@ -1,34 +1,22 @@
 //! The fault record of the last start in the terms of the register map.
 
-use board_support::fault;
+use board_support::fault::FaultRecord;
+use register_map::codes::FaultKind;
+
+/// Returns the kind of the fault.
+pub fn kind(record: &FaultRecord) -> FaultKind {
+    FaultKind::from_code(record.kind.into()).unwrap_or(FaultKind::None)
+}
 
 /// Returns the fault record as the 16 registers from 0x0260 on.
-pub fn words(record: &fault::FaultRecord) -> [u16; 16] {
-    let high = |word: u32| (word >> 16) as u16;
-    let low = |word: u32| word as u16;
-    let fault::FaultRecord {
-        fault,
-        count,
-        uptime,
-        missing,
-        crystal_faults: _,
-    } = *record;
-    [
-        fault.kind as u16,
-        count,
-        high(fault.pc),
-        low(fault.pc),
-        high(fault.lr),
-        low(fault.lr),
-        high(fault.status),
-        low(fault.status),
-        high(fault.address),
-        low(fault.address),
-        high(uptime),
-        low(uptime),
-        missing,
-        0,
-        0,
-        0,
-    ]
+pub fn words(record: &FaultRecord) -> [u16; 16] {
+    let mut words = [0; 16];
+    let [kind, count, longs @ .., missing, _, _, _] = &mut words;
+    (*kind, *count, *missing) = (record.kind.into(), record.count, record.missing);
+    let [pc, lr, status, address] = record.place;
+    let values = [pc, lr, status, address, record.uptime];
+    for (words, value) in longs.as_chunks_mut().0.iter_mut().zip(&values) {
+        *words = [(value >> 16) as u16, *value as u16];
+    }
+    words
 }

@@ -12,7 +12,7 @@ use register_map::{
 };
 use rtt_target::{ChannelMode, UpChannel};
 
-use crate::{board::BOARD, clock, rtt};
+use crate::{board::BOARD, clock, fault_record, rtt};
 
 /// Events that are logged while the device runs.
 #[derive(Clone, Copy)]
@@ -137,8 +137,8 @@ impl Log {
                 self.write(Line::of("reset: ").text(cause));
             }
         }
-        let fault = FaultKind::from_code(start.faults.fault.kind as u16);
-        if let Some(fault) = fault.filter(|fault| *fault != FaultKind::None) {
+        let fault = fault_record::kind(&start.faults);
+        if fault != FaultKind::None {
             self.write(Line::of("WARN last fault: ").text(fault.name()));
         }
         if start.clock == ClockSource::Internal {

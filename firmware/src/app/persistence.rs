@@ -3,7 +3,7 @@
 //! While the supply is too low for the flash, a save waits, before its first operation or between two operations.
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
-use board_support::{Flash, fault, flash::FlashError};
+use board_support::{Flash, flash::FlashError, kept};
 use firmware::{
     config::Settings,
     store::{Operation, Saving, Store, StoreError},
@@ -47,6 +47,7 @@ impl Persistence {
         let (save, restart) = device.lock(|device| (device.config.is_saving(), device.restart));
         let event = if save { self.save(device) } else { None };
         if restart && self.saving.is_none() {
+            kept::keep_asked();
             board_support::restart();
         }
         event
@@ -86,8 +87,8 @@ impl Persistence {
                     self.fail(device);
                     return None;
                 };
-                // A restart may follow before the next scan, which keeps the number otherwise.
-                fault::keep_saves(left);
+                // A restart may follow before the background keeps the number.
+                kept::keep_saves(left);
                 saving
             }
         };

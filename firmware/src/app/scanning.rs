@@ -1,6 +1,6 @@
 //! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
-use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
+use board_support::{Sampler, boards::SLOTS, kept, pac::Interrupt};
 use firmware::{device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{DacLink, ModuleError};
@@ -25,6 +25,8 @@ pub struct Scanning {
     /// Revision of the settings that the modules were configured with.
     revision: u16,
     sampler: Sampler,
+    /// Seconds from power-on to the start.
+    powered_s: u32,
     background_beat: Every,
     proof_beat: Every,
 }
@@ -36,6 +38,7 @@ impl Scanning {
         sampler: Sampler,
         device: &Device,
         dacs: &mut [DacLink; SLOTS],
+        powered_s: u32,
     ) -> Self {
         let ports = device.points.ports();
         for ((module, port), dac) in modules.iter_mut().zip(ports).zip(dacs) {
@@ -47,6 +50,7 @@ impl Scanning {
             modules,
             revision: device.config.revision(),
             sampler,
+            powered_s,
             background_beat: Every::new(SCANS_PER_BACKGROUND),
             proof_beat: Every::new(SCANS_PER_PROOF),
         }
@@ -64,7 +68,7 @@ impl Scanning {
         let now = clock::millis();
         // Filled inside the lock: returning the settings from it would copy them once more in every scan.
         let mut settings = None;
-        let (mut channels, revision, uptime_s, saves, beat, tripped) = device.lock(|device| {
+        let (mut channels, revision, uptime_s, beat, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
             let beat = passed > 0;
             let tripped = beat && device.tick(passed);
@@ -76,8 +80,7 @@ impl Scanning {
                 settings = Some(ports.map(|port| *port.settings()));
             }
             let uptime_s = device.state.uptime_s();
-            let saves = device.config.saves_left();
-            (channels, revision, uptime_s, saves, beat, tripped)
+            (channels, revision, uptime_s, beat, tripped)
         });
         self.revision = revision;
         if let Some(settings) = settings {
@@ -105,9 +108,11 @@ impl Scanning {
             let words = self.revision == device.config.revision();
             let mut changed = [false; SLOTS];
             let ports = device.points.ports_mut().iter_mut().zip(&mut changed);
-            for ((port, changed), (channels, result)) in ports.zip(channels.iter().zip(&results)) {
+            let scanned = channels.iter().zip(&results).enumerate();
+            for ((port, changed), (slot, (channels, result))) in ports.zip(scanned) {
                 if beat {
                     port.scanned(channels, words);
+                    kept::keep_pulses(slot, port.pulses());
                 }
                 *changed = take_failures(port, *result, beat);
             }
@@ -129,8 +134,7 @@ impl Scanning {
             enqueue(events, Event::CommunicationLost);
         }
         if beat {
-            fault::keep_uptime(uptime_s);
-            fault::keep_saves(saves);
+            kept::keep_uptime(self.powered_s.wrapping_add(uptime_s));
             self.check_line(line, device, events);
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.

@@ -3,8 +3,8 @@
 use core::mem::MaybeUninit;
 
 use board_support::{
-    RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes, pac,
-    stack::LowWater, uart,
+    RadioUart, ScanTimer, Watchdog, board, boards::SLOTS, flash::FlashError, gap::LineTimes, kept,
+    pac, stack::LowWater, uart,
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
@@ -86,9 +86,7 @@ pub fn up(
         loaded.settings,
         loaded.invalid || loaded.rejected > 0,
     );
-    if let Some(left) = board.saves_left {
-        config.set_saves_left(left);
-    }
+    config.set_saves_left(board.saves_left);
     let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
@@ -106,8 +104,11 @@ pub fn up(
     };
     let kinds = modules.each_mut().map(|module| module.driver().kinds());
     let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
+    for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {
+        port.set_pulses(kept::pulses(slot));
+    }
     let mut dacs = [DacLink::default(); SLOTS];
-    let scanning = Scanning::new(modules, sampler, device, &mut dacs);
+    let scanning = Scanning::new(modules, sampler, device, &mut dacs, board.powered_s);
 
     log.start(&log::Start {
         address,

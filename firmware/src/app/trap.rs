@@ -39,10 +39,9 @@ const NMI: u32 = 2;
 #[panic_handler]
 fn panic(_info: &PanicInfo<'_>) -> ! {
     interrupt::disable();
-    let kind = Kind::Panic;
-    end(Fault {
-        kind,
-        ..Fault::default()
+    end(&Fault {
+        kind: Kind::Panic,
+        place: [0; 4],
     })
 }
 
@@ -102,16 +101,13 @@ extern "C" fn on_trap(stack_pointer: u32) -> ! {
     } else {
         Kind::HardFault
     };
-    end(Fault {
+    end(&Fault {
         kind,
-        pc,
-        lr,
-        status,
-        address,
+        place: [pc, lr, status, address],
     })
 }
 
-fn end(fault: Fault) -> ! {
+fn end(fault: &Fault) -> ! {
     outputs_off();
     fault::note(fault);
     restart()

@@ -192,8 +192,8 @@ impl<const SLOTS: usize> Points<SLOTS> {
     pub fn pulse_word(&self, address: u16) -> u16 {
         let offset = address.wrapping_sub(counters::PULSES);
         let place = self.place(self.index(offset / counters::WORDS));
-        let pulses = place.map_or(0, |(port, channel)| port.pulses(channel));
-        let [high, low] = words_of(pulses);
+        let pulses = place.and_then(|(port, channel)| port.pulses().get(channel));
+        let [high, low] = words_of(pulses.copied().unwrap_or_default());
         if offset.is_multiple_of(2) { high } else { low }
     }
 

@@ -150,9 +150,19 @@ impl IoPort {
         self.settings.get(channel)
     }
 
-    /// Returns a channel's pulse counter.
-    pub(super) fn pulses(&self, channel: usize) -> u32 {
-        self.pulses.get(channel).copied().unwrap_or_default()
+    /// Returns the pulse counters.
+    #[must_use]
+    pub const fn pulses(&self) -> &[u32; CHANNELS] {
+        &self.pulses
+    }
+
+    /// Sets the pulse counters. Those of channels that are not digital inputs stay 0.
+    pub fn set_pulses(&mut self, pulses: [u32; CHANNELS]) {
+        for (own, (kind, pulses)) in self.pulses.iter_mut().zip(self.kinds.iter().zip(pulses)) {
+            if *kind == Kind::BitInput {
+                *own = pulses;
+            }
+        }
     }
 
     /// Sets a channel's pulse counter to 0.

@@ -7,7 +7,6 @@ use board_support::boards::{modio_02, modio_08};
 use board_support::design::SYSCLK_ON_HSE_HZ;
 use register_map::Board;
 
-use crate::board::Hardware;
 use crate::build;
 use crate::toolchain::TARGET;
 
@@ -36,7 +35,7 @@ fn assert_has(file: &str, lines: &str) {
 fn memories_and_clocks_are_those_of_the_part() {
     for board in Board::ALL {
         let file = format!("{board}.repl");
-        let part = Hardware::of(board).part;
+        let part = board.memory().part;
         assert_has(&file, &format!("\nflash:\n    size: {:#x}\n", part.flash));
         assert_has(&file, &format!("\nsram:\n    size: {:#x}\n", part.ram));
         // The flash size register (RM0008 45.1).

@@ -13,7 +13,7 @@
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `bus`: several boards on one line |
 //! | the radio | `radio` |
-//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `stack`, `log`, `long_run` |
+//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
 
@@ -41,6 +41,7 @@ mod functions;
 mod hung_task;
 mod identify;
 mod in_force;
+mod kept;
 mod lock;
 mod log;
 mod long_run;

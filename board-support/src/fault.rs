@@ -1,31 +1,11 @@
 //! The last fault before the last start, kept across the reset.
 //!
-//! The record lies in RAM that the start-up code does not initialise: a reset keeps it, a loss of power does not. A
-//! fault handler notes what happened (`note`) and resets the chip; the next start reads the record
-//! (`take_at_start`). The watchdog resets the chip without calling a handler. The running firmware therefore keeps
-//! what the next start needs to describe a watchdog reset: the uptime (`keep_uptime`) and the marks of its tasks
-//! (`marks`).
-//!
-//! ```text
-//! word  0      1                  2      3   4   5     6        7       8
-//!       magic  kind, fresh,       count  pc  lr  CFSR  address  uptime  checksum    the record
-//!              crystal faults
-//!       uptime              marks                                             kept up to date
-//!       DIP switch                                                            written at power-on
-//!       saves left                                                            kept up to date
-//! ```
+//! A fault handler notes what happened (`note`) and resets the chip; the next start reads the record. The watchdog
+//! resets the chip without calling a handler. The running firmware therefore keeps what the next start needs to describe
+//! a watchdog reset: the uptime and the marks of its tasks (`marks`). The record lies in the [kept region](crate::kept).
 
 #[cfg(target_os = "none")]
-mod kept;
-#[cfg(any(target_os = "none", test))]
-mod number;
-#[cfg(any(target_os = "none", test))]
-mod record;
-
-#[cfg(target_os = "none")]
-pub(crate) use kept::{keep_dip, kept_dip, kept_saves, take_at_start};
-#[cfg(target_os = "none")]
-pub use kept::{keep_saves, keep_uptime, marks, note};
+pub use crate::kept::{marks, note};
 
 /// Number of tasks that leave a mark.
 pub const TASKS: usize = 4;
@@ -54,29 +34,26 @@ pub enum Kind {
 pub struct Fault {
     /// The kind of fault.
     pub kind: Kind,
-    /// Program counter; 0 = not known.
-    pub pc: u32,
-    /// Link register; 0 = not known.
-    pub lr: u32,
-    /// The core's configurable fault status register (PM0056 4.4.11); 0 when the core raised no fault.
-    pub status: u32,
-    /// The address whose access failed; 0 = not known.
-    pub address: u32,
+    /// Program counter, link register, the core's configurable fault status register (PM0056 4.4.11; 0 when the core
+    /// raised no fault), and the address whose access failed. 0 = not known.
+    pub place: [u32; 4],
 }
 
 /// The last fault since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultRecord {
-    /// The kind and place of the fault.
-    pub fault: Fault,
-    /// Number of faults since power-on; stops at 65535.
-    pub count: u16,
-    /// Uptime of the firmware at the fault, in seconds.
-    pub uptime: u32,
-    /// After a watchdog reset: the tasks without a mark, one bit per task.
-    pub missing: u16,
+    /// Number of the fault's [`Kind`].
+    pub kind: u8,
     /// Number of times the crystal has failed since power-on, at most 255.
     pub crystal_faults: u8,
+    /// Number of faults since power-on; stops at 65535.
+    pub count: u16,
+    /// After a watchdog reset: the tasks without a mark, one bit per task.
+    pub missing: u16,
+    /// As [`Fault::place`].
+    pub place: [u32; 4],
+    /// Uptime of the firmware at the fault, in seconds.
+    pub uptime: u32,
 }
 
 /// Distinguishes a stack overflow from other hard faults. It is one when the stack pointer after the exception lies

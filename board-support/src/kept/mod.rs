@@ -1,0 +1,44 @@
+//! The kept region: the last 512 bytes of RAM, which keep their content over every reset that is not a power-on.
+//!
+//! The region lies at the same address in every image of a board, so that another image finds what the last one has
+//! kept. The start-up code does not initialise it, and the stack, at the other end of the RAM, cannot reach it. Fields
+//! are only ever appended.
+//!
+//! ```text
+//! word  0-15  16-31   sealed part, twice: magic, layout, length, words, CRC-32           changes seldom
+//!       32    33      seconds since power-on, complement                                 live
+//!       34    35 ...  pulse counter of a point, complement; from the first slot's on     live
+//!       98-123        free
+//!       124-127       marks of the tasks, a byte each                                    neither sealed nor live
+//! ```
+//!
+//! A reset at any instruction loses at most the update that it interrupts; `sealed` and `live` say why. Without a valid
+//! sealed part the region counts as after power-on.
+
+use crate::fault::TASKS;
+
+#[cfg(any(target_os = "none", test))]
+mod live;
+#[cfg(target_os = "none")]
+mod region;
+#[cfg(any(target_os = "none", test))]
+mod sealed;
+
+#[cfg(target_os = "none")]
+pub(crate) use region::{at_start, forget, keep_dip};
+#[cfg(target_os = "none")]
+pub use region::{keep_asked, keep_pulses, keep_saves, keep_uptime, marks, note, pulses};
+
+/// Words of one copy of the sealed part: 10 words, room for fields to come, and the CRC-32.
+const COPY: usize = 16;
+/// First word of the seconds since power-on.
+const UPTIME: usize = 2 * COPY;
+/// First word of the pulse counters.
+const PULSES: usize = UPTIME + 2;
+/// First word of the marks.
+const MARKS: usize = WORDS - 4;
+/// Words of the region.
+const WORDS: usize = 128;
+
+// 32 points have pulse counters.
+const _: () = assert!(PULSES + 2 * 32 <= MARKS && TASKS <= 4 * (WORDS - MARKS));

@@ -1,0 +1,160 @@
+//! Access to the kept region.
+//!
+//! Each part has one writer, so that no update interrupts another: the scan writes the live words, the background task
+//! the sealed part, and before both the start. A fault handler writes the sealed part, too; what it interrupts never
+//! continues.
+
+use core::{
+    array,
+    cell::UnsafeCell,
+    ptr,
+    sync::atomic::{AtomicU8, Ordering},
+};
+
+use super::{
+    COPY, MARKS, PULSES, UPTIME, WORDS, live,
+    sealed::{self, ASKED, DIP, FLAGS, FRESH, SAVES, STARTED, Sealed},
+};
+use crate::fault::{Fault, Kind, TASKS};
+
+#[repr(transparent)]
+struct Region(UnsafeCell<[u32; WORDS]>);
+
+// SAFETY: the words are accessed by single volatile accesses only, which cannot be torn, and the marks as atomics.
+unsafe impl Sync for Region {}
+
+unsafe extern "C" {
+    /// The region, placed by the linker script.
+    static _kept: Region;
+}
+
+fn word(at: usize) -> *mut u32 {
+    // SAFETY: the linker script reserves the region. The remainder is the index of one of its words.
+    unsafe { _kept.0.get().cast::<u32>().add(at % WORDS) }
+}
+
+fn read(at: usize) -> u32 {
+    // SAFETY: a word of RAM, which may hold any value. Volatile, because the value may be older than this start.
+    unsafe { ptr::read_volatile(word(at)) }
+}
+
+/// Writes a word. Writes reach the memory in their order in the program.
+fn write(at: usize, value: u32) {
+    // SAFETY: a word of RAM to which no reference exists.
+    unsafe { ptr::write_volatile(word(at), value) }
+}
+
+fn live(at: usize) -> u32 {
+    live::number([read(at), read(at + 1)])
+}
+
+fn set_live(at: usize, number: u32) {
+    write(at, number);
+    write(at + 1, !number);
+}
+
+/// Changes the sealed part: notes a fault, if there is one, and then replaces the bits of `mask` in a word. Without a
+/// valid copy clears the rest of the region first.
+#[inline(never)]
+fn update(fault: Option<&Fault>, word: usize, mask: u32, bits: u32) {
+    let mut sealed = Sealed::after_power_on();
+    let in_force = sealed.load(read);
+    if in_force.is_none() {
+        (UPTIME..WORDS).for_each(|at| write(at, 0));
+    }
+    if let Some(fault) = fault {
+        let missing = if fault.kind == Kind::Watchdog {
+            missing()
+        } else {
+            0
+        };
+        sealed.note(fault, live(UPTIME), missing);
+    }
+    sealed.set(word, mask, bits);
+    sealed.store(in_force.unwrap_or_default(), write);
+}
+
+/// Makes the region count as after power-on.
+pub(crate) fn forget() {
+    write(0, 0);
+    write(COPY, 0);
+}
+
+/// Prepares the region for this start, and returns the content of the sealed part. A reset by the watchdog is noted
+/// when nothing else was. The board calls this once at every start, before it starts the crystal, because the content
+/// has the number of crystal failures.
+pub(crate) fn at_start(by_watchdog: bool) -> Sealed {
+    let fault = Fault {
+        kind: Kind::Watchdog,
+        ..Fault::default()
+    };
+    update(by_watchdog.then_some(&fault), FLAGS, FRESH | ASKED, 0);
+    update(None, STARTED, u32::MAX, live(UPTIME));
+    let marks = marks().iter();
+    marks.for_each(|mark| mark.store(0, Ordering::Relaxed));
+    // Both copies are valid now.
+    Sealed::copy(0, read)
+}
+
+/// Notes a fault. For panic and fault handlers. Only the first fault since the start is noted.
+pub fn note(fault: &Fault) {
+    update(Some(fault), FLAGS, 0, 0);
+}
+
+/// Keeps SW01 as read at power-on.
+pub(crate) fn keep_dip(dip: u8) {
+    update(None, FLAGS, DIP, sealed::dip(dip));
+}
+
+/// Keeps the number of saves that the firmware may still write to flash. For the background task.
+pub fn keep_saves(left: u8) {
+    let saves = sealed::saves(left);
+    if read(FLAGS) & SAVES != saves {
+        update(None, FLAGS, SAVES, saves);
+    }
+}
+
+/// Keeps that the restart that now follows was asked for. For the background task.
+pub fn keep_asked() {
+    update(None, FLAGS, 0, ASKED);
+}
+
+/// Keeps the seconds since power-on. For the scan, at least once a second.
+pub fn keep_uptime(seconds: u32) {
+    set_live(UPTIME, seconds);
+}
+
+/// Returns the first word of a slot's pulse counters.
+fn pulses_of(slot: usize) -> usize {
+    PULSES + 8 * slot
+}
+
+/// Returns the pulse counters of a slot, counted from 0, as they were kept. 0 after power-on.
+#[must_use]
+pub fn pulses(slot: usize) -> [u32; 4] {
+    array::from_fn(|channel| live(pulses_of(slot) + 2 * channel))
+}
+
+/// Keeps the pulse counters of a slot. For the scan, after every change.
+pub fn keep_pulses(slot: usize, pulses: &[u32; 4]) {
+    for (pair, pulses) in pulses.iter().enumerate() {
+        set_live(pulses_of(slot) + 2 * pair, *pulses);
+    }
+}
+
+/// Returns the marks of the tasks, all 0 after [`at_start`]. After a watchdog reset the next start reports every task
+/// as missing whose mark is not 1, which means "has run to its end". Each task stores its own mark; the code that
+/// refreshes the watchdog clears all of them.
+#[must_use]
+pub fn marks() -> &'static [AtomicU8; TASKS] {
+    // SAFETY: the last words of the region, aligned and long enough. Any byte is a valid `AtomicU8`, and every access
+    // to these words is one to the atomics.
+    unsafe { &*word(MARKS).cast() }
+}
+
+/// Returns one bit for each task whose mark does not say that it has run to its end.
+fn missing() -> u16 {
+    let marks = marks().iter().map(|mark| mark.load(Ordering::Relaxed));
+    let missing = marks.enumerate().filter(|(_, mark)| *mark != 1);
+    missing.fold(0, |missing, (task, _)| missing | 1 << task)
+}
