@@ -96,7 +96,7 @@ pub fn up(
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (mut modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
+    let (mut modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
