@@ -11,6 +11,7 @@ mod code;
 mod dac;
 mod debounce;
 mod di4;
+mod digital;
 mod do4;
 pub mod input_status;
 mod io_module;
