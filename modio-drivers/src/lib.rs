@@ -28,7 +28,7 @@ pub use analog_inputs::{Codes, STALLED_SCANS};
 pub use ao4::Ao4;
 pub use channels::{CHANNELS, ChannelStatus, Channels, Kind};
 pub use code::Code;
-pub use dac::{DAC_ADDRESS, DacLink, DacWorker};
+pub use dac::{DacLink, DacWorker};
 pub use debounce::{DEBOUNCE_DEFAULT_MS, DEBOUNCE_MAX_MS};
 pub use di4::Di4;
 pub use do4::Do4;
