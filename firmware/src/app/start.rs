@@ -201,7 +201,7 @@ pub fn up(
                 Trouble::at_start(address, board.clock.is_crystal()),
             ),
             log,
-            stack: LowWater::new(),
+            stack: LowWater::default(),
             radio: None,
         },
         scan_timer: board.scan_timer,

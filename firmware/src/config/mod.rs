@@ -111,7 +111,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             save: Save::None,
             unstored: invalid,
             saves: Saves::new(SAVES),
-            lock: Lock::closed(),
+            lock: Lock::default(),
             origin: Origin::default(),
             points_only,
             started,
@@ -432,11 +432,11 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// has reset the settings by point to the new module's defaults, so the running module keeps the settings that
     /// were returned last.
     #[must_use]
-    pub fn points(&self, index: usize) -> Option<impl Iterator<Item = Point>> {
+    pub fn points(&self, index: usize) -> Option<[Point; CHANNELS as usize]> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
         let in_force = self.left >> (index & 7) & 1 == 0;
         in_force.then(|| {
-            (first..first.wrapping_add(CHANNELS)).map(|point| Point::of(&self.edited, point))
+            array::from_fn(|channel| Point::of(&self.edited, first.wrapping_add(channel as u16)))
         })
     }
 

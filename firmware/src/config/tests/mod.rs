@@ -222,7 +222,7 @@ fn settings_take_effect_immediately_or_after_the_restart() {
         (config.comm_timeout_ms(), config.response_delay_ms()),
         (Some(3_600_000), 7)
     );
-    let points: Vec<_> = config.points(0).unwrap().collect();
+    let points = config.points(0).unwrap();
     let signals_and_scales = points
         .iter()
         .map(|point| (point.settings.signal, point.settings.scale));
