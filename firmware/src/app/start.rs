@@ -8,7 +8,7 @@ use board_support::{
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
-    config::{self, Config, RadioConfig},
+    config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     leds::{Leds, Trouble},
     start_up::{self, Address},
@@ -80,6 +80,7 @@ pub fn up(
     let mut pages = board.flash;
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
+    let settings = start_up::line(address, LineConfig::of(&loaded.settings));
     let radio_config = RadioConfig::of(&loaded.settings);
     let mut config = Config::new(
         BOARD,
@@ -92,7 +93,6 @@ pub fn up(
     let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
-    let settings = start_up::line(address, config.line());
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;

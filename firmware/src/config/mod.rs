@@ -73,7 +73,6 @@ pub struct Config<const SLOTS: usize> {
     origin: Origin,
     /// The radio serves points and reads only.
     points_only: bool,
-    line: LineConfig,
     /// Modules and START values of the ports with slots.
     ports: [PortConfig; SLOTS],
     /// The settings that need a restart, with their values at the start.
@@ -101,7 +100,6 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let points_only = stored.get(LORA) == Lora::PointsOnly.code();
         Self {
             board,
-            line: LineConfig::of(&stored),
             ports: array::from_fn(|index| {
                 PortConfig::of(&stored, board.first_port.wrapping_add(index as u16))
             }),
@@ -406,12 +404,6 @@ impl<const SLOTS: usize> Config<SLOTS> {
     #[must_use]
     pub const fn revision(&self) -> u16 {
         self.revision
-    }
-
-    /// Returns the settings of the RS-485 line in force.
-    #[must_use]
-    pub const fn line(&self) -> LineConfig {
-        self.line
     }
 
     /// Returns the board.

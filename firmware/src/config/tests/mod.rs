@@ -234,12 +234,11 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     ]));
     assert_eq!(points[0].settings.filter, 4);
     assert_eq!((points[2].safe, points[3].safe), (None, Some(7)));
-    assert_eq!(config.line(), LineConfig::FACTORY);
     assert_eq!(config.ports()[0].start, [0; 4]);
 
     save(&mut config);
     let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
-    let line = restarted.line();
+    let line = LineConfig::of(&restarted.edited);
     assert_eq!(
         (line.baud, line.format, line.frame_gap),
         (Baud::B115200, Format::F8E1, Some(5))
