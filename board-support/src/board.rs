@@ -1,7 +1,5 @@
 //! The board as one struct of named devices.
 
-use core::array;
-
 use cortex_m::peripheral::SCB;
 use stm32f1xx_hal::{
     pac,
@@ -9,8 +7,8 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, GapTimer, IoPin, Rs485, Sampler, ScanTimer, Slot, Watchdog,
-    boards::{BOARD, SLOTS},
+    ClockSource, DacBus, Flash, GapTimer, IoPin, Rs485, Sampler, ScanTimer, Watchdog,
+    boards::BOARD,
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
     dip,
@@ -45,8 +43,6 @@ pub struct Board {
     pub powered_s: u32,
     /// The chip's unique identity, half-words in the order of their addresses (RM0008 30.2).
     pub unique_id: [u16; 6],
-    /// The slots, in the order of their ports.
-    pub slots: [Slot; SLOTS],
     /// The converter of the slots' analog lines.
     pub sampler: Sampler,
     /// The bus to the DACs of the analog-output modules. Its pins float until the first transfer.
@@ -151,7 +147,6 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
         saves_left: kept.saves(),
         powered_s: kept.started(),
         unique_id: unique_id::read(),
-        slots: array::from_fn(|index| Slot::new(&BOARD.slots[index])),
         sampler: Sampler::new(device.ADC1),
         dacs: DacBus::new(device.I2C1, clock),
         flash: Flash::new(device.FLASH, device.PWR, masked),

@@ -70,7 +70,6 @@ pub use {
     rs485::{Character, Rs485, Status},
     safe::outputs_off,
     scan_timer::ScanTimer,
-    slot::Slot,
     stm32f1xx_hal::pac,
     watchdog::Watchdog,
 };

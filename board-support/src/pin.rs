@@ -8,7 +8,7 @@
 //!
 //! | register | changed by |
 //! |---|---|
-//! | all, for slots, SW01, LEDs, the line and the radio | `board::setup`, `Slot`, `LineOff` and `RadioOff`: in `init`, before the first interrupt |
+//! | all, for slots, SW01, LEDs, the line and the radio | `board::setup`, `SlotPins`, `LineOff` and `RadioOff`: in `init`, before the first interrupt |
 //! | port B CRL, for the DACs' bus | `BusPins`: in `init` and later by the background task alone |
 //! | the slots' | `outputs_off`, from fault handlers, after which the interrupted program does not run again |
 //!

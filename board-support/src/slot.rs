@@ -1,49 +1,26 @@
-//! A slot: four lines that are configured for the module in it.
+//! The four lines of a slot, configured for the module in it. They float, as after a reset, until one of the methods is
+//! called; an empty slot leaves them floating.
 
-use crate::{
-    IoPin,
-    boards::SlotPins,
-    pin::{Mode, Pin},
-};
+use crate::{IoPin, boards::SlotPins, pin::Mode};
 
-/// The four lines of a slot. They float, as after a reset, until one of the methods is called; an empty slot leaves
-/// them floating. Configure a slot in `init`, before the first interrupt.
-pub struct Slot {
-    lines: [Pin; 4],
-    dac_address: u8,
-}
-
-impl Slot {
-    /// Each slot of a board must be created only once.
-    pub(crate) const fn new(pins: &SlotPins) -> Self {
-        Self {
-            lines: pins.lines,
-            dac_address: pins.dac_address,
-        }
-    }
-
-    /// Returns the I2C address of the DAC of a module in this slot.
-    #[must_use]
-    pub const fn dac_address(&self) -> u8 {
-        self.dac_address
-    }
-
+/// Call one of these once, in `init`, before the first interrupt.
+impl SlotPins {
     /// Makes all lines inputs with pull-ups.
     #[must_use]
-    pub fn into_inputs(self) -> [IoPin; 4] {
+    pub fn inputs(&self) -> [IoPin; 4] {
         self.lines.map(IoPin::pulled_up)
     }
 
     /// Makes all lines outputs that are low from the start, with the slowest edges: relays and open collectors need
     /// no fast ones.
     #[must_use]
-    pub fn into_outputs_low(self) -> [IoPin; 4] {
+    pub fn outputs_low(&self) -> [IoPin; 4] {
         self.lines.map(IoPin::low)
     }
 
     /// Makes lines 1 and 2 inputs with pull-ups, and lines 3 and 4 outputs that are low from the start.
     #[must_use]
-    pub fn into_relay(self) -> ([IoPin; 2], [IoPin; 2]) {
+    pub fn relay(&self) -> ([IoPin; 2], [IoPin; 2]) {
         let [line1, line2, line3, line4] = self.lines;
         (
             [line1, line2].map(IoPin::pulled_up),
@@ -53,7 +30,7 @@ impl Slot {
 
     /// Makes the first `count` lines analog inputs and leaves the others floating. Returns their inputs of the ADC.
     #[must_use]
-    pub fn into_analog(self, count: usize) -> [Option<u8>; 4] {
+    pub fn analog(&self, count: usize) -> [Option<u8>; 4] {
         let mut inputs = [None; 4];
         for (line, input) in self.lines.iter().zip(&mut inputs).take(count) {
             line.configure(Mode::Analog);

@@ -42,15 +42,6 @@ pub struct LowWater {
 }
 
 impl LowWater {
-    /// Creates the search with the present stack pointer as the lowest address in use.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            lowest: cortex_m::register::msp::read().max(bottom()).min(top()) & !3,
-            next: bottom(),
-        }
-    }
-
     /// Checks the next 16 words, upwards from the end of the stack, and returns the number of bytes never used
     /// since the start: 0 to the size of the stack, in steps of 4.
     ///
@@ -69,7 +60,11 @@ impl LowWater {
 }
 
 impl Default for LowWater {
+    /// Creates the search with the present stack pointer as the lowest address in use.
     fn default() -> Self {
-        Self::new()
+        Self {
+            lowest: cortex_m::register::msp::read().max(bottom()).min(top()) & !3,
+            next: bottom(),
+        }
     }
 }

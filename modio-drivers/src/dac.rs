@@ -19,9 +19,6 @@ use embedded_hal::i2c::{Error as _, ErrorKind, I2c};
 
 use crate::{CHANNELS, Code, ModuleError};
 
-/// The lowest address that a DAC can be ordered with, and the most common one (DS22187E, 5.3). The highest is 0x67.
-pub const DAC_ADDRESS: u8 = 0x60;
-
 /// The command and UDAC = 0.
 const MULTI_WRITE: u8 = 0b0100_0000;
 
@@ -77,7 +74,7 @@ pub struct DacWorker {
 }
 
 impl DacWorker {
-    /// Creates a worker for the DAC at this address, 0x60 to 0x67.
+    /// Creates a worker for the DAC at this address, 0x60 to 0x67. Most DACs have 0x60 (DS22187E, 5.3).
     #[must_use]
     pub const fn new(address: u8) -> Self {
         Self {

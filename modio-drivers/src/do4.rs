@@ -1,7 +1,8 @@
 //! ModIO-DO: four open-collector outputs for 5 to 30 V, 200 mA. A high line makes its transistor conduct.
 
-use embedded_hal::digital::{OutputPin, PinState};
+use embedded_hal::digital::OutputPin;
 
+use crate::digital;
 use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Four digital outputs.
@@ -29,18 +30,8 @@ impl<P: OutputPin> IoModule for Do4<P> {
         Ok(())
     }
 
-    /// Drives every line in every call, changed or not, so that a disturbed output is wrong for one scan at most.
     fn drive_outputs(&mut self, channels: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
-        let mut result = Ok(());
-        for (channel, line) in self.lines.iter_mut().enumerate() {
-            if line
-                .set_state(PinState::from(channels.bit(channel)))
-                .is_err()
-            {
-                result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
-            }
-        }
-        result
+        digital::drive(&mut self.lines, 0, channels)
     }
 }
 
@@ -49,7 +40,6 @@ mod tests {
     extern crate std;
     use std::vec::Vec;
 
-    use embedded_hal_mock::eh1::MockError;
     use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 
     use super::*;
@@ -90,19 +80,6 @@ mod tests {
         assert!(
             channels.bit(1) && channels.bit(3),
             "reading does not change outputs"
-        );
-        module.lines.iter_mut().for_each(Mock::done);
-    }
-
-    #[test]
-    fn a_line_that_cannot_be_driven_is_reported_and_the_others_are_driven() {
-        let failing = Mock::new(&[Transaction::set(State::Low)
-            .with_error(MockError::Io(std::io::ErrorKind::NotConnected))]);
-        let low = || line(&[State::Low]);
-        let mut module = Do4::new([failing, low(), low(), low()]);
-        assert_eq!(
-            module.drive_outputs(&Channels::new(), &mut DacLink::default()),
-            Err(ModuleError::line(0))
         );
         module.lines.iter_mut().for_each(Mock::done);
     }

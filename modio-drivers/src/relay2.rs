@@ -1,9 +1,10 @@
 //! ModIO-Relay: two relays for 2 A. Lines 1 and 2 read the mode jumper of each relay, low for manual. Lines 3 and 4
 //! drive the coils, high for energised.
 
-use embedded_hal::digital::{InputPin, OutputPin, PinState};
+use embedded_hal::digital::{InputPin, OutputPin};
 
 use crate::debounce::Debounce;
+use crate::digital;
 use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
 
 /// Debounce of the mode jumpers, in milliseconds. A jumper is moved by hand, and its contacts bounce for longer
@@ -47,29 +48,11 @@ impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
     fn read_inputs(&mut self, channels: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
-        let mut result = Ok(());
-        let jumpers = self.jumpers.iter_mut().zip(&mut self.filters);
-        for (channel, (jumper, filter)) in jumpers.enumerate() {
-            match jumper.is_low() {
-                Ok(manual) => channels.set_bit(channel, filter.sample(manual)),
-                Err(_) => {
-                    result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
-                }
-            }
-        }
-        result
+        digital::read(&mut self.jumpers, &mut self.filters, channels)
     }
 
-    /// Drives both coils in every call, as [`Do4`](crate::Do4) does.
     fn drive_outputs(&mut self, channels: &Channels, _: &mut DacLink) -> Result<(), ModuleError> {
-        let mut result = Ok(());
-        for (channel, coil) in (FIRST_COIL..).zip(&mut self.coils) {
-            let energised = PinState::from(channels.bit(channel));
-            if coil.set_state(energised).is_err() {
-                result = ModuleError::in_either(result, Err(ModuleError::line(channel)));
-            }
-        }
-        result
+        digital::drive(&mut self.coils, FIRST_COIL, channels)
     }
 }
 

@@ -1,6 +1,11 @@
 //! The modules installed in the slots.
 
-use board_support::{DacBus, IoPin, Sampler, Slot, boards::SLOTS};
+use core::array;
+
+use board_support::{
+    DacBus, IoPin, Sampler,
+    boards::{BOARD, SLOTS, SlotPins},
+};
 use modio_drivers::{Absent, Ai2Ao2, Ai4, Ao4, DacLink, DacWorker, Di4, Do4, IoModule, Relay2};
 use register_map::Module;
 use rtic::Mutex;
@@ -18,22 +23,22 @@ pub enum Installed {
 
 impl Installed {
     /// Configures the slot for a module. `analog` is for the slot's inputs of the ADC.
-    fn new(module: Module, slot: Slot, analog: &mut [Option<u8>; 4]) -> Self {
+    fn new(module: Module, slot: &SlotPins, analog: &mut [Option<u8>; 4]) -> Self {
         match module {
             Module::None => Self::None(Absent),
-            Module::Di4 => Self::Di4(Di4::new(slot.into_inputs())),
-            Module::Do4 => Self::Do4(Do4::new(slot.into_outputs_low())),
+            Module::Di4 => Self::Di4(Di4::new(slot.inputs())),
+            Module::Do4 => Self::Do4(Do4::new(slot.outputs_low())),
             Module::Relay2 => {
-                let (jumpers, coils) = slot.into_relay();
+                let (jumpers, coils) = slot.relay();
                 Self::Relay2(Relay2::new(jumpers, coils))
             }
             Module::Ai4 => {
-                *analog = slot.into_analog(4);
+                *analog = slot.analog(4);
                 Self::Ai4(Ai4::default())
             }
             Module::Ao4 => Self::Ao4(Ao4::default()),
             Module::Ai2Ao2 => {
-                *analog = slot.into_analog(2);
+                *analog = slot.analog(2);
                 Self::Ai2Ao2(Ai2Ao2::default())
             }
         }
@@ -79,15 +84,15 @@ impl AnalogOutputs {
 /// Configures every slot for its module.
 pub fn install(
     modules: [Module; SLOTS],
-    slots: [Slot; SLOTS],
     sampler: &mut Sampler,
     bus: DacBus,
 ) -> ([Installed; SLOTS], AnalogOutputs) {
-    let workers = slots
-        .each_ref()
-        .map(|slot| DacWorker::new(slot.dac_address()));
+    let workers = array::from_fn(|index| DacWorker::new(BOARD.slots[index].dac_address));
     let mut installed = [const { Installed::None(Absent) }; SLOTS];
-    let plugged = modules.into_iter().zip(slots).zip(&mut sampler.inputs);
+    let plugged = modules
+        .into_iter()
+        .zip(BOARD.slots)
+        .zip(&mut sampler.inputs);
     for (((module, slot), analog), place) in plugged.zip(&mut installed) {
         *place = Installed::new(module, slot, analog);
     }

@@ -8,7 +8,7 @@ use board_support::{
 };
 use cortex_m::peripheral::SCB;
 use firmware::{
-    config::{self, Config, RadioConfig},
+    config::{self, Config, LineConfig, RadioConfig},
     device::Identity,
     leds::{Leds, Trouble},
     start_up::{self, Address},
@@ -80,6 +80,7 @@ pub fn up(
     let mut pages = board.flash;
     let mut store = Store::open(&pages);
     let loaded = store.load(BOARD, &pages);
+    let settings = start_up::line(address, LineConfig::of(&loaded.settings));
     let radio_config = RadioConfig::of(&loaded.settings);
     let mut config = Config::new(
         BOARD,
@@ -90,11 +91,10 @@ pub fn up(
     let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
     let installed = config.ports().map(|port| port.module);
-    let settings = start_up::line(address, config.line());
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (mut modules, analog_outputs) = install(installed, board.slots, &mut sampler, board.dacs);
+    let (mut modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
@@ -202,7 +202,7 @@ pub fn up(
                 Trouble::at_start(address, board.clock.is_crystal()),
             ),
             log,
-            stack: LowWater::new(),
+            stack: LowWater::default(),
             radio: None,
         },
         scan_timer: board.scan_timer,

@@ -33,7 +33,9 @@ impl LineConfig {
         gap_rule: GapRule::Count,
     };
 
-    pub(super) fn of(settings: &Settings) -> Self {
+    /// Returns the settings of the line that a start with these settings puts in force.
+    #[must_use]
+    pub fn of(settings: &Settings) -> Self {
         let get = |address| settings.get(address);
         Self {
             baud: Baud::from_code(get(at::BAUD)).unwrap_or(Self::FACTORY.baud),

@@ -4,7 +4,8 @@ use register_map::configuration::OPEN_S;
 
 use super::LineName;
 
-/// A lock that stays open for [`OPEN_S`] seconds after the last configuration write, for the line that opened it.
+/// A lock that stays open for [`OPEN_S`] seconds after the last configuration write, for the line that opened it. Closed by
+/// default.
 #[derive(Debug, Default)]
 pub(super) struct Lock {
     left_ms: u32,
@@ -12,14 +13,6 @@ pub(super) struct Lock {
 }
 
 impl Lock {
-    /// Returns a closed lock, as at every start.
-    pub(super) const fn closed() -> Self {
-        Self {
-            left_ms: 0,
-            owner: LineName::Rs485,
-        }
-    }
-
     /// Opens the lock for a line, or keeps it open. It closes for every other line.
     pub(super) const fn open(&mut self, line: LineName) {
         self.left_ms = OPEN_S * 1000;
@@ -44,7 +37,7 @@ mod tests {
 
     #[test]
     fn the_lock_closes_sixty_seconds_after_the_last_opening() {
-        let mut lock = Lock::closed();
+        let mut lock = Lock::default();
         assert!(!lock.is_open(Rs485));
         lock.open(Rs485);
         lock.tick(59_999);
@@ -60,7 +53,7 @@ mod tests {
 
     #[test]
     fn the_lock_is_open_for_the_line_that_opened_it_last() {
-        let mut lock = Lock::closed();
+        let mut lock = Lock::default();
         lock.open(Radio);
         assert!(lock.is_open(Radio) && !lock.is_open(Rs485));
         lock.tick(59_999);

@@ -41,7 +41,6 @@ pub use in_force::{LineConfig, Point, PortConfig, RadioConfig};
 use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
-pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, takes_module};
 
@@ -74,7 +73,6 @@ pub struct Config<const SLOTS: usize> {
     origin: Origin,
     /// The radio serves points and reads only.
     points_only: bool,
-    line: LineConfig,
     /// Modules and START values of the ports with slots.
     ports: [PortConfig; SLOTS],
     /// The settings that need a restart, with their values at the start.
@@ -102,7 +100,6 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let points_only = stored.get(LORA) == Lora::PointsOnly.code();
         Self {
             board,
-            line: LineConfig::of(&stored),
             ports: array::from_fn(|index| {
                 PortConfig::of(&stored, board.first_port.wrapping_add(index as u16))
             }),
@@ -112,7 +109,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
             save: Save::None,
             unstored: invalid,
             saves: Saves::new(SAVES),
-            lock: Lock::closed(),
+            lock: Lock::default(),
             origin: Origin::default(),
             points_only,
             started,
@@ -335,18 +332,11 @@ impl<const SLOTS: usize> Config<SLOTS> {
         &self.saved
     }
 
-    /// Returns the settings that need a restart, with the values in force since the start.
-    #[must_use]
-    pub const fn started(&self) -> RestartValues {
-        RestartValues(self.started)
-    }
-
-    /// Ends a successful save. `changed` says whether the saved settings need a restart to be in force, see
-    /// [`Settings::needs_restart`].
-    pub const fn end_save(&mut self, changed: bool) {
+    /// Ends a successful save.
+    pub fn end_save(&mut self) {
         self.save = Save::None;
         self.unstored = false;
-        self.waiting = self.left != 0 || changed;
+        self.waiting = self.left != 0 || !self.saved.restart_values().eq(self.started);
     }
 
     /// Ends a save that failed. `stored` is what the flash still holds.
@@ -409,12 +399,6 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.revision
     }
 
-    /// Returns the settings of the RS-485 line in force.
-    #[must_use]
-    pub const fn line(&self) -> LineConfig {
-        self.line
-    }
-
     /// Returns the board.
     #[must_use]
     pub const fn board(&self) -> &'static Board {
@@ -433,11 +417,11 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// has reset the settings by point to the new module's defaults, so the running module keeps the settings that
     /// were returned last.
     #[must_use]
-    pub fn points(&self, index: usize) -> Option<impl Iterator<Item = Point>> {
+    pub fn points(&self, index: usize) -> Option<[Point; CHANNELS as usize]> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
         let in_force = self.left >> (index & 7) & 1 == 0;
         in_force.then(|| {
-            (first..first.wrapping_add(CHANNELS)).map(|point| Point::of(&self.edited, point))
+            array::from_fn(|channel| Point::of(&self.edited, first.wrapping_add(channel as u16)))
         })
     }
 

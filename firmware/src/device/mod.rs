@@ -131,16 +131,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
     fn configure_points(&mut self) {
         self.revision = self.config.revision();
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
-            let Some(points) = self.config.points(index) else {
-                continue;
-            };
-            let mut settings = *port.settings();
-            let mut safe = [None; CHANNELS];
-            for ((settings, safe), point) in settings.iter_mut().zip(&mut safe).zip(points) {
-                *settings = point.settings;
-                *safe = point.safe;
+            if let Some(points) = self.config.points(index) {
+                let settings = points.map(|point| point.settings);
+                port.configure(settings, points.map(|point| point.safe));
             }
-            port.configure(settings, safe);
         }
     }
 

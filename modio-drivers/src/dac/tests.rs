@@ -31,7 +31,7 @@ fn wanted(codes: [u16; 4]) -> Option<[Code; 4]> {
 #[test]
 fn nothing_is_transferred_without_codes() {
     let mut bus = Mock::new(&[]);
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     assert!((0..100).all(|_| worker.work(&mut bus, None) == Ok(false)));
     bus.done();
 }
@@ -42,7 +42,7 @@ fn a_transfer_is_one_multi_write_of_codes_and_configuration() {
         0x40, 0x00, 0x00, 0x42, 0x01, 0x23, 0x44, 0x0A, 0xBC, 0x46, 0x0F, 0xFF,
     ];
     let mut bus = Mock::new(&[Transaction::write(0x60, bytes)]);
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     assert_eq!(
         worker.work(&mut bus, wanted([0, 0x123, 0xABC, 0xFFF])),
         Ok(true)
@@ -53,7 +53,7 @@ fn a_transfer_is_one_multi_write_of_codes_and_configuration() {
 #[test]
 fn a_code_above_the_range_does_not_change_the_configuration() {
     let mut bus = Mock::new(&[transfer([0xFFF, 0xFFF, 0xFFF, 1])]);
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     assert_eq!(
         worker.work(&mut bus, wanted([0x1000, 0x8001, 0xFFFF, 1])),
         Ok(true)
@@ -69,7 +69,7 @@ fn a_change_is_sent_at_the_next_call_and_all_codes_at_every_tenth() {
         transfer([1, 2, 3, 5]),
         transfer([1, 2, 3, 5]),
     ]);
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     let mut codes = wanted([1, 2, 3, 4]);
     assert_eq!(worker.work(&mut bus, codes), Ok(true));
     assert_eq!(worker.work(&mut bus, codes), Ok(false));
@@ -91,7 +91,7 @@ fn the_dac_fails_after_two_failures_until_a_transfer_succeeds() {
         transfer([7; 4]).with_error(ErrorKind::Bus),
         transfer([8; 4]),
     ]);
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     let mut codes = wanted([9; 4]);
     assert!(worker.work(&mut bus, codes).is_err());
     assert!(!worker.failed());
@@ -118,7 +118,7 @@ fn the_dac_fails_after_two_failures_until_a_transfer_succeeds() {
 #[test]
 fn tries_become_rarer_down_to_one_in_seventeen_calls_and_never_stop() {
     let mut bus = Mock::new(&std::vec![transfer([1; 4]).with_error(NO_ANSWER); 300]);
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     let codes = wanted([1; 4]);
     let tries: Vec<_> = (0..6_000)
         .filter(|_| worker.work(&mut bus, codes).is_err())
@@ -200,7 +200,7 @@ impl I2c for Dac {
 
 #[test]
 fn a_dac_is_configured_by_one_transfer_and_again_after_a_loss_of_power() {
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     let mut bus = Dac::new();
     let mut codes = wanted([0, 819, 2048, 4095]);
     assert_eq!(worker.work(&mut bus, codes), Ok(true));
@@ -234,7 +234,7 @@ fn a_dac_is_configured_by_one_transfer_and_again_after_a_loss_of_power() {
 #[test]
 fn an_interrupted_transfer_is_repeated_completely() {
     for cut_after in 0..12 {
-        let mut worker = DacWorker::new(DAC_ADDRESS);
+        let mut worker = DacWorker::new(0x60);
         let mut bus = Dac::new();
         let codes = wanted([10, 20, 30, 40]);
         bus.cut_after = cut_after;
@@ -250,7 +250,7 @@ fn an_interrupted_transfer_is_repeated_completely() {
 
 #[test]
 fn a_change_that_failed_half_way_is_undone_when_the_old_codes_are_wanted() {
-    let mut worker = DacWorker::new(DAC_ADDRESS);
+    let mut worker = DacWorker::new(0x60);
     let mut bus = Dac::new();
     let mut codes = wanted([1; 4]);
     assert_eq!(worker.work(&mut bus, codes), Ok(true));

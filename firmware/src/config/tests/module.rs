@@ -90,8 +90,7 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
 }
 
 fn filter(config: &Config) -> Option<u16> {
-    let mut points = config.points(0)?;
-    points.next().map(|point| point.settings.filter)
+    config.points(0).map(|[first, ..]| first.settings.filter)
 }
 
 #[test]
