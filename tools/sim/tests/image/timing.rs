@@ -68,43 +68,6 @@ impl Settings {
     const T35: Time = Time::from_ps(38_500_000_000_000 / 9600);
 }
 
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn unit_sends_only_replies() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    for unit in [1, 2, 1, 0, 1] {
-        bench.exchange(&adu(&[unit, 1, 0, FIRST, 0, 4]));
-    }
-    let line = bench.board.line();
-    let (from_master, from_unit) = line.frame_counts();
-    assert_eq!((from_master, from_unit), (5, 3));
-    assert_eq!(line.driver_edges().count(), 6);
-    for frame in line.frames().filter(|f| f.direction == Direction::FromUnit) {
-        assert_eq!(frame.bytes, adu(&[1, 1, 1, 0]), "no byte around the reply");
-    }
-}
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn requests_t35_after_each_reply_are_all_answered() {
-    let mut bench = Bench::new(Module::Di4, 1);
-    let request = adu(&[1, 1, 0, FIRST, 0, 4]);
-    let mut replies = 0;
-    for _ in 0..200 {
-        let now = bench.board.now();
-        let end = bench.board.line().send(now, &request);
-        bench
-            .board
-            .run_until(end + bench.t35() + bench.characters(1));
-        while bench.board.driver_enable() {
-            bench.board.run_for(Time::from_us(50));
-        }
-        bench.board.run_for(bench.t35());
-        replies += bench.board.line().take_received().len() / 6;
-    }
-    assert_eq!(replies, 200);
-}
-
 /// The driver is off within a bit up to 460800 bit/s, and within two bits at 921600 bit/s. There a bit is 1.085 us, and
 /// the time of the interrupt is significant. In a few of a thousand replies, the tick occurs just before the end. Then
 /// the driver is off within 10 us.
