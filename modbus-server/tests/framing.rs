@@ -279,15 +279,6 @@ fn a_frame_of_256_bytes_that_continues_is_too_long() {
 }
 
 #[test]
-fn t35_without_t15_ends_a_frame() {
-    let mut unit = unit();
-    unit.characters(&request());
-    assert!(unit.port.long_silence(0));
-    assert_eq!(unit.port.waiting(), Some(UNIT));
-    assert_eq!(unit.port.counters().bus_messages, 1);
-}
-
-#[test]
 fn the_unit_receives_immediately_after_its_own_reply() {
     let mut unit = unit();
     unit.characters(&[0x55, 0x55]); // the echo of the unit's reply, if the receiver was late

@@ -160,6 +160,16 @@ codes! {
 }
 
 codes! {
+    /// COMM_SOURCE: which requests restart the communication watchdog. Bit 0: only writes; bit 1: only over RS-485.
+    CommSource {
+        Any = 0 "any",
+        Writes = 1 "writes only",
+        Rs485 = 2 "RS-485 only",
+        Rs485Writes = 3 "writes over RS-485 only",
+    }
+}
+
+codes! {
     /// LORA: what the radio serves.
     Lora {
         Off = 0 "off",

@@ -3,7 +3,7 @@
 use crate::Module;
 use crate::block::block;
 use crate::codes;
-use crate::codes::{AirRate, Baud, Command, Format, GapRule, Lora, Mode, Power};
+use crate::codes::{AirRate, Baud, CommSource, Command, Format, GapRule, Lora, Mode, Power};
 use crate::points::Kind::{BitOutput, WordInput, WordOutput};
 use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
@@ -69,6 +69,8 @@ block! {
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
     /// Runs after the response. Reads 0
     COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::range(1, 6).or(0xB007), 0);
+    /// Requests that restart the time of COMM_TIMEOUT
+    COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
     /// Module in the slot; 0 only for a port without a slot
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
     /// Digital input: debounce. Analog input: low-pass over 2^n samples

@@ -95,8 +95,9 @@ enum Command {
     Fuzz(fuzz::Options),
     /// Send a million frames, good and damaged, to the image in simulation
     Soak(soak::Options),
-    /// Run the conformance suite at every rate and format of the register map, in simulation
-    Matrix,
+    /// Run the conformance suite at every rate and format of the register map, in simulation, with another module for
+    /// each rate
+    Matrix(soak::Matrix),
     /// Renew docs/register-map.md
     Docs,
     /// Take the pictures of the simulator's page in docs/images
@@ -147,7 +148,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Peers(options) => peers::run(workspace, &options),
         Command::Fuzz(options) => fuzz::run(workspace, &options),
         Command::Soak(options) => soak::run(workspace, &options),
-        Command::Matrix => soak::matrix(workspace),
+        Command::Matrix(options) => soak::matrix(workspace, &options),
         Command::Docs => {
             let mut text = String::new();
             register_map::docs::write_markdown(&mut text)?;

@@ -1,7 +1,10 @@
 //! `cargo xtask soak` and `cargo xtask matrix`: longer runs of tests that `cargo xtask test` also runs, there with
 //! fewer frames, for seconds, and with selected cases.
 
+use std::time::SystemTime;
+
 use anyhow::Result;
+use register_map::Module;
 
 use crate::test;
 use crate::workspace::Workspace;
@@ -45,10 +48,27 @@ pub fn run(workspace: &mut Workspace, options: &Options) -> Result<()> {
     test::simulated(workspace, "--quiet --test=image", &name, &variables)
 }
 
-/// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, the test
-/// `matrix` of `tools/conformance/tests/suite`.
-pub fn matrix(workspace: &mut Workspace) -> Result<()> {
+/// Number of turns after which each rate has had every module.
+const MODULES: u64 = Module::ALL.len() as u64;
+
+/// Which module each rate of the matrix has.
+#[derive(clap::Args, Clone, Debug)]
+#[group(skip)]
+pub struct Matrix {
+    /// Move the modules on by so many rates, to repeat a run [default: the number of the day, so that each rate has every
+    /// module once in seven days]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(..MODULES))]
+    turn: Option<u64>,
+}
+
+/// `cargo xtask matrix`: every case of the conformance suite at every rate and format of the register map, with another
+/// module for each rate, the test `matrix` of `tools/conformance/tests/suite`.
+pub fn matrix(workspace: &mut Workspace, options: &Matrix) -> Result<()> {
+    const DAY_S: u64 = 24 * 60 * 60;
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?;
+    let turn = options.turn.unwrap_or(since.as_secs() / DAY_S % MODULES);
+    say!("repeat this run with: cargo xtask matrix --turn {turn}");
     let name = format!("{ONE_TEST} matrix::every_rate_and_format_conforms");
-    let every_case = [("MODIO_MATRIX", "every case")];
+    let every_case = [("MODIO_MATRIX", &*turn.to_string())];
     test::simulated(workspace, "--quiet --test=suite", &name, &every_case)
 }

@@ -150,7 +150,7 @@ impl Served {
         self.order = device.lock(|device| {
             // In listen-only mode requests do not count, so that the outputs go to SAFE.
             if !matches!(outcome, Outcome::NoRequest | Outcome::NotObeyed) {
-                device.request_seen(ended.wrapping_sub(self.frame_gap_ms));
+                device.request_seen(ended.wrapping_sub(self.frame_gap_ms), writes);
             }
             device.end_request()
         });

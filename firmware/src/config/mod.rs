@@ -29,9 +29,10 @@ mod tests;
 use core::array;
 
 use modbus_server::{Exception, Span, Words, WordsOut};
-use register_map::codes::{Command, Lora};
+use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
-    COMM_TIMEOUT, COMMAND, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES, SAVES,
+    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES,
+    SAVES,
 };
 use register_map::points::{self, CHANNELS};
 use register_map::state::status;
@@ -430,6 +431,15 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn comm_timeout_ms(&self) -> Option<u32> {
         let tenths = self.edited.get(COMM_TIMEOUT);
         (tenths != 0).then_some(u32::from(tenths) * 100)
+    }
+
+    /// Returns whether the request that is being served restarts the communication watchdog. `writes`: it writes points
+    /// or registers.
+    #[must_use]
+    pub fn restarts_watchdog(&self, writes: bool) -> bool {
+        let only = |source: CommSource| self.edited.get(COMM_SOURCE) & source.code() != 0;
+        (writes || !only(CommSource::Writes))
+            && (self.origin.line == LineName::Rs485 || !only(CommSource::Rs485))
     }
 
     /// Returns RESPONSE_DELAY in milliseconds, 0 to 1000.

@@ -150,10 +150,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
         tripped
     }
 
-    /// Restarts the communication watchdog: a valid request for this unit ended at `at_ms` milliseconds after the
-    /// start.
-    pub const fn request_seen(&mut self, at_ms: u32) {
-        self.comm_watchdog.refresh(at_ms);
+    /// Restarts the communication watchdog, unless COMM_SOURCE excludes the request: a valid request for this unit ended
+    /// at `at_ms` milliseconds after the start. `writes`: it writes points or registers.
+    pub fn request_seen(&mut self, at_ms: u32, writes: bool) {
+        if self.config.restarts_watchdog(writes) {
+            self.comm_watchdog.refresh(at_ms);
+        }
     }
 
     /// Sets the origin of the request that is served next.

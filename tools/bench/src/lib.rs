@@ -29,8 +29,6 @@ pub struct Row {
     pub request: String,
     /// From the end of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
-    /// From the end of t3.5 to the second byte, the first that depends on the request.
-    pub to_second_byte: u32,
     /// The three interrupt handlers of the line, from the request's first byte until the driver is off.
     pub transaction: u32,
     /// The instructions of `transaction`, by address.
@@ -41,6 +39,10 @@ pub struct Row {
     pub byte_out: u32,
     /// The handler at the end of the reply, which switches the driver off.
     pub reply_end: u32,
+    /// Longest time for which the request holds off the scan, in cycles of the core.
+    pub scan_held: u32,
+    /// What is allowed for some of these figures in this row, by their names.
+    pub budgets: BTreeMap<&'static str, u32>,
     /// Cost on each rival, from complete frame to complete response; `None` when the rival does not answer.
     pub rivals: BTreeMap<String, Option<u32>>,
 }
@@ -88,14 +90,15 @@ pub fn measure(image: &Image, board: &Board, rivals: &[(String, Image)]) -> Resu
             others.insert(name.clone(), taken);
         }
         requests.push(Row {
+            budgets: request.budgets(),
             request: request.name,
             to_first_byte: cost.to_first_byte,
-            to_second_byte: cost.to_second_byte,
             transaction: cost.transaction,
             addresses: cost.addresses,
             byte_in: cost.byte_in,
             byte_out: cost.byte_out,
             reply_end: cost.reply_end,
+            scan_held: cost.scan_held,
             rivals: others,
         });
     }

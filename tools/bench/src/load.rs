@@ -8,7 +8,7 @@ use serde::Serialize;
 use sim::{Corner, Image, Time};
 
 use crate::framing::{adu, is_adu};
-use crate::unit::{BYTE, GAP, SERVE, Unit};
+use crate::unit::{BACKGROUND, BYTE, GAP, SCAN, SERVE, Unit};
 
 /// Duration of the measurement.
 const SPAN: Time = Time::from_ms(1_000);
@@ -19,8 +19,8 @@ const TASKS: [(u32, &str); 6] = [
     (GAP, "frame gap (TIM2)"),
     (SERVE, "serve (EXTI3)"),
     (16 + 30, "beat (TIM4)"),
-    (16 + 7, "scan (EXTI1)"),
-    (16 + 6, "background (EXTI0)"),
+    (SCAN, "scan (EXTI1)"),
+    (BACKGROUND, "background (EXTI0)"),
 ];
 
 /// The load of the processor in one case.

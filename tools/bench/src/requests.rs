@@ -3,6 +3,8 @@
 //! The addresses are those of modio. A rival has its points from address 0 on, so its requests have other addresses
 //! and are otherwise the same.
 
+use std::collections::BTreeMap;
+
 use register_map::codes::Mode;
 use register_map::configuration::{BETA, FILTER, KEY, OPENING_KEY};
 use register_map::{Board, Module};
@@ -12,6 +14,16 @@ pub const UNIT: u8 = 1;
 
 /// First register of the longest range that can be written: BETA to START.
 const LONG: u16 = BETA;
+
+/// Instructions from t3.5 to the first byte: for one point that is read or written, for four, for the points of four
+/// slots, for a request without points or registers, and for a setting that is written.
+const POINT: u32 = 700;
+const FOUR: u32 = 850;
+const SIXTEEN: u32 = 1500;
+const SHORT: u32 = 850;
+const SETTING: u32 = 1300;
+/// What ASCII mode may take in addition.
+const ASCII: u32 = 50;
 
 /// A request and the conditions for it.
 #[derive(Clone, Debug)]
@@ -26,8 +38,24 @@ pub struct Request {
     pub before: Option<Vec<u8>>,
     /// The PDU for modio.
     pub pdu: Vec<u8>,
+    /// Instructions that are allowed from t3.5 to the first byte of the reply, which is whole by then.
+    pub to_first_byte: u32,
+    /// Instructions that are allowed for the whole transaction, if they have a limit.
+    pub transaction: Option<u32>,
     /// The PDU for a rival; `None` when the rival does not have the function.
     pub rival: Option<Vec<u8>>,
+}
+
+impl Request {
+    /// Returns what is allowed for the figures of this request, by the names of the figures.
+    #[must_use]
+    pub fn budgets(&self) -> BTreeMap<&'static str, u32> {
+        let transaction = self.transaction.map(|most| ("transaction", most));
+        [("to_first_byte", self.to_first_byte)]
+            .into_iter()
+            .chain(transaction)
+            .collect()
+    }
 }
 
 /// Returns a PDU: the function code and 16-bit fields, high byte first.
@@ -67,71 +95,94 @@ pub fn all(board: &Board) -> Vec<Request> {
 fn of_all_slots(board: &Board) -> Vec<Request> {
     let points = board.points();
     let count = points.end - points.start;
-    let request = |name: &str, module, pdu| Request {
-        name: format!("{name}, {count}"),
-        mode: Mode::Rtu,
+    let request = |name: &str, most, module, pdu| Request {
         module,
-        before: None,
-        pdu,
-        rival: None,
+        ..alone(&format!("{name}, {count}"), most, pdu)
     };
     let read = [points.start, count];
     let bits = vec![0x55; usize::from(count).div_ceil(8)];
     let words: Vec<u8> = points.flat_map(|_| 100_u16.to_be_bytes()).collect();
     vec![
-        request("01 read coils", Module::Do4, pdu(1, &read)),
-        request("02 read discrete inputs", Module::Di4, pdu(2, &read)),
-        request("04 read input registers", Module::Ai4, pdu(4, &read)),
+        request("01 read coils", SIXTEEN, Module::Do4, pdu(1, &read)),
+        request(
+            "02 read discrete inputs",
+            SIXTEEN,
+            Module::Di4,
+            pdu(2, &read),
+        ),
+        request(
+            "04 read input registers",
+            SIXTEEN,
+            Module::Ai4,
+            pdu(4, &read),
+        ),
         request(
             "0F write multiple coils",
+            SIXTEEN,
             Module::Do4,
             with_data(0x0F, &read, &bits),
         ),
         request(
             "10 write multiple registers, outputs",
+            1900,
             Module::Ao4,
             with_data(0x10, &read, &words),
         ),
     ]
 }
 
-/// Returns the requests that every board serves, with its points from `first` on.
-fn of_any_board(first: u16) -> Vec<Request> {
-    let of = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
-        name: name.to_owned(),
-        mode: Mode::Rtu,
-        module,
-        before: None,
-        pdu: make(address),
-        rival: Some(make(0)),
-    };
-    let open = || Some(pdu(0x06, &[KEY, OPENING_KEY]));
-    let bits = |name: &str, module, make: &dyn Fn(u16) -> Vec<u8>| of(name, module, make, first);
-    let setting = |name: &str, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
-        before: open(),
-        ..of(name, Module::Di4, make, address)
-    };
-    let alone = |name: &str, pdu: Vec<u8>| Request {
+/// Returns a request to a 4DI that a rival does not get.
+fn alone(name: &str, to_first_byte: u32, pdu: Vec<u8>) -> Request {
+    Request {
         name: name.to_owned(),
         mode: Mode::Rtu,
         module: Module::Di4,
         before: None,
         pdu,
+        to_first_byte,
+        transaction: None,
         rival: None,
+    }
+}
+
+/// Returns the requests that every board serves, with its points from `first` on.
+fn of_any_board(first: u16) -> Vec<Request> {
+    let of = |name: &str, most, module, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
+        module,
+        rival: Some(make(0)),
+        ..alone(name, most, make(address))
+    };
+    let point = |name: &str, most, module, make: &dyn Fn(u16) -> Vec<u8>| {
+        of(name, most, module, make, first)
+    };
+    let setting = |name: &str, most, make: &dyn Fn(u16) -> Vec<u8>, address| Request {
+        before: Some(pdu(0x06, &[KEY, OPENING_KEY])),
+        ..of(name, most, Module::Di4, make, address)
     };
     let own = |request: Request| Request {
         rival: None,
         ..request
     };
+    let within = |transaction, request: Request| Request {
+        transaction: Some(transaction),
+        ..request
+    };
     let ascii = |request: Request| Request {
         name: format!("ASCII: {}", request.name),
         mode: Mode::Ascii,
+        to_first_byte: request.to_first_byte + ASCII,
         rival: None,
         ..request
+    };
+    let read_one = || {
+        point("03 read holding registers, 1", POINT, Module::Ai4, &|a| {
+            pdu(3, &[a, 1])
+        })
     };
     let read_many = || {
         of(
             "03 read holding registers, 125",
+            3000,
             Module::Di4,
             &|a| pdu(3, &[a, 125]),
             LONG,
@@ -140,97 +191,116 @@ fn of_any_board(first: u16) -> Vec<Request> {
     let write_many = || {
         setting(
             "10 write multiple registers, 123",
+            5200,
             &|a| with_data(0x10, &[a, 123], &settings(123)),
             LONG,
         )
     };
 
     vec![
-        bits("01 read coils, 1", Module::Do4, &|a| pdu(1, &[a, 1])),
-        bits("01 read coils, 4", Module::Do4, &|a| pdu(1, &[a, 4])),
-        bits("02 read discrete inputs, 1", Module::Di4, &|a| {
+        point("01 read coils, 1", POINT, Module::Do4, &|a| pdu(1, &[a, 1])),
+        point("01 read coils, 4", FOUR, Module::Do4, &|a| pdu(1, &[a, 4])),
+        point("02 read discrete inputs, 1", POINT, Module::Di4, &|a| {
             pdu(2, &[a, 1])
         }),
-        bits("02 read discrete inputs, 4", Module::Di4, &|a| {
+        point("02 read discrete inputs, 4", FOUR, Module::Di4, &|a| {
             pdu(2, &[a, 4])
         }),
-        bits("03 read holding registers, 1", Module::Ai4, &|a| {
-            pdu(3, &[a, 1])
-        }),
-        read_many(),
-        bits("04 read input registers, 1", Module::Ai4, &|a| {
+        within(2245, read_one()),
+        within(21_509, read_many()),
+        point("04 read input registers, 1", POINT, Module::Ai4, &|a| {
             pdu(4, &[a, 1])
         }),
         of(
             "04 read input registers, 125",
+            3000,
             Module::Di4,
             &|a| pdu(4, &[a, 125]),
             LONG,
         ),
-        bits("05 write single coil", Module::Do4, &|a| {
+        point("05 write single coil", POINT, Module::Do4, &|a| {
             pdu(5, &[a, 0xFF00])
         }),
-        bits("06 write single register, output", Module::Ao4, &|a| {
-            pdu(6, &[a, 100])
-        }),
+        point(
+            "06 write single register, output",
+            POINT,
+            Module::Ao4,
+            &|a| pdu(6, &[a, 100]),
+        ),
         setting(
             "06 write single register, setting",
+            SETTING,
             &|a| pdu(6, &[a, 5]),
             FILTER,
         ),
-        bits("0F write multiple coils, 1", Module::Do4, &|a| {
+        point("0F write multiple coils, 1", POINT, Module::Do4, &|a| {
             with_data(0x0F, &[a, 1], &[1])
         }),
-        bits("0F write multiple coils, 4", Module::Do4, &|a| {
+        point("0F write multiple coils, 4", FOUR, Module::Do4, &|a| {
             with_data(0x0F, &[a, 4], &[5])
         }),
         setting(
             "10 write multiple registers, 1",
+            SETTING,
             &|a| with_data(0x10, &[a, 1], &settings(1)),
             LONG,
         ),
         write_many(),
         own(setting(
             "16 mask write register",
+            SETTING,
             &|a| pdu(0x16, &[a, 0xFFFF, 0]),
             LONG,
         )),
         own(setting(
             "17 read/write registers, 1 and 1",
+            2000,
             &|a| with_data(0x17, &[a, 1, a, 1], &settings(1)),
             LONG,
         )),
         own(setting(
             "17 read/write registers, 125 and 121",
+            7200,
             &|a| with_data(0x17, &[a, 125, a, 121], &settings(121)),
             LONG,
         )),
-        alone("07 read exception status", pdu(7, &[])),
-        alone("08/00 return query data, 2 bytes", pdu(8, &[0, 0x1234])),
-        alone("08/00 return query data, 250 bytes", {
+        alone("07 read exception status", SHORT, pdu(7, &[])),
+        alone(
+            "08/00 return query data, 2 bytes",
+            SHORT,
+            pdu(8, &[0, 0x1234]),
+        ),
+        alone("08/00 return query data, 250 bytes", SHORT, {
             let mut pdu = pdu(8, &[0]);
             pdu.resize(253, 0xA5);
             pdu
         }),
-        alone("08/0B return bus message count", pdu(8, &[0x0B, 0])),
-        alone("0B get comm event counter", pdu(0x0B, &[])),
-        alone("0C get comm event log", pdu(0x0C, &[])),
-        alone("11 report server id", pdu(0x11, &[])),
-        alone("14 read file record, 1", {
+        alone("08/0B return bus message count", SHORT, pdu(8, &[0x0B, 0])),
+        alone("0B get comm event counter", SHORT, pdu(0x0B, &[])),
+        alone("0C get comm event log", 3200, pdu(0x0C, &[])),
+        alone("11 report server id", SHORT, pdu(0x11, &[])),
+        alone("14 read file record, 1", 1500, {
             vec![0x14, 7, 6, 0, 1, 0, 0, 0, 1]
         }),
-        alone("14 read file record, 124", {
+        alone("14 read file record, 124", 4500, {
             vec![0x14, 7, 6, 0, 1, 1, 0, 0, 124]
+        }),
+        alone("14 read file record, 35 groups of 2", 6400, {
+            let groups = (0..35).flat_map(|group| [6, 0, 1, group, 0, 0, 2]);
+            [0x14, 35 * 7].into_iter().chain(groups).collect()
         }),
         alone(
             "2B/0E device identification, one object",
+            900,
             vec![0x2B, 0x0E, 4, 0],
         ),
-        alone("2B/0E device identification, all", vec![0x2B, 0x0E, 3, 0]),
-        alone("an unknown function", pdu(0x41, &[])),
-        ascii(bits("03 read holding registers, 1", Module::Ai4, &|a| {
-            pdu(3, &[a, 1])
-        })),
+        alone(
+            "2B/0E device identification, all",
+            2700,
+            vec![0x2B, 0x0E, 3, 0],
+        ),
+        alone("an unknown function", SHORT, pdu(0x41, &[])),
+        ascii(read_one()),
         ascii(read_many()),
         ascii(write_many()),
     ]

@@ -15,6 +15,14 @@ use crate::requests::Request;
 pub(crate) const BYTE: u32 = 16 + 37;
 pub(crate) const GAP: u32 = 16 + 28;
 pub(crate) const SERVE: u32 = 16 + 9;
+/// The program itself, and the exceptions that do not hold off the scan: EXTI1 (the scan), EXTI4 (the radio), EXTI0 (the
+/// background).
+const THREAD: u32 = 0;
+pub(crate) const SCAN: u32 = 16 + 7;
+const RADIO: u32 = 16 + 10;
+pub(crate) const BACKGROUND: u32 = 16 + 6;
+/// Frequency of the core on the board's crystal.
+const CORE_HZ: f64 = 72e6;
 
 /// Time for the image to start.
 const START: Time = Time::from_ms(150);
@@ -32,9 +40,6 @@ const TOO_MANY: u32 = 1_000_000;
 pub struct Cost {
     /// From the end of t3.5 to the first byte of the response in the UART's data register.
     pub to_first_byte: u32,
-    /// From the end of t3.5 to the second byte, which is the first that depends on the request: the first byte, the
-    /// unit address, is sent before the request is decoded.
-    pub to_second_byte: u32,
     /// The three interrupt handlers of the line, from the request's first byte until the driver is off.
     pub transaction: u32,
     /// The instructions of `transaction`, by address.
@@ -45,6 +50,8 @@ pub struct Cost {
     pub byte_out: u32,
     /// The handler at the end of the reply, which switches the driver off.
     pub reply_end: u32,
+    /// Longest time without a chance for the scan to run, in cycles of the core.
+    pub scan_held: u32,
 }
 
 /// A board with the image.
@@ -161,7 +168,7 @@ impl Unit {
             self.board.run_for(pause);
             *cost = self.count(&request.pdu)?;
         }
-        costs.sort_by_key(|cost| (cost.to_first_byte, cost.to_second_byte, cost.transaction));
+        costs.sort_by_key(|cost| (cost.to_first_byte, cost.transaction));
         let [_, _, middle, _, _] = costs;
         Ok(middle)
     }
@@ -173,7 +180,8 @@ impl Unit {
         let expiry = end + self.settings.frame_silence();
         let mut cost = Cost::default();
         let mut handler = Handler::default();
-        let mut waiting = Expiry::Before;
+        let mut expired = false;
+        let mut held_since = now;
         let written = self.board.line_bytes_written();
         let mut replied = false;
         loop {
@@ -185,20 +193,15 @@ impl Unit {
             self.board.step(1);
             let retired = self.board.instructions() - retired;
             let retired = u32::try_from(retired).unwrap_or(u32::MAX);
-            let wrote = self.board.line_bytes_written() > before;
-
-            if exception == GAP && waiting == Expiry::Before && self.board.now() >= expiry {
-                waiting = Expiry::Counting;
-            }
-            if waiting == Expiry::Counting {
+            expired |= exception == GAP && self.board.now() >= expiry;
+            if expired && before == written {
                 cost.to_first_byte += retired;
             }
-            if matches!(waiting, Expiry::Counting | Expiry::FirstByte) {
-                cost.to_second_byte += retired;
-                if wrote {
-                    waiting = waiting.after_a_byte();
-                }
+            if matches!(exception, THREAD | SCAN | RADIO | BACKGROUND) {
+                held_since = self.board.now();
             }
+            let held = (self.board.now() - held_since).as_secs_f64() * CORE_HZ;
+            cost.scan_held = cost.scan_held.max(held as u32);
             if matches!(exception, BYTE | GAP | SERVE) {
                 cost.transaction += retired;
                 *cost.addresses.entry(address).or_default() += retired;
@@ -243,24 +246,6 @@ impl Unit {
     /// Returns the exception whose handler runs; 0 in the program itself.
     fn exception(&self) -> u32 {
         self.board.register(16).unwrap_or_default() & 0x1FF
-    }
-}
-
-/// State of counting up to the first two bytes.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Expiry {
-    Before,
-    Counting,
-    FirstByte,
-    Done,
-}
-
-impl Expiry {
-    const fn after_a_byte(self) -> Self {
-        match self {
-            Self::Counting => Self::FirstByte,
-            _ => Self::Done,
-        }
     }
 }
 

@@ -67,7 +67,7 @@ fn a_value_not_allowed_is_counted_and_an_unknown_address_is_ignored() {
     let (settings, rejected) = loaded(&[
         (BAUD, 97),
         (MODULE, 1),
-        (0x0109, 1),
+        (0x010A, 1),
         (KEY, 0x5A17),
         (COMMAND, 1),
         (0x0200, 1),

@@ -54,6 +54,7 @@ fn read(config: &Config, start: u16, count: u16) -> Result<Vec<u16>, Exception> 
 fn all(config: &Config) -> Vec<u16> {
     let runs = [
         (0x101, 7),
+        (0x109, 1),
         (0x110, 8),
         (0x120, 38),
         (0x160, 96),
@@ -88,8 +89,8 @@ fn save(config: &mut Config) {
 #[test]
 fn every_setting_reads_its_default_and_key_and_command_read_0() {
     let config = config(&[]);
-    let first = read(&config, KEY, 9).unwrap();
-    assert_eq!(first, [0, 96, 0, 0, 0, 0, 0, 0, 0]);
+    let first = read(&config, KEY, 10).unwrap();
+    assert_eq!(first, [0, 96, 0, 0, 0, 0, 0, 0, 0, 0]);
     let mut middle = std::vec![5; 32];
     middle.extend([0, 0, 23, 2, 0, 300]);
     assert_eq!(read(&config, FILTER, 38).unwrap(), middle);
@@ -101,8 +102,8 @@ fn every_setting_reads_its_default_and_key_and_command_read_0() {
 fn gaps_cannot_be_read_or_written() {
     let mut config = unlocked(&[]);
     for (start, count) in [
-        (0x0108, 2),
-        (0x0109, 1),
+        (0x0109, 2),
+        (0x010A, 1),
         (0x010F, 2),
         (0x0117, 2),
         (0x011F, 2),
@@ -129,7 +130,7 @@ fn gaps_cannot_be_read_or_written() {
 #[test]
 fn a_gap_is_reported_before_a_bad_value_and_that_before_the_lock() {
     let mut config = config(&[]);
-    assert_eq!(write(&mut config, COMMAND, &[99, 99]), ADDRESS);
+    assert_eq!(write(&mut config, COMM_SOURCE, &[99, 99]), ADDRESS);
     assert_eq!(write(&mut config, BAUD, &[97]), VALUE);
     assert_eq!(write(&mut config, BAUD, &[96]), LOCKED);
     assert_eq!(write(&mut config, COMMAND, &[5]), LOCKED);

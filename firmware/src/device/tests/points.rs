@@ -1,6 +1,7 @@
 //! The points of the modules and their pulse counters.
 
 use super::*;
+use crate::config::LineName;
 
 #[test]
 fn the_running_module_keeps_its_settings_after_module_is_written() {
@@ -20,7 +21,7 @@ fn the_running_module_keeps_its_settings_after_module_is_written() {
     assert_eq!(before[2].scale, Scale::Engineering);
 
     // SAFE is raw, 1000 of 4095 is 2.442 V.
-    bench.device.request_seen(0);
+    bench.device.request_seen(0, false);
     while !bench.device.tick(1) {}
     assert_eq!(bench.read(0x12, 1), Ok(std::vec![2442]));
 
@@ -243,20 +244,50 @@ fn outputs_begin_with_start_and_go_to_safe_in_silence() {
     let mut bench = Bench::new(Module::Do4, &stored);
     let bits = |bench: &mut Bench| bench.ask(&[1, 0, 0x10, 0, 4])[2];
     assert_eq!(bits(&mut bench), 0b0101);
-    bench.device.request_seen(0);
+    bench.device.request_seen(0, false);
     let trips = (1..=600).filter(|_| bench.device.tick(1)).count();
     assert_eq!(trips, 1);
     assert_eq!(bits(&mut bench), 0b0110, "off, on, held, off");
     let status = |bench: &mut Bench| bench.read(0x020A, 1).unwrap()[0] & 1;
     assert_eq!(status(&mut bench), 1);
     // Outputs keep their values until they are written, and the flag stays set until it is cleared.
-    bench.device.request_seen(bench.device.state.millis());
+    bench
+        .device
+        .request_seen(bench.device.state.millis(), false);
     assert_eq!(bits(&mut bench), 0b0110);
     bench.ask(&[5, 0, 0x10, 0xFF, 0]);
     assert_eq!(bits(&mut bench), 0b0111);
     bench.unlock();
     bench.write(at::COMMAND, &[5]).unwrap();
     assert_eq!(status(&mut bench), 0);
+}
+
+#[test]
+fn comm_source_selects_the_requests_that_restart_the_communication_watchdog() {
+    let lines = [LineName::Rs485, LineName::Radio];
+    // Reads and writes over RS-485, then over the air.
+    for (source, expected) in [
+        (0, [true; 4]),
+        (1, [false, true, false, true]),
+        (2, [true, true, false, false]),
+        (3, [false, true, false, false]),
+    ] {
+        let settings = [(at::COMM_TIMEOUT, 1), (at::COMM_SOURCE, source)];
+        let requests = lines
+            .into_iter()
+            .flat_map(|line| [(line, false), (line, true)]);
+        for ((line, writes), restarts) in requests.zip(expected) {
+            let mut bench = Bench::new(Module::Do4, &settings);
+            bench.device.set_origin(Origin {
+                line,
+                broadcast: false,
+            });
+            assert!(!bench.device.tick(50));
+            bench.device.request_seen(50, writes);
+            let trips = bench.device.tick(50);
+            assert_eq!(trips, !restarts, "{source}: {line:?}, writes: {writes}");
+        }
+    }
 }
 
 #[test]

@@ -239,6 +239,45 @@ impl Bench {
         received.iter().map(|character| character.byte).collect()
     }
 
+    /// Returns the time after the last stop bit of a reply in which the driver is off and the receiver on.
+    pub fn ready(&self) -> Time {
+        self.bit().max(Time::from_us(10))
+    }
+
+    /// Returns how far the end of a character is off in the master's time: its clock and the unit's differ by 100 ppm,
+    /// and the divider by half a cycle a bit.
+    pub fn clocks(&self) -> Time {
+        Time::from_ps(self.characters(1).as_ps() / 10_000) + Time::from_ns(80)
+    }
+
+    /// Sends a request after `rest`. Returns the bytes of the reply and the time from t3.5 until the driver was on. Asserts
+    /// that a reply begins within 60 ms, and that the driver is off in time after it. Afterwards the unit must be ready,
+    /// and a master may send its next request now.
+    pub fn hurry(&mut self, rest: Time, bytes: &[u8]) -> (Vec<u8>, Time) {
+        let start = self.board.now() + rest;
+        self.sent = self.board.line().send(start, bytes);
+        let due = self.sent + self.t35();
+        self.board.run_until(due);
+        while !self.board.driver_enable() {
+            let waited = self.board.now() - due;
+            assert!(waited < Time::from_ms(60), "{bytes:02X?} got no reply");
+            self.board.run_for(Time::from_us(10));
+        }
+        let late = self.board.now() - due;
+        while self.board.driver_enable() {
+            self.board.run_for(Time::from_us(2));
+        }
+        let reply = self.board.line().take_received();
+        let ready = reply.last().expect("a reply").end + self.ready();
+        let (off, _) = self.board.line().driver_edges().next_back().expect("edges");
+        assert!(
+            off <= ready + self.clocks(),
+            "off at {off:?}, after {ready:?}"
+        );
+        self.board.run_until(ready);
+        (reply.iter().map(|character| character.byte).collect(), late)
+    }
+
     /// Sends a PDU to a unit. Returns the PDU of the reply, or `None` when there is no reply. Checks the reply's frame.
     pub fn ask(&mut self, unit: u8, pdu: &[u8]) -> Option<Vec<u8>> {
         let reply = self.exchange(&adu(&[&[unit], pdu].concat()));

@@ -24,7 +24,7 @@ fn closed_lock_refuses_every_write_and_allows_every_read() {
         (0x01E0 + SLOT, 1, 6),
         // The checks of value and address come before the check of the lock.
         (COMM_TIMEOUT, 36_001, 3),
-        (0x0109, 1, 2),
+        (0x010A, 1, 2),
         (0x0100, 0x5A16, 3),
         (0x0100, 0, 3),
     ] {
@@ -91,7 +91,7 @@ fn refused_write_changes_no_register_of_its_range() {
         (COMM_TIMEOUT, &[20, 1001][..], 3),
         (COMM_TIMEOUT, &[20, 5, 1, 0], 3),
         (COMM_TIMEOUT, &[20, 5, 0, 0, 7], 3),
-        (COMM_TIMEOUT, &[20, 5, 0, 0, 1, 0], 2),
+        (COMM_TIMEOUT, &[20, 5, 0, 0, 1, 0, 0], 2),
         (0x00FF, &[0, 0x5A17], 2),
         (0x011F, &[1, 1], 2),
         (FILTER, &[1, 2, 3, 1001], 3),
@@ -116,8 +116,8 @@ fn access_to_a_gap_between_registers_gets_exception_02() {
     for (gap, count) in [
         (0x00FF, 1),
         (0x00FF, 2),
-        (0x0109, 1),
-        (0x0108, 2),
+        (0x010A, 1),
+        (0x0109, 2),
         (0x010F, 2),
         (0x0118, 1),
         (0x0117, 2),

@@ -3,7 +3,7 @@
 from simulator import OnSimulator
 
 FIRST = 0x0010
-KEY, BAUD, FORMAT, COMM_TIMEOUT, COMMAND = 0x0100, 0x0101, 0x0102, 0x0104, 0x0108
+KEY, BAUD, FORMAT, COMM_TIMEOUT, COMMAND, COMM_SOURCE = 0x0100, 0x0101, 0x0102, 0x0104, 0x0108, 0x0109
 MODULE, FILTER, SAFE, START = 0x0114, 0x0130, 0x01D0, 0x01F0
 STATUS, RESET_CAUSE, MODULE_IN_FORCE = 0x020A, 0x0207, 0x0214
 SAVE, RESTART, DROP, CLEAR_FLAG = 1, 2, 4, 5
@@ -71,7 +71,7 @@ class Configuration(OnSimulator):
                                (FILTER, 1001), (SAFE, 2), (START, 0xFFFF), (COMMAND, 0)):
             self.refused(self.master.write_register(address, value), 3)
         self.refused(self.master.write_registers(BAUD, [192, 1, 0, 36001]), 3)
-        self.refused(self.master.write_registers(COMMAND, [1, 1]), 2)
+        self.refused(self.master.write_registers(COMM_SOURCE, [1, 1]), 2)
         self.refused(self.master.write_register(STATUS, 0), 2)
         self.assertEqual(self.register(BAUD, 4), [96, 0, 0, 0])
         self.assertFalse(self.register(STATUS) & UNSAVED)
