@@ -76,6 +76,9 @@ pub struct Rs485 {
     driver: PA8<Output<PushPull>>,
     divider: u16,
     format: Format,
+    /// CR1 as it is written. It is computed once, because the compiler may make the match of [`receiving`] a table in
+    /// flash, and [`Rs485::set_up`] also runs during a flash operation.
+    receiving: u16,
     /// [`Format::stop_in_data`] of the line's format, to be set in every byte.
     stop_in_data: u8,
     /// CR1 and the signature of the other registers, read back after they were set up. Later checks compare with
@@ -130,6 +133,7 @@ impl Rs485 {
             driver: pins.driver,
             divider,
             format: settings.format,
+            receiving: receiving(settings.format),
             stop_in_data: settings.format.stop_in_data(),
             cr1: 0,
             set: Signature::default(),
@@ -153,7 +157,7 @@ impl Rs485 {
         unsafe {
             usart.brr().write(|w| w.bits(self.divider));
             usart.cr2().write(|w| w.bits(stop_bits(self.format)));
-            usart.cr1().write(|w| w.bits(receiving(self.format)));
+            usart.cr1().write(|w| w.bits(self.receiving));
         }
         // Discard what was received before, including its error flags; it is not part of the next frame.
         let _ = (usart.sr().read(), usart.dr().read());

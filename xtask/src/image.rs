@@ -15,9 +15,6 @@ pub const FLASH_BASE: u32 = 0x0800_0000;
 /// First address of RAM.
 pub const RAM_BASE: u32 = 0x2000_0000;
 
-/// Start of the names that lld gives to thunks. The rest is the name of the function that the thunk jumps to.
-const THUNK: &str = "__Thumbv7ABSLongThunk_";
-
 /// An ELF file for a 32-bit microcontroller.
 pub type Elf<'data> = ElfFile32<'data, Endianness>;
 
@@ -88,13 +85,13 @@ pub fn symbols(elf: &Elf<'_>) -> Result<Vec<Symbol>> {
         .collect()
 }
 
-/// Refuses an image that can panic, or whose code in RAM calls functions in flash.
+/// Refuses an image that can panic, or whose code in RAM uses flash.
 ///
 /// Every panic of Rust calls a function of `core::panicking` or the panic handler, and the linker keeps only functions
-/// that something can call. A branch from RAM does not reach flash, so lld makes a thunk for each such call and places
-/// it near the caller.
+/// that something can call.
 pub fn check(bytes: &[u8]) -> Result<()> {
-    let symbols = symbols(&parse(bytes)?)?;
+    let elf = parse(bytes)?;
+    let symbols = symbols(&elf)?;
     let functions = symbols.iter().filter(|symbol| symbol.function);
     let mut functions: Vec<_> = functions.map(|symbol| demangled(&symbol.name)).collect();
     ensure!(
@@ -110,16 +107,7 @@ pub fn check(bytes: &[u8]) -> Result<()> {
          to find them)",
         functions.join(", ")
     );
-    let in_ram = symbols.iter().filter(|symbol| symbol.address >= RAM_BASE);
-    let called = in_ram.filter_map(|symbol| symbol.name.strip_prefix(THUNK));
-    let called: Vec<_> = called.map(demangled).collect();
-    ensure!(
-        called.is_empty(),
-        "code in RAM calls functions in flash, which cannot run during a save; add {} to .ram_code in \
-         firmware/memory/sections.x",
-        called.join(", ")
-    );
-    Ok(())
+    ram_code::check(&elf, &symbols)
 }
 
 /// Returns the path of a Rust symbol, without its hash.
@@ -127,6 +115,7 @@ fn demangled(name: &str) -> String {
     format!("{:#}", rustc_demangle::demangle(name))
 }
 
+mod ram_code;
 #[cfg(test)]
 pub mod sample;
 #[cfg(test)]

@@ -22,13 +22,13 @@ pub fn elf(segments: &[Segment], symbols: &[Symbol]) -> Vec<u8> {
     let mut offset = file.header.e_phoff + 32 * segments.len() as u64;
     for &(load, run, data, size) in segments {
         let section = file.sections.add();
-        let (name, kind) = match (data.is_empty(), load == run) {
-            (true, _) => (".bss", elf::SHT_NOBITS),
-            (false, true) => (".text", elf::SHT_PROGBITS),
-            (false, false) => (".data", elf::SHT_PROGBITS),
+        let (name, kind, flags) = match (data.is_empty(), load == run) {
+            (true, _) => (".bss", elf::SHT_NOBITS, 0),
+            (false, true) => (".text", elf::SHT_PROGBITS, elf::SHF_EXECINSTR),
+            (false, false) => (".data", elf::SHT_PROGBITS, 0),
         };
         (section.name, section.sh_type) = (name.into(), kind);
-        (section.sh_flags, section.sh_addralign) = (elf::SHF_ALLOC.into(), 1);
+        (section.sh_flags, section.sh_addralign) = ((elf::SHF_ALLOC | flags).into(), 1);
         (section.sh_addr, section.sh_offset) = (run.into(), offset);
         section.sh_size = size.into();
         section.data = match kind {

@@ -62,14 +62,71 @@ fn panicking_function_is_refused() {
     assert!(error_of(&[]).contains("no symbols"));
 }
 
+/// Returns what the function `user` in RAM uses, by the error of an image in which it consists of this code and these
+/// constants. The image has a function and a constant in flash.
+fn use_in_ram(code_of_user: &[u16], constants: &[u32]) -> Option<String> {
+    let mut data = code_of_user
+        .iter()
+        .flat_map(|half| half.to_le_bytes())
+        .collect::<Vec<_>>();
+    let pool = RAM_BASE + data.len() as u32;
+    data.extend(constants.iter().flat_map(|word| word.to_le_bytes()));
+    let symbols = [
+        ("store::load", (FLASH_BASE + 8) | 1, 8),
+        ("TABLE", FLASH_BASE + 16, 8),
+        ("user", RAM_BASE | 1, data.len() as u32),
+        ("$t", RAM_BASE, 0),
+        ("$d.1", pool, 0),
+    ];
+    let segments = [code(FLASH_BASE, &[0; 24]), code(RAM_BASE, &data)];
+    let refused = check(&elf(&segments, &symbols)).err()?.to_string();
+    let (_, uses) = refused.split_once("user uses ").expect("the user");
+    Some(uses.split(';').next().unwrap().to_owned())
+}
+
 #[test]
-fn only_a_thunk_in_ram_leads_into_flash() {
-    let name = "__Thumbv7ABSLongThunk__ZN8firmware5store4load17h0123456789abcdefE";
-    let at = |thunk| error_of(&[("TIM2", RAM_BASE | 1, 8), (name, thunk, 10)]);
-    let refused = at(RAM_BASE + 16);
-    assert!(
-        refused.contains("add firmware::store::load to"),
-        "{refused}"
+fn code_in_ram_with_an_address_in_flash_is_refused() {
+    for address in [FLASH_BASE + 16, FLASH_BASE + 20] {
+        let found = use_in_ram(&[0x4800, 0x4770], &[RAM_BASE, address]);
+        assert_eq!(found.as_deref(), Some("TABLE"));
+    }
+    // A thunk: movw ip, #9; movt ip, #0x800; bx ip.
+    let thunk = [0xF240, 0x0C09, 0xF6C0, 0x0C00, 0x4760, 0xBF00];
+    assert_eq!(use_in_ram(&thunk, &[]).as_deref(), Some("store::load"));
+    let nameless = use_in_ram(&[0x4770, 0xBF00], &[FLASH_BASE + 0x1_2345]);
+    assert_eq!(nameless.as_deref(), Some("0x08012345"));
+    // The same bits as code; an address in RAM and a register of USART1 as constants.
+    assert_eq!(
+        use_in_ram(&[0x0010, 0x0800], &[RAM_BASE, 0x4001_3800]),
+        None
     );
-    assert_eq!(at(FLASH_BASE + 4), "none");
+}
+
+#[test]
+fn code_in_ram_that_calls_or_jumps_through_a_register_is_refused() {
+    let indirect = [
+        [0x4798, 0xBF00],
+        [0x4718, 0xBF00],
+        [0x469F, 0xBF00],
+        [0x449F, 0xBF00],
+        [0xF8D3, 0xF004],
+        [0xF853, 0xF021],
+    ];
+    for code in indirect {
+        let found = use_in_ram(&code, &[]);
+        let expected = Some("an address in a register");
+        assert_eq!(found.as_deref(), expected, "{code:04X?}");
+    }
+    // bx lr, pop {pc}, ldr pc, [sp], #4, b.w, bl, tbb, and movt to an address in RAM.
+    let direct = [
+        [0x4770, 0xBD00],
+        [0xF85D, 0xFB04],
+        [0xF000, 0xB800],
+        [0xF000, 0xF800],
+        [0xE8DF, 0xF000],
+        [0xF2C2, 0x0000],
+    ];
+    for code in direct {
+        assert_eq!(use_in_ram(&code, &[]), None, "{code:04X?}");
+    }
 }
