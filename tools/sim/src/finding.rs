@@ -56,6 +56,12 @@ pub enum What {
         /// The block.
         block: &'static str,
     },
+    /// A read of flash by code in SRAM while flash is erased or programmed: the code waits for the end of the operation
+    /// (PM0075 2.3.1), although it is in SRAM so that it does not wait.
+    StalledRead {
+        /// The address read.
+        address: u32,
+    },
     /// A half-word could not be programmed, or a key was wrong, ... (PM0075).
     Flash(&'static str),
     /// Anything else, in words.
@@ -113,6 +119,10 @@ impl fmt::Display for What {
             } => write!(
                 f,
                 "access to {address:#010x}: {block} takes no {width:?} access there"
+            ),
+            Self::StalledRead { address } => write!(
+                f,
+                "read of {address:#010x}: code in SRAM reads flash while flash is erased or programmed"
             ),
             Self::Flash(text) => write!(f, "flash: {text}"),
             Self::Other(text) => f.write_str(text),

@@ -25,9 +25,13 @@ impl<C: Circuit> Bus<C> {
             PPB..0xE010_0000 => Some(self.debug_block(request)),
             _ => match self.flash_offset(address) {
                 Some(offset) if request.write.is_none() => {
-                    let busy = self.soc.flash.busy_until().is_some();
-                    self.read_stalls |= busy;
-                    self.halt |= busy;
+                    if self.soc.flash.busy_until().is_some() {
+                        self.read_stalls = true;
+                        self.halt = true;
+                        if request.pc >= RAM_BASE {
+                            self.note(request, What::StalledRead { address });
+                        }
+                    }
                     Some(self.flash_word(request, offset))
                 }
                 Some(offset) => self.store_to_flash(request, offset),

@@ -4,7 +4,8 @@ use std::{env, ops::Range, path::Path, sync::OnceLock};
 
 use register_map::{configuration, points};
 use sim::{
-    Board, Config, Corner, Image, Module, Time,
+    Board, Config, Corner, Finding, Image, Module, Time,
+    finding::What,
     line::{Format, Settings},
 };
 
@@ -270,8 +271,14 @@ impl Bench {
 
 impl Drop for Bench {
     fn drop(&mut self) {
-        if !self.tolerant && !std::thread::panicking() {
+        if std::thread::panicking() {
+            return;
+        }
+        if !self.tolerant {
             self.assert_sound();
         }
+        let findings = self.board.findings().iter();
+        let stalled = findings.filter(|finding| matches!(finding.what, What::StalledRead { .. }));
+        assert_eq!(stalled.collect::<Vec<_>>(), [] as [&Finding; 0]);
     }
 }

@@ -1,7 +1,7 @@
 //! Saving while the line is busy: at 115200 bit/s, with each request t3.5 after the last reply, no request is lost.
 
-use register_map::{codes::Baud, configuration};
-use sim::{Corner, Module, Time, periph::flash::Durations};
+use register_map::{codes::Baud, configuration, fault};
+use sim::{Corner, Module, Time, periph::flash::Durations, soc::map::Block};
 
 use crate::bench::{Bench, FIRST, PAGE_SIZE, SLOT, adu, corner, pages};
 
@@ -244,6 +244,36 @@ fn a_save_of_all_settings_holds_requests_off_for_at_most_20_us_at_a_time_35_at_t
         longest < Time::from_us(most),
         "a lock was held for {longest}"
     );
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn line_is_set_up_again_during_an_erase_by_code_that_does_not_wait() {
+    const BRR: u32 = 0x08;
+    let mut bench = Master::new(Module::Di4, &large()).bench;
+    let mut repaired = 0;
+    for n in 0..4 {
+        bench.configure(FILTER, &[10 + n]);
+        bench.write(0x0108, &[1]).unwrap();
+        let mut last = 0;
+        for _ in 0..100 {
+            bench.board.run_for(Time::from_ms(1));
+            let operations = bench.board.flash_operations();
+            let erases = bench.board.pc() >= 0x2000_0000 && operations == last;
+            last = operations;
+            if erases {
+                bench.board.upset(Block::Usart1, BRR, 1 << 10);
+                bench.board.run_for(Time::from_ms(10));
+                assert_eq!(bench.board.flash_operations(), last, "the erase has ended");
+                repaired += 1;
+                break;
+            }
+        }
+        bench.board.run_for(Time::from_ms(150));
+        bench.assert_answers(1);
+    }
+    assert!(repaired > 0, "no erase");
+    assert_eq!(bench.register(fault::LINE_REPAIRS), repaired);
 }
 
 #[test]

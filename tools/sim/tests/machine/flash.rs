@@ -146,10 +146,11 @@ fn code_in_sram_runs_during_an_operation_and_stalls_when_it_returns() {
     );
     let at = board.now().as_us();
     assert!((32_500..32_700).contains(&at), "{at}");
+    assert_eq!(findings(&board), [""; 0]);
 }
 
 #[test]
-fn code_in_sram_that_reads_flash_stalls_until_the_operation_ends() {
+fn code_in_sram_that_reads_flash_stalls_until_the_operation_ends_and_is_reported() {
     const CODE: u32 = 0x2000_1000;
     let mut ram = Asm::at(CODE);
     ram.store(OUT + 8, 0);
@@ -172,6 +173,8 @@ fn code_in_sram_that_reads_flash_stalls_until_the_operation_ends() {
     assert_eq!(out(&board, 2), 0, "the read of flash stalls");
     board.run_until(Time::from_ms(50));
     assert_eq!([0, 1, 2].map(|n| out(&board, n)), [0, first, 0x20]);
+    let text = "read of 0x08000100: code in SRAM reads flash while flash is erased or programmed";
+    assert_eq!(findings(&board), [text]);
 }
 
 #[test]
