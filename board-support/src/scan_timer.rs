@@ -25,11 +25,12 @@ impl ScanTimer {
 
     /// Starts the timer: one interrupt every millisecond.
     pub fn start(&mut self) {
-        // The update event by software loads the prescaler. Clear its flag, because it is no tick of the timer.
+        // The update event by software loads the prescaler. With URS it sets no flag, because it is no tick of the
+        // timer. A flag could not be cleared here: it appears in SR some cycles after UG.
+        self.timer.cr1().write(|w| w.urs().counter_only());
         self.timer.egr().write(|w| w.ug().update());
-        self.timer.sr().write(|w| w.uif().clear_bit());
         self.timer.dier().write(|w| w.uie().enabled());
-        self.timer.cr1().write(|w| w.cen().enabled());
+        self.timer.cr1().modify(|_, w| w.cen().enabled());
     }
 
     /// Acknowledges the timer's interrupt.

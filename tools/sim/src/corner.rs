@@ -69,6 +69,18 @@ impl Corner {
         }
     }
 
+    /// Cycles of a timer after which the flags of an update event by software (UG) appear in SR.
+    ///
+    /// On two boards SR read 0 in the next instructions after UG (labwired-core, `f103_conformance.rs`): a delay of at
+    /// least 4 cycles at 8 MHz in this simulator. It may be more where a timer runs at twice PCLK.
+    #[must_use]
+    pub const fn ug_delay(self) -> u32 {
+        match self {
+            Self::Nominal => 0,
+            Self::Slow | Self::Fast => 16,
+        }
+    }
+
     /// How far a conversion of the ADC may be off, in LSB either way.
     #[must_use]
     pub const fn adc_noise(self) -> u16 {

@@ -30,6 +30,8 @@ pub struct Part {
     pub cpuid: u32,
     /// DBGMCU_IDCODE: device and revision (RM0008 31.6.1).
     pub idcode: u32,
+    /// The bits that RCC_AHBENR, RCC_APB2ENR and RCC_APB1ENR keep.
+    pub clock_enables: [u32; 3],
     /// Blocks that this part has beyond those of the medium-density parts, none of which is modelled: base
     /// address and name.
     pub more_blocks: &'static [(u32, &'static str)],
@@ -54,6 +56,8 @@ pub const STM32F103CB: Part = Part {
     cpuid: 0x411F_C231,
     // Revision Y.
     idcode: 0x2003_6410,
+    // Read back from two boards after all ones were written (labwired-core, stm32f1_mmio_diff.rs).
+    clock_enables: [0x55, 0x5E7D, 0x1AE6_4807],
     more_blocks: &[],
 };
 
@@ -68,6 +72,8 @@ pub const STM32F103RC: Part = Part {
     cpuid: 0x411F_C231,
     // Revision Y.
     idcode: 0x1003_6414,
+    // RM0008 7.3.6 to 7.3.8, without the bits that only connectivity-line and XL-density parts have.
+    clock_enables: [0x557, 0xFFFD, 0x3AFE_C83F],
     more_blocks: &[
         (0x4000_0C00, "TIM5"),
         (0x4000_1000, "TIM6"),

@@ -8,6 +8,10 @@ use crate::time::Time;
 /// SWJ_CFG, write-only (RM0008 9.4.2).
 const MAPR_SWJ_CFG: u32 = 0b111 << 24;
 
+/// The bits that each EXTICR keeps, read back from two boards after all ones were written (labwired-core,
+/// stm32f1_mmio_diff.rs).
+const EXTICR: u32 = 0x7FFF;
+
 /// The AFIO registers.
 #[derive(Debug, Default)]
 pub struct Afio {
@@ -37,7 +41,7 @@ impl Peripheral for Afio {
             0x04 if value & !MAPR_SWJ_CFG == 0 => Ok(()),
             0x04 => Err(Unmodelled("pin remapping (AFIO_MAPR)")),
             0x08..=0x14 => {
-                self.exticr[(offset as usize - 8) / 4] = value & 0xFFFF;
+                self.exticr[(offset as usize - 8) / 4] = value & EXTICR;
                 Ok(())
             }
             0x00 => Err(Unmodelled("AFIO_EVCR, the event output")),

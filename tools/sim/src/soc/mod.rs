@@ -100,7 +100,8 @@ impl<C: Circuit> Soc<C> {
     #[must_use]
     pub fn new(config: &Config, flash: Flash, circuit: C) -> Self {
         let oscillators = config.corner.oscillators().with_crystal(config.crystal_hz);
-        let rcc = Rcc::new(config.crystal, oscillators);
+        let rcc = Rcc::new(config.crystal, oscillators, config.part.clock_enables);
+        let timer = |kind| Timer::new(kind).with_ug_delay(config.corner.ug_delay());
         let flash_access = flash.access_control();
         let mut soc = Self {
             part: config.part,
@@ -117,10 +118,10 @@ impl<C: Circuit> Soc<C> {
             iwdg: Iwdg::new(oscillators.lsi),
             usart1: Usart::new(),
             usart3: Usart::new(),
-            tim1: Timer::new(Kind::Advanced),
-            tim2: Timer::new(Kind::General),
-            tim3: Timer::new(Kind::General),
-            tim4: Timer::new(Kind::General),
+            tim1: timer(Kind::Advanced),
+            tim2: timer(Kind::General),
+            tim3: timer(Kind::General),
+            tim4: timer(Kind::General),
             adc1: Adc::new(),
             i2c1: I2c::new(),
             seen: [0; PORTS],

@@ -191,3 +191,24 @@ fn start_that_hangs_is_reset_by_the_watchdog() {
         "the reset cause is the watchdog"
     );
 }
+
+/// At some corners the flags of the update event that loads the prescaler are late.
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn second_beat_is_a_millisecond_after_the_first() {
+    const TIM4: usize = 16 + 30;
+    let mut bench = Bench::cold(Config::default());
+    let board = &mut bench.board;
+    let vector = board.flash()[4 * TIM4..].first_chunk().expect("a vector");
+    let handler = u32::from_le_bytes(*vector);
+    let mut beat = || {
+        let limit = board.now() + Time::from_ms(100);
+        assert!(board.run_until_pc(handler, limit), "no beat");
+        let at = board.now();
+        board.step(1);
+        at
+    };
+    let (first, second) = (beat(), beat());
+    let off = (second - first).as_us().abs_diff(1_000);
+    assert!(off < 5, "{off} us");
+}

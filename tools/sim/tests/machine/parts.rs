@@ -133,6 +133,35 @@ fn a_block_of_larger_parts_is_reported_by_its_name() {
     }
 }
 
+/// What two STM32F103 read back after all ones were written (labwired-core, `stm32f1_mmio_diff.rs`).
+#[test]
+fn registers_keep_the_bits_that_silicon_keeps() {
+    let kept = [
+        (RCC_APB1ENR, 0x1AE6_4807),
+        (RCC_APB2ENR, 0x5E7D),
+        (RCC_AHBENR, 0x55),
+        (AFIO + 0x08, 0x7FFF),
+        (AFIO + 0x0C, 0x7FFF),
+        (AFIO + 0x10, 0x7FFF),
+        (AFIO + 0x14, 0x7FFF),
+        (TIM2 + 0x04, 0xF8),
+        (TIM2 + 0x08, 0xFFF7),
+        (TIM2 + 0x0C, 0x5F5F),
+        (TIM2 + 0x20, 0x3333),
+    ];
+    let mut program = Asm::new();
+    for (register, n) in kept.map(|(register, _)| register).iter().zip(0..) {
+        program.store(*register, u32::MAX);
+        program.copy(*register, OUT + 4 * n);
+    }
+    program.spin();
+    let mut chip = alone(&STM32F103CB, program);
+    chip.run_until(Time::from_ms(3));
+    for ((register, bits), n) in kept.into_iter().zip(0..) {
+        assert_eq!(out(&chip, n), bits, "{register:#010x}");
+    }
+}
+
 /// A circuit that drives PC0 high, a pin of the packages with 64 pins.
 struct HighPc0;
 

@@ -2,6 +2,7 @@
 
 pub const RCC_CR: u32 = 0x4002_1000;
 pub const RCC_CFGR: u32 = 0x4002_1004;
+pub const RCC_AHBENR: u32 = 0x4002_1014;
 pub const RCC_APB2ENR: u32 = 0x4002_1018;
 pub const RCC_APB1ENR: u32 = 0x4002_101C;
 pub const RCC_CSR: u32 = 0x4002_1024;

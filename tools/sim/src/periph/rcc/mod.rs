@@ -93,6 +93,8 @@ type Ready = Option<Time>;
 pub struct Rcc {
     crystal: bool,
     oscillators: Oscillators,
+    /// The bits that AHBENR, APB2ENR and APB1ENR keep.
+    enables: [u32; 3],
     cr: u32,
     cfgr: u32,
     sws: u32,
@@ -130,12 +132,14 @@ impl Rcc {
         self.changes.clocks = true;
     }
 
-    /// Returns RCC after power-on, on a board with these oscillators, with a working crystal or without one.
+    /// Returns RCC after power-on, on a board with these oscillators, with a working crystal or without one. `enables`
+    /// are the bits that AHBENR, APB2ENR and APB1ENR keep.
     #[must_use]
-    pub fn new(crystal: bool, oscillators: Oscillators) -> Self {
+    pub fn new(crystal: bool, oscillators: Oscillators, enables: [u32; 3]) -> Self {
         Self {
             crystal,
             oscillators,
+            enables,
             cr: CR_RESET,
             cfgr: 0,
             sws: 0,

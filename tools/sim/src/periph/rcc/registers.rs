@@ -44,13 +44,13 @@ impl Peripheral for Rcc {
                 self.changes.resets.1 |= value & !self.rstr.1;
                 self.rstr.1 = value;
             }
-            0x14 => self.ahbenr = value & 0x57,
+            0x14 => self.ahbenr = value & self.enables[0],
             0x18 => {
-                self.enr.0 = value;
+                self.enr.0 = value & self.enables[1];
                 self.changes.clocks = true;
             }
             0x1C => {
-                self.enr.1 = value;
+                self.enr.1 = value & self.enables[2];
                 self.changes.clocks = true;
             }
             0x20 => return Err(Unmodelled("RCC_BDCR, the backup domain")),
@@ -80,7 +80,7 @@ impl Peripheral for Rcc {
     }
 
     fn reset(&mut self, now: Time) {
-        let fresh = Self::new(self.crystal, self.oscillators);
+        let fresh = Self::new(self.crystal, self.oscillators, self.enables);
         *self = Self {
             csr_flags: self.csr_flags,
             now,

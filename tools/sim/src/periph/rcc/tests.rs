@@ -1,6 +1,7 @@
 //! RCC against RM0008 chapter 7.
 
 use super::*;
+use crate::part::STM32F103CB;
 use crate::peripheral::Peripheral;
 
 fn at(rcc: &mut Rcc, us: u64) -> Time {
@@ -12,7 +13,7 @@ fn at(rcc: &mut Rcc, us: u64) -> Time {
 /// HSE on, PLL x9, APB1 / 2, in the sequence that the HAL uses for 72 MHz.
 #[test]
 fn the_pll_from_the_crystal_gives_72_mhz_when_both_are_ready() {
-    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     let now = at(&mut rcc, 10);
     rcc.write(0, 0x1_0083, now).unwrap();
     assert_eq!(rcc.read(0, now).unwrap() & CR_HSERDY, 0);
@@ -34,7 +35,7 @@ fn the_pll_from_the_crystal_gives_72_mhz_when_both_are_ready() {
 
 #[test]
 fn a_dead_crystal_never_gets_ready() {
-    let mut rcc = Rcc::new(false, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(false, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0x1_0083, now).unwrap();
     rcc.write(4, 1, now).unwrap();
@@ -46,7 +47,7 @@ fn a_dead_crystal_never_gets_ready() {
 
 #[test]
 fn reset_flags_accumulate_until_rmvf() {
-    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     assert_eq!(rcc.read(0x24, Time::ZERO).unwrap(), 0x0C00_0000);
     rcc.note_reset(Cause::Iwdg);
     rcc.reset(Time::ZERO);
@@ -59,7 +60,7 @@ fn reset_flags_accumulate_until_rmvf() {
 
 #[test]
 fn the_clock_in_use_cannot_be_stopped() {
-    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0, now).unwrap();
     assert_ne!(rcc.read(0, now).unwrap() & CR_HSIRDY, 0);
@@ -67,7 +68,7 @@ fn the_clock_in_use_cannot_be_stopped() {
 
 /// 72 MHz from the crystal, with the clock security system on.
 fn secured() -> Rcc {
-    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0x9_0083, now).unwrap();
     rcc.write(4, 0x001D_0400, now).unwrap();
@@ -102,7 +103,7 @@ fn after_a_failure_the_crystal_can_be_taken_into_use_again() {
 
 #[test]
 fn a_crystal_that_dies_while_it_starts_is_no_failure() {
-    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     let now = at(&mut rcc, 0);
     rcc.write(0, 0x9_0083, now).unwrap();
     let now = at(&mut rcc, 1_000);
@@ -132,7 +133,7 @@ fn the_security_system_can_be_switched_off() {
 
 #[test]
 fn pll_fed_by_the_hsi_keeps_running_when_the_crystal_fails() {
-    let mut rcc = Rcc::new(true, Oscillators::TYPICAL);
+    let mut rcc = Rcc::new(true, Oscillators::TYPICAL, STM32F103CB.clock_enables);
     let now = at(&mut rcc, 0);
     rcc.write(4, 0x0038_0400, now).unwrap();
     rcc.write(0, 0x0109_0083, now).unwrap();

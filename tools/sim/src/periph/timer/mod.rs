@@ -66,6 +66,17 @@ pub enum Kind {
     Advanced,
 }
 
+impl Kind {
+    /// Returns the bits that a register keeps: `general` were read back from two boards after all ones were written
+    /// (labwired-core, stm32f1_mmio_diff.rs), `advanced` are those of RM0008 14.4.
+    const fn keeps(self, general: u32, advanced: u32) -> u32 {
+        match self {
+            Self::General => general,
+            Self::Advanced => advanced,
+        }
+    }
+}
+
 /// A timer.
 #[derive(Clone, Debug)]
 pub struct Timer {
@@ -81,6 +92,10 @@ pub struct Timer {
     ccer: u32,
     rcr: u32,
     bdtr: u32,
+    /// Cycles after which the flags of UG appear in SR.
+    ug_delay: u32,
+    /// Flags of UG that have not appeared in SR yet, and when they do.
+    late: Option<(Time, u32)>,
 }
 
 impl Timer {
@@ -100,7 +115,16 @@ impl Timer {
             ccer: 0,
             rcr: 0,
             bdtr: 0,
+            ug_delay: 0,
+            late: None,
         }
+    }
+
+    /// Sets after how many cycles the flags of UG appear in SR.
+    #[must_use]
+    pub const fn with_ug_delay(mut self, cycles: u32) -> Self {
+        self.ug_delay = cycles;
+        self
     }
 
     /// TIM1's update interrupt, TIM1_UP.
@@ -127,6 +151,9 @@ impl Timer {
     fn sync(&mut self, now: Time) {
         let flags = self.counter.run(now);
         self.sr |= self.risen(flags);
+        if let Some((_, flags)) = self.late.take_if(|(at, _)| *at <= now) {
+            self.sr |= flags;
+        }
     }
 
     fn write_cr1(&mut self, value: u32) -> Result<(), Unmodelled> {
@@ -148,12 +175,19 @@ impl Timer {
         Ok(())
     }
 
-    fn write_egr(&mut self, value: u32) -> Result<(), Unmodelled> {
+    fn write_egr(&mut self, value: u32, now: Time) -> Result<(), Unmodelled> {
         if value & 1 != 0 {
-            let flags = self.counter.restart();
-            self.sr |= self.risen(flags);
+            let mut flags = self.counter.restart();
+            flags = self.risen(flags);
             if self.cr1 & (cr1::UDIS | cr1::URS) == 0 {
-                self.sr |= UPDATE;
+                flags |= UPDATE;
+            }
+            if self.ug_delay == 0 {
+                self.sr |= flags;
+            } else {
+                let earlier = self.late.map_or(0, |(_, flags)| flags);
+                let at = now + Time::cycles(self.ug_delay.into(), self.hz);
+                self.late = Some((at, flags | earlier));
             }
         }
         for n in 0..4 {
@@ -207,23 +241,23 @@ impl Peripheral for Timer {
         match offset {
             offset::CR1 => return self.write_cr1(value),
             offset::CR2 => {
-                self.cr2 = value & 0x7FFF;
+                self.cr2 = value & self.kind.keeps(0xF8, 0x7FFF);
                 return unless_zero(self.cr2, "timer master mode and idle states (CR2)");
             }
             offset::SMCR => {
-                self.smcr = value & 0xFFFF;
+                self.smcr = value & 0xFFF7;
                 return unless_zero(self.smcr, "timer slave mode (SMCR)");
             }
             offset::DIER => {
-                self.dier = value & 0x7FFF;
+                self.dier = value & self.kind.keeps(0x5F5F, 0x7FFF);
                 return unless_zero(self.dier & !FLAGS, "timer trigger, break or DMA (DIER)");
             }
             offset::SR => self.sr &= value & SR_MASK,
-            offset::EGR => return self.write_egr(value),
+            offset::EGR => return self.write_egr(value, now),
             offset::CCMR1 => return self.write_ccmr(0, value),
             offset::CCMR2 => return self.write_ccmr(1, value),
             offset::CCER => {
-                self.ccer = value & 0x3FFF;
+                self.ccer = value & self.kind.keeps(0x3333, 0x3FFF);
                 return self.check_outputs();
             }
             offset::CNT => self.counter.set_count(value & 0xFFFF),
@@ -249,7 +283,13 @@ impl Peripheral for Timer {
     }
 
     fn next_event(&self) -> Option<Time> {
-        self.counter.next(self.risen(self.dier & FLAGS & !self.sr))
+        let wanted = self.dier & FLAGS & !self.sr;
+        let late = self.late.filter(|(_, flags)| flags & wanted != 0);
+        let counter = self.counter.next(self.risen(wanted));
+        [counter, late.map(|(at, _)| at)]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     fn advance(&mut self, now: Time) {
@@ -267,7 +307,7 @@ impl Peripheral for Timer {
         *self = Self {
             hz: self.hz,
             counter: Counter::new(self.hz, now),
-            ..Self::new(self.kind)
+            ..Self::new(self.kind).with_ug_delay(self.ug_delay)
         };
     }
 

@@ -88,6 +88,26 @@ fn ug_sets_uif_unless_urs_and_nothing_with_udis() {
 }
 
 #[test]
+fn flags_of_ug_appear_late_so_that_a_clear_right_after_ug_is_lost() {
+    let mut timer = timer().with_ug_delay(4);
+    write(&mut timer, offset::DIER, 1, Time::ZERO);
+    write(&mut timer, offset::EGR, 1, Time::ZERO);
+    write(&mut timer, offset::SR, 0, cycles(2));
+    assert_eq!(read(&mut timer, offset::SR, cycles(3)), 0);
+    assert_eq!(timer.next_event(), Some(cycles(4)));
+    timer.advance(cycles(4));
+    assert!(timer.irq());
+    assert_eq!(read(&mut timer, offset::SR, cycles(4)), 0x1F);
+    // The prescaler, the counter and the flags of the counter itself are not late.
+    write(&mut timer, offset::CNT, 7, cycles(5));
+    write(&mut timer, offset::EGR, 1, cycles(5));
+    assert_eq!(read(&mut timer, offset::CNT, cycles(5)), 0);
+    timer.reset(cycles(6));
+    assert_eq!(read(&mut timer, offset::SR, cycles(20)), 0);
+    assert_eq!(timer.ug_delay, 4, "a property of the part");
+}
+
+#[test]
 fn the_prescaler_is_loaded_at_the_update() {
     let mut timer = timer();
     write(&mut timer, offset::ARR, 9, Time::ZERO);
