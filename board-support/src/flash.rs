@@ -42,7 +42,7 @@ pub enum FlashError {
     Protected(u32),
     /// The controller cannot be unlocked before the next reset.
     Locked,
-    /// The operation did not end in time. It may or may not have taken effect.
+    /// This operation, or the one before it, did not end in time. It may or may not have taken effect.
     Timeout(u32),
     /// The controller did not report the end of the operation (EOP, PM0075 3.5). The operation may or may not have
     /// taken effect.
@@ -214,6 +214,10 @@ impl Flash {
             return Err(FlashError::LowSupply);
         }
         let flash = &self.flash;
+        // The manual asks for this check first (PM0075 2.3.3): an operation that did not end in time may still run.
+        if flash.sr().read().bsy().bit_is_set() {
+            return Err(FlashError::Timeout(address));
+        }
         self.unlock()?;
         // Clear the flags of an earlier operation by writing 1; otherwise its EOP would count for this operation.
         flash.sr().write(|w| {
