@@ -96,6 +96,13 @@ pub enum Event {
         /// Whether the driver was on afterwards.
         on: bool,
     },
+    /// A reply of the unit has ended.
+    Silence {
+        /// Time at which the driver was switched off.
+        at: Duration,
+        /// Longest silence between two bytes of the reply.
+        longest: Duration,
+    },
 }
 
 impl Event {
@@ -104,7 +111,7 @@ impl Event {
     pub const fn at(&self) -> Duration {
         match self {
             Self::Byte { end, .. } => *end,
-            Self::Driver { at, .. } => *at,
+            Self::Driver { at, .. } | Self::Silence { at, .. } => *at,
         }
     }
 }
@@ -208,6 +215,10 @@ fn event(word: &str) -> Option<Option<Event>> {
             at: parse(when).ok()?,
             on: what == "driver-on",
         })),
+        _ if what.starts_with("silence-") => Some(Some(Event::Silence {
+            at: parse(when).ok()?,
+            longest: parse(&what["silence-".len()..]).ok()?,
+        })),
         _ if what.len() == 2 => {
             let byte = u8::from_str_radix(what, 16).ok()?;
             let (span, good) = when
@@ -243,6 +254,9 @@ impl fmt::Display for Event {
                 if *on { "on" } else { "off" },
                 Micros(*at)
             ),
+            Self::Silence { at, longest } => {
+                write!(f, "silence-{}@{}", Micros(*longest), Micros(*at))
+            }
         }
     }
 }
@@ -318,6 +332,10 @@ mod tests {
             Event::Driver {
                 at: us(12),
                 on: false,
+            },
+            Event::Silence {
+                at: us(12),
+                longest: us(1),
             },
         ];
         for (request, reply) in [

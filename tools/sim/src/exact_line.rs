@@ -15,6 +15,9 @@ pub struct Session {
     edges_until: Time,
     /// Number of findings that were reported.
     findings: usize,
+    /// End of the last byte of the reply that is being sent, and the longest silence inside it.
+    last_end: Option<Duration>,
+    longest: Duration,
 }
 
 impl Session {
@@ -58,7 +61,29 @@ impl Session {
             on,
         }));
         events.sort_by_key(Event::at);
-        events
+        self.with_silences(events)
+    }
+
+    /// Adds the longest silence inside each reply that has ended.
+    fn with_silences(&mut self, events: Vec<Event>) -> Vec<Event> {
+        let mut all = Vec::with_capacity(events.len());
+        for event in events {
+            all.push(event);
+            match event {
+                Event::Byte { start, end, .. } => {
+                    let silence = self.last_end.map(|last| start.saturating_sub(last));
+                    self.longest = self.longest.max(silence.unwrap_or_default());
+                    self.last_end = Some(end);
+                }
+                Event::Driver { on: true, .. } => self.longest = Duration::ZERO,
+                Event::Driver { at, on: false } => {
+                    let longest = self.longest;
+                    all.extend(self.last_end.take().map(|_| Event::Silence { at, longest }));
+                }
+                Event::Silence { .. } => {}
+            }
+        }
+        all
     }
 
     fn findings(&mut self, board: &Board) -> Vec<String> {
@@ -235,6 +260,33 @@ mod tests {
             let took = board.now().as_ps() as f64 / 1e6 - before;
             assert!((took - us).abs() < 1.0, "{line}: {took}");
         }
+    }
+
+    #[test]
+    fn each_reply_is_followed_by_its_longest_silence() {
+        let us = Duration::from_micros;
+        let byte = |start, end| Event::Byte {
+            byte: 0,
+            start: us(start),
+            end: us(end),
+            good: true,
+        };
+        let driver = |at, on| Event::Driver { at: us(at), on };
+        let silence = |at, longest| Event::Silence {
+            at: us(at),
+            longest: us(longest),
+        };
+        let mut session = Session::default();
+        let mut told = |events: &[Event]| session.with_silences(events.to_vec());
+        let begun = [driver(5, true), byte(10, 20), byte(23, 33)];
+        assert_eq!(told(&begun), begun);
+        let ended = [byte(34, 44), driver(45, false)];
+        assert_eq!(told(&ended), [&ended[..], &[silence(45, 3)]].concat());
+        // The silence before a reply is not inside it. A driver that was on without a byte is no reply.
+        let next = [driver(90, true), byte(99, 109), driver(110, false)];
+        assert_eq!(told(&next), [&next[..], &[silence(110, 0)]].concat());
+        let none = [driver(120, true), driver(121, false)];
+        assert_eq!(told(&none), none);
     }
 
     #[test]

@@ -158,6 +158,8 @@ class Frame:
     """Silence before the frame. None for the first frame."""
     turnaround_us: Optional[int]
     """Of a reply: time from the end of the request to its start. None for any other frame."""
+    silence_us: float
+    """Longest silence between two characters of the frame."""
     damaged: bool
     """A character collided with another one, or was damaged."""
 

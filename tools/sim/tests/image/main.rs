@@ -8,7 +8,7 @@
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
 //! | the description | `self_description` |
-//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `dip`, `bus` |
+//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `silences`, `dip`, `bus` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
 //! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
 //! | the simulator | `cores`: boards of one process share translated code; `bus`: several boards on one line |
@@ -58,6 +58,7 @@ mod registers;
 mod save_budget;
 mod saving;
 mod self_description;
+mod silences;
 mod stack;
 mod standard_functions;
 mod storing;

@@ -10,7 +10,7 @@ const FILTER: u16 = 0x0120 + SLOT;
 const UNSAVED: u16 = 8;
 
 /// The longest durations of flash operations (DS5319 table 28).
-const SLOWEST: Durations = Durations {
+pub const SLOWEST: Durations = Durations {
     erase: Time::from_ms(40),
     program: Time::from_us(70),
 };
@@ -27,7 +27,7 @@ const BLOCKS: [(u16, u16); 6] = [
 
 /// Returns settings whose record fills two fifths of a page: the third record goes to the other page, and a start makes
 /// room.
-fn large() -> Vec<(u16, u16)> {
+pub fn large() -> Vec<(u16, u16)> {
     // Three blocks need 400 bytes, six need 800.
     let blocks = BLOCKS.iter().take(3 * PAGE_SIZE / 1024);
     let pairs = blocks.map(|&(first, value)| (0..32).map(move |n| (first + n, value)));

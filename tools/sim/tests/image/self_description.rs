@@ -1,21 +1,17 @@
 //! The self-description: file 1 over the line by function 14, and its CRC in register 0x020F.
 
 use modio_description::{Description, describe, records};
-use register_map::{Module as Known, codes::Baud, configuration};
-use sim::{Module, Time};
+use register_map::Module as Known;
+use sim::Module;
 
 use crate::LAYOUT;
 use crate::bench::{Bench, MODULE, PORT};
 
-/// Longest silence in a reply: t1.5 above 19200 bit/s (V1.02 2.5.1.1), so that a master which checks t1.5 accepts the
-/// reply.
-const SILENCE: Time = Time::from_us(750);
-
 /// Groups of records: file, first record and number of records.
-type Groups<'a> = &'a [(u16, u16, u16)];
+pub type Groups<'a> = &'a [(u16, u16, u16)];
 
 /// Returns the PDU of function 14.
-fn request(groups: Groups<'_>) -> Vec<u8> {
+pub fn request(groups: Groups<'_>) -> Vec<u8> {
     let mut pdu = vec![0x14, groups.len() as u8 * 7];
     for (file, record, count) in groups {
         pdu.push(6);
@@ -91,31 +87,6 @@ fn file_1_describes_the_unit_with_any_number_of_groups() {
     bench.assert_described(Known::Ai4, &file);
     for groups in [2, 7, 35] {
         assert_eq!(bench.self_description(groups), file, "{groups} groups");
-    }
-}
-
-/// The unit reads the records while it sends. Groups cost more than records.
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn replies_with_the_most_records_or_groups_are_sent_without_long_silences() {
-    for baud in [Baud::B19200, Baud::B115200, Baud::B921600] {
-        let mut bench = Bench::set_up(Module::Ai2Ao2, &[(configuration::BAUD, baud.code())]);
-        bench.patience = SILENCE;
-        let file = bench.self_description(1);
-        let records = (file.len() / 2) as u16;
-        for first in (15..records - 124).step_by(16) {
-            for (groups, count) in [(1, 124), (35, 2)] {
-                let read = bench.read_file(&vec![(1, first, count); groups]).unwrap();
-                let [from, to] = [first, first + count].map(|record| usize::from(record) * 2);
-                assert_eq!(read, vec![&file[from..to]; groups]);
-                let frame = bench.board.line().frames().next_back().expect("a reply");
-                assert!(
-                    frame.longest_gap <= SILENCE,
-                    "{baud:?}, {groups} groups from record {first}: {:?}",
-                    frame.longest_gap
-                );
-            }
-        }
     }
 }
 

@@ -49,6 +49,8 @@ mod registers;
 mod saving;
 #[path = "../image/self_description.rs"]
 mod self_description;
+#[path = "../image/silences.rs"]
+mod silences;
 #[path = "../image/stack.rs"]
 mod stack;
 #[path = "../image/storing.rs"]

@@ -17,7 +17,7 @@ class Frames(OnPage):
     def texts(self, column: str) -> list[str]:
         return self.page.locator(f"#frames tr:not([hidden]) td.{column}").all_text_contents()
 
-    def test_frames_have_meaning_gap_and_turnaround(self):
+    def test_frames_have_meaning_gap_turnaround_and_silence(self):
         self.good(self.master.read_coils(0x0010, count=4))
         self.master.read_coils(0x0077, count=1)
         expect(self.rows).to_have_count(4)
@@ -32,6 +32,8 @@ class Frames(OnPage):
             # Each instant is in whole microseconds, so their difference may be 1 us off.
             self.assertAlmostEqual(float(text), (after.start_us - before.end_us) / 1000, delta=0.0061)
         self.assertEqual(self.texts("turnaround"), ["", gaps[1], "", gaps[3]])
+        # Half a character at 9600 bit/s.
+        self.assertEqual([text != "" and float(text) < 573 for text in self.texts("silence")], [False, True] * 2)
 
     def test_filter_shows_only_frames_with_all_words(self):
         self.good(self.master.read_coils(0x0010, count=4))

@@ -25,6 +25,7 @@ function row(frame) {
     cell("time number", (frame.start_us / 1e6).toFixed(3)),
     cell("gap number", milliseconds(frame.gap_us)),
     cell("turnaround number", milliseconds(frame.turnaround_us)),
+    cell("silence number", fromMaster ? "" : frame.silence_us.toFixed(1)),
     cell("from", fromMaster ? "master" : "unit"),
     cell("bytes", spaced(frame.bytes)),
     cell("meaning", frame.summary));

@@ -1,0 +1,150 @@
+//! Silences inside a reply. A reply is complete before its first byte is sent, so only a late interrupt can separate two
+//! of its characters.
+
+use register_map::{
+    codes::Baud,
+    configuration::{self, FILTER, LORA, LORA_AIR_RATE, LORA_FRAME_GAP},
+};
+use sim::line::{Direction, Settings};
+use sim::radio::Parameters;
+use sim::{Config, Module, Time};
+
+use crate::ascii::ascii;
+use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings};
+use crate::saving::{SLOWEST, large};
+use crate::self_description::request;
+
+/// Duration of a save with an erase, from the order on.
+const SAVE: Time = Time::from_ms(300);
+/// Time between two requests over the air, which are answered there.
+const ON_AIR: Time = Time::from_ms(250);
+
+/// Returns requests whose replies are long or take long to make, with a name for messages.
+fn requests() -> [(&'static str, Vec<u8>); 7] {
+    let echo = [&[8, 0, 0], &[0x55; 240][..]].concat();
+    [
+        ("03 x 125", vec![3, 0x01, 0x60, 0, 125]),
+        ("14, 35 groups", request(&[(1, 15, 2); 35])),
+        ("14, 124 records", request(&[(1, 15, 124)])),
+        (
+            "17 x 125",
+            vec![0x17, 0x01, 0x60, 0, 125, 0x01, 0x60, 0, 1, 2, 0, 0],
+        ),
+        ("08, 240 bytes", echo),
+        ("01 x 4", vec![1, 0, FIRST, 0, 4]),
+        ("0C", vec![0x0C]),
+    ]
+}
+
+/// A unit under load: it saves its settings and erases pages while it also answers over the air.
+struct Loaded {
+    bench: Bench,
+    is_ascii: bool,
+    on_air: Time,
+}
+
+impl Loaded {
+    fn new(baud: Baud, is_ascii: bool) -> Self {
+        let settings = [
+            (MODULE, Module::Ai2Ao2.code()),
+            (configuration::BAUD, baud.code()),
+            (configuration::MODE, is_ascii.into()),
+            (LORA, 1),
+            (LORA_AIR_RATE, 5),
+            (LORA_FRAME_GAP, 50),
+        ];
+        let mut bench = Bench::with(Config {
+            module: Module::Ai2Ao2,
+            flash: Some(flash_with_settings(&[&settings, &large()[..]].concat())),
+            radio: Some(Parameters::FACTORY),
+            ..Config::default()
+        });
+        bench.settings(Settings {
+            baud: baud.bits_per_second(),
+            ..Settings::default()
+        });
+        bench.board.set_flash_durations(SLOWEST);
+        // The radio module sets itself up.
+        bench.board.run_for(Time::from_ms(1_500));
+        // A request that ends during an erase is answered after the erase.
+        bench.patience = Time::from_ms(60);
+        Self {
+            bench,
+            is_ascii,
+            on_air: Time::ZERO,
+        }
+    }
+
+    /// Sends a request. Returns the longest silence inside the reply, or `None` when the reply is not a complete frame.
+    fn silence(&mut self, pdu: &[u8]) -> Option<Time> {
+        let board = &mut self.bench.board;
+        let now = board.now();
+        if now >= self.on_air {
+            let air = board.air().expect("a radio");
+            air.take_received();
+            air.send(now, &adu(&[&[1, 8, 0, 0], &[0x55; 60][..]].concat()));
+            self.on_air = now + ON_AIR;
+        }
+        let frame = if self.is_ascii {
+            ascii(pdu, "\r\n")
+        } else {
+            adu(&[&[1], pdu].concat())
+        };
+        self.bench.exchange(&frame);
+        let reply = self.bench.board.line().frames().next_back()?;
+        let is_complete = reply.direction == Direction::FromUnit && reply.crc_ok;
+        is_complete.then_some(reply.longest_gap)
+    }
+
+    /// Orders a save of a changed setting.
+    fn save(&mut self, value: u8) {
+        let [high, low] = FILTER.to_be_bytes();
+        for write in [
+            [6, 0x01, 0x00, 0x5A, 0x17],
+            [6, high, low, 0, value],
+            [6, 0x01, 0x08, 0, 1],
+        ] {
+            self.silence(&write).expect("a reply");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
+fn no_reply_has_a_silence_of_more_than_half_a_character_under_any_load() {
+    let mut failures = Vec::new();
+    for baud in [Baud::B1200, Baud::B19200, Baud::B115200, Baud::B921600] {
+        for is_ascii in [false, true] {
+            let mut loaded = Loaded::new(baud, is_ascii);
+            let half = Time::from_ps(loaded.bench.characters(1).as_ps() / 2);
+            let mut longest = requests().map(|(name, _)| (name, Some(Time::ZERO)));
+            let operations = loaded.bench.board.flash_operations();
+            for value in 10..13 {
+                loaded.save(value);
+                let end = loaded.bench.board.now() + SAVE;
+                while loaded.bench.board.now() < end {
+                    for ((_, longest), (_, pdu)) in longest.iter_mut().zip(requests()) {
+                        let silence = loaded.silence(&pdu);
+                        *longest = longest.and_then(|longest| Some(longest.max(silence?)));
+                    }
+                }
+            }
+            let operations = loaded.bench.board.flash_operations() - operations;
+            assert!(operations > 3 * 190, "{baud:?}: {operations} operations");
+            for (name, silence) in longest {
+                let mode = if is_ascii { "ASCII" } else { "RTU" };
+                let measured =
+                    silence.map_or("not complete".to_owned(), |it| format!("{} ns", it.as_ns()));
+                let text = format!(
+                    "{baud:?} {mode}, {name}: {measured}, half a character {} ns",
+                    half.as_ns()
+                );
+                println!("{text}");
+                if silence.is_none_or(|silence| silence > half) {
+                    failures.push(text);
+                }
+            }
+        }
+    }
+    assert_eq!(failures, [""; 0], "the longest silence inside a reply");
+}
