@@ -13,7 +13,7 @@ use core::{
 
 use super::{
     COPY, MARKS, PULSES, UPTIME, WORDS, live,
-    sealed::{self, ASKED, DIP, FLAGS, FRESH, SAVES, STARTED, Sealed},
+    sealed::{self, ASKED, DIP, FLAGS, FRESH, HAS_DIP, SAVES, STARTED, Sealed},
 };
 use crate::fault::{Fault, Kind, TASKS};
 
@@ -103,7 +103,7 @@ pub fn note(fault: &Fault) {
 
 /// Keeps SW01 as read at power-on.
 pub(crate) fn keep_dip(dip: u8) {
-    update(None, FLAGS, DIP, sealed::dip(dip));
+    update(None, FLAGS, DIP, HAS_DIP | u32::from(dip));
 }
 
 /// Keeps the number of saves that the firmware may still write to flash. For the background task.
@@ -142,7 +142,7 @@ pub fn keep_pulses(slot: usize, pulses: &[u32; 4]) {
     }
 }
 
-/// Returns the marks of the tasks, all 0 after [`at_start`]. After a watchdog reset the next start reports every task
+/// Returns the marks of the tasks, all 0 after the start. After a watchdog reset the next start reports every task
 /// as missing whose mark is not 1, which means "has run to its end". Each task stores its own mark; the code that
 /// refreshes the watchdog clears all of them.
 #[must_use]

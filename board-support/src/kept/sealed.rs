@@ -138,11 +138,6 @@ impl Sealed {
     }
 }
 
-/// Returns the bits of SW01.
-pub(super) const fn dip(dip: u8) -> u32 {
-    HAS_DIP | dip as u32
-}
-
 /// Returns the bits of a number of saves left.
 pub(super) const fn saves(left: u8) -> u32 {
     (!left as u32) << 16
@@ -199,48 +194,30 @@ mod tests {
         *update(&noise, |sealed| {
             sealed.set(STARTED, 0, 1_000);
             sealed.note(&HARD_FAULT, 1_077, 0);
-            set(sealed, 17, 9);
+            sealed.set(FLAGS, DIP | SAVES, HAS_DIP | 17 | saves(9));
         })
         .last()
         .unwrap()
     }
 
-    fn set(sealed: &mut Sealed, dip: u8, saves: u8) {
-        sealed.set(FLAGS, DIP | SAVES, super::dip(dip) | super::saves(saves));
-    }
-
-    fn content(region: &Region) -> (FaultRecord, Option<u8>, u8, u32) {
-        let sealed = find(region).expect("a copy is valid");
-        (
-            sealed.record(),
-            sealed.dip(),
-            sealed.saves(),
-            sealed.started(),
-        )
-    }
-
-    #[test]
-    fn crc_is_that_of_the_parts_unit() {
-        // CRC-32/MPEG-2 of the characters 12345678.
-        assert_eq!(crc(&[0x3132_3334, 0x3536_3738]), 0x49E3_C2FB);
-    }
-
     #[test]
     fn reset_after_any_write_of_an_update_leaves_the_old_or_the_new_content() {
         let region = in_service();
-        let (record, _, _, started) = content(&region);
-        for first in update(&region, |sealed| set(sealed, 17, 8)) {
-            let saves = content(&first).2;
-            assert!([9, 8].contains(&saves));
+        let old = find(&region).unwrap();
+        let states = update(&region, |sealed| sealed.set(FLAGS, SAVES, saves(8)));
+        for first in &states {
+            let between = find(first).expect("a copy is valid");
+            assert!([9, 8].contains(&between.saves()));
             // The update of the next start may be interrupted as well.
-            for second in update(&first, |sealed| set(sealed, 18, saves)) {
-                let dip = content(&second).1;
-                assert!([Some(17), Some(18)].contains(&dip));
-                assert_eq!(content(&second), (record, dip, saves, started));
+            for second in update(first, |sealed| sealed.set(STARTED, u32::MAX, 2_000)) {
+                let now = find(&second).expect("a copy is valid");
+                assert!([1_000, 2_000].contains(&now.started()));
+                assert_eq!(now.saves(), between.saves());
+                assert_eq!((now.record(), now.dip()), (old.record(), Some(17)));
             }
         }
-        let last = update(&region, |sealed| set(sealed, 17, 8)).pop().unwrap();
-        assert_eq!(content(&last).2, 8);
+        let last = states.last().unwrap();
+        assert_eq!(find(last).unwrap().saves(), 8);
         assert_eq!(last[..COPY], last[COPY..], "both copies are new");
     }
 
@@ -290,27 +267,23 @@ mod tests {
             assert_eq!(find(&noise), None);
         }
         let region = in_service();
-        for word in 0..COPY {
-            for bit in 0..32 {
-                let mut broken = region;
-                broken[word] ^= 1 << bit;
-                assert_eq!(content(&broken), content(&region), "the other copy");
-                broken[COPY + word] ^= 1 << bit;
-                assert_eq!(find(&broken), None, "word {word} bit {bit}");
-            }
+        for (word, bit) in (0..COPY).flat_map(|word| (0..32).map(move |bit| (word, bit))) {
+            let mut broken = region;
+            broken[word] ^= 1 << bit;
+            assert_eq!(find(&broken), find(&region), "the other copy");
+            broken[COPY + word] ^= 1 << bit;
+            assert_eq!(find(&broken), None, "word {word} bit {bit}");
         }
         let after = Sealed::after_power_on();
         assert_eq!((after.dip(), after.saves()), (None, u8::MAX));
-        assert_eq!(
-            (after.record(), after.started()),
-            (FaultRecord::default(), 0)
-        );
     }
 
     #[test]
-    fn fields_of_a_newer_image_are_kept() {
+    fn fields_of_a_newer_image_are_kept_and_the_crc_is_that_of_the_parts_unit() {
         let states = update(&in_service(), |sealed| sealed.0[COPY - 2] = 1234);
-        let states = update(states.last().unwrap(), |sealed| set(sealed, 17, 8));
+        let states = update(states.last().unwrap(), |sealed| sealed.set(FLAGS, DIP, 18));
         assert_eq!(find(states.last().unwrap()).unwrap().0[COPY - 2], 1234);
+        // CRC-32/MPEG-2 of the characters 12345678.
+        assert_eq!(crc(&[0x3132_3334, 0x3536_3738]), 0x49E3_C2FB);
     }
 }
