@@ -145,14 +145,9 @@ pub(crate) fn check(
 #[inline(never)]
 pub(crate) fn read(adu: &mut Adu, bytes: u8, model: &impl DataModel) {
     // The groups of the reply are written over those of the request.
-    let mut copy = [0; *READ.end() as usize];
-    let request = adu.from(GROUPS_FROM);
-    let len = request.len();
-    for (copy, byte) in copy.iter_mut().zip(request) {
-        *copy = *byte;
-    }
-    // A checked request always fits.
-    let rest = copy.get(..len).unwrap_or_default();
+    let mut request = Adu::new();
+    request.extend(adu.from(GROUPS_FROM));
+    let rest = request.as_slice();
     adu.set(GROUPS_FROM - 1, bytes);
     adu.truncate(GROUPS_FROM.into());
     let with_words = false;

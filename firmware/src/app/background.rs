@@ -29,7 +29,6 @@ impl Background {
     pub fn run(
         &mut self,
         device: &mut impl Mutex<T = &'static mut Device>,
-        activity: &mut impl Mutex<T = bool>,
         dacs: &mut impl Mutex<T = [DacLink; SLOTS]>,
         logged: &mut Consumer<'static, Event>,
     ) {
@@ -58,8 +57,9 @@ impl Background {
         if identify {
             self.leds.identify();
         }
-        self.leds
-            .show(millis, failing, || activity.lock(core::mem::take));
+        self.leds.show(millis, failing, || {
+            device.lock(|device| core::mem::take(&mut device.activity))
+        });
         while let Some(event) = logged.dequeue() {
             self.log.event(event);
         }

@@ -72,8 +72,6 @@ mod app {
         radio_uart: Option<RadioUart>,
         /// Built in place, because it is too large to be moved over the stack.
         device: &'static mut Device,
-        /// A request for this unit has been served since the LEDs were last updated.
-        activity: bool,
         /// What the scan and the background task exchange about each slot's DAC.
         dacs: [DacLink; SLOTS],
     }
@@ -114,7 +112,6 @@ mod app {
                 line: started.line,
                 radio: started.radio,
                 radio_uart: started.radio_uart,
-                activity: false,
                 dacs: started.dacs,
                 device: started.device,
             },
@@ -197,18 +194,14 @@ mod app {
         binds = EXTI3,
         priority = 3,
         local = [serving],
-        shared = [line, radio, device, activity],
+        shared = [line, radio, device],
     )]
     fn serve(cx: serve::Context) {
         alive::begin(fault::marks(), Task::Serve);
         let mut shared = cx.shared;
-        let served = cx
-            .local
+        cx.local
             .serving
             .run(&mut shared.line, &mut shared.radio, &mut shared.device);
-        if served {
-            shared.activity.lock(|activity| *activity = true);
-        }
         alive::end(fault::marks(), Task::Serve);
     }
 
@@ -248,16 +241,13 @@ mod app {
         }
     }
 
-    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, dacs])]
+    #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, dacs])]
     fn background(cx: background::Context) {
         alive::begin(fault::marks(), Task::Background);
         let mut shared = cx.shared;
-        cx.local.background_work.run(
-            &mut shared.device,
-            &mut shared.activity,
-            &mut shared.dacs,
-            cx.local.logged,
-        );
+        cx.local
+            .background_work
+            .run(&mut shared.device, &mut shared.dacs, cx.local.logged);
         alive::end(fault::marks(), Task::Background);
     }
 }

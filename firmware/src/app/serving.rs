@@ -68,13 +68,12 @@ impl Serving {
     }
 
     /// Serves the waiting request of each line, if any, after executing the command of the line's previous request.
-    /// Returns whether there was a request.
     pub fn run(
         &mut self,
         rs485: &mut impl Mutex<T = Option<Line>>,
         radio: &mut impl Mutex<T = Option<Radio>>,
         device: &mut impl Mutex<T = &'static mut Device>,
-    ) -> bool {
+    ) {
         if let Some(order) = self.rs485.order
             && rs485.lock(|line| line.as_ref().is_some_and(|line| !line.is_replying()))
         {
@@ -111,7 +110,6 @@ impl Serving {
                 self.radio.copy_counters(&line, device);
             }
         }
-        served
     }
 }
 

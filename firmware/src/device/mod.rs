@@ -58,6 +58,8 @@ pub struct Device<const SLOTS: usize> {
     pub restart: bool,
     /// The LEDs are to blink.
     pub identify: bool,
+    /// A request for this unit has been served since the LEDs were last updated.
+    pub activity: bool,
     /// Revision of the configuration whose settings the points have.
     revision: u16,
 }
@@ -115,6 +117,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             ordered: None,
             restart: false,
             identify: false,
+            activity: false,
             revision: config.revision(),
             config,
         };
@@ -176,6 +179,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Ends a request whose reply has begun: applies changed settings to the points. Returns the command that the
     /// request ordered.
     pub fn end_request(&mut self) -> Option<Command> {
+        self.activity = true;
         self.settings_may_have_changed();
         self.ordered.take()
     }
