@@ -158,11 +158,11 @@ impl Life {
         }
         match result {
             None | Some(Ok(_)) => {}
-            Some(Err(StoreError::Flash(_, Fault::PowerCut))) => self.power_cycle(),
+            Some(Err(StoreError::Flash(Fault::PowerCut))) => self.power_cycle(),
             // The flash only refuses a half-word whose programming was interrupted. The stored configuration
             // remains.
-            Some(Err(StoreError::Flash(_, Fault::NotErased))) => self.refusals += 1,
-            Some(Err(StoreError::Worn(..))) => assert!(self.flash.worn.is_some(), "not worn"),
+            Some(Err(StoreError::Flash(Fault::NotErased))) => self.refusals += 1,
+            Some(Err(StoreError::Worn)) => assert!(self.flash.worn.is_some(), "not worn"),
         }
     }
 

@@ -59,7 +59,7 @@ impl Persistence {
         self.erase = false;
         // After a failure of the flash, the next save that needs the page erases it. After a low supply, this
         // function tries again.
-        if let Err(StoreError::Flash(_, FlashError::LowSupply)) =
+        if let Err(StoreError::Flash(FlashError::LowSupply)) =
             self.store.make_spare(&mut self.pages)
         {
             self.erase = true;
@@ -96,7 +96,7 @@ impl Persistence {
         while let Some(operation) = self.refused.take().or_else(|| saving.next(&settings)) {
             match operation.perform(&mut self.pages) {
                 Ok(()) => {}
-                Err(StoreError::Flash(_, FlashError::LowSupply)) => {
+                Err(StoreError::Flash(FlashError::LowSupply)) => {
                     self.refused = Some(operation);
                     return self.wait(saving);
                 }

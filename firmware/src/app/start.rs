@@ -125,7 +125,7 @@ pub fn up(
     let prepared = store.prepare(&mut pages);
     match prepared {
         Ok(()) => {}
-        Err(StoreError::Flash(_, FlashError::LowSupply)) => log.event(log::Event::LowSupply),
+        Err(StoreError::Flash(FlashError::LowSupply)) => log.event(log::Event::LowSupply),
         Err(_) => log.event(log::Event::SaveFailed),
     }
     // An erase that failed here is done by the background task, as after a change of pages.

@@ -54,9 +54,9 @@ const LITTLE_ROOM: usize = 256;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError<E> {
     /// The flash refused the operation or failed. The page may be worn out.
-    Flash(Page, E),
-    /// The flash does not read back as programmed at this offset: the page is worn out.
-    Worn(Page, usize),
+    Flash(E),
+    /// The flash does not read back as programmed: the page is worn out.
+    Worn,
 }
 
 /// The configuration that a start found.
@@ -169,16 +169,12 @@ impl Store {
         else {
             return Ok(());
         };
-        for offset in [place.seals, place.seals.saturating_add(2)] {
+        let mut seals = [place.seals, place.seals.saturating_add(2)].into_iter();
+        perform_all(flash, &mut || {
             // 0 can be programmed over any value.
-            Operation::Program {
-                page,
-                offset,
-                half: 0,
-            }
-            .perform(flash)?;
-        }
-        Ok(())
+            let (offset, half) = (seals.next()?, 0);
+            Some(Operation::Program { page, offset, half })
+        })
     }
 
     /// Clears the page without the newest record, and moves the newest record there if its own page has little room
@@ -241,16 +237,12 @@ impl Store {
         let as_delivered = self.survey(page).blank && (page == Page::Second || self.second.blank);
         if as_delivered {
             let mut marking = Readying::Mark(page);
-            while let Some(operation) = marking.next() {
-                operation.perform(flash)?;
-            }
+            perform_all(flash, &mut || marking.next())?;
         } else {
             self.make_ready(page, flash)?;
         }
         let mut writing = Writing::new(page, FIRST_OFFSET, Encoder::new(SCHEMA, 0, 0));
-        while let Some(operation) = writing.next(&mut || None) {
-            operation.perform(flash)?;
-        }
+        perform_all(flash, &mut || writing.next(&mut || None))?;
         self.make_ready(page.other(), flash)
     }
 
@@ -260,10 +252,7 @@ impl Store {
             return Ok(());
         }
         let mut readying = Readying::new(page, survey.marked);
-        while let Some(operation) = readying.next() {
-            operation.perform(flash)?;
-        }
-        Ok(())
+        perform_all(flash, &mut || readying.next())
     }
 
     fn survey_again(&mut self, flash: &impl Pages) {
@@ -309,4 +298,15 @@ impl Store {
             Page::First
         }
     }
+}
+
+/// Performs operations until there are no more.
+fn perform_all<F: Pages>(
+    flash: &mut F,
+    next: &mut dyn FnMut() -> Option<Operation>,
+) -> Result<(), StoreError<F::Error>> {
+    while let Some(operation) = next() {
+        operation.perform(flash)?;
+    }
+    Ok(())
 }

@@ -30,20 +30,21 @@ impl Operation {
         match self {
             Self::Program { page, offset, half } => {
                 let done = flash.program(page, offset, half);
-                done.map_err(|error| StoreError::Flash(page, error))?;
+                done.map_err(StoreError::Flash)?;
                 let read = flash.page(page).get(offset..).unwrap_or_default();
                 if read.first_chunk() == Some(&half.to_le_bytes()) {
                     Ok(())
                 } else {
-                    Err(StoreError::Worn(page, offset))
+                    Err(StoreError::Worn)
                 }
             }
             Self::Erase(page) => {
                 let done = flash.erase(page);
-                done.map_err(|error| StoreError::Flash(page, error))?;
-                match flash.page(page).iter().position(|byte| *byte != 0xFF) {
-                    None => Ok(()),
-                    Some(offset) => Err(StoreError::Worn(page, offset)),
+                done.map_err(StoreError::Flash)?;
+                if flash.page(page).iter().all(|byte| *byte == 0xFF) {
+                    Ok(())
+                } else {
+                    Err(StoreError::Worn)
                 }
             }
         }
@@ -103,11 +104,6 @@ impl Writing {
             offset,
             encoder,
         }
-    }
-
-    /// Returns the offset of the next half-word.
-    pub(super) const fn offset(&self) -> usize {
-        self.offset
     }
 
     /// Returns the next operation, or `None` when the record is complete. [`Encoder::next`] describes `pair`.

@@ -70,7 +70,7 @@ impl Saving {
             Some(newest) if newest.place.sequence == self.sequence => Ok(()),
             _ => {
                 store.avoid(self.writing.page);
-                Err(StoreError::Worn(self.writing.page, self.writing.offset()))
+                Err(StoreError::Worn)
             }
         }
     }

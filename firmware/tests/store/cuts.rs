@@ -280,7 +280,7 @@ fn cut_in_a_half_word_that_then_reads_as_erased_only_at_the_start_is_recovered()
         assert!(loaded.settings == old && !loaded.invalid, "{starts}");
         if let Err(failure) = save(&mut store, &mut flash, &new) {
             assert!(
-                matches!(failure, StoreError::Flash(_, Fault::NotErased)),
+                matches!(failure, StoreError::Flash(Fault::NotErased)),
                 "{starts}: {failure:?}"
             );
             refused += 1;
