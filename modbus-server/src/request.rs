@@ -41,8 +41,6 @@ pub struct Reply<'a> {
     pub(crate) is_answered: bool,
     /// Framing of what follows the reply.
     pub(crate) framing: Framing,
-    /// Number of valid frames on the bus when the request was taken.
-    pub(crate) messages: u16,
     pub(crate) outcome: Outcome,
     pub(crate) writes: bool,
 }

@@ -141,26 +141,28 @@ fn a_delayed_reply_starts_after_its_ticks() {
     unit.is_well();
 }
 
-/// The frame is received while the request is served, or during the delay after it.
 #[test]
 fn a_reply_is_dropped_and_counted_when_another_frame_begins_before_it() {
     for frame in [&OTHERS[..], &OTHERS[..3]] {
-        for delay in [0, 2] {
+        for (step, delay) in [(0, 0), (1, 0), (2, 2)] {
             let mut adus = [Adu::new(), Adu::new()];
             let mut unit = Unit::rtu(&mut adus);
             assert!(unit.receive_frame(&READ));
+            // The frame is received before the request is taken, before its reply is sent, or during the delay.
+            let receive = |unit: &mut Unit<'_>, now: bool| {
+                if now {
+                    unit.receive(frame);
+                    if frame.len() == OTHERS.len() {
+                        assert!(!unit.silence());
+                    }
+                }
+            };
+            receive(&mut unit, step == 0);
             let request = unit.port.take().expect("a request waits");
+            receive(&mut unit, step == 1);
             let reply = unit.server.serve(request, &mut unit.registers.tables());
-            if delay > 0 {
-                unit.port.send(reply, delay);
-                unit.receive(frame);
-            } else {
-                unit.receive(frame);
-                unit.port.send(reply, delay);
-            }
-            if frame.len() == OTHERS.len() {
-                assert!(!unit.silence());
-            }
+            unit.port.send(reply, delay);
+            receive(&mut unit, step == 2);
             (0..5).for_each(|_| unit.port.tick());
             assert_eq!(unit.port.start(), None);
             assert!(!unit.port.is_replying());
@@ -191,15 +193,15 @@ fn a_new_request_drops_the_delayed_reply_before_it() {
 fn no_buffer_is_lost_when_a_second_request_is_taken_before_the_first_reply_is_sent() {
     let mut adus = [Adu::new(), Adu::new()];
     let mut unit = Unit::rtu(&mut adus);
-    let mut served = [(); 2].map(|()| {
+    let served = [(); 2].map(|()| {
         assert!(unit.receive_frame(&READ));
         let request = unit.port.take().expect("a request waits");
-        Some(unit.server.serve(request, &mut unit.registers.tables()))
+        unit.server.serve(request, &mut unit.registers.tables())
     });
-    for (reply, sends) in served.iter_mut().zip([false, true]) {
-        unit.port.send(reply.take().unwrap(), 0);
-        assert_eq!(!unit.sends().is_empty(), sends);
+    for reply in served {
+        unit.port.send(reply, 0);
     }
+    assert_eq!(unit.sends(), REPLY);
     assert_eq!(unit.counters().no_response, 1);
     unit.is_well();
 }

@@ -31,8 +31,8 @@ use core::array;
 use modbus_server::{Exception, Span, Words, WordsOut};
 use register_map::codes::{CommSource, Command, Lora};
 use register_map::configuration::{
-    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY, RULES,
-    SAVES,
+    COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY,
+    RULES, SAVES,
 };
 use register_map::points::{self, CHANNELS};
 use register_map::state::status;
@@ -273,11 +273,19 @@ impl<const SLOTS: usize> Config<SLOTS> {
     pub fn write(&mut self, span: Span, words: Words<'_>) -> Option<Command> {
         self.lock.open(self.origin.line);
         let mut command = None;
-        for (address, value) in span.addresses().zip(words.iter()) {
-            match address {
-                KEY => {}
-                COMMAND => command = Command::from_code(value),
-                _ => self.edited.set(address, value),
+        if span.start() >= FILTER {
+            // These registers do not affect others.
+            let edited = self.edited.slice_mut(span.start(), span.count());
+            for (edited, value) in edited.iter_mut().zip(words.iter()) {
+                *edited = value;
+            }
+        } else {
+            for (address, value) in span.addresses().zip(words.iter()) {
+                match address {
+                    KEY => {}
+                    COMMAND => command = Command::from_code(value),
+                    _ => self.edited.set(address, value),
+                }
             }
         }
         if span != Span::single(KEY) && span != Span::single(COMMAND) {

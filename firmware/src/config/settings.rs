@@ -114,6 +114,14 @@ impl Settings {
         }
     }
 
+    /// Returns `count` values from an address on, to be changed. The range must not contain MODULE, KEY or COMMAND.
+    #[inline]
+    pub(super) fn slice_mut(&mut self, start: u16, count: u16) -> &mut [u16] {
+        let start = usize::from(start & 0xFF);
+        let end = start.saturating_add(usize::from(count));
+        self.values.get_mut(start..end).unwrap_or_default()
+    }
+
     /// Returns `count` values from an address on.
     #[inline]
     pub(super) fn slice(&self, start: u16, count: u16) -> &[u16] {

@@ -287,8 +287,10 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
 
     #[inline]
     fn before_read_words(&mut self, span: Span, server: &Server) {
-        // The request may have written settings.
-        self.settings_may_have_changed();
+        // The request may have written settings, which may change anything else.
+        if !matches!(Block::of(span), Block::Config) {
+            self.settings_may_have_changed();
+        }
         if span.start() >= state_map::PRODUCT_CODE {
             *self.state.counters_of(self.config.origin_line()) = server.counters();
         }

@@ -33,7 +33,7 @@ pub struct Port<'a, U = u8> {
     /// Unit address and PDU of the request that waits, and the tick in which it ended.
     request: Option<(&'a mut Adu, u32)>,
     reply: State,
-    /// Number of valid frames on the bus when the request of a delayed reply ended.
+    /// Number of valid frames on the bus when the last request ended.
     messages_before: u16,
 }
 
@@ -121,6 +121,7 @@ impl<'a, U: Units> Port<'a, U> {
         let Some(adu) = self.receiver.close() else {
             return false;
         };
+        self.messages_before = self.receiver.counters().bus_messages;
         // A request that has not been taken yet cannot be answered in time any more.
         if let Some((late, _)) = self.request.replace((adu, ended)) {
             self.receiver.drop_request(late);
@@ -128,8 +129,8 @@ impl<'a, U: Units> Port<'a, U> {
         true
     }
 
-    /// Takes the waiting request, if any, to be served. A reply that has not begun yet is not sent any more, because
-    /// the master no longer expects it.
+    /// Takes the waiting request, if any, to be served; [`send`](Self::send) its reply before the next is taken. A reply
+    /// that has not begun yet is not sent any more, because the master no longer expects it.
     #[inline]
     pub fn take(&mut self) -> Option<Request<'a>> {
         let (adu, ended) = self.request.take()?;
@@ -160,7 +161,6 @@ impl<'a, U: Units> Port<'a, U> {
             }
         }
         self.transmitter = Transmitter::new(reply.adu, framing);
-        self.messages_before = reply.messages;
         // The request ended within a tick, so the first tick does not count.
         self.reply = State::Waiting(if delay == 0 { 0 } else { 1 + u32::from(delay) });
     }
@@ -179,7 +179,8 @@ impl<'a, U: Units> Port<'a, U> {
             return None;
         }
         let messages = self.receiver.counters().bus_messages;
-        if !self.receiver.is_idle() || messages != self.messages_before {
+        let is_late = self.request.is_some() || messages != self.messages_before;
+        if is_late || !self.receiver.is_idle() {
             self.drop_reply();
             return None;
         }

@@ -102,7 +102,6 @@ impl Server {
             adu,
             is_answered,
             framing: self.framing,
-            messages: line.bus_messages,
             outcome: executed.map_or_else(|outcome| outcome, |_| Outcome::Accepted),
             writes: executed == Ok(Effect::Written),
         }
