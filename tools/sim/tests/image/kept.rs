@@ -58,14 +58,14 @@ fn reset_at_any_instruction_of_an_update_loses_at_most_that_update() {
     let mut contents = Contents(Vec::new());
     for pulses in 0..2 {
         bench.board.set_energised(1, true).unwrap();
-        contents.collect(&mut bench, 10_000, (pulses, 0), (pulses + 1, 0));
+        contents.collect(&mut bench, 20_000, (pulses, 0), (pulses + 1, 0));
         bench.board.set_energised(1, false).unwrap();
         bench.board.run_for(Time::from_ms(3));
     }
     bench.configure(FILTER, &[1]);
     send(&mut bench, &[6, 1, 8, 0, 1], 8);
     let updates = contents.0.len();
-    contents.collect(&mut bench, 30_000, (2, 0), (2, 0));
+    contents.collect(&mut bench, 200_000, (2, 0), (2, 0));
     assert!(contents.0.len() > updates, "the budget of saves");
     bench.started();
 
@@ -81,7 +81,7 @@ fn reset_at_any_instruction_of_an_update_loses_at_most_that_update() {
     bench.started();
 
     send(&mut bench, &[16, 3, 32, 0, 2, 4, 0, 0, 0, 0], 0);
-    contents.collect(&mut bench, 10_000, (2, 1), (0, 1));
+    contents.collect(&mut bench, 40_000, (2, 1), (0, 1));
     bench.started();
     let mut seen = Vec::new();
     for (n, (content, allowed)) in contents.0.iter().enumerate() {
