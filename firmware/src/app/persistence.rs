@@ -4,7 +4,10 @@
 //! It continues once the supply has recovered. Until then another save is rejected as busy.
 
 use board_support::{Flash, flash::FlashError, kept};
-use firmware::store::{Operation, Saving, Store, StoreError};
+use firmware::{
+    config::Settings,
+    store::{Operation, Saving, Store, StoreError},
+};
 use rtic::Mutex;
 
 use crate::{
@@ -77,7 +80,7 @@ impl Persistence {
             None => {
                 let Some(saving) = Saving::new(&self.store, &self.pages, &settings) else {
                     // These settings are already stored, so nothing is written and the flash does not wear.
-                    device.lock(|device| device.config.end_save());
+                    Self::end(&settings, device);
                     return None;
                 };
                 let Some(left) = device.lock(|device| device.config.take_save()) else {
@@ -110,7 +113,7 @@ impl Persistence {
         good = saving.finish(&mut self.store, &self.pages).is_ok() && good;
         self.erase = !self.store.has_spare();
         Some(if good {
-            device.lock(|device| device.config.end_save());
+            Self::end(&settings, device);
             Event::Saved
         } else {
             self.fail(device);
@@ -122,6 +125,13 @@ impl Persistence {
     fn fail(&mut self, device: &mut impl Mutex<T = &'static mut Device>) {
         let stored = self.store.load(BOARD, &self.pages).settings;
         device.lock(|device| device.config.save_failed(stored));
+    }
+
+    /// Reports the settings as stored. Compares them outside the lock, so that requests do not wait.
+    fn end(settings: &Settings, device: &mut impl Mutex<T = &'static mut Device>) {
+        let started = device.lock(|device| device.config.started());
+        let changed = settings.needs_restart(&started);
+        device.lock(|device| device.config.end_save(changed));
     }
 
     /// Keeps a save until the supply has recovered. Returns the event to log, once.

@@ -42,6 +42,7 @@ pub use in_force::{LineConfig, Point, PortConfig, RadioConfig};
 use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
+pub use settings::RestartValues;
 pub use settings::Settings;
 use settings::{RESTARTS, format_suits_mode, takes_module};
 
@@ -341,11 +342,18 @@ impl<const SLOTS: usize> Config<SLOTS> {
         &self.saved
     }
 
-    /// Ends a successful save.
-    pub fn end_save(&mut self) {
+    /// Returns the settings that need a restart, with the values in force since the start.
+    #[must_use]
+    pub const fn started(&self) -> RestartValues {
+        RestartValues(self.started)
+    }
+
+    /// Ends a successful save. `changed` says whether the saved settings need a restart to be in force, see
+    /// [`Settings::needs_restart`].
+    pub const fn end_save(&mut self, changed: bool) {
         self.save = Save::None;
         self.unstored = false;
-        self.waiting = self.left != 0 || !self.saved.restart_values().eq(self.started);
+        self.waiting = self.left != 0 || changed;
     }
 
     /// Ends a save that failed. `stored` is what the flash still holds.

@@ -11,6 +11,10 @@ const PAGE: u16 = KEY >> 8;
 /// Number of settings that need a restart.
 pub(super) const RESTARTS: usize = restarts();
 
+/// The values of all settings that need a restart, in the order of their addresses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RestartValues(pub(super) [u16; RESTARTS]);
+
 /// A value for every register of the configuration. The values are consistent: a setting by point is always one
 /// that the point's module allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -135,6 +139,12 @@ impl Settings {
         let pairs = self.values.iter().zip(&from.values);
         // There are at most 256.
         pairs.map(|(a, b)| u16::from(a != b)).sum()
+    }
+
+    /// Returns whether a setting that needs a restart differs from its value in force since the start.
+    #[must_use]
+    pub fn needs_restart(&self, started: &RestartValues) -> bool {
+        !self.restart_values().eq(started.0.iter().copied())
     }
 
     /// Returns the settings that need a restart, in the order of their addresses.

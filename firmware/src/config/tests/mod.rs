@@ -83,7 +83,8 @@ fn status(config: &Config) -> u16 {
 fn save(config: &mut Config) {
     assert_eq!(write(config, COMMAND, &[1]), Ok(Some(Command::Save)));
     config.begin_save();
-    config.end_save();
+    let changed = config.to_save().needs_restart(&config.started());
+    config.end_save(changed);
 }
 
 #[test]
@@ -303,7 +304,8 @@ fn a_save_stores_the_settings_at_the_time_of_the_command() {
     );
     assert_eq!(config.to_save().get(BETA), 2000);
     assert!(config.is_saving());
-    config.end_save();
+    let changed = config.to_save().needs_restart(&config.started());
+    config.end_save(changed);
     assert_eq!(status(&config), status::UNSAVED, "the later change");
     config.drop_changes();
     assert_eq!((config.edited.get(BETA), status(&config)), (2000, 0));

@@ -51,12 +51,12 @@ fn a_save_in_a_request_with_settings_counts_what_they_change() {
     let saved = Ok(Some(Command::Save));
     assert_eq!(write(&mut config, COMM_TIMEOUT, &unchanged), saved);
     config.begin_save();
-    config.end_save();
+    config.end_save(false);
     // The request takes an unsaved change back.
     assert_eq!(write(&mut config, COMM_TIMEOUT, &[9]), DONE);
     assert_eq!(write(&mut config, COMM_TIMEOUT, &unchanged), saved);
     config.begin_save();
-    config.end_save();
+    config.end_save(false);
     // KEY is not a setting.
     let all = [&[OPENING_KEY, 96, 0, 0][..], &unchanged].concat();
     assert_eq!(write(&mut config, KEY, &all), saved);
@@ -70,7 +70,7 @@ fn a_save_after_an_invalid_store_needs_the_budget_until_it_is_complete() {
     assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);
     config.set_saves_left(1);
     assert!(config.take_save().is_some());
-    config.end_save();
+    config.end_save(false);
     save(&mut config);
 }
 
