@@ -210,8 +210,8 @@ pub fn up(
     }
 }
 
-/// Returns the duration of the longest reply in microseconds: the longest frame, a millisecond, which is more than the
-/// server takes for it, and 2 % for the difference between two clocks.
+/// Returns a limit for the duration of a reply in microseconds: the longest frame, with 2 % and a millisecond in
+/// reserve.
 fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
     // V1.02 2.5.1 and 2.5.2.1: 256 bytes in RTU mode, 513 characters in ASCII mode.
     let characters = match framing {
