@@ -7,7 +7,7 @@ use crate::ascii::ascii;
 use crate::bench::{Bench, FIRST, Most, adu, corner};
 
 /// From t3.5 to the write of the first byte to the UART's data register. The baud generator adds up to a bit.
-const LATE: Most = Most(Time::from_us(13), Time::from_us(24));
+const LATE: Most = Most(Time::from_us(25), Time::from_us(45));
 /// From enabling the driver to the write of the first byte to the UART's data register.
 const ON: Most = Most(Time::from_us(1), Time::from_us(1));
 /// From the last stop bit to disabling the driver.
