@@ -133,14 +133,7 @@ impl RadioUart {
             if let Some(byte) = byte {
                 usart.dr().write(|w| w.dr().set(byte.into()));
             }
-            let bits = if byte.is_some() {
-                RECEIVING | TXEIE
-            } else {
-                RECEIVING
-            };
-            // Written as a whole, because another bit that was disturbed may raise this interrupt without end.
-            // SAFETY: as in `set_up`.
-            usart.cr1().write(|w| unsafe { w.bits(bits) });
+            usart.cr1().modify(|_, w| w.txeie().bit(byte.is_some()));
         }
     }
 }

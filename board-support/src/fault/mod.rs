@@ -28,7 +28,7 @@ pub(crate) use kept::{keep_dip, kept_dip, kept_saves, take_at_start};
 pub use kept::{keep_saves, keep_uptime, marks, note};
 
 /// Number of tasks that leave a mark.
-pub const TASKS: usize = 4;
+pub const TASKS: usize = 9;
 
 /// Kinds of fault, with their numbers as reported in the fault record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -224,12 +224,12 @@ mod tests {
     #[test]
     fn a_watchdog_reset_records_the_uptime_and_the_missing_marks() {
         let words = Noted::default().words();
-        let start = at_start(&words, WATCHDOG, 42, [1, 0, 1, 2]);
+        let start = at_start(&words, WATCHDOG, 42, [1, 0, 1, 2, 1, 1, 1, 1, 0]);
         assert_eq!(start.record.fault.kind, Kind::Watchdog);
         assert_eq!(start.record.uptime, 42);
-        assert_eq!(start.record.missing, 0b1010);
+        assert_eq!(start.record.missing, 0b1_0000_1010);
         assert_eq!(start.record.count, 1);
-        let again = at_start(&start.words(), WATCHDOG, 3, [0, 1, 1, 1]);
+        let again = at_start(&start.words(), WATCHDOG, 3, [0, 1, 1, 1, 1, 1, 1, 1, 1]);
         assert_eq!((again.record.count, again.record.missing), (2, 1));
     }
 

@@ -1,6 +1,7 @@
 //! The fault record of the last start in the terms of the register map.
 
 use board_support::fault;
+use firmware::alive;
 use register_map::codes::FaultKind;
 
 /// Returns the kind of a fault as its register has it.
@@ -39,7 +40,7 @@ pub fn words(record: &fault::FaultRecord) -> [u16; 16] {
         low(fault.address),
         high(uptime),
         low(uptime),
-        missing,
+        alive::missing_tasks(missing),
         0,
         0,
         0,

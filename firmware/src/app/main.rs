@@ -11,7 +11,7 @@
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
 //! | `radio` | EXTI4, pended by `scan` while the radio is on | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
 //! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
-//! | `idle` | - | - | refreshes the watchdog when all tasks above have run; sleeps |
+//! | `idle` | - | - | refreshes the watchdog when each task above has set its mark; sleeps |
 //!
 //! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
 //! or programmed; the others wait for up to 40 ms.
@@ -156,7 +156,7 @@ mod app {
 
     #[task(binds = USART1, priority = 4, shared = [line])]
     fn uart(mut cx: uart::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(fault::marks(), Task::Uart);
         let sent = cx
             .shared
             .line
@@ -169,7 +169,7 @@ mod app {
 
     #[task(binds = TIM2, priority = 4, shared = [line])]
     fn gap(mut cx: gap::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(fault::marks(), Task::Gap);
         let waits = cx.shared.line.lock(|line| {
             line.as_mut()
                 .is_some_and(|line| line.on_gap(clock::millis()))
@@ -181,7 +181,7 @@ mod app {
 
     #[task(binds = TIM1_CC, priority = 4, shared = [line])]
     fn limit(mut cx: limit::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(fault::marks(), Task::Limit);
         cx.shared
             .line
             .lock(|line| line.as_mut().map(Line::on_limit));
@@ -189,7 +189,7 @@ mod app {
 
     #[task(binds = TIM4, priority = 4, local = [scan_timer], shared = [line])]
     fn beat(mut cx: beat::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(fault::marks(), Task::Beat);
         cx.local.scan_timer.take_beat();
         clock::advance();
         cx.shared
@@ -200,6 +200,7 @@ mod app {
 
     #[task(binds = USART3, priority = 4, shared = [radio_uart])]
     fn radio_uart(mut cx: radio_uart::Context) {
+        alive::begin(fault::marks(), Task::RadioUart);
         cx.shared
             .radio_uart
             .lock(|uart| uart.as_mut().map(on_interrupt));
@@ -230,27 +231,22 @@ mod app {
 
     #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device])]
     fn scan(cx: scan::Context) {
-        let mark = alive::look(fault::marks(), Task::Scan);
         alive::begin(fault::marks(), Task::Scan);
-        alive::end_line(fault::marks());
+        alive::end_interrupts(fault::marks());
         let mut shared = cx.shared;
         let beat = cx
             .local
             .scanning
             .run(&mut shared.line, &mut shared.device, cx.local.events);
-        if beat {
-            alive::end(fault::marks(), Task::Scan);
-            if *cx.local.radio_is_on {
-                rtic::pend(Interrupt::EXTI4);
-            }
-        } else {
-            // Only a scan after a tick of the clock proves that the scan works.
-            alive::put_back(fault::marks(), Task::Scan, mark);
+        alive::end(fault::marks(), Task::Scan);
+        if beat && *cx.local.radio_is_on {
+            rtic::pend(Interrupt::EXTI4);
         }
     }
 
     #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, radio_uart, device])]
     fn radio(cx: radio::Context) {
+        alive::begin(fault::marks(), Task::Radio);
         let mut shared = cx.shared;
         let waits = cx.local.radio_polling.run(
             &mut shared.radio,
@@ -260,6 +256,7 @@ mod app {
         if waits {
             rtic::pend(Interrupt::EXTI3);
         }
+        alive::end(fault::marks(), Task::Radio);
     }
 
     #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, activity, orders])]

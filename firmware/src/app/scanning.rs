@@ -1,7 +1,7 @@
 //! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
 use board_support::{Sampler, boards::SLOTS, fault, pac::Interrupt};
-use firmware::{device::IoPort, lamps::TICK_MS};
+use firmware::{alive, device::IoPort, lamps::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{IoModule, ModuleError};
 use rtic::Mutex;
@@ -15,7 +15,7 @@ use crate::{
     log::Event,
 };
 
-/// Scans per run of the background task, and scans per check that `uart` and `serve` still run.
+/// Scans per run of the background task, and scans per check that every other task still runs.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
 const SCANS_PER_PROOF: u8 = 100;
 
@@ -146,10 +146,19 @@ impl Scanning {
             enqueue(events, Event::LineRepaired);
         }
         if self.proof_beat.is_due() {
-            // On a silent line nothing triggers these two tasks. Without a cause they only set their
-            // marks.
-            rtic::pend(Interrupt::USART1);
-            rtic::pend(Interrupt::EXTI3);
+            // On a silent line nothing triggers these tasks. Without a cause they only set their marks.
+            for task in [
+                Interrupt::USART1,
+                Interrupt::TIM2,
+                Interrupt::TIM1_CC,
+                Interrupt::USART3,
+                Interrupt::EXTI3,
+                Interrupt::EXTI4,
+            ] {
+                rtic::pend(task);
+            }
+            // The interrupts have run by now.
+            alive::end_interrupts(fault::marks());
         }
     }
 }
