@@ -88,8 +88,6 @@ impl LineOff {
         let (timer, start_bit) = (self.timer, self.start_bit);
         let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
         let line = Rs485::new(self.usart, self.pins, settings, clock, rcc)?;
-        // TX needs no faster edges than the 10 MHz setting gives, either.
-        Port::A.registers().crh().modify(|_, w| w.mode9().output());
         Some((line, gap))
     }
 }
@@ -156,9 +154,9 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
             usart: device.USART1,
             pins: rs485::Pins {
                 driver,
-                tx: a.pa9,
-                rx,
-                cr: a.crh,
+                _tx: a.pa9,
+                _rx: rx,
+                _cr: a.crh,
             },
             timer: device.TIM2,
             start_bit: device.TIM1,

@@ -10,6 +10,8 @@ use crate::{ClockSource, design::SCAN_HZ};
 /// The scan's timer.
 pub struct ScanTimer {
     timer: pac::TIM4,
+    /// Reload value.
+    reload: u16,
 }
 
 impl ScanTimer {
@@ -17,19 +19,29 @@ impl ScanTimer {
         pac::TIM4::enable(rcc);
         pac::TIM4::reset(rcc);
         // Half the clock fits 16 bits and is a whole number; the design constants check both.
-        timer.psc().write(|w| w.psc().set(1));
         let ticks = clock.core_hz() / 2 / SCAN_HZ;
-        timer.arr().write(|w| w.arr().set((ticks - 1) as u16));
-        Self { timer }
+        Self {
+            timer,
+            reload: (ticks - 1) as u16,
+        }
     }
 
-    /// Starts the timer: one interrupt every millisecond.
+    /// Sets every register up and starts the timer: one interrupt every millisecond. Runs from RAM, because a
+    /// disturbed timer is started again while flash may be busy.
+    #[inline(never)]
+    #[unsafe(link_section = ".ram_code")]
     pub fn start(&mut self) {
-        // The update event by software loads the prescaler. Clear its flag, because it is no tick of the timer.
-        self.timer.egr().write(|w| w.ug().update());
-        self.timer.sr().write(|w| w.uif().clear_bit());
-        self.timer.dier().write(|w| w.uie().enabled());
-        self.timer.cr1().write(|w| w.cen().enabled());
+        let timer = &self.timer;
+        // With URS the update event that loads the prescaler sets no flag, which would count as a tick.
+        timer.cr1().write(|w| w.urs().counter_only());
+        timer.smcr().reset();
+        timer.psc().write(|w| w.psc().set(1));
+        timer.arr().write(|w| w.arr().set(self.reload));
+        timer.egr().write(|w| w.ug().update());
+        timer.dier().write(|w| w.uie().enabled());
+        timer
+            .cr1()
+            .write(|w| w.urs().counter_only().cen().enabled());
     }
 
     /// Acknowledges the timer's interrupt.

@@ -2,7 +2,7 @@
 //!
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
-//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan`. If late, the clock is late |
+//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay, checks the registers, pends `scan`. If late, the clock is late |
 //! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
 //! | `radio_uart` | USART3 | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
@@ -43,6 +43,7 @@ mod serving;
 mod signals;
 mod start;
 mod trap;
+mod upkeep;
 
 #[rtic::app(device = board_support::pac, peripherals = true)]
 mod app {
@@ -65,6 +66,7 @@ mod app {
         serving::{Lines, Serving},
         signals::Signals,
         start,
+        upkeep::Upkeep,
     };
 
     #[shared]
@@ -86,6 +88,7 @@ mod app {
     #[local]
     struct Local {
         scan_timer: ScanTimer,
+        upkeep: Upkeep,
         radio_polling: Polling,
         serving: Serving,
         scanning: Scanning,
@@ -114,6 +117,7 @@ mod app {
         started.scan_timer.start();
         started.watchdog.arm();
         let radio_is_on = started.radio.is_some();
+        let upkeep = Upkeep::new(started.line.is_some(), radio_is_on);
         (
             Shared {
                 line: started.line,
@@ -126,6 +130,7 @@ mod app {
             Local {
                 radio_is_on,
                 scan_timer: started.scan_timer,
+                upkeep,
                 radio_polling: Polling::new(),
                 serving: started.serving,
                 scanning: started.scanning,
@@ -187,14 +192,20 @@ mod app {
             .lock(|line| line.as_mut().map(Line::on_limit));
     }
 
-    #[task(binds = TIM4, priority = 4, local = [scan_timer], shared = [line])]
+    #[task(binds = TIM4, priority = 4, local = [scan_timer, upkeep], shared = [line, radio_uart])]
     fn beat(mut cx: beat::Context) {
-        alive::begin(fault::marks(), Task::Beat);
+        if cx.local.upkeep.helps() {
+            alive::begin(fault::marks(), Task::Beat);
+        }
         cx.local.scan_timer.take_beat();
         clock::advance();
-        cx.shared
-            .line
-            .lock(|line| line.as_mut().map(Line::on_millisecond));
+        let (upkeep, scan_timer) = (cx.local.upkeep, cx.local.scan_timer);
+        let radio = cx.shared.line.lock(|line| upkeep.run(line, scan_timer));
+        if radio {
+            cx.shared
+                .radio_uart
+                .lock(|uart| uart.as_mut().map(RadioUart::set_up));
+        }
         rtic::pend(Interrupt::EXTI1);
     }
 
@@ -229,30 +240,26 @@ mod app {
         alive::end(fault::marks(), Task::Serve);
     }
 
-    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device])]
+    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [device])]
     fn scan(cx: scan::Context) {
         alive::begin(fault::marks(), Task::Scan);
         alive::end_interrupts(fault::marks());
         let mut shared = cx.shared;
-        let beat = cx
-            .local
-            .scanning
-            .run(&mut shared.line, &mut shared.device, cx.local.events);
+        let beat = cx.local.scanning.run(&mut shared.device, cx.local.events);
         alive::end(fault::marks(), Task::Scan);
         if beat && *cx.local.radio_is_on {
             rtic::pend(Interrupt::EXTI4);
         }
     }
 
-    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, radio_uart, device])]
+    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, device])]
     fn radio(cx: radio::Context) {
         alive::begin(fault::marks(), Task::Radio);
         let mut shared = cx.shared;
-        let waits = cx.local.radio_polling.run(
-            &mut shared.radio,
-            &mut shared.radio_uart,
-            &mut shared.device,
-        );
+        let waits = cx
+            .local
+            .radio_polling
+            .run(&mut shared.radio, &mut shared.device);
         if waits {
             rtic::pend(Interrupt::EXTI3);
         }

@@ -11,8 +11,8 @@ use crate::{
     clock,
     every::Every,
     installed::Installed,
-    line::Line,
     log::Event,
+    upkeep,
 };
 
 /// Scans per run of the background task, and scans per check that every other task still runs.
@@ -51,7 +51,6 @@ impl Scanning {
     /// that.
     pub fn run(
         &mut self,
-        line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         events: &mut Producer<'static, Event>,
     ) -> bool {
@@ -122,7 +121,7 @@ impl Scanning {
         if beat {
             fault::keep_uptime(uptime_s);
             fault::keep_saves(saves);
-            self.look_at_line(line, device, events);
+            self.look_after_tasks(device, events);
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.
         if self.background_beat.is_due() || !beat || tripped {
@@ -131,14 +130,13 @@ impl Scanning {
         beat
     }
 
-    fn look_at_line(
+    /// Reports repairs, and asks every other task for its mark.
+    fn look_after_tasks(
         &mut self,
-        line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         events: &mut Producer<'static, Event>,
     ) {
-        let repaired = line.lock(|line| line.as_mut().is_some_and(Line::take_repaired));
-        if repaired {
+        if upkeep::take_repaired() {
             device.lock(|device| {
                 let repairs = &mut device.state.line_repairs;
                 *repairs = repairs.saturating_add(1);
