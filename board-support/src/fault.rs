@@ -8,7 +8,7 @@
 pub use crate::kept::{marks, note};
 
 /// Number of tasks that leave a mark.
-pub const TASKS: usize = 4;
+pub const TASKS: usize = 9;
 
 /// Kinds of fault, with their numbers as reported in the fault record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

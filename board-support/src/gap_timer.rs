@@ -21,7 +21,6 @@ use stm32f1xx_hal::{
 use crate::{
     ClockSource,
     gap::{GapTicks, LimitTicks, LineTimes},
-    signature::Signature,
     uart::LineSettings,
 };
 
@@ -42,9 +41,6 @@ pub struct GapTimer {
     start_bit: pac::TIM1,
     ticks: GapTicks,
     limit: LimitTicks,
-    /// Signatures of the registers of TIM2 and TIM1, read back after they were set up. Later checks compare with
-    /// these instead of the written values, because an emulator may not keep every bit.
-    set: [Signature; 3],
 }
 
 impl GapTimer {
@@ -67,7 +63,6 @@ impl GapTimer {
             start_bit,
             ticks,
             limit: LimitTicks::new(clock.core_mhz(), times.limit_us),
-            set: [Signature::default(); 3],
         };
         gap.set_up();
         Some(gap)
@@ -110,7 +105,6 @@ impl GapTimer {
         start_bit.egr().write(|w| w.ug().update());
         start_bit.cr1().write(|w| w.cen().enabled());
         self.stop();
-        self.set = [self.control(), self.times(), self.start_bit()];
     }
 
     /// Starts the time limit of a reply that has just begun. [`take_limit`](Self::take_limit) reports when it is
@@ -133,73 +127,29 @@ impl GapTimer {
     /// reached. The interrupt also occurs when the reply ended in time. Returns false when a newer reply has
     /// started its own limit.
     pub fn take_limit(&mut self) -> bool {
-        let reached = self.start_bit.sr().read().cc1if().bit_is_set();
+        const CC1: u32 = 1 << 1;
+        let timer = &self.start_bit;
+        let flags = timer.sr().read().bits() & timer.dier().read().bits();
+        // Clear every flag that is enabled. A disturbed enable bit would otherwise raise this interrupt without end.
+        // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 14.4.5).
+        timer.sr().write(|w| unsafe { w.bits(!flags) });
+        let reached = flags & CC1 != 0;
         if reached {
-            self.start_bit.dier().reset();
+            timer.dier().modify(|_, w| w.cc1ie().disabled());
         }
         reached
     }
 
-    /// Returns whether the control registers of TIM2, which measures the silences, are as set up.
-    #[must_use]
-    pub fn control_is_sound(&self) -> bool {
-        self.control() == self.set[0]
-    }
-
-    /// Returns whether the times in TIM2 are as set up.
-    #[must_use]
-    pub fn times_are_sound(&self) -> bool {
-        self.times() == self.set[1]
-    }
-
-    /// Returns whether TIM1, which detects the start bit and limits replies, is as set up.
-    #[must_use]
-    pub fn start_bit_is_sound(&self) -> bool {
-        self.start_bit() == self.set[2]
-    }
-
-    /// Returns the signature of TIM2's control registers, without the bits that change while a silence is measured.
-    fn control(&self) -> Signature {
-        const CEN: u32 = 1;
-        const CC2IE: u32 = 1 << 2;
-        let timer = &self.timer;
-        Signature::default()
-            .with(timer.cr1().read().bits() & !CEN)
-            .with(timer.smcr().read().bits())
-            .with(timer.dier().read().bits() & !CC2IE)
-            .with(timer.ccmr1_output().read().bits())
-            .with(timer.ccmr2_output().read().bits())
-    }
-
-    /// Returns the signature of TIM2's times.
-    fn times(&self) -> Signature {
-        let timer = &self.timer;
-        Signature::default()
-            .with(timer.psc().read().bits())
-            .with(timer.arr().read().bits())
-            .with(timer.ccr1().read().bits())
-            .with(timer.ccr2().read().bits())
-            .with(timer.ccr3().read().bits())
-    }
-
-    /// Returns the signature of TIM1's registers, without those that change with each reply.
-    fn start_bit(&self) -> Signature {
-        let start_bit = &self.start_bit;
-        Signature::default()
-            .with(start_bit.cr1().read().bits())
-            .with(start_bit.smcr().read().bits())
-            .with(start_bit.ccmr2_input().read().bits())
-            .with(start_bit.ccer().read().bits())
-            .with(start_bit.psc().read().bits())
-            .with(start_bit.arr().read().bits())
-    }
-
-    /// Returns whether a silence is being measured, or its end has not been [taken](Self::take_event) yet.
+    /// Returns whether a silence is being measured.
     #[must_use]
     pub fn is_running(&self) -> bool {
-        let timer = &self.timer;
-        timer.cr1().read().cen().is_enabled()
-            || timer.sr().read().bits() & timer.dier().read().bits() != 0
+        self.timer.cr1().read().cen().is_enabled()
+    }
+
+    /// Returns whether an event waits to be [taken](Self::take_event).
+    #[must_use]
+    pub fn is_pending(&self) -> bool {
+        self.timer.sr().read().bits() & self.timer.dier().read().bits() != 0
     }
 
     /// Restarts the silence: a character has just been received.

@@ -37,14 +37,14 @@ mod mem;
 mod pin_io;
 #[cfg(target_os = "none")]
 mod radio;
+#[cfg(any(target_os = "none", test))]
+mod registers;
 #[cfg(target_os = "none")]
 mod rs485;
 #[cfg(target_os = "none")]
 mod safe;
 #[cfg(target_os = "none")]
 mod scan_timer;
-#[cfg(any(target_os = "none", test))]
-mod signature;
 #[cfg(target_os = "none")]
 mod slot;
 #[cfg(target_os = "none")]
@@ -67,6 +67,7 @@ pub use {
     i2c::DacBus,
     pin_io::IoPin,
     radio::{Damaged, RadioUart},
+    registers::{Part, Registers, Wrong},
     rs485::{Character, Rs485, Status},
     safe::outputs_off,
     scan_timer::ScanTimer,

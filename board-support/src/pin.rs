@@ -10,6 +10,8 @@
 //! |---|---|
 //! | all, for slots, SW01, LEDs, the line and the radio | `board::setup`, `SlotPins`, `LineOff` and `RadioOff`: in `init`, before the first interrupt |
 //! | port B CRL, for the DACs' bus | `BusPins`: in `init` and later by the background task alone |
+//! | port A CRH, for the line | `Rs485::set_up` later, too, at the highest priority in use |
+//! | all of them | `Registers`, which repairs them, at the highest priority in use |
 //! | the slots' | `outputs_off`, from fault handlers, after which the interrupted program does not run again |
 //!
 //! Output bits are changed through BSRR by a single store, which does not affect other pins.

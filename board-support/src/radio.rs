@@ -25,8 +25,6 @@ const TXE: u16 = 1 << 7;
 
 /// CR1: UE, TE, RE and RXNEIE; words of eight bits without parity (RM0008 27.6.4).
 const RECEIVING: u16 = 1 << 13 | 1 << 3 | 1 << 2 | 1 << 5;
-/// TXEIE in CR1.
-const TXEIE: u16 = 1 << 7;
 
 /// The radio before it is set up.
 pub struct RadioOff {
@@ -38,8 +36,6 @@ pub struct RadioOff {
 pub struct RadioUart {
     usart: pac::USART3,
     divider: u16,
-    /// The registers, read back after they were set up, because an emulator may not keep every bit.
-    set: [u16; 4],
 }
 
 /// A byte from the radio, or a damaged or lost one.
@@ -58,7 +54,6 @@ impl RadioOff {
         let mut uart = RadioUart {
             usart: self.usart,
             divider,
-            set: [0; 4],
         };
         uart.set_up();
         // The transmitter is on and drives high before the pin becomes its output.
@@ -71,7 +66,10 @@ impl RadioOff {
 }
 
 impl RadioUart {
-    /// Sets every register of the UART up. A byte under way is lost.
+    /// Sets every register of the UART up. A byte under way is lost. Runs from RAM, because a disturbed UART is set
+    /// up again while flash may be busy.
+    #[inline(never)]
+    #[unsafe(link_section = ".ram_code")]
     pub fn set_up(&mut self) {
         let usart = &self.usart;
         usart.cr1().reset();
@@ -82,23 +80,6 @@ impl RadioUart {
             usart.brr().write(|w| w.bits(self.divider));
             usart.cr1().write(|w| w.bits(RECEIVING));
         }
-        self.set = self.registers();
-    }
-
-    /// Returns whether every register is as set up.
-    #[must_use]
-    pub fn is_sound(&self) -> bool {
-        self.registers() == self.set
-    }
-
-    fn registers(&self) -> [u16; 4] {
-        let usart = &self.usart;
-        [
-            usart.cr1().read().bits() & !TXEIE,
-            usart.cr2().read().bits(),
-            usart.cr3().read().bits(),
-            usart.brr().read().bits(),
-        ]
     }
 
     /// Handles the UART's interrupt, whatever its cause: passes a received byte to `received`, and sends the next
@@ -125,14 +106,7 @@ impl RadioUart {
             if let Some(byte) = byte {
                 usart.dr().write(|w| w.dr().set(byte.into()));
             }
-            let bits = if byte.is_some() {
-                RECEIVING | TXEIE
-            } else {
-                RECEIVING
-            };
-            // Written as a whole, because another bit that was disturbed may raise this interrupt without end.
-            // SAFETY: as in `set_up`.
-            usart.cr1().write(|w| unsafe { w.bits(bits) });
+            usart.cr1().modify(|_, w| w.txeie().bit(byte.is_some()));
         }
     }
 }

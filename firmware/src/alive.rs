@@ -11,11 +11,21 @@ pub const BEGUN: u8 = 2;
 /// Mark of a task that has finished.
 pub const ENDED: u8 = 1;
 
-/// A task that must set its mark.
+/// A task that must set its mark. The interrupts of priority 4 come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
-    /// The interrupts of the line.
-    Line,
+    /// The UART of the RS-485 line.
+    Uart,
+    /// The silences of that line.
+    Gap,
+    /// The time limit of a reply.
+    Limit,
+    /// The device's clock.
+    Beat,
+    /// The radio's UART.
+    RadioUart,
+    /// The radio's frames.
+    Radio,
     /// The task that serves requests.
     Serve,
     /// The task that scans the modules.
@@ -24,56 +34,48 @@ pub enum Task {
     Background,
 }
 
+/// Number of tasks.
+const TASKS: usize = 9;
+/// Number of tasks that are only marked as begun, because their time is short: the first ones.
+const INTERRUPTS: usize = 5;
+/// Position of [`Task::Serve`]. The tasks before it belong to a line.
+const FIRST_AFTER_LINES: u16 = Task::Serve as u16;
+
 /// The marks, one for each [`Task`] in the order of the variants; 0 means no mark. They may lie in memory that a
 /// reset keeps, so that the start after a watchdog reset can report the missing ones.
-pub type Marks = [AtomicU8; 4];
+pub type Marks = [AtomicU8; TASKS];
 
 /// Marks a task as begun. This is a single store, cheap enough for interrupts.
-#[inline]
+#[inline(always)]
 pub fn begin(marks: &Marks, task: Task) {
-    of(marks, task).store(BEGUN, Ordering::Relaxed);
+    marks[task as usize].store(BEGUN, Ordering::Relaxed);
 }
 
 /// Marks a task as finished.
-#[inline]
+#[inline(always)]
 pub fn end(marks: &Marks, task: Task) {
-    of(marks, task).store(ENDED, Ordering::Relaxed);
+    marks[task as usize].store(ENDED, Ordering::Relaxed);
 }
 
-/// Returns the mark of a task.
-#[inline]
+/// Marks the interrupts that have begun as finished. They have no time to set a second mark, so a task of lower
+/// priority, which runs only after they have returned, calls this for them.
+#[inline(never)]
+pub fn end_interrupts(marks: &Marks) {
+    for mark in marks.iter().take(INTERRUPTS) {
+        // An interrupt between the load and the store is also marked as finished, which is correct: it has returned
+        // by then.
+        if mark.load(Ordering::Relaxed) == BEGUN {
+            mark.store(ENDED, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Returns the bits of register MISSING_TASKS for the tasks that are missing, one bit each in the order of the
+/// variants of [`Task`]: bit 0 is any task of a line, 1 serve, 2 scan, 3 background.
 #[must_use]
-pub fn look(marks: &Marks, task: Task) -> u8 {
-    of(marks, task).load(Ordering::Relaxed)
-}
-
-/// Restores the mark that [`look`] returned, after a run that does not prove that the task works.
-#[inline]
-pub fn put_back(marks: &Marks, task: Task, mark: u8) {
-    of(marks, task).store(mark, Ordering::Relaxed);
-}
-
-/// Marks the line's interrupts as finished if they have begun. They have no time to set a second mark, so a task of
-/// lower priority, which runs only after they have returned, calls this for them.
-#[inline]
-pub fn end_line(marks: &Marks) {
-    let line = of(marks, Task::Line);
-    // An interrupt between the load and the store is also marked as finished, which is correct: it has returned by
-    // then.
-    if line.load(Ordering::Relaxed) == BEGUN {
-        line.store(ENDED, Ordering::Relaxed);
-    }
-}
-
-#[inline]
-const fn of(marks: &Marks, task: Task) -> &AtomicU8 {
-    let [line, serve, scan, background] = marks;
-    match task {
-        Task::Line => line,
-        Task::Serve => serve,
-        Task::Scan => scan,
-        Task::Background => background,
-    }
+pub const fn missing_tasks(missing: u16) -> u16 {
+    let line = missing & ((1 << FIRST_AFTER_LINES) - 1) != 0;
+    missing >> FIRST_AFTER_LINES << 1 | line as u16
 }
 
 /// Returns whether all tasks have set their marks, and clears the marks if so. Call this from `idle`, where every
@@ -93,14 +95,23 @@ pub fn take_all(marks: &Marks) -> bool {
 mod tests {
     use super::*;
 
-    const TASKS: [Task; 4] = [Task::Line, Task::Serve, Task::Scan, Task::Background];
+    const ALL: [Task; TASKS] = [
+        Task::Uart,
+        Task::Gap,
+        Task::Limit,
+        Task::Beat,
+        Task::RadioUart,
+        Task::Radio,
+        Task::Serve,
+        Task::Scan,
+        Task::Background,
+    ];
 
     #[test]
     fn all_marks_are_required_and_each_counts_once() {
-        for missing in TASKS {
+        for missing in ALL {
             let marks = Marks::default();
-            TASKS
-                .into_iter()
+            ALL.into_iter()
                 .filter(|&task| task != missing)
                 .for_each(|task| end(&marks, task));
             assert!(!take_all(&marks), "{missing:?} is missing");
@@ -113,19 +124,22 @@ mod tests {
     #[test]
     fn a_begun_task_is_distinguished_from_a_finished_one() {
         let marks = Marks::default();
-        end_line(&marks);
-        let left = || TASKS.map(|task| look(&marks, task));
-        assert_eq!(left(), [0; 4], "no line interrupt, no mark");
-        begin(&marks, Task::Line);
+        end_interrupts(&marks);
+        let of = |task| marks[task as usize].load(Ordering::Relaxed);
+        let left = || [Task::Gap, Task::Scan, Task::Background].map(of);
+        assert_eq!(left(), [0; 3], "no interrupt, no mark");
+        begin(&marks, Task::Gap);
         begin(&marks, Task::Scan);
         end(&marks, Task::Background);
-        assert_eq!(left(), [BEGUN, 0, BEGUN, ENDED]);
-        end_line(&marks);
-        end(&marks, Task::Scan);
-        assert_eq!(left(), [ENDED, 0, ENDED, ENDED]);
-        let before = look(&marks, Task::Serve);
-        begin(&marks, Task::Serve);
-        put_back(&marks, Task::Serve, before);
-        assert_eq!(left(), [ENDED, 0, ENDED, ENDED]);
+        assert_eq!(left(), [BEGUN, BEGUN, ENDED]);
+        end_interrupts(&marks);
+        assert_eq!(left(), [ENDED, BEGUN, ENDED]);
+    }
+
+    #[test]
+    fn every_task_of_a_line_is_bit_0_of_the_register() {
+        let bits = ALL.map(|task| missing_tasks(1 << task as u16));
+        assert_eq!(bits, [1, 1, 1, 1, 1, 1, 2, 4, 8]);
+        assert_eq!(missing_tasks(0x1FF), 0b1111);
     }
 }

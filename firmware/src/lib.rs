@@ -12,5 +12,6 @@ pub mod device;
 pub mod leds;
 pub mod line;
 pub mod radio;
+pub mod repairs;
 pub mod start_up;
 pub mod store;

@@ -33,24 +33,23 @@ pub trait Uart {
     fn finish_sending(&mut self);
     /// Turns the driver off and the receiver on.
     fn stop_sending(&mut self);
+    /// Returns whether the driver is off.
+    fn driver_is_off(&self) -> bool;
 
     /// Turns the driver off, sets every register up, and turns the receiver on.
     fn set_up(&mut self);
-    /// Returns whether every register is as set up and the driver is off. Only valid while nothing is being sent.
-    fn is_sound(&self) -> bool;
 }
 
 /// The timer that measures a line's silences and limits the duration of a reply.
 pub trait GapTimer {
-    /// Number of [parts](Self::is_sound) of its registers, which are checked one after another.
-    const PARTS: u8;
-
     /// Restarts the silence: a character was received.
     fn restart(&mut self);
     /// Stops measuring: silences do not matter while a reply is being sent.
     fn stop(&mut self);
     /// Returns whether a silence is being measured.
     fn is_running(&self) -> bool;
+    /// Returns whether an event waits to be [taken](Self::take_event).
+    fn is_pending(&self) -> bool;
     /// Acknowledges its interrupt and returns the reason.
     fn take_event(&mut self) -> Silence;
     /// Starts the time limit of a reply that has just begun.
@@ -61,9 +60,6 @@ pub trait GapTimer {
 
     /// Sets every register up.
     fn set_up(&mut self);
-    /// Returns whether the registers of a part, 0 to [`PARTS`](Self::PARTS) - 1, are as set up. Checking all of
-    /// them in one call would delay the line's interrupts for longer.
-    fn is_sound(&self, part: u8) -> bool;
 }
 
 /// A silence on the line.
@@ -86,19 +82,11 @@ pub struct Line<U, G> {
     /// one has taken.
     longest_ms: u16,
     sending_ms: u16,
-    /// Part that was checked in the last millisecond: [`UART`], or from 1 on a part of the timer.
-    looked_at: u8,
-    /// Number of interrupts of the UART without a cause since the last millisecond.
-    causeless: u8,
-    /// The line was set up again since the last [`take_repaired`](Self::take_repaired).
+    /// An event of the timer was pending in the last millisecond, and its interrupt has not run since.
+    is_pending: bool,
+    /// The line was set up again since the last millisecond.
     repaired: bool,
 }
-
-/// Value of [`Line::looked_at`] for the UART.
-const UART: u8 = 0;
-
-/// Number of UART interrupts without a cause in one millisecond after which its registers are checked.
-const CAUSELESS: u8 = 8;
 
 impl<U: Uart, G: GapTimer> Line<U, G> {
     /// Creates a line that receives. The gap timer measures the port's silences. A reply that takes more than
@@ -111,8 +99,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
             port,
             longest_ms,
             sending_ms: 0,
-            looked_at: UART,
-            causeless: 0,
+            is_pending: false,
             repaired: false,
         }
     }
@@ -138,8 +125,6 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
                 Some(byte) => self.uart.send(byte),
                 None => self.uart.finish_sending(),
             }
-        } else if !U::received(status) {
-            self.without_cause();
         }
         false
     }
@@ -148,6 +133,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
     /// waits to be served.
     #[inline]
     pub fn on_gap(&mut self, now_ms: u32) -> bool {
+        self.is_pending = false;
         match self.gap.take_event() {
             Silence::T15 => self.port.short_silence(now_ms),
             Silence::T35 => self.port.long_silence(now_ms),
@@ -155,36 +141,32 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Counts an interrupt of the UART without a known cause. The scan pends the interrupt now and then. If there
-    /// are more, a disturbed register raises the interrupt again and again, which blocks all tasks.
-    fn without_cause(&mut self) {
-        self.causeless += 1;
-        if self.causeless == CAUSELESS {
-            self.causeless = 0;
-            self.check(UART);
-        }
+    /// Returns whether a reply is being sent.
+    pub fn is_sending(&self) -> bool {
+        self.port.is_sending()
     }
 
-    /// Sets the line up again when registers are not as set up, when the end of a frame is not being measured, or
-    /// when a reply does not end. After that the driver is off and the next request is served, whatever the cause
-    /// was. While a reply is being sent only its duration is checked, because the driver must be turned off right
-    /// after the last bit.
-    #[cold]
-    fn check(&mut self, registers: u8) {
-        let is_sound = if self.port.is_sending() {
-            self.sending_ms < self.longest_ms
-        } else if let Some(part) = registers.checked_sub(UART + 1) {
-            let waits_for_silence = part == 0 && !self.port.is_idle();
-            self.gap.is_sound(part) && (!waits_for_silence || self.gap.is_running())
+    /// Returns whether a reply has not taken too long, or the driver is off and the end of a frame is measured. An event
+    /// that is pending in two milliseconds, while its interrupt has not run, is not going to be handled.
+    fn is_sound(&mut self) -> bool {
+        if self.port.is_sending() {
+            return self.sending_ms < self.longest_ms;
+        }
+        if !self.uart.driver_is_off() {
+            return false;
+        }
+        let is_pending = self.gap.is_pending();
+        let was_pending = core::mem::replace(&mut self.is_pending, is_pending);
+        if is_pending {
+            !was_pending
         } else {
-            self.uart.is_sound()
-        };
-        if !is_sound {
-            self.repair();
+            self.port.is_idle() || self.gap.is_running()
         }
     }
 
-    fn repair(&mut self) {
+    /// Sets the line up again. After that the driver is off and the next request is served, whatever the state was
+    /// before.
+    pub fn repair(&mut self) {
         self.uart.set_up();
         self.gap.set_up();
         self.port.sent();
@@ -199,23 +181,16 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Returns whether the line was set up again since the last call.
-    pub const fn take_repaired(&mut self) -> bool {
-        core::mem::replace(&mut self.repaired, false)
-    }
-
-    /// Runs once per millisecond: advances the response delay and repairs a disturbed line.
-    pub fn on_millisecond(&mut self) {
-        self.causeless = 0;
+    /// Runs once per millisecond: advances the response delay and repairs a line that does not work. Returns whether
+    /// the line was set up again since the last call.
+    pub fn on_millisecond(&mut self) -> bool {
         self.sending_ms = self.sending_ms.saturating_add(1);
-        self.looked_at = if self.looked_at < G::PARTS {
-            self.looked_at + 1
-        } else {
-            UART
-        };
-        self.check(self.looked_at);
+        if !self.is_sound() {
+            self.repair();
+        }
         self.port.tick();
         self.start();
+        core::mem::take(&mut self.repaired)
     }
 
     /// Turns the driver on and sends the first byte of a reply, if one starts now.

@@ -1,6 +1,7 @@
 //! The fault record of the last start in the terms of the register map.
 
 use board_support::fault::FaultRecord;
+use firmware::alive;
 use register_map::codes::FaultKind;
 
 /// Returns the kind of the fault.
@@ -12,7 +13,8 @@ pub fn kind(record: &FaultRecord) -> FaultKind {
 pub fn words(record: &FaultRecord) -> [u16; 16] {
     let mut words = [0; 16];
     let [kind, count, longs @ .., missing, _, _, _] = &mut words;
-    (*kind, *count, *missing) = (record.kind.into(), record.count, record.missing);
+    (*kind, *count) = (record.kind.into(), record.count);
+    *missing = alive::missing_tasks(record.missing);
     let [pc, lr, status, address] = record.place;
     let values = [pc, lr, status, address, record.uptime];
     for (words, value) in longs.as_chunks_mut().0.iter_mut().zip(&values) {

@@ -62,13 +62,13 @@ impl Uart for Rs485Uart {
     }
 
     #[inline]
-    fn set_up(&mut self) {
-        self.0.set_up();
+    fn driver_is_off(&self) -> bool {
+        self.0.driver_is_off()
     }
 
     #[inline]
-    fn is_sound(&self) -> bool {
-        self.0.is_sound()
+    fn set_up(&mut self) {
+        self.0.set_up();
     }
 }
 
@@ -76,8 +76,6 @@ impl Uart for Rs485Uart {
 pub struct Rs485Gap(pub board_support::GapTimer);
 
 impl GapTimer for Rs485Gap {
-    const PARTS: u8 = 3;
-
     #[inline]
     fn restart(&mut self) {
         self.0.restart();
@@ -91,6 +89,11 @@ impl GapTimer for Rs485Gap {
     #[inline]
     fn is_running(&self) -> bool {
         self.0.is_running()
+    }
+
+    #[inline]
+    fn is_pending(&self) -> bool {
+        self.0.is_pending()
     }
 
     #[inline]
@@ -115,14 +118,5 @@ impl GapTimer for Rs485Gap {
     #[inline]
     fn set_up(&mut self) {
         self.0.set_up();
-    }
-
-    #[inline]
-    fn is_sound(&self, part: u8) -> bool {
-        match part {
-            0 => self.0.control_is_sound(),
-            1 => self.0.times_are_sound(),
-            _ => self.0.start_bit_is_sound(),
-        }
     }
 }

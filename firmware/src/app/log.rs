@@ -27,7 +27,7 @@ pub enum Event {
     Saved,
     /// The configuration could not be stored.
     SaveFailed,
-    /// The line's registers were disturbed, or a reply did not end: the line was set up again.
+    /// Registers were disturbed, or a reply did not end: they, or the line, were set up again.
     LineRepaired,
     /// The radio is ready, or does not answer.
     Radio(bool),

@@ -2,7 +2,7 @@
 //!
 //! | task | bound to | priority | duty, and what an overrun costs |
 //! |---|---|---|---|
-//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay and its check, pends `scan`. If late, the clock is late |
+//! | `beat` | TIM4, 1 kHz | 4 | advances the device's clock, runs the line's response delay, checks the registers, pends `scan`. If late, the clock is late |
 //! | `uart` | USART1 | 4 | reads or writes a byte, turns the driver off at the end. At 921600 bit/s a byte is received every 12 us; if the task is later than that, a byte is lost, the receiver reports an overrun and the frame is discarded |
 //! | `gap` | TIM2 | 4 | handles t1.5 and t3.5. If late, a silence becomes longer, never shorter |
 //! | `radio_uart` | USART3 | 4 | moves a byte between the radio's UART and the queues. A byte is received every 1.04 ms; if the task is later than that, a byte is lost |
@@ -11,7 +11,7 @@
 //! | `scan` | EXTI1, pended by `beat` and by a write | 2 | copies inputs into the device and outputs to the modules, runs the time-outs. If late, it catches up |
 //! | `radio` | EXTI4, pended by `scan` while the radio is on | 2 | sets the radio up, receives frames and sends replies through the queues. If late, a silence becomes longer, never shorter |
 //! | `background` | EXTI0, pended every 10 ms and on commands | 1 | DAC transfers, configuration store, LEDs, log. Not urgent |
-//! | `idle` | - | - | refreshes the watchdog when all tasks above have run; sleeps |
+//! | `idle` | - | - | refreshes the watchdog when each task above has set its mark; sleeps |
 //!
 //! The tasks of priority 4 run from RAM with all that they call (`memory.x`). They continue while flash is erased
 //! or programmed; the others wait for up to 40 ms.
@@ -39,12 +39,13 @@ mod scanning;
 mod serving;
 mod start;
 mod trap;
+mod upkeep;
 
 #[rtic::app(device = board_support::pac, peripherals = true)]
 mod app {
     use core::mem::MaybeUninit;
 
-    use board_support::{RadioUart, ScanTimer, Watchdog, boards::SLOTS, fault, pac::Interrupt};
+    use board_support::{RadioUart, ScanTimer, Watchdog, boards::SLOTS, kept, pac::Interrupt};
     use firmware::alive::{self, Task};
     use heapless::spsc::{Consumer, Producer, Queue};
     use modbus_server::Adu;
@@ -60,6 +61,7 @@ mod app {
         scanning::Scanning,
         serving::Serving,
         start,
+        upkeep::Upkeep,
     };
 
     #[shared]
@@ -79,6 +81,7 @@ mod app {
     #[local]
     struct Local {
         scan_timer: ScanTimer,
+        upkeep: Upkeep,
         radio_polling: Polling,
         serving: Serving,
         scanning: Scanning,
@@ -107,6 +110,7 @@ mod app {
         started.scan_timer.start();
         started.watchdog.arm();
         let radio_is_on = started.radio.is_some();
+        let upkeep = Upkeep::new(started.line.is_some(), radio_is_on);
         (
             Shared {
                 line: started.line,
@@ -118,6 +122,7 @@ mod app {
             Local {
                 radio_is_on,
                 scan_timer: started.scan_timer,
+                upkeep,
                 radio_polling: Polling::new(),
                 serving: started.serving,
                 scanning: started.scanning,
@@ -132,7 +137,7 @@ mod app {
     #[idle(local = [watchdog])]
     fn idle(cx: idle::Context) -> ! {
         loop {
-            if alive::take_all(fault::marks()) {
+            if alive::take_all(kept::marks()) {
                 cx.local.watchdog.refresh();
             }
             rtic::export::wfi();
@@ -141,7 +146,7 @@ mod app {
 
     #[task(binds = USART1, priority = 4, shared = [line])]
     fn uart(mut cx: uart::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(kept::marks(), Task::Uart);
         let sent = cx
             .shared
             .line
@@ -154,7 +159,7 @@ mod app {
 
     #[task(binds = TIM2, priority = 4, shared = [line])]
     fn gap(mut cx: gap::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(kept::marks(), Task::Gap);
         let waits = cx.shared.line.lock(|line| {
             line.as_mut()
                 .is_some_and(|line| line.on_gap(clock::millis()))
@@ -166,25 +171,32 @@ mod app {
 
     #[task(binds = TIM1_CC, priority = 4, shared = [line])]
     fn limit(mut cx: limit::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        alive::begin(kept::marks(), Task::Limit);
         cx.shared
             .line
             .lock(|line| line.as_mut().map(Line::on_limit));
     }
 
-    #[task(binds = TIM4, priority = 4, local = [scan_timer], shared = [line])]
+    #[task(binds = TIM4, priority = 4, local = [scan_timer, upkeep], shared = [line, radio_uart])]
     fn beat(mut cx: beat::Context) {
-        alive::begin(fault::marks(), Task::Line);
+        if cx.local.upkeep.helps() {
+            alive::begin(kept::marks(), Task::Beat);
+        }
         cx.local.scan_timer.take_beat();
         clock::advance();
-        cx.shared
-            .line
-            .lock(|line| line.as_mut().map(Line::on_millisecond));
+        let (upkeep, scan_timer) = (cx.local.upkeep, cx.local.scan_timer);
+        let radio = cx.shared.line.lock(|line| upkeep.run(line, scan_timer));
+        if radio {
+            cx.shared
+                .radio_uart
+                .lock(|uart| uart.as_mut().map(RadioUart::set_up));
+        }
         rtic::pend(Interrupt::EXTI1);
     }
 
     #[task(binds = USART3, priority = 4, shared = [radio_uart])]
     fn radio_uart(mut cx: radio_uart::Context) {
+        alive::begin(kept::marks(), Task::RadioUart);
         cx.shared
             .radio_uart
             .lock(|uart| uart.as_mut().map(on_interrupt));
@@ -197,57 +209,50 @@ mod app {
         shared = [line, radio, device],
     )]
     fn serve(cx: serve::Context) {
-        alive::begin(fault::marks(), Task::Serve);
+        alive::begin(kept::marks(), Task::Serve);
         let mut shared = cx.shared;
         cx.local
             .serving
             .run(&mut shared.line, &mut shared.radio, &mut shared.device);
-        alive::end(fault::marks(), Task::Serve);
+        alive::end(kept::marks(), Task::Serve);
     }
 
-    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [line, device, dacs])]
+    #[task(binds = EXTI1, priority = 2, local = [scanning, radio_is_on, events], shared = [device, dacs])]
     fn scan(cx: scan::Context) {
-        let mark = alive::look(fault::marks(), Task::Scan);
-        alive::begin(fault::marks(), Task::Scan);
-        alive::end_line(fault::marks());
+        alive::begin(kept::marks(), Task::Scan);
+        alive::end_interrupts(kept::marks());
         let mut shared = cx.shared;
-        let beat = cx.local.scanning.run(
-            &mut shared.line,
-            &mut shared.device,
-            &mut shared.dacs,
-            cx.local.events,
-        );
-        if beat {
-            alive::end(fault::marks(), Task::Scan);
-            if *cx.local.radio_is_on {
-                rtic::pend(Interrupt::EXTI4);
-            }
-        } else {
-            // Only a scan after a tick of the clock proves that the scan works.
-            alive::put_back(fault::marks(), Task::Scan, mark);
+        let beat = cx
+            .local
+            .scanning
+            .run(&mut shared.device, &mut shared.dacs, cx.local.events);
+        alive::end(kept::marks(), Task::Scan);
+        if beat && *cx.local.radio_is_on {
+            rtic::pend(Interrupt::EXTI4);
         }
     }
 
-    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, radio_uart, device])]
+    #[task(binds = EXTI4, priority = 2, local = [radio_polling], shared = [radio, device])]
     fn radio(cx: radio::Context) {
+        alive::begin(kept::marks(), Task::Radio);
         let mut shared = cx.shared;
-        let waits = cx.local.radio_polling.run(
-            &mut shared.radio,
-            &mut shared.radio_uart,
-            &mut shared.device,
-        );
+        let waits = cx
+            .local
+            .radio_polling
+            .run(&mut shared.radio, &mut shared.device);
         if waits {
             rtic::pend(Interrupt::EXTI3);
         }
+        alive::end(kept::marks(), Task::Radio);
     }
 
     #[task(binds = EXTI0, priority = 1, local = [background_work, logged], shared = [device, dacs])]
     fn background(cx: background::Context) {
-        alive::begin(fault::marks(), Task::Background);
+        alive::begin(kept::marks(), Task::Background);
         let mut shared = cx.shared;
         cx.local
             .background_work
             .run(&mut shared.device, &mut shared.dacs, cx.local.logged);
-        alive::end(fault::marks(), Task::Background);
+        alive::end(kept::marks(), Task::Background);
     }
 }

@@ -15,13 +15,10 @@ use embedded_hal_nb::serial::{ErrorKind, ErrorType, Read, Write};
 use firmware::{byte_queue::ByteQueue, radio};
 use rtic::Mutex;
 
-use crate::{board::Device, clock, every::Every};
+use crate::{board::Device, clock};
 
 /// The radio line.
 pub type Radio = radio::RadioLine<Serial, IoPin, IoPin>;
-
-/// Milliseconds between two checks of the UART's registers.
-const CHECK_MS: u8 = 100;
 
 static RECEIVED: ByteQueue = ByteQueue::new();
 static TO_SEND: ByteQueue = ByteQueue::new();
@@ -90,22 +87,17 @@ impl Write<u8> for Serial {
 /// The state of the task `radio`.
 pub struct Polling {
     polled_at: u32,
-    check: Every,
 }
 
 impl Polling {
     pub const fn new() -> Self {
-        Self {
-            polled_at: 0,
-            check: Every::new(CHECK_MS),
-        }
+        Self { polled_at: 0 }
     }
 
     /// Continues what the radio line does. Returns whether a request waits to be served.
     pub fn run(
         &mut self,
         radio: &mut impl Mutex<T = Option<Radio>>,
-        uart: &mut impl Mutex<T = Option<RadioUart>>,
         device: &mut impl Mutex<T = &'static mut Device>,
     ) -> bool {
         let now = clock::millis();
@@ -120,23 +112,7 @@ impl Polling {
         let Some((waits, works)) = polled else {
             return false;
         };
-        let repaired = self.check.is_due() && uart.lock(repair);
-        device.lock(|device| {
-            let state = &mut device.state;
-            state.radio_works = works;
-            if repaired {
-                state.line_repairs = state.line_repairs.saturating_add(1);
-            }
-        });
+        device.lock(|device| device.state.radio_works = works);
         waits
     }
-}
-
-/// Sets the UART up again when its registers were disturbed. Returns whether they were.
-fn repair(uart: &mut Option<RadioUart>) -> bool {
-    let Some(uart) = uart.as_mut().filter(|uart| !uart.is_sound()) else {
-        return false;
-    };
-    uart.set_up();
-    true
 }

@@ -1,7 +1,7 @@
 //! A scan: copies inputs into the device and outputs to the modules, and runs the time-outs.
 
 use board_support::{Sampler, boards::SLOTS, kept, pac::Interrupt};
-use firmware::{device::IoPort, leds::TICK_MS};
+use firmware::{alive, device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
 use modio_drivers::{DacLink, ModuleError};
 use rtic::Mutex;
@@ -11,11 +11,11 @@ use crate::{
     clock,
     every::Every,
     installed::Installed,
-    line::Line,
     log::Event,
+    upkeep,
 };
 
-/// Scans per run of the background task, and scans per check that `uart` and `serve` still run.
+/// Scans per run of the background task, and scans per check that every other task still runs.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
 const SCANS_PER_PROOF: u8 = 100;
 
@@ -60,7 +60,6 @@ impl Scanning {
     /// that.
     pub fn run(
         &mut self,
-        line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         dacs: &mut impl Mutex<T = [DacLink; SLOTS]>,
         events: &mut Producer<'static, Event>,
@@ -135,7 +134,7 @@ impl Scanning {
         }
         if beat {
             kept::keep_uptime(self.powered_s.wrapping_add(uptime_s));
-            self.check_line(line, device, events);
+            self.look_after_tasks(device, events);
         }
         // Run the background immediately when outputs may have changed: they may be those of a DAC.
         if self.background_beat.is_due() || !beat || tripped {
@@ -144,14 +143,13 @@ impl Scanning {
         beat
     }
 
-    fn check_line(
+    /// Reports repairs, and asks every other task for its mark.
+    fn look_after_tasks(
         &mut self,
-        line: &mut impl Mutex<T = Option<Line>>,
         device: &mut impl Mutex<T = &'static mut Device>,
         events: &mut Producer<'static, Event>,
     ) {
-        let repaired = line.lock(|line| line.as_mut().is_some_and(Line::take_repaired));
-        if repaired {
+        if upkeep::take_repaired() {
             device.lock(|device| {
                 let repairs = &mut device.state.line_repairs;
                 *repairs = repairs.saturating_add(1);
@@ -159,10 +157,19 @@ impl Scanning {
             enqueue(events, Event::LineRepaired);
         }
         if self.proof_beat.is_due() {
-            // On a silent line nothing triggers these two tasks. Without a cause they only set their
-            // marks.
-            rtic::pend(Interrupt::USART1);
-            rtic::pend(Interrupt::EXTI3);
+            // On a silent line nothing triggers these tasks. Without a cause they only set their marks.
+            for task in [
+                Interrupt::USART1,
+                Interrupt::TIM2,
+                Interrupt::TIM1_CC,
+                Interrupt::USART3,
+                Interrupt::EXTI3,
+                Interrupt::EXTI4,
+            ] {
+                rtic::pend(task);
+            }
+            // The interrupts have run by now.
+            alive::end_interrupts(kept::marks());
         }
     }
 }

@@ -63,7 +63,7 @@ pub struct State {
     pub radio_works: Option<bool>,
     /// The smallest amount of free stack so far, in bytes.
     pub stack_free: u16,
-    /// Number of times the line was set up again since the start; stops at 65535.
+    /// Number of times that registers were repaired or the line was set up again since the start; stops at 65535.
     pub line_repairs: u16,
 }
 

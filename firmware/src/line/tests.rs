@@ -18,8 +18,6 @@ struct FakeUart {
     finishing: bool,
     driver: bool,
     sent: Vec<u8>,
-    upset: bool,
-    set_up: u32,
 }
 
 #[derive(Clone, Copy)]
@@ -75,16 +73,15 @@ impl Uart for FakeUart {
         (self.driver, self.finishing) = (false, false);
     }
 
+    fn driver_is_off(&self) -> bool {
+        !self.driver
+    }
+
     fn set_up(&mut self) {
         *self = Self {
             sent: self.sent.clone(),
-            set_up: self.set_up + 1,
             ..Self::default()
         };
-    }
-
-    fn is_sound(&self) -> bool {
-        !self.upset
     }
 }
 
@@ -95,12 +92,9 @@ struct FakeGap {
     passed: Option<Silence>,
     limited: bool,
     limit_passed: bool,
-    upset: Option<u8>,
 }
 
 impl GapTimer for FakeGap {
-    const PARTS: u8 = 2;
-
     fn restart(&mut self) {
         self.running = true;
     }
@@ -111,6 +105,10 @@ impl GapTimer for FakeGap {
 
     fn is_running(&self) -> bool {
         self.running
+    }
+
+    fn is_pending(&self) -> bool {
+        self.passed.is_some()
     }
 
     fn take_event(&mut self) -> Silence {
@@ -129,10 +127,6 @@ impl GapTimer for FakeGap {
 
     fn set_up(&mut self) {
         *self = Self::default();
-    }
-
-    fn is_sound(&self, part: u8) -> bool {
-        self.upset != Some(part)
     }
 }
 
@@ -197,8 +191,9 @@ impl Bench {
         panic!("the reply does not end");
     }
 
-    fn pass(&mut self, ms: u16) {
-        (0..ms).for_each(|_| self.line.on_millisecond());
+    /// Returns whether the line was set up again in these milliseconds.
+    fn pass(&mut self, ms: u16) -> bool {
+        (0..ms).fold(false, |repaired, _| repaired | self.line.on_millisecond())
     }
 }
 
@@ -218,36 +213,42 @@ fn request_is_served_with_the_driver_on_from_the_first_byte_to_the_last() {
     bench.send();
     assert_eq!(bench.line.uart.sent, REPLY);
     assert!(!bench.line.uart.driver && !bench.line.is_replying());
-    assert!(!bench.line.take_repaired());
-}
-
-#[test]
-fn disturbed_registers_are_set_up_again_within_one_millisecond_per_part() {
-    for part in [None, Some(0), Some(1)] {
-        let mut bench = Bench::new();
-        bench.pass(100);
-        assert!(!bench.line.take_repaired());
-        match part {
-            None => bench.line.uart.upset = true,
-            Some(part) => bench.line.gap.upset = Some(part),
-        }
-        bench.pass(3);
-        assert!(bench.line.take_repaired(), "{part:?}");
-        assert!(!bench.line.take_repaired(), "a repair is reported once");
-        assert_eq!(bench.line.uart.set_up, 1);
-        bench.silence(Silence::T35);
-        bench.receive(&REQUEST);
-        assert!(bench.silence(Silence::T35), "{part:?}");
-    }
+    assert!(!bench.pass(100));
 }
 
 #[test]
 fn timer_that_stopped_in_a_frame_is_started_again() {
     let mut bench = Bench::new();
     bench.receive(&REQUEST[..3]);
+    assert!(!bench.pass(3));
     bench.line.gap.running = false;
-    bench.pass(3);
-    assert!(bench.line.take_repaired() && bench.line.gap.running);
+    assert!(bench.pass(1) && bench.line.gap.running);
+    assert!(!bench.pass(3), "a repair is reported once");
+}
+
+#[test]
+fn driver_that_is_on_without_a_reply_is_switched_off() {
+    let mut bench = Bench::new();
+    bench.line.uart.driver = true;
+    assert!(bench.pass(1) && !bench.line.uart.driver);
+}
+
+#[test]
+fn event_that_is_pending_for_two_milliseconds_without_its_interrupt_is_a_fault() {
+    let mut bench = Bench::new();
+    bench.receive(&REQUEST);
+    for _ in 0..3 {
+        bench.line.gap.passed = Some(Silence::T15);
+        assert!(
+            !bench.pass(1),
+            "the interrupt runs between two milliseconds"
+        );
+        bench.line.on_gap(0);
+    }
+    bench.line.gap.passed = Some(Silence::T35);
+    assert!(!bench.pass(1));
+    assert!(bench.pass(1));
+    assert!(!bench.pass(3));
 }
 
 #[test]
@@ -256,10 +257,8 @@ fn reply_that_does_not_end_is_aborted() {
     bench.receive(&REQUEST);
     assert!(bench.silence(Silence::T35));
     bench.serve();
-    bench.pass(LONGEST_MS - 1);
-    assert!(bench.line.uart.driver && !bench.line.take_repaired());
-    bench.pass(1);
-    assert!(!bench.line.uart.driver && bench.line.take_repaired());
+    assert!(!bench.pass(LONGEST_MS - 1) && bench.line.uart.driver);
+    assert!(bench.pass(1) && !bench.line.uart.driver);
 
     let mut bench = Bench::new();
     bench.receive(&REQUEST);
@@ -269,17 +268,5 @@ fn reply_that_does_not_end_is_aborted() {
     assert!(bench.line.uart.driver, "the limit has not been reached");
     bench.line.gap.limit_passed = true;
     bench.line.on_limit();
-    assert!(!bench.line.uart.driver && bench.line.take_repaired());
-}
-
-#[test]
-fn interrupts_without_a_cause_have_the_uart_checked_in_the_same_millisecond() {
-    let mut bench = Bench::new();
-    bench.line.uart.upset = true;
-    for _ in 1..CAUSELESS {
-        bench.line.on_uart();
-        assert_eq!(bench.line.uart.set_up, 0);
-    }
-    bench.line.on_uart();
-    assert_eq!(bench.line.uart.set_up, 1);
+    assert!(!bench.line.uart.driver && bench.pass(1));
 }
