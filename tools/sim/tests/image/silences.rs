@@ -3,19 +3,21 @@
 
 use register_map::{
     codes::Baud,
-    configuration::{self, FILTER, LORA, LORA_AIR_RATE, LORA_FRAME_GAP},
+    configuration::{self, BETA, LORA, LORA_AIR_RATE, LORA_FRAME_GAP},
 };
 use sim::line::{Direction, Settings};
 use sim::radio::Parameters;
 use sim::{Config, Module, Time};
 
 use crate::ascii::ascii;
-use crate::bench::{Bench, FIRST, MODULE, adu, flash_with_settings};
+use crate::bench::{Bench, MODULE, adu, flash_with_settings};
 use crate::saving::{SLOWEST, large};
 use crate::self_description::request;
 
 /// Duration of a save with an erase, from the order on.
 const SAVE: Time = Time::from_ms(300);
+/// A setting that takes any value from 2000 to 5000, whatever the modules are.
+const LAST_BETA: u16 = BETA + 31;
 /// Time between two requests over the air, which are answered there.
 const ON_AIR: Time = Time::from_ms(250);
 
@@ -28,10 +30,10 @@ fn requests() -> [(&'static str, Vec<u8>); 7] {
         ("14, 124 records", request(&[(1, 15, 124)])),
         (
             "17 x 125",
-            vec![0x17, 0x01, 0x60, 0, 125, 0x01, 0x60, 0, 1, 2, 0, 0],
+            vec![0x17, 0x01, 0x60, 0, 125, 0x01, 0x7E, 0, 1, 2, 0x0B, 0xB8],
         ),
         ("08, 240 bytes", echo),
-        ("01 x 4", vec![1, 0, FIRST, 0, 4]),
+        ("03 x 1", vec![3, 0x02, 0x0A, 0, 1]),
         ("0C", vec![0x0C]),
     ]
 }
@@ -92,16 +94,25 @@ impl Loaded {
         };
         self.bench.exchange(&frame);
         let reply = self.bench.board.line().frames().next_back()?;
-        let is_complete = reply.direction == Direction::FromUnit && reply.crc_ok;
-        is_complete.then_some(reply.longest_gap)
+        if reply.direction != Direction::FromUnit || !reply.crc_ok {
+            return None;
+        }
+        // The first digit of the function code is 8 or 9 in an exception.
+        let refused = if self.is_ascii {
+            reply.bytes[3] >= b'8'
+        } else {
+            reply.bytes[1] >= 0x80
+        };
+        assert!(!refused, "{pdu:02X?}: {:02X?}", reply.bytes);
+        Some(reply.longest_gap)
     }
 
     /// Orders a save of a changed setting.
     fn save(&mut self, value: u8) {
-        let [high, low] = FILTER.to_be_bytes();
+        let [high, low] = LAST_BETA.to_be_bytes();
         for write in [
             [6, 0x01, 0x00, 0x5A, 0x17],
-            [6, high, low, 0, value],
+            [6, high, low, 0x0B, value],
             [6, 0x01, 0x08, 0, 1],
         ] {
             self.silence(&write).expect("a reply");
