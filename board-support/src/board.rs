@@ -7,7 +7,7 @@ use stm32f1xx_hal::{
 };
 
 use crate::{
-    ClockSource, DacBus, Flash, GapTimer, IoPin, Rs485, Sampler, ScanTimer, Watchdog,
+    ClockSource, DacBus, Flash, IoPin, Rs485, Rs485Timer, Sampler, ScanTimer, Watchdog,
     boards::BOARD,
     clock,
     design::{CRYSTAL_FAULTS, DIP_POLL_US, DIP_SETTLE_CYCLES},
@@ -80,10 +80,10 @@ impl LineOff {
         settings: LineSettings,
         times: LineTimes,
         rcc: &mut pac::RCC,
-    ) -> Option<(Rs485, GapTimer)> {
+    ) -> Option<(Rs485, Rs485Timer)> {
         let clock = self.clock;
         let (timer, start_bit) = (self.timer, self.start_bit);
-        let gap = GapTimer::new(timer, start_bit, settings, times, clock, rcc)?;
+        let gap = Rs485Timer::new(timer, start_bit, settings, times, clock, rcc)?;
         let line = Rs485::new(self.usart, settings, clock, rcc)?;
         Some((line, gap))
     }

@@ -21,29 +21,19 @@ use stm32f1xx_hal::{
 use crate::{
     ClockSource,
     gap::{GapTicks, LimitTicks, LineTimes},
+    line::{GapTimer, Silence},
     uart::LineSettings,
 };
 
-/// Reason for the timer's interrupt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GapEvent {
-    /// The line has been silent for t1.5 since the last character.
-    T15,
-    /// The line has been silent for t3.5.
-    T35,
-    /// Nothing to do: a character was received before the interrupt was served, or one may have begun.
-    Nothing,
-}
-
-/// The timer, one per line.
-pub struct GapTimer {
+/// The timers of the line.
+pub struct Rs485Timer {
     timer: pac::TIM2,
     start_bit: pac::TIM1,
     ticks: GapTicks,
     limit: LimitTicks,
 }
 
-impl GapTimer {
+impl Rs485Timer {
     /// Sets the timers up for these times. Returns `None` when TIM2 cannot measure the silences.
     pub(crate) fn new(
         timer: pac::TIM2,
@@ -68,9 +58,24 @@ impl GapTimer {
         Some(gap)
     }
 
+    fn halt(&mut self) {
+        self.timer
+            .cr1()
+            .write(|w| w.urs().counter_only().opm().enabled());
+    }
+
+    /// Selects whether t1.5 is reported one character time late. Returns the previous selection.
+    fn late_t15(&mut self, on: bool) -> bool {
+        let before = self.timer.dier().read().cc2ie().bit_is_set();
+        self.timer.dier().modify(|_, w| w.cc2ie().bit(on));
+        before
+    }
+}
+
+impl GapTimer for Rs485Timer {
     /// Sets every register of both timers that matters. The silence is measured from the next
     /// [`restart`](Self::restart).
-    pub fn set_up(&mut self) {
+    fn set_up(&mut self) {
         let (timer, ticks) = (&self.timer, self.ticks);
         timer.cr1().reset();
         timer.cr2().reset();
@@ -110,7 +115,7 @@ impl GapTimer {
     /// Starts the time limit of a reply that has just begun. [`take_limit`](Self::take_limit) reports when it is
     /// exceeded.
     #[inline]
-    pub fn limit_sending(&mut self) {
+    fn limit_sending(&mut self) {
         let timer = &self.start_bit;
         let end = timer
             .cnt()
@@ -126,7 +131,7 @@ impl GapTimer {
     /// Acknowledges the interrupt of the [limit](Self::limit_sending) and returns whether the limit has been
     /// reached. The interrupt also occurs when the reply ended in time. Returns false when a newer reply has
     /// started its own limit.
-    pub fn take_limit(&mut self) -> bool {
+    fn take_limit(&mut self) -> bool {
         const CC1: u32 = 1 << 1;
         let timer = &self.start_bit;
         let flags = timer.sr().read().bits() & timer.dier().read().bits();
@@ -140,21 +145,16 @@ impl GapTimer {
         reached
     }
 
-    /// Returns whether a silence is being measured.
-    #[must_use]
-    pub fn is_running(&self) -> bool {
+    fn is_running(&self) -> bool {
         self.timer.cr1().read().cen().is_enabled()
     }
 
-    /// Returns whether an event waits to be [taken](Self::take_event).
-    #[must_use]
-    pub fn is_pending(&self) -> bool {
+    fn is_pending(&self) -> bool {
         self.timer.sr().read().bits() & self.timer.dier().read().bits() != 0
     }
 
-    /// Restarts the silence: a character has just been received.
     #[inline]
-    pub fn restart(&mut self) {
+    fn restart(&mut self) {
         // Clear the capture flag, so that it shows edges after this character only.
         self.start_bit.sr().write(|w| w.cc3if().clear_bit());
         // The update event clears the counter and the prescaler. With URS set it raises no interrupt.
@@ -168,21 +168,13 @@ impl GapTimer {
             .write(|w| w.urs().counter_only().opm().enabled().cen().enabled());
     }
 
-    /// Stops the timer until the next character.
-    pub fn stop(&mut self) {
+    fn stop(&mut self) {
         self.halt();
         self.timer.sr().reset();
     }
 
-    fn halt(&mut self) {
-        self.timer
-            .cr1()
-            .write(|w| w.urs().counter_only().opm().enabled());
-    }
-
-    /// Acknowledges the timer's interrupt and returns its reason.
     #[inline]
-    pub fn take_event(&mut self) -> GapEvent {
+    fn take_event(&mut self) -> Silence {
         let flags = self.timer.sr().read();
         // Clear only the flags that were read; a flag set after that raises the interrupt again.
         // SAFETY: writing 0 clears a bit of SR and writing 1 leaves it unchanged (RM0008 15.4.5).
@@ -190,31 +182,24 @@ impl GapTimer {
         let may_be_on_its_way = self.start_bit.sr().read().cc3if().bit_is_set();
         if flags.uif().bit_is_set() {
             // The counter has stopped, because of one-pulse mode.
-            GapEvent::T35
+            Silence::T35
         } else if flags.cc3if().bit_is_set() {
             if may_be_on_its_way {
-                return GapEvent::Nothing;
+                return Silence::None;
             }
             self.halt();
-            GapEvent::T35
+            Silence::T35
         } else if flags.cc2if().bit_is_set() && self.late_t15(false) {
-            GapEvent::T15
+            Silence::T15
         } else if flags.cc1if().bit_is_set() {
             // The decision is delayed only once: not after the later compare value has passed.
             if may_be_on_its_way && flags.cc2if().bit_is_clear() {
                 self.late_t15(true);
-                return GapEvent::Nothing;
+                return Silence::None;
             }
-            GapEvent::T15
+            Silence::T15
         } else {
-            GapEvent::Nothing
+            Silence::None
         }
-    }
-
-    /// Selects whether t1.5 is reported one character time late. Returns the previous selection.
-    fn late_t15(&mut self, on: bool) -> bool {
-        let before = self.timer.dier().read().cc2ie().bit_is_set();
-        self.timer.dier().modify(|_, w| w.cc2ie().bit(on));
-        before
     }
 }

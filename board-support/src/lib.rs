@@ -14,6 +14,7 @@ pub mod gap;
 #[cfg(any(target_os = "none", test))]
 mod i2c;
 pub mod kept;
+pub mod line;
 pub mod pages;
 mod pin;
 pub mod tolerance;
@@ -63,12 +64,12 @@ pub use {
     adc::Sampler,
     clock::ClockSource,
     flash::{Flash, FlashError},
-    gap_timer::{GapEvent, GapTimer},
+    gap_timer::Rs485Timer,
     i2c::DacBus,
     pin_io::IoPin,
     radio::{Damaged, RadioUart},
     registers::{Part, Registers, Wrong},
-    rs485::{Character, Rs485, Status},
+    rs485::Rs485,
     safe::outputs_off,
     scan_timer::ScanTimer,
     stm32f1xx_hal::pac,

@@ -2,7 +2,7 @@
 //!
 //! The line is half duplex. While the unit sends, its receiver is off, so that it does not receive its own bytes
 //! even when the transceiver's receiver stays enabled. Each method serves one interrupt in a few instructions:
-//! [`Rs485::status`] is read once and gives the reason for the interrupt.
+//! [`Uart::status`] is read once and gives the reason for the interrupt.
 
 use stm32f1xx_hal::{
     pac,
@@ -11,27 +11,17 @@ use stm32f1xx_hal::{
 
 use crate::{
     ClockSource,
+    line::{Character, Uart},
     pin::{Mode, Pin, Port},
     uart::{Format, LineSettings, divider},
 };
 
-/// The UART's flags and interrupt enables, as [`Rs485::status`] read them.
+/// The UART's flags and interrupt enables, as [`Uart::status`] read them.
 #[derive(Clone, Copy)]
 pub struct Status {
     flags: u16,
     /// CR1, whose interrupt enable bits have the same positions as their flags (RM0008 27.6.1, 27.6.4).
     enables: u16,
-}
-
-/// A character received from the line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Character {
-    /// Its eight data bits. With seven data bits, bit 7 is the parity bit or the first stop bit.
-    pub byte: u8,
-    /// Errors: bit 0 parity, bit 1 framing (the stop bit was low), bit 3 overrun (a character after this one was
-    /// lost). Bit 2, noise, is never set: it means that the samples of a bit differed. The UART uses the majority,
-    /// and the frame's checksum detects a wrong result.
-    pub faults: u8,
 }
 
 /// Modes of the pins in CRH: PA8 is an output and PA9 one of the UART, both at 10 MHz, PA10 is an input with pull-up
@@ -45,26 +35,6 @@ const ORE: u16 = 1 << 3;
 const RXNE: u16 = 1 << 5;
 const TC: u16 = 1 << 6;
 const TXE: u16 = 1 << 7;
-
-impl Status {
-    /// Returns whether a character is waiting to be [read](Rs485::read) or was lost.
-    #[must_use]
-    pub const fn received(self) -> bool {
-        self.flags & (RXNE | ORE) != 0
-    }
-
-    /// Returns whether the UART wants the next byte and can [send](Rs485::send) it.
-    #[must_use]
-    pub const fn wants_byte(self) -> bool {
-        self.flags & self.enables & TXE != 0
-    }
-
-    /// Returns whether the last stop bit has been sent.
-    #[must_use]
-    pub const fn sent(self) -> bool {
-        self.flags & self.enables & TC != 0
-    }
-}
 
 /// Driver enable of the transceiver.
 const DRIVER: Pin = Pin::a(8);
@@ -147,9 +117,34 @@ impl Rs485 {
         Some(line)
     }
 
-    /// Turns the driver off, sets the pins and every register of the UART up, and turns the receiver on. A character under way is
-    /// lost.
-    pub fn set_up(&mut self) {
+    /// The UART replaces the highest bit by the parity bit (RM0008 27.6.2).
+    #[inline]
+    fn write(&self, byte: u8) {
+        let word = byte | self.stop_in_data;
+        self.usart.dr().write(|w| w.dr().set(u16::from(word)));
+    }
+}
+
+impl Uart for Rs485 {
+    type Status = Status;
+
+    #[inline]
+    fn received(status: Status) -> bool {
+        status.flags & (RXNE | ORE) != 0
+    }
+
+    #[inline]
+    fn wants_byte(status: Status) -> bool {
+        status.flags & status.enables & TXE != 0
+    }
+
+    #[inline]
+    fn sent(status: Status) -> bool {
+        status.flags & status.enables & TC != 0
+    }
+
+    /// A character under way is lost.
+    fn set_up(&mut self) {
         disable_driver();
         let usart = &self.usart;
         usart.cr1().reset();
@@ -171,26 +166,21 @@ impl Rs485 {
         let _ = (usart.sr().read(), usart.dr().read());
     }
 
-    /// Returns whether the driver is off.
     #[inline]
-    #[must_use]
-    pub fn driver_is_off(&self) -> bool {
+    fn driver_is_off(&self) -> bool {
         !DRIVER.is_set()
     }
 
-    /// Reads the UART's flags and interrupt enables.
     #[inline]
-    #[must_use]
-    pub fn status(&self) -> Status {
+    fn status(&self) -> Status {
         Status {
             flags: self.usart.sr().read().bits(),
             enables: self.usart.cr1().read().bits(),
         }
     }
 
-    /// Reads the character that [`Status::received`] reported.
     #[inline]
-    pub fn read(&mut self, status: Status) -> Character {
+    fn read(&mut self, status: Status) -> Character {
         Character {
             // With words of nine bits, the ninth is the parity bit.
             byte: self.usart.dr().read().bits() as u8,
@@ -198,8 +188,7 @@ impl Rs485 {
         }
     }
 
-    /// Turns the receiver off and the driver on, and sends the first byte of a reply.
-    pub fn start_sending(&mut self, first: u8) {
+    fn start_sending(&mut self, first: u8) {
         DRIVER.set(true);
         // Reading SR and then writing DR clears TC (RM0008 27.6.1).
         let _ = self.usart.sr().read();
@@ -209,16 +198,8 @@ impl Rs485 {
             .modify(|_, w| w.re().disabled().rxneie().disabled().txeie().enabled());
     }
 
-    /// The UART replaces the highest bit by the parity bit (RM0008 27.6.2).
     #[inline]
-    fn write(&self, byte: u8) {
-        let word = byte | self.stop_in_data;
-        self.usart.dr().write(|w| w.dr().set(u16::from(word)));
-    }
-
-    /// Sends the next byte.
-    #[inline]
-    pub fn send(&mut self, byte: u8) {
+    fn send(&mut self, byte: u8) {
         self.write(byte);
         // When this runs late, the previous byte may end between the read of SR and the write to DR, which then
         // does not clear TC (RM0008 27.6.1). This byte cannot have ended yet, so a TC that is set belongs to the
@@ -229,17 +210,15 @@ impl Rs485 {
         }
     }
 
-    /// Ends the sending: the last byte was given to the UART. [`Status::sent`] reports when it has been sent.
     #[inline]
-    pub fn finish_sending(&mut self) {
+    fn finish_sending(&mut self) {
         self.usart
             .cr1()
             .modify(|_, w| w.txeie().disabled().tcie().enabled());
     }
 
-    /// Turns the driver off and the receiver on. Call this as soon as [`Status::sent`] returns true.
     #[inline]
-    pub fn stop_sending(&mut self) {
+    fn stop_sending(&mut self) {
         disable_driver();
         self.usart
             .cr1()

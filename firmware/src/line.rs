@@ -1,77 +1,13 @@
 //! A line: UART, frame-gap timer and port, and its recovery after a disturbance.
 //!
-//! This module does not access hardware. UART and timer are two traits, so that every line of a board and the tests
-//! use the same code. On the device all of it runs from RAM, so that it continues while flash is erased or
+//! This module does not access hardware: UART and timer are traits of [`board_support::line`]. On the device all of it runs from RAM, so that it continues while flash is erased or
 //! programmed. Functions that are called from here must be in RAM, too (`memory/sections.x`).
 
+use board_support::line::{GapTimer, Silence, Uart};
 use modbus_server::{
     LineCounters, Reply, Request,
     line::{Faults, Port},
 };
-
-/// A UART with the driver enable of its transceiver.
-pub trait Uart {
-    /// State of the UART at the time of a [`status`](Self::status) call.
-    type Status: Copy;
-
-    /// Reads the state of the UART.
-    fn status(&self) -> Self::Status;
-    /// Returns whether a character is waiting to be [read](Self::read) or was lost.
-    fn received(status: Self::Status) -> bool;
-    /// Returns whether the UART wants the next byte and can [send](Self::send) it.
-    fn wants_byte(status: Self::Status) -> bool;
-    /// Returns whether the last stop bit has been sent.
-    fn sent(status: Self::Status) -> bool;
-
-    /// Reads the character that [`received`](Self::received) reported, with its errors.
-    fn read(&mut self, status: Self::Status) -> (u8, Faults);
-    /// Turns the receiver off and the driver on, and sends the first byte of a reply.
-    fn start_sending(&mut self, first: u8);
-    /// Sends the next byte.
-    fn send(&mut self, byte: u8);
-    /// Ends the sending: the last byte was given to the UART. [`sent`](Self::sent) reports when it has been sent.
-    fn finish_sending(&mut self);
-    /// Turns the driver off and the receiver on.
-    fn stop_sending(&mut self);
-    /// Returns whether the driver is off.
-    fn driver_is_off(&self) -> bool;
-
-    /// Turns the driver off, sets every register up, and turns the receiver on.
-    fn set_up(&mut self);
-}
-
-/// The timer that measures a line's silences and limits the duration of a reply.
-pub trait GapTimer {
-    /// Restarts the silence: a character was received.
-    fn restart(&mut self);
-    /// Stops measuring: silences do not matter while a reply is being sent.
-    fn stop(&mut self);
-    /// Returns whether a silence is being measured.
-    fn is_running(&self) -> bool;
-    /// Returns whether an event waits to be [taken](Self::take_event).
-    fn is_pending(&self) -> bool;
-    /// Acknowledges its interrupt and returns the reason.
-    fn take_event(&mut self) -> Silence;
-    /// Starts the time limit of a reply that has just begun.
-    fn limit_sending(&mut self);
-    /// Acknowledges the interrupt of [`limit_sending`](Self::limit_sending). Returns whether the time limit has
-    /// been reached.
-    fn take_limit(&mut self) -> bool;
-
-    /// Sets every register up.
-    fn set_up(&mut self);
-}
-
-/// A silence on the line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Silence {
-    /// t1.5 has passed.
-    T15,
-    /// t3.5 has passed.
-    T35,
-    /// Neither; the interrupt had no cause.
-    None,
-}
 
 /// A line in use.
 pub struct Line<U, G> {
@@ -116,9 +52,10 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
             return true;
         }
         if U::received(status) {
-            let (byte, faults) = self.uart.read(status);
+            let character = self.uart.read(status);
             self.gap.restart();
-            self.port.received(byte, faults);
+            let faults = Faults::from_bits(character.faults);
+            self.port.received(character.byte, faults);
         }
         if U::wants_byte(status) {
             match self.port.next_byte() {

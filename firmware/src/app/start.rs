@@ -29,7 +29,7 @@ use crate::{
     board::{BOARD, DESCRIPTION, Device},
     fault_record,
     installed::install,
-    line::{Line, Rs485Gap, Rs485Uart},
+    line::Line,
     log::{self, Log},
     persistence::Persistence,
     radio::{Radio, Serial},
@@ -162,7 +162,7 @@ pub fn up(
         // The count may begin just before a tick.
         let longest_ms = (limit_us / 1000) as u16 + 2;
         let port = Port::new(receiver, adus);
-        Some(Line::new(Rs485Uart(uart), Rs485Gap(gap), port, longest_ms))
+        Some(Line::new(uart, gap, port, longest_ms))
     });
 
     let (radio, radio_uart) = radio_config

@@ -4,6 +4,7 @@ extern crate std;
 use std::boxed::Box;
 use std::vec::Vec;
 
+use board_support::line::Character;
 use modbus_server::line::{Framing, Receiver};
 use modbus_server::{Adu, Server, Tables};
 
@@ -50,8 +51,9 @@ impl Uart for FakeUart {
         status.sent
     }
 
-    fn read(&mut self, _: Wants) -> (u8, Faults) {
-        (self.waiting.take().unwrap(), Faults::NONE)
+    fn read(&mut self, _: Wants) -> Character {
+        let byte = self.waiting.take().unwrap();
+        Character { byte, faults: 0 }
     }
 
     fn start_sending(&mut self, first: u8) {
