@@ -6,7 +6,7 @@
 //!
 //! | block | checked | a wrong register is |
 //! |---|---|---|
-//! | RS-485 line: USART1 with its pins, TIM2, TIM1 | two rows per millisecond, while no reply is being sent | set up with its block by the caller |
+//! | RS-485 line: USART1 with its pins, TIM2, TIM1 | one row per millisecond, while no reply is being sent | set up with its block by the caller |
 //! | clock enables and resets | one row per millisecond, and first when any other row is wrong | written |
 //! | pins, interrupts, flash | one row per millisecond | written |
 //! | scan timer, radio | one row per millisecond | set up with its block by the caller |
@@ -111,9 +111,8 @@ const SCAN_TIMER: usize = 22;
 const RADIO: usize = 27;
 const LINE: usize = 31;
 const ROWS: usize = 55;
-/// Number of the line's rows that are checked in a millisecond, and in how many milliseconds all are.
-const LINE_ROWS: usize = (ROWS - LINE) / LINE_MS;
-const LINE_MS: usize = 12;
+/// Number of milliseconds after which every row of the line has been checked, one in each.
+const LINE_MS: usize = ROWS - LINE;
 /// Number of milliseconds after which every row has been checked.
 const ROUND_MS: u8 = LINE as u8;
 
@@ -231,13 +230,12 @@ impl Registers {
         is_wrong.then(|| self.repair(bus, row))
     }
 
-    /// Returns whether one of the line's registers of this millisecond is wrong.
+    /// Returns whether the line's register of this millisecond is wrong.
     #[inline(always)]
     fn line_is_wrong(&mut self, bus: &impl Bus) -> bool {
         self.part = (self.part + 1) % LINE_MS as u8;
-        let first = LINE + LINE_ROWS * usize::from(self.part);
-        let rows = self.rows.get(first..first + LINE_ROWS);
-        rows.is_some_and(|rows| rows.iter().any(|row| row.is_wrong_peripheral(bus)))
+        let row = self.rows.get(LINE + usize::from(self.part));
+        row.is_some_and(|row| row.is_wrong_peripheral(bus))
     }
 
     /// Repairs a wrong row, but first the clocks: a block without its clock returns 0, so its registers say nothing.
