@@ -132,6 +132,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// Applies the settings in force to the points, after the settings may have changed.
     #[inline(never)]
     fn configure_points(&mut self) {
+        self.config.compare();
         self.revision = self.config.revision();
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
             if let Some(points) = self.config.points(index) {
@@ -200,10 +201,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.settings_may_have_changed();
     }
 
-    #[inline]
+    #[inline(always)]
     fn settings_may_have_changed(&mut self) {
         if self.revision != self.config.revision() {
-            self.config.compare();
             self.configure_points();
         }
     }

@@ -222,7 +222,7 @@ fn data(adu: &mut Adu, bytes: &[u8]) {
 }
 
 /// Begins the reply to a read: byte count and as many bytes, at most 250, which are returned.
-#[inline]
+#[inline(always)]
 fn body(adu: &mut Adu, len: usize) -> &mut [u8] {
     let from = usize::from(FIELDS) + 1;
     adu.resize(from + len);
