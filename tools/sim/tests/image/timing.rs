@@ -15,9 +15,6 @@ const OFF: Most = Most(Time::from_ns(1_250), Time::from_ns(2_300));
 /// The same when another interrupt of the line, usually the 1 kHz tick, has just occurred: the longest wait that `cargo
 /// xtask bench` allows, 5.0 us, and the handler; at the slow corner the time of [`Bench::ready`] at high rates.
 const OFF_BEHIND: Most = Most(Time::from_ns(6_250), Time::from_us(10));
-/// Between the first byte, which does not depend on the request, and the second. t1.5 is 750 us.
-const GAP: Most = Most(Time::from_us(16), Time::from_us(30));
-
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
 fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
@@ -53,11 +50,6 @@ fn reply_starts_at_t35_and_the_driver_is_on_only_for_the_reply() {
             frame.end
         );
         assert_eq!(line.collisions().count(), 0);
-        assert!(
-            frame.longest_gap <= bit,
-            "gaps in the reply: {:?}",
-            frame.longest_gap
-        );
     }
 }
 
@@ -97,7 +89,7 @@ fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
             let mut least = u64::MAX;
             for _ in 0..2 {
                 bench.exchange(&request);
-                let (character, clocks) = (bench.characters(1), bench.clocks());
+                let clocks = bench.clocks();
                 let line = bench.board.line();
                 let frame = line.frames().next_back().expect("a reply").clone();
                 assert_eq!(
@@ -124,10 +116,6 @@ fn driver_is_off_soon_after_the_reply_at_every_rate_and_format() {
                     )
                 });
                 least = least.min(held.saturating_sub(clocks.as_ps()));
-                // At the highest rates the values are assembled while the first bytes are sent.
-                let gap = frame.longest_gap;
-                let most = character.max(GAP.of(corner()));
-                assert!(gap <= most, "{baud:?}: gap of {gap:?}");
             }
             assert!(least <= OFF.of(corner()).as_ps(), "{baud:?}: {least} ps");
             let bit_or_less = *baud == Baud::B921600 || least <= bit.as_ps();
