@@ -72,7 +72,7 @@ fn use_in_ram(code_of_user: &[u16], constants: &[u32]) -> Option<String> {
     let pool = RAM_BASE + data.len() as u32;
     data.extend(constants.iter().flat_map(|word| word.to_le_bytes()));
     let symbols = [
-        ("store::load", FLASH_BASE + 8 | 1, 8),
+        ("store::load", (FLASH_BASE + 8) | 1, 8),
         ("TABLE", FLASH_BASE + 16, 8),
         ("user", RAM_BASE | 1, data.len() as u32),
         ("$t", RAM_BASE, 0),
