@@ -19,6 +19,8 @@ pub struct Sampler {
     pub inputs: [[Option<u8>; 4]; SLOTS],
     /// The calibration has succeeded.
     calibrated: bool,
+    /// Number of calls in which a conversion did not end, wrapping.
+    missed: u8,
 }
 
 impl Sampler {
@@ -29,6 +31,7 @@ impl Sampler {
             adc,
             inputs: [[None; 4]; SLOTS],
             calibrated: false,
+            missed: 0,
         };
         sampler.power_up();
         sampler
@@ -44,6 +47,11 @@ impl Sampler {
             if let Some(input) = *input {
                 *code = self.convert(input);
                 if code.is_none() {
+                    // A disturbance may have turned the converter off.
+                    self.missed = self.missed.wrapping_add(1);
+                    if self.missed == 0 {
+                        self.power_up();
+                    }
                     break;
                 }
             }

@@ -96,21 +96,32 @@ impl Flash {
     /// Turns the voltage detector on; the clock of PWR must be on. `masked` is the value of BASEPRI during an
     /// operation: interrupts that it does not mask must run from RAM.
     pub(crate) fn new(flash: pac::FLASH, power: pac::PWR, masked: u8) -> Self {
-        power
-            .cr()
-            // SAFETY: each of the field's eight values is a threshold.
-            .modify(|_, w| unsafe { w.pls().bits(PVD_LEVEL).pvde().set_bit() });
-        Self {
+        let flash = Self {
             flash,
             power,
             masked,
-        }
+        };
+        flash.set_up_detector();
+        flash
     }
 
-    /// Returns whether the supply is high enough for an operation.
+    fn set_up_detector(&self) {
+        self.power
+            .cr()
+            // SAFETY: each of the field's eight values is a threshold.
+            .modify(|_, w| unsafe { w.pls().bits(PVD_LEVEL).pvde().set_bit() });
+    }
+
+    /// Returns whether the supply is high enough for an operation. A detector that is off, because of a disturbance,
+    /// says nothing: it is turned on again, and the caller asks later.
     #[must_use]
     pub fn has_supply(&self) -> bool {
-        self.power.csr().read().pvdo().bit_is_clear()
+        let settings = self.power.cr().read();
+        let is_set = settings.pvde().bit_is_set() && settings.pls().bits() == PVD_LEVEL;
+        if !is_set {
+            self.set_up_detector();
+        }
+        is_set && self.power.csr().read().pvdo().bit_is_clear()
     }
 
     /// Runs an operation: unlocks the controller, sets it up, waits for the end within a time limit, and locks it

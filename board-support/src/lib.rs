@@ -69,7 +69,7 @@ pub use {
     pin_io::IoPin,
     radio::{Damaged, RadioUart},
     registers::{Part, Registers, Wrong},
-    rs485::Rs485,
+    rs485::{Rs485, disable_driver},
     safe::outputs_off,
     scan_timer::ScanTimer,
     stm32f1xx_hal::pac,

@@ -43,6 +43,7 @@ const PERIPHERALS: u32 = 0x4000_0000;
 const TIM2: u32 = 0x4000_0000;
 const TIM4: u32 = 0x4000_0800;
 const USART3: u32 = 0x4000_4800;
+const AFIO: u32 = 0x4001_0000;
 const GPIOA: u32 = 0x4001_0800;
 const GPIOB: u32 = 0x4001_0C00;
 const GPIOC: u32 = 0x4001_1000;
@@ -60,9 +61,9 @@ const ISER: u16 = 0x100;
 const ICER: u16 = 0x180;
 
 /// Base address of a block, compared bits, and offsets of its registers. A mask is extended by its highest bit.
-const TABLE: [(u32, i16, &[u16]); 21] = [
-    // APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR (RM0008 7.3).
-    (RCC, ALL, &[0x0C, 0x10, 0x14, 0x18, 0x1C]),
+const TABLE: [(u32, i16, &[u16]); 22] = [
+    // CFGR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR (RM0008 7.3).
+    (RCC, ALL, &[0x04, 0x0C, 0x10, 0x14, 0x18, 0x1C]),
     // The pulls of the slots' lines and of RX.
     (GPIOA, 0x4FF, &[ODR]),
     (GPIOB, 0x003, &[ODR]),
@@ -81,6 +82,8 @@ const TABLE: [(u32, i16, &[u16]); 21] = [
     ),
     // Wait states and prefetch, without its status (PM0075 3.1).
     (FLASH_ACR, 0x1F, &[0]),
+    // MAPR, without the debug port (RM0008 9.4.2).
+    (AFIO, 0x7FFF, &[0x04]),
     // CR1, SMCR, DIER, PSC, ARR (RM0008 15.4).
     (TIM4, ALL, &[0x00, 0x08, 0x0C, 0x28, 0x2C]),
     // CR1 without TXEIE, BRR, CR2, CR3 (RM0008 27.6).
@@ -104,13 +107,13 @@ const TABLE: [(u32, i16, &[u16]); 21] = [
 const ALL: i16 = -1;
 
 /// Number of clock and reset registers, the first rows.
-const CLOCKS: usize = 5;
+const CLOCKS: usize = 6;
 // Positions of rows: after the pulls, and the first of each block.
-const MODES: usize = 8;
-const SCAN_TIMER: usize = 22;
-const RADIO: usize = 27;
-const LINE: usize = 31;
-const ROWS: usize = 55;
+const MODES: usize = 9;
+const SCAN_TIMER: usize = 24;
+const RADIO: usize = 29;
+const LINE: usize = 33;
+const ROWS: usize = 57;
 /// Number of milliseconds after which every row of the line has been checked, one in each.
 const LINE_MS: usize = ROWS - LINE;
 /// Number of milliseconds after which every row has been checked.
@@ -203,6 +206,10 @@ impl Registers {
                 (row.place, row.mask) = (place, mask);
                 if (CLOCKS..MODES).contains(&n) {
                     row.mask &= pulled(bus, row.address() - u32::from(ODR));
+                }
+                if !line && row.address() == GPIOA + u32::from(CRH) {
+                    // The pins of a line that is not in use: its driver must stay off.
+                    row.mask = ALL;
                 }
                 row.expected = bus.read(row.address()) & row.mask();
             }

@@ -50,7 +50,7 @@ pub(crate) fn set_up_pins() {
 
 /// Turns the driver off.
 #[inline(always)]
-pub(crate) fn disable_driver() {
+pub fn disable_driver() {
     DRIVER.set(false);
 }
 
@@ -164,6 +164,13 @@ impl Uart for Rs485 {
             .modify(|r, w| unsafe { w.bits(r.bits() & !0xFFF | MODES) });
         // Discard what was received before, including its error flags; it is not part of the next frame.
         let _ = (usart.sr().read(), usart.dr().read());
+    }
+
+    #[inline]
+    fn disable_other_interrupts(&mut self) {
+        self.usart
+            .cr1()
+            .modify(|_, w| w.idleie().disabled().peie().disabled());
     }
 
     #[inline]

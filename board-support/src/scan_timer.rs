@@ -45,8 +45,8 @@ impl ScanTimer {
             .write(|w| w.urs().counter_only().cen().enabled());
     }
 
-    /// Acknowledges the timer's interrupt.
+    /// Acknowledges the timer's interrupt, and any other that a disturbed bit has enabled.
     pub fn take_beat(&mut self) {
-        self.timer.sr().write(|w| w.uif().clear_bit());
+        self.timer.sr().reset();
     }
 }

@@ -62,6 +62,8 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
                 Some(byte) => self.uart.send(byte),
                 None => self.uart.finish_sending(),
             }
+        } else if !U::received(status) {
+            self.uart.disable_other_interrupts();
         }
         false
     }

@@ -1,10 +1,9 @@
-//! The buffer of one frame. The receiver fills it, the server reads it and reuses it for the body of the reply.
+//! The buffer of one frame. The receiver fills it, and the server makes it the reply.
 
 /// One application data unit of up to 256 bytes (V1.02 2.5.1: the largest RTU frame, including address and CRC; an
 /// ASCII frame holds at most 255).
 ///
-/// As a request it holds the unit address and the PDU; the receiver removes a valid CRC or LRC. As a reply it holds
-/// the part after the head.
+/// It holds the unit address and the PDU. The receiver removes a valid CRC or LRC, and that of a reply is never in it.
 #[derive(Debug)]
 pub struct Adu {
     bytes: [u8; Adu::CAPACITY],

@@ -18,7 +18,7 @@ pub struct LineCounters {
     /// Valid frames for this unit or a broadcast that were not served: no buffer was free, a gap longer than t1.5
     /// is not tolerated, or it was too late for a reply. `bus_messages` includes them.
     pub dropped: u16,
-    /// Replies that were not sent, because another frame had begun by then.
+    /// Replies that were not sent: another frame was being received, or a valid one had come since the request.
     pub unsent: u16,
 }
 

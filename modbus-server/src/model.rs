@@ -69,7 +69,7 @@ pub trait DataModel {
         let _ = (table, span, out);
     }
 
-    /// Called before [`read_words`](Self::read_words), with the server of this request. A model whose registers show
+    /// Called before [`read_words`](Self::read_words) of functions 03, 04 and 17, with the server of this request. A model whose registers show
     /// the server's [`counters`](Server::counters), which include the request, copies them here.
     fn before_read_words(&mut self, span: Span, server: &Server) {
         let _ = (span, server);

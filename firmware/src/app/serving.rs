@@ -93,11 +93,16 @@ impl Serving {
             execute(order, device);
         }
         let mut served = false;
-        if let Some(request) = rs485.lock(|line| line.as_mut()?.take()) {
+        // The next request waits until the command has been executed.
+        if self.rs485.order.is_none()
+            && let Some(request) = rs485.lock(|line| line.as_mut()?.take())
+        {
             self.rs485.serve(request, rs485, radio, device);
             served = true;
         }
-        if let Some(request) = radio.lock(|line| line.as_mut()?.take()) {
+        if self.radio.order.is_none()
+            && let Some(request) = radio.lock(|line| line.as_mut()?.take())
+        {
             self.radio.serve(request, rs485, radio, device);
             served = true;
         }
@@ -134,7 +139,7 @@ impl Served {
             device.set_origin(origin);
             (self.server.serve(request, &mut **device), delay_ms)
         });
-        let (outcome, writes, is_answered) = (reply.outcome(), reply.writes(), reply.is_answered());
+        let (outcome, writes) = (reply.outcome(), reply.writes());
         match self.line {
             LineName::Rs485 => {
                 let delay_ms = if self.at_once { 0 } else { delay_ms };
@@ -155,8 +160,8 @@ impl Served {
         if writes {
             rtic::pend(Interrupt::EXTI1);
         }
-        if self.order.is_some() && !is_answered {
-            // There is no reply to wait for, so execute the command now.
+        if self.order.is_some() {
+            // Without a reply there is no end of a reply to wait for.
             rtic::pend(Interrupt::EXTI3);
         }
     }

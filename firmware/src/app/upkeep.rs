@@ -57,6 +57,8 @@ impl Upkeep {
                 line.repair();
             }
             repaired |= line.on_millisecond();
+        } else {
+            board_support::disable_driver();
         }
         if self.repairs.end_millisecond(repaired) {
             REPAIRED.store(true, Ordering::Relaxed);

@@ -298,8 +298,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
         command
     }
 
-    /// Compares the edited settings with the others after [`revision`](Self::revision) has changed. The next
-    /// request needs the result.
+    /// Compares the edited settings with the others after [`revision`](Self::revision) has changed, before
+    /// anything needs the result.
     pub fn compare(&mut self) {
         self.differences = self.edited.differences(&self.saved);
         for (index, port) in self.ports.iter().enumerate() {
@@ -310,22 +310,17 @@ impl<const SLOTS: usize> Config<SLOTS> {
         }
     }
 
-    fn edited_anew(&mut self) {
-        self.revision = self.revision.wrapping_add(1);
-        self.compare();
-    }
-
     /// COMMAND 3: sets every setting to its default. These values are not stored in flash.
     pub fn load_defaults(&mut self) {
         self.edited = Settings::defaults();
-        self.edited_anew();
+        self.revision = self.revision.wrapping_add(1);
     }
 
     /// COMMAND 4: sets every setting to its saved value.
     pub fn drop_changes(&mut self) {
         self.edited.clone_from(&self.saved);
         self.left = 0;
-        self.edited_anew();
+        self.revision = self.revision.wrapping_add(1);
     }
 
     /// COMMAND 1: copies the present settings for a save, which later changes do not affect. [`Self::to_save`]

@@ -55,7 +55,7 @@ pub struct State {
     /// Milliseconds of the current second.
     part_ms: u32,
     uptime_s: u32,
-    /// The counters of the RS-485 line, copied from its server when they were last read.
+    /// The counters of the RS-485 line, copied from its server before a read over this line, and ten times a second.
     counters: Counters,
     /// The counters of the radio line, copied in the same way. Zero while the radio is off.
     radio_counters: Counters,

@@ -18,6 +18,8 @@ struct FakeUart {
     wants: bool,
     finishing: bool,
     driver: bool,
+    /// An interrupt that the line does not use is enabled.
+    others: bool,
     sent: Vec<u8>,
 }
 
@@ -73,6 +75,10 @@ impl Uart for FakeUart {
 
     fn stop_sending(&mut self) {
         (self.driver, self.finishing) = (false, false);
+    }
+
+    fn disable_other_interrupts(&mut self) {
+        self.others = false;
     }
 
     fn driver_is_off(&self) -> bool {
@@ -271,4 +277,14 @@ fn reply_that_does_not_end_is_aborted() {
     bench.line.gap.limit_passed = true;
     bench.line.on_limit();
     assert!(!bench.line.uart.driver && bench.pass(1));
+}
+
+#[test]
+fn interrupt_without_a_cause_is_disabled() {
+    let mut bench = Bench::new();
+    bench.line.uart.others = true;
+    bench.receive(&REQUEST[..1]);
+    assert!(bench.line.uart.others);
+    assert!(!bench.line.on_uart());
+    assert!(!bench.line.uart.others);
 }

@@ -42,7 +42,7 @@ pub struct Port<'a, U = u8> {
 enum State {
     /// There is no reply.
     None,
-    /// The reply may start after this many ticks, unless another frame begins before.
+    /// The reply may start after this many ticks, unless it is too late by then.
     Waiting(u32),
     /// The reply is being sent.
     Sending,
@@ -172,8 +172,8 @@ impl<'a, U: Units> Port<'a, U> {
         }
     }
 
-    /// Starts a reply whose delay has passed, if there is one, and returns its first character. When another frame has
-    /// begun since the request, the reply is dropped and counted instead.
+    /// Starts a reply whose delay has passed, if there is one, and returns its first character. When another frame is
+    /// being received, or a valid one has come since the request, the reply is dropped and counted instead.
     pub fn start(&mut self) -> Option<u8> {
         if self.reply != State::Waiting(0) {
             return None;
@@ -184,8 +184,9 @@ impl<'a, U: Units> Port<'a, U> {
             self.drop_reply();
             return None;
         }
+        let first = self.transmitter.next()?;
         self.reply = State::Sending;
-        self.transmitter.next()
+        Some(first)
     }
 
     /// Returns the next character to send. After `None`, wait for the last stop bit.

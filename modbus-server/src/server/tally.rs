@@ -37,7 +37,7 @@ impl Tally {
 }
 
 impl Server {
-    /// Counts and logs a request, with the line's counters at its end, before it is executed.
+    /// Counts and logs a request, with the line's counters when it was taken, before it is executed.
     ///
     /// Requests are served in the order in which the receiver has received them.
     #[inline(never)]
@@ -68,7 +68,7 @@ impl Server {
         self.log.push(event);
     }
 
-    /// Stores the line's counters at the end of a request, and logs the damaged frames before that request.
+    /// Stores the line's counters, and logs the damaged frames since the last request.
     /// Private, because with a copy older than the last one the differences would wrap: while a request is pending,
     /// its copy is older than the receiver's counters.
     fn note_line(&mut self, line: &LineCounters) {

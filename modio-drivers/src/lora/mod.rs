@@ -153,7 +153,13 @@ where
                 Some(false) => self.go(Step::Failed),
                 None => self.fail_after(REPLY_MS),
             },
-            Step::Ready if free => self.elapsed = 0,
+            Step::Ready if free => {
+                self.elapsed = 0;
+                // A disturbance may have changed the pins.
+                self.mode.iter_mut().for_each(|pin| {
+                    let _ = pin.set_low();
+                });
+            }
             Step::Ready => {
                 let all = self.settings.packet_ms().saturating_mul(PACKETS);
                 self.fail_after(all.saturating_add(START_MS));

@@ -308,6 +308,7 @@ fn a_save_stores_the_settings_at_the_time_of_the_command() {
     config.end_save(changed);
     assert_eq!(status(&config), status::UNSAVED, "the later change");
     config.drop_changes();
+    config.compare();
     assert_eq!((config.edited.get(BETA), status(&config)), (2000, 0));
 }
 
@@ -339,6 +340,7 @@ fn loading_defaults_and_dropping_changes_act_like_writes() {
     );
     let revision = config.revision();
     config.load_defaults();
+    config.compare();
     assert_ne!(config.revision(), revision);
     assert_eq!(
         all(&config),
@@ -346,6 +348,7 @@ fn loading_defaults_and_dropping_changes_act_like_writes() {
     );
     assert_eq!(status(&config), status::UNSAVED);
     config.drop_changes();
+    config.compare();
     assert_eq!(
         (config.edited.get(BAUD), config.edited.get(BETA)),
         (1152, 2000)

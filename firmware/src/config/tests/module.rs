@@ -80,6 +80,7 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
     assert_eq!(write(&mut config, MODULE, &[6, 5, 4, 3, 0, 0, 0, 0]), DONE);
     assert_eq!(write(&mut config, MODULE, &[6, 5, 4, 3, 0, 0, 0, 1]), VALUE);
     config.drop_changes();
+    config.compare();
     assert_eq!(write(&mut config, module_of(2), &[5]), DONE);
     let left: Vec<_> = (0..4).map(|index| config.points(index).is_none()).collect();
     assert_eq!(
@@ -107,6 +108,7 @@ fn settings_by_point_take_effect_together_with_their_module() {
         "edited settings are defaults now and not in force"
     );
     config.drop_changes();
+    config.compare();
     assert_eq!(filter(&config).unwrap(), 7, "the saved value");
     for module in [1, 4] {
         assert_eq!(write(&mut config, MODULE_SLOT, &[module]), DONE);

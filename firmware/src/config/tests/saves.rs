@@ -32,6 +32,7 @@ fn a_save_without_budget_is_refused_unless_it_would_write_nothing() {
         Ok(Some(Command::LoadDefaults))
     );
     config.load_defaults();
+    config.compare();
     assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);
     config.tick(59_999);
     assert_eq!(write(&mut config, COMMAND, &[1]), LOCKED);
