@@ -36,8 +36,8 @@ pub trait Uart {
     /// Turns the driver off and the receiver on.
     fn stop_sending(&mut self);
     /// Turns off the interrupts that no line uses, after an interrupt without a cause: a disturbed bit may have enabled
-    /// one, which would then occur again and again.
-    fn disable_other_interrupts(&mut self);
+    /// one, which would then occur again and again. Returns whether one was enabled.
+    fn disable_other_interrupts(&mut self) -> bool;
     /// Returns whether the driver is off.
     fn driver_is_off(&self) -> bool;
 

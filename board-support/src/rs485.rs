@@ -167,10 +167,15 @@ impl Uart for Rs485 {
     }
 
     #[inline]
-    fn disable_other_interrupts(&mut self) {
+    fn disable_other_interrupts(&mut self) -> bool {
+        /// IDLEIE and PEIE.
+        const OTHERS: u16 = 1 << 4 | 1 << 8;
+        let settings = self.usart.cr1().read().bits();
+        // SAFETY: clears bits of the present settings.
         self.usart
             .cr1()
-            .modify(|_, w| w.idleie().disabled().peie().disabled());
+            .write(|w| unsafe { w.bits(settings & !OTHERS) });
+        settings & OTHERS != 0
     }
 
     #[inline]

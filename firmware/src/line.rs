@@ -63,7 +63,7 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
                 None => self.uart.finish_sending(),
             }
         } else if !U::received(status) {
-            self.uart.disable_other_interrupts();
+            self.repaired |= self.uart.disable_other_interrupts();
         }
         false
     }

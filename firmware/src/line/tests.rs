@@ -77,8 +77,8 @@ impl Uart for FakeUart {
         (self.driver, self.finishing) = (false, false);
     }
 
-    fn disable_other_interrupts(&mut self) {
-        self.others = false;
+    fn disable_other_interrupts(&mut self) -> bool {
+        core::mem::take(&mut self.others)
     }
 
     fn driver_is_off(&self) -> bool {
@@ -287,4 +287,5 @@ fn interrupt_without_a_cause_is_disabled() {
     assert!(bench.line.uart.others);
     assert!(!bench.line.on_uart());
     assert!(!bench.line.uart.others);
+    assert!(bench.pass(1), "it is a repair");
 }

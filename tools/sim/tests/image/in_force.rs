@@ -64,7 +64,7 @@ fn new_rate_and_format_are_in_force_after_the_restart_and_not_before() {
         assert_at(
             turnaround(&mut bench),
             bench.t35(),
-            Time::from_us(60) + bench.bit(),
+            Time::from_us(100) + bench.bit(),
         );
         for _ in 0..10 {
             assert_eq!(
