@@ -7,9 +7,9 @@
 //! | block | checked | a wrong register is |
 //! |---|---|---|
 //! | RS-485 line: USART1 with its pins, TIM2, TIM1 | one row per millisecond, while no reply is being sent | set up with its block by the caller |
-//! | clock enables and resets | one row per millisecond, and first when any other row is wrong | written |
-//! | pins, interrupts, flash | one row per millisecond | written |
-//! | scan timer, radio | one row per millisecond | set up with its block by the caller |
+//! | clocks and resets | one row each time, and first when any other row is wrong | written |
+//! | pins, interrupts, flash | one row each time | written |
+//! | scan timer, radio | one row each time | set up with its block by the caller |
 //!
 //! A register is expected to keep what it returned after the start instead of what was written, because an emulator
 //! or a clone of the part may not keep every bit. Pins and bits that change in operation are not in the table: the
@@ -116,8 +116,8 @@ const LINE: usize = 33;
 const ROWS: usize = 57;
 /// Number of milliseconds after which every row of the line has been checked, one in each.
 const LINE_MS: usize = ROWS - LINE;
-/// Number of milliseconds after which every row has been checked.
-const ROUND_MS: u8 = LINE as u8;
+/// Number of rows outside the line.
+const ROUND: u8 = LINE as u8;
 
 /// Bits 2 to 17 of the address and the compared bits of every row. The peripherals do not use the range of bits 2 to
 /// 17 in which the NVIC lies.
@@ -221,16 +221,19 @@ impl Registers {
         }
     }
 
-    /// Compares the registers of this millisecond, the line's only while no reply is being sent, and repairs those
+    /// Compares a register of the line, unless a reply is being sent, and one of the `others`, and repairs those
     /// that no block owns. Returns what is wrong, if anything. Call this at the highest priority in use.
     #[inline(always)]
-    pub fn check(&mut self, bus: &mut impl Bus, is_sending: bool) -> Option<Wrong> {
-        self.row += 1;
-        if self.row >= ROUND_MS {
-            self.row = 0;
-        }
+    pub fn check(&mut self, bus: &mut impl Bus, is_sending: bool, others: bool) -> Option<Wrong> {
         if !is_sending && self.line_is_wrong(bus) {
             return Some(self.repair(bus, LINE));
+        }
+        if !others {
+            return None;
+        }
+        self.row += 1;
+        if self.row >= ROUND {
+            self.row = 0;
         }
         let row = usize::from(self.row);
         let is_wrong = self.rows.get(row).is_some_and(|row| row.is_wrong(bus));
@@ -240,7 +243,10 @@ impl Registers {
     /// Returns whether the line's register of this millisecond is wrong.
     #[inline(always)]
     fn line_is_wrong(&mut self, bus: &impl Bus) -> bool {
-        self.part = (self.part + 1) % LINE_MS as u8;
+        self.part += 1;
+        if self.part >= LINE_MS as u8 {
+            self.part = 0;
+        }
         let row = self.rows.get(LINE + usize::from(self.part));
         row.is_some_and(|row| row.is_wrong_peripheral(bus))
     }
@@ -350,7 +356,7 @@ mod tests {
     }
 
     fn run(registers: &mut Registers, memory: &mut Memory, ms: u8) -> Vec<Wrong> {
-        let checks = (0..ms).filter_map(|_| registers.check(memory, false));
+        let checks = (0..ms).filter_map(|_| registers.check(memory, false, true));
         checks.collect()
     }
 
@@ -361,9 +367,9 @@ mod tests {
         for (n, row) in recorded.rows.iter().enumerate() {
             let (wrong, ms) = match n {
                 LINE.. => (Wrong::Line, LINE_MS as u8),
-                RADIO.. => (Wrong::Radio, ROUND_MS),
-                SCAN_TIMER.. => (Wrong::ScanTimer, ROUND_MS),
-                _ => (Wrong::Mended, ROUND_MS),
+                RADIO.. => (Wrong::Radio, ROUND),
+                SCAN_TIMER.. => (Wrong::ScanTimer, ROUND),
+                _ => (Wrong::Mended, ROUND),
             };
             for bit in 0..32 {
                 let mut memory = memory.clone();
@@ -394,7 +400,7 @@ mod tests {
             run(&mut registers, &mut memory, LINE_MS as u8),
             [Wrong::Mended]
         );
-        assert_eq!(run(&mut registers, &mut memory, ROUND_MS), []);
+        assert_eq!(run(&mut registers, &mut memory, ROUND), []);
     }
 
     #[test]
@@ -403,14 +409,14 @@ mod tests {
         let mut registers = Registers::record(&memory, true, true);
         let mut unused = Registers::record(&memory, false, false);
         memory.0.insert(USART1 + 0x0C, 0);
-        for _ in 0..ROUND_MS {
-            assert_eq!(registers.check(&mut memory, true), None);
+        for _ in 0..ROUND {
+            assert_eq!(registers.check(&mut memory, true, true), None);
         }
         assert_eq!(
             run(&mut registers, &mut memory, LINE_MS as u8),
             [Wrong::Line]
         );
         memory.0.insert(USART3 + 0x0C, 0);
-        assert_eq!(run(&mut unused, &mut memory, ROUND_MS), []);
+        assert_eq!(run(&mut unused, &mut memory, ROUND), []);
     }
 }

@@ -120,15 +120,16 @@ impl<U: Uart, G: GapTimer> Line<U, G> {
         }
     }
 
-    /// Runs once per millisecond: advances the response delay and repairs a line that does not work. Returns whether
-    /// the line was set up again since the last call.
-    pub fn on_millisecond(&mut self) -> bool {
+    /// Runs once per millisecond: advances the response delay and, when `checks`, repairs a line that does not work.
+    /// Returns whether the line was set up again since the last call.
+    pub fn on_millisecond(&mut self, checks: bool) -> bool {
         self.sending_ms = self.sending_ms.saturating_add(1);
-        if !self.is_sound() {
+        if checks && !self.is_sound() {
             self.repair();
         }
-        self.port.tick();
-        self.start();
+        if self.port.tick() {
+            self.start();
+        }
         core::mem::take(&mut self.repaired)
     }
 

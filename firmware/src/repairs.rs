@@ -4,7 +4,7 @@
 //! which are found one after another. Repairs that follow each other closely therefore count as one.
 
 /// Milliseconds without a repair after which the next repair is a new one: more than one round of the checks.
-const QUIET_MS: u8 = 40;
+const QUIET_MS: u8 = 80;
 /// Number of repairs that may follow each other closely. More mean that repairs do not help.
 const MOST: u8 = 16;
 

@@ -131,11 +131,11 @@ fn a_delayed_reply_starts_after_its_ticks() {
         unit.serve(delay);
         // The request ended within a tick, so the first tick does not count.
         for _ in 0..delay {
-            unit.port.tick();
+            assert!(!unit.port.tick());
             assert_eq!(unit.port.start(), None);
             assert!(unit.port.is_replying());
         }
-        unit.port.tick();
+        assert!(unit.port.tick());
         assert_eq!(unit.sends(), REPLY);
     }
     unit.is_well();
@@ -163,7 +163,7 @@ fn a_reply_is_dropped_and_counted_when_another_frame_begins_before_it() {
             let reply = unit.server.serve(request, &mut unit.registers.tables());
             unit.port.send(reply, delay);
             receive(&mut unit, step == 2);
-            (0..5).for_each(|_| unit.port.tick());
+            (0..5).for_each(|_| _ = unit.port.tick());
             assert_eq!(unit.port.start(), None);
             assert!(!unit.port.is_replying());
             let counters = unit.counters();

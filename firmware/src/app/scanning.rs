@@ -17,7 +17,7 @@ use crate::{
 
 /// Scans per run of the background task, and scans per check that every other task still runs.
 const SCANS_PER_BACKGROUND: u8 = TICK_MS as u8;
-const SCANS_PER_PROOF: u8 = 100;
+const SCANS_PER_PROOF: u8 = 16;
 
 /// The modules and the state of their scans.
 pub struct Scanning {
@@ -29,6 +29,8 @@ pub struct Scanning {
     powered_s: u32,
     background_beat: Every,
     proof_beat: Every,
+    /// The task that was asked for its mark last.
+    asked: usize,
 }
 
 impl Scanning {
@@ -53,6 +55,7 @@ impl Scanning {
             powered_s,
             background_beat: Every::new(SCANS_PER_BACKGROUND),
             proof_beat: Every::new(SCANS_PER_PROOF),
+            asked: 0,
         }
     }
 
@@ -157,18 +160,22 @@ impl Scanning {
             enqueue(events, Event::LineRepaired);
         }
         if self.proof_beat.is_due() {
-            // On a silent line nothing triggers these tasks. Without a cause they only set their marks.
-            for task in [
+            // On a silent line nothing triggers these tasks. Without a cause they only set their marks. One after
+            // another, because a byte waits for all interrupts that are pended together.
+            let mut tasks = [
                 Interrupt::USART1,
                 Interrupt::TIM2,
                 Interrupt::TIM1_CC,
                 Interrupt::USART3,
                 Interrupt::EXTI3,
                 Interrupt::EXTI4,
-            ] {
+            ]
+            .into_iter();
+            self.asked = (self.asked + 1) % tasks.len();
+            if let Some(task) = tasks.nth(self.asked) {
                 rtic::pend(task);
             }
-            // The interrupts have run by now.
+            // An interrupt has run by now.
             alive::end_interrupts(kept::marks());
         }
     }

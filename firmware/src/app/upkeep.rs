@@ -25,6 +25,8 @@ pub fn take_repaired() -> bool {
 pub struct Upkeep {
     registers: Registers,
     repairs: Repairs,
+    /// This millisecond is for the registers outside the line; the next one for the state of the line.
+    others: bool,
 }
 
 impl Upkeep {
@@ -33,6 +35,7 @@ impl Upkeep {
         Self {
             registers: Registers::record(&Part, line, radio),
             repairs: Repairs::default(),
+            others: false,
         }
     }
 
@@ -47,7 +50,9 @@ impl Upkeep {
     #[inline(always)]
     pub fn run(&mut self, line: &mut Option<Line>, scan_timer: &mut ScanTimer) -> bool {
         let is_sending = line.as_ref().is_some_and(Line::is_sending);
-        let wrong = self.registers.check(&mut Part, is_sending);
+        // In turn, because a byte waits for this task.
+        self.others = !self.others;
+        let wrong = self.registers.check(&mut Part, is_sending, self.others);
         let mut repaired = wrong.is_some();
         if wrong == Some(Wrong::ScanTimer) {
             scan_timer.start();
@@ -56,7 +61,7 @@ impl Upkeep {
             if wrong == Some(Wrong::Line) {
                 line.repair();
             }
-            repaired |= line.on_millisecond();
+            repaired |= line.on_millisecond(!self.others);
         } else {
             board_support::disable_driver();
         }

@@ -201,7 +201,9 @@ impl Bench {
 
     /// Returns whether the line was set up again in these milliseconds.
     fn pass(&mut self, ms: u16) -> bool {
-        (0..ms).fold(false, |repaired, _| repaired | self.line.on_millisecond())
+        (0..ms).fold(false, |repaired, _| {
+            repaired | self.line.on_millisecond(true)
+        })
     }
 }
 

@@ -165,11 +165,15 @@ impl<'a, U: Units> Port<'a, U> {
         self.reply = State::Waiting(if delay == 0 { 0 } else { 1 + u32::from(delay) });
     }
 
-    /// Advances the time by a tick.
-    pub const fn tick(&mut self) {
-        if let State::Waiting(ticks) = &mut self.reply {
-            *ticks = ticks.saturating_sub(1);
-        }
+    /// Advances the time by a tick. Returns whether the delay of a reply has passed, so that it may
+    /// [`start`](Self::start).
+    #[inline(always)]
+    pub const fn tick(&mut self) -> bool {
+        let State::Waiting(ticks) = &mut self.reply else {
+            return false;
+        };
+        *ticks = ticks.saturating_sub(1);
+        *ticks == 0
     }
 
     /// Starts a reply whose delay has passed, if there is one, and returns its first character. When another frame is
