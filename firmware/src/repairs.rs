@@ -3,8 +3,9 @@
 //! One disturbance may need several repairs: a block that was reset by a disturbed bit has lost all its registers,
 //! which are found one after another. Repairs that follow each other closely therefore count as one.
 
-/// Milliseconds without a repair after which the next repair is a new one: more than one round of the checks.
-const QUIET_MS: u8 = 80;
+/// Milliseconds without a repair after which the next repair is a new one. After a repair of a clock or a reset the checks
+/// begin at the first row, so all that this disturbance has changed is found within fewer.
+const QUIET_MS: u8 = 40;
 /// Number of repairs that may follow each other closely. More mean that repairs do not help.
 const MOST: u8 = 16;
 
