@@ -189,7 +189,7 @@ fn fails(bench: &mut Bench, register: Register, bit: u32, after: Option<Time>) -
     let upset = bench.board.now();
     let most = bound(bench);
     // The checks find any register in 66 ms. The watchdog needs 667 ms.
-    let end = if may_restart(name, bit) { 700 } else { 110 };
+    let end = if may_restart(name, bit) { 900 } else { 110 };
     while bench.board.now() < upset + most.max(Time::from_ms(end)) {
         bench.board.run_for(Time::from_us(250));
         let now = bench.board.now();
