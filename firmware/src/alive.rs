@@ -6,10 +6,10 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
+use board_support::fault::{ENDED, TASKS};
+
 /// Mark of a task that has begun.
 pub const BEGUN: u8 = 2;
-/// Mark of a task that has finished.
-pub const ENDED: u8 = 1;
 
 /// A task that must set its mark. The interrupts of priority 4 come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +34,6 @@ pub enum Task {
     Background,
 }
 
-/// Number of tasks.
-const TASKS: usize = 9;
 /// Number of tasks that are only marked as begun, because their time is short: the first ones.
 const INTERRUPTS: usize = 5;
 /// Position of [`Task::Serve`]. The tasks before it belong to a line.

@@ -1,7 +1,8 @@
 //! A line: UART, frame-gap timer and port, and its recovery after a disturbance.
 //!
-//! This module does not access hardware: UART and timer are traits of [`board_support::line`]. On the device all of it runs from RAM, so that it continues while flash is erased or
-//! programmed. Functions that are called from here must be in RAM, too (`memory/sections.x`).
+//! This module does not access hardware: UART and timer are traits of [`board_support::line`]. On the device all of it
+//! runs from RAM, so that it continues while flash is erased or programmed. Functions that are called from here must be
+//! in RAM, too (`memory/sections.x`).
 
 use board_support::line::{GapTimer, Silence, Uart};
 use modbus_server::{

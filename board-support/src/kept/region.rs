@@ -15,7 +15,7 @@ use super::{
     COPY, MARKS, PULSES, UPTIME, WORDS, live,
     sealed::{self, ASKED, DIP, FLAGS, FRESH, HAS_DIP, SAVES, STARTED, Sealed},
 };
-use crate::fault::{Fault, Kind, TASKS};
+use crate::fault::{ENDED, Fault, Kind, TASKS};
 
 #[repr(transparent)]
 struct Region(UnsafeCell<[u32; WORDS]>);
@@ -143,8 +143,8 @@ pub fn keep_pulses(slot: usize, pulses: &[u32; 4]) {
 }
 
 /// Returns the marks of the tasks, all 0 after the start. After a watchdog reset the next start reports every task
-/// as missing whose mark is not 1, which means "has run to its end". Each task stores its own mark; the code that
-/// refreshes the watchdog clears all of them.
+/// as missing whose mark is not [`ENDED`]. Each task stores its own mark; the code that refreshes the watchdog clears
+/// all of them.
 #[must_use]
 pub fn marks() -> &'static [AtomicU8; TASKS] {
     // SAFETY: the last words of the region, aligned and long enough. Any byte is a valid `AtomicU8`, and every access
@@ -155,6 +155,6 @@ pub fn marks() -> &'static [AtomicU8; TASKS] {
 /// Returns one bit for each task whose mark does not say that it has run to its end.
 fn missing() -> u16 {
     let marks = marks().iter().map(|mark| mark.load(Ordering::Relaxed));
-    let missing = marks.enumerate().filter(|(_, mark)| *mark != 1);
+    let missing = marks.enumerate().filter(|(_, mark)| *mark != ENDED);
     missing.fold(0, |missing, (task, _)| missing | 1 << task)
 }

@@ -19,7 +19,7 @@ use crate::{board::Device, line::Line, radio::Radio};
 /// The unit address of a broadcast.
 const BROADCAST: u8 = 0;
 
-/// The server of a line, and what belongs to it.
+/// The server of one line, with the settings and the pending command of that line.
 struct Served {
     server: Server,
     line: LineName,

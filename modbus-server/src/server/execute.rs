@@ -221,13 +221,17 @@ fn data(adu: &mut Adu, bytes: &[u8]) {
     adu.extend(bytes);
 }
 
-/// Begins the reply to a read: byte count and as many bytes, at most 250, which are returned.
+/// Makes room for the data of a read, at most 250 bytes, writes the byte count in front of it, and returns the room.
 #[inline(always)]
 fn body(adu: &mut Adu, len: usize) -> &mut [u8] {
-    let from = usize::from(FIELDS) + 1;
-    adu.resize(from + len);
-    adu.set(FIELDS, len as u8);
-    adu.resize(from + len).get_mut(from..).unwrap_or_default()
+    let from = usize::from(FIELDS);
+    match adu.resize(from + 1 + len).get_mut(from..) {
+        Some([count, data @ ..]) => {
+            *count = len as u8;
+            data
+        }
+        _ => &mut [],
+    }
 }
 
 fn read_words(
