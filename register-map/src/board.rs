@@ -100,7 +100,7 @@ const ROWS: [Row; 2] = [
         memory: Memory {
             part: STM32F103RC,
             smaller: None,
-            stack: 9 * KIB,
+            stack: 10 * KIB,
             budget: [48 * KIB, 12 * KIB],
         },
     },
