@@ -28,11 +28,6 @@ impl Default for Ai2Ao2 {
 const OUTPUTS: u8 = 0b1100;
 
 impl IoModule for Ai2Ao2 {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        use Kind::{WordInput, WordOutput};
-        [WordInput, WordInput, WordOutput, WordOutput]
-    }
-
     /// The settings have the same meaning as for [`Ai4`](crate::Ai4) and [`Ao4`](crate::Ao4).
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
         self.inputs.configure(settings);

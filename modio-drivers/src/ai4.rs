@@ -3,7 +3,7 @@
 //! has a pull-up of 10 k to 3.3 V.
 
 use crate::analog_inputs::AnalogInputs;
-use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, ModuleError};
 
 /// Four filtered analog inputs.
 ///
@@ -19,10 +19,6 @@ impl Default for Ai4 {
 }
 
 impl IoModule for Ai4 {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        [Kind::WordInput; CHANNELS]
-    }
-
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
         self.0.configure(settings);
     }

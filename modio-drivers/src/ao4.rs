@@ -26,10 +26,6 @@ impl Default for Ao4 {
 const ALL: u8 = 0b1111;
 
 impl IoModule for Ao4 {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        [Kind::WordOutput; CHANNELS]
-    }
-
     /// Applies range and scale. They also define the meaning of a word that is already in [`Channels`], so the
     /// caller must convert it; see [`output_rescaled`](crate::scale::output_rescaled).
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
@@ -82,7 +78,6 @@ mod tests {
     fn raw_words_are_driven_unchanged_up_to_the_largest_code() {
         let mut link = DacLink::default();
         let mut module = Ao4::default();
-        assert_eq!(module.kinds(), [Kind::WordOutput; 4]);
         module
             .drive_outputs(&words([0, 1, 4095, 4096]), &mut link)
             .unwrap();

@@ -4,7 +4,7 @@ use embedded_hal::digital::InputPin;
 
 use crate::debounce::{DEBOUNCE_DEFAULT_MS, Debounce};
 use crate::digital;
-use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, ModuleError};
 
 /// Four debounced digital inputs.
 ///
@@ -29,10 +29,6 @@ impl<P: InputPin> Di4<P> {
 }
 
 impl<P: InputPin> IoModule for Di4<P> {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        [Kind::BitInput; CHANNELS]
-    }
-
     /// Applies the debounce in [`ChannelSettings::filter`].
     fn configure(&mut self, settings: &[ChannelSettings; CHANNELS]) {
         for (filter, settings) in self.filters.iter_mut().zip(settings) {
@@ -57,6 +53,7 @@ mod tests {
     use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 
     use super::*;
+    use crate::Kind;
 
     /// Returns a line with these levels, one per scan: `true` is energised, which is low.
     fn line(energised: &[bool]) -> Mock {
@@ -86,7 +83,6 @@ mod tests {
             [0, 1, 2, 3].map(|c| channels.bit(c)),
             [true, false, false, true]
         );
-        assert_eq!(module.kinds(), [Kind::BitInput; 4]);
         finish(module);
     }
 

@@ -3,7 +3,7 @@
 use embedded_hal::digital::OutputPin;
 
 use crate::digital;
-use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, ModuleError};
 
 /// Four digital outputs.
 #[derive(Debug)]
@@ -20,10 +20,6 @@ impl<P: OutputPin> Do4<P> {
 }
 
 impl<P: OutputPin> IoModule for Do4<P> {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        [Kind::BitOutput; CHANNELS]
-    }
-
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
     fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {
@@ -62,7 +58,6 @@ mod tests {
             line(&[Low, Low, Low]),
             line(&[High, High, High]),
         ]);
-        assert_eq!(module.kinds(), [Kind::BitOutput; 4]);
         let mut channels = Channels::new();
         channels.set_bit(0, true);
         channels.set_bit(3, true);

@@ -1,6 +1,6 @@
 //! The interface of every module's driver.
 
-use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, Kind};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink};
 
 /// Channels of a module that could not be read or driven. They keep their values and are tried again at every scan.
 /// All other channels have been served.
@@ -66,9 +66,6 @@ impl ModuleError {
 
 /// A plug-in module in its slot.
 pub trait IoModule {
-    /// Returns the kinds of the four channels. They never change while the module is in use.
-    fn kinds(&self) -> [Kind; CHANNELS];
-
     /// Sets how each channel is read or driven, in force from the next scan on. May be called at any time between
     /// two scans. A channel whose settings have not changed is not disturbed: a debounce continues and a filter
     /// keeps its state.
@@ -100,10 +97,6 @@ pub trait IoModule {
 pub struct Absent;
 
 impl IoModule for Absent {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        [Kind::None; CHANNELS]
-    }
-
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
     fn read_inputs(&mut self, _: &mut Channels, _: &Codes) -> Result<(), ModuleError> {

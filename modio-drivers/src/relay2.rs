@@ -5,7 +5,7 @@ use embedded_hal::digital::{InputPin, OutputPin};
 
 use crate::debounce::Debounce;
 use crate::digital;
-use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, Kind, ModuleError};
+use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, ModuleError};
 
 /// Debounce of the mode jumpers, in milliseconds. A jumper is moved by hand, and its contacts bounce for longer
 /// than a switch.
@@ -39,11 +39,6 @@ impl<I: InputPin, O: OutputPin> Relay2<I, O> {
 }
 
 impl<I: InputPin, O: OutputPin> IoModule for Relay2<I, O> {
-    fn kinds(&self) -> [Kind; CHANNELS] {
-        use Kind::{BitInput, BitOutput};
-        [BitInput, BitInput, BitOutput, BitOutput]
-    }
-
     /// There are no settings: the jumpers' debounce is [`JUMPER_DEBOUNCE_MS`].
     fn configure(&mut self, _settings: &[ChannelSettings; CHANNELS]) {}
 
@@ -65,6 +60,7 @@ mod tests {
     use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
 
     use super::*;
+    use crate::Kind;
 
     const BROKEN: MockError = MockError::Io(std::io::ErrorKind::NotConnected);
 
@@ -88,8 +84,6 @@ mod tests {
     #[test]
     fn jumpers_are_read_without_delay_at_the_first_scan_and_do_not_change_coils() {
         let mut module = Relay2::new([jumper(&[true]), jumper(&[false])], [coil(&[]), coil(&[])]);
-        use Kind::{BitInput, BitOutput};
-        assert_eq!(module.kinds(), [BitInput, BitInput, BitOutput, BitOutput]);
         let mut channels = Channels::new();
         channels.set_bit(3, true);
         module.read_inputs(&mut channels, &[None; 4]).unwrap();

@@ -95,7 +95,10 @@ fn the_configuration_matches_the_numbers_written_by_hand() {
             (default, in_force),
             "{first:#06x}"
         );
-        assert!(rule.values.allow_all(good.iter().copied()), "{first:#06x}");
+        assert!(
+            good.iter().all(|value| rule.values.allow(*value)),
+            "{first:#06x}"
+        );
         assert!(
             !bad.iter().any(|value| rule.values.allow(*value)),
             "{first:#06x}"

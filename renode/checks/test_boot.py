@@ -90,7 +90,7 @@ class Board:
         # Addresses as in board.resc.
         self.blocks = {int(address, 16): Peripheral(file, machine) for file, address in models()}
         self.blocks.update({0x40010800: ports["A"], 0x40010C00: ports["B"], 0x40011000: ports["C"]})
-        for address in (0x40000000, 0x40000800, 0x40012C00, 0x40013800):
+        for address in (0x40000000, 0x40000800, 0x40010000, 0x40012C00, 0x40013800):
             self.blocks[address] = Registers()
         # PWR in modio-02.repl: the supply is never too low.
         self.blocks[0x40007000] = Tag()

@@ -90,11 +90,11 @@ pub fn up(
     config.set_saves_left(board.saves_left);
     let points_only = config.air_serves_points_only();
     let radio_config = radio_config.filter(|_| matches!(address, Address::Unit(_)));
-    let installed = config.ports().map(|port| port.module);
+    let installed = *config.modules();
     let on_wire = wire_settings(settings);
 
     let mut sampler = board.sampler;
-    let (mut modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
+    let (modules, analog_outputs) = install(installed, &mut sampler, board.dacs);
     let identity = Identity {
         unit: address.unit().unwrap_or_default(),
         reset_cause: board.reset_cause,
@@ -102,8 +102,7 @@ pub fn up(
         fault: fault_record::words(&board.faults),
         internal_oscillator: !board.clock.is_crystal(),
     };
-    let kinds = modules.each_mut().map(|module| module.driver().kinds());
-    let device = place.write(Device::new(kinds, config, identity, DESCRIPTION));
+    let device = place.write(Device::new(config, identity, DESCRIPTION));
     for (slot, port) in device.points.ports_mut().iter_mut().enumerate() {
         port.set_pulses(kept::pulses(slot));
     }

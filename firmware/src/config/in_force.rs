@@ -1,10 +1,8 @@
 //! The settings in force, as typed values for the rest of the device.
 
 use modio_drivers::{ChannelSettings, LoraSettings, Scale, Signal};
-use register_map::Module;
 use register_map::codes::{Baud, Format, GapRule, Mode};
 use register_map::configuration as at;
-use register_map::points::{self, CHANNELS};
 
 use super::Settings;
 
@@ -85,6 +83,8 @@ pub struct Point {
     /// Output when the line is silent for too long: 0 or 1 for a bit, 0 to 4095 raw for a word; `None` holds the
     /// output.
     pub safe: Option<u16>,
+    /// Output at power-on: 0 or 1 for a bit, 0 to 4095 raw for a word.
+    pub start: u16,
 }
 
 impl Point {
@@ -99,30 +99,7 @@ impl Point {
                 scale: Scale::from_code(get(at::SCALE)).unwrap_or_default(),
             },
             safe: Some(get(at::SAFE)).filter(|safe| *safe != at::HOLD),
-        }
-    }
-}
-
-/// The module of a port and its outputs at power-on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PortConfig {
-    /// The module.
-    pub module: Module,
-    /// START of each channel: 0 or 1 for a bit, 0 to 4095 raw for a word.
-    pub start: [u16; CHANNELS as usize],
-}
-
-impl PortConfig {
-    /// Returns the configuration of a port, 1 to 8.
-    pub(super) fn of(settings: &Settings, port: u16) -> Self {
-        let first = points::of_port(port);
-        let mut start = [0; CHANNELS as usize];
-        for (point, start) in (first..).zip(&mut start) {
-            *start = settings.get(at::START.wrapping_add(point));
-        }
-        Self {
-            module: settings.module(port),
-            start,
+            start: get(at::START),
         }
     }
 }

@@ -34,11 +34,11 @@ use register_map::configuration::{
     COMM_SOURCE, COMM_TIMEOUT, COMMAND, FILTER, FORMAT, KEY, LORA, MODE, MODULE, RESPONSE_DELAY,
     RULES, SAVES,
 };
-use register_map::points::{self, CHANNELS};
+use register_map::points;
 use register_map::state::status;
-use register_map::{Board, Run, runs};
+use register_map::{Board, Module, Run, runs};
 
-pub use in_force::{LineConfig, Point, PortConfig, RadioConfig};
+pub use in_force::{LineConfig, Point, RadioConfig};
 use lock::Lock;
 pub use origin::{LineName, Origin};
 use saves::Saves;
@@ -75,8 +75,8 @@ pub struct Config<const SLOTS: usize> {
     origin: Origin,
     /// The radio serves points and reads only.
     points_only: bool,
-    /// Modules and START values of the ports with slots.
-    ports: [PortConfig; SLOTS],
+    /// The modules in force, by slot.
+    modules: [Module; SLOTS],
     /// The settings that need a restart, with their values at the start.
     started: [u16; RESTARTS],
     /// The stored configuration was damaged or contained rejected values at the start.
@@ -102,8 +102,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
         let points_only = stored.get(LORA) == Lora::PointsOnly.code();
         Self {
             board,
-            ports: array::from_fn(|index| {
-                PortConfig::of(&stored, board.first_port.wrapping_add(index as u16))
+            modules: array::from_fn(|slot| {
+                stored.module(board.first_port.wrapping_add(slot as u16))
             }),
             edited: stored.clone(),
             saved: stored,
@@ -193,7 +193,8 @@ impl<const SLOTS: usize> Config<SLOTS> {
         for run in runs {
             let of_run = values.slice(0, run.count);
             values = values.slice(run.count, u16::MAX);
-            if !run.rule.values.allow_all(of_run.iter()) || !self.suits_the_ports(run, of_run) {
+            let allowed = of_run.iter().all(|value| run.rule.values.allow(value));
+            if !allowed || !self.suits_the_ports(run, of_run) {
                 return Err(Exception::IllegalDataValue);
             }
         }
@@ -302,9 +303,9 @@ impl<const SLOTS: usize> Config<SLOTS> {
     /// anything needs the result.
     pub fn compare(&mut self) {
         self.differences = self.edited.differences(&self.saved);
-        for (index, port) in self.ports.iter().enumerate() {
-            let number = self.board.first_port.wrapping_add(index as u16);
-            if self.edited.module(number) != port.module {
+        for (index, module) in self.modules.iter().enumerate() {
+            let port = self.board.first_port.wrapping_add(index as u16);
+            if self.edited.module(port) != *module {
                 self.left |= 1 << (index & 7);
             }
         }
@@ -417,24 +418,20 @@ impl<const SLOTS: usize> Config<SLOTS> {
         self.board
     }
 
-    /// Returns the modules in force and their outputs at power-on, for every port with a slot, in the order of the
-    /// ports.
+    /// Returns the modules in force, for every port with a slot, in the order of the ports.
     #[must_use]
-    pub const fn ports(&self) -> &[PortConfig; SLOTS] {
-        &self.ports
+    pub const fn modules(&self) -> &[Module; SLOTS] {
+        &self.modules
     }
 
-    /// Returns the settings in force of a port's points, by channel. `index` counts the ports with a slot. Returns
-    /// `None` from a change of the port's MODULE until the restart, even when the change was reverted: the change
-    /// has reset the settings by point to the new module's defaults, so the running module keeps the settings that
-    /// were returned last.
+    /// Returns the settings in force of a point. `index` counts the ports with a slot. Returns `None` from a change of
+    /// the port's MODULE until the restart, even when the change was reverted: the change has reset the settings by
+    /// point to the new module's defaults, so the running module keeps the settings that were returned last.
     #[must_use]
-    pub fn points(&self, index: usize) -> Option<[Point; CHANNELS as usize]> {
+    pub fn point(&self, index: usize, channel: usize) -> Option<Point> {
         let first = points::of_port(self.board.first_port.wrapping_add(index as u16));
         let in_force = self.left >> (index & 7) & 1 == 0;
-        in_force.then(|| {
-            array::from_fn(|channel| Point::of(&self.edited, first.wrapping_add(channel as u16)))
-        })
+        in_force.then(|| Point::of(&self.edited, first.wrapping_add(channel as u16)))
     }
 
     /// Returns COMM_TIMEOUT in milliseconds, up to an hour, or `None` when the communication watchdog is off.

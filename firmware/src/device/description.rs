@@ -127,9 +127,9 @@ fn copy(bytes: &[u8], at: usize, out: &mut slice::IterMut<'_, u8>) {
 /// Returns the end of the document: number and module of each port with a slot.
 #[inline(never)]
 fn ports<const SLOTS: usize>(config: &Config<SLOTS>) -> [[u8; PORT_BYTES]; SLOTS] {
-    let (first, ports) = (config.board().first_port, config.ports());
+    let (first, modules) = (config.board().first_port, config.modules());
     array::from_fn(|index| {
-        let module = ports.get(index).map_or(0, |port| port.module.code());
+        let module = modules.get(index).map_or(0, |module| module.code());
         let [high, low] = module.to_be_bytes();
         [first.wrapping_add(index as u16) as u8, high, low]
     })

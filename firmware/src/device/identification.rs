@@ -42,7 +42,7 @@ pub fn object<'a, const SLOTS: usize>(
         0x80 => serial,
         _ => {
             let slot = usize::from(id.checked_sub(FIRST_MODULE)?);
-            config.ports().get(slot)?.module.name().as_bytes()
+            config.modules().get(slot)?.name().as_bytes()
         }
     })
 }

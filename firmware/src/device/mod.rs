@@ -29,7 +29,7 @@ use core::ops::Range;
 use modbus_server::{
     Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
-use modio_drivers::{CHANNELS, Kind};
+use modio_drivers::CHANNELS;
 use register_map::{codes::Command, configuration, counters, fault, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
@@ -103,14 +103,9 @@ impl<const SLOTS: usize> Device<SLOTS> {
     /// The outputs are set to START. `description` is that of the board.
     #[must_use]
     #[inline(never)]
-    pub fn new(
-        kinds: [[Kind; CHANNELS]; SLOTS],
-        config: Config<SLOTS>,
-        identity: Identity,
-        description: &'static Fixed,
-    ) -> Self {
+    pub fn new(config: Config<SLOTS>, identity: Identity, description: &'static Fixed) -> Self {
         let mut device = Self {
-            points: Points::new(config.board().points().start, kinds),
+            points: Points::new(config.board().points().start, config.modules()),
             state: State::new(config.board(), identity),
             description: Description::new(description, &config),
             comm_watchdog: CommWatchdog::new(),
@@ -122,9 +117,12 @@ impl<const SLOTS: usize> Device<SLOTS> {
             config,
         };
         device.configure_points();
-        let ports = device.points.ports_mut().iter_mut();
-        for (port, config) in ports.zip(device.config.ports()) {
-            port.command_raw(config.start.map(Some));
+        for (index, port) in device.points.ports_mut().iter_mut().enumerate() {
+            for channel in 0..CHANNELS {
+                if let Some(point) = device.config.point(index, channel) {
+                    port.command_raw(channel, point.start);
+                }
+            }
         }
         device
     }
@@ -135,9 +133,10 @@ impl<const SLOTS: usize> Device<SLOTS> {
         self.config.compare();
         self.revision = self.config.revision();
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
-            if let Some(points) = self.config.points(index) {
-                let settings = points.map(|point| point.settings);
-                port.configure(settings, points.map(|point| point.safe));
+            for channel in 0..CHANNELS {
+                if let Some(point) = self.config.point(index, channel) {
+                    port.configure(channel, point);
+                }
             }
         }
     }

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
 use modio_drivers::{CHANNELS, ChannelStatus, Kind, scale};
-use register_map::counters;
+use register_map::{Module, counters};
 
 use super::port::IoPort;
 
@@ -19,10 +19,10 @@ pub struct Points<const SLOTS: usize> {
 impl<const SLOTS: usize> Points<SLOTS> {
     /// Creates points of these kinds by port, from an address on, with every value 0.
     #[must_use]
-    pub fn new(first: u16, kinds: [[Kind; CHANNELS]; SLOTS]) -> Self {
+    pub fn new(first: u16, modules: &[Module; SLOTS]) -> Self {
         Self {
             first,
-            ports: kinds.map(IoPort::new),
+            ports: modules.map(|module| IoPort::new(module.points())),
         }
     }
 

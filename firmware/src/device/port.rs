@@ -3,6 +3,8 @@
 use modio_drivers::{CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, scale};
 use register_map::codes::ModuleState;
 
+use crate::config::Point;
+
 /// The points of one port.
 #[derive(Debug)]
 pub struct IoPort {
@@ -25,7 +27,7 @@ impl IoPort {
     pub fn new(kinds: [Kind; CHANNELS]) -> Self {
         Self {
             kinds,
-            settings: kinds.map(ChannelSettings::default_for),
+            settings: [ChannelSettings::default_for(Kind::None); CHANNELS],
             channels: Channels::new(),
             safe: [None; CHANNELS],
             pulses: [0; CHANNELS],
@@ -34,20 +36,21 @@ impl IoPort {
         }
     }
 
-    /// Applies new settings and SAFE values. Outputs do not change: a commanded word is converted to the new scale.
-    pub fn configure(
-        &mut self,
-        settings: [ChannelSettings; CHANNELS],
-        safe: [Option<u16>; CHANNELS],
-    ) {
-        for (channel, (from, to)) in self.settings.iter().zip(&settings).enumerate() {
-            if self.kinds.get(channel) == Some(&Kind::WordOutput) {
-                let word = scale::output_rescaled(self.channels.word(channel), from, to);
-                self.channels.set_word(channel, word);
-            }
+    /// Applies the settings and SAFE of a channel. The output does not change: a commanded word is converted to the new
+    /// scale.
+    pub fn configure(&mut self, channel: usize, to: Point) {
+        let kind = self.kind(channel);
+        let places = (self.settings.get_mut(channel), self.safe.get_mut(channel));
+        let (Some(settings), Some(safe)) = places else {
+            return;
+        };
+        if kind == Kind::WordOutput {
+            let word = self.channels.word(channel);
+            let word = scale::output_rescaled(word, settings, &to.settings);
+            self.channels.set_word(channel, word);
         }
-        self.settings = settings;
-        self.safe = safe;
+        *settings = to.settings;
+        *safe = to.safe;
     }
 
     /// Returns the settings that were applied last.
@@ -96,25 +99,26 @@ impl IoPort {
         self.failing
     }
 
-    /// Commands outputs with raw values, as SAFE and START have them: 0 or 1 for a bit, 0 to 4095 for a word,
-    /// `None` to leave the output unchanged.
-    pub fn command_raw(&mut self, values: [Option<u16>; CHANNELS]) {
-        let settings = self.settings.iter().zip(&self.kinds);
-        for (channel, (value, (settings, kind))) in values.into_iter().zip(settings).enumerate() {
-            match (kind, value) {
-                (Kind::BitOutput, Some(value)) => self.channels.set_bit(channel, value != 0),
-                (Kind::WordOutput, Some(value)) => self.channels.set_word(
-                    channel,
-                    scale::output_from_raw(Code::new(value), settings.signal, settings.scale),
-                ),
-                _ => {}
+    /// Commands an output with a raw value, as SAFE and START have it: 0 or 1 for a bit, 0 to 4095 for a word.
+    pub fn command_raw(&mut self, channel: usize, value: u16) {
+        match (self.kind(channel), self.setting(channel)) {
+            (Kind::BitOutput, _) => self.channels.set_bit(channel, value != 0),
+            (Kind::WordOutput, Some(settings)) => {
+                let code = Code::new(value);
+                let word = scale::output_from_raw(code, settings.signal, settings.scale);
+                self.channels.set_word(channel, word);
             }
+            _ => {}
         }
     }
 
     /// Sets the outputs to SAFE.
     pub fn go_safe(&mut self) {
-        self.command_raw(self.safe);
+        for (channel, safe) in self.safe.into_iter().enumerate() {
+            if let Some(value) = safe {
+                self.command_raw(channel, value);
+            }
+        }
     }
 
     /// Returns the state of the module.

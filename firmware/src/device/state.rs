@@ -1,7 +1,7 @@
 //! Identity and health: the read-only registers at 0x0200 and the fault record at 0x0260.
 
 use modbus_server::Counters;
-use register_map::{Board, Module, codes::ModuleState, fault, points::PORTS, radio, state as at};
+use register_map::{Board, codes::ModuleState, fault, points::PORTS, radio, state as at};
 
 use super::identification::{self, SERIAL_LEN};
 use super::points::{Points, words_of};
@@ -177,8 +177,8 @@ impl State {
         let slot = |index: u16| usize::from((index + 1).wrapping_sub(config.board().first_port));
         match address.wrapping_sub(at::MODULE_IN_FORCE) {
             index if index < PORTS => {
-                let port = config.ports().get(slot(index));
-                port.map_or(Module::None, |port| port.module).code()
+                let module = config.modules().get(slot(index));
+                module.map_or(0, |module| module.code())
             }
             index if index < 2 * PORTS => {
                 let port = points.ports().get(slot(index - PORTS));

@@ -28,8 +28,8 @@ const CORE_HZ: f64 = 72e6;
 const START: Time = Time::from_ms(150);
 /// Duration of the longest response at 115200 bit/s.
 const LONGEST: Time = Time::from_ms(100);
-/// Time within which the unit starts to answer after t3.5, at any corner.
-const ANSWER: Time = Time::from_us(100);
+/// Time within which the unit starts to answer after t3.5, at any corner: no request keeps it busy for longer.
+const ANSWER: Time = Time::from_ms(1);
 /// Difference between the pauses before the counted runs of a request: not a simple fraction of a millisecond.
 const PAUSE: Time = Time::from_us(137);
 /// More instructions than any measurement needs: the image hangs.
@@ -137,8 +137,7 @@ impl Unit {
     }
 
     fn silence(&self) -> Time {
-        // At the highest rates the unit needs more than two characters to start to answer.
-        self.settings.frame_silence() + self.settings.characters(2) + ANSWER
+        self.settings.frame_silence() + ANSWER
     }
 
     fn received(&mut self) -> Vec<u8> {

@@ -226,7 +226,7 @@ fn settings_take_effect_immediately_or_after_the_restart() {
         (config.comm_timeout_ms(), config.response_delay_ms()),
         (Some(3_600_000), 7)
     );
-    let points = config.points(0).unwrap();
+    let points = [0, 1, 2, 3].map(|channel| config.point(0, channel).unwrap());
     let signals_and_scales = points
         .iter()
         .map(|point| (point.settings.signal, point.settings.scale));
@@ -238,7 +238,6 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     ]));
     assert_eq!(points[0].settings.filter, 4);
     assert_eq!((points[2].safe, points[3].safe), (None, Some(7)));
-    assert_eq!(config.ports()[0].start, [0; 4]);
 
     save(&mut config);
     let restarted = Config::new(&MODIO_02, config.to_save().clone(), false);
@@ -249,7 +248,8 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     );
     let lora = [LORA, LORA_ADDRESS, LORA_CHANNEL].map(|address| restarted.to_save().get(address));
     assert_eq!(lora, [1, 2, 3]);
-    assert_eq!(restarted.ports()[0].start, [0, 0, 8, 0]);
+    let start = [0, 1, 2, 3].map(|channel| restarted.point(0, channel).unwrap().start);
+    assert_eq!(start, [0, 0, 8, 0]);
     assert_eq!(all(&restarted), all(&config));
 }
 

@@ -34,7 +34,7 @@ fn the_module_written_last_determines_the_allowed_values_of_its_points() {
         );
         assert_eq!(read(&config, address, 1).unwrap(), [good]);
     }
-    assert_eq!(config.ports()[0].module, Module::Di4, "until the restart");
+    assert_eq!(config.modules()[0], Module::Di4, "until the restart");
 }
 
 #[test]
@@ -57,12 +57,11 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
     let (settings, rejected) = Settings::load(&MODIO_08, pairs.into_iter());
     assert_eq!(rejected, 0);
     let mut config = crate::config::Config::<4>::new(&MODIO_08, settings, false);
-    let in_force: Vec<_> = config.ports().iter().map(|port| port.module).collect();
     assert_eq!(
-        in_force,
+        *config.modules(),
         [Module::Di4, Module::Ai4, Module::None, Module::Do4]
     );
-    assert_eq!(config.ports()[3].start, [1, 0, 0, 0]);
+    assert_eq!(config.point(3, 0).unwrap().start, 1);
 
     assert_eq!(write(&mut config, KEY, &[OPENING_KEY]), DONE);
     // A write over the points of ports 1 to 4: each is checked against its own module.
@@ -82,7 +81,9 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
     config.drop_changes();
     config.compare();
     assert_eq!(write(&mut config, module_of(2), &[5]), DONE);
-    let left: Vec<_> = (0..4).map(|index| config.points(index).is_none()).collect();
+    let left: Vec<_> = (0..4)
+        .map(|index| config.point(index, 0).is_none())
+        .collect();
     assert_eq!(
         left,
         [false, true, false, false],
@@ -91,7 +92,7 @@ fn every_slot_of_a_board_has_its_own_module_and_settings() {
 }
 
 fn filter(config: &Config) -> Option<u16> {
-    config.points(0).map(|[first, ..]| first.settings.filter)
+    config.point(0, 0).map(|point| point.settings.filter)
 }
 
 #[test]

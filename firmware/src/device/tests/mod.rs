@@ -12,7 +12,7 @@ use std::vec::Vec;
 use modbus_server::line::{Faults, Framing, Port, Receiver};
 use modbus_server::{Adu, Server};
 use modio_drivers::ChannelStatus;
-use modio_drivers::Scale;
+use modio_drivers::{Kind, Scale};
 use register_map::board::{MODIO_02, MODIO_08};
 use register_map::{Board, Module, configuration as at};
 
@@ -60,7 +60,6 @@ impl<const SLOTS: usize> Bench<SLOTS> {
         };
         Self {
             device: Device::new(
-                modules.map(Module::points),
                 Config::new(board, settings, false),
                 identity,
                 if *board == MODIO_02 {
