@@ -15,7 +15,7 @@ use crate::{
     fault::FaultRecord,
     gap::LineTimes,
     kept,
-    pin::{Pin, Port},
+    pin::Pin,
     radio::RadioOff,
     rs485,
     uart::LineSettings,
@@ -169,7 +169,7 @@ pub fn setup(device: pac::Peripherals, scb: &SCB, masked: u8) -> Board {
 
 /// Reads SW01 now, without waiting for a stable value.
 fn read_dip() -> u8 {
-    dip::number(&BOARD.switch, Port::levels())
+    dip::number(&BOARD.switch, Pin::is_high)
 }
 
 /// Reads and clears the reset flags, so that the next start sees only its own flags. After a power-on clears the kept

@@ -64,17 +64,6 @@ pub const PVD_LEVEL: u8 = 0b111;
 /// reset after another.
 pub const CRYSTAL_FAULTS: u8 = 2;
 
-/// Largest error of the internal oscillator, in ppm: -2 to +2.5 % from -40 to 105 degrees Celsius (DS5319
-/// table 24, ACC_HSI, factory-calibrated).
-pub const HSI_ERROR_PPM: u32 = 25_000;
-
-/// Largest error of the other station's baud rate, in ppm: 1 % (MODBUS over Serial Line V1.02, 3.2).
-pub const MASTER_ERROR_PPM: u32 = 10_000;
-
-/// Time by which transceivers and cable may lengthen or shorten a bit, in ns: the skews of two common
-/// transceivers.
-pub const LINE_ASYMMETRY_NS: u32 = 50;
-
 /// Number of polls of the crystal's ready flag before the crystal is given up. One poll takes about ten cycles of
 /// the 8 MHz that the chip starts with, so the limit is about 100 ms; a working crystal needs 2 ms (DS5319 table
 /// 22).

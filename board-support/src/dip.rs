@@ -10,13 +10,11 @@ use crate::{
     pin::Pin,
 };
 
-/// Returns the switch as a number from 0 to 255, given the levels of ports A, B and C. Position 1 is bit 0; a
-/// position that is ON pulls its pin low.
-pub(crate) fn number(switch: &[Pin; 8], levels: [u32; 3]) -> u8 {
+/// Returns the switch as a number from 0 to 255, given access to the levels of its pins. Position 1 is bit 0; a position
+/// that is ON pulls its pin low.
+pub(crate) fn number(switch: &[Pin; 8], is_high: impl Fn(Pin) -> bool) -> u8 {
     let positions = switch.iter().rev();
-    positions.fold(0, |number, pin| {
-        number << 1 | u8::from(!pin.is_high_in(levels))
-    })
+    positions.fold(0, |number, pin| number << 1 | u8::from(!is_high(*pin)))
 }
 
 /// Returns the switch once [`DIP_STABLE_POLLS`] more readings equal the first, calling `wait` between readings. If
@@ -82,22 +80,21 @@ mod tests {
     }
 
     #[test]
-    fn every_position_has_its_own_bit_and_other_pins_are_ignored() {
-        const ALL: u32 = 0xFFFF;
-        let modio_02 = |a, b| number(&modio_02::BOARD.switch, [a, b, ALL]);
-        let modio_08 = |b, c| number(&modio_08::BOARD.switch, [ALL, b, c]);
-        assert_eq!((modio_02(ALL, ALL), modio_08(ALL, ALL)), (0, 0), "all open");
-        for position in 0..4 {
-            assert_eq!(modio_02(ALL & !(1 << (4 + position)), ALL), 1 << position);
-            assert_eq!(modio_08(ALL, ALL & !(1 << (6 + position))), 1 << position);
-            let upper = 1 << (4 + position);
-            assert_eq!(modio_02(ALL, ALL & !(1 << (12 + position))), upper);
-            assert_eq!(modio_08(ALL & !(1 << (12 + position)), ALL), upper);
+    fn every_position_has_its_own_bit() {
+        let on = |switch: &[Pin; 8], low: &[Pin]| number(switch, |pin| !low.contains(&pin));
+        for (switch, lower, upper) in [
+            (
+                &modio_02::BOARD.switch,
+                Pin::a as fn(u8) -> Pin,
+                (Pin::b as fn(u8) -> Pin),
+            ),
+            (&modio_08::BOARD.switch, |n| Pin::c(n + 2), Pin::b),
+        ] {
+            assert_eq!((on(switch, &[]), on(switch, switch)), (0, 255));
+            for position in 0..4 {
+                assert_eq!(on(switch, &[lower(4 + position)]), 1 << position);
+                assert_eq!(on(switch, &[upper(12 + position)]), 16 << position);
+            }
         }
-        assert_eq!(
-            (modio_02(0xFF0F, 0x0FFF), modio_08(0x0FFF, 0xFC3F)),
-            (255, 255)
-        );
-        assert_eq!((modio_02(0x00F0, 0xF000), modio_08(0xF000, 0x03C0)), (0, 0));
     }
 }

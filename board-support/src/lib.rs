@@ -2,7 +2,7 @@
 //!
 //! `board::setup` starts the clocks, reads the DIP switch and returns one `Board` whose fields are the devices.
 //! This is the only crate that uses the HAL. A port to another board is a descriptor in [`boards`]. The parts
-//! without hardware access ([`design`], [`uart`], [`tolerance`], [`gap`], the logic of [`fault`] and of the
+//! without hardware access ([`design`], [`uart`], [`gap`], the logic of [`fault`] and of the
 //! recovery of an I2C bus) are built and tested on the host.
 
 #![no_std]
@@ -17,7 +17,6 @@ pub mod kept;
 pub mod line;
 pub mod pages;
 mod pin;
-pub mod tolerance;
 pub mod uart;
 
 #[cfg(target_os = "none")]

@@ -70,19 +70,6 @@ impl Pin {
             _ => None,
         }
     }
-
-    /// Returns whether the pin is high, given the input registers (IDR) of ports A, B and C.
-    #[cfg(any(target_os = "none", test))]
-    #[must_use]
-    pub(crate) const fn is_high_in(self, levels: [u32; 3]) -> bool {
-        let [a, b, c] = levels;
-        let level = match self.port {
-            Port::A => a,
-            Port::B => b,
-            Port::C => c,
-        };
-        level >> self.number & 1 != 0
-    }
 }
 
 /// Mode of a pin: its four bits in a configuration register (RM0008 9.2.1 and 9.2.2).
@@ -125,11 +112,6 @@ mod registers {
             let block = GPIOA::ptr().wrapping_byte_add(0x400 * self as usize);
             // SAFETY: the registers always exist, and no access to them can violate memory safety.
             unsafe { &*block }
-        }
-
-        /// Returns the input registers of ports A, B and C.
-        pub(crate) fn levels() -> [u32; 3] {
-            [Self::A, Self::B, Self::C].map(|port| port.registers().idr().read().bits())
         }
     }
 

@@ -24,7 +24,9 @@ pub fn outputs_off() {
         return;
     }
     rs485::disable_driver();
-    for line in BOARD.slots.iter().flat_map(|slot| slot.lines) {
-        line.configure(Mode::Floating);
+    for slot in BOARD.slots {
+        for line in slot.lines {
+            line.configure(Mode::Floating);
+        }
     }
 }

@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn recovery_mode_uses_the_factory_line_settings() {
         let configured = LineConfig {
-            baud: register_map::codes::Baud::B115200,
+            baud: 115_200,
             ..LineConfig::FACTORY
         };
         assert_eq!(line(Address::Unit(1), configured), configured);

@@ -87,7 +87,7 @@ const ROWS: [Row; 2] = [
             part: STM32F103CB,
             smaller: Some(STM32F103C8),
             stack: 8 * KIB,
-            budget: [47 * KIB, 9 * KIB],
+            budget: [45 * KIB, 9 * KIB],
         },
     },
     // The larger board with an STM32F103RC: four slots, ports 1 to 4.
@@ -101,7 +101,7 @@ const ROWS: [Row; 2] = [
             part: STM32F103RC,
             smaller: None,
             stack: 10 * KIB,
-            budget: [48 * KIB, 12 * KIB],
+            budget: [46 * KIB, 12 * KIB],
         },
     },
 ];

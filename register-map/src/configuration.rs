@@ -51,11 +51,11 @@ const LORA_MHZ: Value = Value::Number(Unit {
 block! {
     "Configuration", 0x0100..=0x01FF;
 
-    /// Write 0x5A17 to unlock for 60 s. Reads 1 while unlocked
+    /// 0x5A17 unlocks for 60 s. Reads 1 while unlocked
     KEY "KEY": 0x0100 x 1, Value::NUMBER, Rule::now(Values::only(OPENING_KEY), 0);
     /// Speed of the RS-485 line
     BAUD "BAUD": 0x0101 x 1, Value::tens("bit/s", 2), Rule::restart(Values::OneOf(Baud::CODES), 96);
-    /// Data, parity and stop bits. 7 data bits need MODE 1
+    /// Data, parity and stop bits. 7 bits need MODE 1
     FORMAT "FORMAT": 0x0102 x 1, Value::Codes(Format::NAMES), Rule::restart(Values::up_to(6), 0);
     /// Transmission mode
     MODE "MODE": 0x0103 x 1, Value::Codes(Mode::NAMES), Rule::restart(Values::up_to(1), 0);
@@ -63,19 +63,19 @@ block! {
     COMM_TIMEOUT "COMM_TIMEOUT": 0x0104 x 1, Value::tens("s", -1), Rule::now(Values::up_to(36_000), 0);
     /// Pause before a response, beyond t3.5
     RESPONSE_DELAY "RESPONSE_DELAY": 0x0105 x 1, Value::number("ms"), Rule::now(Values::up_to(1000), 0);
-    /// Silence that ends a frame, at least 1.5 characters; 0 = t3.5 by the standard
+    /// Silence that ends a frame; 0 = t3.5 of the standard
     FRAME_GAP "FRAME_GAP": 0x0106 x 1, Value::tens("ms", -1), Rule::restart(Values::range(2, 1000).or(0), 0);
     /// Frames with a gap above t1.5
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
     /// Runs after the response. Reads 0
     COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::range(1, 6).or(0xB007), 0);
-    /// Requests that restart the time of COMM_TIMEOUT
+    /// Requests that restart COMM_TIMEOUT
     COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
-    /// Module in the slot; 0 only for a port without a slot
+    /// Module in the slot
     MODULE "MODULE": 0x0110 x 8, Value::Codes(Module::NAMES), Rule::restart(Values::up_to(Module::LAST), 0);
-    /// Digital input: debounce. Analog input: low-pass over 2^n samples
+    /// Debounce, or low-pass over 2^n samples
     FILTER "FILTER": 0x0120 x 32, Value::number("ms") => Value::NUMBER, FILTER_RULE;
-    /// The LoRa line, which never takes settings by broadcast; 2 is recommended
+    /// The LoRa line; 2 is recommended
     LORA "LORA": 0x0140 x 1, Value::Codes(Lora::NAMES), Rule::restart(Values::up_to(2), 0);
     /// Address of the LoRa module
     LORA_ADDRESS "LORA_ADDRESS": 0x0141 x 1, Value::NUMBER, Rule::restart(Values::ANY, 0);
@@ -85,17 +85,17 @@ block! {
     LORA_AIR_RATE "LORA_AIR_RATE": 0x0143 x 1, Value::Codes(AirRate::NAMES), Rule::restart(Values::up_to(5), 2);
     /// Power on the air
     LORA_POWER "LORA_POWER": 0x0144 x 1, Value::Codes(Power::NAMES), Rule::restart(Values::up_to(3), 0);
-    /// Silence that ends an incomplete LoRa frame
+    /// Silence that ends an incomplete frame
     LORA_FRAME_GAP "LORA_FRAME_GAP": 0x0145 x 1, Value::number("ms"), Rule::restart(Values::range(5, 500), 300);
-    /// NTC constant of an analog input
+    /// Constant of an NTC
     BETA "BETA": 0x0160 x 32, Value::number("K"), Rule::now(Values::range(2000, 5000), 3950);
-    /// Signal of an analog point; an output has a jumper too
+    /// Signal; an output has a jumper too
     RANGE "RANGE": 0x0180 x 32, Value::Codes(codes::SIGNAL_NAMES), RANGE_RULE;
-    /// Number format of an analog point
+    /// Number format
     SCALE "SCALE": 0x01A0 x 32, Value::Codes(codes::SCALE_NAMES), Rule::now(Values::up_to(1), 0);
-    /// Output while the line is silent; words are raw, 0xFFFF = hold
+    /// Output while the line is silent, raw; 0xFFFF = hold
     SAFE "SAFE": 0x01C0 x 32, Value::NUMBER, SAFE_RULE;
-    /// Output at power-on; words are raw
+    /// Output at power-on, raw
     START "START": 0x01E0 x 32, Value::NUMBER, START_RULE;
 }
 

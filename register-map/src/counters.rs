@@ -11,7 +11,7 @@ pub const WORDS: u16 = 2;
 block! {
     "Pulse counters of digital inputs", 0x0300..=0x033F;
 
-    /// Rising edges after debounce. Write 0 to both registers to clear
+    /// Rising edges. Write 0 to both registers to clear
     PULSES "pulses": 0x0300 x 64, Value::LONG, Rule::now(Values::only(0), 0);
 }
 

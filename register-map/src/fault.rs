@@ -22,15 +22,15 @@ block! {
     PROGRAM_COUNTER "program counter": 0x0262 x 2, Value::Opaque, READ;
     /// At the fault; 0 = not known
     LINK_REGISTER "link register": 0x0264 x 2, Value::Opaque, READ;
-    /// Configurable fault status register
+    /// Fault status
     STATUS "CFSR": 0x0266 x 2, Value::Opaque, READ;
-    /// Address whose access failed; 0 = not known
+    /// Of the failed access; 0 = not known
     FAULT_ADDRESS "fault address": 0x0268 x 2, Value::Opaque, READ;
     /// At the fault
     UPTIME "uptime at the fault": 0x026A x 2, Value::long("s"), READ;
-    /// Tasks that hung before a watchdog reset; 0 = only idle
+    /// Tasks that hung; 0 = only idle
     MISSING_TASKS "missing tasks": 0x026C x 1, Value::Bits(TASKS), READ;
-    /// Restarts of a line after lost settings or endless replies
+    /// Repairs of registers and of endless replies
     LINE_REPAIRS "line repairs": 0x026D x 1, Value::NUMBER, READ;
     /// Reads 0
     RESERVED "reserved": 0x026E x 2, Value::NUMBER, READ;

@@ -86,7 +86,7 @@ block! {
     FIRMWARE_VERSION "firmware version": 0x0202 x 1, Value::NUMBER, READ;
     /// Patch level
     FIRMWARE_PATCH "firmware patch level": 0x0203 x 1, Value::NUMBER, READ;
-    /// Version of this map
+    /// This map
     MAP_VERSION "register-map version": 0x0204 x 1, Value::NUMBER, READ;
     /// Board
     BOARD "board": 0x0205 x 1, Value::Codes(&Board::NAMES), READ;
@@ -100,21 +100,21 @@ block! {
     STATUS "status": 0x020A x 1, Value::Bits(status::NAMES), READ;
     /// Least free stack since the start
     STACK_FREE "free stack": 0x020B x 1, Value::number("By"), READ;
-    /// First 32 bits of the commit; 0 = not known
+    /// First 32 bits; 0 = not known
     COMMIT "commit": 0x020C x 2, Value::Opaque, READ;
     /// How the firmware was built
     BUILD "build": 0x020E x 1, Value::Bits(BUILD_NAMES), READ;
-    /// CRC-16 of file 1: the same value means the same registers
+    /// CRC-16 of file 1
     DESCRIPTION_CRC "description CRC": 0x020F x 1, Value::Opaque, READ;
-    /// Module that the unit runs
+    /// It changes at a restart
     MODULE_IN_FORCE "module in force": 0x0210 x 8, Value::Codes(Module::NAMES), READ;
     /// State of the module
     MODULE_STATE "module state": 0x0218 x 8, Value::Codes(ModuleState::NAMES), READ;
-    /// 96 bits, unique
+    /// 96 bits
     UNIQUE_ID "unique device identity": 0x0220 x 6, Value::Opaque, READ;
-    /// Good frames on the bus; line counters wrap
+    /// Good frames; counters wrap
     BUS_MESSAGES "bus messages": 0x0230 x 1, Value::NUMBER, READ;
-    /// Frames with a bad CRC, a bad character or under 3 bytes
+    /// Bad CRC, bad character, or under 3 bytes
     BUS_ERRORS "bus communication errors": 0x0231 x 1, Value::NUMBER, READ;
     /// Exceptions, broadcasts included
     EXCEPTIONS "exceptions sent": 0x0232 x 1, Value::NUMBER, READ;
@@ -126,7 +126,7 @@ block! {
     NAKS "NAK": 0x0235 x 1, Value::NUMBER, READ;
     /// Exceptions 06 sent
     BUSY "busy": 0x0236 x 1, Value::NUMBER, READ;
-    /// Messages lost to a character overrun
+    /// Messages lost by it
     OVERRUNS "character overruns": 0x0237 x 1, Value::NUMBER, READ;
     /// Gaps above t1.5 inside frames
     T15_GAPS "inter-character gaps": 0x0238 x 1, Value::NUMBER, READ;

@@ -69,6 +69,17 @@ impl Values {
             Self::OneOf(values) => values.iter().any(|one| *one == value),
         }
     }
+
+    /// Returns whether the set contains all of these values. Faster than [`Self::allow`] for each of them.
+    #[inline]
+    pub fn allow_all(self, mut values: impl Iterator<Item = u16>) -> bool {
+        let (also, min, max) = match self {
+            Self::Range { min, max } => (min, min, max),
+            Self::RangeOr { also, min, max } => (also, min, max),
+            Self::OneOf(_) => return values.all(|value| self.allow(value)),
+        };
+        values.all(|value| value == also || min <= value && value <= max)
+    }
 }
 
 #[cfg(test)]

@@ -26,11 +26,11 @@ impl Installed {
     fn new(module: Module, slot: &SlotPins, analog: &mut [Option<u8>; 4]) -> Self {
         match module {
             Module::None => Self::None(Absent),
-            Module::Di4 => Self::Di4(Di4::new(slot.inputs())),
-            Module::Do4 => Self::Do4(Do4::new(slot.outputs_low())),
+            Module::Di4 => Self::Di4(Di4::new(slot.digital(4))),
+            Module::Do4 => Self::Do4(Do4::new(slot.digital(0))),
             Module::Relay2 => {
-                let (jumpers, coils) = slot.relay();
-                Self::Relay2(Relay2::new(jumpers, coils))
+                let [jumper1, jumper2, coil1, coil2] = slot.digital(2);
+                Self::Relay2(Relay2::new([jumper1, jumper2], [coil1, coil2]))
             }
             Module::Ai4 => {
                 *analog = slot.analog(4);

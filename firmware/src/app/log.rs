@@ -2,7 +2,7 @@
 //! reads it, further lines are dropped; the firmware never waits. docs/architecture.md describes the lines, and says
 //! why they are text.
 
-use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault, tolerance, uart};
+use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault};
 use firmware::{config, start_up::Address};
 use heapless::String;
 use modio_drivers::ModuleError;
@@ -40,8 +40,6 @@ pub struct Start {
     pub address: Address,
     pub dip: u8,
     pub line: config::LineConfig,
-    /// The line settings as the UART uses them.
-    pub on_wire: uart::LineSettings,
     /// The module of each slot.
     pub modules: [Module; SLOTS],
     pub clock: ClockSource,
@@ -124,7 +122,7 @@ impl Log {
     /// Logs how the device starts.
     pub fn start(&mut self, start: &Start) {
         let format = start.line.format.name();
-        let baud = start.line.baud.bits_per_second();
+        let baud = start.line.baud;
         let mode = match start.line.mode {
             Mode::Rtu => "",
             Mode::Ascii => " ASCII",
@@ -148,10 +146,6 @@ impl Log {
                 "WARN the crystal failed twice: internal oscillator until power-on"
             };
             self.write(&mut Line::of(text));
-            if !tolerance::internal_oscillator_serves(start.on_wire) {
-                let text = "WARN too fast for the internal oscillator at all temperatures";
-                self.write(&mut Line::of(text));
-            }
         }
         match start.address {
             Address::Unit(unit) => self.write(Line::of("unit address ").number(unit.into())),

@@ -3,7 +3,7 @@
 use board_support::{Sampler, boards::SLOTS, kept, pac::Interrupt};
 use firmware::{alive, device::IoPort, leds::TICK_MS};
 use heapless::spsc::Producer;
-use modio_drivers::{DacLink, ModuleError};
+use modio_drivers::{Channels, DacLink, ModuleError};
 use rtic::Mutex;
 
 use crate::{
@@ -68,28 +68,25 @@ impl Scanning {
         events: &mut Producer<'static, Event>,
     ) -> bool {
         let now = clock::millis();
-        // Filled inside the lock: returning the settings from it would copy them once more in every scan.
-        let mut settings = None;
-        let (mut channels, revision, uptime_s, beat, tripped) = device.lock(|device| {
+        let (mut channels, uptime_s, beat, tripped) = device.lock(|device| {
             let passed = now.wrapping_sub(device.state.millis());
             let beat = passed > 0;
             let tripped = beat && device.tick(passed);
-            let ports = device.points.ports().each_ref();
-            let channels = ports.map(|port| *port.channels());
-            // Read under the same lock as the words, because the settings define the units of the words.
+            let ports = device.points.ports();
+            // Under the same lock as the words, because the settings define the units of the words.
             let revision = device.config.revision();
-            if revision != self.revision {
-                settings = Some(ports.map(|port| *port.settings()));
+            if self.revision != revision {
+                self.revision = revision;
+                for (module, port) in self.modules.iter_mut().zip(ports) {
+                    module.driver().configure(port.settings());
+                }
             }
-            let uptime_s = device.state.uptime_s();
-            (channels, revision, uptime_s, beat, tripped)
+            let mut channels = [Channels::new(); SLOTS];
+            for (channels, port) in channels.iter_mut().zip(ports) {
+                *channels = *port.channels();
+            }
+            (channels, device.state.uptime_s(), beat, tripped)
         });
-        self.revision = revision;
-        if let Some(settings) = settings {
-            for (module, settings) in self.modules.iter_mut().zip(&settings) {
-                module.driver().configure(settings);
-            }
-        }
 
         let mut results = [Ok(()); SLOTS];
         let modules = self.modules.iter_mut().zip(&channels);
@@ -106,32 +103,24 @@ impl Scanning {
                     ModuleError::in_either(*result, module.driver().read_inputs(channels, codes));
             }
         }
-        let changed = device.lock(|device| {
+        device.lock(|device| {
             let words = self.revision == device.config.revision();
-            let mut changed = [false; SLOTS];
-            let ports = device.points.ports_mut().iter_mut().zip(&mut changed);
-            let scanned = channels.iter().zip(&results).enumerate();
-            for ((port, changed), (slot, (channels, result))) in ports.zip(scanned) {
+            let ports = device.points.ports_mut().iter_mut().enumerate();
+            for ((slot, port), (channels, result)) in ports.zip(channels.iter().zip(results)) {
                 if beat {
                     port.scanned(channels, words);
                     kept::keep_pulses(slot, port.pulses());
                 }
-                *changed = take_failures(port, *result, beat);
+                if take_failures(port, result, beat) {
+                    let number = BOARD.first_port + slot as u16;
+                    let event = match result {
+                        Ok(()) => Event::ModuleGood(number),
+                        Err(error) => Event::ModuleFails(number, error),
+                    };
+                    enqueue(events, event);
+                }
             }
-            changed
         });
-
-        for ((port, changed), result) in BOARD.ports().zip(changed).zip(results) {
-            if changed {
-                enqueue(
-                    events,
-                    match result {
-                        Ok(()) => Event::ModuleGood(port),
-                        Err(error) => Event::ModuleFails(port, error),
-                    },
-                );
-            }
-        }
         if tripped {
             enqueue(events, Event::CommunicationLost);
         }

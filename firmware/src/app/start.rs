@@ -113,7 +113,6 @@ pub fn up(
         address,
         dip: board.dip,
         line: settings,
-        on_wire,
         modules: installed,
         clock: board.clock,
         reset_cause: board.reset_cause,
@@ -225,7 +224,7 @@ fn longest_reply_us(line: uart::LineSettings, framing: Framing) -> u32 {
 
 fn wire_settings(line: config::LineConfig) -> uart::LineSettings {
     uart::LineSettings {
-        baud: line.baud.bits_per_second(),
+        baud: line.baud,
         format: match line.format {
             Format::F8N2 => uart::Format::N2,
             Format::F8E1 => uart::Format::E1,

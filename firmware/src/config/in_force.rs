@@ -1,7 +1,7 @@
 //! The settings in force, as typed values for the rest of the device.
 
 use modio_drivers::{ChannelSettings, LoraSettings, Scale, Signal};
-use register_map::codes::{Baud, Format, GapRule, Mode};
+use register_map::codes::{Format, GapRule, Mode};
 use register_map::configuration as at;
 
 use super::Settings;
@@ -9,8 +9,8 @@ use super::Settings;
 /// Settings of the RS-485 line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineConfig {
-    /// Baud rate.
-    pub baud: Baud,
+    /// Baud rate, in bit/s.
+    pub baud: u32,
     /// Parity and stop bits.
     pub format: Format,
     /// RTU or ASCII.
@@ -24,7 +24,7 @@ pub struct LineConfig {
 impl LineConfig {
     /// The factory setting: 9600 8N2 RTU. Recovery mode always uses it.
     pub const FACTORY: Self = Self {
-        baud: Baud::B9600,
+        baud: 9600,
         format: Format::F8N2,
         mode: Mode::Rtu,
         frame_gap: None,
@@ -36,7 +36,7 @@ impl LineConfig {
     pub fn of(settings: &Settings) -> Self {
         let get = |address| settings.get(address);
         Self {
-            baud: Baud::from_code(get(at::BAUD)).unwrap_or(Self::FACTORY.baud),
+            baud: u32::from(get(at::BAUD)) * 100,
             format: Format::from_code(get(at::FORMAT)).unwrap_or(Self::FACTORY.format),
             mode: Mode::from_code(get(at::MODE)).unwrap_or(Self::FACTORY.mode),
             frame_gap: Some(get(at::FRAME_GAP)).filter(|gap| *gap != 0),

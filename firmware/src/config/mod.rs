@@ -193,8 +193,7 @@ impl<const SLOTS: usize> Config<SLOTS> {
         for run in runs {
             let of_run = values.slice(0, run.count);
             values = values.slice(run.count, u16::MAX);
-            let allowed = of_run.iter().all(|value| run.rule.values.allow(value));
-            if !allowed || !self.suits_the_ports(run, of_run) {
+            if !run.rule.values.allow_all(of_run.iter()) || !self.suits_the_ports(run, of_run) {
                 return Err(Exception::IllegalDataValue);
             }
         }

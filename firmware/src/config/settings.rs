@@ -34,30 +34,25 @@ impl Settings {
         settings
     }
 
-    /// Returns the settings from a record's pairs of address and value, in any order, and the number of values that
+    /// Returns the settings from a record's pairs of address and value, in ascending order, and the number of values that
     /// this board does not allow and that have their default instead. Unknown addresses are ignored.
     #[must_use]
-    pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)> + Clone) -> (Self, u16) {
+    pub fn load(board: &Board, pairs: impl Iterator<Item = (u16, u16)>) -> (Self, u16) {
         let mut settings = Self::defaults();
         let mut rejected: u16 = 0;
-        // Load the modules first, because they determine which settings by point are allowed.
-        for modules in [true, false] {
-            for (address, value) in pairs.clone() {
-                let Some((rule, _)) = rule_at(RULES, address).filter(|(rule, _)| holds(rule))
-                else {
-                    continue;
-                };
-                let port = port_of(address);
-                if port.is_some() != modules {
-                    continue;
-                }
-                let allowed = rule.values_for(settings.kind_at(address)).allow(value)
-                    && port.is_none_or(|port| takes_module(board, port, value));
-                if allowed {
-                    settings.set(address, value);
-                } else {
-                    rejected = rejected.saturating_add(1);
-                }
+        // Pairs are in ascending order. So the modules, which determine which settings by point are allowed, come before
+        // these.
+        for (address, value) in pairs {
+            let Some((rule, _)) = rule_at(RULES, address).filter(|(rule, _)| holds(rule)) else {
+                continue;
+            };
+            let port = port_of(address);
+            let allowed = rule.values_for(settings.kind_at(address)).allow(value)
+                && port.is_none_or(|port| takes_module(board, port, value));
+            if allowed {
+                settings.set(address, value);
+            } else {
+                rejected = rejected.saturating_add(1);
             }
         }
         // Each of the two may be allowed alone but not in combination.

@@ -85,20 +85,24 @@ impl<const SLOTS: usize> Points<SLOTS> {
             })
     }
 
-    /// Checks that all points of a span exist and have one of these kinds; otherwise exception 02. Returns whether
-    /// one of them that has one of the kinds `needed` cannot be read or driven.
-    fn check_kinds(&self, span: Span, kinds: Kinds, needed: Kinds) -> Result<bool, Exception> {
+    /// Checks that all points of a span exist and have one of these kinds; otherwise exception 02. Exception 04 when one
+    /// of them that has one of the kinds `needed` cannot be read or driven.
+    fn check_kinds(&self, span: Span, kinds: Kinds, needed: Kinds) -> Result<(), Exception> {
         let mut fails = 0;
         // A long span fails at the first address after the last port.
         for index in self.indices(span) {
             match self.place(index) {
                 Some((port, channel)) if kinds.contain(port.kind(channel)) => {
-                    fails |= needed.bit(port.kind(channel)) & port.failing() >> channel;
+                    fails |= needed.0 >> port.kind(channel) as u8 & port.failing() >> channel;
                 }
                 _ => return Err(Exception::IllegalDataAddress),
             }
         }
-        Ok(fails != 0)
+        if fails & 1 == 0 {
+            Ok(())
+        } else {
+            Err(Exception::ServerDeviceFailure)
+        }
     }
 
     /// Checks whether these bit points can be read. Outputs always can: a read returns the commanded value, which
@@ -109,7 +113,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     ///
     /// Exception 02 for points that do not exist, 04 when one of them is an input that cannot be read.
     pub fn check_read_bits(&self, span: Span) -> Result<(), Exception> {
-        answers(self.check_kinds(span, Kinds::BITS, Kinds::INPUTS)?)
+        self.check_kinds(span, Kinds::BITS, Kinds::INPUTS)
     }
 
     /// Checks whether these word points can be read.
@@ -118,7 +122,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     ///
     /// As for [`check_read_bits`](Self::check_read_bits).
     pub fn check_read_words(&self, span: Span) -> Result<(), Exception> {
-        answers(self.check_kinds(span, Kinds::WORDS, Kinds::INPUTS)?)
+        self.check_kinds(span, Kinds::WORDS, Kinds::INPUTS)
     }
 
     /// Checks whether these bit points can be written.
@@ -127,7 +131,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
     ///
     /// Exception 02 for points that do not exist and for inputs, 04 when one of them cannot be driven.
     pub fn check_write_bits(&self, span: Span) -> Result<(), Exception> {
-        answers(self.check_kinds(span, Kinds::BIT_OUTPUTS, Kinds::BIT_OUTPUTS)?)
+        self.check_kinds(span, Kinds::BIT_OUTPUTS, Kinds::BIT_OUTPUTS)
     }
 
     /// Checks whether these word points can be written with these values.
@@ -137,7 +141,10 @@ impl<const SLOTS: usize> Points<SLOTS> {
     /// As for [`check_write_bits`](Self::check_write_bits), and 03 for a value out of range, which is checked after
     /// 02 and before 04.
     pub fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
-        let fails = self.check_kinds(span, Kinds::WORD_OUTPUTS, Kinds::WORD_OUTPUTS)?;
+        let checked = self.check_kinds(span, Kinds::WORD_OUTPUTS, Kinds::WORD_OUTPUTS);
+        if checked == Err(Exception::IllegalDataAddress) {
+            return checked;
+        }
         let allowed = self.indices(span).zip(words.iter()).all(|(index, word)| {
             let place = self.place(index);
             place
@@ -150,7 +157,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
         if !allowed {
             return Err(Exception::IllegalDataValue);
         }
-        answers(fails)
+        checked
     }
 
     /// Reads bit points that the check has accepted.
@@ -229,21 +236,7 @@ impl Kinds {
     }
 
     const fn contain(self, kind: Kind) -> bool {
-        self.bit(kind) != 0
-    }
-
-    /// Returns 1 if the set contains this kind, otherwise 0.
-    const fn bit(self, kind: Kind) -> u8 {
-        self.0 >> kind as u8 & 1
-    }
-}
-
-/// Returns exception 04 when points cannot be read or driven.
-const fn answers(fails: bool) -> Result<(), Exception> {
-    if fails {
-        Err(Exception::ServerDeviceFailure)
-    } else {
-        Ok(())
+        self.0 >> kind as u8 & 1 != 0
     }
 }
 

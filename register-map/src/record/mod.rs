@@ -138,26 +138,11 @@ fn pair([a0, a1, v0, v1]: [u8; 4]) -> (u16, u16) {
     (u16::from_le_bytes([a0, a1]), u16::from_le_bytes([v0, v1]))
 }
 
-/// Returns the number of bytes of a page up to the last one that is not erased. It skips erased bytes by words,
-/// because a start examines whole pages several times.
+/// Returns the number of bytes of a page up to the last one that is not erased.
 #[must_use]
 pub fn used(page: &[u8]) -> usize {
-    let is_used = |byte: &u8| *byte != 0xFF;
-    let (words, rest) = page.as_chunks::<4>();
-    if let Some(last) = rest.iter().rposition(is_used) {
-        return size_of_val(words).saturating_add(last).saturating_add(1);
-    }
-    let Some(word) = words.iter().rposition(|word| *word != [0xFF; 4]) else {
-        return 0;
-    };
-    // Cells whose programming was interrupted may read as erased now and differently a moment ago. In that case the
-    // whole word counts as used.
-    let last = words
-        .get(word)
-        .and_then(|bytes| bytes.iter().rposition(is_used));
-    word.saturating_mul(4)
-        .saturating_add(last.unwrap_or(3))
-        .saturating_add(1)
+    let last = page.iter().rposition(|byte| *byte != 0xFF);
+    last.map_or(0, |last| last.saturating_add(1))
 }
 
 /// Iterates over every valid record of a page with its offset, skipping anything between them.

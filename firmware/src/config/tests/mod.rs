@@ -11,7 +11,7 @@ use std::vec::Vec;
 use super::*;
 use register_map::Module;
 use register_map::board::{MODIO_02, MODIO_08};
-use register_map::codes::{Baud, Format, Scale, Signal};
+use register_map::codes::{Format, Scale, Signal};
 use register_map::configuration::*;
 use register_map::points;
 
@@ -244,7 +244,7 @@ fn settings_take_effect_immediately_or_after_the_restart() {
     let line = LineConfig::of(&restarted.edited);
     assert_eq!(
         (line.baud, line.format, line.frame_gap),
-        (Baud::B115200, Format::F8E1, Some(5))
+        (115_200, Format::F8E1, Some(5))
     );
     let lora = [LORA, LORA_ADDRESS, LORA_CHANNEL].map(|address| restarted.to_save().get(address));
     assert_eq!(lora, [1, 2, 3]);

@@ -155,22 +155,3 @@ fn crystal_that_fails_after_each_start_is_not_used_after_two_faults_until_power_
     assert_eq!(bench.board.hclk(), on_crystal(72_000_000));
     assert!(!bench.status(INTERNAL));
 }
-
-#[test]
-#[ignore = "needs the image: cargo xtask test"]
-fn rate_too_fast_for_the_internal_oscillator_is_logged() {
-    // Format 0 is 8N2, 1 is 8E1.
-    for (baud, code, warned) in [
-        (192, 1, false),
-        (384, 1, true),
-        (2304, 0, false),
-        (4608, 0, true),
-        (9216, 0, true),
-    ] {
-        let mut bench = without_crystal(&[(0x0101, baud), (0x0102, code)]);
-        bench.board.run_for(Time::from_ms(300));
-        let log = bench.board.take_log();
-        let found = log.contains("too fast for the internal oscillator");
-        assert_eq!(found, warned, "{baud}00, format {code}: {log}");
-    }
-}
