@@ -132,7 +132,7 @@ fn answered(code: u8, pdu: &[u8], request: Option<&[u8]>) -> Option<String> {
         0x14 => groups(pdu)?,
         0x2B => {
             let objects = objects(pdu)?.into_iter();
-            let texts = objects.map(|(id, text)| format!("{id:02X} {text:?}"));
+            let texts = objects.map(|(id, text)| format!("{id:02X} \"{text}\""));
             format!("= {}", texts.collect::<Vec<_>>().join(", "))
         }
         _ => return None,
@@ -160,11 +160,13 @@ fn identity(pdu: &[u8]) -> Option<String> {
         (0xFF, identity) => (identity, ", on"),
         _ => (data, ""),
     };
-    let text = str::from_utf8(identity).ok().filter(|text| {
-        let printable = |letter: char| !letter.is_control();
-        !text.is_empty() && text.chars().all(printable)
-    });
-    let identity = text.map_or_else(|| bytes(Framing::Rtu, identity), |text| format!("{text:?}"));
+    let is_text = str::from_utf8(identity)
+        .is_ok_and(|text| !text.is_empty() && !text.contains(char::is_control));
+    let identity = if is_text {
+        format!("\"{}\"", text(identity))
+    } else {
+        bytes(Framing::Rtu, identity)
+    };
     Some(format!("= {identity}{state}"))
 }
 
@@ -187,29 +189,32 @@ fn counted(pdu: &[u8]) -> Option<&[u8]> {
     (data.len() == usize::from(*pdu.get(1)?)).then_some(data)
 }
 
-/// Returns the objects in a response of function 2B/0E (V1.1b3, 6.21), as texts without control characters.
+/// Returns the objects in a response of function 2B/0E (V1.1b3, 6.21) in the form of [`text`].
 #[must_use]
 pub fn objects(pdu: &[u8]) -> Option<Vec<(u8, String)>> {
     let mut rest = pdu.get(7..)?;
     let mut objects = Vec::new();
     for _ in 0..*pdu.get(6)? {
         let (head, data) = rest.split_first_chunk::<2>()?;
-        let (text, after) = data.split_at_checked(head[1].into())?;
-        objects.push((head[0], printable(text)));
+        let (object, after) = data.split_at_checked(head[1].into())?;
+        objects.push((head[0], text(object)));
         rest = after;
     }
     Some(objects)
 }
 
-/// Returns a text that a device sent, with `?` for everything except printable ASCII, letters and digits: other
-/// characters can control a terminal.
-fn printable(text: &[u8]) -> String {
-    let plain = |c: char| match c {
-        ' '..='~' => c,
-        _ if c.is_alphanumeric() => c,
-        _ => '?',
-    };
-    String::from_utf8_lossy(text).chars().map(plain).collect()
+/// Returns a text that a device sent, with escapes such as `\u{1b}` for every character that is not visible: control
+/// characters act on a terminal, and others change the direction of the text after them.
+#[must_use]
+pub fn text(bytes: &[u8]) -> String {
+    let mut shown = String::new();
+    for c in String::from_utf8_lossy(bytes).chars() {
+        match c {
+            '"' | '\'' | '\\' => shown.push(c),
+            _ => shown.extend(c.escape_debug()),
+        }
+    }
+    shown
 }
 
 const fn coil(word: u16) -> &'static str {
@@ -246,14 +251,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texts_of_the_device_identification_have_no_control_characters() {
+    fn texts_of_a_device_have_escapes_for_control_characters() {
         let object = |text: &[u8]| {
             let head = [0x2B, 0x0E, 1, 1, 0, 0, 1, 0, text.len() as u8];
             objects(&[&head, text].concat()).unwrap()[0].1.clone()
         };
         assert_eq!(object("MØ 2 (b)".as_bytes()), "MØ 2 (b)");
-        assert_eq!(object(b"a\x1b[2J\r\n\x9b\0"), "a?[2J????");
-        assert_eq!(object("\u{202E}\u{9B}2J".as_bytes()), "??2J");
+        assert_eq!(object("21 °C \"é\" \\".as_bytes()), "21 °C \"é\" \\");
+        let red = object(b"a\x1b[31m\x07\r\n\x7f\x9b");
+        assert_eq!(red, "a\\u{1b}[31m\\u{7}\\r\\n\\u{7f}\u{FFFD}");
+        let directions = "\u{9B}\u{200F}\u{202E}\u{2066}\u{2028}".as_bytes();
+        let escaped = r"\u{9b}\u{200f}\u{202e}\u{2066}\u{2028}";
+        assert_eq!(object(directions), escaped);
+        // The same texts in responses of functions 2B/0E and 11.
+        let answer = [&[0x2B, 0x0E, 1, 1, 0, 0, 1, 0, 14][..], directions].concat();
+        let shown = response(&answer, None);
+        assert_eq!(shown, format!("encapsulated interface = 00 \"{escaped}\""));
+        let shown = response(
+            &[&[0x11, 4][..], "\u{202E}".as_bytes(), &[0xFF]].concat(),
+            None,
+        );
+        assert_eq!(shown, r#"report server id = "\u{202e}", on"#);
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub const fn function(code: u8) -> Option<&'static str> {
     })
 }
 
-/// Returns the name of an exception, if the standard defines it.
+/// Returns the name of an exception, if the standard defines it. 07 is only in the older reference guide (PI-MBUS-300).
 #[must_use]
 pub const fn exception(code: u8) -> Option<&'static str> {
     Some(match code {
@@ -37,6 +37,7 @@ pub const fn exception(code: u8) -> Option<&'static str> {
         0x04 => "server device failure",
         0x05 => "acknowledge",
         0x06 => "server device busy",
+        0x07 => "negative acknowledge",
         0x08 => "memory parity error",
         0x0A => "gateway path unavailable",
         0x0B => "gateway target device failed to respond",

@@ -31,13 +31,23 @@ fn key(model: &mut Model, code: KeyCode, now: Instant) -> Action {
 }
 
 fn mouse(model: &mut Model, kind: MouseEventKind, at: (u16, u16), now: Instant) -> Action {
+    mouse_on(model, SCREEN, kind, at, now)
+}
+
+fn mouse_on(
+    model: &mut Model,
+    screen: Rect,
+    kind: MouseEventKind,
+    at: (u16, u16),
+    now: Instant,
+) -> Action {
     let mouse = MouseEvent {
         kind,
         column: at.0,
         row: at.1,
         modifiers: KeyModifiers::NONE,
     };
-    event(model, &Event::Mouse(mouse), SCREEN, now)
+    event(model, &Event::Mouse(mouse), screen, now)
 }
 
 fn click(model: &mut Model, at: (u16, u16), now: Instant) -> Action {
@@ -235,7 +245,7 @@ fn any_event_on_any_screen_is_handled() {
                 MouseEventKind::Down(MouseButton::Left),
                 MouseEventKind::ScrollUp,
             ] {
-                mouse(&mut model, kind, at, now);
+                mouse_on(&mut model, screen, kind, at, now);
             }
         }
     }

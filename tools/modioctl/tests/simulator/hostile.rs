@@ -93,6 +93,39 @@ fn an_echo_that_begins_late_and_in_pieces_is_not_mistaken_for_a_unit() {
     }
 }
 
+/// A unit whose identification moves the cursor, changes the colour and rings.
+#[test]
+fn texts_of_a_unit_have_escapes_for_control_characters() {
+    const TEXT: &[u8] = b"\x1b[31m\x07\r\n\x7fA";
+    let unit = serve(|mut master| {
+        let mut bytes = [0; 512];
+        while let Ok(count @ 1..) = master.read(&mut bytes) {
+            let (unit, pdu) = Framing::Rtu.open(&bytes[..count]).unwrap();
+            let length = TEXT.len() as u8;
+            let answer = match pdu[0] {
+                0x11 => [&[0x11, length + 1], TEXT, &[0xFF]].concat(),
+                0x2B => [&[0x2B, 0x0E, 3, 3, 0, 0, 1, 0, length][..], TEXT].concat(),
+                function => vec![function | 0x80, 1],
+            };
+            let frame = Framing::Rtu.frame(0, unit, &answer);
+            master.write_all(&frame).unwrap();
+        }
+    });
+    for (words, is_text) in [
+        ("--trace scan --units 1", true),
+        ("--trace info", true),
+        ("raw 2B 0E 03 00", true),
+        ("raw 11", false),
+    ] {
+        let ran = At::tcp(unit).run(words);
+        assert_eq!(ran.status, 0, "{ran:?}");
+        let shown = r"\u{1b}[31m\u{7}\r\n\u{7f}A";
+        assert_eq!(ran.out.contains(shown), is_text, "{ran:?}");
+        let raw = |c: char| c.is_control() && c != '\n';
+        assert!(!ran.out.contains(raw) && !ran.err.contains(raw), "{ran:?}");
+    }
+}
+
 #[test]
 fn a_unit_behind_an_echo_answers() {
     for delay in [Duration::ZERO, Duration::from_millis(30)] {
