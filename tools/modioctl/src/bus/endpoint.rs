@@ -1,6 +1,9 @@
 //! Address and settings of the unit: from the command line, a file of named endpoints, and the environment.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Duration;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser};
@@ -11,7 +14,7 @@ use super::format::Format;
 use crate::failure::Failure;
 
 /// Possible rates of a line in bit/s.
-pub const RATES: std::ops::RangeInclusive<u32> = 50..=4_000_000;
+pub const RATES: RangeInclusive<u32> = 50..=4_000_000;
 
 /// Connection to the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,15 +90,15 @@ pub struct Options {
     pub port: Option<String>,
 
     /// RTU or ASCII frames over TCP, for gateways in transparent mode [env: MODIO_TCP]
-    #[arg(long, global = true, value_name = "HOST:PORT", group = "where")]
+    #[arg(long, global = true, value_name = "HOST:PORT", group = "where", value_parser = address)]
     pub tcp: Option<String>,
 
     /// Modbus TCP [env: MODIO_MODBUS_TCP]
-    #[arg(long, global = true, value_name = "HOST:PORT", group = "where")]
+    #[arg(long, global = true, value_name = "HOST:PORT", group = "where", value_parser = address)]
     pub modbus_tcp: Option<String>,
 
     /// Baud rate of the serial port in bit/s [default: 9600] [env: MODIO_BAUD]
-    #[arg(long, global = true, value_name = "RATE", value_parser = clap::value_parser!(u32).range(i64::from(*RATES.start())..=i64::from(*RATES.end())))]
+    #[arg(long, global = true, value_name = "RATE", value_parser = baud)]
     pub baud: Option<u32>,
 
     /// Data bits, parity, stop bits [default: 8N2] [env: MODIO_FORMAT]
@@ -115,7 +118,7 @@ pub struct Options {
     pub timeout: Option<Duration>,
 
     /// Number of times to repeat a request [default: 2] [env: MODIO_RETRIES]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=20))]
+    #[arg(long, global = true, value_name = "N", value_parser = retries)]
     pub retries: Option<u8>,
 }
 
@@ -126,6 +129,50 @@ pub enum Mode {
     Rtu,
     /// ASCII.
     Ascii,
+}
+
+fn address(text: &str) -> Result<String, String> {
+    host_and_port(text).map(|_| text.to_owned())
+}
+
+/// Returns host and port of a network address.
+///
+/// # Errors
+///
+/// When the address has no port.
+pub fn host_and_port(address: &str) -> Result<(String, u16), String> {
+    let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
+    match port.parse() {
+        Ok(port) if !host.is_empty() => {
+            let host = host.trim_start_matches('[').trim_end_matches(']');
+            Ok((host.to_owned(), port))
+        }
+        _ => {
+            let host = if host.is_empty() { "192.168.1.5" } else { host };
+            Err(format!("a host with a port is needed, such as {host}:502"))
+        }
+    }
+}
+
+fn baud(text: &str) -> Result<u32, String> {
+    number(text, RATES, "9600")
+}
+
+fn retries(text: &str) -> Result<u8, String> {
+    number(text, 0..=20, "2")
+}
+
+/// Parses a number of this range.
+fn number<T: FromStr + PartialOrd + Display>(
+    text: &str,
+    range: RangeInclusive<T>,
+    example: &str,
+) -> Result<T, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| {
+        let (first, last) = range.into_inner();
+        format!("a number from {first} to {last} is needed, such as {example}")
+    })
 }
 
 fn unit(text: &str) -> Result<u8, String> {
@@ -144,11 +191,11 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     let seconds = text.parse::<f64>().ok();
     let duration = match seconds.map(Duration::try_from_secs_f64) {
         Some(Ok(duration)) => duration,
-        _ => humantime::parse_duration(text).map_err(|error| error.to_string())?,
+        _ => humantime::parse_duration(text).unwrap_or_default(),
     };
     match duration.as_millis() {
         1..=3_600_000 => Ok(duration),
-        _ => Err("a time from 1ms to 1h is needed".to_owned()),
+        _ => Err("a time from 1ms to 1h is needed, such as 200ms".to_owned()),
     }
 }
 
@@ -299,13 +346,21 @@ impl Options {
             .and_then(|matches| Elsewhere::from_arg_matches(&matches));
         elsewhere
             .map(|elsewhere| elsewhere.options)
-            .map_err(|error| first_line(&error.to_string()))
+            .map_err(|error| one_line(&error))
     }
 }
 
-/// Returns the first line of clap's message, without its heading.
-fn first_line(text: &str) -> String {
-    let line = text.lines().next().unwrap_or_default();
+/// Returns clap's message as one line, without its heading and the usage.
+#[must_use]
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let is_about_error = |line: &&str| {
+        let starts = ["Usage:", "For more information"];
+        !starts.iter().any(|start| line.starts_with(start))
+    };
+    let lines = text.lines().take_while(is_about_error).map(str::trim);
+    let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
+    let line = lines.join(" ").replace(" tip: ", "; ");
     line.trim_start_matches("error: ").to_owned()
 }
 
@@ -349,6 +404,50 @@ mod tests {
         assert!(parse(&[("port", "a"), ("tcp", "b:1")]).is_err());
         let seven = parse(&[("port", "a"), ("format", "7E1")]).unwrap();
         assert!(seven.endpoint(None, None).is_err(), "RTU with 7 data bits");
+    }
+
+    #[test]
+    fn a_wrong_value_is_reported_in_one_line_with_an_example() {
+        for (option, value, example) in [
+            (
+                "baud",
+                "abc",
+                "a number from 50 to 4000000 is needed, such as 9600",
+            ),
+            (
+                "baud",
+                "1",
+                "a number from 50 to 4000000 is needed, such as 9600",
+            ),
+            ("retries", "x", "a number from 0 to 20 is needed, such as 2"),
+            (
+                "tcp",
+                "localhost",
+                "a host with a port is needed, such as localhost:502",
+            ),
+            (
+                "modbus-tcp",
+                "a:b",
+                "a host with a port is needed, such as a:502",
+            ),
+            (
+                "tcp",
+                ":502",
+                "a host with a port is needed, such as 192.168.1.5:502",
+            ),
+            (
+                "timeout",
+                "abc",
+                "a time from 1ms to 1h is needed, such as 200ms",
+            ),
+            ("mode", "x", "[possible values: rtu, ascii]"),
+        ] {
+            let wrong = parse(&[(option, value)]).unwrap_err();
+            assert!(wrong.starts_with(&format!("invalid value '{value}' for '--{option}")));
+            assert!(wrong.ends_with(example), "{wrong}");
+            assert_eq!(wrong.lines().count(), 1, "{wrong}");
+        }
+        assert!(parse(&[("modbus-tcp", "[::1]:502")]).is_ok());
     }
 
     #[test]

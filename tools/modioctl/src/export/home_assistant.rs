@@ -7,8 +7,9 @@
 use modio_description::Table;
 use serde::Serialize;
 
-use super::{Line, Scaling, Source, host_and_port, identifier, no_ascii_over_tcp, plain, power};
+use super::{Line, Scaling, Source, identifier, no_ascii_over_tcp, plain, power};
 use crate::bus::adu::Framing;
+use crate::bus::endpoint::host_and_port;
 use crate::bus::{Endpoint, Place};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
@@ -222,7 +223,7 @@ fn entities(hub: &mut Hub, source: &Source, unit: Unit<'_>) -> Vec<Number> {
 
 fn connection(endpoint: &Endpoint) -> Result<Connection, Failure> {
     let network = |r#type, address: &str| {
-        let (host, port) = host_and_port(address)?;
+        let (host, port) = host_and_port(address).map_err(Failure::usage)?;
         Ok(Connection::Network { r#type, host, port })
     };
     match &endpoint.place {

@@ -198,23 +198,6 @@ fn identifier(name: &str) -> String {
     words.join("_").to_ascii_lowercase()
 }
 
-/// Returns host and port of a network address.
-///
-/// # Errors
-///
-/// When the address has no port.
-fn host_and_port(address: &str) -> Result<(String, u16), Failure> {
-    let parts = address.rsplit_once(':');
-    let parsed = parts.and_then(|(host, port)| Some((host, port.parse().ok()?)));
-    let (host, port) = parsed.ok_or_else(|| {
-        Failure::usage(format!(
-            "{address:?} is not an address with a port; give one such as 192.168.1.5:502"
-        ))
-    })?;
-    let host = host.trim_start_matches('[').trim_end_matches(']');
-    Ok((host.to_owned(), port))
-}
-
 /// Returns an error for ASCII frames over TCP, which a system cannot use.
 fn no_ascii_over_tcp(system: &str, endpoint: &Endpoint) -> Result<(), Failure> {
     let ascii = endpoint.framing == Framing::Ascii;

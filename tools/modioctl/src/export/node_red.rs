@@ -7,9 +7,10 @@
 use modio_description::Table;
 use serde_json::{Value as Json, json};
 
-use super::{Line, Scaling, Source, host_and_port, identifier, no_ascii_over_tcp, plain};
+use super::{Line, Scaling, Source, identifier, no_ascii_over_tcp, plain};
 use crate::bus::Place;
 use crate::bus::adu::Framing;
+use crate::bus::endpoint::host_and_port;
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
 use crate::value::quantities;
@@ -122,7 +123,7 @@ fn client(line: Line<'_>, id: &str, name: &str) -> Result<Json, Failure> {
             }
         }
         Place::Tcp(address) | Place::ModbusTcp(address) => {
-            let (host, port) = host_and_port(address)?;
+            let (host, port) = host_and_port(address).map_err(Failure::usage)?;
             client["tcpHost"] = json!(host);
             client["tcpPort"] = json!(port.to_string());
             if endpoint.framing == Framing::Rtu {
