@@ -4,15 +4,18 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
+use register_map::codes::{Baud, Format};
 
 use crate::bus::Options;
 use crate::bus::endpoint::{RATES, duration};
+use crate::names::port_number;
 
 /// Finds, sets up and watches modio units over Modbus
 #[derive(Parser, Debug)]
 #[command(name = "modioctl", version, max_term_width = 100)]
 #[command(after_help = "\
-Exit status: 0 done; 1 the unit refused; 2 wrong usage; 3 no answer; 4 garbled answers; 5 the port cannot be opened.
+Exit status: 0 done; 1 the unit refused; 2 wrong usage; 3 no answer; 4 garbled answers; 5 the port cannot be opened; \
+130 stopped with Ctrl-C.
 
 Options of the endpoint may also stand in the environment (MODIO_PORT, MODIO_BAUD, ...), or under a name in a file:
 `--at office` takes those of [office] in endpoints.toml, where the system keeps settings (Linux: ~/.config/modio/).")]
@@ -103,7 +106,8 @@ pub struct Scan {
     /// Rates to try in bit/s, such as 9600,19200, or all; default: that of the endpoint
     #[arg(long, value_name = "LIST", value_parser = rates)]
     pub rates: Option<Rates>,
-    /// Formats to try, such as 8N2,8E1, or all; default: that of the endpoint
+    /// Formats to try, such as 8N2,8E1, or all; default: that of the endpoint. Those with 7 data bits are tried in ASCII
+    /// mode
     #[arg(long, value_name = "LIST", value_parser = formats)]
     pub formats: Option<Formats>,
 }
@@ -136,11 +140,9 @@ fn units(text: &str) -> Result<Units, String> {
 }
 
 fn rates(text: &str) -> Result<Rates, String> {
-    let all = register_map::codes::Baud::ALL;
     if text == "all" {
-        return Ok(Rates(
-            all.iter().map(|baud| baud.bits_per_second()).collect(),
-        ));
+        let all = Baud::ALL.iter();
+        return Ok(Rates(all.map(|baud| baud.bits_per_second()).collect()));
     }
     let each = text.split(',').map(|part| part.trim().parse::<u32>());
     let rates = each.collect::<Result<Vec<_>, _>>();
@@ -153,12 +155,11 @@ fn rates(text: &str) -> Result<Rates, String> {
 }
 
 fn formats(text: &str) -> Result<Formats, String> {
-    let text = if text == "all" {
-        "8N2,8E1,8O1,8N1"
-    } else {
-        text
+    let names: Vec<_> = match text {
+        "all" => Format::NAMES.iter().map(|(_, name)| *name).collect(),
+        text => text.split(',').map(str::trim).collect(),
     };
-    let each = text.split(',').map(|part| part.trim().parse());
+    let each = names.into_iter().map(str::parse);
     Ok(Formats(each.collect::<Result<_, _>>()?))
 }
 
@@ -199,12 +200,17 @@ fn assignment(text: &str) -> Result<(String, String), String> {
 pub enum Module {
     /// Set the module, save, restart and check the result
     Set {
-        /// The port of the slot, 1 to 8
-        #[arg(id = "slot", value_name = "PORT", value_parser = clap::value_parser!(u8).range(1..=8))]
+        /// The port of the slot, such as p5 or 5
+        #[arg(id = "slot", value_name = "PORT", value_parser = port)]
         port: u8,
         /// The module: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
         module: String,
     },
+}
+
+fn port(text: &str) -> Result<u8, String> {
+    let port = port_number(text).filter(|port| (1..=8).contains(port));
+    port.ok_or_else(|| "a port is 1 to 8, such as p5 or 5".to_owned())
 }
 
 /// The unit's settings.
@@ -232,11 +238,17 @@ pub enum Config {
     Export {
         /// The file; without it, print on standard output
         file: Option<PathBuf>,
+        /// Overwrite an existing file
+        #[arg(long)]
+        force: bool,
     },
-    /// Check all settings of a file, then write and save them
+    /// Check all settings of a file, show those that change, then write and save them
     Import {
         /// A file that `config export` wrote
         file: PathBuf,
+        /// Do not ask before the module of a port changes
+        #[arg(long)]
+        yes: bool,
         /// Restart the unit afterwards if a setting needs it
         #[arg(long)]
         restart: bool,
@@ -305,9 +317,12 @@ pub struct Raw {
 /// Show the frames of other devices on the line.
 #[derive(Args, Debug)]
 pub struct Sniff {
-    /// Write a capture file (pcapng) for Wireshark as well; an existing file is overwritten
+    /// Write a capture file (pcapng) for Wireshark as well
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// Overwrite an existing file
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Write a configuration of another system for the unit.
@@ -323,9 +338,12 @@ pub struct Export {
     /// Name of the line, in front of the names of its units; needed when the system has other lines with modio units
     #[arg(long, value_name = "NAME", value_parser = line_name)]
     pub name: Option<String>,
-    /// Write to this file instead of standard output; an existing file is overwritten
+    /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Overwrite an existing file
+    #[arg(long)]
+    pub force: bool,
 }
 
 fn line_name(text: &str) -> Result<String, String> {
@@ -388,6 +406,14 @@ mod tests {
     }
 
     #[test]
+    fn a_port_is_a_number_with_or_without_p() {
+        assert_eq!([port("p5"), port("P5"), port("5")], [Ok(5), Ok(5), Ok(5)]);
+        for wrong in ["", "p", "0", "9", "p9", "pp5", "p5.1"] {
+            assert!(port(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
     fn lists_of_units_are_parsed() {
         assert_eq!(units("3,1-2,2"), Ok(Units(vec![1, 2, 3])));
         for wrong in ["", "0", "248", "5-3", "1-", "x"] {
@@ -395,6 +421,6 @@ mod tests {
         }
         assert_eq!(rates("all").unwrap().0.len(), 11);
         assert!(rates("9600,x").is_err());
-        assert_eq!(formats("all").unwrap().0.len(), 4);
+        assert_eq!(formats("all").unwrap().0.len(), 7);
     }
 }

@@ -191,9 +191,33 @@ impl Book {
     }
 }
 
-/// Returns a name in the form in which names are compared.
+/// Returns a name in the form in which names are compared. `5.1` is `p5.1`.
 fn slug(name: &str) -> String {
-    name.trim().to_lowercase().replace([' ', '-'], "_")
+    let name = name.trim().to_lowercase().replace([' ', '-'], "_");
+    match name.split_once('.') {
+        Some((port, _)) if port.parse::<u8>().is_ok() => format!("p{name}"),
+        _ => name,
+    }
+}
+
+/// Returns the number of a port: `p5` or `5`.
+#[must_use]
+pub fn port_number(text: &str) -> Option<u8> {
+    text.strip_prefix(['p', 'P']).unwrap_or(text).parse().ok()
+}
+
+/// Returns the port in a name such as `p5.1.filter` or `5.module`.
+#[must_use]
+pub fn port_of(name: &str) -> Option<u8> {
+    port_number(name.trim().split_once('.')?.0)
+}
+
+/// Lists the ports with a slot, for people.
+#[must_use]
+pub fn slots(description: &Description) -> String {
+    let ports = description.ports.iter();
+    let ports: Vec<_> = ports.map(|port| port.number.to_string()).collect();
+    ports.join(", ")
 }
 
 fn unknown(address: u16) -> Item {
@@ -341,6 +365,8 @@ mod tests {
         let address = |name| book.find(name).map(|item| (item.address, item.words));
         assert_eq!(address("p5.1"), Ok((0x10, 1)));
         assert_eq!(address("P5.4.SAFE"), Ok((0x1D3, 1)));
+        assert_eq!(address("5.1"), address("p5.1"));
+        assert_eq!(address("5.4.safe"), address("p5.4.safe"));
         assert_eq!(address("baud"), Ok((0x101, 1)));
         assert_eq!(address("reset cause"), Ok((0x207, 1)));
         assert_eq!(address("reset_cause"), Ok((0x207, 1)));

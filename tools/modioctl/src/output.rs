@@ -1,7 +1,9 @@
-//! Standard output. When the reader closes it, as `head` does, the program ends without an error message.
+//! Standard output and files. When the reader closes it, as `head` does, the program ends without an error message.
 
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write, stdout};
+use std::fs::File;
+use std::io::{self, ErrorKind, Write, stdout};
+use std::path::Path;
 
 use crate::failure::Failure;
 
@@ -44,4 +46,93 @@ pub fn table<const COLUMNS: usize>(rows: &[[String; COLUMNS]]) -> Result<(), Fai
         column.set_padding((0, 2));
     }
     line(format_args!("{}", table.trim_fmt()))
+}
+
+/// Creates a file. Overwrites an existing one only with `force`. A device or a pipe is no existing file.
+///
+/// # Errors
+///
+/// When the file exists or cannot be created.
+pub fn create(path: &Path, force: bool) -> Result<File, Failure> {
+    if path.is_file() && !force {
+        return Err(Failure::usage(format!(
+            "{} exists: choose another name, or overwrite it with --force",
+            path.display()
+        )));
+    }
+    File::create(path).map_err(|error| not_written(path, &error))
+}
+
+/// Writes a text to a file, and reports that on standard error; or prints the text if no file is given.
+///
+/// # Errors
+///
+/// When the file exists, or the text cannot be written.
+pub fn save(text: &str, path: Option<&Path>, force: bool) -> Result<(), Failure> {
+    let Some(path) = path else {
+        return line(format_args!("{}", text.trim_end()));
+    };
+    let written = create(path, force)?.write_all(text.as_bytes());
+    written.map_err(|error| not_written(path, &error))?;
+    eprintln!("modioctl: wrote {}", path.display());
+    Ok(())
+}
+
+/// Returns the failure for a file that cannot be written.
+pub fn not_written(path: &Path, error: &io::Error) -> Failure {
+    Failure::usage(format!("cannot write {}: {error}", path.display()))
+}
+
+/// Returns a text as a field of a CSV file (RFC 4180). A text that a spreadsheet would calculate gets `'` in front; a
+/// number stays a number.
+#[must_use]
+pub fn csv_field(text: &str) -> String {
+    let is_number = text.parse().is_ok_and(f64::is_finite);
+    let is_formula = text.len() > 1 && text.starts_with(['=', '+', '-', '@']) && !is_number;
+    let field = if is_formula {
+        format!("'{text}")
+    } else {
+        text.to_owned()
+    };
+    if field.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_field_quotes_formulas_and_leaves_numbers() {
+        for (text, field) in [
+            ("-12.5", "-12.5"),
+            ("-", "-"),
+            ("plain", "plain"),
+            ("=1+1", "'=1+1"),
+            ("+1-1", "'+1-1"),
+            ("-inf", "'-inf"),
+            ("@SUM(A1,A2)", "\"'@SUM(A1,A2)\""),
+            ("a \"b\"", "\"a \"\"b\"\"\""),
+            ("-12,5", "\"'-12,5\""),
+        ] {
+            assert_eq!(csv_field(text), field);
+        }
+    }
+
+    #[test]
+    fn existing_file_is_overwritten_only_with_force() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("unit.toml");
+        save("1\n", Some(&path), false).unwrap();
+        let error = save("2\n", Some(&path), false).unwrap_err();
+        assert_eq!(error.status(), 2);
+        assert!(error.to_string().contains("--force"), "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "1\n");
+        save("2\n", Some(&path), true).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "2\n");
+        assert!(create(folder.path(), true).is_err(), "a folder");
+    }
 }

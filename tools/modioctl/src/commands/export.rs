@@ -1,7 +1,5 @@
 //! `modioctl export`.
 
-use std::path::Path;
-
 use crate::cli::Export;
 use crate::device::{Device, fetch};
 use crate::export::{Line, Source, text};
@@ -36,10 +34,7 @@ pub async fn run(device: &mut Device, options: &Export) -> Result<(), Failure> {
             units: &units,
         },
     )?;
-    match options.output.as_deref() {
-        None => output::line(format_args!("{}", text.trim_end())),
-        Some(path) => write(path, &text),
-    }
+    output::save(&text, options.output.as_deref(), options.force)
 }
 
 /// Learns the names of the unit.
@@ -51,9 +46,4 @@ async fn source(device: &mut Device) -> Result<Source, Failure> {
         book: learned.book,
         source: learned.source,
     })
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text)
-        .map_err(|error| Failure::usage(format!("cannot write {}: {error}", path.display())))
 }

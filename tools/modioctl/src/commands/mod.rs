@@ -23,6 +23,7 @@ use crate::cli::{Cli, Command};
 use crate::device::Device;
 use crate::failure::Failure;
 use crate::{monitor, output, trace};
+use config::Note;
 
 /// Exit status of a program that Ctrl-C has ended, as shells define it.
 const INTERRUPTED: u8 = 130;
@@ -45,28 +46,32 @@ pub async fn run(mut cli: Cli) -> Result<ExitCode, Failure> {
         return Ok(if complete {
             ExitCode::SUCCESS
         } else {
-            stopped()
+            stopped("")
         });
     }
+    let note = Note::default();
     tokio::select! {
         // Ctrl-C is handled before the command begins.
         biased;
         _ = tokio::signal::ctrl_c() => Ok(if until_stopped {
             ExitCode::SUCCESS
         } else {
-            stopped()
+            stopped(&note.borrow())
         }),
-        result = dispatch(cli) => result.map(|()| ExitCode::SUCCESS),
+        result = dispatch(cli, &note) => result.map(|()| ExitCode::SUCCESS),
     }
 }
 
-/// Reports that Ctrl-C has ended the command. Returns the exit status.
-fn stopped() -> ExitCode {
-    eprintln!("modioctl: stopped");
+/// Reports that Ctrl-C has ended the command, and what it had done. Returns the exit status.
+fn stopped(note: &str) -> ExitCode {
+    match note {
+        "" => eprintln!("modioctl: stopped"),
+        note => eprintln!("modioctl: stopped: {note}"),
+    }
     ExitCode::from(INTERRUPTED)
 }
 
-async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
+async fn dispatch(mut cli: Cli, note: &Note) -> Result<(), Failure> {
     let json = cli.json;
     // These commands need no unit.
     match cli.command {
@@ -100,7 +105,7 @@ async fn dispatch(mut cli: Cli) -> Result<(), Failure> {
         Command::Read(options) => read::run(&mut device, &options, json).await,
         Command::Write(options) => write::run(&mut device, &options).await,
         Command::Module(options) => module::run(device, options).await,
-        Command::Config(options) => config::run(device, options, json).await,
+        Command::Config(options) => config::run(device, options, json, note).await,
         Command::Watch(options) => watch::run(device, &options).await,
         Command::Raw(options) => raw::run(&mut device, &options).await,
         Command::Describe => describe::run(&mut device, json).await,

@@ -5,6 +5,7 @@ use register_map::{points, state};
 use crate::cli::Module;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
+use crate::names::slots;
 use crate::output;
 use crate::value::{parse, show};
 
@@ -21,15 +22,10 @@ pub async fn run(mut device: Device, options: Module) -> Result<(), Failure> {
     let book = fetch(&mut device).await?.book;
     let description = book.of_modio()?;
     if !description.ports.iter().any(|known| known.number == port) {
-        let ports: Vec<_> = description
-            .ports
-            .iter()
-            .map(|port| port.number.to_string())
-            .collect();
         return Err(Failure::usage(format!(
             "port {port} has no slot: {} has slots at {}",
             description.board,
-            ports.join(", ")
+            slots(description)
         )));
     }
     let item = book.find(&format!("p{port}.module"))?;

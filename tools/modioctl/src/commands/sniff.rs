@@ -1,8 +1,7 @@
 //! `modioctl sniff`.
 
 use std::fs::File;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use chrono::{DateTime, Local, SecondsFormat};
@@ -15,8 +14,9 @@ use crate::bus::{Direction, Endpoint, Place, Stream, decode, is_pseudo_terminal}
 use crate::cli::Sniff;
 use crate::device::place;
 use crate::failure::Failure;
+use crate::output::{self, not_written};
 use crate::sniff::{Kind, Piece, Splitter};
-use crate::{output, trace};
+use crate::trace;
 
 /// Silence after which an incomplete RTU frame counts as garbled, in addition to the time of some characters. USB
 /// adapters deliver bytes in batches, 16 ms apart and more.
@@ -43,7 +43,12 @@ pub async fn run(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<(),
         Framing::Ascii => ASCII_IDLE,
         Framing::Rtu | Framing::Mbap => BATCH + endpoint.time_of(12),
     };
-    eprintln!("modioctl: listening at {}; Ctrl-C stops", place(endpoint));
+    let record = options.record.as_deref();
+    let record = record.map_or_else(String::new, |path| format!(", writing {}", path.display()));
+    eprintln!(
+        "modioctl: listening at {}{record}; Ctrl-C stops",
+        place(endpoint)
+    );
     let mut chunk = [0; 512];
     loop {
         let read = if splitter.is_empty() {
@@ -97,8 +102,8 @@ impl Printer {
     fn new(endpoint: &Endpoint, options: &Sniff, json: bool) -> Result<Self, Failure> {
         let record = options.record.as_deref().map(|path| {
             let program = concat!("modioctl ", env!("CARGO_PKG_VERSION"));
-            let recorder =
-                File::create(path).and_then(|file| Recorder::new(file, program, &place(endpoint)));
+            let file = output::create(path, options.force)?;
+            let recorder = Recorder::new(file, program, &place(endpoint));
             let recorder = recorder.map_err(|error| not_written(path, &error))?;
             Ok((recorder, path.to_owned()))
         });
@@ -140,13 +145,6 @@ impl Printer {
         }
         Ok(())
     }
-}
-
-fn not_written(path: &Path, error: &io::Error) -> Failure {
-    Failure::usage(format!(
-        "cannot write the capture file {}: {error}",
-        path.display()
-    ))
 }
 
 fn milliseconds(time: Duration) -> f64 {

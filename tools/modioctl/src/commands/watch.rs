@@ -8,7 +8,7 @@ use crate::cli::Watch;
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Book, Item};
-use crate::output;
+use crate::output::{self, csv_field};
 use crate::value::{Shown, show};
 
 /// Prints values until it is stopped. Waits for a unit that is lost.
@@ -19,7 +19,7 @@ use crate::value::{Shown, show};
 pub async fn run(mut device: Device, options: &Watch) -> Result<(), Failure> {
     let items = chosen(&fetch(&mut device).await?.book, &options.names)?;
     if options.csv {
-        let names: Vec<_> = items.iter().map(|item| item.name.as_str()).collect();
+        let names: Vec<_> = items.iter().map(|item| csv_field(&item.name)).collect();
         output::line(format_args!("time,{}", names.join(",")))?;
     }
     let mut ticks = interval(options.every);
@@ -94,7 +94,7 @@ fn print(
 ) -> Result<(), Failure> {
     let time = now.to_rfc3339_opts(SecondsFormat::Millis, false);
     if options.csv {
-        let values: Vec<_> = shown.iter().map(|shown| quoted(&shown.text)).collect();
+        let values: Vec<_> = shown.iter().map(|shown| csv_field(&shown.text)).collect();
         return output::line(format_args!("{time},{}", values.join(",")));
     }
     let both = items.iter().zip(shown);
@@ -113,13 +113,4 @@ fn print(
         now.format("%H:%M:%S%.3f"),
         values.join("   ")
     ))
-}
-
-/// Returns a field of a CSV file (RFC 4180).
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
 }

@@ -6,6 +6,7 @@ use super::{Line, Scaling, plain};
 use crate::failure::Failure;
 use crate::listing::values;
 use crate::names::Item;
+use crate::output::csv_field;
 use crate::value::{table_name, unit_name};
 
 const HEAD: &str = "name,address,table,function,words,type,scale,offset,unit,access,values,about,line,unit_address";
@@ -18,7 +19,7 @@ pub fn text(line: Line<'_>) -> Result<String, Failure> {
         source.book.of_modio()?;
         for item in source.book.items() {
             let row = row(item).join(",");
-            text.push_str(&format!("{row},{},{}\n", quoted(&name), source.unit));
+            text.push_str(&format!("{row},{},{}\n", csv_field(&name), source.unit));
         }
     }
     Ok(text)
@@ -46,7 +47,7 @@ fn row(item: &Item) -> [String; 12] {
         (true, true) => "read write restart",
     };
     [
-        quoted(&plain(&item.name)),
+        csv_field(&plain(&item.name)),
         item.address.to_string(),
         table_name(item.table).to_owned(),
         function.to_owned(),
@@ -54,22 +55,9 @@ fn row(item: &Item) -> [String; 12] {
         data_type.to_owned(),
         scaling.factor().to_string(),
         scaling.unit.offset.to_string(),
-        quoted(unit_name(&scaling.unit.code)),
+        csv_field(unit_name(&scaling.unit.code)),
         access.to_owned(),
-        quoted(values(item).trim_start_matches("it takes ")),
-        quoted(&item.about),
+        csv_field(values(item).trim_start_matches("it takes ")),
+        csv_field(&item.about),
     ]
-}
-
-/// Returns a text as a field. A spreadsheet would calculate a text that begins like a formula.
-fn quoted(text: &str) -> String {
-    let text = match text.starts_with(['=', '+', '-', '@']) {
-        true => format!("'{text}"),
-        false => text.to_owned(),
-    };
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text
-    }
 }

@@ -19,7 +19,7 @@ fn a_slot_is_commissioned_with_one_command_and_its_points_are_read_on_every_line
     for n in 0..3 {
         let unit = Unit::start(1, "4ai");
         let at = &lines(&unit)[n];
-        let text = at.run("module set 5 4ai").fine();
+        let text = at.run("module set p5 4ai").fine();
         assert_eq!(text, "port 5: 4ai, saved and in force; state: good\n");
         at.run("write p5.1.range=0 p5.1.scale=1").fine();
         at.run("config save").fine();
@@ -103,7 +103,9 @@ fn settings_are_exported_and_imported_and_a_wrong_file_changes_nothing() {
     for at in lines(&unit) {
         at.run("config reset --restart").fine();
         at.run("module set 5 2ai2ao").fine();
-        at.run(&format!("config export {path}")).fine();
+        let wrote = at.run(&format!("config export {path} --force"));
+        assert_eq!(wrote.err, format!("modioctl: wrote {path}\n"));
+        assert_eq!(wrote.fine(), "");
         let same = at.run(&format!("config diff {path}")).fine();
         assert_eq!(same, "no difference\n");
 
@@ -126,7 +128,12 @@ fn settings_are_exported_and_imported_and_a_wrong_file_changes_nothing() {
             "{differs}"
         );
         let text = at.run(&format!("config import {path} --restart")).fine();
-        assert_eq!(text, "2 settings written\nsaved\n");
+        let rows = [
+            "COMM_TIMEOUT  0.0 s     2.5 s\n",
+            "p5.3.safe     0         1000\n",
+        ];
+        assert!(rows.iter().all(|row| text.contains(row)), "{text}");
+        assert!(text.ends_with("\n2 settings written\nsaved\n"), "{text}");
         assert_eq!(
             at.run("config get COMM_TIMEOUT").fine(),
             "COMM_TIMEOUT  2.5 s\n"

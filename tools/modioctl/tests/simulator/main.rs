@@ -8,6 +8,7 @@ mod commands;
 mod errors;
 mod gateway;
 mod hostile;
+mod importing;
 mod listening;
 mod newer;
 mod ordinary;

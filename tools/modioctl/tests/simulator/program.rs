@@ -136,6 +136,13 @@ pub struct Running {
 }
 
 impl Running {
+    /// Presses Ctrl-C.
+    pub fn interrupt(&self) {
+        let id = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status();
+        assert!(sent.unwrap().success());
+    }
+
     /// Waits for the end of the program.
     pub fn end(mut self) -> Ran {
         let status = self.child.wait().unwrap().code().unwrap();

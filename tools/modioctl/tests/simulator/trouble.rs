@@ -76,11 +76,7 @@ fn ctrl_c_ends_a_command_that_waits_and_the_line_stays_usable() {
     let at = At::port(unit.pty.display());
     let mut waiting = at.start("--timeout 1h --trace --unit 99 info");
     waiting.err.wait_for(REQUEST);
-    let id = waiting.child.id().to_string();
-    std::process::Command::new("kill")
-        .args(["-INT", &id])
-        .status()
-        .unwrap();
+    waiting.interrupt();
     let ran = waiting.end();
     assert_eq!(ran.status, 130, "{ran:?}");
     at.run("info").fine();

@@ -1,15 +1,18 @@
 //! The file of settings: TOML with register names.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use std::ops::Range;
 use std::path::Path;
 
-use modio_description::Unit;
+use modio_description::{Description, Unit};
 use register_map::codes::{Format, Mode};
-use register_map::configuration::{FORMAT, MODE};
+use register_map::configuration::{FORMAT, MODE, module_of};
+use toml::de::{DeTable, DeValue};
 
-use super::{is_module, of_modules};
+use super::{Setting, is_module, of_modules};
 use crate::failure::Failure;
-use crate::names::{Book, Item, Meaning};
+use crate::names::{Book, Item, Meaning, port_of, slots};
 use crate::value::{parse, show, takes};
 
 /// Returns the text of a file.
@@ -64,101 +67,244 @@ fn comment(item: &Item, unit: &str) -> String {
     }
 }
 
-/// Reads names and values from a file.
+/// A line of a file.
+#[derive(Debug, PartialEq, Eq)]
+struct Line {
+    number: usize,
+    name: String,
+    value: String,
+}
+
+/// Reads the settings in a file and checks all of them, with the modules in the file.
 ///
 /// # Errors
 ///
-/// When the file cannot be read, or is not valid TOML.
-pub fn read(path: &Path) -> Result<Vec<(String, String)>, Failure> {
-    let shown = path.display();
+/// When the file cannot be read or is of another board, or all lines that are wrong.
+pub fn read(book: &Book, path: &Path) -> Result<Vec<Setting>, Failure> {
+    let shown = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|error| Failure::usage(format!("cannot read {shown}: {error}")))?;
-    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
-        let line = error.span().map_or(1, |span| {
-            text.get(..span.start)
-                .unwrap_or_default()
-                .matches('\n')
-                .count()
-                + 1
-        });
-        Failure::usage(format!("{shown}, line {line}: {}", error.message()))
-    })?;
-    let mut values = Vec::new();
-    flatten(String::new(), table, &mut values);
-    Ok(values)
+    check(book, &shown, &text)
 }
 
-/// `p5.1.filter = 4` is a table within tables.
-fn flatten(prefix: String, table: toml::Table, values: &mut Vec<(String, String)>) {
+/// Checks the text of the file with this name.
+fn check(book: &Book, file: &str, text: &str) -> Result<Vec<Setting>, Failure> {
+    let (lines, mut wrong) = parsed(text);
+    check_board(book.of_modio()?, file, &lines)?;
+    let (book, unknown) = with_modules(book, &lines)?;
+    let mut settings = Vec::new();
+    for line in &lines {
+        match setting(&book, &line.name, &line.value) {
+            Ok(setting) => settings.push(setting),
+            // Without the module it is not known which settings its points have.
+            Err(_) if unknown.contains(&port_of(&line.name)) && !line.name.ends_with("module") => {}
+            Err(failure) => {
+                let text = failure.to_string();
+                wrong.entry(line.number).or_insert(text);
+            }
+        }
+    }
+    if !is_consistent(&settings) {
+        let format = |line: &&Line| line.name.eq_ignore_ascii_case("FORMAT");
+        let number = lines.iter().find(format).map_or(1, |line| line.number);
+        let text = "FORMAT with 7 data bits needs MODE = \"ASCII\"".to_owned();
+        wrong.entry(number).or_insert(text);
+    }
+    if wrong.is_empty() {
+        return Ok(settings);
+    }
+    let each: Vec<_> = wrong
+        .iter()
+        .map(|(line, text)| format!("line {line}: {text}"))
+        .collect();
+    Err(Failure::usage(match &each[..] {
+        [only] => format!("{file}, {only}"),
+        each => format!(
+            "{file} has {} wrong lines; nothing is written\n  {}",
+            each.len(),
+            each.join("\n  ")
+        ),
+    }))
+}
+
+/// Returns the lines of a TOML text that have the form of a setting, and what is wrong with others.
+fn parsed(text: &str) -> (Vec<Line>, BTreeMap<usize, String>) {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    let number = |at: usize| {
+        let before = text.get(..at).unwrap_or_default();
+        before.matches('\n').count() + 1
+    };
+    let mut wrong = BTreeMap::new();
+    for error in errors {
+        let at = error.span().map_or(0, |span| span.start);
+        let text = error.message().to_owned();
+        wrong.entry(number(at)).or_insert(text);
+    }
+    let mut lines = Vec::new();
+    flatten("", table.get_ref(), &mut |at, name, value| {
+        let number = number(at.start);
+        // The parser continues after an error with a default value.
+        if !wrong.contains_key(&number) {
+            lines.push(Line {
+                number,
+                name,
+                value: value.unwrap_or_else(|| text.get(at).unwrap_or_default().to_owned()),
+            });
+        }
+    });
+    lines.sort_by_key(|line| line.number);
+    (lines, wrong)
+}
+
+/// Passes the place, the name and the value of each setting in a table to `add`; the value `None` is the text at the
+/// place. `p5.1.filter = 4` is a table within tables.
+fn flatten(
+    prefix: &str,
+    table: &DeTable<'_>,
+    add: &mut impl FnMut(Range<usize>, String, Option<String>),
+) {
     for (key, value) in table {
-        let name = if prefix.is_empty() {
-            key
-        } else {
-            format!("{prefix}.{key}")
-        };
-        match value {
-            toml::Value::Table(inner) => flatten(name, inner, values),
-            toml::Value::String(text) => values.push((name, text)),
-            other => values.push((name, other.to_string())),
+        let name = format!("{prefix}{}", key.get_ref());
+        match value.get_ref() {
+            DeValue::Table(inner) => flatten(&format!("{name}."), inner, add),
+            DeValue::String(text) => add(value.span(), name, Some(text.to_string())),
+            DeValue::Integer(number) => add(value.span(), name, Some(number.to_string())),
+            DeValue::Float(number) => add(value.span(), name, Some(number.to_string())),
+            _ => add(value.span(), name, None),
         }
     }
 }
 
-/// Returns the names of the unit with the modules in the file.
-///
-/// # Errors
-///
-/// When the file cannot be read, or contains an unknown module.
-pub fn book(book: &Book, path: &Path) -> Result<Book, Failure> {
-    let mut modules = Vec::new();
-    for (name, text) in read(path)? {
-        if let Ok(item) = book.find(&name)
-            && is_module(&item)
-        {
-            modules.push((item.address, parse(&item, &text, false)?));
+/// Checks that the file belongs to this board: a port in the file has a slot.
+fn check_board(unit: &Description, file: &str, lines: &[Line]) -> Result<(), Failure> {
+    let ports: BTreeSet<_> = lines
+        .iter()
+        .filter_map(|line| port_of(&line.name))
+        .collect();
+    let has_slot = |port: &u8| unit.ports.iter().any(|known| known.number == *port);
+    if ports.is_empty() || ports.iter().any(has_slot) {
+        return Ok(());
+    }
+    let ports: Vec<_> = ports.iter().map(u8::to_string).collect();
+    Err(Failure::usage(format!(
+        "{file} is a file of another board: it has settings of port {}, and {} has slots at {}; nothing is written",
+        ports.join(", "),
+        unit.board,
+        slots(unit)
+    )))
+}
+
+/// Returns the names of the unit with the modules in the file, and the ports whose module is wrong.
+fn with_modules(book: &Book, lines: &[Line]) -> Result<(Book, Vec<Option<u8>>), Failure> {
+    let (mut modules, mut unknown) = (Vec::new(), Vec::new());
+    for line in lines {
+        match book.find(&line.name) {
+            Ok(item) if is_module(&item) => match parse(&item, &line.value, false) {
+                Ok(words) => modules.push((item.address, words)),
+                Err(_) => unknown.push(port_of(&item.name)),
+            },
+            _ => {}
         }
     }
-    of_modules(book, |port| {
-        let address = register_map::configuration::module_of(port.into());
-        let wanted = modules.iter().find(|(module, _)| *module == address);
+    let book = of_modules(book, |port| {
+        let wanted = modules
+            .iter()
+            .find(|(module, _)| *module == module_of(port.into()));
         wanted.and_then(|(_, words)| words.first().copied())
-    })
+    })?;
+    Ok((book, unknown))
 }
 
-/// Checks names and values.
+/// Checks a name and a value.
 ///
 /// # Errors
 ///
-/// The first name or value that is wrong.
-pub fn check(book: &Book, values: Vec<(String, String)>) -> Result<Vec<(Item, Vec<u16>)>, Failure> {
-    let mut changes = Vec::new();
-    for (name, text) in values {
-        let item = book.find(&name)?;
-        if !item.setting {
-            return Err(Failure::usage(format!("{name} is not a setting")));
-        }
-        let words = parse(&item, &text, false)?;
-        changes.push((item, words));
+/// When one of them is wrong.
+pub fn setting(book: &Book, name: &str, value: &str) -> Result<Setting, Failure> {
+    let item = book.find(name)?;
+    if !item.setting {
+        return Err(Failure::usage(format!("{name} is not a setting")));
     }
-    Ok(changes)
+    let words = parse(&item, value, false)?;
+    Ok((item, words))
 }
 
-/// Checks that FORMAT and MODE are compatible, as the unit does.
-///
-/// # Errors
-///
-/// When they are not.
-pub fn check_line(wanted: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
+/// Returns whether FORMAT and MODE are compatible, as the unit checks it.
+fn is_consistent(settings: &[Setting]) -> bool {
     let word = |address: u16| {
-        let found = wanted.iter().find(|(item, _)| item.address == address);
+        let found = settings.iter().find(|(item, _)| item.address == address);
         found.and_then(|(_, words)| words.first().copied())
     };
     let format = word(FORMAT).and_then(Format::from_code);
     let mode = word(MODE).and_then(Mode::from_code);
-    match (format, mode) {
-        (Some(format), Some(mode)) if !format.suits(mode) => Err(Failure::usage(
-            "FORMAT with 7 data bits needs MODE = \"ASCII\"",
-        )),
-        _ => Ok(()),
+    format
+        .zip(mode)
+        .is_none_or(|(format, mode)| format.suits(mode))
+}
+
+#[cfg(test)]
+mod tests {
+    use modio_description::describe;
+    use register_map::Module;
+    use register_map::board::MODIO_02;
+
+    use super::*;
+
+    fn checked(text: &str) -> Result<Vec<String>, String> {
+        let unit = describe(&MODIO_02, "0.1.0", |_| Module::None);
+        let settings = check(&Book::new(unit, Vec::new()), "unit.toml", text);
+        let shown = |(item, words): Setting| format!("{}={}", item.name, words[0]);
+        settings
+            .map(|settings| settings.into_iter().map(shown).collect())
+            .map_err(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn settings_have_the_meaning_of_the_modules_in_the_file() {
+        let text = "BAUD = 19_200 # rate\np5.module = '4ao'\n5.1.safe = 0xFFFF\np5.2.range = \"4-20 mA\"\n";
+        let settings = ["BAUD=192", "p5.module=5", "p5.1.safe=65535", "p5.2.range=1"];
+        assert_eq!(checked(text).unwrap(), settings);
+    }
+
+    #[test]
+    fn every_wrong_line_is_reported() {
+        let text = "BAUD = 1\nMODE = \nCOMM_TIMEOUT = 2.5\nBUAD = 96\nuptime = 0\np5.module = '4di'\np5.1.filter = [5]\nMODE 3\n";
+        let wrong = checked(text).unwrap_err();
+        let lines: Vec<_> = wrong.lines().collect();
+        assert_eq!(lines[0], "unit.toml has 6 wrong lines; nothing is written");
+        for (line, (number, part)) in lines[1..].iter().zip([
+            (1, "BAUD does not allow \"1\": it takes 1200"),
+            (2, "string values must be quoted"),
+            (4, "BUAD: no such point or register; similar names: BAUD"),
+            (5, "uptime is not a setting"),
+            (
+                7,
+                "p5.1.filter does not allow \"[5]\": it takes 0 to 1000 ms",
+            ),
+            (8, "key with no value, expected `=`"),
+        ]) {
+            let start = format!("  line {number}: {part}");
+            assert!(line.starts_with(&start), "{line:?}, not {start:?}");
+        }
+    }
+
+    #[test]
+    fn one_wrong_line_is_reported_in_one_line() {
+        let wrong = checked("BAUD = 9600\nFORMAT = '7E1'\nMODE = 'rtu'").unwrap_err();
+        let text = "unit.toml, line 2: FORMAT with 7 data bits needs MODE = \"ASCII\"";
+        assert_eq!(wrong, text);
+        // What settings the points have depends on the module.
+        let wrong = checked("p5.1.filter = 4\np5.module = '5di'\np5.1.safe = 0").unwrap_err();
+        assert!(wrong.starts_with("unit.toml, line 2: p5.module does not allow"));
+    }
+
+    #[test]
+    fn file_of_another_board_is_called_that() {
+        let wrong = checked("BAUD = 9600\np1.module = '4di'\np2.module = 'none'").unwrap_err();
+        let text = "unit.toml is a file of another board: it has settings of port 1, 2, and ";
+        assert!(
+            wrong.starts_with(text) && wrong.contains("has slots at 5"),
+            "{wrong}"
+        );
     }
 }

@@ -2,6 +2,8 @@
 
 mod file;
 
+use std::cell::RefCell;
+use std::io::{IsTerminal, stdin};
 use std::path::Path;
 
 use register_map::codes::Command;
@@ -19,12 +21,23 @@ use crate::value::show;
 /// Largest number of registers that one request writes.
 const MOST: usize = 100;
 
+/// A setting with its words.
+type Setting = (Item, Vec<u16>);
+
+/// Text that Ctrl-C prints: how much of the command is done.
+pub type Note = RefCell<String>;
+
 /// Reads and changes settings.
 ///
 /// # Errors
 ///
 /// When a name, a value or a file is wrong; nothing is written then. When the unit does not answer or refuses.
-pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), Failure> {
+pub async fn run(
+    mut device: Device,
+    options: Config,
+    json: bool,
+    note: &Note,
+) -> Result<(), Failure> {
     let book = fetch(&mut device).await?.book;
     let modules = device
         .read_words(configuration::MODULE, points::PORTS)
@@ -35,9 +48,14 @@ pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), 
     match options {
         Config::Get { names } => get(&mut device, &book, &names, json).await,
         Config::Set { values } => {
-            let changes = file::check(&book, values)?;
+            let changes = values
+                .iter()
+                .map(|(name, value)| file::setting(&book, name, value))
+                .collect::<Result<Vec<_>, _>>()?;
             device.unlock().await?;
-            write(&mut device, &changes).await?;
+            Progress::new(note, changes.len())
+                .write(&mut device, &changes)
+                .await?;
             output::line(format_args!(
                 "written, but not saved: save with `modioctl config save`"
             ))
@@ -49,17 +67,28 @@ pub async fn run(mut device: Device, options: Config, json: bool) -> Result<(), 
             tell_restart(&mut device).await
         }
         Config::Diff { file } => diff(&mut device, &book, file.as_deref()).await,
-        Config::Export { file } => {
+        Config::Export { file, force } => {
             let (items, values) = settings(&mut device, &book).await?;
             let text = file::text(&book, &items, &values)?;
-            match file {
-                None => output::line(format_args!("{}", text.trim_end())),
-                Some(path) => std::fs::write(&path, text).map_err(|error| {
-                    Failure::usage(format!("cannot write {}: {error}", path.display()))
-                }),
-            }
+            output::save(&text, file.as_deref(), force)
         }
-        Config::Import { file, restart } => import(device, &book, &file, restart).await,
+        Config::Import { file, yes, restart } => {
+            let wanted = file::read(&book, &file)?;
+            let rows = differences(&mut device, &book, &wanted).await?;
+            table(rows.clone(), "the file")?;
+            let is_changed = |item: &Item| rows.iter().any(|[name, ..]| *name == item.name);
+            let modules = wanted.iter().filter(|(item, _)| is_module(item));
+            let modules: Vec<_> = modules
+                .filter(|(item, _)| is_changed(item))
+                .map(|(item, _)| item.name.as_str())
+                .collect();
+            if !modules.is_empty() && !yes {
+                agree(&modules.join(", ")).await?;
+            }
+            let mut progress = Progress::new(note, rows.len());
+            import(&mut device, &wanted, &file, &mut progress).await?;
+            finish(device, restart).await
+        }
         Config::Reset { restart } => {
             device.unlock().await?;
             let (items, values) = settings(&mut device, &book).await?;
@@ -115,11 +144,45 @@ async fn get(
     output::table(&rows)
 }
 
-/// Writes settings that have been checked. The lock must be open.
-async fn write(device: &mut Device, changes: &[(Item, Vec<u16>)]) -> Result<(), Failure> {
-    device.warn_of_line(changes.iter().map(|(item, _)| item.address));
-    // Modules first: a change of module resets the settings of its points. Registers with consecutive addresses go in one
-    // request, so that the unit checks FORMAT and MODE together.
+/// Settings that are being written.
+struct Progress<'a> {
+    note: &'a Note,
+    done: usize,
+    all: usize,
+}
+
+impl<'a> Progress<'a> {
+    /// Begins to write this number of settings.
+    fn new(note: &'a Note, all: usize) -> Self {
+        let progress = Self { note, done: 0, all };
+        progress.show();
+        progress
+    }
+
+    fn show(&self) {
+        let Self { done, all, .. } = self;
+        self.note.replace(format!(
+            "{done} of {all} settings are written and nothing is saved: `modioctl reboot` brings the saved settings back"
+        ));
+    }
+
+    /// Writes settings that have been checked. The lock must be open.
+    async fn write(&mut self, device: &mut Device, changes: &[Setting]) -> Result<(), Failure> {
+        device.warn_of_line(changes.iter().map(|(item, _)| item.address));
+        for (names, first, words) in runs(changes) {
+            let about = format!("writing {}", names.join(", "));
+            device.write_words(first, &words, &about).await?;
+            self.done += names.len();
+            self.show();
+        }
+        Ok(())
+    }
+}
+
+/// Returns the requests that write these settings: names, first address and words. Modules are first, because a change
+/// of module resets the settings of its points. Registers with consecutive addresses are in one request, so that the
+/// unit checks FORMAT and MODE together.
+fn runs(changes: &[Setting]) -> Vec<(Vec<&str>, u16, Vec<u16>)> {
     let mut sorted: Vec<_> = changes.iter().collect();
     sorted.sort_by_key(|(item, _)| (!is_module(item), item.address));
     let mut runs: Vec<(Vec<&str>, u16, Vec<u16>)> = Vec::new();
@@ -135,12 +198,7 @@ async fn write(device: &mut Device, changes: &[(Item, Vec<u16>)]) -> Result<(), 
             _ => runs.push((vec![&item.name], item.address, words.clone())),
         }
     }
-    for (names, first, words) in runs {
-        device
-            .write_words(first, &words, &format!("writing {}", names.join(", ")))
-            .await?;
-    }
-    Ok(())
+    runs
 }
 
 fn is_module(item: &Item) -> bool {
@@ -149,16 +207,29 @@ fn is_module(item: &Item) -> bool {
 }
 
 async fn diff(device: &mut Device, book: &Book, path: Option<&Path>) -> Result<(), Failure> {
-    let (items, values) = settings(device, book).await?;
-    let wanted = match path {
-        Some(path) => file::check(&file::book(book, path)?, file::read(path)?)?,
-        None => items
-            .iter()
-            .map(|item| (item.clone(), vec![item.default]))
-            .collect(),
+    let (wanted, other) = match path {
+        Some(path) => (file::read(book, path)?, "the file"),
+        None => {
+            let default = |item: &Item| (item.clone(), vec![item.default]);
+            (book.settings().map(default).collect(), "the factory")
+        }
     };
+    let rows = differences(device, book, &wanted).await?;
+    if rows.is_empty() {
+        return output::line(format_args!("no difference"));
+    }
+    table(rows, other)
+}
+
+/// Returns the name, the present value and the wanted value of each setting whose value differs.
+async fn differences(
+    device: &mut Device,
+    book: &Book,
+    wanted: &[Setting],
+) -> Result<Vec<[String; 3]>, Failure> {
+    let (items, values) = settings(device, book).await?;
     let mut rows = Vec::new();
-    for (item, words) in &wanted {
+    for (item, words) in wanted {
         let now = items
             .iter()
             .zip(&values)
@@ -172,45 +243,60 @@ async fn diff(device: &mut Device, book: &Book, path: Option<&Path>) -> Result<(
             rows.push([item.name.clone(), now, show(item, words, false).to_string()]);
         }
     }
+    Ok(rows)
+}
+
+/// Prints differences between the unit and something else.
+fn table(mut rows: Vec<[String; 3]>, other: &str) -> Result<(), Failure> {
     if rows.is_empty() {
-        return output::line(format_args!("no difference"));
+        return Ok(());
     }
-    let other = if path.is_some() {
-        "the file"
-    } else {
-        "the factory"
-    };
-    rows.insert(
-        0,
-        [
-            "setting".to_owned(),
-            "the unit".to_owned(),
-            other.to_owned(),
-        ],
-    );
+    rows.insert(0, ["setting", "the unit", other].map(str::to_owned));
     output::table(&rows)
 }
 
+/// Asks whether the modules with these names may be changed.
+///
+/// # Errors
+///
+/// When the answer is not yes, or when nobody can answer.
+async fn agree(modules: &str) -> Result<(), Failure> {
+    let mut answer = String::new();
+    if stdin().is_terminal() {
+        eprint!("modioctl: {modules} changes: write all of this? [y/N] ");
+        let (tell, told) = tokio::sync::oneshot::channel();
+        // Ctrl-C ends the program while this thread waits for a line.
+        std::thread::spawn(move || {
+            let mut line = String::new();
+            let _ = stdin().read_line(&mut line);
+            tell.send(line)
+        });
+        answer = told.await.unwrap_or_default();
+    }
+    match answer.trim() {
+        "y" | "Y" | "yes" => Ok(()),
+        _ => Err(Failure::usage(format!(
+            "nothing is written: {modules} would change; --yes allows it"
+        ))),
+    }
+}
+
+/// Writes the settings of a file that differ from those of the unit, and saves them.
 async fn import(
-    mut device: Device,
-    book: &Book,
+    device: &mut Device,
+    wanted: &[Setting],
     path: &Path,
-    restart: bool,
+    progress: &mut Progress<'_>,
 ) -> Result<(), Failure> {
-    // Check the whole file before anything is written, with the modules that it contains.
-    let values = file::read(path)?;
-    let book = file::book(book, path)?;
-    let wanted = file::check(&book, values)?;
-    file::check_line(&wanted)?;
     device.unlock().await?;
     let modules: Vec<_> = wanted
         .iter()
         .filter(|(item, _)| is_module(item))
         .cloned()
         .collect();
-    let modules = differing(&mut device, &modules).await?;
-    write(&mut device, &modules).await?;
-    let mut changes = differing(&mut device, &wanted).await?;
+    let modules = differing(device, &modules).await?;
+    progress.write(device, &modules).await?;
+    let mut changes = differing(device, wanted).await?;
     // FORMAT and MODE must be compatible, so write both or none.
     let line = configuration::FORMAT..=configuration::MODE;
     if changes.iter().any(|(item, _)| line.contains(&item.address)) {
@@ -222,8 +308,9 @@ async fn import(
                 .cloned(),
         );
     }
-    write(&mut device, &changes).await?;
-    let left = differing(&mut device, &wanted).await?;
+    progress.all = progress.done + changes.len();
+    progress.write(device, &changes).await?;
+    let left = differing(device, wanted).await?;
     if let Some((item, _)) = left.first() {
         return Err(Failure::Refused(format!(
             "{} does not have the written value; nothing is saved: see `modioctl config diff {}`",
@@ -231,22 +318,22 @@ async fn import(
             path.display()
         )));
     }
-    let count = modules.len() + changes.len();
-    if count == 0 {
+    if progress.done == 0 {
         output::line(format_args!("the unit has these settings already"))?;
     } else {
-        output::line(format_args!("{count} settings written"))?;
+        output::line(format_args!("{} settings written", progress.done))?;
     }
+    progress.note.replace(
+        "all settings are written; whether they are saved is not known: repeat the import"
+            .to_owned(),
+    );
     device.save().await?;
-    output::line(format_args!("saved"))?;
-    finish(device, restart).await
+    progress.note.replace("the settings are saved".to_owned());
+    output::line(format_args!("saved"))
 }
 
 /// Returns the settings whose values differ from those of the unit.
-async fn differing(
-    device: &mut Device,
-    wanted: &[(Item, Vec<u16>)],
-) -> Result<Vec<(Item, Vec<u16>)>, Failure> {
+async fn differing(device: &mut Device, wanted: &[Setting]) -> Result<Vec<Setting>, Failure> {
     let items: Vec<_> = wanted.iter().map(|(item, _)| item.clone()).collect();
     let now = device.read_items(&items).await?;
     let both = wanted.iter().zip(now);
