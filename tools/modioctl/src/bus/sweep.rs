@@ -18,7 +18,7 @@ use super::master::{Lost, MOST, Master};
 
 /// Report Server ID (V1.1b3, 6.13). Its response differs from the request, so an adapter that returns the request
 /// is not mistaken for a unit.
-const REPORT: u8 = 0x11;
+pub const REPORT: u8 = 0x11;
 
 /// Time that an address has for the first byte of its answer: t3.5 at 9600 bit/s and the 16 ms for which adapters
 /// hold bytes back, with a margin.

@@ -1,8 +1,13 @@
 //! `modioctl info`.
 
+use std::fmt;
+
+use modbus_frames::names;
+use register_map::configuration::{BAUD, FRAME_GAP};
+use register_map::{fault, radio, state};
 use serde_json::{Map, Value as Json, json};
 
-use crate::bus::decode;
+use crate::bus::{Lost, decode};
 use crate::device::{Device, fetch};
 use crate::failure::Failure;
 use crate::names::{Item, Meaning};
@@ -20,13 +25,39 @@ const OBJECTS: [&str; 7] = [
     "application",
 ];
 
+/// The groups of registers, in the order in which they are shown.
+const GROUPS: [&str; 7] = [
+    "identity", "line", "modules", "state", "faults", "counters", "others",
+];
+
+/// Returns the group of the register at this address.
+const fn group(address: u16) -> &'static str {
+    match address {
+        BAUD..=FRAME_GAP | state::UNIT_ADDRESS => "line",
+        state::RESET_CAUSE..=state::STACK_FREE => "state",
+        state::MODULE_IN_FORCE..state::UNIQUE_ID | state::CHANNEL_STATUS..fault::KIND => "modules",
+        state::BUS_MESSAGES..state::CHANNEL_STATUS | radio::BUS_MESSAGES..=radio::T15_GAPS => {
+            "counters"
+        }
+        fault::KIND..=fault::RESERVED => "faults",
+        state::PRODUCT_CODE..=state::BOARD
+        | state::COMMIT..=state::DESCRIPTION_CRC
+        | state::UNIQUE_ID..state::BUS_MESSAGES => "identity",
+        // Firmware that is newer than this program has them.
+        _ => "others",
+    }
+}
+
 /// Shows identity, state and counters of the unit.
 ///
 /// # Errors
 ///
 /// When the unit does not answer or refuses.
 pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
-    let mut identity = identity(device).await?;
+    let mut identity = match identity(device).await {
+        Err(Unidentified::Lost(lost)) => return Err(device.lost(&lost)),
+        objects => objects.unwrap_or_default(),
+    };
     let book = fetch(device).await?.book;
     if book.description().is_some() {
         // The objects that the standard does not define are also registers.
@@ -49,45 +80,87 @@ pub async fn run(device: &mut Device, json: bool) -> Result<(), Failure> {
         }
         return output::json(&out);
     }
-    let mut rows: Vec<[String; 2]> = identity
-        .into_iter()
-        .map(|(name, text)| [name, text])
-        .collect();
-    rows.extend(
-        state
-            .iter()
-            .zip(&values)
-            .map(|(item, words)| [item.name.clone(), show(item, words, false).to_string()]),
-    );
-    output::table(&rows)
+    let identity = identity.into_iter();
+    let identity = identity.map(|(name, text)| (GROUPS[0], [name, text]));
+    let state = state.iter().zip(&values).map(|(item, words)| {
+        let shown = show(item, words, false).to_string();
+        (group(item.address), [item.name.clone(), shown])
+    });
+    output::table(&grouped(&identity.chain(state).collect::<Vec<_>>()))
 }
 
-/// Returns whether an item is state of the unit: a read-only register, or the module of a slot.
+/// Returns the rows of each group under its name, with an empty row between groups.
+fn grouped(rows: &[(&str, [String; 2])]) -> Vec<[String; 2]> {
+    let mut shown = Vec::new();
+    for group in GROUPS {
+        let of_group = rows.iter().filter(|(of, _)| *of == group);
+        let of_group: Vec<_> = of_group
+            .map(|(_, [name, text])| [format!("  {name}"), text.clone()])
+            .collect();
+        if of_group.is_empty() {
+            continue;
+        }
+        if !shown.is_empty() {
+            shown.push([String::new(), String::new()]);
+        }
+        shown.push([group.to_owned(), String::new()]);
+        shown.extend(of_group);
+    }
+    shown
+}
+
+/// Returns whether an item is shown: a read-only register with a meaning, or a setting of the line.
 fn is_state(item: &Item) -> bool {
-    !item.writable && matches!(item.meaning, Meaning::Value(_))
+    let is_read_only = !item.writable && matches!(item.meaning, Meaning::Value(_));
+    let is_of_line = item.setting && (BAUD..=FRAME_GAP).contains(&item.address);
+    (is_read_only || is_of_line) && !item.name.starts_with("reserved")
 }
 
-/// Returns the objects of the device identification, or none for a unit without it.
+/// Reason why a unit has no device identification.
+pub enum Unidentified {
+    /// The unit refuses with this exception.
+    Exception(u8),
+    /// The answer contains no objects, or wrong lengths.
+    Damaged,
+    /// There is no answer.
+    Lost(Lost),
+}
+
+impl fmt::Display for Unidentified {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exception(code) => {
+                let name = names::exception(*code).unwrap_or("unknown exception");
+                write!(f, "exception {code:02X}, {name}")
+            }
+            Self::Damaged | Self::Lost(Lost::Garbled(_)) => f.write_str("damaged answer"),
+            Self::Lost(Lost::Silent | Lost::Broken(_)) => f.write_str("no answer"),
+        }
+    }
+}
+
+/// Returns the objects of the device identification.
 ///
 /// # Errors
 ///
-/// When the unit does not answer.
-pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Failure> {
+/// The reason why there are none.
+pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Unidentified> {
     let mut found = Vec::new();
     let mut object = 0;
     // Extended stream from an object on. A unit with few objects needs only one answer.
     for _ in 0..16 {
-        let answer = device
-            .ask(
-                &[0x2B, 0x0E, 0x03, object],
-                "reading the device identification",
-            )
-            .await;
-        let answer = match answer {
-            Err(Failure::Refused(_)) => break,
-            other => other?,
+        let request = [0x2B, 0x0E, 0x03, object];
+        let answer = device.master.ask(device.unit, &request).await;
+        let answer = answer.map_err(Unidentified::Lost)?;
+        let objects = match answer[..] {
+            [function, code] if function & 0x80 != 0 => Err(Unidentified::Exception(code)),
+            _ => decode::objects(&answer).ok_or(Unidentified::Damaged),
         };
-        for (id, text) in decode::objects(&answer).unwrap_or_default() {
+        let objects = match objects {
+            Err(_) if !found.is_empty() => break,
+            objects => objects?,
+        };
+        for (id, text) in objects {
             let name = OBJECTS.get(usize::from(id));
             let name = name.map_or_else(|| format!("object {id:02X}"), |name| (*name).to_owned());
             found.push((name, text));
@@ -97,5 +170,73 @@ pub async fn identity(device: &mut Device) -> Result<Vec<(String, String)>, Fail
             _ => break,
         }
     }
+    if found.is_empty() {
+        return Err(Unidentified::Damaged);
+    }
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use modio_description::describe;
+    use register_map::Module;
+    use register_map::board::MODIO_08;
+
+    use super::*;
+    use crate::names::Book;
+
+    #[test]
+    fn every_register_has_a_group_and_reserved_ones_are_not_shown() {
+        let description = describe(&MODIO_08, "0.1.0", |_| Module::Ai4);
+        let book = Book::new(description, vec![(0, 0); 32]);
+        let shown = |name: &str| {
+            let item = book.find(name).unwrap();
+            is_state(&item).then(|| group(item.address))
+        };
+        for (name, group) in [
+            ("board", "identity"),
+            ("unique_device_identity", "identity"),
+            ("unit_address", "line"),
+            ("BAUD", "line"),
+            ("p1.module_in_force", "modules"),
+            ("p1.1.channel_status", "modules"),
+            ("uptime", "state"),
+            ("fault_kind", "faults"),
+            ("line_repairs", "faults"),
+            ("bus_messages", "counters"),
+            ("radio_busy", "counters"),
+        ] {
+            assert_eq!(shown(name), Some(group), "{name}");
+        }
+        let state = || book.items().iter().filter(|item| is_state(item));
+        assert!(state().all(|item| group(item.address) != "others"));
+        assert!(state().all(|item| !item.name.contains("reserved")));
+    }
+
+    #[test]
+    fn groups_have_a_heading_and_an_empty_row_between_them() {
+        let row = |name: &str| [name.to_owned(), "1".to_owned()];
+        let rows = [
+            ("state", row("b")),
+            ("identity", row("a")),
+            ("state", row("c")),
+        ];
+        let names: Vec<_> = grouped(&rows).into_iter().map(|[name, _]| name).collect();
+        assert_eq!(names, ["identity", "  a", "", "state", "  b", "  c"]);
+    }
+
+    #[test]
+    fn reasons_name_the_exception() {
+        let shown = |reason: Unidentified| reason.to_string();
+        assert_eq!(
+            shown(Unidentified::Exception(1)),
+            "exception 01, illegal function"
+        );
+        assert_eq!(
+            shown(Unidentified::Exception(7)),
+            "exception 07, negative acknowledge"
+        );
+        assert_eq!(shown(Unidentified::Damaged), "damaged answer");
+        assert_eq!(shown(Unidentified::Lost(Lost::Silent)), "no answer");
+    }
 }

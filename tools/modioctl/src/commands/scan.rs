@@ -5,19 +5,22 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::info::identity;
+use super::info::{Unidentified, identity};
 use crate::bus::adu::Framing;
-use crate::bus::{Endpoint, Found, LONG, Master, Observer, Place, SHORT};
+use crate::bus::format::Format;
+use crate::bus::{Endpoint, Found, LONG, Lost, Master, Observer, Place, REPORT, SHORT};
 use crate::cli::Scan;
 use crate::device::{Device, known, place};
 use crate::failure::Failure;
 use crate::output;
 
+/// Shortest time that is worth an announcement.
+const LONG_SCAN: Duration = Duration::from_secs(10);
+
 /// A unit that was found.
 struct Unit {
     address: u8,
-    baud: u32,
-    format: String,
+    line: Endpoint,
     identity: String,
     modules: String,
 }
@@ -54,13 +57,17 @@ pub async fn run(
             "--rates and --formats are for a serial port: over TCP the gateway has the line's settings",
         ));
     }
+    let lines = lines(&endpoint, options);
+    if let Some(time) = announcement(&lines, options.units.0.len()) {
+        eprintln!("modioctl: {time}");
+    }
     let mut scanned = Scanned::default();
     let bar = progress();
     let complete = tokio::select! {
         // Ctrl-C is handled before the scan begins.
         biased;
         _ = tokio::signal::ctrl_c() => false,
-        result = search(endpoint, observer, options, &bar, &mut scanned) => {
+        result = search(lines, observer, &options.units.0, &bar, &mut scanned) => {
             result?;
             true
         }
@@ -88,38 +95,89 @@ pub async fn run(
     }
 }
 
-async fn search(
-    endpoint: Endpoint,
-    observer: Option<Observer>,
-    options: &Scan,
-    bar: &ProgressBar,
-    scanned: &mut Scanned,
-) -> Result<(), Failure> {
+/// Returns the lines to try: each rate with each format. RTU needs 8 data bits, so formats with 7 are tried in ASCII
+/// mode.
+fn lines(endpoint: &Endpoint, options: &Scan) -> Vec<Endpoint> {
     let rates = options.rates.as_ref();
     let rates = rates.map_or(vec![endpoint.baud], |rates| rates.0.clone());
     let formats = options.formats.as_ref();
     let formats = formats.map_or(vec![endpoint.format], |formats| formats.0.clone());
-    let units = &options.units.0;
-    let lines = rates.len() * formats.len();
-    bar.set_length((units.len() * lines) as u64);
-    let mut master = Master::open(endpoint, observer).await?;
-    for baud in rates {
-        for format in &formats {
-            let now = master.endpoint();
-            if (now.baud, now.format) != (baud, *format) {
-                let next = Endpoint {
-                    baud,
-                    format: *format,
-                    ..now.clone()
-                };
-                master.change_line(next)?;
-            }
-            scanned.found = Found::default();
-            scanned.line = Some(master.endpoint().clone());
-            sweep(&mut master, units, lines > 1, bar, &mut scanned.found).await?;
-            scanned.echo |= master.has_echo();
-            master = look_at_found(master, scanned).await?;
+    let line = |baud, format: Format| Endpoint {
+        baud,
+        format,
+        framing: match format.data_bits {
+            7 if endpoint.place.is_serial() => Framing::Ascii,
+            _ => endpoint.framing,
+        },
+        ..endpoint.clone()
+    };
+    let of_rate = |baud| formats.iter().map(move |format| line(baud, *format));
+    rates.into_iter().flat_map(of_rate).collect()
+}
+
+/// Returns whether every address is asked only once, with the time-out of the line.
+fn is_asked_once(line: &Endpoint) -> bool {
+    // A gateway waits for its units itself, and reports when a unit is missing.
+    line.framing == Framing::Mbap || line.timeout_given
+}
+
+/// Returns the time of a pass over this number of silent addresses.
+fn pass(line: &Endpoint, units: usize, wait: Duration) -> Duration {
+    let request = line.framing.frame(0, 1, &[REPORT]).len();
+    let each = line.time_of(request) + line.frame_gap() + wait;
+    each * u32::try_from(units).unwrap_or(u32::MAX)
+}
+
+/// Describes how long a scan takes; `None` for a short one.
+fn announcement(lines: &[Endpoint], units: usize) -> Option<String> {
+    let all = |wait: fn(&Endpoint) -> Duration| {
+        let passes = lines.iter().map(|line| pass(line, units, wait(line)));
+        passes.sum::<Duration>()
+    };
+    let mut more = String::new();
+    let time = match lines {
+        [first, ..] if is_asked_once(first) => all(|line| line.timeout),
+        [only] => all(|_| SHORT) + pass(only, units, LONG),
+        [first, ..] => {
+            let second = shown(pass(first, units, LONG));
+            more = format!(", and {second} more for each rate and format with an answer");
+            all(|_| SHORT)
         }
+        [] => return None,
+    };
+    let time = (time >= LONG_SCAN).then(|| shown(time))?;
+    Some(format!(
+        "the scan takes about {time}{more}; Ctrl-C ends it and keeps what was found"
+    ))
+}
+
+fn shown(time: Duration) -> String {
+    match time.as_secs() {
+        seconds @ 0..120 => format!("{seconds} s"),
+        seconds => format!("{} min", seconds.div_ceil(60)),
+    }
+}
+
+async fn search(
+    lines: Vec<Endpoint>,
+    observer: Option<Observer>,
+    units: &[u8],
+    bar: &ProgressBar,
+    scanned: &mut Scanned,
+) -> Result<(), Failure> {
+    let several = lines.len() > 1;
+    bar.set_length((units.len() * lines.len()) as u64);
+    let Some(first) = lines.first() else {
+        return Ok(());
+    };
+    let mut master = Master::open(first.clone(), observer).await?;
+    for line in lines {
+        master.change_line(line.clone())?;
+        scanned.found = Found::default();
+        scanned.line = Some(line);
+        sweep(&mut master, units, several, bar, &mut scanned.found).await?;
+        scanned.echo |= master.has_echo();
+        master = look_at_found(master, scanned).await?;
     }
     Ok(())
 }
@@ -129,7 +187,7 @@ async fn search(
 async fn sweep(
     master: &mut Master,
     units: &[u8],
-    one_of_several: bool,
+    is_one_of_several: bool,
     bar: &ProgressBar,
     found: &mut Found,
 ) -> Result<(), Failure> {
@@ -141,10 +199,8 @@ async fn sweep(
     bar.set_message(line.clone());
     let lost = |error| Failure::Port(format!("{} is lost ({error})", place(&endpoint)));
     let asked = |_| bar.inc(1);
-    // A gateway waits for its units itself, and reports when a unit is missing.
-    if endpoint.framing == Framing::Mbap || endpoint.timeout_given {
-        let wait = endpoint.timeout;
-        let sweep = master.sweep(units, wait, found, asked);
+    if is_asked_once(&endpoint) {
+        let sweep = master.sweep(units, endpoint.timeout, found, asked);
         return sweep.await.map_err(lost);
     }
     let sweep = master.sweep(units, SHORT, found, asked);
@@ -152,7 +208,7 @@ async fn sweep(
     let silent = |unit: &&u8| !found.units.contains(unit) && !found.garbled.contains(unit);
     let silent: Vec<_> = units.iter().filter(silent).copied().collect();
     let nothing = found.units.is_empty() && found.garbled.is_empty();
-    if found.never_silent || (one_of_several && nothing) {
+    if found.never_silent || (is_one_of_several && nothing) {
         return Ok(());
     }
     bar.inc_length(silent.len() as u64);
@@ -201,8 +257,7 @@ impl Scanned {
         let Some(line) = &self.line else { return };
         let units = self.found.units.iter().map(|address| Unit {
             address: *address,
-            baud: line.baud,
-            format: line.format.to_string(),
+            line: line.clone(),
             identity: "answers".to_owned(),
             modules: String::new(),
         });
@@ -223,13 +278,20 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
             other => other,
         }
     }
-    let objects = answered(identity(device).await)?;
-    let object = |name: &str| {
-        let found = objects.iter().find(|(known, _)| known == name);
-        found.map(|(_, text)| text.as_str()).unwrap_or_default()
+    let identity = match identity(device).await {
+        Ok(objects) => {
+            let object = |name: &str| {
+                let found = objects.iter().find(|(known, _)| known == name);
+                found.map(|(_, text)| text.as_str()).unwrap_or_default()
+            };
+            let texts = ["vendor", "product", "revision"].map(object);
+            texts.join(" ").trim().to_owned()
+        }
+        Err(Unidentified::Lost(lost @ (Lost::Garbled(_) | Lost::Broken(_)))) => {
+            return Err(device.lost(&lost));
+        }
+        Err(reason) => format!("no identification: {reason}"),
     };
-    let identity = ["vendor", "product", "revision"].map(object).join(" ");
-    let identity = identity.trim();
     let description = answered(known(device).await)?;
     let modules = match description {
         None => String::new(),
@@ -247,16 +309,10 @@ async fn look_at(device: &mut Device) -> Result<Unit, Failure> {
             ports.collect::<Vec<_>>().join(", ")
         }
     };
-    let endpoint = device.master.endpoint();
     Ok(Unit {
         address: device.unit,
-        baud: endpoint.baud,
-        format: endpoint.format.to_string(),
-        identity: if identity.is_empty() {
-            "no identification".to_owned()
-        } else {
-            identity.to_owned()
-        },
+        line: device.master.endpoint().clone(),
+        identity,
         modules,
     })
 }
@@ -267,8 +323,9 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
         let units = scanned.units.iter().map(|unit| {
             json!({
                 "unit": unit.address,
-                "baud": serial.then_some(unit.baud),
-                "format": serial.then_some(&unit.format),
+                "baud": serial.then_some(unit.line.baud),
+                "format": serial.then(|| unit.line.format.to_string()),
+                "mode": serial.then_some(unit.line.framing),
                 "identity": unit.identity,
                 "modules": unit.modules,
             })
@@ -281,10 +338,11 @@ fn print(scanned: &Scanned, serial: bool, json: bool) -> Result<(), Failure> {
         .units
         .iter()
         .map(|unit| {
-            let line = if serial {
-                format!("{} {}", unit.baud, unit.format)
-            } else {
-                String::new()
+            let Endpoint { baud, format, .. } = &unit.line;
+            let line = match (serial, unit.line.framing) {
+                (false, _) => String::new(),
+                (true, Framing::Ascii) => format!("{baud} {format} ASCII"),
+                (true, _) => format!("{baud} {format}"),
             };
             [
                 unit.address.to_string(),
@@ -316,4 +374,53 @@ fn progress() -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::{Cli, Command};
+
+    /// Returns the lines of a scan with these options, and the number of addresses.
+    fn lines_of(words: &str) -> (Vec<Endpoint>, usize) {
+        let words = format!("modioctl {words}");
+        let cli = Cli::try_parse_from(words.split(' ')).unwrap();
+        let Command::Scan(options) = cli.command else {
+            panic!("not a scan");
+        };
+        let endpoint = cli.endpoint.endpoint(None, None).unwrap();
+        (lines(&endpoint, &options), options.units.0.len())
+    }
+
+    #[test]
+    fn all_formats_are_seven_and_those_with_7_data_bits_are_ascii() {
+        let (lines, _) = lines_of("--port a scan --formats all");
+        let lines: Vec<_> = lines
+            .iter()
+            .map(|line| (line.format.to_string(), line.framing))
+            .collect();
+        let (rtu, ascii) = (Framing::Rtu, Framing::Ascii);
+        let eight = ["8N2", "8E1", "8O1", "8N1"].map(|format| (format.to_owned(), rtu));
+        let seven = ["7E1", "7O1", "7N2"].map(|format| (format.to_owned(), ascii));
+        assert_eq!(lines, [&eight[..], &seven].concat());
+    }
+
+    #[test]
+    fn time_of_a_scan_is_known_before_it_begins() {
+        let time = |words: &str| {
+            let (lines, units) = lines_of(words);
+            announcement(&lines, units).unwrap_or_default()
+        };
+        // 247 addresses, 4 characters and t3.5 at 9600 bit/s, 25 and 150 ms.
+        assert!(time("--port a scan").starts_with("the scan takes about 47 s;"));
+        let all = time("--port a scan --formats all --rates all");
+        let times =
+            "the scan takes about 13 min, and 54 s more for each rate and format with an answer;";
+        assert!(all.starts_with(times), "{all}");
+        let slow = time("--tcp a:1 --timeout 1s scan");
+        assert!(slow.starts_with("the scan takes about 5 min;"), "{slow}");
+        assert_eq!(time("--port a scan --units 1-20"), "");
+    }
 }

@@ -116,6 +116,16 @@ fn answer(pdu: &[u8], registers: &BTreeMap<u16, u16>, file: &[u16]) -> Vec<u8> {
 }
 
 #[test]
+fn a_unit_without_identification_is_listed_with_the_reason() {
+    let at = At::tcp(unit(&description(), 1));
+    let text = at.run("scan --units 3").fine();
+    assert_eq!(
+        text,
+        "3     no identification: exception 01, illegal function\n"
+    );
+}
+
+#[test]
 fn a_newer_unit_is_read_by_its_own_description() {
     let at = At::tcp(unit(&description(), 1));
     let first = at.run("read PRESSURE_LIMIT p5.1");

@@ -162,11 +162,7 @@ fn ctrl_c_keeps_the_units_that_were_found() {
     // The second pass has asked unit 1.
     while requests.recv().unwrap() != 247 {}
     while requests.recv().unwrap() != 2 {}
-    let id = scan.child.id().to_string();
-    std::process::Command::new("kill")
-        .args(["-INT", &id])
-        .status()
-        .unwrap();
+    scan.interrupt();
     let ran = scan.end();
     assert_eq!(ran.status, 130, "{ran:?}");
     assert!(ran.out.starts_with("1  "), "{ran:?}");
