@@ -1,7 +1,7 @@
 //! Identity and state, 0x0200 to 0x025F: read-only registers.
 
 use crate::block::block;
-use crate::codes::{CHANNEL_STATUS_NAMES, ModuleState};
+use crate::codes::{ChannelStatus, ModuleState};
 use crate::rule::Rule;
 use crate::value::Value;
 use crate::{Board, Module};
@@ -131,5 +131,5 @@ block! {
     /// Gaps above t1.5 inside frames
     T15_GAPS "inter-character gaps": 0x0238 x 1, Value::NUMBER, READ;
     /// State of the channel
-    CHANNEL_STATUS "channel status": 0x0240 x 32, Value::Codes(CHANNEL_STATUS_NAMES), READ;
+    CHANNEL_STATUS "channel status": 0x0240 x 32, Value::Codes(ChannelStatus::NAMES), READ;
 }

@@ -3,8 +3,8 @@
 use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
-use modio_drivers::{CHANNELS, ChannelStatus, Kind, scale};
-use register_map::{Module, counters};
+use modio_drivers::{CHANNELS, ChannelStatus, Kind};
+use register_map::{Module, counters, limits};
 
 use super::port::IoPort;
 
@@ -150,7 +150,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
             place
                 .and_then(|(port, channel)| port.setting(channel))
                 .is_some_and(|settings| {
-                    let (min, max) = scale::output_limits(settings.signal, settings.scale);
+                    let (min, max) = limits::of_output(settings.signal, settings.scale);
                     (min..=max).contains(&word)
                 })
         });
