@@ -152,7 +152,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Matrix(options) => soak::matrix(workspace, &options),
         Command::Docs => {
             let path = workspace.root.join(docs::PATH);
-            fs_err::write(&path, docs::markdown())?;
+            fs_err::write(&path, docs::markdown()?)?;
             say!("wrote {}", path.display());
             Ok(())
         }

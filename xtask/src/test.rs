@@ -53,7 +53,7 @@ enum Run {
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number at the end of its name, such as `lint-02`.
-const STEPS: [(In, &str, &str, Run); 23] = [
+const STEPS: [(In, &str, &str, Run); 22] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
     (Ci, "lint", "lints, target", Each(lint_target)),
@@ -74,7 +74,6 @@ const STEPS: [(In, &str, &str, Run); 23] = [
     (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
     (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
     (Ci, "bench", "instructions and bytes", Each(bench::check)),
-    (Ci, "suites", "suites for Renode", Each(checks::suites)),
     (Ci, "peers", "Modbus servers, briefly", Once(peers::check)),
     (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
 ];
