@@ -172,7 +172,6 @@ codes! {
         DropChanges = 4 "drop unsaved changes",
         ClearWatchdogFlag = 5 "clear the watchdog flag",
         Identify = 6 "identify",
-        EnterLoader = 0xB007 "enter the loader",
     }
 }
 
@@ -250,7 +249,6 @@ mod tests {
         }
         let taken = (0..=0xFFFF).filter(|code| Baud::from_code(*code).is_some());
         assert!(taken.eq(Baud::CODES.iter().copied()));
-        assert_eq!(Command::from_code(0xB007), Some(Command::EnterLoader));
         assert_eq!(Command::from_code(0), None);
         assert_eq!(Format::from_code(7), None);
     }

@@ -12,7 +12,7 @@ const READ: Rule = Rule::read_only();
 pub const PRODUCT: u32 = 0x2383_5860;
 
 /// Value of MAP_VERSION: the version of this map.
-pub const MAP_VERSION_VALUE: u16 = 1;
+pub const MAP_VERSION_VALUE: u16 = 2;
 
 /// Bits of STATUS.
 pub mod status {
@@ -71,11 +71,7 @@ pub mod reset_cause {
 }
 
 /// Names of the bits of BUILD.
-const BUILD_NAMES: &[(u8, &str)] = &[
-    (0, "sources differ from the commit"),
-    (1, "signed with development key"),
-    (2, "not signed"),
-];
+const BUILD_NAMES: &[(u8, &str)] = &[(0, "sources differ from the commit")];
 
 block! {
     "Identity and state", 0x0200..=0x025F;

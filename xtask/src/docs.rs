@@ -10,7 +10,7 @@ use register_map::{
 };
 
 const INTRODUCTION: &str = "\
-# Register map, version 1
+# Register map, version 2
 
 <!-- Written by `cargo xtask docs` from crate register-map. Change it there. -->
 
