@@ -22,7 +22,7 @@ pub const CORNER: &str = "MODIO_CORNER";
 
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
 /// built twice.
-const SUITE: &str = "conformance/sim";
+const SUITE: &str = "hil/sim";
 
 /// The packages of the image.
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";

@@ -21,7 +21,7 @@ const PROGRAMS: [(&str, &str); 4] = [
     ("modioctl", "modioctl"),
     ("sim", "modio-sim"),
     ("conformance", "modio-conformance"),
-    ("conformance", "modio-hil"),
+    ("hil", "modio-hil"),
 ];
 
 /// Builds the programs for a target, the simulator with the images `BOARD.elf` of a directory in it, and writes them and
