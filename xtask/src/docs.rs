@@ -49,9 +49,9 @@ const CONFIGURATION_NOTES: &str = "
 - Identify (6): all LEDs blink together for 10 s, and then show the state of the device again. Another identify starts
   the 10 s again.
 - Load defaults (3) and drop (4) change the settings as writes do: save to make them permanent.
-- A setting by point takes the values of the kind of point that the last written MODULE makes it. If a point has no use
-  for the setting, it takes any value of the register. A change of MODULE from one module to another sets the settings of
-  its points to their defaults. A change from none to a module keeps the settings that suit.
+- The allowed values of a setting by point depend on the kind of the point, which the last written MODULE defines. If
+  the point does not use the setting, every value of the register is allowed. A change of MODULE from one module to
+  another sets the settings of its points to their defaults. A change from none to a module keeps the settings that suit.
 - Until the restart a \"now\" setting that does not suit the module in force counts as its default.
 ";
 

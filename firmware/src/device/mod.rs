@@ -4,7 +4,7 @@
 //!            requests (serve)
 //!                  |
 //!   +--------------v---------------------------------------------+
-//!   | points    the process image: values of the channels         |<--> scan, 1 kHz
+//!   | points    the value of every channel                        |<--> scan, 1 kHz
 //!   | pulses    counters of digital inputs                        |
 //!   | config    settings, lock, commands                          |<--> store, in flash
 //!   | state     identity, counters, health                        |<--- all tasks
@@ -44,7 +44,7 @@ use crate::config::{Config, Origin};
 /// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
 pub struct Device<const SLOTS: usize> {
-    /// The process image.
+    /// The values of all channels.
     pub points: Points<SLOTS>,
     /// The settings.
     pub config: Config<SLOTS>,

@@ -1,4 +1,4 @@
-//! The process image: the points of all ports with a slot.
+//! The points of all ports with a slot: the values that requests and the scan share.
 
 use core::ops::Range;
 

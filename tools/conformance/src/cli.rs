@@ -116,7 +116,7 @@ pub struct Cli {
     #[arg(long)]
     pub trace: bool,
 
-    /// List the cases and end
+    /// List the cases as a page in Markdown and end
     #[arg(long)]
     pub list: bool,
 
