@@ -110,7 +110,7 @@ block! {
     UNIQUE_ID "unique device identity": 0x0220 x 6, Value::Opaque, READ;
     /// Good frames; counters wrap
     BUS_MESSAGES "bus messages": 0x0230 x 1, Value::NUMBER, READ;
-    /// Bad CRC, bad character, or under 3 bytes
+    /// Bad CRC or character, too short or too long
     BUS_ERRORS "bus communication errors": 0x0231 x 1, Value::NUMBER, READ;
     /// Exceptions, broadcasts included
     EXCEPTIONS "exceptions sent": 0x0232 x 1, Value::NUMBER, READ;
