@@ -1,6 +1,6 @@
 //! Checks of Renode's files without Renode: the Python files have only what Renode's Python has, every name in scripts
-//! and suites is that of a file, a command or a device, and every suite calls keywords that Renode has with the right
-//! arguments. Whether the image runs there only Renode itself can say.
+//! and suites is that of a file, a command or a device, every suite calls keywords that Renode has with the right
+//! arguments, and the image starts on the platform's models. Whether it serves there only Renode itself can say.
 //!
 //! Tests of this package (`platform`) check the platform and the scripts against the boards.
 
@@ -11,17 +11,19 @@ use register_map::Board;
 
 use super::{DIRECTORY, suites::all};
 use crate::workspace::Workspace;
-use crate::{command, python};
+use crate::{build, command, python};
 
 /// The tests, relative to the root.
 const CHECKS: &str = "renode/checks";
 
-/// Checks the Python files and the names, and the suites of a board in a dry run.
+/// Checks the Python files, the names and the start of the image, and the suites of a board in a dry run.
 pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
+    let elf = build::image(workspace, board)?;
     let python = python(workspace)?;
     let mut tests = python::python(&python);
     tests.args(["-m", "unittest", "discover", "--start-directory"]);
-    command::run(tests.arg(workspace.root.join(CHECKS)))?;
+    tests.arg(workspace.root.join(CHECKS));
+    command::run(tests.env("MODIO_BOARD", board.name).env("MODIO_ELF", elf))?;
     let output = workspace.target.join("renode-checks");
     let mut robot = python::python(&python);
     robot.args("-m robot --dryrun --console quiet --prerunmodifier".split(' '));
@@ -32,7 +34,7 @@ pub fn files(workspace: &mut Workspace, board: &'static Board) -> Result<()> {
     command::run(&mut robot).with_context(|| format!("see {}", output.join("log.html").display()))
 }
 
-/// Returns the interpreter of an environment with Robot Framework.
+/// Returns the interpreter of an environment with Robot Framework and Unicorn.
 pub fn python(workspace: &Workspace) -> Result<PathBuf> {
     let requirements = format!("{CHECKS}/requirements.txt");
     python::environment(workspace, "renode", &[&requirements])
