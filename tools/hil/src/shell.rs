@@ -7,8 +7,8 @@ use std::time::Duration;
 use anyhow::{Context as _, Result, ensure};
 use delegate::delegate;
 
-use crate::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::line::LineFormat;
+use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
+use conformance::line::LineFormat;
 
 /// How the image is written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -125,7 +125,7 @@ impl Endpoint for Powered {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use crate::hil::fake::Line;
+    use crate::fake::Line;
 
     /// A line whose power is switched by a script that writes its argument to a file.
     fn powered(directory: &std::path::Path, fails: &str) -> Powered {

@@ -8,9 +8,9 @@ use register_map::state;
 use serde_json::{Value, json};
 use serialport::{SerialPortInfo, SerialPortType};
 
-use crate::bench::Bench;
-use crate::case::Check;
-use crate::target::{Modio, Span};
+use conformance::bench::Bench;
+use conformance::case::Check;
+use conformance::target::{Modio, Span};
 
 /// First version of the register map that has the registers of [`COMMIT`].
 const MAP_WITH_COMMIT: u16 = 2;
@@ -143,7 +143,7 @@ impl Unit {
     ///
     /// # Errors
     ///
-    /// [`Stop::Fail`](crate::case::Stop::Fail) when the registers cannot be read, `Stop::Broken`.
+    /// [`Stop::Fail`](conformance::case::Stop::Fail) when the registers cannot be read, `Stop::Broken`.
     pub fn ask(bench: &mut Bench<'_>, modules: Modio) -> Check<Self> {
         let mut read = |first, count: u16| {
             bench.read_words(Span {

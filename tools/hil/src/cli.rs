@@ -6,8 +6,8 @@ use clap::Parser;
 use register_map::Module;
 use register_map::codes::Baud;
 
-use crate::line::CharacterFormat;
-use crate::program::Files;
+use conformance::line::CharacterFormat;
+use conformance::program::Files;
 
 /// Tests a modio on a bench: the conformance suite, the turnaround and lost frames at each rate, and the wires from
 /// outputs to inputs.
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn every_option_is_in_the_manual() {
-        let manual = include_str!("../../../../docs/hil.md");
+        let manual = include_str!("../../../docs/hil.md");
         let command = Cli::command();
         let options = command.get_arguments().filter_map(clap::Arg::get_long);
         let missing: Vec<&str> = options

@@ -1,11 +1,11 @@
 //! Reads and writes points of any unit on the line, and restores outputs.
 
-use crate::bench::Bench;
-use crate::case::Check;
-use crate::frame::Reply;
-use crate::hil::bench_file::Place;
-use crate::points::{pdu, words_of};
-use crate::target::Target;
+use crate::bench_file::Place;
+use conformance::bench::Bench;
+use conformance::case::Check;
+use conformance::frame::Reply;
+use conformance::points::{pdu, words_of};
+use conformance::target::Target;
 
 /// Number of attempts to restore an output.
 const ATTEMPTS: u32 = 3;

@@ -7,12 +7,12 @@ use register_map::codes::{Scale, Signal};
 use register_map::points::output_values;
 use register_map::{Values, configuration};
 
-use crate::bench::Bench;
-use crate::case::{Check, Failure, Stop};
-use crate::hil::bench_file::{Analog, Place};
-use crate::hil::remote::{put_back, read_word, registers, write_word};
-use crate::hil::report::Finding;
-use crate::hil::verdict;
+use crate::bench_file::{Analog, Place};
+use crate::remote::{put_back, read_word, registers, write_word};
+use crate::report::Finding;
+use crate::verdict;
+use conformance::bench::Bench;
+use conformance::case::{Check, Failure, Stop};
 
 /// Tests the wires until `stop` is set. Calls `report` with each finding.
 ///

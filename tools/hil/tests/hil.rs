@@ -10,9 +10,9 @@ use std::time::Duration;
 use conformance::cli::{chosen, waits};
 use conformance::endpoint::Endpoint as _;
 use conformance::endpoint::sim::{Fitting, start};
-use conformance::hil::report::Report;
-use conformance::hil::{Plan, run};
 use conformance::line::LineFormat;
+use hil::report::Report;
+use hil::{Plan, run};
 use register_map::Module;
 use register_map::board::MODIO_02;
 

@@ -30,7 +30,7 @@ fn example_in_the_documentation_is_read() {
 
 #[test]
 fn examples_in_the_manual_are_read() {
-    let manual = include_str!("../../../../../docs/hil.md");
+    let manual = include_str!("../../../../docs/hil.md");
     let examples: Vec<BenchFile> = manual
         .split("```toml\n")
         .skip(1)

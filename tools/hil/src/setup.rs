@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, anyhow, bail};
 
-use crate::case::Case;
-use crate::cli::{chosen, waits};
-use crate::endpoint::stream::Stream;
-use crate::endpoint::{Broken, Endpoint};
-use crate::hil::Plan;
-use crate::hil::bench_file::BenchFile;
-use crate::hil::cli::Cli;
-use crate::hil::shell::{Flash, Powered};
-use crate::line::LineFormat;
+use crate::Plan;
+use crate::bench_file::BenchFile;
+use crate::cli::Cli;
+use crate::shell::{Flash, Powered};
+use conformance::case::Case;
+use conformance::cli::{chosen, waits};
+use conformance::endpoint::stream::Stream;
+use conformance::endpoint::{Broken, Endpoint};
+use conformance::line::LineFormat;
 
 /// The command line and the bench file, merged.
 #[derive(Clone, Debug)]
@@ -144,7 +144,7 @@ mod tests {
     use register_map::Module;
 
     use super::*;
-    use crate::hil::fake::Line;
+    use crate::fake::Line;
 
     fn parse(arguments: &[&str]) -> Result<Cli, clap::Error> {
         Cli::try_parse_from([&["x"], arguments].concat())

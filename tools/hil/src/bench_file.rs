@@ -38,7 +38,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
-use crate::line::CharacterFormat;
+use conformance::line::CharacterFormat;
 
 /// The contents of a bench file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -2,11 +2,11 @@
 
 use std::process::ExitCode;
 
-use conformance::hil::about::About;
-use conformance::hil::cli::Cli;
-use conformance::hil::report::Report;
-use conformance::hil::shell;
-use conformance::{hil, interrupt, program};
+use conformance::{interrupt, program};
+use hil::about::About;
+use hil::cli::Cli;
+use hil::report::Report;
+use hil::shell;
 
 fn main() -> ExitCode {
     program::run("modio-hil", commit::version!(), test)

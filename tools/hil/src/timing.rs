@@ -9,15 +9,15 @@ use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::bench::Bench;
-use crate::case::{Check, Failure};
-use crate::cases::timing::silence;
-use crate::endpoint::Piece;
-use crate::frame::Reply;
-use crate::hil::spread::Spread;
-use crate::line::LineFormat;
-use crate::points::pdu;
-use crate::run::Verdict;
+use crate::spread::Spread;
+use conformance::bench::Bench;
+use conformance::case::{Check, Failure};
+use conformance::cases::timing::silence;
+use conformance::endpoint::Piece;
+use conformance::frame::Reply;
+use conformance::line::LineFormat;
+use conformance::points::pdu;
+use conformance::run::Verdict;
 
 /// Number of requests in a row without a reply after which the measurement ends.
 const GIVE_UP: u32 = 20;
@@ -62,7 +62,7 @@ fn echo(number: u16) -> Vec<u8> {
 ///
 /// # Errors
 ///
-/// [`Stop::Broken`](crate::case::Stop::Broken).
+/// [`Stop::Broken`](conformance::case::Stop::Broken).
 pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check<Tally> {
     let line = bench.endpoint.line();
     let exact = bench.endpoint.abilities().exact;
@@ -104,7 +104,7 @@ pub fn measure(bench: &mut Bench<'_>, requests: u32, stop: &AtomicBool) -> Check
             } else {
                 tally.wrong += 1;
             }
-            if let (None, Err(crate::case::Stop::Fail(failure))) =
+            if let (None, Err(conformance::case::Stop::Fail(failure))) =
                 (&tally.example, bench.fail::<()>("the request, echoed"))
             {
                 tally.example = Some(failure);

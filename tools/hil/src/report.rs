@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::case::Kind;
-use crate::hil::about::About;
-use crate::hil::timing::Tally;
-use crate::report::junit::{self, Test};
-use crate::report::{Totals, json as suite_json};
-use crate::run::{Outcome, Verdict};
+use crate::about::About;
+use crate::timing::Tally;
+use conformance::case::Kind;
+use conformance::report::junit::{self, Test};
+use conformance::report::{Totals, json as suite_json};
+use conformance::run::{Outcome, Verdict};
 
 /// The result of a test outside the suite.
 #[derive(Clone, Debug, PartialEq, Eq)]

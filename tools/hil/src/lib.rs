@@ -1,5 +1,5 @@
 //! Tests a board on a bench: the whole suite, then the turnaround and the lost frames at each rate, then the wires that
-//! connect outputs to inputs. The command `modio-hil`, which `cargo xtask hil` runs, uses this module.
+//! connect outputs to inputs. The command `modio-hil`, which `cargo xtask hil` runs, uses this crate.
 //!
 //! ```text
 //! cli, setup  the command                 timing   requests at one rate: turnaround, lost frames
@@ -12,21 +12,23 @@
 //! The rate, the outputs and the configuration of the unit are restored at the end, also when a step fails or the run
 //! is interrupted.
 
+#![forbid(unsafe_code)]
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context as _, Error, Result, bail};
 use register_map::{Module, state};
 
-use crate::bench::{Bench, Patience};
-use crate::case::{Case, Check, Stop, skip};
-use crate::endpoint::Endpoint;
-use crate::frame::Mode;
-use crate::line::LineFormat;
-use crate::probe::{Given, probe};
-use crate::rate::tour;
-use crate::report::table;
-use crate::run::{Options, Verdict, run_while};
+use conformance::bench::{Bench, Patience};
+use conformance::case::{Case, Check, Stop, skip};
+use conformance::endpoint::Endpoint;
+use conformance::frame::Mode;
+use conformance::line::LineFormat;
+use conformance::probe::{Given, probe};
+use conformance::rate::tour;
+use conformance::report::table;
+use conformance::run::{Options, Verdict, run_while};
 
 pub mod about;
 pub mod analog;

@@ -7,9 +7,9 @@ use register_map::board::MODIO_02;
 use register_map::configuration::{BAUD, COMMAND, FORMAT, KEY};
 use register_map::{Module, counters, points, state};
 
-use crate::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::frame::Mode;
-use crate::line::{LineFormat, Parity};
+use conformance::endpoint::{Abilities, Broken, Endpoint, Piece, Received};
+use conformance::frame::Mode;
+use conformance::line::{LineFormat, Parity};
 
 /// One unit.
 pub(super) struct Unit {

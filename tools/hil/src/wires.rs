@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use register_map::counters;
 
-use crate::bench::Bench;
-use crate::case::{Check, Failure, Stop};
-use crate::hil::bench_file::{Place, Wire};
-use crate::hil::remote::{put_back, read_bit, registers, write_bit};
-use crate::hil::report::Finding;
-use crate::hil::verdict;
-use crate::run::Verdict;
+use crate::bench_file::{Place, Wire};
+use crate::remote::{put_back, read_bit, registers, write_bit};
+use crate::report::Finding;
+use crate::verdict;
+use conformance::bench::Bench;
+use conformance::case::{Check, Failure, Stop};
+use conformance::run::Verdict;
 
 /// Tests the wires until `stop` is set. Calls `report` with each finding.
 ///

@@ -1,17 +1,16 @@
-//! `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
+//! `cargo xtask docs`: `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
 
-use core::fmt::{Result, Write};
-use core::ops::Range;
+use std::fmt::{Result, Write};
+use std::ops::Range;
 
-use crate::block::{Block, Scope, Text};
-use crate::points::Kind;
-use crate::rule::{InForce, Rule};
-use crate::value::{Unit, Value};
-use crate::values::Values;
-use crate::{BLOCKS, Board, Module, codes, configuration, counters, points};
+use register_map::points::Kind;
+use register_map::{
+    BLOCKS, Block, Board, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
+    configuration, counters, fault, points,
+};
 
 const INTRODUCTION: &str = "\
-# Register map, version 1
+# Register map, version 2
 
 <!-- Written by `cargo xtask docs` from crate register-map. Change it there. -->
 
@@ -50,9 +49,9 @@ const CONFIGURATION_NOTES: &str = "
 - Identify (6): all LEDs blink together for 10 s, and then show the state of the device again. Another identify starts
   the 10 s again.
 - Load defaults (3) and drop (4) change the settings as writes do: save to make them permanent.
-- A setting by point takes the values of the kind of point that the last written MODULE makes it. If a point has no use
-  for the setting, it takes any value of the register. A change of MODULE from one module to another sets the settings of
-  its points to their defaults. A change from none to a module keeps the settings that suit.
+- The allowed values of a setting by point depend on the kind of the point, which the last written MODULE defines. If
+  the point does not use the setting, every value of the register is allowed. A change of MODULE from one module to
+  another sets the settings of its points to their defaults. A change from none to a module keeps the settings that suit.
 - Until the restart a \"now\" setting that does not suit the module in force counts as its default.
 ";
 
@@ -65,12 +64,17 @@ The record survives every reset but a loss of power. A new fault replaces it. Li
 stop at 65535.
 ";
 
-/// Writes the whole document.
-///
-/// # Errors
-///
-/// The errors of `out`.
-pub fn write_markdown(out: &mut impl Write) -> Result {
+/// The document, in the repository.
+pub const PATH: &str = "docs/register-map.md";
+
+/// Returns the whole document.
+pub fn markdown() -> std::result::Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    write_markdown(&mut text)?;
+    Ok(text)
+}
+
+fn write_markdown(out: &mut impl Write) -> Result {
     out.write_str(INTRODUCTION)?;
     for block in BLOCKS {
         let Block {
@@ -85,7 +89,7 @@ pub fn write_markdown(out: &mut impl Write) -> Result {
         if block.first == configuration::BLOCK.first {
             out.write_str(CONFIGURATION_NOTES)?;
             write_store(out)?;
-        } else if block.first == crate::fault::BLOCK.first {
+        } else if block.first == fault::BLOCK.first {
             out.write_str(FAULT_NOTES)?;
         } else if block.first == counters::BLOCK.first {
             out.write_str(COUNTER_NOTES)?;
@@ -275,8 +279,8 @@ fn write_readings(out: &mut impl Write) -> Result {
         write!(
             out,
             "| {range} = {} | {scale} = {} | {} | {} to {} | ",
-            name(codes::SIGNAL_NAMES, range),
-            name(codes::SCALE_NAMES, scale),
+            name(codes::Signal::NAMES, range),
+            name(codes::Scale::NAMES, scale),
             input.unit,
             input.min,
             input.max
@@ -310,17 +314,25 @@ fn write_store(out: &mut impl Write) -> Result {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-    use std::string::String;
-
     use super::*;
 
     #[test]
+    fn the_document_is_up_to_date() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("..")
+            .join(PATH);
+        let written = fs_err::read_to_string(path).unwrap_or_default();
+        assert!(
+            written == markdown().unwrap(),
+            "{PATH} is out of date or missing; write it with: cargo xtask docs"
+        );
+    }
+
+    #[test]
     fn every_register_of_every_block_has_a_line() {
-        let mut text = String::new();
-        write_markdown(&mut text).unwrap();
+        let text = markdown().unwrap();
         for (rule, about) in BLOCKS.iter().skip(1).flat_map(|block| block.registers()) {
-            let begin = std::format!("| {:#06X}", rule.first);
+            let begin = format!("| {:#06X}", rule.first);
             let line = text.lines().find(|line| line.starts_with(&begin));
             assert!(
                 line.is_some_and(|line| line.contains(about.name)),
@@ -345,7 +357,7 @@ mod tests {
 
     #[test]
     fn a_setting_by_point_names_the_kind_that_differs() {
-        let (rule, _) = crate::rule_at(configuration::RULES, configuration::FILTER).unwrap();
+        let (rule, _) = register_map::rule_at(configuration::RULES, configuration::FILTER).unwrap();
         let mut text = String::new();
         write_values(rule, &mut text).unwrap();
         assert_eq!(text, "0-1000 (5); analog inputs 0-8 (4)");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::fake::{Fate, Line, TURNAROUND};
 use super::*;
-use crate::cli::waits;
+use conformance::cli::waits;
 
 pub(super) fn plan(line: &Line) -> Plan {
     Plan {
