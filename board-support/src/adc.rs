@@ -1,8 +1,7 @@
 //! ADC1, which samples the analog lines of all slots, once per scan.
 //!
-//! Software starts each conversion and polls for its end a limited number of times. The HAL's driver is not used,
-//! because it polls a conversion and the calibration without a limit. Voltages are relative to the board's 3.3 V.
-//! The same 3.3 V supplies the signal conditioning of the module, so supply drift cancels out.
+//! Software starts each conversion and polls for its end a limited number of times. Voltages are relative to the
+//! board's 3.3 V. The same 3.3 V supplies the signal conditioning of the module, so supply drift cancels out.
 
 use stm32f1xx_hal::pac;
 

@@ -1,9 +1,8 @@
 //! The clock tree: 72 MHz from the crystal, or 60 MHz from the internal oscillator when the crystal does not start
 //! or has failed too often since power-on.
 //!
-//! The HAL would wait forever for a crystal that does not start or a PLL that does not lock, and it panics on
-//! frequencies that it does not accept. Here every wait is bounded and the frequencies are constants. While the
-//! core runs on the crystal, the clock security system monitors it (RM0008 7.2.7).
+//! Every wait is bounded and the frequencies are constants. While the core runs on the crystal, the clock security
+//! system monitors it (RM0008 7.2.7).
 
 use stm32f1xx_hal::pac;
 

@@ -1,9 +1,8 @@
-//! SW01, the eight-way DIP switch. It is read at power-on, once it is stable, and its value is kept over every
-//! other reset.
+//! SW01, the eight-way DIP switch: its pins as a number, read until the number is stable.
 //!
-//! A reset by the watchdog, by software or by the pin does not read the switch again. Otherwise a unit in service
-//! could change its address at a reset, which a master does not expect. The register map says "read once at
-//! power-on".
+//! The switch is read after a power-on only. The kept region has the number over every other reset: by the watchdog,
+//! by software or by the reset pin. Otherwise a unit in service could change its address at a reset, which its master
+//! does not expect.
 
 use crate::{
     design::{DIP_POLLS, DIP_STABLE_POLLS},

@@ -113,15 +113,22 @@ impl Flash {
     }
 
     /// Returns whether the supply is high enough for an operation. A detector that is off, because of a disturbance,
-    /// says nothing: it is turned on again, and the caller asks later.
+    /// says nothing: it is turned on again, and the caller asks later. On an emulator whose detector cannot be turned on
+    /// the supply is never low.
     #[must_use]
     pub fn has_supply(&self) -> bool {
-        let settings = self.power.cr().read();
-        let is_set = settings.pvde().bit_is_set() && settings.pls().bits() == PVD_LEVEL;
-        if !is_set {
+        if !self.detector_is_set() {
             self.set_up_detector();
+            if self.detector_is_set() {
+                return false;
+            }
         }
-        is_set && self.power.csr().read().pvdo().bit_is_clear()
+        self.power.csr().read().pvdo().bit_is_clear()
+    }
+
+    fn detector_is_set(&self) -> bool {
+        let settings = self.power.cr().read();
+        settings.pvde().bit_is_set() && settings.pls().bits() == PVD_LEVEL
     }
 
     /// Runs an operation: unlocks the controller, sets it up, waits for the end within a time limit, and locks it

@@ -1,8 +1,6 @@
 //! The flash pages that keep data without power, as the store sees them.
 //!
-//! The traits of embedded-storage cannot say what the store needs. `ReadNorFlash` copies bytes, but the store reads pages
-//! in place. The store makes a mark invalid by writing 0 over it; `NorFlash` writes erased bytes only, and
-//! `MultiwriteNorFlash` promises that any bit can be cleared later, but this flash takes only a half-word of 0.
+//! docs/decisions.md says why these are not the traits of embedded-storage.
 
 /// One of the store's two pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

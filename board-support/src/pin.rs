@@ -1,7 +1,6 @@
 //! Pins as data, and access to a pin through the registers of its port.
 //!
-//! The HAL has one type per pin and mode, which would spread a board's pins over the code as types. Here they are data,
-//! most of them in the board's [descriptor](crate::boards::Descriptor).
+//! Most pins are in the board's [descriptor](crate::boards::Descriptor).
 //!
 //! Code changes a configuration register (CRL, CRH) by a read and a write. A change by another context in between
 //! would be lost, so only one context at a time may change each register:

@@ -1,5 +1,4 @@
-//! Pins from the board's descriptor as pins of embedded-hal. The HAL's type for any pin of a port is not used: it looks
-//! the pin up in an array and panics when it does not exist.
+//! Pins from the board's descriptor as pins of embedded-hal.
 
 use core::convert::Infallible;
 

@@ -1,6 +1,5 @@
 //! The independent watchdog. It resets the device when it is not refreshed, even when the main clock has stopped.
-//! It runs from the first steps of a start. It is set up through its registers, because the HAL's driver panics and
-//! waits without a limit.
+//! It runs from the first steps of a start.
 
 use stm32f1xx_hal::pac;
 

@@ -9,16 +9,11 @@ pub const COMMIT: u32 = match TEXT.split_at_checked(8) {
     None => 0,
 };
 
-/// Value of the register BUILD: bit 0 means that the sources had changes that are not in the commit, bit 2 that the
-/// image is not signed.
-pub const FLAGS: u16 = NOT_SIGNED
-    | match TEXT.as_bytes() {
-        [.., b'-', b'd', b'i', b'r', b't', b'y'] => CHANGED,
-        _ => 0,
-    };
-
-const CHANGED: u16 = 1 << 0;
-const NOT_SIGNED: u16 = 1 << 2;
+/// Value of the register BUILD: bit 0 means that the sources had changes that are not in the commit.
+pub const FLAGS: u16 = match TEXT.as_bytes() {
+    [.., b'-', b'd', b'i', b'r', b't', b'y'] => 1,
+    _ => 0,
+};
 
 const fn number(digits: &str) -> u32 {
     match u32::from_str_radix(digits, 16) {

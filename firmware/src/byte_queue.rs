@@ -1,7 +1,4 @@
-//! A queue of bytes between an interrupt and a task.
-//!
-//! `heapless::spsc::Queue` is not used here. Version 0.9 finds the end of its buffer by a division at run time, which
-//! can panic when a program has several queues, and its methods would have to be placed in RAM by name.
+//! A queue of bytes between an interrupt and a task. docs/decisions.md says why it is not `heapless::spsc::Queue`.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 

@@ -1,11 +1,15 @@
 //! The status LEDs, set in steps of 10 ms.
 //!
-//! | LED | shows |
+//! | LED | pattern |
 //! |---|---|
 //! | running | blinks once a second |
-//! | activity | lights for 50 ms after a request for this unit |
-//! | all three | blink together for 10 s after COMMAND 6, identify, instead of all other patterns |
-//! | fault | blinks five times in two seconds: SW01 is not set to a unit address; steady: a module does not answer; a short flash every two seconds: no crystal |
+//! | activity | is lit for 50 ms after a request for this unit, or a broadcast |
+//! | fault | blinks five times in two seconds: SW01 is not set to a unit address |
+//! | | is lit: a module does not answer |
+//! | | is lit for 100 ms every two seconds: the crystal does not run |
+//! | | is dark: no fault |
+//!
+//! After COMMAND 6, identify, all three blink together for 10 s in place of these patterns.
 
 use embedded_hal::digital::{OutputPin, PinState};
 

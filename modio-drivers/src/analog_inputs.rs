@@ -1,6 +1,8 @@
 //! The analog inputs of a module: computes each channel from the codes of its line.
 
-use crate::low_pass::{LOW_PASS_DEFAULT, LowPass};
+use register_map::limits::LOW_PASS_DEFAULT;
+
+use crate::low_pass::LowPass;
 use crate::{
     CHANNELS, ChannelSettings, ChannelStatus, Channels, Code, Kind, ModuleError, Scale,
     input_status, scale::Measured,

@@ -1,47 +1,9 @@
 //! The four channels of one module, as the rest of the device accesses them.
 
+use crate::ChannelStatus;
+
 /// Number of channels of a module.
 pub const CHANNELS: usize = 4;
-
-/// Kind of a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// No channel: there is no point at its address.
-    None,
-    /// A digital input.
-    BitInput,
-    /// A digital output.
-    BitOutput,
-    /// An analog input.
-    WordInput,
-    /// An analog output.
-    WordOutput,
-}
-
-/// Validity of an analog input's word. Always good for any other kind of channel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum ChannelStatus {
-    /// The word is the measured value.
-    #[default]
-    Good = 0,
-    /// The value is below the range of the signal.
-    UnderRange = 1,
-    /// The value is above the range of the signal or of the converter.
-    OverRange = 2,
-    /// Nothing is connected, or a wire is broken.
-    OpenCircuit = 3,
-    /// The sensor's wires touch.
-    ShortCircuit = 4,
-}
-
-impl ChannelStatus {
-    /// Returns the code of this status, 0 to 4.
-    #[must_use]
-    pub const fn code(self) -> u16 {
-        self as u16
-    }
-}
 
 /// The values of a module's channels: inputs as last scanned, outputs as commanded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -11,9 +11,6 @@
 //! transfer the DAC is therefore configured correctly, whatever its EEPROM contains. With UDAC = 0 each channel
 //! changes its output at its last byte, whatever the level of the LDAC pin. The command only writes the volatile
 //! registers. The EEPROM, which would wear out, is never written.
-//!
-//! Crate `mcp4728` 0.2 was used for these twelve bytes. It is not any more: all that it adds to them are errors that
-//! cannot occur here.
 
 use embedded_hal::i2c::{Error as _, ErrorKind, I2c};
 

@@ -1,10 +1,6 @@
 //! The filter of a digital input.
 
-/// Default debounce of every input, in milliseconds.
-pub const DEBOUNCE_DEFAULT_MS: u16 = 5;
-
-/// The longest debounce, in milliseconds.
-pub const DEBOUNCE_MAX_MS: u16 = 1000;
+use register_map::limits::DEBOUNCE_MAX_MS;
 
 /// Debounces a level. A new level counts after it was seen in `needed` samples in a row; with 0 it counts
 /// immediately. The first sample counts immediately. Shorter pulses are suppressed, and both edges are delayed

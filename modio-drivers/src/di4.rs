@@ -1,8 +1,9 @@
 //! ModIO-DI: four isolated inputs for 5 to 24 V. An energised input pulls its line low.
 
 use embedded_hal::digital::InputPin;
+use register_map::limits::DEBOUNCE_DEFAULT_MS;
 
-use crate::debounce::{DEBOUNCE_DEFAULT_MS, Debounce};
+use crate::debounce::Debounce;
 use crate::digital;
 use crate::{CHANNELS, ChannelSettings, Channels, Codes, DacLink, IoModule, ModuleError};
 

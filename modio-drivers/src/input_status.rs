@@ -4,8 +4,10 @@
 //! Every threshold has a second one a little further inside the range, at which the status is cleared, so that
 //! noise near a threshold does not toggle the status.
 
+use register_map::limits::{MAX_TENTHS, MIN_TENTHS};
+
 use crate::scale::Measured;
-use crate::{ChannelStatus, Code, ntc};
+use crate::{ChannelStatus, Code};
 
 /// A 4-20 mA loop below this current, in uA, is under range. A transmitter signals its own failure with 3.6 mA or
 /// less, and measures down to 3.8 mA (NAMUR NE 43).
@@ -33,7 +35,7 @@ pub const OPEN_CIRCUIT_CODE: u16 = Code::MAX.get() - 16;
 /// Hysteresis of the codes above: two to three times the noise of the F103's converter.
 pub const HYSTERESIS_CODE: u16 = 8;
 
-/// Hysteresis of a thermistor's limits [`ntc::MIN_TENTHS`] and [`ntc::MAX_TENTHS`], in 0.1 degC.
+/// Hysteresis of a thermistor's limits [`MIN_TENTHS`] and [`MAX_TENTHS`], in 0.1 degC.
 pub const HYSTERESIS_TENTHS: i16 = 10;
 
 /// Returns the status of an input with this code and measured value, whose status in the same range was `before`.
@@ -80,9 +82,9 @@ fn thermistor(code: Code, tenths: i16, before: ChannelStatus) -> ChannelStatus {
     }
     let was_cold = matches!(before, UnderRange | OpenCircuit);
     let was_hot = matches!(before, OverRange | ShortCircuit);
-    if tenths < ntc::MIN_TENTHS + if was_cold { HYSTERESIS_TENTHS } else { 0 } {
+    if tenths < MIN_TENTHS + if was_cold { HYSTERESIS_TENTHS } else { 0 } {
         UnderRange
-    } else if tenths > ntc::MAX_TENTHS - if was_hot { HYSTERESIS_TENTHS } else { 0 } {
+    } else if tenths > MAX_TENTHS - if was_hot { HYSTERESIS_TENTHS } else { 0 } {
         OverRange
     } else {
         Good
@@ -96,8 +98,10 @@ const fn back_off(active: bool, hysteresis: u16) -> u16 {
 
 #[cfg(test)]
 mod tests {
+    use register_map::limits::{BETA_MAX, BETA_MIN};
+
     use super::*;
-    use crate::{ChannelSettings, Kind, Signal};
+    use crate::{ChannelSettings, Kind, Signal, ntc};
     use ChannelStatus::{Good, OpenCircuit, OverRange, ShortCircuit, UnderRange};
 
     fn settings(signal: Signal) -> ChannelSettings {
@@ -178,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_thermistor_goes_through_all_five_statuses_for_every_beta() {
-        for beta in (ntc::BETA_MIN..=ntc::BETA_MAX).step_by(50) {
+        for beta in (BETA_MIN..=BETA_MAX).step_by(50) {
             let first = |limit: i16| {
                 (0..=4095)
                     .find(|&code| ntc::tenths_celsius(Code::new(code), beta) <= limit)

@@ -5,13 +5,9 @@
 //! value. The shift drops bits of the difference, which leaves the state at most (2^n - 1) / 65536 below a steady
 //! input, so the rounded code settles exactly.
 
+use register_map::limits::LOW_PASS_MAX;
+
 use crate::Code;
-
-/// Default n of every analog input.
-pub const LOW_PASS_DEFAULT: u16 = 4;
-
-/// The largest n.
-pub const LOW_PASS_MAX: u16 = 8;
 
 /// Number of fraction bits. With the 12 bits of a code the state has 28 bits, so differences fit an `i32`.
 const FRACTION: u32 = 16;

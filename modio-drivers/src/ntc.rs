@@ -16,22 +16,9 @@
 //! With the rounding to a tenth, the test finds an error of at most 0.06 degC for every B and every code between
 //! -40 and 125 degC.
 
+use register_map::limits::{BETA_MAX, BETA_MIN};
+
 use crate::Code;
-
-/// The smallest B constant, in K.
-pub const BETA_MIN: u16 = 2000;
-
-/// The largest B constant, in K.
-pub const BETA_MAX: u16 = 5000;
-
-/// Default B constant, in K.
-pub const BETA_DEFAULT: u16 = 3950;
-
-/// The lowest measured temperature, in 0.1 degC: -40 degC, the limit of common 10 k thermistors.
-pub const MIN_TENTHS: i16 = -400;
-
-/// The highest measured temperature, in 0.1 degC: 125 degC, for the same reason.
-pub const MAX_TENTHS: i16 = 1250;
 
 /// Largest result of [`tenths_celsius`], far above any thermistor: 300 degC.
 const SATURATED: i16 = 3000;
@@ -114,6 +101,8 @@ const fn log2_table() -> [u32; SEGMENTS + 1] {
 mod tests {
     extern crate std;
     use std::{println, vec::Vec};
+
+    use register_map::limits::BETA_DEFAULT;
 
     use super::*;
 

@@ -2,20 +2,13 @@
 //!
 //! Full scale, 10 V or 20 mA, is code 4095, for inputs and outputs. Every conversion rounds to the nearest value.
 //!
-//! A master may command an output within [`output_limits`], so the smallest current is 4 mA in uA. A raw code may
+//! A master may command an output within [`limits::of_output`](register_map::limits::of_output), so the smallest current is 4 mA in uA. A raw code may
 //! be any code, so that an output can also have no current; [`output_from_raw`] then returns 0 uA. Converting any
 //! code to its unit and back returns the same code.
 
+use register_map::limits::{FULL_SCALE_MV, FULL_SCALE_UA, MAX_TENTHS, MIN_TENTHS};
+
 use crate::{ChannelSettings, Code, Scale, Signal, ntc};
-
-/// 10 V in mV.
-pub const FULL_SCALE_MV: u16 = 10_000;
-
-/// 20 mA in uA.
-pub const FULL_SCALE_UA: u16 = 20_000;
-
-/// The smallest current that an output may be commanded to, in uA.
-pub const OUTPUT_MIN_UA: u16 = 4_000;
 
 /// The measured value of an analog input, in the unit of its signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,36 +33,13 @@ impl Measured {
     }
 
     /// Returns the word of an input in engineering units. A temperature is in two's complement and limited to
-    /// [`ntc::MIN_TENTHS`] to [`ntc::MAX_TENTHS`].
+    /// [`MIN_TENTHS`] to [`MAX_TENTHS`].
     #[must_use]
     pub fn word(self) -> u16 {
         match self {
             Self::Millivolts(units) | Self::Microamps(units) => units,
-            Self::TenthsCelsius(tenths) => tenths.clamp(ntc::MIN_TENTHS, ntc::MAX_TENTHS) as u16,
+            Self::TenthsCelsius(tenths) => tenths.clamp(MIN_TENTHS, MAX_TENTHS) as u16,
         }
-    }
-}
-
-/// Returns the smallest and the largest word of an input: 0 to 4095 raw, 0 to 10000 mV, 0 to 20000 uA, -400 to 1250
-/// in 0.1 degC.
-#[must_use]
-pub const fn input_limits(signal: Signal, scale: Scale) -> (i16, i16) {
-    match (scale, signal) {
-        (Scale::Raw, _) => (0, Code::MAX.get() as i16),
-        (Scale::Engineering, Signal::Voltage) => (0, FULL_SCALE_MV as i16),
-        (Scale::Engineering, Signal::Current) => (0, FULL_SCALE_UA as i16),
-        (Scale::Engineering, Signal::Ntc) => (ntc::MIN_TENTHS, ntc::MAX_TENTHS),
-    }
-}
-
-/// Returns the smallest and the largest word that an output may be commanded to: 0 to 4095 raw, 0 to 10000 mV, 4000
-/// to 20000 uA.
-#[must_use]
-pub const fn output_limits(signal: Signal, scale: Scale) -> (u16, u16) {
-    match (scale, signal) {
-        (Scale::Raw, _) => (0, Code::MAX.get()),
-        (Scale::Engineering, Signal::Voltage | Signal::Ntc) => (0, FULL_SCALE_MV),
-        (Scale::Engineering, Signal::Current) => (OUTPUT_MIN_UA, FULL_SCALE_UA),
     }
 }
 
@@ -136,6 +106,8 @@ const fn rescale(value: u16, to: u16, from: u16) -> u16 {
 mod tests {
     extern crate std;
 
+    use register_map::limits::of_output;
+
     use super::*;
     use crate::Kind;
 
@@ -179,7 +151,7 @@ mod tests {
     #[test]
     fn a_commanded_word_becomes_the_nearest_code() {
         for (signal, full_scale) in [(Signal::Voltage, 10_000.0), (Signal::Current, 20_000.0)] {
-            let (min, max) = output_limits(signal, Scale::Engineering);
+            let (min, max) = of_output(signal, Scale::Engineering);
             for word in min..=max {
                 let exact = (f64::from(word) * 4095.0 / full_scale).round() as u16;
                 let code = output_to_raw(word, signal, Scale::Engineering);
@@ -198,7 +170,7 @@ mod tests {
                     let word = output_from_raw(code, signal, scale);
                     assert_eq!(output_to_raw(word, signal, scale), code);
                 }
-                let (min, max) = output_limits(signal, scale);
+                let (min, max) = of_output(signal, scale);
                 assert!(min < max);
                 assert_eq!(output_to_raw(max, signal, scale), Code::MAX);
                 for beyond in [max, max + 1, u16::MAX] {

@@ -1,38 +1,14 @@
-//! Registers whose values are codes: one enum for each, with the code and a name for every value. The enums for a
-//! module's channels belong to modio-drivers; this module has their names.
-
-pub use modio_drivers::{ChannelStatus, Scale, Signal};
-
-/// RANGE: every code of a [`Signal`] with its name.
-pub const SIGNAL_NAMES: &[(u16, &str)] = &[
-    (Signal::Voltage.code(), "0-10 V"),
-    (Signal::Current.code(), "4-20 mA"),
-    (Signal::Ntc.code(), "NTC"),
-];
-
-/// SCALE: every code of a [`Scale`] with its name.
-pub const SCALE_NAMES: &[(u16, &str)] = &[
-    (Scale::Raw.code(), "raw 12-bit"),
-    (Scale::Engineering.code(), "engineering units"),
-];
-
-/// Every code of a [`ChannelStatus`] with its name.
-pub const CHANNEL_STATUS_NAMES: &[(u16, &str)] = &[
-    (ChannelStatus::Good.code(), "good"),
-    (ChannelStatus::UnderRange.code(), "under range"),
-    (ChannelStatus::OverRange.code(), "over range"),
-    (ChannelStatus::OpenCircuit.code(), "open circuit"),
-    (ChannelStatus::ShortCircuit.code(), "short circuit"),
-];
+//! Registers whose values are codes: one enum for each, with the code and a name for every value.
 
 /// Declares an enum of codes. The name of a value is also its documentation.
 macro_rules! codes {
-    ($(#[$doc:meta])* $name:ident { $($variant:ident = $code:literal $text:literal,)+ }) => {
-        $(#[$doc])*
+    ($(#[$attribute:meta])* $name:ident {
+        $($(#[$of_variant:meta])* $variant:ident = $code:literal $text:literal,)+
+    }) => {
+        $(#[$attribute])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[repr(u16)]
         pub enum $name {
-            $(#[doc = $text] $variant = $code,)+
+            $(#[doc = $text] $(#[$of_variant])* $variant = $code,)+
         }
 
         impl $name {
@@ -70,6 +46,47 @@ macro_rules! codes {
             }
         }
     };
+}
+
+codes! {
+    /// RANGE: the signal of an analog point, which must match the position of the jumper.
+    #[derive(Default)]
+    Signal {
+        #[default]
+        Voltage = 0 "0-10 V",
+        Current = 1 "4-20 mA",
+        /// A thermistor of 10 kOhm. Inputs only; an output treats it as [`Voltage`](Self::Voltage).
+        Ntc = 2 "NTC",
+    }
+}
+
+codes! {
+    /// SCALE: the number format of an analog point.
+    #[derive(Default)]
+    Scale {
+        /// The converter's code, 0 to 4095.
+        #[default]
+        Raw = 0 "raw 12-bit",
+        /// mV, uA or 0.1 degC, depending on the [`Signal`].
+        Engineering = 1 "engineering units",
+    }
+}
+
+codes! {
+    /// The validity of an analog input's word. Always good for any other kind of point.
+    #[derive(Default)]
+    ChannelStatus {
+        #[default]
+        Good = 0 "good",
+        /// The value is below the range of the signal.
+        UnderRange = 1 "under range",
+        /// The value is above the range of the signal or of the converter.
+        OverRange = 2 "over range",
+        /// Nothing is connected, or a wire is broken.
+        OpenCircuit = 3 "open circuit",
+        /// The sensor's wires touch.
+        ShortCircuit = 4 "short circuit",
+    }
 }
 
 codes! {
@@ -155,7 +172,6 @@ codes! {
         DropChanges = 4 "drop unsaved changes",
         ClearWatchdogFlag = 5 "clear the watchdog flag",
         Identify = 6 "identify",
-        EnterLoader = 0xB007 "enter the loader",
     }
 }
 
@@ -233,7 +249,6 @@ mod tests {
         }
         let taken = (0..=0xFFFF).filter(|code| Baud::from_code(*code).is_some());
         assert!(taken.eq(Baud::CODES.iter().copied()));
-        assert_eq!(Command::from_code(0xB007), Some(Command::EnterLoader));
         assert_eq!(Command::from_code(0), None);
         assert_eq!(Format::from_code(7), None);
     }

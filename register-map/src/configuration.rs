@@ -2,8 +2,13 @@
 
 use crate::Module;
 use crate::block::block;
-use crate::codes;
-use crate::codes::{AirRate, Baud, CommSource, Command, Format, GapRule, Lora, Mode, Power};
+use crate::codes::{
+    AirRate, Baud, CommSource, Command, Format, GapRule, Lora, Mode, Power, Scale, Signal,
+};
+use crate::limits::{
+    BETA_DEFAULT, BETA_MAX, BETA_MIN, DEBOUNCE_DEFAULT_MS, DEBOUNCE_MAX_MS, LOW_PASS_DEFAULT,
+    LOW_PASS_MAX, RAW_MAX,
+};
 use crate::points::Kind::{BitOutput, WordInput, WordOutput};
 use crate::rule::{Narrower, Rule};
 use crate::value::{Unit, Value};
@@ -24,21 +29,16 @@ pub const SAVE_EVERY_S: u32 = 60;
 /// Value of SAFE that leaves an output unchanged.
 pub const HOLD: u16 = 0xFFFF;
 
-/// Largest raw value of a word point: 12 bits.
-pub const RAW_MAX: u16 = 4095;
-
-/// Factory default of FILTER for a point that is not an analog input, in ms.
-pub const DEBOUNCE_DEFAULT_MS: u16 = 5;
-
 const SAFE_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1).or(HOLD), 0);
 const START_OF_A_BIT: Narrower = Narrower::new(BitOutput, Values::up_to(1), 0);
-const FILTER_OF_A_WORD: Narrower = Narrower::new(WordInput, Values::up_to(8), 4);
+const FILTER_OF_A_WORD: Narrower =
+    Narrower::new(WordInput, Values::up_to(LOW_PASS_MAX), LOW_PASS_DEFAULT);
 const RANGE_OF_AN_OUTPUT: Narrower = Narrower::new(WordOutput, Values::up_to(1), 0);
 
 const SAFE_RULE: Rule = Rule::now(Values::up_to(RAW_MAX).or(HOLD), 0).but(&SAFE_OF_A_BIT);
 const START_RULE: Rule = Rule::restart(Values::up_to(RAW_MAX), 0).but(&START_OF_A_BIT);
 const FILTER_RULE: Rule =
-    Rule::now(Values::up_to(1000), DEBOUNCE_DEFAULT_MS).but(&FILTER_OF_A_WORD);
+    Rule::now(Values::up_to(DEBOUNCE_MAX_MS), DEBOUNCE_DEFAULT_MS).but(&FILTER_OF_A_WORD);
 const RANGE_RULE: Rule = Rule::now(Values::up_to(2), 0).but(&RANGE_OF_AN_OUTPUT);
 
 /// Frequency of a channel: 410 MHz plus 1 MHz per step.
@@ -68,7 +68,7 @@ block! {
     /// Frames with a gap above t1.5
     STRICT_T15 "STRICT_T15": 0x0107 x 1, Value::Codes(GapRule::NAMES), Rule::restart(Values::up_to(1), 0);
     /// Runs after the response. Reads 0
-    COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::range(1, 6).or(0xB007), 0);
+    COMMAND "COMMAND": 0x0108 x 1, Value::Codes(Command::NAMES), Rule::now(Values::range(1, 6), 0);
     /// Requests that restart COMM_TIMEOUT
     COMM_SOURCE "COMM_SOURCE": 0x0109 x 1, Value::Codes(CommSource::NAMES), Rule::now(Values::up_to(3), 0);
     /// Module in the slot
@@ -88,11 +88,11 @@ block! {
     /// Silence that ends an incomplete frame
     LORA_FRAME_GAP "LORA_FRAME_GAP": 0x0145 x 1, Value::number("ms"), Rule::restart(Values::range(5, 500), 300);
     /// Constant of an NTC
-    BETA "BETA": 0x0160 x 32, Value::number("K"), Rule::now(Values::range(2000, 5000), 3950);
+    BETA "BETA": 0x0160 x 32, Value::number("K"), Rule::now(Values::range(BETA_MIN, BETA_MAX), BETA_DEFAULT);
     /// Signal; an output has a jumper too
-    RANGE "RANGE": 0x0180 x 32, Value::Codes(codes::SIGNAL_NAMES), RANGE_RULE;
+    RANGE "RANGE": 0x0180 x 32, Value::Codes(Signal::NAMES), RANGE_RULE;
     /// Number format
-    SCALE "SCALE": 0x01A0 x 32, Value::Codes(codes::SCALE_NAMES), Rule::now(Values::up_to(1), 0);
+    SCALE "SCALE": 0x01A0 x 32, Value::Codes(Scale::NAMES), Rule::now(Values::up_to(1), 0);
     /// Output while the line is silent, raw; 0xFFFF = hold
     SAFE "SAFE": 0x01C0 x 32, Value::NUMBER, SAFE_RULE;
     /// Output at power-on, raw

@@ -6,8 +6,8 @@
 //! Each block of registers is a module with a constant for every address; `RULES`, the numbers of its registers
 //! ([`Rule`]); and `BLOCK`, the same with the texts for people ([`Block`], [`Text`]). The firmware uses only the
 //! numbers: its image contains the texts only in the self-description. [`codes`] has an enum for each register that
-//! holds codes, [`record`] describes the format of a configuration in flash, and [`docs`] writes
-//! `docs/register-map.md`.
+//! holds codes, and [`record`] describes the format of a configuration in flash. `cargo xtask docs` writes
+//! `docs/register-map.md` from all of it.
 //!
 //! ```
 //! use register_map::{BLOCKS, InForce, Values, configuration, rule_at};
@@ -29,8 +29,8 @@ pub mod board;
 pub mod codes;
 pub mod configuration;
 pub mod counters;
-pub mod docs;
 pub mod fault;
+pub mod limits;
 mod module;
 pub mod part;
 pub mod points;

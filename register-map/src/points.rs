@@ -1,9 +1,8 @@
 //! The I/O points: the addresses of each port, the kinds of a point, and the meaning of the words of analog points.
 
-use modio_drivers::scale::{input_limits, output_limits};
-
 use crate::block::block;
 use crate::codes::{Scale, Signal};
+use crate::limits;
 use crate::rule::Rule;
 use crate::value::{Unit, Value};
 use crate::values::Values;
@@ -11,14 +10,26 @@ use crate::values::Values;
 pub use crate::port::{CHANNELS, COUNT, PORTS, first, of_port};
 
 /// The kind of a point, which its module determines.
-pub use modio_drivers::Kind;
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// There is no point at the address.
+    None,
+    /// A digital input.
+    BitInput,
+    /// A digital output.
+    BitOutput,
+    /// An analog input.
+    WordInput,
+    /// An analog output.
+    WordOutput,
+}
 
 /// Returns the values that a master may write to an analog output: 0-4095 raw, 0-10000 mV or 4000-20000 uA.
 ///
 /// Outputs have no [`Signal::Ntc`]; it is treated as [`Signal::Voltage`].
 #[must_use]
 pub const fn output_values(signal: Signal, scale: Scale) -> Values {
-    let (min, max) = output_limits(signal, scale);
+    let (min, max) = limits::of_output(signal, scale);
     Values::range(min, max)
 }
 
@@ -56,12 +67,12 @@ static OUTPUT_READINGS: [Reading; 4] = [
 ];
 
 const fn input(signal: Signal, scale: Scale) -> Reading {
-    let (min, max) = input_limits(signal, scale);
+    let (min, max) = limits::of_input(signal, scale);
     reading(signal, scale, min as i32, max as i32)
 }
 
 const fn output(signal: Signal, scale: Scale) -> Reading {
-    let (min, max) = output_limits(signal, scale);
+    let (min, max) = limits::of_output(signal, scale);
     reading(signal, scale, min as i32, max as i32)
 }
 
@@ -109,13 +120,12 @@ mod tests {
 
     #[test]
     fn readings_cover_every_range_and_scale_that_a_point_allows() {
-        use crate::codes::{SCALE_NAMES, SIGNAL_NAMES};
         for (kind, signals) in [(Kind::WordInput, 3), (Kind::WordOutput, 2)] {
             let readings = readings(kind).iter();
             let codes = readings.map(|reading| (reading.signal.code(), reading.scale.code()));
-            let signals = SIGNAL_NAMES.iter().take(signals);
-            let all =
-                signals.flat_map(|signal| SCALE_NAMES.iter().map(move |scale| (signal.0, scale.0)));
+            let signals = Signal::NAMES.iter().take(signals);
+            let all = signals
+                .flat_map(|signal| Scale::NAMES.iter().map(move |scale| (signal.0, scale.0)));
             assert!(codes.eq(all), "{kind:?}");
         }
         assert!(readings(Kind::BitInput).is_empty());

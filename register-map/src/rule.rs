@@ -1,7 +1,7 @@
 //! The rules of registers as numbers, which is all that the firmware needs.
 
+use crate::points::Kind;
 use crate::values::Values;
-use modio_drivers::Kind;
 
 /// How a master may access a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

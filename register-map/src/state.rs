@@ -1,7 +1,7 @@
 //! Identity and state, 0x0200 to 0x025F: read-only registers.
 
 use crate::block::block;
-use crate::codes::{CHANNEL_STATUS_NAMES, ModuleState};
+use crate::codes::{ChannelStatus, ModuleState};
 use crate::rule::Rule;
 use crate::value::Value;
 use crate::{Board, Module};
@@ -12,7 +12,7 @@ const READ: Rule = Rule::read_only();
 pub const PRODUCT: u32 = 0x2383_5860;
 
 /// Value of MAP_VERSION: the version of this map.
-pub const MAP_VERSION_VALUE: u16 = 1;
+pub const MAP_VERSION_VALUE: u16 = 2;
 
 /// Bits of STATUS.
 pub mod status {
@@ -71,11 +71,7 @@ pub mod reset_cause {
 }
 
 /// Names of the bits of BUILD.
-const BUILD_NAMES: &[(u8, &str)] = &[
-    (0, "sources differ from the commit"),
-    (1, "signed with development key"),
-    (2, "not signed"),
-];
+const BUILD_NAMES: &[(u8, &str)] = &[(0, "sources differ from the commit")];
 
 block! {
     "Identity and state", 0x0200..=0x025F;
@@ -114,7 +110,7 @@ block! {
     UNIQUE_ID "unique device identity": 0x0220 x 6, Value::Opaque, READ;
     /// Good frames; counters wrap
     BUS_MESSAGES "bus messages": 0x0230 x 1, Value::NUMBER, READ;
-    /// Bad CRC, bad character, or under 3 bytes
+    /// Bad CRC or character, too short or too long
     BUS_ERRORS "bus communication errors": 0x0231 x 1, Value::NUMBER, READ;
     /// Exceptions, broadcasts included
     EXCEPTIONS "exceptions sent": 0x0232 x 1, Value::NUMBER, READ;
@@ -131,5 +127,5 @@ block! {
     /// Gaps above t1.5 inside frames
     T15_GAPS "inter-character gaps": 0x0238 x 1, Value::NUMBER, READ;
     /// State of the channel
-    CHANNEL_STATUS "channel status": 0x0240 x 32, Value::Codes(CHANNEL_STATUS_NAMES), READ;
+    CHANNEL_STATUS "channel status": 0x0240 x 32, Value::Codes(ChannelStatus::NAMES), READ;
 }

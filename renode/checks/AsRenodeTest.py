@@ -1,12 +1,12 @@
 """Prepares a suite as renode-test does before it runs the suite: adds Renode's keywords, and Renode's default
 fixtures where the suite names none (robot_tests_provider.py). Pass this file to robot as `--prerunmodifier`.
-The keywords come from a library instead of Renode's server."""
+The keywords come from a library that does nothing: for a dry run."""
 
 from pathlib import Path
 
 from robot.api import SuiteVisitor
 
-KEYWORDS = Path(__file__).with_name("RenodeOnSimulator.py")
+KEYWORDS = Path(__file__).with_name("RenodeKeywords.py")
 
 
 class AsRenodeTest(SuiteVisitor):

@@ -28,17 +28,6 @@ class Request:
         self._value = value
 
 
-class Memory:
-    """A Memory.MappedMemory."""
-
-    def __init__(self, size):
-        self.data = bytearray(b"\xff" * size)
-
-    def SetRange(self, start, count, value):
-        assert 0 <= start and start + count <= len(self.data)
-        self.data[start : start + count] = bytes([value]) * count
-
-
 class Machine(dict):
     """The machine: its peripherals by name."""
 
@@ -46,14 +35,12 @@ class Machine(dict):
 class Peripheral:
     """A Python.PythonPeripheral that runs a file of renode/peripherals."""
 
-    def __init__(self, name, machine=None, has_get_machine=True):
+    def __init__(self, name, machine=None):
         path = RENODE / "peripherals" / name
         self.code = compile(path.read_text(encoding="utf-8"), str(path), "exec")
         self.request = Request()
         self.warnings = []
-        peripheral = types.SimpleNamespace(WarningLog=self.warnings.append)
-        if has_get_machine:
-            peripheral.GetMachine = lambda: machine
+        peripheral = types.SimpleNamespace(WarningLog=self.warnings.append, GetMachine=lambda: machine)
         monitor = types.SimpleNamespace(Machine=machine)
         self.scope = {"request": self.request, "self": peripheral, "monitor": monitor, "size": 0x400}
         self.inited = False
@@ -86,17 +73,11 @@ class Peripheral:
             self.reset()
         self._run("write", offset, value)
 
-    def modify(self, offset, set_bits=0, clear_bits=0):
-        self.write(offset, self.read(offset) & ~clear_bits | set_bits)
 
-
-def commands(machine, printed, parsed=None):
-    """Returns the functions of commands.py for a machine. Their output is added to `printed`, and their
-    monitor commands to `parsed`."""
+def commands(machine):
+    """Returns the functions of commands.py for a machine."""
     path = RENODE / "commands.py"
     monitor = types.SimpleNamespace(Machine=machine)
-    if parsed is not None:
-        monitor.Parse = parsed.append
-    scope = {"monitor": monitor, "print": printed.append}
+    scope = {"monitor": monitor}
     exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), scope)
     return types.SimpleNamespace(**{name: value for name, value in scope.items() if name.startswith("mc_")})

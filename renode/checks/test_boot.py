@@ -100,7 +100,7 @@ class Board:
         self._map(0xE0000000, 0x100000, lambda offset, size: (self.system, offset))
         for address, value in writes(board):
             self.blocks[address & ~0x3FF].write(address & 0x3FF, value)
-        run = commands(machine, [])
+        run = commands(machine)
         run.mc_modio_board(board)
         run.mc_modio_preset(module)
         run.mc_modio_inputs(dip)

@@ -4,7 +4,9 @@ IronPython 2, and these tests run them in Python 3."""
 import ast
 import unittest
 
-from renode_fake import RENODE
+from pathlib import Path
+
+RENODE = Path(__file__).parent.parent
 
 # Syntax that Python 2.7 does not have, or interprets differently.
 REFUSED = {

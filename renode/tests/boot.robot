@@ -14,7 +14,6 @@ Reports Its Identity
     Request Gives    03 0205 0001    03 02 ${BOARD_CODE}
 
 Reports The Unique Identity
-    [Tags]    renode-only
     # Six half-words at 0x1FFFF7E8, as in the board's .repl file.
     Request Gives    03 0220 0006    03 0C 1100 3322 5544 7766 1908 3B2A
 
@@ -39,7 +38,6 @@ Writes A Log
     Should Contain    ${log}    slot ${PORT}: 4di
 
 Starts Without A Crystal
-    [Tags]    renode-only
     Execute Command    sysbus WriteDoubleWord ${CRYSTAL} 0
     Cut The Power
     Unit Answers

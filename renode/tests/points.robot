@@ -76,7 +76,6 @@ Resource            modio.resource
     Request Gives    03 ${P}0 0004    03 08 0ABC 0000 0FFF 0456
 
 4AO Reports When Its DAC Stops Answering And When It Answers Again
-    [Tags]    renode-only
     Start Board    4ao
     Request Gives    03 ${MODULE_STATE} 0001    03 02 0000
     Execute Command    sysbus WriteDoubleWord ${DAC_PLUGGED} 0

@@ -14,6 +14,8 @@ use crate::workspace::{self, Workspace};
 use crate::{build, command, image, size};
 
 mod figures;
+#[cfg(test)]
+mod pages;
 mod server;
 mod table;
 

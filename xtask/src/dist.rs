@@ -19,7 +19,6 @@ use crate::{build, command, image};
 
 mod hex;
 mod notices;
-mod oci;
 mod paths;
 mod programs;
 mod sbom;

@@ -27,6 +27,7 @@ mod build;
 mod command;
 mod debug;
 mod dist;
+mod docs;
 mod error;
 mod fuzz;
 mod group;
@@ -150,10 +151,8 @@ fn run(cli: Cli) -> Result<()> {
         Command::Soak(options) => soak::run(workspace, &options),
         Command::Matrix(options) => soak::matrix(workspace, &options),
         Command::Docs => {
-            let mut text = String::new();
-            register_map::docs::write_markdown(&mut text)?;
-            let path = workspace.root.join("docs/register-map.md");
-            fs_err::write(&path, text)?;
+            let path = workspace.root.join(docs::PATH);
+            fs_err::write(&path, docs::markdown()?)?;
             say!("wrote {}", path.display());
             Ok(())
         }

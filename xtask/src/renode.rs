@@ -43,7 +43,8 @@ pub struct Options {
     #[arg(long)]
     interactive: bool,
 
-    /// The module in the first slot of --interactive: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// The module in the first slot of --interactive
+    #[arg(help = format!("The module in the first slot of --interactive: {}", Module::ALL.map(Module::name).join(", ")))]
     #[arg(long, default_value = "4di", requires = "interactive")]
     module: Module,
 

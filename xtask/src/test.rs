@@ -2,11 +2,11 @@
 //! documentation with every warning an error, and steps that take longer.
 
 use std::env;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use In::{Ci, Host, Test};
 use Run::{Each, Once};
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use register_map::Board;
 use register_map::board::{MODIO_02, MODIO_08};
 
@@ -22,7 +22,7 @@ pub const CORNER: &str = "MODIO_CORNER";
 
 /// The feature with which the conformance suite contains the simulator. All tests are built with it, so that nothing is
 /// built twice.
-const SUITE: &str = "conformance/sim";
+const SUITE: &str = "hil/sim";
 
 /// The packages of the image.
 const TARGET_PACKAGES: &str = "firmware board-support modio-drivers modbus-server register-map";
@@ -53,7 +53,7 @@ enum Run {
 
 /// The steps in the order in which they run: command, name, description, function. The names do not change. A step that
 /// runs for each board has the board's number at the end of its name, such as `lint-02`.
-const STEPS: [(In, &str, &str, Run); 23] = [
+const STEPS: [(In, &str, &str, Run); 22] = [
     (Ci, "fmt", "formatting", Once(formatting)),
     (Ci, "lint-host", "lints, host", Once(lint_host)),
     (Ci, "lint", "lints, target", Each(lint_target)),
@@ -74,7 +74,6 @@ const STEPS: [(In, &str, &str, Run); 23] = [
     (Ci, "sim-slow", "sim, slow corner", Once(sim_slow)),
     (Ci, "sim-fast", "sim, fast corner", Once(sim_fast)),
     (Ci, "bench", "instructions and bytes", Each(bench::check)),
-    (Ci, "suites", "suites for Renode", Each(checks::suites)),
     (Ci, "peers", "Modbus servers, briefly", Once(peers::check)),
     (Ci, "fuzz", "fuzz targets, briefly", Once(fuzz::check)),
 ];
@@ -308,22 +307,46 @@ pub fn simulated(
     names: &str,
     variables: &[(&str, &str)],
 ) -> Result<()> {
-    let mut cargo = workspace.cargo("test");
-    cargo.args(ALL).args(["--features", SUITE]);
     let ordinary = ordinary::words()?;
-    if !ordinary.is_empty() {
-        let runner = format!("target.'cfg(unix)'.runner={ordinary:?}");
-        cargo.args(["--config", &runner]);
+    let images = [&MODIO_02, &MODIO_08].map(|board| build::image(workspace, board));
+    let [modio_02, modio_08] = images;
+    let (modio_02, modio_08) = (modio_02?, modio_08?);
+    let simulator = workspace.simulator()?;
+    let tests = |list: &[&str]| {
+        let mut cargo = workspace.cargo("test");
+        cargo.args(ALL).args(["--features", SUITE]);
+        if !ordinary.is_empty() {
+            let runner = format!("target.'cfg(unix)'.runner={ordinary:?}");
+            cargo.args(["--config", &runner]);
+        }
+        cargo.arg("--no-fail-fast").args(targets.split(' '));
+        cargo.args(["--", "--include-ignored"]).args(list);
+        cargo.args(names.split_whitespace());
+        cargo.env(CORNER, "nominal").envs(variables.iter().copied());
+        cargo
+            .env("MODIO_ELF", &modio_02)
+            .env("MODIO_ELF_08", &modio_08);
+        // Tests of one package do not know the path of another package's program.
+        cargo.env("MODIO_SIM", &simulator);
+        cargo
+    };
+    let wanted = names.split_whitespace();
+    let wanted: Vec<_> = wanted.filter(|word| !word.starts_with("--")).collect();
+    if !wanted.is_empty() {
+        // The messages of the compiler are shown.
+        let list = command::read(tests(&["--list"]).stderr(Stdio::inherit()))?;
+        all_match(&list, &wanted)?;
     }
-    cargo.arg("--no-fail-fast").args(targets.split(' '));
-    cargo.args(["--", "--include-ignored"]);
-    cargo.args(names.split_whitespace());
-    cargo.env(CORNER, "nominal").envs(variables.iter().copied());
-    cargo.env("MODIO_ELF", build::image(workspace, &MODIO_02)?);
-    cargo.env("MODIO_ELF_08", build::image(workspace, &MODIO_08)?);
-    // Tests of one package do not know the path of another package's program.
-    cargo.env("MODIO_SIM", workspace.simulator()?);
-    command::run(&mut cargo)
+    command::run(&mut tests(&[]))
+}
+
+/// Refuses a name that no test in this list of tests has, because a run of no test passes.
+fn all_match(list: &str, names: &[&str]) -> Result<()> {
+    let tests = || list.lines().filter_map(|line| line.strip_suffix(": test"));
+    let absent = names
+        .iter()
+        .find(|name| !tests().any(|test| test.contains(**name)));
+    absent.map_or(Ok(()), |name| bail!("no test has the name {name}"))
 }
 
 #[cfg(test)]
@@ -336,6 +359,15 @@ mod tests {
         let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         let chosen = chosen(&names, command)?;
         Ok(chosen.into_iter().map(|step| step.1).collect())
+    }
+
+    #[test]
+    fn a_name_that_no_test_has_is_an_error() {
+        let list = "noise::soak: test\nslots::a_pulse: test\n\n2 tests, 0 benchmarks\n";
+        assert!(all_match(list, &["noise::soak", "slots::"]).is_ok());
+        let error = all_match(list, &["slots::", "long_run::"]).unwrap_err();
+        assert_eq!(error.to_string(), "no test has the name long_run::");
+        assert!(all_match("", &["tests"]).is_err());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The log: lines on RTT channel 0, for a debug probe or the simulator. When the buffer is full because nobody
-//! reads it, further lines are dropped; the firmware never waits. docs/architecture.md describes the lines, and says
-//! why they are text.
+//! reads it, further lines are dropped; the firmware never waits. docs/architecture.md describes the lines;
+//! docs/decisions.md says why they are text.
 
 use board_support::{ClockSource, boards::SLOTS, design::CRYSTAL_FAULTS, fault};
 use firmware::{config, start_up::Address};

@@ -17,9 +17,7 @@
 //! or programmed; the others wait for up to 40 ms.
 //!
 //! `serve`, `scan`, `radio` and `background` act as software tasks, but each is bound to an interrupt that nothing else
-//! uses. An interrupt that is pended while its handler runs occurs again afterwards. A second spawn of a running
-//! software task would fail instead, and the request would not be served. With interrupts the image also contains
-//! no panic of an executor.
+//! uses. docs/decisions.md says why.
 
 #![no_std]
 #![no_main]

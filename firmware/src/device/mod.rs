@@ -4,7 +4,7 @@
 //!            requests (serve)
 //!                  |
 //!   +--------------v---------------------------------------------+
-//!   | points    the process image: values of the channels         |<--> scan, 1 kHz
+//!   | points    the value of every channel                        |<--> scan, 1 kHz
 //!   | pulses    counters of digital inputs                        |
 //!   | config    settings, lock, commands                          |<--> store, in flash
 //!   | state     identity, counters, health                        |<--- all tasks
@@ -30,7 +30,7 @@ use modbus_server::{
     Bits, BitsOut, DataModel, Exception, Server, Span, Table, TextOut, Words, WordsOut,
 };
 use modio_drivers::CHANNELS;
-use register_map::{codes::Command, configuration, counters, fault, radio, state as state_map};
+use register_map::{codes::Command, counters, fault, radio, state as state_map};
 
 pub use comm_watchdog::CommWatchdog;
 use description::Description;
@@ -44,7 +44,7 @@ use crate::config::{Config, Origin};
 /// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
 pub struct Device<const SLOTS: usize> {
-    /// The process image.
+    /// The values of all channels.
     pub points: Points<SLOTS>,
     /// The settings.
     pub config: Config<SLOTS>,
@@ -194,8 +194,6 @@ impl<const SLOTS: usize> Device<SLOTS> {
             Command::DropChanges => self.config.drop_changes(),
             Command::ClearWatchdogFlag => self.comm_watchdog.clear(),
             Command::Identify => self.identify = true,
-            // `check_ready` rejects it.
-            Command::EnterLoader => {}
         }
         self.settings_may_have_changed();
     }
@@ -267,10 +265,7 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
     fn check_write_words(&self, span: Span, words: Words<'_>) -> Result<(), Exception> {
         match Block::of(span) {
             Block::Points => self.points.check_write_words(span, words),
-            Block::Config => {
-                self.config.check_write(span, words)?;
-                check_ready(span, words)
-            }
+            Block::Config => self.config.check_write(span, words),
             Block::State | Block::Fault | Block::Radio => Err(Exception::IllegalDataAddress),
             Block::Pulses => {
                 check_exists(counters::SPANS, span)?;
@@ -364,15 +359,5 @@ impl<const SLOTS: usize> DataModel for Device<SLOTS> {
         let value = identification::object(object, self.state.serial(), &self.config);
         text.extend(value.unwrap_or_default());
         value.is_some()
-    }
-}
-
-/// Rejects the command that this firmware does not support as not allowed: it has no loader.
-fn check_ready(span: Span, words: Words<'_>) -> Result<(), Exception> {
-    let index = configuration::COMMAND.wrapping_sub(span.start());
-    if words.get(index) == Some(Command::EnterLoader.code()) {
-        Err(Exception::IllegalDataValue)
-    } else {
-        Ok(())
     }
 }

@@ -1,10 +1,10 @@
-//! The process image: the points of all ports with a slot.
+//! The points of all ports with a slot: the values that requests and the scan share.
 
 use core::ops::Range;
 
 use modbus_server::{Bits, BitsOut, Exception, Span, Words, WordsOut};
-use modio_drivers::{CHANNELS, ChannelStatus, Kind, scale};
-use register_map::{Module, counters};
+use modio_drivers::{CHANNELS, ChannelStatus, Kind};
+use register_map::{Module, counters, limits};
 
 use super::port::IoPort;
 
@@ -150,7 +150,7 @@ impl<const SLOTS: usize> Points<SLOTS> {
             place
                 .and_then(|(port, channel)| port.setting(channel))
                 .is_some_and(|settings| {
-                    let (min, max) = scale::output_limits(settings.signal, settings.scale);
+                    let (min, max) = limits::of_output(settings.signal, settings.scale);
                     (min..=max).contains(&word)
                 })
         });

@@ -16,9 +16,6 @@
 //! During the set-up AUX is pulled up, because a module may have an open-drain output. Afterwards the output is
 //! push-pull, and AUX is pulled down: a module that is removed, or whose AUX is open, then looks busy without end and is
 //! reported, and the set-up that follows finds a new module.
-//!
-//! Crate `ebyte-e32` 0.10 is not used: it waits in a loop for each byte and for AUX, without a limit, and panics
-//! when a pin fails.
 
 use embedded_hal::digital::{InputPin, OutputPin, PinState};
 use embedded_hal_nb::serial::{ErrorType, Read, Write};

@@ -46,8 +46,9 @@ pub struct Cli {
     #[arg(long, value_name = "NAME", default_value_t = &register_map::board::MODIO_02, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub board: &'static register_map::Board,
 
-    /// The module in the simulated board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// The module in the simulated board's first slot
     #[cfg(feature = "sim")]
+    #[arg(help = format!("The module in the simulated board's first slot: {}", register_map::Module::ALL.map(register_map::Module::name).join(", ")))]
     #[arg(long, value_name = "NAME", default_value = "4do", conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub module: register_map::Module,
 
@@ -115,7 +116,7 @@ pub struct Cli {
     #[arg(long)]
     pub trace: bool,
 
-    /// List the cases and end
+    /// List the cases as a page in Markdown and end
     #[arg(long)]
     pub list: bool,
 

@@ -11,8 +11,7 @@
 //! probe, profile the unit under test: Target  bench, points  steps of cases: requests and checks
 //! endpoint/      the lines                    run, report/   runs cases; table, JUnit, JSON
 //! frame          RTU and ASCII frames         vectors        worked frames of manuals
-//! hil/           a board on a bench: timing,  rate           changes the rate and restores it
-//!                wires; command modio-hil     interrupt      Ctrl-C
+//!                                             interrupt      Ctrl-C
 //! ```
 //!
 //! The suite shares no code with the server that it tests.
@@ -26,7 +25,6 @@ pub mod check;
 pub mod cli;
 pub mod endpoint;
 pub mod frame;
-pub mod hil;
 pub mod interrupt;
 pub mod line;
 pub mod points;

@@ -152,7 +152,7 @@ fn one(
         Ok(()) => Verdict::Failed(Failure {
             sent: case.about.to_owned(),
             came: complaints.join("; "),
-            wanted: "nothing on the board that a real part would not take well".to_owned(),
+            wanted: "no action of the firmware that a real part does not allow".to_owned(),
         }),
         Err(Stop::Skip(why)) => Verdict::Skipped(why),
         Err(Stop::Fail(failure)) => Verdict::Failed(failure),

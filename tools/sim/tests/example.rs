@@ -1,4 +1,4 @@
-//! The example of another board behaves as docs/simulator.md describes.
+//! The example of another board behaves as docs/simulator-library.md describes.
 
 #[path = "../examples/blue_pill.rs"]
 #[allow(dead_code, reason = "main is for the command line")]

@@ -11,7 +11,7 @@ use object::build::elf::Builder;
 use register_map::Board;
 
 use super::notices::Notices;
-use super::{oci, rustc, sbom, sha256};
+use super::{rustc, sbom, sha256};
 use crate::image;
 use crate::toolchain::Machine;
 use crate::workspace::{self, Workspace};
@@ -19,12 +19,10 @@ use crate::workspace::{self, Workspace};
 /// Packages, and their programs.
 const PROGRAMS: [(&str, &str); 4] = [
     ("modioctl", "modioctl"),
-    ("sim", SIMULATOR),
+    ("sim", "modio-sim"),
     ("conformance", "modio-conformance"),
-    ("conformance", "modio-hil"),
+    ("hil", "modio-hil"),
 ];
-
-const SIMULATOR: &str = "modio-sim";
 
 /// Builds the programs for a target, the simulator with the images `BOARD.elf` of a directory in it, and writes them and
 /// their bills of materials.
@@ -59,7 +57,6 @@ pub fn files(
     let version = rustc(&["--version"])?;
     for (package, program) in PROGRAMS {
         let built = workspace::executable(&artifacts, program)?;
-        let content = fs::read(&built)?;
         let name = format!("{program}-{target}");
         let subject = sbom::Subject {
             name: program,
@@ -69,16 +66,10 @@ pub fn files(
             features: String::new(),
             compiled: &compiled,
             compiler: version.trim_start_matches("rustc "),
-            sha256: sha256(&content),
+            sha256: sha256(&fs::read(&built)?),
         };
         let bill = subject.bill(workspace, notices)?;
         fs::write(out.join(format!("{name}.cdx.json")), bill)?;
-        if let Some((processor, _)) = target.split_once("-unknown-linux-")
-            && program == SIMULATOR
-        {
-            let archive = oci::archive(&content, processor)?;
-            fs::write(out.join("modio-sim-oci.tar"), archive)?;
-        }
         fs::copy(built, out.join(name + std::env::consts::EXE_SUFFIX))?;
     }
     Ok(())

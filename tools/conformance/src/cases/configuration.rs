@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use register_map::{codes::Command, configuration, points, state};
+use register_map::{Module, codes::Command, configuration, points, state};
 
 use crate::bench::Bench;
 use crate::case::{Case, Check, Need, case, skip};
@@ -55,7 +55,7 @@ fn value_first(bench: &mut Bench<'_>) -> Check {
         (configuration::RESPONSE_DELAY, 1001),
         (configuration::FRAME_GAP, 1),
         (configuration::COMM_TIMEOUT, 36_001),
-        (configuration::MODULE, 7),
+        (configuration::MODULE, Module::LAST + 1),
         (configuration::BETA, 1999),
     ];
     if let Some(board) = bench.target.modio.and_then(|modio| modio.board) {

@@ -20,7 +20,7 @@ mod outputs;
 mod power;
 mod read;
 mod settings;
-pub(crate) mod timing;
+pub mod timing;
 mod worked;
 mod write_bits;
 mod write_words;

@@ -32,7 +32,8 @@ fn for_others(bench: &mut Bench<'_>) -> Check {
     Ok(())
 }
 
-/// Sends a worked frame to this unit. A write to a register that exists is left out; on a modio there is none.
+/// Sends a worked frame to this unit. A write to a register that exists is left out, because it would change the
+/// unit. On a modio these are writes to 0x0006 with analog points in port 2, which the modio-08 has.
 fn send(bench: &mut Bench<'_>, worked: &Worked, frame: &[u8]) -> Check {
     let function = frame[1];
     if let [_, 6 | 0x10, high, low, ..] = *frame {

@@ -53,10 +53,23 @@ pub fn summary(outcomes: &[Outcome]) -> String {
     )
 }
 
-/// Returns the cases as a table in Markdown, which is the output of `--list`.
+/// The start of the page with the cases.
+const PAGE: &str = "\
+# The cases of the conformance suite
+
+<!-- Written by `cargo run -p conformance -- --list` from the cases in tools/conformance. Change them there. -->
+
+What each case demands, and where the demand is written. [conformance.md](conformance.md) explains the sections, the
+kinds and how to run the suite.
+
+| case | section | kind | what must be so |
+|---|---|---|---|
+";
+
+/// Returns the cases as a page in Markdown, which is the output of `--list` and `docs/conformance-cases.md`.
 #[must_use]
 pub fn list(cases: &[Case]) -> String {
-    let mut text = "| case | section | kind | what must be so |\n|---|---|---|---|\n".to_owned();
+    let mut text = PAGE.to_owned();
     for case in cases {
         let (name, section, about) = (case.name, case.section, case.about);
         text += &format!(

@@ -32,8 +32,9 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value_t = &MODIO_02)]
     pub board: &'static Board,
 
-    /// Module in the board's first slot: none, 4di, 4do, 2relay, 4ai, 4ao or 2ai2ao
+    /// Module in the board's first slot
     #[arg(long, value_name = "NAME", default_value = "4di")]
+    #[arg(help = format!("Module in the board's first slot: {}", Module::ALL.map(Module::name).join(", ")))]
     pub module: Module,
 
     /// Module in the slot at a port, such as 3=4do; may be repeated, and overrides --module for the first slot

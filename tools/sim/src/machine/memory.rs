@@ -1,23 +1,23 @@
-//! The part's memories, flash and SRAM.
+//! A memory of the part, the flash or the SRAM.
 //!
-//! The core reads them, and writes SRAM, through a raw pointer while it runs, so they are kept behind one
-//! and lent out as slices only between its calls.
+//! The core accesses a memory through a raw pointer while it runs. So a [`Memory`] owns its bytes through a raw pointer,
+//! too, and lends them as slices only while the core does not run.
 
 use core::fmt;
 use core::ptr::NonNull;
 use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
 
-/// Where the flash starts (RM0008 3.3.3); it is at 0 as well (boot from main flash, RM0008 3.4).
+/// Start address of the flash (RM0008 3.3.3). The flash is also at address 0 (boot from main flash, RM0008 3.4).
 pub const FLASH_BASE: u32 = 0x0800_0000;
-/// Where the SRAM starts (RM0008 3.3.1).
+/// Start address of the SRAM (RM0008 3.3.1).
 pub const RAM_BASE: u32 = 0x2000_0000;
-/// Bytes of a page of crate rigless's: accesses are sent to the bus page by page.
+/// Size of a page of crate rigless, in bytes. Each page is either read directly or sent to the bus.
 pub(super) const ROUTED_PAGE: usize = 1024;
 
-/// More than any page size the core asks for.
+/// Alignment of a memory, in bytes. It is a multiple of [`ROUTED_PAGE`].
 const ALIGNMENT: usize = 4096;
 
-/// A memory of the part, at a fixed place in the host's.
+/// A memory of the part, at a fixed address of the host.
 pub struct Memory {
     start: NonNull<u8>,
     layout: Layout,
@@ -27,7 +27,7 @@ pub struct Memory {
 unsafe impl Send for Memory {}
 
 impl Memory {
-    /// `size` bytes, each `fill`.
+    /// Creates a memory of `size` bytes with the value `fill`.
     ///
     /// # Panics
     ///
@@ -46,12 +46,13 @@ impl Memory {
         memory
     }
 
-    /// Where the core finds it. Nothing returned by the other methods may be alive while the core runs on it.
+    /// Returns the address of the memory on the host, for the core. While the core runs, no slice that another method has
+    /// returned may exist.
     pub fn host(&mut self) -> *mut u8 {
         self.start.as_ptr()
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         // SAFETY: `start` owns `size` initialised bytes, and the borrow of `self` keeps the core, which
@@ -59,7 +60,7 @@ impl Memory {
         unsafe { core::slice::from_raw_parts(self.start.as_ptr(), self.layout.size()) }
     }
 
-    /// The bytes, to change.
+    /// Returns the bytes for changes.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         // SAFETY: as for `bytes`, and the borrow is exclusive.
         unsafe { core::slice::from_raw_parts_mut(self.start.as_ptr(), self.layout.size()) }

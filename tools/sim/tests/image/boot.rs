@@ -23,6 +23,17 @@ fn log_reports_module_line_settings_reset_cause_and_unit_address() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
+fn unit_reports_the_commit_that_it_was_built_from() {
+    let commit = commit::commit!().get(..8).unwrap_or_default();
+    // Outside a repository the commit is not known.
+    let commit = u32::from_str_radix(commit, 16).unwrap_or_default();
+    let mut bench = Bench::new(Module::Do4, 1);
+    let words = [0x020C, 0x020D].map(|address| u32::from(bench.register(address)));
+    assert_eq!(words, [commit >> 16, commit & 0xFFFF]);
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
 fn unit_answers_within_a_hundred_milliseconds_of_power_on() {
     let mut bench = Bench::cold(Config {
         flash: Some(flash_with(Module::Di4)),

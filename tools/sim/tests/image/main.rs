@@ -8,12 +8,12 @@
 //! |---|---|
 //! | a board and its master | `bench`, `registers` |
 //! | the description | `self_description` |
-//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `refusals`, `timing`, `silences`, `dip`, `bus` |
+//! | the line | `standard_functions`, `ascii`, `framing`, `noise`, `pulses`, `refusals`, `timing`, `silences`, `dip`, `bus` |
 //! | points | `points`, `functions`, `analog_inputs`, `analog_outputs`, `dac_faults`, `counters`, `identify` |
-//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `flash_faults`, `power_cut`, `erase_cut` |
-//! | the simulator | `cores`: boards of one process share translated code; `bus`: several boards on one line |
+//! | configuration | `lock`, `ranges`, `in_force`, `module_choice`, `storing`, `saving`, `save_budget`, `flash_faults`, `power_cut` |
+//! | the simulator | `cores`: boards of one process share translated code |
 //! | the radio | `radio` |
-//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `kept`, `stack`, `log`, `long_run` |
+//! | safety | `boot`, `clock`, `outputs_at_start`, `comm_watchdog`, `hung_task`, `faults`, `upsets`, `kept`, `stack`, `log`, `long_run` |
 
 use sim::board::{Layout, MODIO_02};
 

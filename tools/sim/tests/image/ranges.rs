@@ -129,8 +129,7 @@ fn key_and_command_accept_only_their_defined_values() {
     for value in [0, 1, 0x5A16, 0x5A18, 0x175A, 0xFFFF] {
         assert_eq!(bench.write_single(6, KEY, value), Err(3), "KEY {value:#x}");
     }
-    // 0xB007 is refused until there is a loader.
-    for value in [0, 7, 0xB006, 0xB007, 0xB008, 0xFFFF] {
+    for value in [0, 7, 0xB007, 0xFFFF] {
         assert_eq!(
             bench.write_single(6, COMMAND, value),
             Err(3),

@@ -106,7 +106,11 @@ fn only_ports_1_to_4_accept_a_module() {
             assert_eq!(bench.write(address, &[module]), expected, "port {port}");
             assert_eq!(bench.write_single(6, address, module), expected);
         }
-        assert_eq!(bench.write(address, &[7]), Err(3), "port {port}");
+        assert_eq!(
+            bench.write(address, &[Module::LAST + 1]),
+            Err(3),
+            "port {port}"
+        );
         assert_eq!(bench.write(address, &[0]), Ok(()), "port {port}");
     }
     assert_eq!(bench.write(MODULE, &[1, 2, 3, 4, 5, 0, 0, 0]), Err(3));

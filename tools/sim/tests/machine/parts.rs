@@ -11,6 +11,10 @@ use super::regs::*;
 const FLASH_KIB: u32 = 0x1FFF_F7E0;
 const IDCODE: u32 = 0xE004_2000;
 const TIM5: u32 = 0x4000_0C00;
+const I2C1: u32 = 0x4000_5400;
+const FLASH_OBR: u32 = 0x4002_201C;
+const FLASH_WRPR: u32 = 0x4002_2020;
+const IWDG_RLR: u32 = 0x4000_3008;
 const GPIOC_IDR: u32 = GPIOC + 8;
 
 /// Returns a part that runs `program`, with nothing connected to its pins.
@@ -160,6 +164,91 @@ fn registers_keep_the_bits_that_silicon_keeps() {
     for ((register, bits), n) in kept.into_iter().zip(0..) {
         assert_eq!(out(&chip, n), bits, "{register:#010x}");
     }
+}
+
+/// What two STM32F103 returned after reset (labwired-core, `stm32f1_mmio_diff.rs`, `f103_conformance.rs`). The clocks of
+/// the blocks after `None` have to be on.
+#[test]
+fn registers_have_the_reset_values_of_silicon() {
+    let values = [
+        Some((RCC_CFGR, 0)),
+        Some((RCC_AHBENR, 0x14)),
+        Some((RCC_APB2ENR, 0)),
+        Some((RCC_APB1ENR, 0)),
+        Some((RCC_CSR, 0x0C00_0000)),
+        Some((FLASH_ACR, 0x30)),
+        Some((FLASH_SR, 0)),
+        Some((FLASH_CR, 0x80)),
+        Some((FLASH_OBR, 0x03FF_FFFC)),
+        Some((FLASH_WRPR, u32::MAX)),
+        Some((IWDG_PR, 0)),
+        Some((IWDG_RLR, 0xFFF)),
+        Some((IWDG_SR, 0)),
+        Some((EXTI, 0)),
+        None,
+        Some((USART3, 0xC0)),
+        Some((I2C1 + 0x04, 0)),
+        Some((I2C1 + 0x20, 2)),
+        Some((TIM2, 0)),
+        Some((TIM2 + 0x2C, 0xFFFF)),
+        Some((ADC1 + 0x04, 0)),
+        Some((ADC1 + 0x08, 0)),
+    ];
+    let mut program = Asm::new();
+    for (value, n) in values.iter().zip(0..) {
+        match value {
+            Some((register, _)) => program.copy(*register, OUT + 4 * n),
+            None => clocks_on(&mut program),
+        }
+    }
+    program.spin();
+    let mut chip = alone(&STM32F103CB, program);
+    chip.run_until(Time::from_ms(3));
+    for (value, n) in values.into_iter().zip(0..) {
+        if let Some((register, after_reset)) = value {
+            assert_eq!(out(&chip, n), after_reset, "{register:#010x}");
+        }
+    }
+    assert_eq!(findings(&chip), [""; 0]);
+}
+
+/// What two STM32F103 read back after all ones were written (labwired-core, `stm32f1_mmio_diff.rs`), where every bit is
+/// allowed.
+#[test]
+fn blocks_keep_the_bits_that_silicon_keeps() {
+    let kept = [
+        (I2C1 + 0x08, 0xC3FF),
+        (I2C1 + 0x0C, 0xFF),
+        (I2C1 + 0x1C, 0xCFFF),
+        (I2C1 + 0x20, 0x3F),
+        (TIM2 + 0x24, 0xFFFF),
+        (TIM2 + 0x28, 0xFFFF),
+        (TIM2 + 0x2C, 0xFFFF),
+        (TIM2 + 0x34, 0xFFFF),
+        (TIM2 + 0x38, 0xFFFF),
+        (TIM2 + 0x3C, 0xFFFF),
+        (TIM2 + 0x40, 0xFFFF),
+        (USART3 + 0x08, 0xFFFF),
+    ];
+    let mut program = Asm::new();
+    clocks_on(&mut program);
+    for (register, n) in kept.map(|(register, _)| register).iter().zip(0..) {
+        program.store(*register, u32::MAX);
+        program.copy(*register, OUT + 4 * n);
+    }
+    program.spin();
+    let mut chip = alone(&STM32F103CB, program);
+    chip.run_until(Time::from_ms(3));
+    for ((register, bits), n) in kept.into_iter().zip(0..) {
+        assert_eq!(out(&chip, n), bits, "{register:#010x}");
+    }
+    assert_eq!(findings(&chip), [""; 0]);
+}
+
+/// Turns the clocks of TIM2, USART3, I2C1 and ADC1 on.
+fn clocks_on(program: &mut Asm) {
+    program.store(RCC_APB1ENR, 1 | 1 << 18 | 1 << 21);
+    program.store(RCC_APB2ENR, 1 << 9);
 }
 
 /// A circuit that drives PC0 high, a pin of the packages with 64 pins.

@@ -1,4 +1,4 @@
-"""Runs the example of docs/simulator.md and compares its output with the page."""
+"""Runs the example of docs/simulator-http.md and compares its output with the page."""
 
 import os
 import pathlib
@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[4]
 
 class Example(unittest.TestCase):
     def test_the_example_of_the_python_client_prints_what_the_docs_say(self):
-        text = (ROOT / "docs/simulator.md").read_text()
+        text = (ROOT / "docs/simulator-http.md").read_text()
         [(program, printed)] = re.findall(r"```python\n(.+?)```\n\n```text\n(.+?)```", text, re.DOTALL)
         with tempfile.TemporaryDirectory() as directory:
             # Adds the option for the image, which a released simulator does not need.

@@ -1,0 +1,365 @@
+//! `cargo xtask docs`: `docs/register-map.md`, written from the registers' own data so that it cannot say anything else.
+
+use std::fmt::{Result, Write};
+use std::ops::Range;
+
+use register_map::points::Kind;
+use register_map::{
+    BLOCKS, Block, Board, InForce, Module, Rule, Scope, Text, Unit, Value, Values, codes,
+    configuration, counters, fault, points,
+};
+
+const INTRODUCTION: &str = "\
+# Register map, version 2
+
+<!-- Written by `cargo xtask docs` from crate register-map. Change it there. -->
+
+Addresses are the numbers in the frame and count from 0. Many masters count from 1, or put a digit for the table in
+front: 0x0010 is then 17, 00017 or 10017 as a bit, and 40017 or 30017 as a word.
+
+## Rules
+
+- Functions 01 and 02 read the same bits, and functions 03 and 04 the same words.
+- A request must lie within one of the blocks below and within its defined registers: gaps are exception 02.
+- A write to a register that does not exist, or that can only be read, is exception 02 and writes nothing.
+- A write to several registers is checked completely, and then done completely or not at all.
+- The first failing check decides the exception: function (01), then quantity, byte count and form of the value (03),
+  then the address (02), then the value (03), then the state (04: a module does not answer, 06: the configuration is
+  locked, its store is busy, there were too many saves, or the radio does not serve this).
+- A value of two registers has its high word first. A request that reads both registers gets one consistent value.
+";
+
+const CONFIGURATION_NOTES: &str = "
+- Every write to this block except to KEY needs the open lock, COMMAND included. Otherwise it is exception 06. The state
+  of the lock when the request arrives counts: a request with KEY and a setting needs an open lock already. A refused
+  write does not open the lock and does not keep it open. A value of KEY other than 0x5A17 is exception 03.
+- A written value reads back immediately. \"now\" is in force immediately. \"restart\" is in force after the next start, if
+  the value was saved before it.
+- The response to COMMAND is sent before the command is executed. While a save runs, another save is exception 06 and a
+  restart waits for the save. A change that is made during a save is not part of it. Status bit 3 clears when the save is
+  complete. A save of values that are already stored writes nothing to the flash.
+- The lock closes 60 s after the last configuration write. It belongs to the line that opened it: writes over the other
+  line are exception 06, and KEY and status bit 5 read 1 over the owner's line only. KEY over the other line takes the
+  lock.
+- Twenty saves are possible one after another, and then one a minute; between them a save is exception 06. A save that
+  writes nothing is always possible and does not count. The number of saves left survives every reset but a power-on.
+- A broadcast over the air writes nothing here: it is exception 06, which is not sent. With LORA 2 no write over the air
+  is accepted here at all, and neither the clearing of pulse counters nor function 08 except 00, 02 and 0B-12.
+- FRAME_GAP counts as 1.5 characters when it is shorter than that at the rate in force.
+- Identify (6): all LEDs blink together for 10 s, and then show the state of the device again. Another identify starts
+  the 10 s again.
+- Load defaults (3) and drop (4) change the settings as writes do: save to make them permanent.
+- The allowed values of a setting by point depend on the kind of the point, which the last written MODULE defines. If
+  the point does not use the setting, every value of the register is allowed. A change of MODULE from one module to
+  another sets the settings of its points to their defaults. A change from none to a module keeps the settings that suit.
+- Until the restart a \"now\" setting that does not suit the module in force counts as its default.
+";
+
+const COUNTER_NOTES: &str = "
+A counter wraps. A write of 0 to both registers of a point in one request clears the counter. Any other write is exception 03.
+";
+
+const FAULT_NOTES: &str = "
+The record survives every reset but a loss of power. A new fault replaces it. Line repairs start at 0 with each start and
+stop at 65535.
+";
+
+/// The document, in the repository.
+pub const PATH: &str = "docs/register-map.md";
+
+/// Returns the whole document.
+pub fn markdown() -> std::result::Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    write_markdown(&mut text)?;
+    Ok(text)
+}
+
+fn write_markdown(out: &mut impl Write) -> Result {
+    out.write_str(INTRODUCTION)?;
+    for block in BLOCKS {
+        let Block {
+            title, first, last, ..
+        } = block;
+        write!(out, "\n## {title}: {first:#06X}-{last:04X}\n\n")?;
+        if block.first == points::BLOCK.first {
+            write_points(out)?;
+        } else {
+            write_registers(block, out)?;
+        }
+        if block.first == configuration::BLOCK.first {
+            out.write_str(CONFIGURATION_NOTES)?;
+            write_store(out)?;
+        } else if block.first == fault::BLOCK.first {
+            out.write_str(FAULT_NOTES)?;
+        } else if block.first == counters::BLOCK.first {
+            out.write_str(COUNTER_NOTES)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_registers(block: &Block, out: &mut impl Write) -> Result {
+    let settings = block.first == configuration::BLOCK.first;
+    out.write_str(if settings {
+        "| address | name | values (default) | unit | in force | what |\n|---|---|---|---|---|---|\n"
+    } else {
+        "| address | name | unit | what |\n|---|---|---|---|\n"
+    })?;
+    for (rule, text) in block.registers() {
+        out.write_str("| ")?;
+        write_addresses(rule, out)?;
+        write!(out, " | {} | ", text.name)?;
+        if settings {
+            write_values(rule, out)?;
+            let in_force = match rule.in_force {
+                InForce::Now => "now",
+                InForce::Restart => "restart",
+            };
+            write!(out, " | {}", text.value.unit())?;
+            if let (Some(value), Some(narrower)) = (text.narrower, rule.narrower) {
+                let unit = value.unit();
+                write!(out, "; {} ", plural(narrower.kind))?;
+                if unit == Unit::NONE {
+                    out.write_str("none")?;
+                } else {
+                    write!(out, "{unit}")?;
+                }
+            }
+            write!(out, " | {in_force} | ")?;
+        } else {
+            write!(out, "{} | ", text.value.unit())?;
+        }
+        out.write_str(match text.scope(rule.count) {
+            Scope::Unit => "",
+            Scope::Port => "By port. ",
+            Scope::Point => "By point. ",
+        })?;
+        write_about(text, out)?;
+        out.write_str(" |\n")?;
+    }
+    Ok(())
+}
+
+fn write_addresses(rule: &Rule, out: &mut impl Write) -> Result {
+    write!(out, "{:#06X}", rule.first)?;
+    if rule.count > 1 {
+        write!(out, "-{:04X}", rule.end().wrapping_sub(1))?;
+    }
+    Ok(())
+}
+
+fn write_values(rule: &Rule, out: &mut impl Write) -> Result {
+    write_set(rule.values, out)?;
+    if rule.values.allow(rule.default) {
+        write!(out, " ({})", rule.default)?;
+    }
+    if let Some(narrower) = rule.narrower {
+        write!(out, "; {} ", plural(narrower.kind))?;
+        write_set(narrower.values, out)?;
+        write!(out, " ({})", narrower.default)?;
+    }
+    Ok(())
+}
+
+fn write_set(values: Values, out: &mut impl Write) -> Result {
+    match values {
+        Values::Range { min, max } => write_range(min, max, out),
+        Values::RangeOr { also, min, max } if also < min => {
+            write!(out, "{also}, ")?;
+            write_range(min, max, out)
+        }
+        Values::RangeOr { also, min, max } => {
+            write_range(min, max, out)?;
+            write!(out, ", {also:#06X}")
+        }
+        Values::OneOf(set) => set.iter().enumerate().try_for_each(|(i, value)| {
+            out.write_str(if i == 0 { "" } else { " " })?;
+            write!(out, "{value}")
+        }),
+    }
+}
+
+fn write_range(min: u16, max: u16, out: &mut impl Write) -> Result {
+    match max {
+        _ if min != max => write!(out, "{min}-{max}"),
+        0..=9 => write!(out, "{min}"),
+        _ => write!(out, "{min:#06X}"),
+    }
+}
+
+fn write_about(text: &Text, out: &mut impl Write) -> Result {
+    out.write_str(text.about.trim())?;
+    let separator = |i| if i == 0 { ": " } else { ", " };
+    match text.value {
+        Value::Codes(codes) => {
+            for (i, (code, name)) in codes.iter().enumerate() {
+                out.write_str(separator(i))?;
+                match code {
+                    0..=0xFF => write!(out, "{code} = {name}")?,
+                    _ => write!(out, "{code:#06X} = {name}")?,
+                }
+            }
+        }
+        Value::Bits(bits) => {
+            for (i, (bit, name)) in bits.iter().enumerate() {
+                write!(out, "{}bit {bit} {name}", separator(i))?;
+            }
+        }
+        Value::Number(_) | Value::Long(_) | Value::Opaque => {}
+    }
+    Ok(())
+}
+
+fn plural(kind: Kind) -> &'static str {
+    match kind {
+        Kind::None => "absent points",
+        Kind::BitInput => "bit inputs",
+        Kind::BitOutput => "bit outputs",
+        Kind::WordInput => "analog inputs",
+        Kind::WordOutput => "analog outputs",
+    }
+}
+
+fn write_points(out: &mut impl Write) -> Result {
+    out.write_str(
+        "`address = (port - 1) * 4 + (channel - 1)`, for bits and words alike. Points of ports without a slot, and those \
+         a module\ndoes not have, are exception 02. The boards have slots at these ports:\n\n\
+         | board | ports | points |\n|---|---|---|\n",
+    )?;
+    for board in Board::ALL {
+        let (ports, points) = (board.ports(), board.points());
+        let last = |range: &Range<u16>| range.end.wrapping_sub(1);
+        write!(out, "| {board} | {}", ports.start)?;
+        if board.slots > 1 {
+            write!(out, "-{}", last(&ports))?;
+        }
+        writeln!(out, " | {:#06X}-{:04X} |", points.start, last(&points))?;
+    }
+    out.write_str("\n| code | module | channel 1 | 2 | 3 | 4 |\n|---|---|---|---|---|---|\n")?;
+    for module in Module::ALL {
+        write!(out, "| {} | {module} |", module.code())?;
+        for kind in module.points() {
+            let kind = match kind {
+                Kind::None => "-",
+                Kind::BitInput => "bit, read",
+                Kind::BitOutput => "bit, read and write",
+                Kind::WordInput => "word, read",
+                Kind::WordOutput => "word, read and write",
+            };
+            write!(out, " {kind} |")?;
+        }
+        out.write_str("\n")?;
+    }
+    out.write_str(
+        "\nThe bits of 2relay: 1 and 2 are the mode jumpers of relays 1 and 2 (1 = manual), 3 and 4 their coils. \
+         An output reads back\nwhat was commanded, also while its module does not answer. RANGE and SCALE of a point say \
+         what its word means. Values\nbelow 0 are in two's complement. A write of another value to an output is exception \
+         03.\n\n",
+    )?;
+    write_readings(out)?;
+    out.write_str("\n")?;
+    writeln!(
+        out,
+        "The pulse counter of a point is at {:#06X} + 2 * address.",
+        counters::PULSES
+    )
+}
+
+/// Writes what the words of analog points mean.
+fn write_readings(out: &mut impl Write) -> Result {
+    out.write_str(
+        "| RANGE | SCALE | unit | analog input | analog output |\n|---|---|---|---|---|\n",
+    )?;
+    for input in points::readings(Kind::WordInput) {
+        let name = |names: &[(u16, &'static str)], code: u16| {
+            let named = names.iter().find(|named| named.0 == code);
+            named.map_or("", |named| named.1)
+        };
+        let (range, scale) = (input.signal.code(), input.scale.code());
+        write!(
+            out,
+            "| {range} = {} | {scale} = {} | {} | {} to {} | ",
+            name(codes::Signal::NAMES, range),
+            name(codes::Scale::NAMES, scale),
+            input.unit,
+            input.min,
+            input.max
+        )?;
+        let mut outputs = points::readings(Kind::WordOutput).iter();
+        match outputs.find(|output| (output.signal, output.scale) == (input.signal, input.scale)) {
+            Some(output) => writeln!(out, "{} to {} |", output.min, output.max)?,
+            None => out.write_str("- |\n")?,
+        }
+    }
+    Ok(())
+}
+
+fn write_store(out: &mut impl Write) -> Result {
+    out.write_str("\nA save goes to two flash pages: ")?;
+    for (i, board) in Board::ALL.iter().enumerate() {
+        let [first, second] = board.store.addresses();
+        let separator = if i == 0 { "" } else { "; " };
+        write!(
+            out,
+            "{separator}on the {board} those at {first:#010X} and {second:#010X}"
+        )?;
+    }
+    writeln!(
+        out,
+        ".\nIt is a record of the settings that differ from their defaults, with a CRC-32. A setting that this \
+         firmware does not know\nis ignored. A setting with a stored value that it does not allow has its default; status \
+         bit 1 reports this, and also when nothing\nvalid was found."
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_document_is_up_to_date() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("..")
+            .join(PATH);
+        let written = fs_err::read_to_string(path).unwrap_or_default();
+        assert!(
+            written == markdown().unwrap(),
+            "{PATH} is out of date or missing; write it with: cargo xtask docs"
+        );
+    }
+
+    #[test]
+    fn every_register_of_every_block_has_a_line() {
+        let text = markdown().unwrap();
+        for (rule, about) in BLOCKS.iter().skip(1).flat_map(|block| block.registers()) {
+            let begin = format!("| {:#06X}", rule.first);
+            let line = text.lines().find(|line| line.starts_with(&begin));
+            assert!(
+                line.is_some_and(|line| line.contains(about.name)),
+                "{begin}"
+            );
+        }
+    }
+
+    #[test]
+    fn values_are_written_as_people_read_them() {
+        let written = |values| {
+            let mut text = String::new();
+            write_set(values, &mut text).unwrap();
+            text
+        };
+        assert_eq!(written(Values::range(2, 1000).or(0)), "0, 2-1000");
+        assert_eq!(written(Values::up_to(1).or(0xFFFF)), "0-1, 0xFFFF");
+        assert_eq!(written(Values::only(0x5A17)), "0x5A17");
+        assert_eq!(written(Values::only(0)), "0");
+        assert_eq!(written(Values::OneOf(&[12, 24])), "12 24");
+    }
+
+    #[test]
+    fn a_setting_by_point_names_the_kind_that_differs() {
+        let (rule, _) = register_map::rule_at(configuration::RULES, configuration::FILTER).unwrap();
+        let mut text = String::new();
+        write_values(rule, &mut text).unwrap();
+        assert_eq!(text, "0-1000 (5); analog inputs 0-8 (4)");
+    }
+}
