@@ -150,7 +150,7 @@ fn second_client_is_refused_and_the_first_is_still_served() {
         second.read(),
         "error the line is in use by another client\n"
     );
-    assert_eq!(first.ask(b"run 10\n"), "ok 100020.000\n");
+    assert_eq!(first.ask(b"run 10\n"), "ok 400020.000\n");
 }
 
 #[test]
