@@ -68,7 +68,7 @@ def larger_board(browser, board, line, scheme, file):
         line.request(requests[second % 4], 1000 if second < SECONDS - 1 else 40)
         shows(page, "c2-1", value(second, 0))
         page.clock.run_for(1000)
-    shoot(page, file, page.locator("#frame-scroll"))
+    shoot(page, board, file, page.locator("#frame-scroll"))
 
 
 def smaller_board(browser, board, line, scheme, file):
@@ -81,7 +81,7 @@ def smaller_board(browser, board, line, scheme, file):
     line.request("020400100002", 40)
     shows(page, "c0-1", 1815)
     page.clock.run_for(1000)
-    shoot(page, file, page.locator(".board"))
+    shoot(page, board, file, page.locator(".board"))
 
 
 def opened(browser, board, viewport, scheme, scale):
@@ -100,10 +100,13 @@ def shows(page, slider: str, millivolts: int):
     expect(page.locator(f"#{slider}")).to_have_value(str(millivolts))
 
 
-def shoot(page, file: pathlib.Path, last):
+def shoot(page, board, file: pathlib.Path, last):
     """Takes a picture of the page down to the element `last`, in 256 colours."""
     # Wait for the last frame and the state after it.
     page.wait_for_load_state()
+    line = board.state().line
+    expect(page.locator("#line-requests")).to_have_text(str(line.rx_frames))
+    expect(page.locator("#line-replies")).to_have_text(str(line.tx_frames))
     page.clock.run_for(500)
     box = last.bounding_box()
     width = page.viewport_size["width"]
