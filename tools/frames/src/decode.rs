@@ -1,6 +1,6 @@
 //! Describes requests and responses in words, for people.
 
-use crate::adu::{Framing, bytes};
+use crate::adu::{Framing, RTU_MOST, bytes};
 use crate::{Direction, names};
 
 /// Describes a frame in words: the unit, and the request or response. `request` is the PDU of the preceding
@@ -13,7 +13,7 @@ pub fn frame(
     request: Option<&[u8]>,
 ) -> String {
     match framing.open(bytes) {
-        None => format!("not a complete frame, {} bytes", bytes.len()),
+        None => damaged(framing, bytes),
         Some((unit, pdu)) => {
             let text = match direction {
                 Direction::Request => self::request(&pdu),
@@ -27,7 +27,22 @@ pub fn frame(
     }
 }
 
-pub(crate) fn word(bytes: &[u8], at: usize) -> Option<u16> {
+/// Describes what is wrong with bytes that are not a frame.
+fn damaged(framing: Framing, bytes: &[u8]) -> String {
+    let count = match bytes.len() {
+        1 => "1 byte".to_owned(),
+        length => format!("{length} bytes"),
+    };
+    match (framing, bytes) {
+        (Framing::Mbap, _) => format!("not a complete frame, {count}"),
+        (_, [b':', .., b'\r', b'\n']) => format!("{count} with a bad LRC"),
+        _ if bytes.len() < 4 => format!("{count}, too short for a frame"),
+        _ if bytes.len() > RTU_MOST => format!("{count}, too long for a frame"),
+        _ => format!("{count} with a bad CRC"),
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_be_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
@@ -342,7 +357,22 @@ mod tests {
             }
         }
         assert_eq!(request(&[0x41, 1, 2]), "function 41: 01 02");
-        let damaged = frame(Framing::Rtu, Direction::Response, &[1, 2, 3], None);
-        assert_eq!(damaged, "not a complete frame, 3 bytes");
+    }
+
+    #[test]
+    fn bytes_that_are_not_a_frame_are_described_as_damaged() {
+        for (bytes, text) in [
+            (&[1, 2, 3][..], "3 bytes, too short for a frame"),
+            (&[1], "1 byte, too short for a frame"),
+            (&[], "0 bytes, too short for a frame"),
+            (&[1, 1, 0, 0, 0, 1, 9, 9], "8 bytes with a bad CRC"),
+            (b":1103006B00037F\r\n", "17 bytes with a bad LRC"),
+            (b":\r\n", "3 bytes with a bad LRC"),
+            (&[0; 257], "257 bytes, too long for a frame"),
+        ] {
+            assert_eq!(frame(Framing::Rtu, Direction::Request, bytes, None), text);
+        }
+        let text = frame(Framing::Mbap, Direction::Request, &[0], None);
+        assert_eq!(text, "not a complete frame, 1 byte");
     }
 }

@@ -5,22 +5,19 @@
 //! |---|---|
 //! | [`adu`] | frames in RTU, ASCII and TCP form: created, checked and measured |
 //! | [`names`] | names of functions and exceptions |
-//! | [`decode`] | requests and responses in words, as in `modioctl sniff` |
-//! | [`sentence`] | a frame as a sentence, as in the simulator's log |
+//! | [`decode`] | frames, requests and responses in words, as in `modioctl sniff` and the simulator's frame log |
 //! | [`capture`] | capture files that Wireshark reads |
 //!
 //! The crate only implements the standard: it knows no device, line or clock. The host tool and the simulator both
 //! use it, and it depends on neither.
 //!
 //! ```
-//! use modbus_frames::{Direction, adu::Framing, decode, sentence};
+//! use modbus_frames::{Direction, adu::Framing, decode};
 //!
 //! let frame = Framing::Ascii.frame(0, 17, &[3, 0, 0x6B, 0, 3]);
 //! assert_eq!(frame, b":1103006B00037E\r\n");
 //! let words = decode::frame(Framing::Ascii, Direction::Request, &frame, None);
 //! assert_eq!(words, "unit 17: read holding registers 0x006B x 3");
-//! let sentence = sentence::frame(Direction::Request, &frame);
-//! assert_eq!(sentence, "unit 17: read 3 holding registers from 0x006b");
 //! ```
 
 #![forbid(unsafe_code)]
@@ -29,7 +26,6 @@ pub mod adu;
 pub mod capture;
 pub mod decode;
 pub mod names;
-pub mod sentence;
 mod waiting;
 
 pub use waiting::Waiting;

@@ -62,6 +62,8 @@ class Slot:
 
     port: int
     module: str
+    configured: str
+    """The module that the unit has stored for this slot."""
     channels: Tuple[Channel, ...]
 
     @staticmethod
@@ -99,8 +101,13 @@ class State:
     powered: bool
     dip: int
     """The DIP switch as a number."""
+    address: Optional[int]
+    """The unit address in force: the DIP switch at the last power-on. None without power, and when the position is no
+    address."""
     module: str
     """The module in the first slot."""
+    configured: str
+    """The module that the unit has stored for the first slot."""
     leds: Leds
     driver_enable: bool
     """The unit's RS-485 driver is on."""
@@ -191,6 +198,18 @@ class BoardInfo:
     board: str
     """"modio-02" or "modio-08"."""
     dip: int
+    address: Optional[int]
+    """The unit address in force, as in `State`."""
+    powered: bool
+    fault: bool
+    """The fault LED is lit."""
+    modules: Tuple[str, ...]
+    """The modules in the slots."""
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> BoardInfo:
+        """Returns a board from JSON."""
+        return taken(BoardInfo, {**data, "modules": tuple(data["modules"])})
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-from typing import List, Mapping, Optional, Sequence
+from typing import Dict, List, Mapping, Optional, Sequence
 from urllib.parse import quote
 
 from .board import Board
-from .errors import StartError
+from .errors import RefusedError, StartError
 from .events import Events
 from .connection import Http
 from .process import Argument, Process
-from .model import BoardInfo, Json, taken
+from .model import BoardInfo, Json
 
 # Longest time in seconds for an answer, a start or an end.
 PATIENCE = 60.0
@@ -102,10 +102,18 @@ class Simulator(Board):
 
     def boards(self) -> List[BoardInfo]:
         """Returns the boards on the line, in their order there."""
-        return [taken(BoardInfo, board) for board in self._get("boards")]
+        return [BoardInfo.from_json(board) for board in self._get("boards")]
+
+    def endpoints(self) -> Dict[str, str]:
+        """Returns the addresses of all endpoints by name, also of a simulator that was attached to."""
+        endpoints: Dict[str, str] = self._get("endpoints")
+        return endpoints
 
     def board(self, name: str) -> Board:
-        """Returns the board with this name."""
+        """Returns the board with this name. RefusedError when there is none."""
+        names = [board.name for board in self.boards()]
+        if name not in names:
+            raise RefusedError(404, f"there is no board {name!r}; the boards are {', '.join(names)}")
         return Board(self._http, f"{self._path}/boards/{quote(name, safe='')}")
 
     def events(self) -> Events:

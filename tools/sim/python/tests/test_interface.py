@@ -17,15 +17,18 @@ DESCRIPTION = json.loads((HERE.parents[1] / "src/app/openapi.json").read_text())
 
 CHANNELS = [{"kind": "none"}] * 4
 STATE = {
-    "virtual_ms": 1, "board": "modio-08", "powered": True, "dip": 1, "module": "4di",
+    "virtual_ms": 1, "board": "modio-08", "powered": True, "dip": 1, "address": 1, "module": "4di", "configured": "4di",
     "leds": {"activity": False, "fault": False, "run": True}, "driver_enable": False,
     "line": {"baud": 9600, "format": "8N2", "rx_frames": 0, "tx_frames": 0},
-    "channels": CHANNELS, "log_tail": [], "slots": [{"port": 1, "module": "4di", "channels": CHANNELS}],
+    "channels": CHANNELS, "log_tail": [], "slots": [{"port": 1, "module": "4di", "configured": "4di", "channels": CHANNELS}],
 }
+
+BOARDS = [{"name": name, "board": "modio-02", "dip": 1, "address": 1, "powered": True, "fault": False, "modules": ["4di"]}
+          for name in ("one", "left/1")]
 
 # A call of each method that makes a request, at least one per method.
 CALLS = {
-    "board": [], "boards": [{}], "events": [{}], "faults": [{}], "findings": [{}], "frames": [{"since": 7}],
+    "board": [{"name": "one"}], "boards": [{}], "endpoints": [{}], "events": [{}], "faults": [{}], "findings": [{}], "frames": [{"since": 7}],
     "openapi": [{}], "power_cycle": [{}], "power_off": [{}], "power_on": [{}],
     "set_channel": [{"channel": 4, "energised": True}, {"channel": 4, "manual": True, "port": 1}],
     "set_dip": [{"value": 5}], "set_faults": [{"faults": {"drop_rate": 0.5}}],
@@ -48,7 +51,7 @@ class Recorder(Http):
     def ask(self, method, path, body=None):
         self.open(method, path)
         return {
-            "boards": [{"name": "one", "board": "modio-02", "dip": 1}], "findings": {"findings": []},
+            "boards": BOARDS, "endpoints": {}, "findings": {"findings": []},
             "frames": {"frames": []}, "faults": {}, "openapi.json": {},
         }.get(path.partition("?")[0].rpartition("/")[2], STATE)
 
@@ -89,10 +92,15 @@ class Paths(unittest.TestCase):
 
     def test_requests_to_a_board_contain_its_name(self):
         asked = called(self.simulator, self.simulator.board("left/1"))
-        of_all = {("GET", "/api/events"), ("GET", "/api/boards"), ("GET", "/api/openapi.json")}
+        of_all = {("GET", f"/api/{name}") for name in ("events", "boards", "endpoints", "openapi.json")}
         for method, path in asked - of_all:
             self.assertTrue(path.startswith("/api/boards/left%2F1/"), path)
         self.assertIn(("POST", "/api/boards/left%2F1/slots/1/channels/4"), asked)
+
+    def test_unknown_board_is_refused_with_the_names_of_the_boards(self):
+        with self.assertRaisesRegex(modio_sim.RefusedError, "no board 'two'; the boards are one, left/1") as refused:
+            self.simulator.board("two")
+        self.assertEqual(refused.exception.status, 404)
 
     def test_exactly_one_value_is_applied_to_a_channel(self):
         for given in ({}, {"energised": True, "manual": False}):

@@ -48,12 +48,12 @@ class Running(unittest.TestCase):
 
     def test_a_board_has_a_name(self):
         [board] = self.simulator.boards()
-        self.assertEqual(board.board, "modio-02")
+        self.assertEqual((board.board, board.address, board.modules), ("modio-02", 1, ("2relay",)))
         state = self.simulator.board(board.name).set_channel(2, manual=True)
         self.assertTrue(state.channels[1].manual)
         self.assertFalse(self.simulator.set_channel(2, manual=False, port=5).channels[1].manual)
         with self.assertRaises(modio_sim.RefusedError) as refused:
-            self.simulator.board("nobody").state()
+            self.simulator.board("nobody")
         self.assertEqual(refused.exception.status, 404)
 
     def test_refusal_has_status_and_message_of_the_simulator(self):
@@ -106,6 +106,7 @@ class Running(unittest.TestCase):
         with modio_sim.Simulator.attach(self.simulator.url + "/") as other:
             other.set_dip(17)
             self.assertEqual((other.pty, other.output), (None, []))
+            self.assertEqual(other.endpoints()["tcp"], self.simulator.endpoint("tcp"))
             with self.assertRaises(modio_sim.StartError):
                 other.endpoint("tcp")
         self.assertEqual(self.simulator.set_dip(1).dip, 1)

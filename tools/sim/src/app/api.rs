@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `GET /api/state` | everything that is visible of the board |
 //! | `GET /api/frames?since=K` | those of the last frames on the line that have a number above K |
-//! | `GET /api/boards` | the boards: name, board, switch |
+//! | `GET /api/boards` | the boards: name, board, switch, address in force, power, fault LED, modules |
+//! | `GET /api/endpoints` | the endpoints of the simulator by name |
 //! | `GET /api/findings` | the findings of the chip model |
 //! | `GET /api/openapi.json` | the OpenAPI description of this interface |
 //! | `POST /api/channels/N` | `{"energised":bool}`, `{"manual":bool}` or `{"millivolts":n}` outside channel N |
@@ -151,6 +152,7 @@ fn of_path(
 ) -> Option<Result<Value, Reply>> {
     Some(match path {
         "boards" => reading(request).map(|()| boards(bench)),
+        "endpoints" => reading(request).map(|()| endpoints(bench)),
         "state" => reading(request).map(|()| state::json(bench, n)),
         "frames" => reading(request)
             .and_then(|()| since(query))
@@ -171,9 +173,25 @@ fn of_path(
 fn boards(bench: &Bench) -> Value {
     let boards = bench.units.iter().zip(bench.bus.boards());
     let each = boards.map(|(unit, board)| {
-        json!({ "name": unit.name, "board": board.layout().board.name, "dip": board.dip() })
+        let modules = board.slots().map(|(_, slot)| slot.module().name());
+        json!({
+            "name": unit.name,
+            "board": board.layout().board.name,
+            "dip": board.dip(),
+            "address": state::address(board),
+            "powered": board.powered(),
+            "fault": board.leds().fault,
+            "modules": modules.collect::<Vec<_>>(),
+        })
     });
     each.collect()
+}
+
+/// The body of `GET /api/endpoints`.
+fn endpoints(bench: &Bench) -> Value {
+    let each = bench.endpoints.iter();
+    each.map(|(name, address)| ((*name).to_owned(), json!(address)))
+        .collect()
 }
 
 /// Carries out a request for a slot: the one at the port in `path`, or the first one. Returns `None` if there is no

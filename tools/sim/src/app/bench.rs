@@ -1,5 +1,7 @@
 //! The boards on one line, with their disturbances, the scenario, logs and flash files.
 
+use std::collections::VecDeque;
+use std::fmt::Display;
 use std::io::Write;
 
 use sim::bus::Bus;
@@ -8,6 +10,7 @@ use sim::line::Settings;
 use sim::slot::BusFault;
 use sim::{Board, Channel, Error, Time};
 
+use super::Origin;
 use super::action::{Action, Change};
 use super::disturbance::Disturbance;
 use super::faults::{Faults, HSI_HZ};
@@ -27,6 +30,10 @@ pub struct Bench {
     pub disturbance: Disturbance,
     /// Scheduled changes of the boards' surroundings.
     pub scenario: Scenario,
+    /// The endpoints that were announced: name and address.
+    pub endpoints: Vec<(&'static str, String)>,
+    /// The bytes that clients are sending on the line: the end of the last byte, the client, and the bytes.
+    sending: VecDeque<(Time, Origin, Vec<u8>)>,
 }
 
 impl Bench {
@@ -42,7 +49,16 @@ impl Bench {
             debug: Debug::default(),
             disturbance: Disturbance::default(),
             scenario: Scenario::default(),
+            endpoints: Vec::new(),
+            sending: VecDeque::new(),
         }
+    }
+
+    /// Prints an endpoint on stdout, and keeps it for the HTTP interface.
+    pub fn announce(&mut self, name: &'static str, address: impl Display) {
+        let address = address.to_string();
+        say(&format!("{name}: {address}"));
+        self.endpoints.push((name, address));
     }
 
     /// The first board. Requests without the name of a board mean this one.
@@ -195,12 +211,28 @@ impl Bench {
         line.set_settings(Settings { baud, ..settings });
     }
 
+    /// Sends the bytes of a client that are not lost on the way to the line, as [`put`](Self::put) does.
+    pub fn send(&mut self, bytes: &[u8], origin: Origin) -> Time {
+        let bytes = self.disturbance.not_dropped(bytes.iter().copied());
+        self.put(bytes, origin)
+    }
+
     /// Sends bytes on the line now, or directly after the bytes that are still being sent. Returns the end of the last
     /// byte.
-    pub fn send(&mut self, bytes: &[u8]) -> Time {
+    pub fn put(&mut self, bytes: Vec<u8>, origin: Origin) -> Time {
         let now = self.now();
-        let bytes = self.disturbance.not_dropped(bytes.iter().copied());
-        self.bus.line().send(now, &bytes)
+        let end = self.bus.line().send(now, &bytes);
+        self.sending.push_back((end, origin, bytes));
+        end
+    }
+
+    /// Returns the bytes of clients whose last byte has been sent on the line since the last call.
+    pub fn take_sent(&mut self) -> Vec<(Origin, Vec<u8>)> {
+        let now = self.now();
+        let sent = self.sending.partition_point(|(end, ..)| *end <= now);
+        let sent = self.sending.drain(..sent);
+        sent.map(|(_, origin, bytes)| (origin, self.disturbance.not_dropped(bytes.into_iter())))
+            .collect()
     }
 
     /// Returns the bytes that the master has received since the last call.
@@ -271,4 +303,27 @@ pub fn say(line: &str) {
 /// Prints a line on stderr. A closed stderr does not stop the simulator.
 pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "modio-sim: {line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use register_map::Module;
+
+    use super::*;
+    use crate::app::testing::bench;
+
+    #[test]
+    fn bytes_of_a_client_are_returned_when_they_have_been_on_the_line() {
+        let mut bench = bench(Module::Di4);
+        let end = bench.send(&[1, 2, 3], Origin::Pty);
+        bench.put(vec![4], Origin::Gateway);
+        bench.run_until(end.saturating_sub(Time::from_us(10)));
+        assert!(bench.take_sent().is_empty());
+        bench.run_until(end);
+        let sent = bench.take_sent();
+        assert!(matches!(&sent[..], [(Origin::Pty, bytes)] if bytes == &[1, 2, 3]));
+        bench.run_until(end + Time::from_ms(2));
+        let sent = bench.take_sent();
+        assert!(matches!(&sent[..], [(Origin::Gateway, bytes)] if bytes == &[4]));
+    }
 }

@@ -96,7 +96,7 @@ mod tests {
     use sim::Time;
 
     use super::*;
-    use crate::app::testing::bench;
+    use crate::app::{Origin, testing::bench};
 
     #[test]
     fn frames_are_in_the_file_as_soon_as_they_have_ended() {
@@ -107,7 +107,7 @@ mod tests {
         let size = || std::fs::metadata(&path).unwrap().len();
         let mut sizes = vec![size()];
         for pdu in [&[7][..], &[3, 0, 0, 0, 1]] {
-            bench.send(&Framing::Rtu.frame(0, 1, pdu));
+            bench.send(&Framing::Rtu.frame(0, 1, pdu), Origin::Pty);
             bench.bus.run_for(Time::from_ms(20));
             capture.update(bench.bus.line());
             capture.update(bench.bus.line());
@@ -138,7 +138,7 @@ mod tests {
         });
         let mut capture = Capture::create(&path).unwrap();
         let mut fails = || {
-            bench.send(&[1, 2, 3]);
+            bench.send(&[1, 2, 3], Origin::Pty);
             bench.bus.run_for(Time::from_ms(20));
             capture.update(bench.bus.line());
             capture.failed()

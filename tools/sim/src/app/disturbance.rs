@@ -113,13 +113,15 @@ impl Strikes {
     }
 }
 
-/// Random time between two events with a mean rate of `hz`, exponentially distributed: at least 1 us and at most 1 h.
+/// Random time between two events with a mean rate of `hz`, exponentially distributed: at least 1 us. At 0 Hz it is
+/// [`Time::MAX`]: there is no event.
 fn pause(hz: f64, chance: &mut Rng) -> Time {
-    const MOST: f64 = 3600.0 * PS_PER_S;
+    if hz == 0.0 {
+        return Time::MAX;
+    }
     let seconds = -(1.0 - chance.f64()).ln() / hz;
-    // At 0 Hz the quotient is infinite or NaN, and `min` returns the limit.
-    let ps = (seconds * PS_PER_S).min(MOST);
-    Time::from_us(1).max(Time::from_ps(ps as u64))
+    // The conversion saturates at the largest time.
+    Time::from_us(1).max(Time::from_ps((seconds * PS_PER_S) as u64))
 }
 
 #[cfg(test)]
@@ -136,6 +138,23 @@ mod tests {
             edges += line.falling_edges(from, to).count();
         }
         edges
+    }
+
+    #[test]
+    fn pause_at_a_rate_of_zero_never_ends() {
+        let mut chance = Rng::with_seed(1);
+        assert_eq!(pause(0.0, &mut chance), Time::MAX);
+        let mut strikes = Strikes::default();
+        let late = Time::from_secs(100 * 3600);
+        assert_eq!(strikes.next(0.0, late, &mut chance), Time::MAX);
+    }
+
+    #[test]
+    fn pauses_have_the_mean_of_a_rate_below_one_an_hour() {
+        let mut chance = Rng::with_seed(1);
+        let pauses = (0..1000).map(|_| pause(1e-5, &mut chance).as_secs_f64());
+        let mean = pauses.sum::<f64>() / 1000.0;
+        assert!((90_000.0..110_000.0).contains(&mean), "{mean} s");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use modbus_frames::sentence;
+use modbus_frames::{adu::Framing, decode};
 use serde_json::{Value, json};
 use sim::Time;
 use sim::line::{Direction, Frame, Line};
@@ -31,9 +31,11 @@ pub fn frame(frame: &Frame) -> Value {
     })
 }
 
-/// The meaning of a frame as text.
+/// The meaning of a frame as text, as in `modioctl sniff`.
 pub fn summary(frame: &Frame) -> String {
-    sentence::frame(way(frame.direction), &frame.bytes)
+    let framing = Framing::on_line(&frame.bytes).unwrap_or_default();
+    let request = frame.request.as_deref();
+    decode::frame(framing, way(frame.direction), &frame.bytes, request)
 }
 
 /// The direction of a frame, in the terms of the standard.
@@ -71,6 +73,7 @@ mod tests {
             longest_gap: Time::from_ns(5_250),
             gap: Some(Time::from_us(1000)),
             turnaround: None,
+            request: None,
         };
         let expected = json!({
             "number": 7,
@@ -81,10 +84,28 @@ mod tests {
             "turnaround_us": null,
             "silence_us": 5.25,
             "bytes": "0101001000043c0c",
-            "summary": "unit 1: read 4 coils from 0x0010",
+            "summary": "unit 1: read coils 0x0010 x 4",
             "crc_ok": true,
             "damaged": false,
         });
         assert_eq!(frame(&seen), expected);
+    }
+
+    #[test]
+    fn summary_of_a_reply_has_the_address_of_its_request_and_the_values() {
+        let reply = Frame {
+            number: 2,
+            direction: Direction::FromUnit,
+            start: Time::ZERO,
+            end: Time::ZERO,
+            bytes: Framing::Rtu.frame(0, 1, &[1, 1, 0x05]),
+            crc_ok: true,
+            damaged: false,
+            longest_gap: Time::ZERO,
+            gap: None,
+            turnaround: Some(Time::ZERO),
+            request: Some(vec![1, 0, 0x10, 0, 4]),
+        };
+        assert_eq!(summary(&reply), "unit 1: read coils 0x0010 = 1010");
     }
 }

@@ -103,7 +103,7 @@ mod tests {
     use sim::Time;
 
     use super::*;
-    use crate::app::testing::bench;
+    use crate::app::{Origin, testing::bench};
 
     fn taken(notes: &mut broadcast::Receiver<Note>) -> Vec<(&'static str, Value)> {
         std::iter::from_fn(|| notes.try_recv().ok())
@@ -117,7 +117,7 @@ mod tests {
         let mut live = Live::default();
         let begin = Instant::now();
         let request = [0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C];
-        bench.send(&request);
+        bench.send(&request, Origin::Pty);
         bench.bus.run_for(Time::from_ms(20));
         live.send(&mut bench, begin);
         let mut notes = live.listeners().subscribe();
@@ -135,7 +135,7 @@ mod tests {
         live.send(&mut bench, begin + Duration::from_millis(500));
         assert!(taken(&mut notes).is_empty(), "only time has passed");
 
-        bench.send(&request);
+        bench.send(&request, Origin::Pty);
         bench.bus.run_for(Time::from_ms(20));
         bench.first().set_energised(2, true).unwrap();
         let later = begin + Duration::from_secs(1);

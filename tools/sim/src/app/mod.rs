@@ -14,9 +14,10 @@
 //! One thread owns the boards. The other threads wait for input and put it into the queue, which wakes the first
 //! thread. So the boards need no lock, and a request does not wait for a tick of a clock.
 
-use std::sync::mpsc;
+use std::sync::{Weak, mpsc};
 
 use ::exact_line::Request;
+use modbus_frames::adu::Framing;
 use sim::Time;
 use sim::line::{Format, Settings};
 use sim_options::Options;
@@ -53,18 +54,23 @@ mod unit;
 use bench::Bench;
 pub use inside::version;
 
-/// Virtual time from power-on until the endpoints are printed. The unit has started by then, and the first silence on
-/// the line is over, so the unit answers.
-const START_UP: Time = Time::from_ms(100);
+/// Virtual time from power-on until the endpoints are made and printed. Every unit answers by then: a unit that prepares
+/// its store, waits for its switch and has no crystal needs 360 ms (docs/safety.md).
+const START_UP: Time = Time::from_ms(400);
 
 /// Most virtual time, from power-on, that the simulator waits for the first board's LoRa module to enter normal mode,
 /// before the endpoints are printed.
 const RADIO_START_UP: Time = Time::from_secs(3);
 
+/// Virtual time that a request and its reply have in [`rehearse`]: 30 characters at 9600 bit/s.
+const REHEARSED: Time = Time::from_ms(60);
+
 /// An event that wakes the thread of the boards.
 enum Event {
-    /// Bytes from a master, to be sent on the line.
+    /// Bytes from the master at the pseudo-terminal, to be sent on the line.
     Bytes(Vec<u8>, Hold),
+    /// Bytes from a client of `--tcp`, to be sent on the line.
+    Tcp(Weak<clients::Client>, Vec<u8>, Hold),
     /// Bytes from a master, for the gateway radio.
     Radio(Vec<u8>, Hold),
     /// A request to the HTTP interface, and the receiver of its reply.
@@ -79,17 +85,43 @@ enum Event {
     Stop,
 }
 
+/// The client of the line that has sent bytes. All other clients receive these bytes.
+#[derive(Clone)]
+enum Origin {
+    Pty,
+    Tcp(Weak<clients::Client>),
+    Gateway,
+}
+
 /// While this exists, the endpoint that has sent an event reads no more bytes from its master, which then has to wait as
 /// at a serial port.
 type Hold = mpsc::Sender<()>;
 
 /// Sends an event with bytes, and waits until the boards' thread wants more. Returns false when the simulator ends.
-fn pass_on(bytes: &[u8], event: fn(Vec<u8>, Hold) -> Event, events: &mpsc::Sender<Event>) -> bool {
+fn pass_on(
+    bytes: &[u8],
+    event: impl FnOnce(Vec<u8>, Hold) -> Event,
+    events: &mpsc::Sender<Event>,
+) -> bool {
     let (hold, held) = mpsc::channel();
     let sent = events.send(event(bytes.to_vec(), hold)).is_ok();
     // Nothing is ever sent: this returns when the hold is dropped.
     let _ = held.recv();
     sent
+}
+
+/// Runs boards as the options name them until each has served a request, and drops them. The boards that are made next
+/// take over their cores, on which the code is translated: without that the first replies are late by the wall clock,
+/// and a scan misses the units.
+fn rehearse(options: &Options) -> Result<(), String> {
+    let mut bench = Bench::new(boards::fitted(options)?);
+    bench.run_until(START_UP);
+    for n in 0..bench.units.len() {
+        let address = bench.bus.board(n).dip();
+        bench.put(Framing::Rtu.frame(0, address, &[0x11]), Origin::Gateway);
+        bench.run_until(bench.now() + REHEARSED);
+    }
+    Ok(())
 }
 
 /// Runs the simulator until something stops it or its time is over.
@@ -99,6 +131,9 @@ fn pass_on(bytes: &[u8], event: fn(Vec<u8>, Hold) -> Event, events: &mpsc::Sende
 /// In one line: why the simulator cannot start, or why it cannot write the flash file at the end.
 pub fn run(options: &Options) -> Result<(), String> {
     options.check_line()?;
+    if options.exact_line.is_none() {
+        rehearse(options)?;
+    }
     let mut bench = Bench::new(boards::fitted(options)?);
     if let Some((baud, format)) = &options.line {
         let format = Format::named(format).ok_or("the simulator does not know this format")?;
@@ -113,6 +148,8 @@ pub fn run(options: &Options) -> Result<(), String> {
     if let Some(path) = &options.scenario {
         bench.scenario = scenario::Scenario::read(path, &bench.known())?;
     }
+    // An unwritable file is reported now, not when the firmware saves something.
+    bench.write_flash()?;
     let (events, queue) = mpsc::channel();
 
     let stop = events.clone();
@@ -120,6 +157,9 @@ pub fn run(options: &Options) -> Result<(), String> {
     ctrlc::set_handler(move || drop(stop.send(Event::Stop)))
         .map_err(|error| format!("cannot catch Ctrl-C: {error}"))?;
 
+    // A client that finds an endpoint, such as the link to the pseudo-terminal, can use it immediately.
+    bench.run_until(START_UP);
+    bench.start_radio(RADIO_START_UP);
     let mut endpoints = match options.exact_line {
         Some(address) => run::Endpoints::Exact(exact_line::listen(address, events.clone())?),
         None => run::Endpoints::Clock {
@@ -141,18 +181,14 @@ pub fn run(options: &Options) -> Result<(), String> {
         .gdb
         .map(|address| gdb::listen(address, events.clone()))
         .transpose()?;
-    // An unwritable file is reported now, not when the firmware saves something.
-    bench.write_flash()?;
     // Last, because it replaces a capture file that exists.
     let mut attached = attached::Attached::new(options, events)?;
 
-    bench.run_until(START_UP);
-    bench.start_radio(RADIO_START_UP);
     match &mut endpoints {
         run::Endpoints::Exact(address) => {
             // The line has taken over the unit's rate and format by now. From here on only the client changes them.
             bench.bus.line().set_follow(false);
-            bench::say(&format!("exact-line: {address}"));
+            bench.announce("exact-line", address);
         }
         run::Endpoints::Clock { pty, tcp, .. } => {
             if options.fixed_line {
@@ -161,22 +197,22 @@ pub fn run(options: &Options) -> Result<(), String> {
                 pty.keep_own_rate(settings.baud)?;
             }
             if let Some(path) = pty.path() {
-                bench::say(&format!("pty: {}", path.display()));
+                bench.announce("pty", path.display());
             }
             if let Some(tcp) = tcp {
-                bench::say(&format!("tcp: {}", tcp.address()));
+                bench.announce("tcp", tcp.address());
             }
             if let Some(gateway) = &attached.gateway {
-                bench::say(&format!("modbus-tcp: {}", gateway.address()));
+                bench.announce("modbus-tcp", gateway.address());
             }
         }
     }
-    bench::say(&format!("http: http://{http}/"));
+    bench.announce("http", format_args!("http://{http}/"));
     if let Some(gdb) = gdb {
-        bench::say(&format!("gdb: {gdb}"));
+        bench.announce("gdb", gdb);
     }
     if let Some(path) = endpoints.lora() {
-        bench::say(&format!("lora: {}", path.display()));
+        bench.announce("lora", path.display());
     }
 
     run::until_stopped(

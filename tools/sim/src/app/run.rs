@@ -14,7 +14,7 @@ use super::exact_line::Requests;
 use super::gdb::Session;
 use super::live::Live;
 use super::pace::{Pace, span};
-use super::{Event, Hold, api, pty, tcp};
+use super::{Event, Hold, Origin, api, pty, tcp};
 
 /// Longest time between two updates of the boards: no byte waits longer to be passed on.
 const SLICE: Duration = Duration::from_millis(1);
@@ -92,10 +92,16 @@ pub fn until_stopped(
             if let Some(baud) = pty.take_rate() {
                 bench.set_client_rate(baud);
             }
+            for (origin, bytes) in bench.take_sent() {
+                if !matches!(origin, Origin::Pty) {
+                    pty.write(&bytes);
+                }
+                tcp.iter().for_each(|tcp| tcp.write(&bytes, Some(&origin)));
+            }
             let bytes = bench.take_received();
             if !bytes.is_empty() {
                 pty.write(&bytes);
-                tcp.iter().for_each(|tcp| tcp.write(&bytes));
+                tcp.iter().for_each(|tcp| tcp.write(&bytes, None));
             }
             if let Some(lora) = lora {
                 let bytes = bench.take_received_by_radio();
@@ -115,7 +121,11 @@ pub fn until_stopped(
         match queue.recv_timeout(wait) {
             Ok(Event::Bytes(bytes, hold)) => {
                 clock.catch_up(bench);
-                holds.push((bench.send(&bytes), hold));
+                holds.push((bench.send(&bytes, Origin::Pty), hold));
+            }
+            Ok(Event::Tcp(client, bytes, hold)) => {
+                clock.catch_up(bench);
+                holds.push((bench.send(&bytes, Origin::Tcp(client)), hold));
             }
             Ok(Event::Radio(bytes, hold)) => {
                 clock.catch_up(bench);

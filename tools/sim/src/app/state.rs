@@ -1,9 +1,9 @@
 //! The visible state of a board as JSON: LEDs, channels, line, log, radio.
 
 use serde_json::{Value, json};
-use sim::Channel;
 use sim::radio::{Mode, Module};
 use sim::slot::Slot;
+use sim::{Board, Channel};
 
 use super::bench::Bench;
 use super::faults::HSI_HZ;
@@ -20,7 +20,9 @@ pub fn json(bench: &mut Bench, n: usize) -> Value {
         "board": board.layout().board.name,
         "powered": board.powered(),
         "dip": board.dip(),
+        "address": address(board),
         "module": board.module().name(),
+        "configured": configured(board, board.layout().slots[0].port),
         "leds": { "activity": leds.activity, "fault": leds.fault, "run": leds.run },
         "driver_enable": board.driver_enable(),
         "line": {
@@ -35,7 +37,7 @@ pub fn json(bench: &mut Bench, n: usize) -> Value {
     if board.slots().count() > 1 {
         state["slots"] = board
             .slots()
-            .map(|(port, slot)| one_slot(port, slot))
+            .map(|(port, slot)| one_slot(board, port, slot))
             .collect();
     }
     if let Some(module) = board.radio() {
@@ -82,10 +84,22 @@ fn radio(module: &Module) -> Value {
     })
 }
 
-fn one_slot(port: u8, slot: &Slot) -> Value {
+/// The unit address in force; `None` without power, and if the switch had no valid position at power-on.
+pub fn address(board: &Board) -> Option<u8> {
+    let dip = board.dip_at_power_on();
+    (board.powered() && matches!(dip, 1..=247 | 255)).then_some(dip)
+}
+
+/// Name of the module that the unit has stored for the slot at `port`.
+fn configured(board: &Board, port: u8) -> &'static str {
+    board.layout().configured(board.flash(), port).name()
+}
+
+fn one_slot(board: &Board, port: u8, slot: &Slot) -> Value {
     json!({
         "port": port,
         "module": slot.module().name(),
+        "configured": configured(board, port),
         "channels": channels(slot),
     })
 }

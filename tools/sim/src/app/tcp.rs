@@ -1,5 +1,5 @@
-//! The RS-485 line as raw bytes on a TCP socket: every client receives the bytes that the units send, and the bytes of
-//! all clients are sent on the line.
+//! The RS-485 line as raw bytes on a TCP socket: the bytes of all clients are sent on the line, and every client receives
+//! all bytes on the line except its own.
 
 use std::io::{Read, Write};
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 
 use super::clients::{self, Client};
-use super::{Event, pass_on};
+use super::{Event, Origin, pass_on};
 
 /// Pieces of received bytes that may wait for a client that does not read. The client misses further pieces.
 const WAITING: usize = 1024;
@@ -59,9 +59,12 @@ impl Tcp {
         self.address
     }
 
-    /// Sends these bytes to every client; never waits.
-    pub fn write(&self, bytes: &[u8]) {
+    /// Sends these bytes to every client except `origin`, which has sent them itself; never waits.
+    pub fn write(&self, bytes: &[u8], origin: Option<&Origin>) {
         for outlet in &*self.outlets.all() {
+            if matches!(origin, Some(Origin::Tcp(client)) if client.ptr_eq(&outlet.client)) {
+                continue;
+            }
             // A client that reads too slowly, or that has just disconnected, misses them.
             let _ = outlet.bytes.try_send(bytes.to_vec());
         }
@@ -99,7 +102,7 @@ fn write(client: &Client, to_client: Receiver<Vec<u8>>) {
 }
 
 /// Passes on the bytes of a client until it disconnects.
-fn read(client: &Client, events: &Sender<Event>) {
+fn read(client: &Arc<Client>, events: &Sender<Event>) {
     let mut buffer = [0; 4096];
     let mut is_first = true;
     while let Ok(length @ 1..) = client.stream().read(&mut buffer) {
@@ -109,7 +112,8 @@ fn read(client: &Client, events: &Sender<Event>) {
         }
         is_first = false;
         client.heard();
-        if !pass_on(bytes, Event::Bytes, events) {
+        let event = |bytes, hold| Event::Tcp(Arc::downgrade(client), bytes, hold);
+        if !pass_on(bytes, event, events) {
             return;
         }
     }
@@ -130,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_of_a_client_are_an_event_and_all_clients_receive_written_bytes() {
+    fn bytes_of_a_client_are_an_event_and_clients_receive_all_bytes_except_their_own() {
         let (events, queue) = mpsc::channel();
         let tcp = Tcp::listen("127.0.0.1:0".parse().unwrap(), events).unwrap();
         let mut first = TcpStream::connect(tcp.address()).unwrap();
@@ -141,10 +145,18 @@ mod tests {
 
         first.write_all(&[1, 2, 3]).unwrap();
         let event = queue.recv_timeout(Duration::from_secs(20)).unwrap();
-        assert!(matches!(&event, Event::Bytes(bytes, _) if bytes == &[1, 2, 3]));
-        drop(event);
+        let Event::Tcp(client, bytes, hold) = event else {
+            panic!("another event");
+        };
+        assert_eq!(bytes, [1, 2, 3]);
+        drop(hold);
 
-        tcp.write(&[4, 5]);
+        tcp.write(&[1, 2, 3], Some(&Origin::Tcp(client)));
+        tcp.write(&[4], Some(&Origin::Pty));
+        let mut received = [0; 3];
+        second.read_exact(&mut received).unwrap();
+        assert_eq!(received, [1, 2, 3]);
+        tcp.write(&[5], None);
         for client in [&mut first, &mut second] {
             let mut received = [0; 2];
             client.read_exact(&mut received).unwrap();
@@ -174,7 +186,7 @@ mod tests {
         let mut master = TcpStream::connect(tcp.address()).unwrap();
         master.write_all(b"G").unwrap();
         let event = queue.recv_timeout(Duration::from_secs(20)).unwrap();
-        assert!(matches!(event, Event::Bytes(bytes, _) if bytes == b"G"));
+        assert!(matches!(event, Event::Tcp(_, bytes, _) if bytes == b"G"));
     }
 
     #[test]

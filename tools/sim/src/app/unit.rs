@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use modbus_frames::decode;
 use sim::Board;
 
 use super::flash_file::FlashFile;
@@ -43,7 +44,7 @@ impl Unit {
         self.log.iter().map(String::as_str)
     }
 
-    /// Returns the lines that the firmware has logged since the last call.
+    /// Returns the lines that the firmware has logged since the last call, with control characters escaped.
     pub fn take_log(&mut self, board: &mut Board) -> Vec<String> {
         self.unfinished += &board.take_log();
         let Some(end) = self.unfinished.rfind('\n') else {
@@ -51,7 +52,7 @@ impl Unit {
         };
         let rest = self.unfinished.split_off(end + 1);
         let text = std::mem::replace(&mut self.unfinished, rest);
-        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let lines: Vec<String> = text.lines().map(escaped).collect();
         self.log.extend(lines.iter().cloned());
         self.log.drain(..self.log.len().saturating_sub(TAIL));
         lines
@@ -67,5 +68,25 @@ impl Unit {
             .collect();
         self.findings = found.len();
         new
+    }
+}
+
+/// Returns a line of the log with escapes for every character that is not visible. The firmware may log bytes that it
+/// has received from the line.
+fn escaped(line: &str) -> String {
+    decode::text(line.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_in_the_log_are_escaped() {
+        assert_eq!(escaped("[1.000] saved, Größe 5"), "[1.000] saved, Größe 5");
+        assert_eq!(
+            escaped("a\x1b[2J\x7f\u{9b}31m\u{202e}b\t"),
+            r"a\u{1b}[2J\u{7f}\u{9b}31m\u{202e}b\t"
+        );
     }
 }

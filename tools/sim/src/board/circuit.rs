@@ -34,6 +34,8 @@ pub struct Modio {
     pub slots: Vec<Slot>,
     /// DIP switch SW01: bit 0 = position 1, a set bit = ON = connected to ground.
     pub dip: u8,
+    /// Position of the switch when the power was switched on last. The firmware reads the switch only then.
+    pub dip_at_power_on: u8,
     /// The LoRa module, if it is fitted.
     pub radio: Option<Radio>,
     /// Number of the slot whose DAC has acknowledged its address.
@@ -52,6 +54,7 @@ impl Modio {
             line: Line::default(),
             slots: slots.collect(),
             dip: config.dip,
+            dip_at_power_on: config.dip,
             radio: config.radio.map(|stored| Radio::new(stored, config.corner)),
             addressed: None,
         }
@@ -107,6 +110,9 @@ impl Circuit for Modio {
     }
 
     fn set_power(&mut self, on: bool, now: Time) {
+        if on {
+            self.dip_at_power_on = self.dip;
+        }
         for slot in &mut self.slots {
             slot.set_power(on, now);
         }

@@ -25,6 +25,12 @@ impl Board {
         self.circuit().dip
     }
 
+    /// Position of the DIP switch when the power was switched on last, which is in force.
+    #[must_use]
+    pub fn dip_at_power_on(&self) -> u8 {
+        self.circuit().dip_at_power_on
+    }
+
     /// Moves the DIP switch.
     pub fn set_dip(&mut self, dip: u8) {
         self.change(|circuit| circuit.dip = dip);

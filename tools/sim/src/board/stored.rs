@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use register_map::record;
+use register_map::{Module, configuration, record};
 
 use super::Layout;
 use crate::machine::memory::FLASH_BASE;
@@ -45,6 +45,13 @@ impl Layout {
         pairs.find(|(at, _)| *at == address).map(|(_, value)| value)
     }
 
+    /// Returns the module that is stored in this flash for the slot at `port`.
+    #[must_use]
+    pub fn configured(&self, flash: &[u8], port: u8) -> Module {
+        let code = self.stored(flash, configuration::module_of(port.into()));
+        code.and_then(Module::from_code).unwrap_or(Module::None)
+    }
+
     /// Stores these settings (address and value of a register) in a flash without a configuration. Returns whether they
     /// fit into a page.
     pub fn store(&self, flash: &mut [u8], settings: &[(u16, u16)]) -> bool {
@@ -78,6 +85,8 @@ mod tests {
         let page = &flash[0x3_F000..0x3_F800];
         let (_, record) = record::records(page).next().unwrap();
         assert!(record.pairs().eq(settings));
+        let ports = [1, 2, 4].map(|port| MODIO_08.configured(&flash, port));
+        assert_eq!(ports, [Module::Di4, Module::None, Module::Ao4]);
         flash[0x3_F000..0x3_F800].fill(0xFF);
         assert!(MODIO_08.stores_nothing(&flash));
         flash[0x3_FFFE] = 0;

@@ -47,6 +47,8 @@ pub struct Frame {
     /// Time from the end of a request to the start of this frame, if this is the first frame of a unit after a request
     /// to that unit.
     pub turnaround: Option<Time>,
+    /// PDU of the request that this frame answers, if this is the first frame of a unit after a request to that unit.
+    pub request: Option<Vec<u8>>,
 }
 
 /// Joins words into frames.
@@ -57,8 +59,8 @@ pub struct Record {
     last_number: u64,
     /// End of the last frame.
     last_end: Option<Time>,
-    /// Unit address and end of the last request, until a unit answers.
-    request: Option<(u8, Time)>,
+    /// Unit address, PDU and end of the last request, until a unit answers.
+    request: Option<(u8, Vec<u8>, Time)>,
     keep_all: bool,
     from_master: u64,
     from_unit: u64,
@@ -93,6 +95,7 @@ impl Record {
             longest_gap: Time::ZERO,
             gap: None,
             turnaround: None,
+            request: None,
         });
         let gap = word.start.saturating_sub(frame.end);
         frame.longest_gap = frame.longest_gap.max(gap);
@@ -130,26 +133,27 @@ impl Record {
             return;
         };
         let opened = Framing::on_line(&frame.bytes).and_then(|framing| framing.open(&frame.bytes));
-        let unit = opened.map(|(unit, _)| unit);
-        frame.crc_ok = unit.is_some();
+        frame.crc_ok = opened.is_some();
         frame.gap = self.last_end.map(|end| frame.start.saturating_sub(end));
         self.last_end = Some(frame.end);
         self.last_number = frame.number;
         match frame.direction {
             Direction::FromMaster => {
                 self.from_master += 1;
-                if let Some(unit) = unit {
+                if let Some((unit, pdu)) = opened {
                     // No unit answers a broadcast.
-                    self.request = (unit != 0).then_some((unit, frame.end));
+                    self.request = (unit != 0).then_some((unit, pdu, frame.end));
                 }
             }
             Direction::FromUnit => {
                 self.from_unit += 1;
-                frame.turnaround = self
-                    .request
-                    .take()
-                    .filter(|(asked, _)| unit.is_none_or(|unit| unit == *asked))
-                    .map(|(_, end)| frame.start.saturating_sub(end));
+                let unit = opened.map(|(unit, _)| unit);
+                if let Some((asked, pdu, end)) = self.request.take()
+                    && unit.is_none_or(|unit| unit == asked)
+                {
+                    frame.turnaround = Some(frame.start.saturating_sub(end));
+                    frame.request = Some(pdu);
+                }
             }
         }
         self.kept.push_back(frame);
@@ -298,5 +302,9 @@ mod tests {
         let mut wanted = [None; 10];
         (wanted[2], wanted[9]) = (Some(3600), Some(1600));
         assert_eq!(turnarounds, wanted);
+        for frame in &frames {
+            let request = frame.turnaround.map(|_| vec![7]);
+            assert_eq!(frame.request, request, "frame {}", frame.number);
+        }
     }
 }

@@ -11,11 +11,12 @@ mod several;
 mod unit;
 
 use std::fs;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use modbus_frames::adu::Framing;
 use running::*;
 
 #[test]
@@ -101,6 +102,34 @@ fn every_endpoint_is_announced_and_answers() {
     let end = Instant::now() + Duration::from_secs(60);
     while state(&url)["line"]["rx_frames"] != 1 {
         assert!(Instant::now() < end, "the bytes did not arrive");
+    }
+}
+
+#[test]
+fn client_of_the_line_receives_the_bytes_of_other_clients_and_no_echo() {
+    let endpoints = ["--tcp", "127.0.0.1:0", "--modbus-tcp", "127.0.0.1:0"];
+    let mut running = Running::start_loop(&endpoints);
+    running.skip_pty();
+    let tcp = running.endpoint("tcp: ");
+    let mut gateway = connect(&running.endpoint("modbus-tcp: "));
+    let (mut master, mut observer) = (connect(&tcp), connect(&tcp));
+    // Makes sure that the simulator has accepted both connections.
+    observer.write_all(&[9]).unwrap();
+    let mut received = [0; 3];
+    master.read_exact(&mut received[..1]).unwrap();
+    assert_eq!(received[0], 9);
+    master.write_all(&[1, 2, 3]).unwrap();
+    observer.read_exact(&mut received).unwrap();
+    assert_eq!(received, [1, 2, 3]);
+    let pdu = [3, 2, 0, 0, 1];
+    gateway
+        .write_all(&Framing::Mbap.frame(1, 17, &pdu))
+        .unwrap();
+    for client in [&mut master, &mut observer] {
+        let mut request = [0; 8];
+        client.read_exact(&mut request).unwrap();
+        let text = "no echo in front of the request of the gateway";
+        assert_eq!(request[..], Framing::Rtu.frame(0, 17, &pdu), "{text}");
     }
 }
 

@@ -36,6 +36,17 @@ fn each_unit_answers_to_its_own_address_only() {
 
 #[test]
 #[ignore = "needs the image: cargo xtask test"]
+fn units_answer_the_first_request_after_their_endpoints_were_announced() {
+    let several = ["--unit", "1", "--unit", "2"];
+    for (options, address) in [(&["--no-preset"][..], 1), (&several, 1), (&several, 2)] {
+        let mut unit = Unit::start(options);
+        let reply = unit.try_unit(address, &MODULE, 4);
+        assert!(reply.is_some(), "unit {address} with {options:?}");
+    }
+}
+
+#[test]
+#[ignore = "needs the image: cargo xtask test"]
 fn replies_of_two_units_with_the_same_address_collide() {
     let mut unit = Unit::start(&["--unit", "5:4do", "--unit", "5:4di"]);
     let begin = Instant::now();

@@ -21,6 +21,7 @@ from browser import DESKTOP, PHONE, launch  # noqa: E402
 
 SECONDS = 60
 EXACT = ["--exact-line", "127.0.0.1:0"]
+ENDPOINTS = {"pty": "/dev/pts/3", "tcp": "127.0.0.1:5020", "http": "http://127.0.0.1:8502/"}
 
 
 class Line:
@@ -67,7 +68,7 @@ def larger_board(browser, board, line, scheme, file):
         line.request(requests[second % 4], 1000 if second < SECONDS - 1 else 40)
         shows(page, "c2-1", value(second, 0))
         page.clock.run_for(1000)
-    shoot(page, file, page.locator("#frame-scroll"))
+    shoot(page, board, file, page.locator("#frame-scroll"))
 
 
 def smaller_board(browser, board, line, scheme, file):
@@ -75,17 +76,19 @@ def smaller_board(browser, board, line, scheme, file):
     page = opened(browser, board, PHONE, scheme, 2)
     board.set_channel(1, millivolts=1815)
     board.set_channel(2, millivolts=1000)
-    page.get_by_label("Range of analog input 2").select_option(label="°C")
+    page.get_by_label("Range of analog input p5.2").select_option(label="°C")
     line.request("020600120800", 100)
     line.request("020400100002", 40)
     shows(page, "c0-1", 1815)
     page.clock.run_for(1000)
-    shoot(page, file, page.locator(".board"))
+    shoot(page, board, file, page.locator(".board"))
 
 
 def opened(browser, board, viewport, scheme, scale):
     page = browser.new_page(viewport=viewport, color_scheme=scheme, device_scale_factor=scale)
     page.clock.install(time=0)
+    # Addresses that differ from run to run would change the picture.
+    page.route("**/api/endpoints", lambda route: route.fulfill(json=ENDPOINTS))
     page.goto(board.url)
     expect(page.locator("#connection")).to_have_text("live")
     page.clock.pause_at(SECONDS * 1000)
@@ -97,10 +100,13 @@ def shows(page, slider: str, millivolts: int):
     expect(page.locator(f"#{slider}")).to_have_value(str(millivolts))
 
 
-def shoot(page, file: pathlib.Path, last):
+def shoot(page, board, file: pathlib.Path, last):
     """Takes a picture of the page down to the element `last`, in 256 colours."""
     # Wait for the last frame and the state after it.
     page.wait_for_load_state()
+    line = board.state().line
+    expect(page.locator("#line-requests")).to_have_text(str(line.rx_frames))
+    expect(page.locator("#line-replies")).to_have_text(str(line.tx_frames))
     page.clock.run_for(500)
     box = last.bounding_box()
     width = page.viewport_size["width"]

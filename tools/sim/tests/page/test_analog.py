@@ -27,13 +27,13 @@ class Analog(OnPage):
         self.eventually(lambda: abs(self.codes()[number - 1] - wanted) <= 1.5, True)
 
     def slider(self, number: int):
-        return self.page.get_by_label(f"Slider of analog input {number}", exact=True)
+        return self.page.get_by_label(f"Slider of analog input p5.{number}", exact=True)
 
     def field(self, number: int):
-        return self.page.get_by_label(f"Analog input {number}", exact=True)
+        return self.page.get_by_label(f"Analog input p5.{number}", exact=True)
 
     def at_pin(self, number: int, millivolts: int):
-        expect(self.page.get_by_role("group", name=f"AI {number}").locator(".pin")).to_have_text(
+        expect(self.page.get_by_role("group", name=f"AI p5.{number}").locator(".pin")).to_have_text(
             f"pin: {millivolts} mV")
 
     def test_dragged_slider_changes_the_input_register(self):
@@ -65,7 +65,7 @@ class Analog(OnPage):
 
     def test_slider_has_the_value_in_the_chosen_range_and_at_the_pin(self):
         for unit, value in (("V", "5"), ("mA", "10"), ("°C", "25")):
-            self.page.get_by_label("Range of analog input 1").select_option(label=unit)
+            self.page.get_by_label("Range of analog input p5.1").select_option(label=unit)
             self.field(1).fill(value)
             self.page.keyboard.press("Enter")
             self.at_pin(1, 1650)
@@ -74,7 +74,7 @@ class Analog(OnPage):
         self.reads(1, 1650)
 
     def test_temperature_sets_the_voltage_of_a_thermistor_at_that_temperature(self):
-        self.page.get_by_label("Range of analog input 1").select_option(label="°C")
+        self.page.get_by_label("Range of analog input p5.1").select_option(label="°C")
         self.field(1).fill("60")
         self.page.keyboard.press("Enter")
         ohms = 10e3 * math.exp(3950 * (1 / 333.15 - 1 / 298.15))
@@ -92,8 +92,8 @@ class Analog(OnPage):
         expect(self.field(1)).to_have_value("3")
 
     def test_written_output_shows_in_volts_and_milliamps(self):
-        reading = self.page.get_by_role("group", name="AO 3").locator(".reading")
-        jumper = self.page.get_by_label("Jumper of analog output 3")
+        reading = self.page.get_by_role("group", name="AO p5.3").locator(".reading")
+        jumper = self.page.get_by_label("Jumper of analog output p5.3")
         self.good(self.master.write_register(FIRST + 2, 1024))
         expect(reading).to_have_text("2.50")
         jumper.select_option(label="mA")
@@ -106,7 +106,7 @@ class Analog(OnPage):
     def test_chart_shows_every_analog_point(self):
         self.good(self.master.write_register(FIRST + 3, 2048))
         expect(self.page.locator("#legend span")).to_have_text(
-            [re.compile("^1: "), re.compile("^2: "), re.compile("^3: "), re.compile("^4: 5.00 V$")])
+            [re.compile("^p5.1: "), re.compile("^p5.2: "), re.compile("^p5.3: "), re.compile("^p5.4: 5.00 V$")])
         last = lambda n: self.page.locator("#lines polyline").nth(n).get_attribute("points").split()[-1]
         self.eventually(lambda: last(3), "600.0,75.0", 5000)
         self.simulator.set_channel(1, millivolts=3300)

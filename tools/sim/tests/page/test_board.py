@@ -1,6 +1,7 @@
 """Switch, power, modules, LEDs, both boards, and accessibility."""
 
 import pathlib
+import re
 import tempfile
 
 from axe_playwright_python.sync_playwright import Axe
@@ -55,9 +56,12 @@ class Switch(OnPage):
         self.rocker(2).click()
         self.rocker(5).click()
         self.address(18)
+        in_force = self.page.locator("#address")
+        expect(in_force).to_have_text("1")
         self.assertEqual((self.answers(1), self.answers(18)), (True, False), "before the power cycle")
         self.page.get_by_role("button", name="Off and on").click()
         expect(self.page.locator("#log")).to_contain_text("unit address 18")
+        expect(in_force).to_have_text("18")
         self.assertEqual((self.answers(1), self.answers(18)), (False, True), "after the power cycle")
 
     def test_clicks_faster_than_the_answers_all_count(self):
@@ -100,7 +104,8 @@ class Switch(OnPage):
     def test_wrong_number_is_refused_with_the_reason(self):
         self.page.get_by_label("SW01 as a number").fill("300")
         self.page.keyboard.press("Enter")
-        expect(self.page.get_by_role("alert")).to_contain_text("0 to 255")
+        expect(self.page.get_by_role("alert")).to_have_text(re.compile("^SW01 as a number: .*0 to 255"))
+        expect(self.page.get_by_label("SW01 as a number")).to_have_value("1")
         self.assertEqual(self.simulator.state().dip, 1)
 
     def is_expected(self, message) -> bool:
@@ -113,14 +118,17 @@ class Modules(OnPage):
         expect(module).to_be_disabled()
         self.page.locator("#power").click()
         module.select_option("4ao")
-        expect(self.page.get_by_role("group", name="AO 4")).to_be_visible()
+        expect(self.page.get_by_role("group", name="AO p5.4")).to_be_visible()
+        mismatch = self.page.get_by_text("configured 4di, plugged 4ao")
+        expect(mismatch).to_be_visible()
         self.assertEqual(self.simulator.state().module, "4ao")
         module.select_option("none")
         expect(self.page.locator(".channel")).to_have_count(0)
         module.select_option("4di")
+        expect(self.page.locator(".mismatch")).to_be_hidden()
         self.page.locator("#power").click()
         expect(module).to_be_disabled()
-        self.is_on("Digital input 1", "open", False)
+        self.is_on("Digital input p5.1", "open", False)
 
     def test_running_led_blinks(self):
         run = self.page.locator("#led-run-text")
@@ -140,16 +148,16 @@ class LargerBoard(OnPage):
             expect(self.page.get_by_label(f"Module in Port {port}")).to_have_value(module)
 
     def test_each_slot_follows_the_line_and_the_mouse(self):
-        self.switch("Digital input 4").click()
+        self.switch("Digital input p1.4").click()
         read = lambda: self.good(self.master.read_coils(0x0000, count=4)).bits[:4]
         self.eventually(read, [False, False, False, True])
         self.good(self.master.write_coil(0x0006, True))
-        self.is_on("Coil of relay 1", "energised")
-        self.page.get_by_label("Slider of analog input 2", exact=True).fill("3300")
+        self.is_on("Coil of relay 1, p2.3", "energised")
+        self.page.get_by_label("Slider of analog input p3.2", exact=True).fill("3300")
         level = lambda: self.good(self.master.read_input_registers(0x0009, count=1)).registers[0] > 4090
         self.eventually(level, True)
         self.good(self.master.write_register(0x000F, 4095))
-        expect(self.page.get_by_role("group", name="AO 4").locator(".reading")).to_have_text("10.00")
+        expect(self.page.get_by_role("group", name="AO p4.4").locator(".reading")).to_have_text("10.00")
         expect(self.page.locator("#legend span")).to_have_count(8)
 
 

@@ -23,7 +23,8 @@ class Frames(OnPage):
         expect(self.rows).to_have_count(4)
         self.assertEqual(self.texts("from"), ["master", "unit"] * 2)
         meaning = self.texts("meaning")
-        self.assertIn("read 4 coils from 0x0010", meaning[0])
+        self.assertIn("read coils 0x0010 x 4", meaning[0])
+        self.assertIn("read coils 0x0010 = 0000", meaning[1])
         self.assertIn("exception 02", meaning[3])
         frames = self.simulator.frames()[-4:]
         self.assertEqual([text.replace(" ", "") for text in self.texts("bytes")], [f.bytes.hex() for f in frames])
@@ -56,6 +57,17 @@ class Frames(OnPage):
             wire.write(b"\x01\x02\x03\x04\x05")
         expect(self.page.locator("#frames tr.bad")).to_have_count(1)
         expect(self.page.locator("#frames tr.bad td.meaning")).to_contain_text("bad CRC")
+
+    def test_request_without_a_reply_is_marked(self):
+        self.master.close()
+        unanswered = self.page.locator("#frames tr.unanswered")
+        # Units never answer a broadcast.
+        for request in (b"\x09\x07", b"\x01\x07", b"\x00\x06\x00\x10\x00\x00", b"\x08\x07"):
+            with self.simulator.wire() as wire:
+                wire.write(crc(request))
+                self.simulator.wait(100)
+        expect(self.rows).to_have_count(5)
+        expect(unanswered.locator("td.meaning")).to_contain_text(["unit 9", "unit 8"])
 
     def test_page_opened_later_shows_earlier_frames(self):
         self.good(self.master.read_coils(0x0010, count=4))
@@ -159,12 +171,13 @@ class StartedAgain(OnPage):
         master.close()
         expect(page.locator("#frames tr")).to_have_count(6)
         first.close()
-        expect(page.locator("#connection")).to_have_text(re.compile("does not answer"))
+        expect(page.locator("#connection")).to_have_text(re.compile("^OFFLINE: .* does not answer"))
+        expect(page.locator("#board")).to_have_attribute("inert", "")
         second = Simulator.of(http=address, module="4do")
         self.addCleanup(second.close)
         master = second.master()
         self.addCleanup(master.close)
         expect(page.locator("#connection")).to_have_text("live", timeout=PATIENCE * 1000)
         self.good(master.write_coil(0x0010, True))
-        expect(page.get_by_role("switch", name="Digital output 1")).to_have_text("conducts")
+        expect(page.get_by_role("switch", name="Digital output p5.1")).to_have_text("conducts")
         expect(page.locator("#frames tr")).to_have_count(2)

@@ -1,6 +1,7 @@
 """The faults that a user can set, several boards on one line, and the radio."""
 
 import pathlib
+import re
 import tempfile
 
 from browser import OnPage
@@ -41,10 +42,12 @@ class Faults(OnPage):
         self.simulator.power_cycle()
 
     def test_refused_fault_is_reported_and_reset(self):
-        self.page.get_by_label("Bit errors, share of bits").fill("7")
-        self.page.keyboard.press("Tab")
-        expect(self.page.get_by_role("alert")).to_contain_text("from 0 to 0.5")
-        expect(self.page.get_by_label("Bit errors, share of bits")).to_have_value("0")
+        field = self.page.get_by_label("Bit errors, share of bits")
+        for key in ("Enter", "Tab"):
+            field.fill("7")
+            self.page.keyboard.press(key)
+            expect(self.page.get_by_role("alert")).to_have_text(re.compile("^Bit errors, share of bits: .*0 to 0.5"))
+            expect(field).to_have_value("0")
 
     def test_faults_set_by_another_client_are_shown(self):
         expect(self.page.get_by_label("DAC does not answer on I2C")).not_to_be_checked()
@@ -53,8 +56,23 @@ class Faults(OnPage):
 
 
 class OneBoard(OnPage):
+    OPTIONS = ("--tcp", "127.0.0.1:0", "--modbus-tcp", "127.0.0.1:0")
+
+    def test_commands_reach_the_unit(self):
+        ends = self.simulator.endpoints()
+        host, port = ends["modbus-tcp"].split(":")
+        read = "-a 1 -0 -r 16 -c 4 -1 -t 1"
+        expect(self.page.get_by_label("Commands for a terminal")).to_have_text("\n".join([
+            f"modioctl --port {ends['pty']} --baud 9600 --format 8N2 scan",
+            f"modioctl --tcp {ends['tcp']} scan",
+            f"modioctl --modbus-tcp {ends['modbus-tcp']} scan",
+            f"mbpoll -m rtu -b 9600 -P none -s 2 {read} {ends['pty']}",
+            f"mbpoll -m tcp -p {port} {read} {host}"]))
+        expect(self.page.locator("#endpoints dd")).to_have_text(list(ends.values()))
+
     def test_chooser_and_radio_are_hidden(self):
         expect(self.page.locator("#chooser")).to_be_hidden()
+        expect(self.page.get_by_role("heading", name="Boards on the line")).to_be_hidden()
         expect(self.page.get_by_role("heading", name="LoRa radio")).to_be_hidden()
         expect(self.page.get_by_label("Lost radio packets, share of packets")).to_have_count(0)
 
@@ -96,12 +114,20 @@ class Boards(OnPage):
         expect(address).to_have_value("1")
         chooser.select_option("unit-2")
         expect(address).to_have_value("2")
-        expect(self.page.get_by_role("group", name="DO 4")).to_be_visible()
+        expect(self.page.get_by_role("group", name="DO p5.4")).to_be_visible()
         self.good(self.master.write_coil(0x0010, True, device_id=2))
-        expect(self.page.get_by_role("switch", name="Digital output 1")).to_have_text("conducts")
+        expect(self.page.get_by_role("switch", name="Digital output p5.1")).to_have_text("conducts")
         self.page.get_by_role("switch", name="SW01 position 3, adds 4").click()
         expect(address).to_have_value("6")
         self.assertEqual([self.simulator.board(name).state().dip for name in ("unit-1", "unit-2")], [1, 6])
-        chooser.select_option("unit-1")
+        self.page.get_by_role("button", name="unit-1").click()
+        expect(chooser).to_have_value("unit-1")
         expect(address).to_have_value("1")
-        expect(self.page.get_by_role("group", name="DI 4")).to_be_visible()
+        expect(self.page.get_by_role("group", name="DI p5.4")).to_be_visible()
+
+    def test_overview_shows_every_board(self):
+        rows = self.page.locator("#overview tr")
+        expect(rows).to_have_text(["unit-1modio-021onoff4di", "unit-2modio-022onoff4do"])
+        self.simulator.board("unit-2").power_off()
+        expect(rows.nth(1)).to_have_text("unit-2modio-02noneoffoff4do")
+        self.simulator.board("unit-2").power_on()

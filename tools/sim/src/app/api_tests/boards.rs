@@ -63,7 +63,15 @@ fn single_board_is_also_addressed_by_its_name() {
     let boards = get(&mut bench, "/api/boards").body;
     assert_eq!(
         boards,
-        json!([{ "name": "modio-02", "board": "modio-02", "dip": 1 }])
+        json!([{
+            "name": "modio-02",
+            "board": "modio-02",
+            "dip": 1,
+            "address": 1,
+            "powered": true,
+            "fault": false,
+            "modules": ["4di"],
+        }])
     );
     let reply = post(
         &mut bench,
@@ -92,13 +100,8 @@ fn boards_are_addressed_by_name_and_a_path_without_name_means_the_first() {
     };
     let mut bench = bench_of_boards([("pump", config(Module::Di4)), ("fan", config(Module::Ai4))]);
     let boards = get(&mut bench, "/api/boards").body;
-    assert_eq!(
-        boards,
-        json!([
-            { "name": "pump", "board": "modio-02", "dip": 1 },
-            { "name": "fan", "board": "modio-02", "dip": 1 },
-        ])
-    );
+    let named = [0, 1].map(|n| [&boards[n]["name"], &boards[n]["modules"][0]]);
+    assert_eq!(named, [["pump", "4di"], ["fan", "4ai"]]);
     assert_eq!(state(&mut bench)["module"], "4di");
     let fan = get(&mut bench, "/api/boards/fan/state").body;
     assert_eq!(fan["module"], "4ai");
@@ -116,4 +119,56 @@ fn boards_are_addressed_by_name_and_a_path_without_name_means_the_first() {
         (state["dip"].clone(), state["virtual_ms"].clone())
     });
     assert_eq!(both, [(json!(1), json!(100)), (json!(7), json!(100))]);
+}
+
+#[test]
+fn address_in_force_is_the_switch_at_power_on() {
+    let mut bench = bench(Module::Di4);
+    let set = |bench: &mut Bench, path: &str, body: &str| {
+        let state = post(bench, path, body).body;
+        let boards = get(bench, "/api/boards").body;
+        assert_eq!(boards[0]["address"], state["address"]);
+        (state["dip"].clone(), state["address"].clone())
+    };
+    let dip = |value| format!(r#"{{"value":{value}}}"#);
+    for (value, address) in [
+        (7, json!(7)),
+        (255, json!(255)),
+        (248, json!(null)),
+        (0, json!(null)),
+    ] {
+        let before = state(&mut bench)["address"].clone();
+        let moved = set(&mut bench, "/api/dip", &dip(value));
+        assert_eq!(moved, (json!(value), before));
+        let cycled = set(&mut bench, "/api/power", r#"{"cycle":true}"#);
+        assert_eq!(cycled, (json!(value), address));
+    }
+    set(&mut bench, "/api/dip", &dip(3));
+    let off = set(&mut bench, "/api/power", r#"{"on":false}"#);
+    assert_eq!(off, (json!(3), json!(null)));
+}
+
+#[test]
+fn configured_module_is_the_stored_one() {
+    let flash = board::MODIO_02.flash_with(&[(register_map::configuration::module_of(5), 2)]);
+    let mut bench = bench_of(Config {
+        module: Module::Relay2,
+        flash,
+        ..Config::default()
+    });
+    let state = state(&mut bench);
+    assert_eq!(
+        (&state["module"], &state["configured"]),
+        (&json!("2relay"), &json!("4do"))
+    );
+}
+
+#[test]
+fn announced_endpoints_are_listed_by_name() {
+    let mut bench = bench(Module::Di4);
+    assert_eq!(get(&mut bench, "/api/endpoints").body, json!({}));
+    let tcp = ("tcp", "127.0.0.1:5020".to_owned());
+    bench.endpoints.push(tcp);
+    let listed = get(&mut bench, "/api/endpoints").body;
+    assert_eq!(listed, json!({ "tcp": "127.0.0.1:5020" }));
 }

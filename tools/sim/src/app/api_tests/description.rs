@@ -53,7 +53,10 @@ fn replies_have_the_described_entries() {
         ..Config::default()
     });
     let schemas = get(&mut bench, "/api/openapi.json").body["components"]["schemas"].take();
-    bench.send(&[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C]);
+    bench.send(
+        &[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C],
+        Origin::Pty,
+    );
     bench.bus.run_for(sim::Time::from_ms(20));
     let frame = get(&mut bench, "/api/frames").body["frames"][0].take();
     for (name, reply) in [("State", state(&mut bench)), ("Frame", frame)] {

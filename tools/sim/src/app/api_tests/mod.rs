@@ -7,6 +7,7 @@ mod radio;
 use serde_json::{Value, json};
 
 use super::*;
+use crate::app::Origin;
 use crate::app::testing::{bench, bench_of, bench_of_boards};
 use sim::{Config, board};
 
@@ -122,7 +123,10 @@ fn frames_since_a_number_are_the_later_ones() {
     let mut bench = bench(Module::Di4);
     for _ in 0..2 {
         bench.bus.run_for(sim::Time::from_ms(1));
-        bench.send(&[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C]);
+        bench.send(
+            &[0x01, 0x01, 0x00, 0x10, 0x00, 0x04, 0x3C, 0x0C],
+            Origin::Pty,
+        );
         bench.bus.run_for(sim::Time::from_ms(20));
     }
     let all = get(&mut bench, "/api/frames").body;

@@ -5,6 +5,7 @@ use sim::Time;
 use sim::line::{Direction, Frame, Line, Settings};
 
 use super::mbap::Request;
+use crate::app::Origin;
 use crate::app::bench::Bench;
 
 /// Time after the request within which a unit must begin its reply.
@@ -42,13 +43,13 @@ pub struct Exchange {
 impl Exchange {
     /// Sends a request: now, or directly after the bytes that other masters are still sending.
     pub fn begin(bench: &mut Bench, framing: Framing, request: &Request) -> Self {
-        let now = bench.now();
-        let line = bench.bus.line();
-        let after = line.frames().next_back().map_or(0, |frame| frame.number);
-        let end = line.send(now, &framing.frame(0, request.unit, &request.pdu));
+        let after = bench.bus.line().frames().next_back();
+        let after = after.map_or(0, |frame| frame.number);
+        let bytes = framing.frame(0, request.unit, &request.pdu);
+        let end = bench.put(bytes, Origin::Gateway);
         let wait = match request.unit {
             0 => TURNAROUND,
-            _ => patience(framing, line.settings()),
+            _ => patience(framing, bench.bus.line().settings()),
         };
         Self {
             framing,
@@ -127,6 +128,7 @@ mod tests {
             longest_gap: Time::ZERO,
             gap: None,
             turnaround: None,
+            request: None,
         };
         assert_eq!(exchange.reply(&good), Some(pdu.clone()));
         let with = |change: &dyn Fn(&mut Frame)| {

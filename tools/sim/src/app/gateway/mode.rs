@@ -26,10 +26,8 @@ impl Mode {
         if self.start == Some(start) {
             return;
         }
-        if self.start.is_none_or(|(power_ons, _)| power_ons != start.0) {
-            self.dip = board.dip();
-        }
         self.start = Some(start);
+        self.dip = board.dip_at_power_on();
         let mode = board.layout().stored(board.flash(), configuration::MODE);
         self.stored = mode.unwrap_or_default();
     }

@@ -10,15 +10,17 @@ const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Path, type and content of each file.
-pub const FILES: [(&str, &str, &str); 12] = [
+pub const FILES: [(&str, &str, &str); 14] = [
     ("/", HTML, include_str!("../page/index.html")),
     ("/page.css", CSS, include_str!("../page/page.css")),
     ("/board.css", CSS, include_str!("../page/board.css")),
     ("/page.js", SCRIPT, include_str!("../page/page.js")),
     ("/api.js", SCRIPT, include_str!("../page/api.js")),
     ("/board.js", SCRIPT, include_str!("../page/board.js")),
+    ("/boards.js", SCRIPT, include_str!("../page/boards.js")),
     ("/channels.js", SCRIPT, include_str!("../page/channels.js")),
     ("/chart.js", SCRIPT, include_str!("../page/chart.js")),
+    ("/connect.js", SCRIPT, include_str!("../page/connect.js")),
     ("/faults.js", SCRIPT, include_str!("../page/faults.js")),
     ("/frames.js", SCRIPT, include_str!("../page/frames.js")),
     ("/model.js", SCRIPT, include_str!("../page/model.js")),

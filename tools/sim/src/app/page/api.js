@@ -27,8 +27,8 @@ export async function get(address) {
   return answer.ok ? answer.json() : null;
 }
 
-/** Sends JSON and returns the reply. Shows the reason of a refusal, and returns null. */
-export async function send(address, body) {
+/** Sends JSON and returns the reply. Shows the reason of a refusal after the label of the field, and returns null. */
+export async function send(address, body, label) {
   try {
     const answer = await fetch(address, {
       method: "POST",
@@ -36,7 +36,7 @@ export async function send(address, body) {
       body: JSON.stringify(body),
     });
     const got = await answer.json();
-    setText(byId("message"), answer.ok ? "" : got.error);
+    setText(byId("message"), answer.ok ? "" : label ? `${label}: ${got.error}` : got.error);
     return answer.ok ? got : null;
   } catch {
     setText(byId("message"), "The simulator does not answer.");
@@ -45,14 +45,16 @@ export async function send(address, body) {
 }
 
 /** Sends a change of the board, and shows the new state. Changes are sent one after another. A change that depends on
- * the state is a function that returns the body: it is called when the changes before it are shown. */
-export function post(rest, body) {
+ * the state is a function that returns the body: it is called when the changes before it are shown. The promise is false
+ * when the simulator refuses the change. */
+export function post(rest, body, label) {
   const at = prefix;
   const sent = previous.then(async () => {
     const dependsOnState = typeof body === "function";
     if (dependsOnState && at !== prefix) return;
-    const state = await send(at + rest, dependsOnState ? body() : body);
+    const state = await send(at + rest, dependsOnState ? body() : body, label);
     if (state !== null && at === prefix) whenChanged(state);
+    return state !== null;
   });
   previous = sent.catch(() => {});
   return sent;

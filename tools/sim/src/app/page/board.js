@@ -1,6 +1,6 @@
 // The board: power, switch, LEDs, line, and the slots with their modules.
 
-import { modules, slotsOf } from "/model.js";
+import { modules, pointName, slotsOf } from "/model.js";
 import { post } from "/api.js";
 import { buildChannel, showChannel } from "/channels.js";
 import { byId, element, select, setText } from "/ui.js";
@@ -13,7 +13,7 @@ export const current = () => shown;
 /** The channels of all slots, each with its name and the number of its element. */
 export function channels(state) {
   return slotsOf(state).flatMap((slot, n) => slot.channels.map((channel, at) => ({
-    id: idOf(n, at), channel, name: state.slots ? `port ${slot.port}, ${at + 1}` : `${at + 1}`,
+    id: idOf(n, at), channel, name: pointName(slot.port, at + 1),
   })));
 }
 
@@ -34,6 +34,8 @@ export function show(state) {
   setText(byId("power"), state.powered ? "Power is on" : "Power is off");
   byId("cycle").disabled = !state.powered;
   if (document.activeElement !== byId("dip-value")) byId("dip-value").value = state.dip;
+  setText(byId("address"), addressText(state));
+  byId("address").classList.toggle("differs", state.address !== state.dip);
   [...byId("dip").children].forEach((rocker, n) =>
     rocker.setAttribute("aria-checked", String((state.dip >> n) % 2 === 1)));
   for (const name of ["run", "fault", "activity"]) {
@@ -65,12 +67,20 @@ export function forget() {
 export function listen() {
   byId("power").addEventListener("click", () => post("power", () => ({ on: !shown.powered })));
   byId("cycle").addEventListener("click", () => post("power", { cycle: true }));
-  byId("dip-value").addEventListener("change", (event) => {
-    const value = event.target.valueAsNumber;
-    if (Number.isFinite(value)) post("dip", { value });
+  byId("dip-value").addEventListener("change", async ({ target }) => {
+    const value = target.valueAsNumber;
+    const isSet = Number.isFinite(value) && await post("dip", { value }, target.ariaLabel);
+    if (!isSet) target.value = shown.dip;
   });
   byId("dip-value").addEventListener("blur", redraw);
   for (let n = 0; n < 8; n += 1) byId("dip").append(rocker(n));
+}
+
+/** Returns the unit address in force as text. */
+function addressText({ powered, address }) {
+  if (!powered) return "none: the power is off";
+  if (address === null) return "none: SW01 was no address at power-on";
+  return address === 255 ? "255, recovery mode" : String(address);
 }
 
 /** Makes one of the eight positions of SW01; `n` counts from 0. */
@@ -101,6 +111,7 @@ function buildSlot(slot, n) {
         id: `module-${n}`, "aria-label": `Module in ${title}`,
         onchange: (event) => post(`${slot.path}module`, { name: event.target.value }),
       }, Object.entries(modules).map(([name, each]) => [name, each.text]))),
+    element("p", { class: "mismatch", id: `mismatch-${n}` }),
     element("div", { class: "channels" }, ...made.filter(Boolean)),
     element("ol", { class: "terminals", "aria-label": `Screw terminals of ${title}` },
       ...module.terminals.map((label) => element("li", {}, element("span", {}, label)))));
@@ -122,6 +133,9 @@ function showSlot(slot, n, powered) {
   const module = byId(`module-${n}`);
   module.value = slot.module;
   module.disabled = powered;
+  const mismatch = byId(`mismatch-${n}`);
+  mismatch.hidden = slot.configured === slot.module;
+  setText(mismatch, `configured ${slot.configured}, plugged ${slot.module}`);
   module.title = powered ? "Switch the power off to change the module" : "";
   slot.channels.forEach((channel, at) => showChannel(idOf(n, at), channel));
 }

@@ -1,6 +1,6 @@
 // The channels of a module: their controls and displays.
 
-import { inputs, outputs, address } from "/model.js";
+import { inputs, outputs, address, pointName } from "/model.js";
 import { post, stream, isStreaming } from "/api.js";
 import { byId, element, select, setText } from "/ui.js";
 
@@ -15,18 +15,21 @@ const NAMES = { di: "DI", do: "DO", relay: "Relay", ai: "AI", ao: "AO" };
 export function buildChannel(slot, id, channel, number, redraw) {
   const name = NAMES[channel.kind];
   if (name === undefined) return null;
-  // A relay has two points: its jumper, and its coil with an address that is two higher.
-  const point = address(slot.port, channel.kind === "relay" ? number + 2 : number);
-  return element("div", { class: `channel ${channel.kind}`, role: "group", "aria-label": `${name} ${number}` },
-    element("div", { class: "name" }, element("span", {}, `${name} ${number}`), element("code", {}, point)),
-    ...control(`${slot.path}channels/${number}`, id, channel.kind, number, redraw));
+  // A relay has two points: its jumper, and its coil with a number that is two higher.
+  const at = channel.kind === "relay" ? number + 2 : number;
+  const point = pointName(slot.port, at);
+  return element("div", { class: `channel ${channel.kind}`, role: "group", "aria-label": `${name} ${point}` },
+    element("div", { class: "name" },
+      element("span", {}, `${name} ${number}`), element("code", {}, point), element("code", {}, address(slot.port, at))),
+    ...control(slot, id, channel.kind, number, point, redraw));
 }
 
-function control(path, id, kind, number, redraw) {
+function control(slot, id, kind, number, point, redraw) {
+  const path = `${slot.path}channels/${number}`;
   const toggle = (key, label) => {
     const button = element("button", {
       id, type: "button", role: "switch", "aria-checked": "false", "aria-label": label, class: "toggle",
-      onclick: () => post(path, () => ({ [key]: button.getAttribute("aria-checked") !== "true" })),
+      onclick: () => post(path, () => ({ [key]: button.getAttribute("aria-checked") !== "true" }), label),
     });
     return button;
   };
@@ -35,32 +38,36 @@ function control(path, id, kind, number, redraw) {
   });
   switch (kind) {
     case "di":
-      return [toggle("energised", `Digital input ${number}`)];
+      return [toggle("energised", `Digital input ${point}`)];
     case "do":
-      return [lamp(`Digital output ${number}`)];
+      return [lamp(`Digital output ${point}`)];
     case "relay":
-      return [lamp(`Coil of relay ${number}`), toggle("manual", `Manual jumper of relay ${number}`)];
+      return [
+        lamp(`Coil of relay ${number}, ${point}`),
+        toggle("manual", `Manual jumper of relay ${number}, ${pointName(slot.port, number)}`),
+      ];
     case "ai":
-      return analogInput(path, id, number, redraw);
+      return analogInput(path, id, point, redraw);
     default:
-      return analogOutput(id, number, redraw);
+      return analogOutput(id, point, redraw);
   }
 }
 
-function analogInput(path, id, number, redraw) {
+function analogInput(path, id, point, redraw) {
+  const label = `Analog input ${point}`;
   const field = element("input", {
-    type: "number", id: `${id}-number`, step: "any", "aria-label": `Analog input ${number}`,
+    type: "number", id: `${id}-number`, step: "any", "aria-label": label,
     onchange: () => {
       const millivolts = inputRange(id).toPin(field.valueAsNumber);
-      if (!Number.isFinite(millivolts)) return;
-      field.value = inputRange(id).fromPin(millivolts);
-      post(path, { millivolts });
+      const isNumber = Number.isFinite(millivolts);
+      field.value = inputRange(id).fromPin(isNumber ? millivolts : slider.valueAsNumber);
+      if (isNumber) post(path, { millivolts }, label);
     },
     onblur: redraw,
   });
-  const range = rangeOfChannel(id, `Range of analog input ${number}`, inputs, redraw);
+  const range = rangeOfChannel(id, `Range of analog input ${point}`, inputs, redraw);
   const slider = element("input", {
-    type: "range", id, min: 0, max: 3300, step: 1, "aria-label": `Slider of analog input ${number}`, "data-path": path,
+    type: "range", id, min: 0, max: 3300, step: 1, "aria-label": `Slider of analog input ${point}`, "data-path": path,
     oninput: (event) => stream(path, { millivolts: Number(event.target.value) }).then(redraw),
   });
   return [element("div", { class: "value" }, field, range), slider, element("p", { class: "pin", id: `${id}-text` })];
@@ -79,9 +86,9 @@ function rangeOfChannel(id, label, ranges, redraw) {
   return range;
 }
 
-function analogOutput(id, number, redraw) {
-  const range = rangeOfChannel(id, `Jumper of analog output ${number}`, outputs, redraw);
-  const meter = element("meter", { id: `${id}-meter`, min: 0, max: 4095, "aria-label": `Analog output ${number}` });
+function analogOutput(id, point, redraw) {
+  const range = rangeOfChannel(id, `Jumper of analog output ${point}`, outputs, redraw);
+  const meter = element("meter", { id: `${id}-meter`, min: 0, max: 4095, "aria-label": `Analog output ${point}` });
   return [
     element("div", { class: "value" }, element("span", { class: "reading", id: `${id}-value` }), range),
     meter,

@@ -18,7 +18,7 @@ const idOf = (key) => `fault-${key}`;
 
 function control(key, value) {
   const label = LABELS[key] ?? key.replaceAll("_", " ");
-  const set = (wanted) => change({ [key]: wanted });
+  const set = (wanted) => change({ [key]: wanted }, label);
   if (typeof value === "boolean") {
     const box = element("input", { id: idOf(key), type: "checkbox", onchange: (event) => set(event.target.checked) });
     return element("label", { class: "check" }, box, label);
@@ -26,14 +26,17 @@ function control(key, value) {
   const field = element("input", {
     id: idOf(key), type: "number", step: "any",
     onchange: (event) => {
-      if (Number.isFinite(event.target.valueAsNumber)) set(event.target.valueAsNumber);
+      const wanted = event.target.valueAsNumber;
+      if (Number.isFinite(wanted)) set(wanted);
+      else refresh(true);
     },
     onblur: () => refresh(),
   });
   return element("label", {}, field, label);
 }
 
-function show(faults) {
+/** Shows the faults. Without `all`, the field in which the user is typing keeps its value. */
+function show(faults, all) {
   const known = Object.entries(faults).filter(([, value]) => ["boolean", "number"].includes(typeof value));
   const list = byId("faults");
   const keys = known.map(([key]) => key).join();
@@ -44,24 +47,25 @@ function show(faults) {
   for (const [key, value] of known) {
     const field = byId(idOf(key));
     if (typeof value === "boolean") field.checked = value;
-    else if (document.activeElement !== field) field.value = value;
+    else if (all || document.activeElement !== field) field.value = value;
   }
 }
 
 /** Number of changes so far. A reply to a request that was sent before the last change is out of date. */
 let changes = 0;
 
-async function change(wanted) {
+async function change(wanted, label) {
   changes += 1;
-  await send(path("faults"), wanted);
-  await refresh();
+  const isSet = await send(path("faults"), wanted, label) !== null;
+  await refresh(!isSet);
 }
 
-/** Reads and shows the faults. Hides the panel if the simulator does not offer faults. */
-export async function refresh() {
+/** Reads and shows the faults. Hides the panel if the simulator does not offer faults. Without `all`, the field in
+ * which the user is typing keeps its value. */
+export async function refresh(all = false) {
   const before = changes;
   const faults = await get(path("faults")).catch(() => null);
   if (before !== changes) return;
   byId("faults-section").hidden = faults === null;
-  if (faults !== null) show(faults);
+  if (faults !== null) show(faults, all);
 }

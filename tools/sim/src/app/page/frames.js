@@ -1,17 +1,21 @@
 // The log of the frames on the line.
 
-import { isShown, spaced } from "/model.js";
+import { isAnswered, isShown, spaced } from "/model.js";
 import { get } from "/api.js";
 import { byId, element, setText } from "/ui.js";
 
 /** Number of frames that the page keeps. */
 const KEPT = 500;
+/** Time after which a request without a reply is marked. */
+const PATIENCE_MS = 1000;
 let frames = [];
 /** Number of the last frames that have no row yet. */
 let waiting = 0;
 let last = null;
 /** Frames that have arrived while the earlier ones are fetched. */
 let held = null;
+/** The last request, and its row, while it has no reply. */
+let open = null;
 /** The log was cleared while the earlier frames are fetched, so they are not wanted any more. */
 let unwanted = false;
 
@@ -30,7 +34,23 @@ function row(frame) {
     cell("bytes", spaced(frame.bytes)),
     cell("meaning", frame.summary));
   made.hidden = !isShown(frame, byId("filter").value);
+  follow(frame, made);
   return made;
+}
+
+/** Marks the last request when another request follows, or when it has no reply for a while. */
+function follow(frame, made) {
+  if (frame.direction === "tx") {
+    open?.classList.remove("unanswered");
+    open = null;
+    return;
+  }
+  open?.classList.add("unanswered");
+  open = isAnswered(frame) ? made : null;
+  const request = open;
+  setTimeout(() => {
+    if (request !== null && request === open) request.classList.add("unanswered");
+  }, PATIENCE_MS);
 }
 
 /** Adds a frame that was on the line. */

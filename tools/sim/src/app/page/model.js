@@ -69,10 +69,14 @@ const ONLY_PORT = 5;
 /** Returns the slots of a board, each with the first part of its paths. */
 export function slotsOf(state) {
   if (!state.slots) {
-    return [{ port: ONLY_PORT, path: "", module: state.module, channels: state.channels }];
+    const { module, configured, channels } = state;
+    return [{ port: ONLY_PORT, path: "", module, configured, channels }];
   }
   return state.slots.map((slot) => ({ ...slot, path: `slots/${slot.port}/` }));
 }
+
+/** Returns the name of point `number`, from 1, of a port, as in `modioctl`. */
+export const pointName = (port, number) => `p${port}.${number}`;
 
 /** Returns the Modbus address of point `number`, from 1, of a port (docs/points.md). */
 export function address(port, number) {
@@ -81,6 +85,9 @@ export function address(port, number) {
 
 /** Returns the bytes of a frame, with spaces between them. */
 export const spaced = (hex) => hex.match(/../g)?.join(" ") ?? "";
+
+/** Whether a unit should answer this frame: a request that is valid and no broadcast. */
+export const isAnswered = (frame) => frame.crc_ok && !frame.damaged && !frame.summary.startsWith("all units");
 
 /** Whether a frame contains all of the words: in its meaning, its bytes, its sender, or as "bad". */
 export function isShown(frame, words) {

@@ -2,10 +2,12 @@
 
 import * as api from "/api.js";
 import * as board from "/board.js";
+import * as boards from "/boards.js";
 import * as chart from "/chart.js";
+import * as connect from "/connect.js";
 import * as faults from "/faults.js";
 import * as frames from "/frames.js";
-import { byId, element, select, setText } from "/ui.js";
+import { byId, element, setText } from "/ui.js";
 
 const SAMPLE_MS = 250;
 const POLL_MS = 2000;
@@ -15,7 +17,8 @@ let events = null;
 
 /** Shows the first state of a stream. The simulator may have started again since the last one. */
 function begin(state) {
-  board.show(state);
+  show(state);
+  connect.fetchEndpoints().catch(() => {});
   frames.fetchMissed().then((hasRestarted) => {
     if (hasRestarted) chart.reset();
   }).catch(() => {});
@@ -23,7 +26,23 @@ function begin(state) {
 
 /** Shows a later state. Drops a state that is older than the one shown. */
 function take(state) {
-  if (state.virtual_ms >= (board.current()?.virtual_ms ?? 0)) board.show(state);
+  if (state.virtual_ms >= (board.current()?.virtual_ms ?? 0)) show(state);
+}
+
+function show(state) {
+  board.show(state);
+  connect.show(state);
+}
+
+/** Shows whether the simulator answers. Without it the board cannot be operated. */
+function setOnline(isOnline) {
+  const text = "OFFLINE: the simulator does not answer. The page shows its last state and tries again.";
+  setText(byId("connection"), isOnline ? "live" : text);
+  document.body.classList.toggle("offline", !isOnline);
+  byId("board").inert = !isOnline;
+  byId("faults").inert = !isOnline;
+  // The next state sets the title again.
+  if (!isOnline) document.title = `OFFLINE: ${byId("name").textContent}`;
 }
 
 function listen() {
@@ -32,11 +51,11 @@ function listen() {
   let isFirst = true;
   events.addEventListener("open", () => {
     isFirst = true;
-    setText(byId("connection"), "live");
+    setOnline(true);
     poll();
   });
   events.addEventListener("error", () => {
-    setText(byId("connection"), "the simulator does not answer; trying again");
+    setOnline(false);
     // The browser tries again after a lost connection, but not after a refusal.
     if (events.readyState === EventSource.CLOSED) setTimeout(listen, POLL_MS);
   });
@@ -56,28 +75,20 @@ async function fetchFindings() {
   byId("findings").replaceChildren(...(items.length > 0 ? items : [element("li", {}, "none")]));
 }
 
-/** Reads the findings and the faults, which are in no event. */
+/** Reads the boards, the findings and the faults, which are in no event. */
 function poll() {
+  boards.refresh(choose).catch(() => {});
   fetchFindings().catch(() => {});
   if (!byId("faults-section").hidden) faults.refresh();
 }
 
-/** Lets the user choose a board if there are several on the line. */
-async function offerBoards() {
-  const boards = await api.get("/api/boards");
-  if (boards === null || boards.length < 2) return;
-  const choice = select({
-    id: "boards",
-    onchange: (event) => {
-      api.chooseBoard(event.target.value);
-      board.forget();
-      chart.reset();
-      listen();
-      faults.refresh();
-    },
-  }, boards.map(({ name, board: kind }) => [name, `${name} (${kind})`]));
-  byId("chooser").append("Board ", choice);
-  byId("chooser").hidden = false;
+/** Shows another board of the line. */
+function choose(name) {
+  api.chooseBoard(name);
+  board.forget();
+  chart.reset();
+  listen();
+  faults.refresh();
 }
 
 api.onChange(take);
@@ -85,6 +96,5 @@ board.listen();
 frames.listen();
 setInterval(() => board.current() && chart.sample(board.current()), SAMPLE_MS);
 setInterval(poll, POLL_MS);
-offerBoards().catch(() => {});
 faults.refresh();
 listen();
