@@ -68,6 +68,8 @@ class Empty(Mbpoll):
         self.assert_nothing_is_written(HOLDING_REGISTERS)
 
     def test_another_unit_does_not_answer(self):
+        # A reply to the test before counts only after t3.5 of silence.
+        self.simulator.wait(60)
         sent = self.simulator.state().line.tx_frames
         self.assertEqual(self.read(COILS, FIRST, unit=2, wait=SILENCE), "Connection timed out")
         self.simulator.wait(500)
