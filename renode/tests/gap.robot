@@ -56,7 +56,7 @@ FRAME_GAP Changes The Silence After A Restart
 *** Variables ***
 # 03 0204 0001 reads the version of the register map.
 ${REQUEST}      01 03 02 04 00 01 C4 73
-${REPLY}        01 03 02 00 01 79 84
+${REPLY}        01 03 02 00 02 39 85
 
 
 *** Keywords ***

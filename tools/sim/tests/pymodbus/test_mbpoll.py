@@ -90,7 +90,7 @@ class Empty(Mbpoll):
 
     def test_words_of_state_and_a_long_read(self):
         words = self.read(HOLDING_REGISTERS, 0x0200, 7)
-        self.assertEqual((words[0], words[1], words[4:]), (0x2383, 0x5860, [1, 1, 1]))
+        self.assertEqual((words[0], words[1], words[4:]), (0x2383, 0x5860, [2, 1, 1]))
         self.assertEqual(len(self.read(HOLDING_REGISTERS, 0x0160, 125)), 125)
         self.assertEqual(self.read(INPUT_REGISTERS, 0x0160, 64), self.read(HOLDING_REGISTERS, 0x0160, 64))
 
