@@ -241,8 +241,12 @@ impl<const SLOTS: usize> Config<SLOTS> {
         };
         // Ports without a slot have no module that could restrict their points.
         self.board.ports().all(|port| {
+            let first = points::of_port(port);
+            if first >= run.index.wrapping_add(run.count) {
+                return true;
+            }
             let kinds = self.edited.module(port).points();
-            (points::of_port(port)..).zip(kinds).all(|(point, kind)| {
+            (first..).zip(kinds).all(|(point, kind)| {
                 kind != narrower.kind
                     || words
                         .get(point.wrapping_sub(run.index))
