@@ -1,5 +1,7 @@
 //! The raw value of an analog channel.
 
+use register_map::limits::RAW_MAX;
+
 /// A code of a 12-bit converter, 0 to 4095: the result of an analog-to-digital converter or the input of a DAC.
 ///
 /// A channel's word in [`Channels`](crate::Channels) is a code or a value in engineering units, depending on its
@@ -9,7 +11,7 @@ pub struct Code(u16);
 
 impl Code {
     /// The largest code.
-    pub const MAX: Self = Self(4095);
+    pub const MAX: Self = Self(RAW_MAX);
 
     /// Creates a code. A number above 4095 becomes 4095.
     #[inline]

@@ -2,9 +2,9 @@
 //!
 //! Full scale, 10 V or 20 mA, is code 4095, for inputs and outputs. Every conversion rounds to the nearest value.
 //!
-//! A master may command an output within [`limits::of_output`](register_map::limits::of_output), so the smallest current is 4 mA in uA. A raw code may
-//! be any code, so that an output can also have no current; [`output_from_raw`] then returns 0 uA. Converting any
-//! code to its unit and back returns the same code.
+//! A master may command an output within [`of_output`](register_map::limits::of_output), so the smallest current is 4 mA
+//! in uA. A raw code may be any code, so that an output can also have no current; [`output_from_raw`] then returns 0 uA.
+//! Converting any code to its unit and back returns the same code.
 
 use register_map::limits::{FULL_SCALE_MV, FULL_SCALE_UA, MAX_TENTHS, MIN_TENTHS};
 

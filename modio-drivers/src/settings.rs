@@ -7,10 +7,14 @@ use crate::{Kind, Scale, Signal};
 /// The settings of one channel. Each kind of channel uses those that apply to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelSettings {
-    /// For a digital input the debounce in milliseconds, 0 to 1000. For an analog input the exponent n of a
-    /// low-pass over 2^n samples, 0 to 8.
+    /// For a digital input the debounce in milliseconds, 0 to [`DEBOUNCE_MAX_MS`]. For an analog input the
+    /// exponent n of a low-pass over 2^n samples, 0 to [`LOW_PASS_MAX`].
+    ///
+    /// [`DEBOUNCE_MAX_MS`]: register_map::limits::DEBOUNCE_MAX_MS
+    /// [`LOW_PASS_MAX`]: register_map::limits::LOW_PASS_MAX
     pub filter: u16,
-    /// The thermistor's B constant in K, 2000 to 5000.
+    /// The thermistor's B constant in K, [`BETA_MIN`](register_map::limits::BETA_MIN) to
+    /// [`BETA_MAX`](register_map::limits::BETA_MAX).
     pub beta: u16,
     /// The signal of an analog channel; it must match the position of the jumper.
     pub signal: Signal,

@@ -35,10 +35,10 @@ pub const FULL_SCALE_UA: u16 = 20_000;
 /// The smallest current that an output may be commanded to, in uA.
 pub const OUTPUT_MIN_UA: u16 = 4_000;
 
-/// The lowest temperature, in 0.1 degC.
+/// The lowest temperature, in 0.1 degC: -40 degC, the limit of common thermistors of 10 kOhm.
 pub const MIN_TENTHS: i16 = -400;
 
-/// The highest temperature, in 0.1 degC.
+/// The highest temperature, in 0.1 degC: 125 degC, for the same reason.
 pub const MAX_TENTHS: i16 = 1250;
 
 /// Returns the smallest and the largest word of an input: 0 to 4095 raw, 0 to 10000 mV, 0 to 20000 uA, -400 to 1250

@@ -2,9 +2,9 @@
 
 import re
 import unittest
-from pathlib import Path
 
-RENODE = Path(__file__).parent.parent
+from renode_fake import RENODE
+
 SCRIPTS = sorted(RENODE.glob("*.resc"))
 SUITES = sorted([*RENODE.glob("tests/**/*.robot"), *RENODE.glob("tests/*.resource")])
 

@@ -4,9 +4,7 @@ IronPython 2, and these tests run them in Python 3."""
 import ast
 import unittest
 
-from pathlib import Path
-
-RENODE = Path(__file__).parent.parent
+from renode_fake import RENODE
 
 # Syntax that Python 2.7 does not have, or interprets differently.
 REFUSED = {

@@ -299,8 +299,7 @@ fn sim_at(workspace: &mut Workspace, corner: &str) -> Result<()> {
 }
 
 /// Runs tests that run the images in the simulator, as an ordinary user: those of these targets whose names contain one
-/// of `names`, or all.
-/// Spaces separate targets and names. The variables choose the corner of the part, and how long a test is.
+/// of `names`, or all. Spaces separate targets and names. The variables choose the corner of the part, and how long a test is.
 pub fn simulated(
     workspace: &mut Workspace,
     targets: &str,
@@ -308,9 +307,8 @@ pub fn simulated(
     variables: &[(&str, &str)],
 ) -> Result<()> {
     let ordinary = ordinary::words()?;
-    let images = [&MODIO_02, &MODIO_08].map(|board| build::image(workspace, board));
-    let [modio_02, modio_08] = images;
-    let (modio_02, modio_08) = (modio_02?, modio_08?);
+    let modio_02 = build::image(workspace, &MODIO_02)?;
+    let modio_08 = build::image(workspace, &MODIO_08)?;
     let simulator = workspace.simulator()?;
     let tests = |list: &[&str]| {
         let mut cargo = workspace.cargo("test");
@@ -323,9 +321,8 @@ pub fn simulated(
         cargo.args(["--", "--include-ignored"]).args(list);
         cargo.args(names.split_whitespace());
         cargo.env(CORNER, "nominal").envs(variables.iter().copied());
-        cargo
-            .env("MODIO_ELF", &modio_02)
-            .env("MODIO_ELF_08", &modio_08);
+        cargo.env("MODIO_ELF", &modio_02);
+        cargo.env("MODIO_ELF_08", &modio_08);
         // Tests of one package do not know the path of another package's program.
         cargo.env("MODIO_SIM", &simulator);
         cargo

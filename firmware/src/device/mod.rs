@@ -39,7 +39,7 @@ pub use points::Points;
 pub use port::IoPort;
 pub use state::{Identity, State};
 
-use crate::config::{Config, Origin};
+use crate::config::{Config, Origin, Point};
 
 /// The device behind the line, on a board with `SLOTS` slots.
 #[derive(Debug)]
@@ -117,13 +117,7 @@ impl<const SLOTS: usize> Device<SLOTS> {
             config,
         };
         device.configure_points();
-        for (index, port) in device.points.ports_mut().iter_mut().enumerate() {
-            for channel in 0..CHANNELS {
-                if let Some(point) = device.config.point(index, channel) {
-                    port.command_raw(channel, point.start);
-                }
-            }
-        }
+        device.for_each_point(|port, channel, point| port.command_raw(channel, point.start));
         device
     }
 
@@ -132,10 +126,15 @@ impl<const SLOTS: usize> Device<SLOTS> {
     fn configure_points(&mut self) {
         self.config.compare();
         self.revision = self.config.revision();
+        self.for_each_point(IoPort::configure);
+    }
+
+    /// Passes the settings in force of every point to `act`, with the point's port and channel.
+    fn for_each_point(&mut self, act: fn(&mut IoPort, usize, Point)) {
         for (index, port) in self.points.ports_mut().iter_mut().enumerate() {
             for channel in 0..CHANNELS {
                 if let Some(point) = self.config.point(index, channel) {
-                    port.configure(channel, point);
+                    act(port, channel, point);
                 }
             }
         }

@@ -27,7 +27,7 @@ pub(super) const CASES: &[Case] = &[
     case("framing/two-at-once", "V1.02 2.5.1.1", "two requests without a silence between them are both lost", N,
         two_at_once),
     case("framing/no-byte-around-the-reply", "V1.02 2.5.1",
-        "nothing but the reply's own bytes leaves the unit, first and last included", N, nothing_else),
+        "the unit sends nothing before the reply and nothing after it", N, nothing_else),
     case("framing/trailing-byte", "V1.02 2.5.1.1",
         "a byte after a good frame, without a silence, belongs to it and is never ignored", N, trailing),
 ];

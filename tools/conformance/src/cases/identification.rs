@@ -17,7 +17,7 @@ pub(super) const CASES: &[Case] = &[
     case("fc2b/individual-unknown", S, "read code 04 with an object that is not there is exception 02", N,
         individual_unknown),
     case("fc2b/stream-restarts", S, "a stream from an object that is not there starts at object 0", N, restarts),
-    case("fc2b/stream-from-the-middle", S, "a stream from an object that is there starts at that object", N,
+    case("fc2b/stream-from-the-middle", S, "a stream begins at the object that the request names, if the unit has it", N,
         from_the_middle),
     case("fc2b/read-code", S, "read code 00 and those above 04 are exception 03", N, read_code),
     case("fc2b/mei-type", "V1.1b3 6.19", "another MEI type is exception 01", N, mei_type),

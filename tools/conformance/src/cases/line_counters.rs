@@ -12,7 +12,7 @@ const S: &str = "V1.02 appendix A";
 
 #[rustfmt::skip]
 pub(super) const CASES: &[Case] = &[
-    case("counters/bus-messages", S, "0B counts every good message on the bus, whoever it is for", &[], bus_messages),
+    case("counters/bus-messages", S, "0B counts every good message on the bus, for any address", &[], bus_messages),
     case("counters/bus-errors", S, "0C counts frames with a bad check, nothing else", &[], bus_errors),
     case("counters/bus-errors-short", S, "0C counts frames of fewer than 3 bytes", &[Need::Rtu], short_frames),
     case("counters/bus-errors-characters", S, "0C counts a frame with a damaged character once",

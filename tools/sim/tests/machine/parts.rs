@@ -137,6 +137,21 @@ fn a_block_of_larger_parts_is_reported_by_its_name() {
     }
 }
 
+/// Continues a program: it writes all ones to these registers, which must then read back as these bits.
+fn check_kept(mut program: Asm, kept: &[(u32, u32)]) -> Chip<()> {
+    for ((register, _), n) in kept.iter().zip(0..) {
+        program.store(*register, u32::MAX);
+        program.copy(*register, OUT + 4 * n);
+    }
+    program.spin();
+    let mut chip = alone(&STM32F103CB, program);
+    chip.run_until(Time::from_ms(3));
+    for ((register, bits), n) in kept.iter().zip(0..) {
+        assert_eq!(out(&chip, n), *bits, "{register:#010x}");
+    }
+    chip
+}
+
 /// What two STM32F103 read back after all ones were written (labwired-core, `stm32f1_mmio_diff.rs`).
 #[test]
 fn registers_keep_the_bits_that_silicon_keeps() {
@@ -153,17 +168,7 @@ fn registers_keep_the_bits_that_silicon_keeps() {
         (TIM2 + 0x0C, 0x5F5F),
         (TIM2 + 0x20, 0x3333),
     ];
-    let mut program = Asm::new();
-    for (register, n) in kept.map(|(register, _)| register).iter().zip(0..) {
-        program.store(*register, u32::MAX);
-        program.copy(*register, OUT + 4 * n);
-    }
-    program.spin();
-    let mut chip = alone(&STM32F103CB, program);
-    chip.run_until(Time::from_ms(3));
-    for ((register, bits), n) in kept.into_iter().zip(0..) {
-        assert_eq!(out(&chip, n), bits, "{register:#010x}");
-    }
+    check_kept(Asm::new(), &kept);
 }
 
 /// What two STM32F103 returned after reset (labwired-core, `stm32f1_mmio_diff.rs`, `f103_conformance.rs`). The clocks of
@@ -232,16 +237,7 @@ fn blocks_keep_the_bits_that_silicon_keeps() {
     ];
     let mut program = Asm::new();
     clocks_on(&mut program);
-    for (register, n) in kept.map(|(register, _)| register).iter().zip(0..) {
-        program.store(*register, u32::MAX);
-        program.copy(*register, OUT + 4 * n);
-    }
-    program.spin();
-    let mut chip = alone(&STM32F103CB, program);
-    chip.run_until(Time::from_ms(3));
-    for ((register, bits), n) in kept.into_iter().zip(0..) {
-        assert_eq!(out(&chip, n), bits, "{register:#010x}");
-    }
+    let chip = check_kept(program, &kept);
     assert_eq!(findings(&chip), [""; 0]);
 }
 
