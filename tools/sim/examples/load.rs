@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 use register_map::configuration;
 use sim::board::MODIO_02;
 use sim::line::Settings;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use exact_line::{Ability, Event, Hello, LONGEST_RUN, Piece, Reply, Request};
+use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Piece, Reply, Request};
 
 use crate::Board;
 use crate::line::{Character, Format, Settings};

@@ -7,7 +7,7 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ::exact_line::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
+use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
 
 use super::{Abilities, Broken, Endpoint, Piece, Received};
 use crate::line::LineFormat;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ::exact_line::{Reply, Request};
+use modbus_line::exact::{Reply, Request};
 use register_map::codes::{Baud, Format};
 use register_map::{Module, configuration};
 use sim::board::Layout;

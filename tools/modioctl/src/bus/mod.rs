@@ -6,7 +6,7 @@ mod master;
 mod stream;
 mod sweep;
 
-pub use modbus_frames::{Direction, Waiting, adu, decode};
+pub use modbus_line::{Direction, Waiting, adu, decode};
 
 pub use endpoint::{Endpoint, Options, Place};
 pub use master::{Lost, MOST, Master, Observer, Seen};

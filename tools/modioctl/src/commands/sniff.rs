@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use chrono::{DateTime, Local, SecondsFormat};
-use modbus_frames::capture::{Packet, Recorder};
+use modbus_line::capture::{Packet, Recorder};
 use serde_json::{Value as Json, json};
 use tokio::time::{Instant, timeout};
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 
 use crate::serial::Word;
 use crate::time::Time;

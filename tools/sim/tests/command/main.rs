@@ -16,7 +16,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use modbus_frames::adu::Framing;
+use modbus_line::adu::Framing;
 use running::*;
 
 #[test]
