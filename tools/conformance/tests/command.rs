@@ -25,8 +25,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use conformance::frame::Mode;
-use conformance::line::LineFormat;
 use fault::Fault;
+use modbus_line::LineFormat;
 use unit::{Character, Unit};
 
 const PROFILE: &str = r#"

@@ -2,6 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
+//! | [`LineFormat`] | rate and character format, the time of a character, t1.5 and t3.5 |
 //! | [`adu`] | frames in RTU, ASCII and TCP form: created, checked and measured |
 //! | [`names`] | names of functions and exceptions |
 //! | [`decode`] | frames, requests and responses in words, as in `modioctl sniff` and the simulator's frame log |
@@ -25,9 +26,11 @@ pub mod adu;
 pub mod capture;
 pub mod decode;
 pub mod exact;
+mod format;
 pub mod names;
 mod waiting;
 
+pub use format::{Format, Limits, LineFormat, Parity, RATES, t35};
 pub use waiting::Waiting;
 
 /// Direction of a frame.

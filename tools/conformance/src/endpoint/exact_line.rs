@@ -7,10 +7,10 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use modbus_line::LineFormat;
 use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
 
 use super::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::line::LineFormat;
 
 /// Time that a server may take for a request. The longest request is ten minutes of virtual time.
 const PATIENCE: Duration = Duration::from_secs(600);
@@ -138,7 +138,7 @@ impl<T: Transport> Endpoint for ExactLine<T> {
     }
 
     fn set_line(&mut self, line: LineFormat) -> Result<(), Broken> {
-        let request = Request::Line(line.baud, line.format().to_string());
+        let request = Request::Line(line.baud, line.format.to_string());
         self.ask(&request, Some(Ability::Line))?;
         self.line = line;
         Ok(())

@@ -8,7 +8,7 @@ pub mod trace;
 
 use std::time::Duration;
 
-use crate::line::LineFormat;
+use modbus_line::LineFormat;
 
 /// Something to send. Where time is exact, a gap has exactly the length asked for; elsewhere it may be longer. Damaged
 /// characters, breaks and glitches need [`Abilities::faults`].

@@ -6,10 +6,10 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use modbus_line::{LineFormat, Parity};
 use serial2::{CharSize, FlowControl, Parity as SerialParity, SerialPort, Settings, StopBits};
 
 use super::{Abilities, Broken, Endpoint, Piece, Received};
-use crate::line::{LineFormat, Parity};
 
 /// Longest time that one read waits, before the clock is read again.
 const SLICE: Duration = Duration::from_millis(5);
@@ -151,16 +151,16 @@ impl Stream {
 fn configured(mut settings: Settings, line: LineFormat) -> std::io::Result<Settings> {
     settings.set_raw();
     settings.set_baud_rate(line.baud)?;
-    settings.set_char_size(match line.data_bits {
+    settings.set_char_size(match line.format.data_bits {
         7 => CharSize::Bits7,
         _ => CharSize::Bits8,
     });
-    settings.set_parity(match line.parity {
+    settings.set_parity(match line.format.parity {
         Parity::None => SerialParity::None,
         Parity::Even => SerialParity::Even,
         Parity::Odd => SerialParity::Odd,
     });
-    settings.set_stop_bits(match line.stop_bits {
+    settings.set_stop_bits(match line.format.stop_bits {
         1 => StopBits::One,
         _ => StopBits::Two,
     });

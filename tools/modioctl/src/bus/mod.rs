@@ -1,7 +1,6 @@
 //! A Modbus master: frames, the line, and the answers of units.
 
 pub mod endpoint;
-pub mod format;
 mod master;
 mod stream;
 mod sweep;

@@ -3,13 +3,13 @@
 use std::io;
 use std::time::Duration;
 
-use serial2_tokio::{CharSize, Parity, SerialPort, Settings, StopBits};
+use modbus_line::{Format, Parity};
+use serial2_tokio::{self as serial, CharSize, SerialPort, Settings, StopBits};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
 use super::endpoint::{Endpoint, Place};
-use super::format::Format;
 use crate::failure::Failure;
 
 /// Time limit for opening a connection.
@@ -173,9 +173,9 @@ fn set_format(settings: &mut Settings, format: Format) {
         CharSize::Bits8
     });
     settings.set_parity(match format.parity {
-        'E' => Parity::Even,
-        'O' => Parity::Odd,
-        _ => Parity::None,
+        Parity::Even => serial::Parity::Even,
+        Parity::Odd => serial::Parity::Odd,
+        Parity::None => serial::Parity::None,
     });
     settings.set_stop_bits(if format.stop_bits == 2 {
         StopBits::Two

@@ -35,6 +35,7 @@ use master::Master;
 pub use master::Received;
 pub(crate) use shared::Output;
 use shared::Shared;
+pub use silence::frame_silence;
 
 /// How far back [`Line::level_at`] knows the level of the bus.
 pub const HISTORY: Time = Time::from_ms(100);

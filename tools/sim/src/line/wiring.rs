@@ -1,6 +1,6 @@
 //! The connection of the bus to the board: the driver at the TX pin, and the receiver at the RX pin.
 
-use super::{Direction, HISTORY, Line, Received, Span, keep};
+use super::{Direction, HISTORY, Line, Received, Span, frame_silence, keep};
 use crate::periph::usart::{Sent, TxPin, Usart, Wire};
 use crate::serial::{Framing, Wave, Word};
 use crate::time::Time;
@@ -224,7 +224,7 @@ impl Line {
     /// Records every character that was received up to now. Drops edges that are not needed any more.
     pub(super) fn listen(&mut self) {
         let framing = Framing::of(self.settings);
-        let silence = self.settings.frame_silence();
+        let silence = frame_silence(self.settings);
         while let Some(word) = self.listener.next_word(&self.bus, &framing, self.now) {
             let word = Word {
                 data: framing.payload(word.data),
