@@ -184,7 +184,7 @@ fn run_that_cannot_test_gives_status_2_and_one_line() {
     for (arguments, part) in [
         (&[][..], "--serial PORT"),
         (&["--tcp", &nowhere], "cannot connect"),
-        (&["--serial", "/dev/no-such-port"], "not there"),
+        (&["--serial", "/dev/no-such-port"], "there is no port"),
         (
             &["--tcp", &silent, "--unit", "77", "--patience", "50"],
             "does not answer",

@@ -7,6 +7,7 @@
 //! | [`names`] | names of functions and exceptions |
 //! | [`decode`] | frames, requests and responses in words, as in `modioctl sniff` and the simulator's frame log |
 //! | [`capture`] | capture files that Wireshark reads |
+//! | `port` | opens a serial port, with the feature `port` |
 //! | [`exact`] | the exact-line protocol: a serial line in virtual time |
 //!
 //! The crate only implements the standard and this protocol: it knows no device and has no clock.
@@ -28,6 +29,8 @@ pub mod decode;
 pub mod exact;
 mod format;
 pub mod names;
+#[cfg(feature = "port")]
+pub mod port;
 mod waiting;
 
 pub use format::{Format, Limits, LineFormat, Parity, RATES, t35};

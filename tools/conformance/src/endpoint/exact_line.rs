@@ -3,13 +3,14 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::TcpStream;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use modbus_line::LineFormat;
 use modbus_line::exact::{Ability, Event, Hello, LONGEST_RUN, Reply, Request, VERSION};
 
+use super::stream::connect;
 use super::{Abilities, Broken, Endpoint, Piece, Received};
 
 /// Time that a server may take for a request. The longest request is ten minutes of virtual time.
@@ -248,24 +249,11 @@ impl Tcp {
     }
 
     fn open(address: &str) -> Result<Self, String> {
-        let mut last = "the name has no address".to_owned();
-        let found = address.to_socket_addrs();
-        for address in
-            found.map_err(|error| format!("no address such as 127.0.0.1:3470: {error}"))?
-        {
-            match TcpStream::connect_timeout(&address, HANDOVER) {
-                Ok(stream) => {
-                    let set = stream
-                        .set_nodelay(true)
-                        .and_then(|()| stream.set_read_timeout(Some(PATIENCE)));
-                    set.map_err(|error| error.to_string())?;
-                    let stream = BufReader::new(stream);
-                    return Ok(Self { stream });
-                }
-                Err(error) => last = error.to_string(),
-            }
-        }
-        Err(last)
+        let stream = connect(address)?;
+        let set = stream.set_read_timeout(Some(PATIENCE));
+        set.map_err(|error| error.to_string())?;
+        let stream = BufReader::new(stream);
+        Ok(Self { stream })
     }
 }
 
