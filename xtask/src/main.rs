@@ -47,7 +47,7 @@ mod workspace;
 
 /// The command line of `cargo xtask`.
 #[derive(Parser, Debug)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", version = commit::version!(), about, long_about = None)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version = register_map::version!(), about, long_about = None)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
