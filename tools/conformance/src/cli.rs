@@ -54,7 +54,7 @@ pub struct Cli {
 
     /// The module in the simulated board's slot at a port, such as 3=4ai; may be repeated
     #[cfg(feature = "sim")]
-    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim_options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
+    #[arg(long = "slot", value_name = "PORT=MODULE", value_parser = sim::options::slot, conflicts_with_all = ["serial", "tcp", "exact_line"])]
     pub slots: Vec<(u8, register_map::Module)>,
 
     /// The simulated board's DIP switch: its unit address

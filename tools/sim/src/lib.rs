@@ -20,7 +20,7 @@
 //! board      the modio-02 and the modio-08       line   the RS-485 bus and its frames
 //! bus        several boards on one line          slot   what is plugged in, and the world outside it
 //! exact_line the protocol by which a client      radio  the LoRa module, and the air with its gateway
-//!            lets time pass
+//!            lets time pass                        options the options of the command `modio-sim`
 //! ```
 
 pub mod board;
@@ -33,6 +33,7 @@ pub mod finding;
 pub mod image;
 pub mod line;
 pub mod machine;
+pub mod options;
 pub mod part;
 pub mod periph;
 pub mod peripheral;

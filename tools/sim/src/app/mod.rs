@@ -20,7 +20,7 @@ use modbus_line::adu::Framing;
 use modbus_line::exact::Request;
 use sim::Time;
 use sim::line::{Format, Settings};
-use sim_options::Options;
+use sim::options::Options;
 
 mod action;
 mod api;
