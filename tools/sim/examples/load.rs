@@ -190,7 +190,7 @@ fn poll(bus: &mut Bus, unit: u8) -> bool {
         );
     }
     // The last character is received before its last stop bit ends. Wait for that and for t3.5.
-    bus.run_for(settings.frame_silence() + settings.characters(1));
+    bus.run_for(sim::line::frame_silence(settings) + settings.characters(1));
     Framing::Rtu.open(&reply).is_some()
 }
 

@@ -6,7 +6,7 @@ use exact_line::{Ability, Event, Hello, LONGEST_RUN, Piece, Reply, Request};
 
 use crate::Board;
 use crate::line::{Character, Format, Settings};
-use crate::time::Time;
+use f103::time::Time;
 
 /// What the client of a board's line knows already.
 #[derive(Clone, Debug, Default)]

@@ -1,9 +1,10 @@
 //! The connection of the bus to the board: the driver at the TX pin, and the receiver at the RX pin.
 
+use super::silence::frame_silence;
 use super::{Direction, HISTORY, Line, Received, Span, keep};
-use crate::periph::usart::{Sent, TxPin, Usart, Wire};
-use crate::serial::{Framing, Wave, Word};
-use crate::time::Time;
+use f103::periph::usart::{Sent, TxPin, Usart, Wire};
+use f103::serial::{Framing, Wave, Word};
+use f103::time::Time;
 
 impl Wire for Line {
     fn sent(&mut self, sent: Sent) {
@@ -224,7 +225,7 @@ impl Line {
     /// Records every character that was received up to now. Drops edges that are not needed any more.
     pub(super) fn listen(&mut self) {
         let framing = Framing::of(self.settings);
-        let silence = self.settings.frame_silence();
+        let silence = frame_silence(self.settings);
         while let Some(word) = self.listener.next_word(&self.bus, &framing, self.now) {
             let word = Word {
                 data: framing.payload(word.data),

@@ -207,7 +207,7 @@ impl Bench {
 
     /// Returns t3.5 on the line.
     pub fn t35(&self) -> Time {
-        self.settings.frame_silence()
+        sim::line::frame_silence(self.settings)
     }
 
     /// Sends these bytes now and gives the unit time to answer. Returns the bytes of the reply, if there is one.

@@ -51,6 +51,18 @@ pub struct Limit {
     pub breakpoints: bool,
 }
 
+impl Limit {
+    /// At this instant only.
+    pub(crate) const fn until(time: Time) -> Self {
+        Self {
+            time,
+            instructions: u64::MAX,
+            pc: None,
+            breakpoints: false,
+        }
+    }
+}
+
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {

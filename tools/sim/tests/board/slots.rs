@@ -152,7 +152,10 @@ fn slot_that_the_board_does_not_have_is_refused() {
     assert_eq!(board.err(), Some(Error::Slot(1)));
     let mut board = modio_08(&[], Asm::new());
     assert_eq!(board.change_slot(5, |_| ()), Err(Error::Slot(5)));
-    assert_eq!(board.set_module_at(2, Module::Do4), Err(Error::Powered));
+    assert_eq!(
+        board.set_module_at(2, Module::Do4),
+        Err(f103::Error::Powered.into())
+    );
     board.power_off();
     assert_eq!(board.set_module_at(2, Module::Do4), Ok(()));
     let modules: Vec<_> = board

@@ -27,18 +27,15 @@ impl<C: Circuit> Chip<C> {
     /// Runs until `t` as [`Chip::run_until`], or to a breakpoint. Returns whether it has reached a breakpoint.
     pub fn run_debugged(&mut self, t: Time) -> bool {
         self.run(Limit {
-            time: t,
-            instructions: u64::MAX,
-            pc: None,
             breakpoints: true,
+            ..Limit::until(t)
         }) == Stop::Pc
     }
 
     /// Executes one instruction, also at a breakpoint, without taking an interrupt. If the core sleeps or waits for the
     /// flash, time passes until it executes an instruction again, at most one second.
     pub fn step_instruction(&mut self) {
-        let now = self.now();
-        self.machine.bus.soc.refresh(now);
+        self.refresh();
         self.machine.step_instruction();
         self.sync();
     }

@@ -156,7 +156,10 @@ fn slot_follows_outputs_and_drives_inputs_and_voltages() {
     );
     board.set_module(Module::Ai4).unwrap();
     board.power_on();
-    assert_eq!(board.set_module(Module::None), Err(sim::Error::Powered));
+    assert_eq!(
+        board.set_module(Module::None),
+        Err(f103::Error::Powered.into())
+    );
 }
 
 #[test]

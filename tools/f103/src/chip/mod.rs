@@ -1,8 +1,10 @@
 //! An STM32F103 in a circuit. This module has power and time, [`pins`] the pins, the crystal and the supply, [`inside`]
-//! the memories, [`measure`] the measurements, and [`debug`] the methods for a debugger.
+//! the memories, [`joined`] the run with other chips on one wire, [`measure`] the measurements, and [`debug`] the methods
+//! for a debugger.
 
 mod debug;
 mod inside;
+mod joined;
 mod measure;
 mod pins;
 
@@ -27,7 +29,7 @@ pub const CYCLE: Time = Time::from_ms(100);
 /// An STM32F103 in the circuit `C`.
 #[derive(Debug)]
 pub struct Chip<C> {
-    pub(crate) machine: Machine<C>,
+    machine: Machine<C>,
     symbols: BTreeMap<String, u32>,
 }
 
@@ -82,9 +84,8 @@ impl<C: Circuit> Chip<C> {
     /// Changes the circuit at this instant. The part sees the change immediately.
     pub fn change<T>(&mut self, action: impl FnOnce(&mut C) -> T) -> T {
         self.sync();
-        let answer = action(&mut self.machine.bus.soc.circuit);
-        let now = self.now();
-        self.machine.bus.soc.refresh(now);
+        let answer = action(self.circuit_mut());
+        self.refresh();
         answer
     }
 
@@ -97,12 +98,7 @@ impl<C: Circuit> Chip<C> {
     /// Runs until the virtual time is `t`, and finishes the instruction that is being executed then. Returns
     /// immediately if `t` is in the past. Time also passes while the power is off.
     pub fn run_until(&mut self, t: Time) {
-        self.run(Limit {
-            time: t,
-            instructions: u64::MAX,
-            pc: None,
-            breakpoints: false,
-        });
+        self.run(Limit::until(t));
     }
 
     /// Runs for `d` of virtual time.
@@ -114,10 +110,8 @@ impl<C: Circuit> Chip<C> {
     /// executed nothing for a minute of virtual time.
     pub fn step(&mut self, n: u64) {
         self.run(Limit {
-            time: Time::MAX,
             instructions: self.instructions().saturating_add(n),
-            pc: None,
-            breakpoints: false,
+            ..Limit::until(Time::MAX)
         });
     }
 
@@ -125,25 +119,16 @@ impl<C: Circuit> Chip<C> {
     /// instruction. If the core is already there, it runs until it is there again.
     pub fn run_until_pc(&mut self, address: u32, limit: Time) -> bool {
         self.run(Limit {
-            time: limit,
-            instructions: u64::MAX,
             pc: Some(address),
-            breakpoints: false,
+            ..Limit::until(limit)
         }) == Stop::Pc
     }
 
     fn run(&mut self, limit: Limit) -> Stop {
-        let now = self.now();
-        self.machine.bus.soc.refresh(now);
+        self.refresh();
         let stop = self.machine.run(limit);
         self.sync();
         stop
-    }
-
-    /// Computes everything that is computed on demand up to the present.
-    pub(crate) fn sync(&mut self) {
-        let now = self.now();
-        self.machine.bus.soc.sync(now);
     }
 
     /// Switches the power on. Does nothing if it is on.

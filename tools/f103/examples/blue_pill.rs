@@ -4,17 +4,17 @@
 //! that switches the LED and sends a line; with the path of an ELF file it runs that image.
 //!
 //! ```sh
-//! cargo run --ignore-rust-version -p sim --example blue_pill
+//! cargo run --ignore-rust-version -p f103 --example blue_pill
 //! ```
 
 use std::path::Path;
 
-use sim::part::STM32F103C8;
-use sim::periph::gpio::Gpio;
-use sim::periph::usart::{Sent, Usart, Wire};
-use sim::serial::{Format, Framing, Receiver, Settings, Wave};
-use sim::soc::{Circuit, Pin};
-use sim::{Chip, Error, Image, Time, chip};
+use f103::part::STM32F103C8;
+use f103::periph::gpio::Gpio;
+use f103::periph::usart::{Sent, Usart, Wire};
+use f103::serial::{Format, Framing, Receiver, Settings, Wave};
+use f103::soc::{Circuit, Pin};
+use f103::{Chip, Error, Image, Time, chip};
 
 #[path = "../tests/machine/asm.rs"]
 #[allow(dead_code, reason = "the tests of the core use all of the assembler")]

@@ -1,10 +1,11 @@
 //! Resets and start-up: flags, the watchdog, the crystal, the power supply.
 
-use sim::{Config, Time};
+use f103::Time;
+use f103::chip::Config;
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{START, board, board_with, findings, out};
+use super::{START, chip, chip_with, findings, out};
 
 const POWER_ON: u32 = 0x0C00_0000;
 const PIN: u32 = 0x0400_0000;
@@ -40,9 +41,9 @@ fn watchdog_settings_are_not_in_force_while_the_lsi_is_off() {
     wait_a_moment(&mut program);
     program.copy(IWDG_SR, OUT + 4);
     program.spin();
-    let mut board = board(program);
-    board.run_until(Time::from_ms(20));
-    assert_eq!([out(&board, 0), out(&board, 1)], [1, 0]);
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(20));
+    assert_eq!([out(&chip, 0), out(&chip, 1)], [1, 0]);
 }
 
 #[test]
@@ -55,19 +56,19 @@ fn watchdog_resets_after_its_time_out_and_sets_its_flag() {
     wait_a_moment(&mut program);
     program.store(IWDG_KR, 0xAAAA);
     program.spin();
-    let mut board = board(program);
-    board.run_until(Time::from_ms(100));
-    assert_eq!(out(&board, 0) & 0xFF00_0000, POWER_ON);
-    assert_eq!(board.resets(), 0);
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(100));
+    assert_eq!(out(&chip, 0) & 0xFF00_0000, POWER_ON);
+    assert_eq!(chip.resets(), 0);
     // 4096 x 8 / 40 kHz.
-    board.run_until(START + Time::from_us(819_200 - 100));
-    assert_eq!(board.resets(), 0);
-    board.run_until(START + Time::from_us(819_200 + 5_000));
-    assert_eq!(board.resets(), 1);
-    assert_eq!(out(&board, 0) & 0xFF00_0000, WATCHDOG);
-    board.run_until(Time::from_secs(9));
-    assert_eq!(board.resets(), 10);
-    assert_eq!(findings(&board), [""; 0]);
+    chip.run_until(START + Time::from_us(819_200 - 100));
+    assert_eq!(chip.resets(), 0);
+    chip.run_until(START + Time::from_us(819_200 + 5_000));
+    assert_eq!(chip.resets(), 1);
+    assert_eq!(out(&chip, 0) & 0xFF00_0000, WATCHDOG);
+    chip.run_until(Time::from_secs(9));
+    assert_eq!(chip.resets(), 10);
+    assert_eq!(findings(&chip), [""; 0]);
 }
 
 #[test]
@@ -77,7 +78,7 @@ fn refreshed_watchdog_does_not_reset_and_a_locked_core_is_reset() {
     let top = program.here();
     program.store(IWDG_KR, 0xAAAA);
     program.branch(When::Always, top);
-    let mut fed = board(program);
+    let mut fed = chip(program);
     fed.run_until(Time::from_secs(2));
     assert_eq!(fed.resets(), 0);
 
@@ -86,7 +87,7 @@ fn refreshed_watchdog_does_not_reset_and_a_locked_core_is_reset() {
     program.raw(0xDE00);
     program.handler(3);
     program.raw(0xDE00);
-    let mut locked = board(program);
+    let mut locked = chip(program);
     locked.run_until(Time::from_ms(400));
     assert!(locked.locked_up());
     locked.run_until(Time::from_ms(420));
@@ -110,35 +111,35 @@ fn software_reset_keeps_sram_and_restarts_the_program() {
     program.land(done);
     program.store(OUT + 8, 0xD0);
     program.spin();
-    let mut board = board(program);
-    board.ram_mut()[4..8].fill(0);
-    board.run_until(Time::from_ms(5));
-    assert_eq!((out(&board, 1), out(&board, 2)), (3, 0xD0));
-    assert_eq!(board.resets(), 2);
-    assert_eq!(out(&board, 0) & 0xFF00_0000, SOFTWARE);
+    let mut chip = chip(program);
+    chip.ram_mut()[4..8].fill(0);
+    chip.run_until(Time::from_ms(5));
+    assert_eq!((out(&chip, 1), out(&chip, 2)), (3, 0xD0));
+    assert_eq!(chip.resets(), 2);
+    assert_eq!(out(&chip, 0) & 0xFF00_0000, SOFTWARE);
 }
 
 #[test]
 fn power_cycle_loses_sram_and_sets_the_power_on_flag() {
     let mut program = report_cause();
     program.spin();
-    let mut board = board(program);
-    board.run_for(Time::from_ms(3));
-    board.ram_mut()[64..72].copy_from_slice(b"remember");
-    board.reset();
-    board.run_for(Time::from_ms(1));
-    assert_eq!(&board.ram()[64..72], b"remember");
-    assert_eq!(out(&board, 0) & 0xFF00_0000, PIN);
-    assert_eq!(board.resets(), 1);
-    board.cycle();
-    assert_ne!(&board.ram()[64..72], b"remember");
-    board.run_for(Time::from_ms(3));
-    assert_eq!(out(&board, 0) & 0xFF00_0000, POWER_ON);
-    assert_eq!(board.resets(), 0);
-    board.power_off();
-    let count = board.instructions();
-    board.run_for(Time::from_secs(1));
-    assert_eq!(board.instructions(), count);
+    let mut chip = chip(program);
+    chip.run_for(Time::from_ms(3));
+    chip.ram_mut()[64..72].copy_from_slice(b"remember");
+    chip.reset();
+    chip.run_for(Time::from_ms(1));
+    assert_eq!(&chip.ram()[64..72], b"remember");
+    assert_eq!(out(&chip, 0) & 0xFF00_0000, PIN);
+    assert_eq!(chip.resets(), 1);
+    chip.cycle();
+    assert_ne!(&chip.ram()[64..72], b"remember");
+    chip.run_for(Time::from_ms(3));
+    assert_eq!(out(&chip, 0) & 0xFF00_0000, POWER_ON);
+    assert_eq!(chip.resets(), 0);
+    chip.power_off();
+    let count = chip.instructions();
+    chip.run_for(Time::from_secs(1));
+    assert_eq!(chip.instructions(), count);
 }
 
 #[test]
@@ -153,12 +154,12 @@ fn crystal_is_ready_after_two_milliseconds_or_never() {
             crystal,
             ..Config::default()
         };
-        let mut board = board_with(&program.image(), config);
-        board.ram_mut()[0] = 0;
-        board.run_until(START + Time::from_us(1_990));
-        assert_ne!(out(&board, 0), 0xC0);
-        board.run_until(Time::from_secs(1));
-        assert_eq!(out(&board, 0) == 0xC0, crystal);
+        let mut chip = chip_with(&program.image(), config);
+        chip.ram_mut()[0] = 0;
+        chip.run_until(START + Time::from_us(1_990));
+        assert_ne!(out(&chip, 0), 0xC0);
+        chip.run_until(Time::from_secs(1));
+        assert_eq!(out(&chip, 0) == 0xC0, crystal);
     }
 }
 
@@ -174,11 +175,11 @@ fn factory_words_read_as_configured() {
         unique_id: *b"abcdefghijkl",
         ..Config::default()
     };
-    let mut board = board_with(&program.image(), config);
-    board.step(60);
-    assert_eq!(out(&board, 0) & 0xFFFF, 128);
-    assert_eq!(out(&board, 1), u32::from_le_bytes(*b"abcd"));
-    assert_eq!(out(&board, 2) & 0xFFF, 0x410);
-    assert_eq!(out(&board, 3), 0x411F_C231);
-    assert_eq!(findings(&board), [""; 0]);
+    let mut chip = chip_with(&program.image(), config);
+    chip.step(60);
+    assert_eq!(out(&chip, 0) & 0xFFFF, 128);
+    assert_eq!(out(&chip, 1), u32::from_le_bytes(*b"abcd"));
+    assert_eq!(out(&chip, 2) & 0xFFF, 0x410);
+    assert_eq!(out(&chip, 3), 0x411F_C231);
+    assert_eq!(findings(&chip), [""; 0]);
 }

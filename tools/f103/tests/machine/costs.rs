@@ -1,9 +1,10 @@
-//! Costs of code at the two corners of the core, against the classes of `sim::machine::costs`, calculated by hand.
+//! Costs of code at the two corners of the core, against the classes of `f103::machine::costs`, calculated by hand.
 
-use sim::{Board, Config, Corner, Time};
+use f103::chip::Config;
+use f103::{Chip, Corner, Time};
 
 use super::asm::{Asm, When};
-use super::board_with;
+use super::chip_with;
 use super::regs::*;
 
 /// Sets the part to 72 MHz from the crystal, with two wait states and the prefetch buffer.
@@ -43,14 +44,14 @@ fn cycles(program: Asm, [from, to]: [u32; 2], corner: Corner) -> u64 {
         corner,
         ..Config::default()
     };
-    let mut board = board_with(&program.image(), config);
+    let mut chip = chip_with(&program.image(), config);
     let limit = Time::from_ms(50);
-    let run_to = |board: &mut Board, address| {
-        assert!(board.run_until_pc(address, limit), "to {address:#x}");
-        board.cycles()
+    let run_to = |chip: &mut Chip<()>, address| {
+        assert!(chip.run_until_pc(address, limit), "to {address:#x}");
+        chip.cycles()
     };
-    let before = run_to(&mut board, from);
-    run_to(&mut board, to) - before
+    let before = run_to(&mut chip, from);
+    run_to(&mut chip, to) - before
 }
 
 /// Returns the cycles of `code`, which starts at the start of a line, at the nominal and at the slow corner.
@@ -134,14 +135,14 @@ fn literal_costs_the_wait_states_after_a_reset_too() {
         corner: Corner::Slow,
         ..Config::default()
     };
-    let mut board = board_with(&program.image(), config);
+    let mut chip = chip_with(&program.image(), config);
     for _ in 0..2 {
-        let limit = board.now() + Time::from_ms(50);
-        assert!(board.run_until_pc(from, limit));
-        let before = board.cycles();
-        assert!(board.run_until_pc(to, limit));
-        assert_eq!(board.cycles() - before, 2 + 2 + 2 + 3 + 1);
-        board.reset();
+        let limit = chip.now() + Time::from_ms(50);
+        assert!(chip.run_until_pc(from, limit));
+        let before = chip.cycles();
+        assert!(chip.run_until_pc(to, limit));
+        assert_eq!(chip.cycles() - before, 2 + 2 + 2 + 3 + 1);
+        chip.reset();
     }
 }
 

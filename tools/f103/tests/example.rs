@@ -4,7 +4,7 @@
 #[allow(dead_code, reason = "main is for the command line")]
 mod blue_pill;
 
-use sim::Time;
+use f103::Time;
 
 #[test]
 fn blue_pill_blinks_and_sends_lines_at_their_times() {

@@ -1,11 +1,12 @@
 //! The flash: stalls, code in SRAM during an operation, power cuts.
 
-use sim::periph::flash::{Durations, Torn};
-use sim::{Config, Time};
+use f103::Time;
+use f103::chip::Config;
+use f103::periph::flash::{Durations, Torn};
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{board, board_with, findings, out};
+use super::{chip, chip_with, findings, out};
 
 /// Address of the page that the programs use: the last but one.
 const PAGE: u32 = 0x0801_F800;
@@ -55,38 +56,38 @@ fn code_in_flash_stalls_for_the_whole_operation() {
     program.copy(FLASH_SR, OUT + 12);
     let programmed = program.address();
     program.spin();
-    let mut board = board_with(&program.image(), filled());
+    let mut chip = chip_with(&program.image(), filled());
     let limit = Time::from_ms(100);
 
-    assert!(board.run_until_pc(after - 2, limit), "at the store");
-    let (before, count) = (board.now(), board.instructions());
-    assert!(board.run_until_pc(after, limit));
-    assert_eq!(board.instructions(), count + 1);
+    assert!(chip.run_until_pc(after - 2, limit), "at the store");
+    let (before, count) = (chip.now(), chip.instructions());
+    assert!(chip.run_until_pc(after, limit));
+    assert_eq!(chip.instructions(), count + 1);
     // Two moves and the load of FLASH_SR: BSY is set late.
-    board.step(3);
-    assert_eq!((board.register(1), board.flash()[OFFSET]), (Some(0), 0));
+    chip.step(3);
+    assert_eq!((chip.register(1), chip.flash()[OFFSET]), (Some(0), 0));
     // The rest of the instructions that the core may have fetched in advance.
-    board.step(5);
-    assert!(board.now() < before + Time::from_ms(1));
-    board.step(1);
+    chip.step(5);
+    assert!(chip.now() < before + Time::from_ms(1));
+    chip.step(1);
     // The store and a load in addition to the 30 ms.
-    let more = (board.now() - before).as_ps() - 30_000_000_000;
+    let more = (chip.now() - before).as_ps() - 30_000_000_000;
     assert_eq!(more, Time::cycles(3, 8_000_000).as_ps());
-    assert!(board.run_until_pc(programmed, limit));
+    assert!(chip.run_until_pc(programmed, limit));
     assert!(
-        board.flash()[OFFSET + 2..OFFSET + 1024]
+        chip.flash()[OFFSET + 2..OFFSET + 1024]
             .iter()
             .all(|&b| b == 0xFF)
     );
-    assert_eq!(board.flash()[OFFSET..OFFSET + 2], [0x34, 0x12]);
-    assert_eq!(board.flash()[OFFSET - 1], 0);
-    let read = [0, 1, 2, 3].map(|n| out(&board, n));
+    assert_eq!(chip.flash()[OFFSET..OFFSET + 2], [0x34, 0x12]);
+    assert_eq!(chip.flash()[OFFSET - 1], 0);
+    let read = [0, 1, 2, 3].map(|n| out(&chip, n));
     assert_eq!(
         read,
         [0, 0x20, 0x20, 0x20],
         "BSY is set late, then EOP is set and stays set"
     );
-    assert_eq!(findings(&board), [""; 0]);
+    assert_eq!(findings(&chip), [""; 0]);
 }
 
 #[test]
@@ -96,16 +97,16 @@ fn a_run_can_end_in_the_middle_of_a_stall() {
     erase(&mut program);
     let after = program.address();
     program.spin();
-    let mut board = board_with(&program.image(), filled());
-    board.run_until(Time::from_ms(10));
-    assert_eq!((board.now(), board.pc()), (Time::from_ms(10), after));
-    let count = board.instructions();
-    board.run_until(Time::from_ms(30));
-    assert_eq!(board.instructions(), count);
-    assert_eq!(board.flash()[OFFSET], 0, "the page is not erased yet");
-    board.run_until(Time::from_ms(40));
-    assert!(board.instructions() > count);
-    assert_eq!(board.flash()[OFFSET], 0xFF);
+    let mut chip = chip_with(&program.image(), filled());
+    chip.run_until(Time::from_ms(10));
+    assert_eq!((chip.now(), chip.pc()), (Time::from_ms(10), after));
+    let count = chip.instructions();
+    chip.run_until(Time::from_ms(30));
+    assert_eq!(chip.instructions(), count);
+    assert_eq!(chip.flash()[OFFSET], 0, "the page is not erased yet");
+    chip.run_until(Time::from_ms(40));
+    assert!(chip.instructions() > count);
+    assert_eq!(chip.flash()[OFFSET], 0xFF);
 }
 
 /// A piece of code in SRAM that starts an erase, counts in r7 while BSY is set, and returns.
@@ -130,23 +131,23 @@ fn code_in_sram_runs_during_an_operation_and_stalls_when_it_returns() {
     let back = program.address();
     program.copy(FLASH_SR, OUT + 4);
     program.spin();
-    let mut board = board_with(&program.image(), filled());
+    let mut chip = chip_with(&program.image(), filled());
     let code = ram.bytes();
-    board.ram_mut()[0x1000..0x1000 + code.len()].copy_from_slice(&code);
+    chip.ram_mut()[0x1000..0x1000 + code.len()].copy_from_slice(&code);
 
-    assert!(board.run_until_pc(back, Time::from_ms(200)));
-    assert_eq!(out(&board, 0), 1, "BSY is seen from SRAM");
+    assert!(chip.run_until_pc(back, Time::from_ms(200)));
+    assert_eq!(out(&chip, 0), 1, "BSY is seen from SRAM");
     // 100 000 instructions take 15 ms; the erase takes twice as long.
-    assert!(board.instructions() > 100_000);
-    board.step(10);
+    assert!(chip.instructions() > 100_000);
+    chip.step(10);
     assert_eq!(
-        out(&board, 1),
+        out(&chip, 1),
         0x20,
         "the operation has ended when flash is fetched again"
     );
-    let at = board.now().as_us();
+    let at = chip.now().as_us();
     assert!((32_500..32_700).contains(&at), "{at}");
-    assert_eq!(findings(&board), [""; 0]);
+    assert_eq!(findings(&chip), [""; 0]);
 }
 
 #[test]
@@ -164,17 +165,17 @@ fn code_in_sram_that_reads_flash_stalls_until_the_operation_ends_and_is_reported
     unlock(&mut program);
     program.set(3, CODE | 1);
     program.bx(3);
-    let mut board = board_with(&program.image(), Config::default());
-    let first = u32::from_le_bytes(board.flash()[0x100..0x104].try_into().unwrap());
+    let mut chip = chip_with(&program.image(), Config::default());
+    let first = u32::from_le_bytes(chip.flash()[0x100..0x104].try_into().unwrap());
     let code = ram.bytes();
-    board.ram_mut()[0x1000..0x1000 + code.len()].copy_from_slice(&code);
+    chip.ram_mut()[0x1000..0x1000 + code.len()].copy_from_slice(&code);
 
-    board.run_until(Time::from_ms(10));
-    assert_eq!(out(&board, 2), 0, "the read of flash stalls");
-    board.run_until(Time::from_ms(50));
-    assert_eq!([0, 1, 2].map(|n| out(&board, n)), [0, first, 0x20]);
+    chip.run_until(Time::from_ms(10));
+    assert_eq!(out(&chip, 2), 0, "the read of flash stalls");
+    chip.run_until(Time::from_ms(50));
+    assert_eq!([0, 1, 2].map(|n| out(&chip, n)), [0, first, 0x20]);
     let text = "read of 0x08000100: code in SRAM reads flash while flash is erased or programmed";
-    assert_eq!(findings(&board), [text]);
+    assert_eq!(findings(&chip), [text]);
 }
 
 #[test]
@@ -198,13 +199,13 @@ fn program_reads_unsteady_cells_differently_from_read_to_read() {
     erase(&mut program);
     program.spin();
 
-    let mut board = board_with(&program.image(), filled());
-    board.cut_in_flash_operation(1, 0.5);
-    board.run_until(Time::from_ms(60));
-    assert!(!board.powered());
-    board.power_on();
-    board.run_until(Time::from_ms(70));
-    let reads = |from| -> Vec<u32> { (from..from + 16).map(|n| out(&board, n)).collect() };
+    let mut chip = chip_with(&program.image(), filled());
+    chip.cut_in_flash_operation(1, 0.5);
+    chip.run_until(Time::from_ms(60));
+    assert!(!chip.powered());
+    chip.power_on();
+    chip.run_until(Time::from_ms(70));
+    let reads = |from| -> Vec<u32> { (from..from + 16).map(|n| out(&chip, n)).collect() };
     assert_ne!(reads(0), reads(16));
 }
 
@@ -215,13 +216,13 @@ fn power_cut_in_an_erase_leaves_the_same_cells_every_time() {
         unlock(&mut program);
         erase(&mut program);
         program.spin();
-        let mut board = board_with(&program.image(), filled());
-        board.set_torn(torn);
-        board.cut_in_flash_operation(1, fraction);
-        board.run_until(Time::from_ms(60));
-        assert!(!board.powered());
-        assert_eq!(board.now(), Time::from_ms(60));
-        board.flash()[OFFSET..OFFSET + 1024].to_vec()
+        let mut chip = chip_with(&program.image(), filled());
+        chip.set_torn(torn);
+        chip.cut_in_flash_operation(1, fraction);
+        chip.run_until(Time::from_ms(60));
+        assert!(!chip.powered());
+        assert_eq!(chip.now(), Time::from_ms(60));
+        chip.flash()[OFFSET..OFFSET + 1024].to_vec()
     };
     let ones = |page: &[u8]| page.iter().map(|b| b.count_ones()).sum::<u32>();
     let half = run(0.5, Torn::Mess);
@@ -248,21 +249,21 @@ fn power_cut_between_any_two_instructions_keeps_the_written_half_words() {
     };
     let all: Vec<u8> = (1..=4u8).flat_map(|n| [n * 0x11; 2]).collect();
     for cut in 0..100 {
-        let mut board = board_with(&image(), Config::default());
+        let mut chip = chip_with(&image(), Config::default());
         // The test does not cover the cells of a torn half-word.
-        board.set_torn(Torn::Before);
-        board.step(cut);
-        board.power_off();
-        let left = board.flash()[OFFSET..OFFSET + 8].to_vec();
+        chip.set_torn(Torn::Before);
+        chip.step(cut);
+        chip.power_off();
+        let left = chip.flash()[OFFSET..OFFSET + 8].to_vec();
         let written = left.iter().take_while(|&&b| b != 0xFF).count();
         assert_eq!(written % 2, 0, "every half-word is completely old or new");
         assert_eq!(left[..written], all[..written], "after {cut}");
-        board.power_on();
-        assert_eq!(board.resets(), 0);
-        assert_eq!(board.flash()[OFFSET..OFFSET + 8], left);
-        board.run_for(Time::from_ms(10));
+        chip.power_on();
+        assert_eq!(chip.resets(), 0);
+        assert_eq!(chip.flash()[OFFSET..OFFSET + 8], left);
+        chip.run_for(Time::from_ms(10));
         // The flash refuses to program the same value again, so the rest is as the second run left it.
-        assert_eq!(board.flash()[OFFSET..OFFSET + 8], all, "after {cut}");
+        assert_eq!(chip.flash()[OFFSET..OFFSET + 8], all, "after {cut}");
     }
 }
 
@@ -274,20 +275,17 @@ fn durations_can_be_set_and_a_locked_flash_refuses_writes() {
     unlock(&mut program);
     erase(&mut program);
     program.spin();
-    let mut board = board_with(&program.image(), filled());
-    board.set_flash_durations(Durations {
+    let mut chip = chip_with(&program.image(), filled());
+    chip.set_flash_durations(Durations {
         erase: Time::from_ms(40),
         ..Durations::default()
     });
-    board.run_until(Time::from_ms(42));
-    assert_eq!(board.flash()[OFFSET], 0);
-    board.run_until(Time::from_ms(43));
-    assert_eq!(board.flash()[OFFSET], 0xFF);
-    assert_eq!(board.flash_operations(), 1);
-    assert_eq!(
-        findings(&board),
-        ["flash: FLASH_CR written while locked"; 2]
-    );
+    chip.run_until(Time::from_ms(42));
+    assert_eq!(chip.flash()[OFFSET], 0);
+    chip.run_until(Time::from_ms(43));
+    assert_eq!(chip.flash()[OFFSET], 0xFF);
+    assert_eq!(chip.flash_operations(), 1);
+    assert_eq!(findings(&chip), ["flash: FLASH_CR written while locked"; 2]);
 }
 
 #[test]
@@ -298,9 +296,9 @@ fn a_wrong_key_is_a_bus_fault() {
     program.handler(3);
     program.store(OUT, 0xFA);
     program.spin();
-    let mut board = board(program);
-    board.step(50);
-    assert_eq!(out(&board, 0), 0xFA);
+    let mut chip = chip(program);
+    chip.step(50);
+    assert_eq!(out(&chip, 0), 0xFA);
 }
 
 #[test]
@@ -329,9 +327,9 @@ fn new_code_in_flash_is_executed() {
         flash: Some(flash),
         ..Config::default()
     };
-    let mut board = board_with(&program.image(), config);
-    board.run_until(Time::from_ms(50));
-    assert_eq!((out(&board, 0), out(&board, 1)), (1, 2));
+    let mut chip = chip_with(&program.image(), config);
+    chip.run_until(Time::from_ms(50));
+    assert_eq!((out(&chip, 0), out(&chip, 1)), (1, 2));
 }
 
 #[test]
@@ -344,16 +342,16 @@ fn code_copied_to_sram_at_every_start_runs_in_its_last_version() {
     program.set(0, OUT);
     program.str(5, 0, 0);
     program.spin();
-    let mut board = board_with(&program.image(), filled());
+    let mut chip = chip_with(&program.image(), filled());
     for (start, returns) in [1, 1, 2, 2, 1].into_iter().enumerate() {
-        board.power_off();
+        chip.power_off();
         let code = [returns, 0x25, 0x70, 0x47]; // movs r5, #returns; bx lr
-        board.flash_mut().expect("the power is off")[OFFSET..OFFSET + 4].copy_from_slice(&code);
-        board.power_on();
+        chip.flash_mut().expect("the power is off")[OFFSET..OFFSET + 4].copy_from_slice(&code);
+        chip.power_on();
         for _ in 0..3 {
-            board.run_for(Time::from_ms(5));
-            assert_eq!(out(&board, 0), returns.into(), "start {start}");
-            board.reset();
+            chip.run_for(Time::from_ms(5));
+            assert_eq!(out(&chip, 0), returns.into(), "start {start}");
+            chip.reset();
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Other parts of the family: their memories, pages, identity and pins.
 
-use sim::part::{Part, STM32F103C8, STM32F103CB, STM32F103RC};
-use sim::periph::gpio::Drive;
-use sim::soc::{Circuit, Pin, Pins};
-use sim::{Chip, Time, chip};
+use f103::part::{Part, STM32F103C8, STM32F103CB, STM32F103RC};
+use f103::periph::gpio::Drive;
+use f103::soc::{Circuit, Pin, Pins};
+use f103::{Chip, Time, chip};
 
 use super::asm::Asm;
 use super::regs::*;
@@ -280,7 +280,7 @@ fn circuit_cannot_drive_a_pin_that_the_package_does_not_have() {
 #[test]
 fn an_image_that_is_too_large_for_the_part_is_refused() {
     let image =
-        sim::Image::from_bytes(&[0; 64 * 1024 + 1]).expect("the image fits at least one part");
+        f103::Image::from_bytes(&[0; 64 * 1024 + 1]).expect("the image fits at least one part");
     for (part, fits) in [(&STM32F103C8, false), (&STM32F103CB, true)] {
         let config = chip::Config {
             part,

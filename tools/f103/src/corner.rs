@@ -1,7 +1,6 @@
-//! How a part may differ from another: the corners of its core and its clocks, of its converter, and of its radio
-//! ([`crate::radio::timing`]).
+//! How a part may differ from another: the corners of its core, its clocks and its converter.
 //!
-//! A board is created at a corner ([`crate::Config::corner`]). The nominal one has every figure as typical; the
+//! A chip is created at a corner ([`crate::chip::Config::corner`]). The nominal one has every figure as typical; the
 //! other two have all of them at one end of their range at once.
 
 use core::fmt;

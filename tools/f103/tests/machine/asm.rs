@@ -2,7 +2,7 @@
 //!
 //! Registers are `r0` to `r7`. `set`, `store` and the wait functions overwrite `r0`, `r1` and `r2`.
 
-use sim::Image;
+use f103::Image;
 
 /// Address of the first instruction, after the vector table of 16 + 43 entries.
 const CODE: u32 = 0x0800_0100;

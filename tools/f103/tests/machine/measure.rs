@@ -1,10 +1,10 @@
 //! Measurements: the load of the core, and the waiting times of interrupts.
 
-use sim::{Board, CoreTime, Time, Wait};
+use f103::{Chip, CoreTime, Time, Wait};
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{START, board, board_with};
+use super::{START, chip, chip_with};
 
 const NVIC_ISPR: u32 = 0xE000_E200;
 const ICSR: u32 = 0xE000_ED04;
@@ -78,13 +78,13 @@ fn load_is_the_time_of_the_executed_instructions() {
     program.wfi();
     program.branch(When::Always, top);
     tick_handler(&mut program, 50);
-    let mut board = board(program);
-    board.run_until(Time::from_ms(20));
-    let (before, done, slept) = (board.core_time(), board.instructions(), board.cycles());
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(20));
+    let (before, done, slept) = (chip.core_time(), chip.instructions(), chip.cycles());
     assert_eq!(before.off, START);
-    board.run_for(Time::from_ms(100));
-    let spent = board.core_time().since(before);
-    let done = board.instructions() - done;
+    chip.run_for(Time::from_ms(100));
+    let spent = chip.core_time().since(before);
+    let done = chip.instructions() - done;
     // Two instructions of the loop, and those of the handler.
     assert_eq!(done, 100 * (2 + 1 + 2 + 150 + 1));
     // WFI and the branch back; exception entry, the store to APB1, the delay, the return.
@@ -93,27 +93,27 @@ fn load_is_the_time_of_the_executed_instructions() {
     assert_close(spent.asleep, Time::from_ms(100) - spent.running);
     assert_eq!((spent.stalled, spent.off), (Time::ZERO, Time::ZERO));
     assert!((spent.load() - 0.0351).abs() < 0.0001, "{}", spent.load());
-    let slept_through = board.cycles() - slept;
+    let slept_through = chip.cycles() - slept;
     assert!(slept_through.abs_diff(800_000) <= 1, "{slept_through}");
 }
 
 #[test]
-fn endless_loop_is_not_sleep_and_board_without_power_is_off() {
+fn endless_loop_is_not_sleep_and_chip_without_power_is_off() {
     let mut program = Asm::new();
     program.raw(0xE7FE);
-    let mut board = board(program);
-    board.run_until(Time::from_ms(10));
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(10));
     let running = Time::from_ms(10) - START;
     let expected = CoreTime {
         running,
         off: START,
         ..CoreTime::default()
     };
-    assert_eq!(board.core_time(), expected);
-    board.power_off();
-    board.run_for(Time::from_ms(5));
-    assert_eq!(board.core_time().off, START + Time::from_ms(5));
-    assert_eq!(board.core_time().running, running);
+    assert_eq!(chip.core_time(), expected);
+    chip.power_off();
+    chip.run_for(Time::from_ms(5));
+    assert_eq!(chip.core_time().off, START + Time::from_ms(5));
+    assert_eq!(chip.core_time().running, running);
 }
 
 #[test]
@@ -127,9 +127,9 @@ fn a_flash_operation_stalls_the_core() {
     // The instructions that the core may have fetched in advance run before the stall.
     (0..8).for_each(|_| program.nop());
     program.wfi();
-    let mut board = board(program);
-    board.run_until(Time::from_ms(100));
-    let spent = board.core_time();
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(100));
+    let spent = chip.core_time();
     assert_close(spent.stalled, Time::from_ms(30) - cycles(8));
     assert!(spent.asleep > Time::from_ms(67));
     assert!(spent.running < Time::from_us(10));
@@ -137,13 +137,13 @@ fn a_flash_operation_stalls_the_core() {
 
 /// Returns the waiting time of the interrupt, from two addresses of the program (where it is pended, and its handler),
 /// and the simulator's measurement.
-fn waited(mut board: Board, number: usize, pended: u32, handler: u32) -> (Time, Wait) {
-    board.measure_waits(true);
+fn waited(mut chip: Chip<()>, number: usize, pended: u32, handler: u32) -> (Time, Wait) {
+    chip.measure_waits(true);
     let limit = Time::from_secs(1);
-    assert!(board.run_until_pc(pended, limit));
-    let from = board.now();
-    assert!(board.run_until_pc(handler, limit));
-    (board.now() - from, board.wait(number))
+    assert!(chip.run_until_pc(pended, limit));
+    let from = chip.now();
+    assert!(chip.run_until_pc(handler, limit));
+    (chip.now() - from, chip.wait(number))
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn a_masked_interrupt_waits_from_its_request_to_its_handler() {
     program.spin();
     let handler = program.address();
     tick_handler(&mut program, 1);
-    let (between, wait) = waited(board(program), TIM2_IRQ, started, handler);
+    let (between, wait) = waited(chip(program), TIM2_IRQ, started, handler);
     assert_eq!(wait.entries, 1);
     // The timer requests the interrupt a millisecond after its start; the core enters it at the end of an instruction.
     let expected = between - Time::from_ms(1) - cycles(ENTRY);
@@ -183,7 +183,7 @@ fn wait_of_a_pended_interrupt_begins_with_the_instruction_that_pends_it() {
         let handler = program.address();
         program.handler(number);
         program.bx(14);
-        let (between, wait) = waited(board(program), number, pended, handler);
+        let (between, wait) = waited(chip(program), number, pended, handler);
         let waited = between - cycles(ENTRY);
         assert_eq!((wait.entries, wait.longest), (1, waited), "{number}");
         assert_close(waited, cycles(delay_cycles(700) + 1));
@@ -204,7 +204,7 @@ fn wait_of_systick_begins_with_its_event() {
     let handler = program.address();
     program.handler(SYSTICK);
     program.bx(14);
-    let (between, wait) = waited(board(program), SYSTICK, started, handler);
+    let (between, wait) = waited(chip(program), SYSTICK, started, handler);
     let expected = between - Time::from_ms(1) - cycles(ENTRY);
     let off = wait.longest.max(expected) - wait.longest.min(expected);
     assert!(off < cycles(4), "{} is not {expected}", wait.longest);
@@ -225,15 +225,15 @@ fn wait_is_not_counted_before_enabling_or_after_clearing_an_interrupt() {
     program.spin();
     program.handler(TIM2_IRQ);
     program.bx(14);
-    let mut board = board(program);
-    board.measure_waits(true);
-    board.run_until(Time::from_ms(20));
-    let wait = board.wait(TIM2_IRQ);
+    let mut chip = chip(program);
+    chip.measure_waits(true);
+    chip.run_until(Time::from_ms(20));
+    let wait = chip.wait(TIM2_IRQ);
     assert_eq!((wait.entries, wait.longest), (2, Time::ZERO));
-    assert_eq!(board.wait(PENDSV), Wait::default());
-    assert_eq!(board.wait(1_000), Wait::default());
-    board.measure_waits(true);
-    assert_eq!(board.wait(TIM2_IRQ), Wait::default(), "anew");
+    assert_eq!(chip.wait(PENDSV), Wait::default());
+    assert_eq!(chip.wait(1_000), Wait::default());
+    chip.measure_waits(true);
+    assert_eq!(chip.wait(TIM2_IRQ), Wait::default(), "anew");
 }
 
 #[test]
@@ -260,13 +260,13 @@ fn measuring_does_not_change_the_run() {
         program.bx(14);
         program.image()
     };
-    let mut plain = board_with(&program(), sim::Config::default());
-    let mut measured = board_with(&program(), sim::Config::default());
+    let mut plain = chip_with(&program(), f103::chip::Config::default());
+    let mut measured = chip_with(&program(), f103::chip::Config::default());
     measured.measure_waits(true);
-    for board in [&mut plain, &mut measured] {
-        board.run_until(Time::from_ms(30));
-        board.reset();
-        board.run_until(Time::from_ms(60));
+    for chip in [&mut plain, &mut measured] {
+        chip.run_until(Time::from_ms(30));
+        chip.reset();
+        chip.run_until(Time::from_ms(60));
     }
     assert!(measured.wait(TIM2_IRQ).entries > 50);
     assert!(measured.wait(TIM2_IRQ).longest > Time::from_us(1));

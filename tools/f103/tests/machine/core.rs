@@ -1,25 +1,25 @@
 //! The core on its bus: counts and times of instructions, faults, bit-banding, SysTick, interrupts.
 
-use sim::Time;
-use sim::finding::What;
+use f103::Time;
+use f103::finding::What;
 
 use super::asm::{Asm, When};
 use super::regs::*;
-use super::{START, board, findings, out};
+use super::{START, chip, findings, out};
 
 #[test]
 fn step_executes_the_given_number_of_instructions_at_their_costs() {
     let mut program = Asm::new();
     program.spin();
-    let mut board = board(program);
-    board.step(1);
-    assert_eq!(board.instructions(), 1);
-    board.step(63);
-    assert_eq!(board.instructions(), 64);
+    let mut chip = chip(program);
+    chip.step(1);
+    assert_eq!(chip.instructions(), 1);
+    chip.step(63);
+    assert_eq!(chip.instructions(), 64);
     // A NOP of one cycle and a branch of three cycles, at 8 MHz without wait states.
-    assert_eq!(board.now(), START + Time::cycles(32 * 4, 8_000_000));
-    board.run_until(START + Time::from_ms(77));
-    assert_eq!(board.instructions(), 308_000);
+    assert_eq!(chip.now(), START + Time::cycles(32 * 4, 8_000_000));
+    chip.run_until(START + Time::from_ms(77));
+    assert_eq!(chip.instructions(), 308_000);
 }
 
 #[test]
@@ -31,15 +31,15 @@ fn run_until_pc_stops_at_the_address_and_resumes_from_it() {
     program.add(3, 1);
     program.nop();
     program.branch(When::Always, top);
-    let mut board = board(program);
+    let mut chip = chip(program);
     let limit = Time::from_ms(10);
-    assert!(board.run_until_pc(address | 1, limit));
-    assert_eq!((board.pc(), board.instructions()), (address, 2));
-    assert!(board.run_until_pc(address | 1, limit));
-    assert_eq!((board.pc(), board.instructions()), (address, 5));
-    assert_eq!(board.register(3), Some(1));
-    assert!(!board.run_until_pc(0x0800_2000, limit));
-    assert_eq!(board.now().as_ms(), 10);
+    assert!(chip.run_until_pc(address | 1, limit));
+    assert_eq!((chip.pc(), chip.instructions()), (address, 2));
+    assert!(chip.run_until_pc(address | 1, limit));
+    assert_eq!((chip.pc(), chip.instructions()), (address, 5));
+    assert_eq!(chip.register(3), Some(1));
+    assert!(!chip.run_until_pc(0x0800_2000, limit));
+    assert_eq!(chip.now().as_ms(), 10);
 }
 
 #[test]
@@ -54,14 +54,14 @@ fn bit_banding_reaches_single_bits_of_peripherals_and_sram() {
     program.copy(RCC_APB2ENR, OUT + 4);
     program.copy(bit_band(GPIOC + 8, 13), OUT + 8);
     program.spin();
-    let mut board = board(program);
-    board.step(200);
+    let mut chip = chip(program);
+    chip.step(200);
     assert_eq!(
-        [out(&board, 0), out(&board, 1), out(&board, 2)],
+        [out(&chip, 0), out(&chip, 1), out(&chip, 2)],
         [0x71, 0x10, 1]
     );
-    assert!(board.pin('C', 13));
-    assert_eq!(findings(&board), [""; 0]);
+    assert!(chip.pin('C', 13));
+    assert_eq!(findings(&chip), [""; 0]);
 }
 
 #[test]
@@ -75,10 +75,10 @@ fn access_to_a_block_without_clock_is_lost_and_reported_with_its_address() {
     program.store(RCC_APB2ENR, 1 << 2);
     program.copy(GPIOA, OUT + 4);
     program.spin();
-    let mut board = board(program);
-    board.step(100);
-    assert_eq!((out(&board, 0), out(&board, 1)), (0, 0x4444_4444));
-    let first = board.findings()[0];
+    let mut chip = chip(program);
+    chip.step(100);
+    assert_eq!((out(&chip, 0), out(&chip, 1)), (0, 0x4444_4444));
+    let first = chip.findings()[0];
     assert_eq!(first.pc, culprit);
     assert_eq!(
         first.what,
@@ -88,7 +88,7 @@ fn access_to_a_block_without_clock_is_lost_and_reported_with_its_address() {
             block: "GPIOA"
         }
     );
-    assert_eq!(board.findings().len(), 2);
+    assert_eq!(chip.findings().len(), 2);
 }
 
 #[test]
@@ -102,9 +102,9 @@ fn accesses_that_are_not_modelled_or_not_allowed_are_reported() {
     program.strh(1, 0, 0);
     program.copy(0xE000_2000, OUT);
     program.spin();
-    let mut board = board(program);
-    board.step(100);
-    let found = findings(&board);
+    let mut chip = chip(program);
+    chip.step(100);
+    let found = findings(&chip);
     assert_eq!(found.len(), 4, "{found:#?}");
     assert!(found[0].contains("CRC"), "{}", found[0]);
     assert!(found[1].contains("reserved"), "{}", found[1]);
@@ -120,17 +120,17 @@ fn access_to_an_address_without_memory_faults() {
     program.handler(3);
     program.store(OUT + 4, 0xFA);
     program.spin();
-    let mut board = board(program);
-    board.step(100);
-    assert_eq!(out(&board, 1), 0xFA);
+    let mut chip = chip(program);
+    chip.step(100);
+    assert_eq!(out(&chip, 1), 0xFA);
     assert!(matches!(
-        board.findings()[0].what,
+        chip.findings()[0].what,
         What::NoSuchAddress {
             address: 0x2000_5000,
             write: false
         }
     ));
-    assert!(!board.locked_up());
+    assert!(!chip.locked_up());
 }
 
 #[test]
@@ -139,14 +139,14 @@ fn a_fault_in_the_fault_handler_locks_up_the_core_and_time_passes() {
     program.raw(0xDE00);
     program.handler(3);
     program.raw(0xDE00);
-    let mut board = board(program);
-    board.run_until(Time::from_ms(20));
-    assert!(board.locked_up());
-    assert_eq!(board.now(), Time::from_ms(20));
-    assert_eq!(findings(&board), ["the core locked up"]);
-    let done = board.instructions();
-    board.step(10);
-    assert_eq!(board.instructions(), done, "the core executes nothing more");
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(20));
+    assert!(chip.locked_up());
+    assert_eq!(chip.now(), Time::from_ms(20));
+    assert_eq!(findings(&chip), ["the core locked up"]);
+    let done = chip.instructions();
+    chip.step(10);
+    assert_eq!(chip.instructions(), done, "the core executes nothing more");
 }
 
 #[test]
@@ -155,10 +155,10 @@ fn deep_sleep_is_reported() {
     program.store(0xE000_ED10, 4);
     program.wfi();
     program.spin();
-    let mut board = board(program);
-    board.run_until(Time::from_ms(5));
-    assert!(board.asleep());
-    assert!(findings(&board)[0].contains("SLEEPDEEP"));
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(5));
+    assert!(chip.asleep());
+    assert!(findings(&chip)[0].contains("SLEEPDEEP"));
 }
 
 /// Returns a program whose SysTick toggles PC13 every 8000 cycles, either at 8 MHz or at 72 MHz from the PLL.
@@ -195,10 +195,10 @@ fn systick_program(fast: bool) -> Asm {
 #[test]
 fn systick_counts_hclk_and_wakes_the_core_on_the_right_cycle() {
     for (fast, hz) in [(false, 8_000_000), (true, 72_000_000)] {
-        let mut board = board(systick_program(fast));
-        board.watch_pin('C', 13);
-        board.run_until(Time::from_ms(40));
-        let edges = board.pin_edges('C', 13);
+        let mut chip = chip(systick_program(fast));
+        chip.watch_pin('C', 13);
+        chip.run_until(Time::from_ms(40));
+        let edges = chip.pin_edges('C', 13);
         assert!(edges.len() > 20, "{} edges at {hz}", edges.len());
         let (first, _) = edges[0];
         for (n, &(at, _)) in (0..).zip(edges) {
@@ -209,9 +209,9 @@ fn systick_counts_hclk_and_wakes_the_core_on_the_right_cycle() {
                 "edge {n} at {hz} Hz is off by {off:?}"
             );
         }
-        assert!(board.asleep());
-        assert_eq!(board.hclk(), hz);
-        assert_eq!(findings(&board), [""; 0]);
+        assert!(chip.asleep());
+        assert_eq!(chip.hclk(), hz);
+        assert_eq!(findings(&chip), [""; 0]);
     }
 }
 
@@ -225,14 +225,11 @@ fn dwt_does_not_count_without_trcena() {
     program.store(DWT_CTRL, 1);
     program.copy(DWT_CTRL, OUT + 8);
     program.spin();
-    let mut board = board(program);
-    board.step(60);
-    let ctrl = [1, 2].map(|n| out(&board, n) & 1);
-    assert_eq!((out(&board, 0), ctrl), (0, [0, 1]));
-    assert_eq!(
-        findings(&board),
-        ["DWT written while DEMCR.TRCENA is clear"]
-    );
+    let mut chip = chip(program);
+    chip.step(60);
+    let ctrl = [1, 2].map(|n| out(&chip, n) & 1);
+    assert_eq!((out(&chip, 0), ctrl), (0, [0, 1]));
+    assert_eq!(findings(&chip), ["DWT written while DEMCR.TRCENA is clear"]);
 }
 
 #[test]
@@ -249,9 +246,9 @@ fn dwt_counts_cycles_through_sleep() {
     program.spin();
     program.handler(15);
     program.bx(14);
-    let mut board = board(program);
-    board.run_until(Time::from_ms(200));
-    let cycles = out(&board, 1) - out(&board, 0);
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(200));
+    let cycles = out(&chip, 1) - out(&chip, 0);
     assert!((1_000_000..1_000_050).contains(&cycles), "{cycles}");
 }
 
@@ -263,11 +260,11 @@ fn a_program_too_fast_for_its_wait_states_is_reported() {
     program.wait_set(RCC_CR, 1 << 25);
     program.store(RCC_CFGR, 7 << 18 | 0b100 << 8 | 2);
     program.spin();
-    let mut board = board(program);
-    board.run_until(Time::from_ms(5));
-    assert_eq!(board.hclk(), 36_000_000);
+    let mut chip = chip(program);
+    chip.run_until(Time::from_ms(5));
+    assert_eq!(chip.hclk(), 36_000_000);
     assert_eq!(
-        findings(&board),
+        findings(&chip),
         ["SYSCLK is too fast for the wait states of the flash"]
     );
 }
@@ -281,9 +278,9 @@ fn run_is_the_same_to_the_instruction_in_steps_of_any_length() {
         program.bx(14);
         program.image()
     };
-    let config = sim::Config::default;
-    let mut whole = super::board_with(&program(), config());
-    let mut sliced = super::board_with(&program(), config());
+    let config = f103::chip::Config::default;
+    let mut whole = super::chip_with(&program(), config());
+    let mut sliced = super::chip_with(&program(), config());
     whole.watch_pin('C', 13);
     sliced.watch_pin('C', 13);
     whole.run_until(Time::from_ms(50));
