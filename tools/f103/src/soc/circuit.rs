@@ -118,7 +118,7 @@ pub trait Circuit {
         false
     }
 
-    /// Called when the supply of the circuit and the part is switched.
+    /// Called when the supply of the circuit and the part is switched: at power-off before the part's outputs change.
     fn set_power(&mut self, _on: bool, _now: Time) {}
 
     /// Whether the circuit drives its pins in another way than at the last call because time has passed. Called after a

@@ -151,14 +151,18 @@ impl<C: Circuit> Soc<C> {
 
     /// Switches the power. Without power the part drives no pin, and a flash operation is interrupted.
     pub fn set_power(&mut self, on: bool, now: Time) {
-        if !on {
+        if on {
+            self.circuit.set_power(true, now);
+        } else {
+            self.sync(now);
+            // The circuit first, which then knows that the part's outputs do not change by an order of the firmware.
+            self.circuit.set_power(false, now);
             self.flash.power_off(now);
             for block in Block::ALL {
                 self.reset_block(block, now);
             }
             self.set_clocks(now);
         }
-        self.circuit.set_power(on, now);
         self.refresh(now);
     }
 

@@ -112,6 +112,8 @@ impl Circuit for Modio {
     fn set_power(&mut self, on: bool, now: Time) {
         if on {
             self.dip_at_power_on = self.dip;
+        } else {
+            self.line.power_off(now);
         }
         for slot in &mut self.slots {
             slot.set_power(on, now);

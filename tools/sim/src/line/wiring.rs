@@ -99,6 +99,12 @@ impl Line {
         self.settle(now);
     }
 
+    /// Switches the unit's driver off because it has no supply any more, which the firmware cannot prevent.
+    pub fn power_off(&mut self, now: Time) {
+        self.last_sent = None;
+        self.set_driver(false, now);
+    }
+
     /// Chooses whether the unit receives its echo because its receiver stays on while its driver is on. Off at first,
     /// as with DE and RE connected.
     pub fn set_echo(&mut self, echo: bool) {
