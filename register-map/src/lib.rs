@@ -30,6 +30,7 @@ pub mod codes;
 pub mod configuration;
 pub mod counters;
 pub mod fault;
+mod kind;
 pub mod limits;
 mod module;
 pub mod part;
